@@ -10,8 +10,8 @@ from vibsim import experiment as spec
 from vibsim.analysis import analyse_records, summarise, verdicts
 from vibsim.core.record import Record
 from vibsim.experiment import canonical, storage
-from vibsim.report import style
-from vibsim.report.figures import drawing
+from vibsim.report import lead, style
+from vibsim.report.figures import drawing, gallery
 from vibsim.simulation import simulate_record
 
 CENTRAL = ["central"]
@@ -53,6 +53,14 @@ def summary(exp: Any, rec: Any, **changes: Any) -> dict[str, Any]:
 
 def plan(exp: Any) -> Any:
     return SimpleNamespace(experiment=exp)
+
+
+def views(exp: Any, rec: Any, *quantities: str) -> tuple[dict[str, Any], list[str]]:
+    """Return the views over members by the names of their files, and what all members share in words."""
+    decisive = lead.find(exp, rec, {"checks": []})
+    with style.applied():
+        found, told = gallery.over_members(exp, rec, list(quantities), decisive)
+    return {view.picture.name: view for view in found}, told
 
 
 def svg(picture: Any) -> str:

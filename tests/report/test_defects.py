@@ -10,9 +10,9 @@ import pytest
 import samples
 
 from vibsim import report
-from vibsim.report import choice, data, lead, style, sweep_layout
+from vibsim.report import choice, data, lead, style
 from vibsim.report.data import Member
-from vibsim.report.figures import maps, order, solution, time
+from vibsim.report.figures import order, solution, time
 from vibsim.report.tables import levels as contents
 from vibsim.report.text import findings
 
@@ -24,6 +24,7 @@ STIFF = {
     "checks": [{"converges": "theta", "order": "scheme"}],
 }
 GRID = {"initial.theta": [0.5, 1.0, 2.0], "model.g": [1.0, 4.0, 400.0]}
+SIX = [0.5, 0.7, 1.0, 1.3, 1.6, 2.0]
 REST = {"initial": {"theta": 0.0, "omega": 0.0}}
 
 
@@ -102,18 +103,20 @@ def test_a_caption_names_the_dotted_line_where_it_is_drawn():
 
 
 def test_missing_cells_of_a_map_are_hatched_and_cells_have_borders():
-    def draw(sweep):
-        exp = samples.experiment(levels=[6, 7, 8, 9], sweep=sweep)
-        record = samples.record(exp)
-        with style.applied():
-            return maps.verdicts(
-                exp, record, sweep_layout.grid_of(sweep_layout.keys(record)), "theta", 0
-            )
+    def draw(last):
+        exp = samples.experiment(
+            levels=[6, 7, 8, 9], sweep={"initial.theta": SIX, "model.g": [*SIX[:5], last]}
+        )
+        views, _ = samples.views(exp, samples.record(exp), "theta")
+        return views["map_theta_order_0"].picture, views
 
-    picture, full = draw(GRID), draw({**GRID, "model.g": [1.0, 4.0]})
-    orders = picture.figure.axes[1]
-    assert orders.get_title(loc="left") == "Order against the promised one"
-    assert np.ma.getmaskarray(orders.collections[0].get_array()).sum() == 3
+    (picture, views), (full, _) = draw(400.0), draw(3.0)
+    with style.applied():
+        text = samples.svg(views["map_theta_verdict_0"].picture)
+    assert "PASS: asymptotic (" in text
+    orders = picture.figure.axes[0]
+    assert orders.get_title(loc="left") == "Order of θ − 2"
+    assert np.ma.getmaskarray(orders.collections[0].get_array()).sum() == 6
     assert len(orders.collections[0].get_edgecolor())
     assert orders.patch.get_hatch()
     assert "Grey hatched" in picture.caption

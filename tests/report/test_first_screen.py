@@ -16,8 +16,9 @@ from vibsim.core.vocabulary import REASONS
 from vibsim.experiment import Experiment
 from vibsim.experiment.experiment import canonical
 from vibsim.experiment.schema.checks import MEASURED
-from vibsim.report import lead
-from vibsim.report.page import cards, hero
+from vibsim.report import data, lead, style
+from vibsim.report.figures import hero as drawn
+from vibsim.report.page import cards, hero, index
 from vibsim.report.text import changes, equation, experiment_file, findings, glossary
 
 CONFIGS = Path(__file__).parents[2] / "configs"
@@ -144,6 +145,37 @@ def test_badges_tell_a_claim_and_a_trap_from_a_check_that_passed():
     assert [card["badge"] for card in cards.cards(exp, record, summary)] == [
         "passed", "as claimed", "refuted", "trap caught", "failed",
     ]  # fmt: skip
+    # the index says the same words of the same checks
+    assert index.marks(summary["checks"]) == [("trap caught", 1), ("refuted", 1)]
+
+
+@pytest.mark.parametrize("norm", ["l1", "l2", "linf", "linf_interior"])
+def test_the_error_over_the_step_is_in_the_norm_of_the_check(norm):
+    checks = [{"converges": "theta", "order": 2, "norm": norm}]
+    exp = samples.experiment(checks=checks)
+    record, _, decisive = found(exp)
+    with style.applied():
+        ax = drawn.against_step(exp, record, decisive).figure.axes[0]
+    lines = {line.get_label(): np.asarray(line.get_ydata()) for line in ax.lines}
+    here = {"scheme": 0, "case": 0, "norm": data.norm_index(record, norm)}
+    true = data.pick(record, "theta_error_norm", **here)
+    mean = {"l1": 20.0, "l2": 20.0**0.5}.get(norm, 1.0)
+    np.testing.assert_allclose(lines["true"], true / mean, rtol=1e-12)
+    gap = data.pick(record, "theta_difference_norm", **here) / mean
+    # the difference of two levels is 1 - 1/4 of the error of the coarser one
+    np.testing.assert_allclose(lines["estimated"][:-1], gap / 0.75, rtol=0.01)
+    assert ("root-mean-square" in ax.get_title(loc="left")) == (norm == "l2")
+
+
+def test_a_caption_names_the_exact_solution_only_where_it_is_drawn(monkeypatch):
+    for references, drag in ((1, 0.0), (0, 0.1)):
+        monkeypatch.setattr("vibsim.simulation.level.MOST_REFERENCES", references)
+        exp = samples.experiment(model={"kind": "pendulum", "drag": drag}, levels=[6])
+        record, _, decisive = found(exp)
+        with style.applied():
+            picture = drawn.solution(record, "theta", decisive.member, is_left=True)
+            text = samples.svg(picture)
+        assert ("exact" in picture.caption) == ("exact" in text) == (drag == 0.0)
 
 
 # a table is a file of its own

@@ -10,7 +10,7 @@ import pytest
 import samples
 from matplotlib.text import Text
 
-from vibsim.report import frame, lead, style, sweep_layout
+from vibsim.report import frame, lead, style
 from vibsim.report.data import Member
 from vibsim.report.figures import (
     drawing,
@@ -19,7 +19,6 @@ from vibsim.report.figures import (
     gallery,
     motion,
     order,
-    sweep,
     theory,
     time,
     work,
@@ -132,7 +131,8 @@ def test_no_word_leaves_a_figure(case):
     with style.applied():
         decisive = lead.find(exp, record, samples.summary(exp, record))
         below = gallery.pictures(exp, record, shown, decisive, [])
-        behind = [picture for tab in (*below.belief, *below.members) for picture in tab.pictures]
+        behind = [picture for tab in below.belief for picture in tab.pictures]
+        behind += [view.picture for view in below.members]
         for picture in [*hero.pictures(exp, record, decisive), *below.motion, *behind]:
             FigureCanvasAgg(picture.figure)
             assert not drawn_outside(picture.figure), picture.name
@@ -181,17 +181,16 @@ def test_a_centred_formula_that_has_no_value_at_the_ends_did_not_break_down():
 
 def test_frames_are_those_of_the_members_that_stay(diverging):
     exp, record = diverging
-    along = sweep_layout.along_of(sweep_layout.keys(record))
+    views, _ = samples.views(exp, record, "u")
     with style.applied():
-        error = sweep.orders(exp, record, along, "u")
-        amplitude = sweep.amplitude(exp, record, along)
         running = energy.running(record, 8)
     assert np.nanmax(record["u_max"]) > 1e40
-    for picture, axes in ((error, [1]), (amplitude, [0, 1]), (running, [0])):
-        for i in axes:
-            low, high = picture.figure.axes[i].get_ylim()
-            assert high < 1e8
-            assert low > (1e-20 if picture.figure.axes[i].get_yscale() == "log" else -1e8)
+    drawn = [views[name].picture for name in ("sweep_error_u", "amplitude", "amplitude_error")]
+    for picture in (*drawn, running):
+        ax = picture.figure.axes[0]
+        low, high = ax.get_ylim()
+        assert high < 1e8
+        assert low > (1e-20 if ax.get_yscale() == "log" else -1e8)
         assert frame.LEAVING in picture.caption
 
 

@@ -14,7 +14,7 @@ from test_page import make, read
 
 from vibsim import report, store
 from vibsim.report.page import cards, history
-from vibsim.report.page.index import AS_CLAIMED, TRAP, Headline, headline
+from vibsim.report.page.index import Headline, headline
 from vibsim.report.text import words
 
 
@@ -120,11 +120,11 @@ def test_a_trap_and_a_refuted_claim_are_marked(tmp_path):
         put(tmp_path, "a", name, exp)
     report.write_index(tmp_path)
     assert tags(tmp_path) == {
-        "a/caught": {"PASS", TRAP},
-        "a/claimed": {"PASS", AS_CLAIMED},
+        "a/caught": {"PASS", words.TRAP},
+        "a/claimed": {"PASS", words.REFUTED},
         "a/plain": {"PASS"},
     }
-    assert filters(tmp_path)[TRAP] == filters(tmp_path)[AS_CLAIMED] == 1
+    assert filters(tmp_path)[words.TRAP] == filters(tmp_path)[words.REFUTED] == 1
 
 
 def test_a_card_has_the_order_with_its_interval_and_the_error(tmp_path):

@@ -38,9 +38,9 @@ def lean(record, times):
 @pytest.mark.parametrize(
     ("sweep", "figures"),
     [
-        (ACROSS, {"map_theta_0", "map_period_0", "spread_theta"}),
+        (ACROSS, {"map_theta_order_0", "map_theta_error_0", "map_period_0", "spread_theta"}),
         ({"initial.theta": {"linspace": [0.1, 3.1, 12]}}, {"period", "amplitude", "sweep_order_theta"}),
-        ({"initial.theta": [0.5, 3.0], "model.g": [1.0, 400.0, 1e6]}, {"map_theta_0", "period"}),
+        ({"initial.theta": [0.5, 3.0], "model.g": [1.0, 400.0, 1e6]}, {"sweep_error_theta", "period"}),
     ],
 )  # fmt: skip
 def test_a_lean_record_makes_a_page_without_series(tmp_path, sweep, figures, times):
@@ -104,4 +104,5 @@ def test_a_sweep_whose_checks_ask_about_no_order_has_a_page(tmp_path):
     head, *rows = (tmp_path / "tables/members.csv").read_text().splitlines()
     assert len(rows) == exp.members
     assert "amplitude" in head
-    assert "here the first, run it alone" in (tmp_path / "report.html").read_text(encoding="utf-8")
+    text = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert "A member that runs alone has them" in text

@@ -2,32 +2,36 @@
 
 from __future__ import annotations
 
+import math
 import re
 from dataclasses import replace
 from html.parser import HTMLParser
+from pathlib import Path
 
 import numpy as np
 import pytest
 import samples
 
+from vibsim import experiment as spec
 from vibsim import report
 from vibsim.analysis import verdicts
 from vibsim.core.errors import VibsimError
 from vibsim.core.record import Record, Variable
 from vibsim.core.vocabulary import REASONS
-from vibsim.report import choice, style, sweep_layout
+from vibsim.report import choice, style
 from vibsim.report.data import Member
-from vibsim.report.figures import maps as figures_map
 from vibsim.report.figures import order as figures_order
-from vibsim.report.figures import sweep as figures_sweep
 from vibsim.report.figures import time
 from vibsim.report.page import cards
-from vibsim.report.page.page import TEMPLATES
+from vibsim.report.page.page import TEMPLATES, cut
 from vibsim.report.tables import checks as check_tables
+from vibsim.report.tables.table import Column, Table
 from vibsim.report.text import reasons, setting
 
 PROVENANCE = {"versions": {"vibsim": "1.2", "python": "3.99", "numpy": "9.9"}, "digest": "d1"}
-PLOTS = (TEMPLATES / "plots.js").read_text(encoding="utf-8").strip()
+PLOTS, MEMBERS = (
+    (TEMPLATES / f"{name}.js").read_text(encoding="utf-8").strip() for name in ("plots", "members")
+)
 VOID = {"meta", "br", "img", "link", "hr", "input", "col"}
 
 
@@ -117,7 +121,8 @@ def test_the_page_is_well_formed_and_loads_nothing(which, request):
     assert len(reader.ids) == len(set(reader.ids))
     assert not {"link", "iframe", "object", "embed"} & set(reader.tags)
     assert "<script src" not in text
-    assert f"<script>\n{PLOTS}</script>" in text
+    assert PLOTS in text
+    assert ("members-data" in reader.ids) == (MEMBERS in text) == (which == "swept")
     inside = {f"#{name}" for name in reader.ids}
     for tag, address in reader.addresses:
         assert address in inside | {"../../index.html"} or address.startswith("data:image/png"), (
@@ -247,7 +252,7 @@ def test_nan_everywhere_makes_a_page_with_its_failures(tmp_path):
 
 def test_a_sweep_shows_period_orders_and_the_worst_member(swept):
     names = {path.stem for path in (swept / "figures").iterdir()}
-    assert {"period", "sweep_order_theta", "sweep_order_energy_deviation"} <= names
+    assert {"period", "sweep_order_theta", "sweep_error_energy_deviation"} <= names
     assert any(name.endswith("_worst") for name in names)
     assert any(name.endswith("_typical") for name in names)
     rows = (swept / "tables/members.csv").read_text().splitlines()
@@ -367,31 +372,22 @@ def test_one_promise_of_several_schemes_is_drawn_once():
     assert text.count(">slope 2 (promised)</text>") == 1
 
 
-PANELS = [
-    "Verdict",
-    "Order against the promised one",
-    "Error bar of the order",
-    "Levels used for the order",
-    "Error on level 10",
-    "Can the estimate be trusted?",
-]
-
-
 def test_a_sweep_shows_every_promise_and_the_map_is_relative_to_it():
-    sweep = {"initial.theta": [0.5, 1.0], "model.g": [1.0, 2.0]}
-    exp = samples.several(checks=TOLERANT, sweep=sweep)
-    record = promising(samples.record(exp), 2, 1)
+    def drawn(sweep):
+        exp = samples.several(checks=TOLERANT, sweep=sweep)
+        views, _ = samples.views(exp, promising(samples.record(exp), 2, 1), "theta")
+        return views
+
+    curves = drawn({"initial.theta": [0.5, 1.0], "model.g": [1.0, 2.0]})
     with style.applied():
-        keys = sweep_layout.keys(record)
-        along, grid = sweep_layout.along_of(keys), sweep_layout.grid_of(keys)
-        text = samples.svg(figures_sweep.orders(exp, record, along, "theta"))
-        maps = [figures_map.verdicts(exp, record, grid, "theta", s) for s in (0, 1)]
+        text = samples.svg(curves["sweep_order_theta"].picture)
     assert "promised, 1 ± 0.1" in text
     assert "promised, 2 ± 0.3" in text
-    for picture, label in zip(maps, ("order of θ − 2", "order of θ − 1"), strict=True):
-        panel, bars = picture.figure.axes[1], picture.figure.axes[len(PANELS) :]
-        assert [panel.get_title(loc="left") for panel in picture.figure.axes[:6]] == PANELS
-        assert bars[0].get_xlabel() == label
+    sweep = {"initial.theta": {"linspace": [0.5, 1.0, 6]}, "model.g": {"linspace": [1.0, 2.0, 6]}}
+    maps = drawn(sweep)
+    for s, label in enumerate(("Order of θ − 2", "Order of θ − 1")):
+        panel = maps[f"map_theta_order_{s}"].picture.figure.axes[0]
+        assert panel.get_title(loc="left") == label
         assert np.abs(panel.collections[0].get_array()).max() < 0.2
 
 
@@ -551,3 +547,53 @@ def test_the_two_frequencies_of_a_stiff_model_have_labels_of_their_own():
     assert [term for term, _ in rows] == ["w dt", "Highest w dt"]
     assert "natural frequency" in rows[0][1]
     assert "fastest oscillation" in rows[1][1]
+
+
+MOST_WORDS = 3000  # of a page, with what is folded and what stands in its pictures
+CONFIGS = Path(__file__).parents[2] / "configs"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["elastic_pendulum_drag", "order_and_stability_map"])
+def test_the_longest_pages_are_short_enough_to_be_read(tmp_path, name):
+    exp = spec.Experiment.from_yaml(CONFIGS / f"vibration_text/{name}.yaml")
+    make(tmp_path, exp)
+    assert len(" ".join(read(tmp_path / "report.html").text).split()) <= MOST_WORDS
+    assert (tmp_path / "report.html").stat().st_size < 1_500_000
+
+
+def test_many_checks_that_passed_alike_are_a_table_and_the_others_lines():
+    checks = [{"id": f"p{i}", "value": "period", "above": 1.0 + 0.1 * i} for i in range(7)]
+    others = [{"id": "wrong", "value": "period", "below": 1.0}, {"converges": "theta", "order": 2}]
+    exp = samples.experiment(checks=[*checks, *others])
+    record = samples.record(exp)
+    made = cards.cards(exp, record, samples.summary(exp, record))
+    alone, (group,) = cards.gathered(made, "p3")
+    # the one that decides stands alone, and so does what failed
+    assert [card["id"] for card in alone] == ["p3", "wrong", "check_9"]
+    table = group["table"]
+    assert [column.header for column in table.columns] == ["check", "wanted", "got"]
+    assert [row[1] for row in table.rows] == [
+        c["wanted"] for c in made if c["id"] in "p0p1p2p4p5p6"
+    ]
+    few = [card for card in made if card["id"] in "p0p1p2p3p4"]
+    assert cards.gathered(few, None) == (few, [])
+
+
+def test_a_page_cuts_a_table_between_its_blocks():
+    def table(*sizes):
+        rows = tuple((f"m{k}", i, math.nan) for k, size in enumerate(sizes) for i in range(size))
+        return Table(
+            "t",
+            "A table",
+            (Column("member"), Column("level", form="integer"), Column("none")),
+            rows,
+            heads=1,
+        )
+
+    for sizes, kept in (((5, 3, 4), 8), ((5, 5), 5), ((11,), 8), ((3, 2), 5)):
+        _, shown, told = cut(table(*sizes))
+        assert len(shown.rows) == kept
+        assert [column.header for column in shown.columns] == ["member", "level"]
+        more = sum(sizes) - kept
+        assert told == (f"{more} more rows are in tables/t.csv." if more else "")

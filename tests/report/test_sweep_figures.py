@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import sys
 from dataclasses import replace
 from types import MappingProxyType
@@ -16,10 +17,10 @@ from vibsim import report
 from vibsim.core.record import Record, Variable
 from vibsim.core.vocabulary import REASONS
 from vibsim.models import MODELS
-from vibsim.report import finest_level, style, sweep_layout
-from vibsim.report.figures import gallery, maps, members, separatrix
+from vibsim.report import data, finest_level, style, sweep_layout
+from vibsim.report.figures import maps, members, separatrix
 from vibsim.report.figures import order as figures_order
-from vibsim.report.figures import sweep as figures_sweep
+from vibsim.report.page import explorer
 from vibsim.report.sweep_layout import Key
 
 ACROSS = {
@@ -119,18 +120,13 @@ def test_the_separatrix_is_found_where_the_energy_says(across):
     np.testing.assert_allclose(y, 2.0 * np.cos(x / 2.0), atol=1e-9)
 
 
-def drawn_over_members(exp, record, found):
-    return [picture for tab in gallery.over_members(exp, record, found) for picture in tab.pictures]
-
-
 def test_the_separatrix_is_searched_once_for_all_maps(across, monkeypatch):
     exp, record = across
     searches = []
     peaks = separatrix._peaks
     monkeypatch.setattr(separatrix, "_peaks", lambda *a: searches.append(1) or peaks(*a))
-    with style.applied():
-        pictures = drawn_over_members(exp, record, ["theta", "omega"])
-    marked = [p for p in pictures if "separatrix" in p.caption]
+    views, _ = samples.views(exp, record, "theta", "omega")
+    marked = [view for view in views.values() if "separatrix" in view.picture.caption]
     assert len(marked) >= 3
     # down and across
     assert len(searches) == 2
@@ -167,23 +163,26 @@ def test_the_estimated_error_of_the_finest_level_is_the_true_one(across):
 
 def test_maps_show_verdict_order_error_and_the_separatrix(across):
     exp, record = across
-    grid = separatrix.with_separatrix(exp, sweep_layout.grid_of(sweep_layout.keys(record)))
-    with style.applied():
-        picture = maps.verdicts(exp, record, grid, "theta", 0)
-        motion = maps.motion(exp, record, grid, 0)
-        text = samples.svg(picture) + samples.svg(motion)
-    titles = [ax.get_title(loc="left") for ax in (*picture.figure.axes, *motion.figure.axes)]
-    for title in (
-        "Verdict", "Order against the promised one", "Error bar of the order", "Levels used for the order",
-        "Error on level 11", "Can the estimate be trusted?", "Period", "Exact period",
-        "Relative error of the period", "Error bar of the period", "Amplitude", "Error bar of the amplitude",
+    views, told = samples.views(exp, record, "theta")
+    assert "verdict on θ PASS (asymptotic)" in told
+    names = {view.name: view.picture for view in views.values()}
+    for name in (
+        "order of θ", "error bar of the order of θ", "error of θ",
+        "estimated over true error of θ", "period", "exact period", "error of the period", "error bar of the period",
+        "amplitude", "error bar of the amplitude",
     ):  # fmt: skip
-        assert title in titles, title
-    for part in ("PASS: asymptotic (", "initial.theta [rad]", "initial.omega [rad s⁻¹]"):
+        assert name in names, name
+        # one map each, beside its scale
+        assert (
+            next(ax.get_gid() for ax in names[name].figure.axes if ax.collections) == style.MEMBER
+        )
+    with style.applied():
+        text = samples.svg(names["order of θ"])
+    for part in ("initial.theta [rad]", "initial.omega [rad s⁻¹]"):
         assert part in text, part
-    assert "separatrix" in picture.caption
+    assert "separatrix" in names["order of θ"].caption
     # members that go over the top have no amplitude
-    assert "Grey hatched" in motion.caption
+    assert "Grey hatched" in names["amplitude"].caption
 
 
 def test_the_scale_jumps_where_the_tolerance_ends():
@@ -211,12 +210,10 @@ def test_every_reason_has_a_colour_of_its_own():
 def test_a_sweep_over_decades_has_a_logarithmic_axis(values, scale):
     exp = samples.experiment(sweep={"model.g": {"logspace": [*values, 7]}})
     record = samples.record(exp)
-    with style.applied():
-        picture = figures_sweep.orders(
-            exp, record, sweep_layout.along_of(sweep_layout.keys(record)), "theta"
-        )
-    assert picture.figure.axes[0].get_xscale() == scale
-    assert picture.figure.axes[-1].get_xlabel() == "model.g [m s⁻²]"
+    views, _ = samples.views(exp, record, "theta")
+    for view in views.values():
+        assert view.picture.figure.axes[0].get_xscale() == scale
+        assert view.picture.figure.axes[0].get_xlabel() == "model.g [m s⁻²]"
 
 
 def test_keys_that_move_together_are_one_line():
@@ -238,19 +235,21 @@ def test_a_sample_of_three_keys_is_shown_against_each(cloud):
     exp, record = cloud
     assert sweep_layout.along_of(sweep_layout.keys(record)) is None
     assert sweep_layout.grid_of(sweep_layout.keys(record)) is None
-    with style.applied():
-        drawn = drawn_over_members(exp, record, ["theta"])
-    assert [picture.name for picture in drawn] == ["projections_theta_0", "spread_theta"]
-    labels = [ax.get_xlabel() for ax in drawn[0].figure.axes]
-    assert labels[::3] == ["initial.theta [rad]", "model.g [m s⁻²]", "model.L [m]"]
+    views, _ = samples.views(exp, record, "theta")
+    assert list(views) == [
+        *(f"projections_theta_{kind}_0" for kind in ("order", "error", "verdict")),
+        "spread_theta",
+    ]
+    for view in list(views.values())[:3]:
+        labels = [ax.get_xlabel() for ax in view.picture.figure.axes]
+        assert labels == ["initial.theta [rad]", "model.g [m s⁻²]", "model.L [m]"]
 
 
 def test_shares_add_up_to_one_and_count_every_member(cloud, monkeypatch):
     exp, record = cloud
     monkeypatch.setattr(members, "SHARES", 4)
-    with style.applied():
-        picture = members.projections(exp, record, sweep_layout.keys(record), "theta", 0)
-    for ax in picture.figure.axes[2::3]:
+    views, _ = samples.views(exp, record, "theta")
+    for ax in views["projections_theta_verdict_0"].picture.figure.axes:
         ends = {}
         for bar in ax.patches:
             low, high = bar.get_y(), bar.get_y() + bar.get_height()
@@ -263,18 +262,18 @@ def test_shares_add_up_to_one_and_count_every_member(cloud, monkeypatch):
 def test_many_members_are_counted_in_cells(cloud, monkeypatch):
     exp, record = cloud
     monkeypatch.setattr(members, "MOST_POINTS", 10)
-    with style.applied():
-        picture = members.projections(exp, record, sweep_layout.keys(record), "theta", 0)
-    for ax in picture.figure.axes[:2]:
+    views, _ = samples.views(exp, record, "theta")
+    drawn = [views[f"projections_theta_{kind}_0"].picture for kind in ("order", "error")]
+    for ax in (ax for picture in drawn for ax in picture.figure.axes):
         counts = [np.ma.filled(image.get_array(), 0.0).sum() for image in ax.collections]
         assert sum(counts) == 80
     away = np.nan_to_num(finest_level.deviation(record, "theta")[0], nan=-members.ORDER_FRAME)
     inside = np.clip(away, -members.ORDER_FRAME, members.ORDER_FRAME)
-    images = picture.figure.axes[0].collections
+    images = drawn[0].figure.axes[0].collections
     found = sum(np.ma.filled(image.get_array(), 0.0).sum(axis=1) for image in images)
     up = images[0].get_coordinates()[:, 0, 1]
     np.testing.assert_array_equal(found, np.histogram(inside, up)[0])
-    assert "Darker cells" in picture.caption
+    assert "Darker cells" in drawn[0].caption
 
 
 def test_a_histogram_counts_every_member_that_has_the_number(cloud):
@@ -297,12 +296,9 @@ def test_words_that_are_swept_are_written_on_their_axis():
         "schemes.central.start = centred",
         "schemes.central.start = first_order",
     ]
-    grid = sweep_layout.grid_of(sweep_layout.keys(record))
+    views, _ = samples.views(exp, record, "theta")
     with style.applied():
-        text = samples.svg(maps.verdicts(exp, record, grid, "theta", 0))
-        figures_sweep.orders(exp, record, along, "theta")
-    assert "first_order" in text
-    assert "order of θ − 2" in text
+        assert "first_order" in samples.svg(views["sweep_order_theta"].picture)
 
 
 def bare(monkeypatch):
@@ -330,17 +326,14 @@ def test_without_an_exact_solution_maps_show_the_estimate_and_its_error_bar(monk
     monkeypatch.setattr("vibsim.simulation.level.MOST_REFERENCES", 0)
     exp = samples.experiment(sweep=ACROSS, levels=[8, 9, 10, 11], time={"end": 30.0})
     record = samples.record(exp)
-    grid = sweep_layout.grid_of(sweep_layout.keys(record))
-    with style.applied():
-        picture = maps.verdicts(exp, record, grid, "theta", 0)
-        motion = maps.motion(exp, record, grid, 0)
-    axes = picture.figure.axes
-    titles = {ax.get_title(loc="left"): ax for ax in axes}
-    assert "Error bar of the error" in titles
-    assert "Can the estimate be trusted?" not in titles
-    assert "estimated error of θ (l2) [rad √s]" in [ax.get_xlabel() for ax in axes]
-    assert "separatrix" not in picture.caption + motion.caption
-    assert "Exact period" not in [ax.get_title(loc="left") for ax in motion.figure.axes]
+    views, _ = samples.views(exp, record, "theta")
+    names = {view.name: view.picture for view in views.values()}
+    assert "error bar of the error of θ" in names
+    assert "estimated over true error of θ" not in names
+    title = names["error of θ"].figure.axes[0].get_title(loc="left")
+    assert title == "Estimated error of θ (l2) [rad √s]"
+    assert not [name for name, picture in names.items() if "separatrix" in picture.caption]
+    assert "exact period" not in names
     error = finest_level.error(record, "theta")
     # an interval is stated where something is decided
     stated = np.isfinite(record["theta_order_low"][..., 1])
@@ -376,15 +369,12 @@ def test_numbers_of_checks_have_maps_unless_they_are_shown_already():
     ]
     exp = samples.experiment(sweep=ACROSS, checks=checks)
     record = samples.record(exp)
-    grid = sweep_layout.grid_of(sweep_layout.keys(record))
-    with style.applied():
-        picture = maps.numbers(exp, record, grid, 0)
-        pictures = drawn_over_members(exp, record, ["theta"])
-    panel, bar = picture.figure.axes
-    assert (panel.get_title(loc="left"), bar.get_xlabel()) == ("kept", "relative energy error")
+    views, _ = samples.views(exp, record, "theta")
+    assert [name for name in views if "check" in name] == ["map_check_kept_0"]
+    panel = views["map_check_kept_0"].picture.figure.axes[0]
+    assert panel.get_title(loc="left") == "Relative energy error"
     shown = panel.collections[0].get_array().ravel()
     np.testing.assert_array_equal(np.sort(shown), np.sort(record["check_kept_value"][0]))
-    assert "map_checks_0" in [p.name for p in pictures]
 
 
 @pytest.mark.parametrize(
@@ -399,10 +389,11 @@ def test_an_order_of_a_part_is_promised_where_theory_has_one(model, order, word)
     """And where it has none, the line stands at the order that the check expects."""
     part = "theta_phase_error"
     checks = [{"converges": part, "order": order}]
-    exp = samples.swept(4, model={"kind": model}, checks=checks, levels=[8, 9, 10])
+    sweep = {"model.g": [1.0, 4.0, 9.0]}
+    exp = samples.swept(model={"kind": model}, checks=checks, levels=[8, 9, 10], sweep=sweep)
     record = samples.record(exp)
-    along = sweep_layout.along_of(sweep_layout.keys(record))
-    swept = figures_sweep.orders(exp, record, along, part)
+    views, _ = samples.views(exp, record, part)
+    swept = views[f"sweep_order_{part}"].picture
     entries = swept.figure.axes[0].get_legend_handles_labels()[1]
     assert f"{word}, {3 if order == 3 else 2} ± 0.1" in entries
     other = {"promised": "expected", "expected": "promised"}[word]
@@ -417,11 +408,96 @@ def test_what_is_the_same_for_all_members_is_not_drawn():
     record = samples.record(exp)
     # the period depends on g, the amplitude of a linear pendulum does not
     record = Record(record.coords, record.variables | {"amplitude": constant(record)}, record.attrs)
-    with style.applied():
-        labels = [tab.label for tab in gallery.over_members(exp, record, ["theta"])]
-    assert labels == ["period", "order and error of θ"]
+    views, told = samples.views(exp, record, "theta")
+    assert [view.name for view in views.values()] == [
+        "period", "error of the period", "order of θ", "error of θ",
+    ]  # fmt: skip
+    assert told == [
+        "amplitude 1 rad",
+        "error bar of the amplitude 0 rad",
+        "verdict on θ PASS (asymptotic)",
+    ]
 
 
 def constant(record):
     amplitude = record.variables["amplitude"]
     return Variable(amplitude.dims, np.full_like(amplitude.values, 1.0), amplitude.attrs)
+
+
+def test_a_sweep_of_few_values_is_curves_and_of_more_a_map():
+    few = {"initial.theta": [0.5, 1.0, 2.0], "model.g": {"linspace": [1.0, 4.0, 5]}}
+    for sweep, is_map in ((few, False), (ACROSS, True)):
+        exp = samples.experiment(sweep=sweep)
+        views, _ = samples.views(exp, samples.record(exp), "theta")
+        views.pop("spread_theta", None)
+        assert {name.startswith("map_") for name in views} == {is_map}
+        # one panel each; a map has a scale beside it
+        for view in views.values():
+            assert sum(ax.get_gid() == style.MEMBER for ax in view.picture.figure.axes) == 1
+
+
+def test_curves_of_a_family_are_told_apart():
+    exp = samples.experiment(sweep={"initial.theta": [0.5, 1.0, 2.0], "model.g": [1.0, 4.0]})
+    views, _ = samples.views(exp, samples.record(exp), "theta")
+    for name in ("sweep_order_theta", "sweep_error_theta", "period", "amplitude_error"):
+        legend = views[name].picture.figure.axes[0].get_legend()
+        assert [text.get_text() for text in legend.get_texts()][-2:] == [
+            "model.g = 1",
+            "model.g = 4",
+        ], name
+
+
+def drawn_at(ax, point):
+    """Say whether a line of some axes, or the ring on a map, is at a point."""
+    points = [np.column_stack(line.get_data()) for line in ax.lines]
+    return any(np.isclose(part.astype(float), point).all(axis=1).any() for part in points)
+
+
+@pytest.mark.parametrize("sweep", [ACROSS, {"initial.theta": {"linspace": [0.1, 3.1, 9]}}, SAMPLE])
+def test_what_a_page_holds_of_a_member_is_where_it_is_drawn(sweep):
+    exp = samples.experiment(sweep=sweep)
+    record = samples.record(exp)
+    views, _ = samples.views(exp, record, "theta")
+    found = explorer.content(exp, record, list(views.values()))
+    json.dumps(found, allow_nan=False)
+    start, end = found["command"]
+    assert (start, end) == (".venv/bin/vibsim run pendulum_lab/theta@", "")
+    assert found["cases"] == record["case"].tolist()
+    for name, told in found["views"].items():
+        view = views[name]
+        axes = [ax for ax in view.picture.figure.axes if ax.get_gid() == style.MEMBER]
+        if told["worst"] is None:
+            continue
+        case = view.worst
+        assert found["cases"][told["worst"]] == case
+        for ax, (across, up) in zip(axes, told["panels"], strict=True):
+            high = (
+                (told["places"] or told["values"])[0][case]
+                if up is None
+                else found["keys"][up]["values"][case]
+            )
+            # the ring is where the page says that the member is
+            assert drawn_at(ax, (found["keys"][across]["values"][case], high)), name
+    verdicts = found["verdicts"]["theta"]
+    words = [verdicts["texts"][i] for i in verdicts["of"][0]]
+    assert words == [
+        f"{REASONS[reason]} ({reason})" for reason in data.flags(record, "theta_reason")[0]
+    ]
+
+
+def test_of_many_members_an_even_part_can_be_pointed_at_and_the_worst():
+    x, y = (part.ravel() for part in np.meshgrid(np.linspace(1, 2, 1000), np.linspace(1, 2, 100)))
+    keys = [key(x), key(y, "model.L")]
+    found = explorer.listed(keys, x.size, 2000, [77_777])
+    assert 77_777 in found
+    assert 1000 <= found.size <= 2001
+    for one in keys:
+        # the members of a coarser grid reach from end to end, without a gap
+        shown = np.unique(one.values[found])
+        assert shown[0] == 1.0
+        assert shown[-1] == 2.0
+        assert np.diff(shown).max() < 0.04
+    cloud = np.random.default_rng(1).uniform(size=(3, 5000))
+    few = explorer.listed([key(row, str(i)) for i, row in enumerate(cloud)], 5000, 2000, [])
+    assert 1500 <= few.size <= 2000
+    assert explorer.listed(keys, 2000, 2000, []).size == 2000

@@ -88,6 +88,20 @@ def members(record: Record, quantity: str) -> list[Member]:
     ]
 
 
+def worst(record: Record, quantity: str) -> Member:
+    """Return the worst member, judged as by `members`, with the scheme that is worst of it."""
+    found = [member for member in members(record, quantity) if member.role != "typical"]
+    if f"{quantity}_status" not in record:
+        return found[0]
+    status, away = flags(record, f"{quantity}_status"), np.abs(deviation(record, quantity))
+
+    def badness(member: Member) -> tuple[int, float]:
+        place = member.scheme, member.case
+        return SEVERITY[status[place]], float(np.nan_to_num(away[place], nan=np.inf))
+
+    return max(found, key=badness)
+
+
 def with_levels(experiment: Experiment, found: list[Member]) -> list[Member]:
     """Leave out schemes that choose their own steps, which no level changes, unless there are no others."""
     return [m for m in found if not experiment.schemes[m.scheme].adaptive] or found

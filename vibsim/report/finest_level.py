@@ -12,7 +12,7 @@ import numpy as np
 
 from vibsim.core.array_types import Floats
 from vibsim.core.record import Record
-from vibsim.core.vocabulary import MEMBER
+from vibsim.core.vocabulary import MEMBER, TYPICAL_NORM
 from vibsim.report import data
 from vibsim.report.data import Member, formal_orders, known, norm_index, whole
 from vibsim.report.style import finite, no_zeros
@@ -80,11 +80,13 @@ def norms(record: Record, quantity: str, member: Member) -> Floats:
     return of("error") if is_known else np.append(of("difference"), np.nan)
 
 
-def orders(record: Record, quantity: str) -> tuple[Floats, Floats, Floats]:
+def orders(
+    record: Record, quantity: str, norm: str = TYPICAL_NORM
+) -> tuple[Floats, Floats, Floats]:
     """Return the stated order of every scheme and member and the ends of its interval, shape (scheme, case)."""
     order, low, high = (
         # a large sweep has orders of what checks ask about only
-        known(record, f"{quantity}_order{end}", MEMBER, norm=norm_index(record))
+        known(record, f"{quantity}_order{end}", MEMBER, norm=norm_index(record, norm))
         for end in ("", "_low", "_high")
     )
     return order, low, high

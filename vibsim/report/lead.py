@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from vibsim.core.record import Record
-from vibsim.core.vocabulary import SEVERITY
+from vibsim.core.vocabulary import SEVERITY, TYPICAL_NORM
 from vibsim.report import choice, data
 from vibsim.report.data import Member
 from vibsim.report.types import Check, Experiment, Measurement
@@ -39,6 +39,12 @@ class Lead:
     def is_on_order(self) -> bool:
         """Whether the check asks for an order."""
         return self.measured is not None and self.measured.kind == "converges"
+
+    @property
+    def norm(self) -> str:
+        """The norm over time in which the order was judged."""
+        check = self.measured
+        return check.norm if check is not None and check.kind == "converges" else TYPICAL_NORM
 
 
 def is_trap(check: Check | None) -> bool:

@@ -40,8 +40,8 @@ ALLOWED = dict[str, Any](color="#ececec", zorder=0)
 """Of a band of what a tolerance allows."""
 BESIDE = dict[str, Any](loc="upper left", bbox_to_anchor=(1.01, 1.03), borderaxespad=0.0)
 """The place of a legend at the right of its axes."""
-TIME, STEP = "time", "step"
-"""Group ids of axes whose curves a page can read: over time, and against the step (`vibsim.report.figures.svg`)."""
+TIME, STEP, MEMBER = "time", "step", "member"
+"""Group ids of axes that a page can read: over time, over the step, and with members (`vibsim.report.figures.svg`)."""
 LONG, OVERVIEW = "long", "overview"
 """The same of a long series, behind it the width of the window that a page shows at first; and of all of its time."""
 MISSING = "#d4d4d4"  # colour of what has no value

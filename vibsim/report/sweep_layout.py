@@ -20,7 +20,8 @@ from vibsim.report.style import label
 LARGEST_TO_SCALE = 1e100  # swept values from here on are not drawn to scale
 LOG_RATIO = 30.0
 """Positive values are drawn on a logarithmic axis only where the largest is so many times the least."""
-LINES = 6  # most lines that the other parameters of a sweep may make
+FEW, LINES = 5, 6
+"""Most lines that the other parameter of a sweep of two may make, and those of one of more; others are no curves."""
 CELLS = 400  # most cells along each side of a map: more than its pixels could show
 BINS = 8, 100  # least and most cells along each side of a map of members that lie on no grid
 
@@ -183,7 +184,7 @@ def along_of(found: list[Key]) -> Along | None:
     if not others or longest.distinct.size == longest.values.size:
         # of keys that move together one says it all
         return Along(longest, (("", order),), bool(others)) if _moves_together(found) else None
-    if int(np.prod([key.distinct.size for key in others])) > LINES:
+    if int(np.prod([key.distinct.size for key in others])) > (FEW if len(others) == 1 else LINES):
         return None
     number = np.zeros(longest.values.size, dtype=np.intp)
     for key in others:

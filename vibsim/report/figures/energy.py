@@ -73,10 +73,9 @@ def running(record: Record, case: int) -> Picture | None:
     return Picture(
         name=f"energy_running_{case}",
         title=f"How does the energy error grow with time? Level {level}",
-        caption="The largest energy error over every step so far, on the coarsest level: solid with the scheme's own "
-        "velocity, dashed with the centred difference [D₂ₜu] that the tables of the text use. Flat is bounded, slope "
-        "1 is a linear drift, slope 2 a quadratic one. A scheme without a dashed curve has [D₂ₜu] for its velocity. "
-        "Values within round-off are left out where they are zero."
+        caption="The largest energy error so far, on the coarsest level: solid with the scheme's own velocity, dashed "
+        "with the centred difference [D₂ₜu], where that is another one. Flat is bounded, slope 1 is a linear drift, "
+        "slope 2 a quadratic one."
         + (f" {frame.LEAVING} They grow without bound." if leaves else ""),
         alt="Running maximum of the energy error of every scheme, with two velocities, against time, logarithmic",
         figure=axes[0].get_figure(root=True),

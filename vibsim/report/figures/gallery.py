@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from shlex import quote
+from functools import cache
 
 from vibsim.core.record import Record
-from vibsim.core.vocabulary import MEMBER, SEVERITY
+from vibsim.core.vocabulary import SEVERITY
 from vibsim.experiment.storage import asked
-from vibsim.report import choice, data, finest_level, sweep_layout
+from vibsim.report import choice, data, sweep_layout
 from vibsim.report.data import Member
 from vibsim.report.figures import (
     energy,
@@ -27,6 +27,7 @@ from vibsim.report.figures import (
     work,
 )
 from vibsim.report.figures.separatrix import with_separatrix
+from vibsim.report.figures.view import View
 from vibsim.report.lead import Lead
 from vibsim.report.style import Picture
 from vibsim.report.text import words
@@ -54,7 +55,9 @@ class Gallery:
 
     motion: tuple[Picture, ...] = ()
     belief: tuple[Tab, ...] = ()
-    members: tuple[Tab, ...] = ()
+    members: tuple[View, ...] = ()
+    shared: tuple[str, ...] = ()
+    """What all members of a sweep share, in words."""
 
 
 def tab(label: str, drawn: Iterable[Picture | None]) -> list[Tab]:
@@ -127,7 +130,8 @@ def pictures(
     belief = tuple(
         one for one in (_without(found_tab, first) for found_tab in tabs) if one.pictures
     )
-    return Gallery(tuple(shown_below), belief, tuple(over_members(experiment, record, found)))
+    views, told = over_members(experiment, record, found, lead)
+    return Gallery(tuple(shown_below), belief, tuple(views), tuple(told))
 
 
 def _without(tab: Tab, names: Sequence[str]) -> Tab:
@@ -135,41 +139,36 @@ def _without(tab: Tab, names: Sequence[str]) -> Tab:
     return Tab(tab.label, tuple(one for one in tab.pictures if one.name not in names))
 
 
-def over_members(experiment: Experiment, record: Record, found: list[str]) -> list[Tab]:
-    """Return the figures over the swept parameters, a tab for each quantity: along a line, on a map, or by key."""
+def over_members(
+    experiment: Experiment, record: Record, found: list[str], lead: Lead
+) -> tuple[list[View], list[str]]:
+    """Return the views over the swept parameters, and what all members share: along a line, on a map, or by key."""
     keys = sweep_layout.keys(record)
     if not keys:
-        return []
+        return [], []
     along, grid = sweep_layout.along_of(keys), sweep_layout.grid_of(keys)
     schemes = range(min(len(record["scheme"]), MOST_SHOWN))
-    tabs: list[Tab] = []
-    if grid is not None:
-        grid = with_separatrix(experiment, grid)
+
+    @cache
+    def worst(quantity: str) -> Member:
+        return lead.member if quantity == lead.quantity else choice.worst(record, quantity)
+
     if along is not None:
-        for name, draw in (("period", sweep.period), ("amplitude", sweep.amplitude)):
-            # what is the same for all members is a number, no picture
-            if finest_level.varies(data.known(record, name, MEMBER, level=-1)):
-                tabs += tab(name, [draw(experiment, record, along)])
+        drawn = sweep.views(experiment, record, along, found, worst)
     elif grid is not None:
-        drawn = [maps.motion(experiment, record, grid, scheme) for scheme in schemes]
-        tabs += tab("period and amplitude", drawn)
-    for quantity in found:
-        letter, each = words.symbol(quantity), Drawn()
-        if along is not None and data.whole(record, "triple"):
-            each.append(sweep.orders(experiment, record, along, quantity))
-        for scheme in schemes:
-            if grid is not None:
-                each.append(maps.verdicts(experiment, record, grid, quantity, scheme))
-            elif along is None:
-                each.append(members.projections(experiment, record, keys, quantity, scheme))
-        if data.whole(record, "pair"):
-            # the verdict that colours them is on the order
-            each.append(members.histograms(experiment, record, quantity))
-        tabs += tab(f"order and error of {letter}", each)
-    if grid is not None:
-        drawn = [maps.numbers(experiment, record, grid, scheme) for scheme in schemes]
-        tabs += tab("numbers of the checks", drawn)
-    return tabs
+        grid = with_separatrix(experiment, grid)
+        drawn = maps.views(experiment, record, grid, found, worst, schemes)
+    else:
+        drawn = members.views(experiment, record, keys, found, worst, schemes)
+    views, told = list[View](), list[str]()
+    for one in drawn:
+        (told if isinstance(one, str) else views).append(one)  # type: ignore[arg-type]
+    for quantity in found if data.whole(record, "pair") else ():
+        # the verdict that colours them is on the order
+        picture = members.histograms(experiment, record, quantity)
+        if picture is not None:
+            views.append(View(f"histograms of {words.symbol(quantity)}", picture, panels=()))
+    return views, told
 
 
 def choose(experiment: Experiment, record: Record) -> tuple[list[Member], str]:
@@ -185,12 +184,9 @@ def choose(experiment: Experiment, record: Record) -> tuple[list[Member], str]:
     shown = [everyone[i] for i in sorted(ranked)]
     parts, is_swept = [], bool(data.swept(record))
     if data.is_lean(record):
-        case = int(record["case"][shown[0].case])
-        which = "here the worst" if shown[0].role == "worst" else "here the first"
-        command = f".venv/bin/vibsim run {quote(f'{experiment.word}@{case}')}"
         parts.append(
-            "The sweep is large, so no series over time are stored, and there are no figures over time. To see the "
-            f"series of one member, {which}, run it alone: `{command}`."
+            "The sweep is large, so no series over time are stored, and there are no figures over time. A member that "
+            "runs alone has them."
         )
     elif is_swept:
         parts.append("The worst and a typical member are shown over time, for every scheme.")

@@ -26,6 +26,11 @@ LEFT, RIGHT, WHOLE, HEIGHT = 5.4, 3.9, 9.6, 2.75
 FEW = 300  # of more members a histogram of the orders says more than dots
 FEWEST = 2  # errors that a picture over the step needs
 MOST_SCHEMES = 6  # schemes that the right picture can tell apart
+SIZES = {
+    "l1": ("mean error", 1.0), "l2": ("root-mean-square error", 0.5), "linf": ("largest error", 0.0),
+    "linf_interior": ("largest error without the last point", 0.0),
+}  # fmt: skip
+"""Of a norm over time what it is as a size of the error, and over which power of the duration."""
 LONG = 24  # letters of a label above which it is set smaller
 
 
@@ -103,17 +108,19 @@ def against_step(experiment: Experiment, record: Record, lead: Lead) -> Picture 
     """Draw the error of every level against the step, of every scheme; None where there is none to draw."""
     quantity, case = lead.quantity, lead.member.case
     letter, measure = words.symbol(quantity), data.norm_unit(record, quantity, "linf")
+    size, part = SIZES[lead.norm]
     names = record.words("scheme")
     others = [s for s in range(len(names)) if s != lead.member.scheme][: MOST_SCHEMES - 1]
-    dt, scale = data.steps_of(record, case), root_of_duration(record, case)
-    ax = _panel(RIGHT, style.label(f"root-mean-square error of {letter}", measure))
+    dt, scale = data.steps_of(record, case), duration(record, case) ** part
+    ax = _panel(RIGHT, style.label(f"{size} of {letter}", measure))
     ax.set_gid(style.STEP)
     drawn: list[Floats] = []
+    told = dict[str, None]()
     for s in [*others, lead.member.scheme]:
         member = Member(s, case, names[s])
         if not math.isfinite(data.formal_order(record, member, quantity)):
             continue
-        estimate, true = (part / scale for part in _errors(record, quantity, member))
+        estimate, true = (one / scale for one in _errors(record, quantity, member, lead.norm))
         colour = style.COLOURS[s % style.MANY]
         is_lead = s == lead.member.scheme
         mark: dict[str, Any] = {"color": colour, "linestyle": "none", "marker": "o"}
@@ -123,12 +130,14 @@ def against_step(experiment: Experiment, record: Record, lead: Lead) -> Picture 
         if style.finite(estimate).size:
             ax.plot(dt, estimate, **mark, markersize=5 if is_lead else 3.5, label=text)
             drawn.append(estimate)
+            told["Filled: estimated from the differences of the levels."] = None
         if style.finite(true).size:
             ring = mark | {"markerfacecolor": "none", "markersize": 9 if is_lead else 6.5}
             ax.plot(dt, true, **ring, label="true" if alone else f"_true, {names[s]}")
             drawn.append(true)
+            told["Rings: the true error."] = None
         has_order = math.isfinite(
-            data.stated_order(record, quantity, member, data.norm_index(record))[0]
+            data.stated_order(record, quantity, member, data.norm_index(record, lead.norm))[0]
         )
         if is_lead and (has_order or lead.is_on_order) and lead.result.get("reason") != "exact":
             _slope(
@@ -157,8 +166,9 @@ def against_step(experiment: Experiment, record: Record, lead: Lead) -> Picture 
     return Picture(
         "hero_error",
         title,
-        "Both axes are logarithmic, so an error of order p is a line of slope p. Filled: estimated from the "
-        "differences of the levels. Rings: the true error.",
+        style.sentences(
+            "Both axes are logarithmic, so an error of order p is a line of slope p.", *told
+        ),
         f"Error of {words.name(quantity)} against the time step",
         _root(ax),
     )
@@ -172,7 +182,8 @@ def solution(record: Record, quantity: str, member: Member, *, is_left: bool) ->
         LEFT if is_left else RIGHT, style.label(letter, data.unit(record, f"{quantity}_finest"))
     )
     ax.set_gid(style.TIME)
-    if np.isfinite(exact).any():
+    has_exact = bool(np.isfinite(exact).any())
+    if has_exact:
         ax.plot(*style.thin(t, exact, 200), color="#b0b0b0", linewidth=4.5, label="exact")
     steps = words.number(int(record["steps"][-1]), "integer")
     ax.plot(
@@ -189,24 +200,24 @@ def solution(record: Record, quantity: str, member: Member, *, is_left: bool) ->
     ax.legend(loc="best", fontsize=8, handlelength=1.8)
     return Picture(
         "hero_solution", f"{letter}(t), {member.scheme_name}",
-        "Wide and grey is the exact solution, where it is known.",
+        "The solution of the finest level." + " Wide and grey: the exact solution." * has_exact,
         f"{words.name(quantity)} against time for {member.title}", _root(ax),
     )  # fmt: skip
 
 
-def root_of_duration(record: Record, case: int) -> float:
-    """Return by what an L2 norm over time is divided for the root of the mean square."""
+def duration(record: Record, case: int) -> float:
+    """Return how long a member runs; an L2 norm over its root is the root of the mean square."""
     ends = data.ends_of(record)
-    return math.sqrt(float(ends[case if ends.size > 1 else 0]))
+    return float(ends[case if ends.size > 1 else 0])
 
 
-def _errors(record: Record, quantity: str, member: Member) -> tuple[Floats, Floats]:
-    """Return the estimated and the true error of every level in the typical norm, shape (level,); NaN for none.
+def _errors(record: Record, quantity: str, member: Member, name: str) -> tuple[Floats, Floats]:
+    """Return the estimated and the true error of every level in a norm, shape (level,); NaN for none.
 
     The difference d of two levels is d r/(r - 1) as error of the coarser one, and d/(r - 1) of the finer, with r the
     ratio of their errors.
     """
-    norm, levels = data.norm_index(record), data.whole(record, "level")
+    norm, levels = data.norm_index(record, name), data.whole(record, "level")
     true = data.known(
         record, f"{quantity}_error_norm", ("level",), scheme=member.scheme, case=member.case, norm=norm
     )  # fmt: skip
@@ -250,10 +261,12 @@ def response(experiment: Experiment, record: Record, lead: Lead) -> Picture | No
     else:
         ax = _dots(lead, max(keys, key=lambda key: key.distinct.size), values, text)
     count = words.number(len(record["case"]), "integer")
+    is_marked = math.isfinite(values[lead.member.case])
     return Picture(
         "hero_response",
         f"{name[:1].upper()}{name[1:]} of {count} members",
-        "Each member is one run of the sweep, at its finest level. The ring is the member that decides.",
+        "Each member is one run of the sweep, at its finest level."
+        + " The ring is the member that decides." * is_marked,
         f"{name} of every member over the swept parameters",
         _root(ax),
     )
@@ -377,7 +390,7 @@ def orders(experiment: Experiment, record: Record, lead: Lead) -> Picture | None
     keys, quantity = sweep_layout.keys(record), lead.quantity
     if not keys or not data.whole(record, "triple"):
         return None
-    order = finest_level.orders(record, quantity)[0][lead.member.scheme]
+    order = finest_level.orders(record, quantity, lead.norm)[0][lead.member.scheme]
     promised = data.formal_orders(record, quantity)[lead.member.scheme]
     known = np.isfinite(order)
     if not known.any():

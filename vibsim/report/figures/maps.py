@@ -1,30 +1,37 @@
-"""Maps over a grid of two swept parameters: verdict, order, error, period, amplitude, each beside its error bar."""
+"""Maps over a grid of two swept parameters: verdict, order, error, period, amplitude, and the error bar of each."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from vibsim.checks.fields import measured
 from vibsim.core.array_types import Floats
 from vibsim.core.record import Record
 from vibsim.core.vocabulary import REASONS, SEVERITY, TYPICAL_NORM
 from vibsim.report import finest_level, style
 from vibsim.report.choice import position, tolerance
 from vibsim.report.data import due, exact_periods, norm_unit, of_several, pick, promised_text, whole
-from vibsim.report.figures.panels import rows_of
+from vibsim.report.figures.view import (
+    View,
+    Worst,
+    check_words,
+    of_check,
+    ring,
+    shared,
+    shared_verdict,
+    value_checks,
+)  # fmt: skip
 from vibsim.report.style import Picture
 from vibsim.report.sweep_layout import Grid
 from vibsim.report.text import words
 from vibsim.report.types import Axes, Experiment, Figure
 
-PANELS_A_ROW = 3
-LEFT, WIDE, TALL, GAP = 0.68, 2.52, 2.1, 0.27
-"""Left margin, width and height of a panel, gap between panels [inch]."""
-ABOVE, BELOW = 0.32, 1.12
-"""Room for the title above a panel, for ticks and the scale below it [inch]."""
+LEFT, WIDE, TALL, ABOVE, BELOW = 0.8, 5.4, 3.4, 0.32, 0.5
+"""Left margin, width and height of a map, room above and below it [inch]."""
+BAR = 0.14  # width of the scale at its right, and half of the gap before it [inch]
 BORDERED = 400  # most cells that are drawn one by one, with borders; more are one image
 MOST_DECADES = 12.0  # most decades that a logarithmic scale spans, from the largest value down
 LOG_SPREAD = 20.0
@@ -32,147 +39,157 @@ LOG_SPREAD = 20.0
 LOG_SPREAD_OF_PERIODS = 5.0  # the same of periods: those of rotation are much shorter
 ORDER_RANGE = 0.5  # distance from the promised order at which the colours end
 DOT_SPACING = 0.025  # distance between the dots of a separatrix, as part of the panel
-SHOWN_ALREADY = ("period", "period_error", "exact_period", "amplitude")
-"""Values of checks that have maps of their own."""
 
 
 @dataclass(frozen=True)
-class Panel:
-    """One map."""
+class Map:
+    """One number of every member of a scheme."""
 
-    title: str
-    table: Floats  # shape (y, x) of cells or blocks; NaN where there is nothing
+    stem: str
+    name: str
+    quantity: str
+    values: Floats  # shape (case,); NaN where there is nothing
     label: str = ""
     """What the colours mean, with the unit."""
+    unit: str = ""
+    caption: str = ""
+    badness: Floats | None = None
+    """Of several members in a cell the one with most of it is shown; without it the largest value."""
     kind: str = "size"
     """``size`` (dark to light), ``distance`` (around 0, pale within `tolerance`), ``factor`` (around 1), ``code``."""
     tolerance: float = 0.0
-    scale: Floats | None = None
-    """Values that set the range of the colours, where it is that of another panel."""
     spread: float = LOG_SPREAD
     codes: tuple[tuple[str, str], ...] = ()  # of kind ``code``: text and colour of every number
+    texts: tuple[str, ...] = ()  # what the numbers stand for, where the verdict does not tell it
+    number: Floats | None = None
+    """The number itself, where the map shows its distance from another one."""
+    told: str | None = None
+    """What is said where all members have the same; None for the value."""
 
 
-def verdicts(
-    experiment: Experiment, record: Record, grid: Grid, quantity: str, scheme: int
-) -> Picture:
-    """Draw verdict, order and error of a quantity with the width of their intervals."""
-    letter, promise = words.symbol(quantity), due(record, quantity)
-    allowed = tolerance(experiment, quantity, record.words("scheme")[scheme])
-    panels = [_reasons(record, grid, quantity, scheme)]
-    if whole(record, "triple"):
-        away = finest_level.deviation(record, quantity)[scheme]
-        _, low, high = (part[scheme] for part in finest_level.orders(record, quantity))
-        text = f"order of {letter} − {promised_text(record, quantity, scheme)}"
-        worst = grid.worst(away, np.abs(away))
-        panels += [
-            Panel(f"Order against the {promise} one", worst, text, "distance", allowed),
-            Panel("Error bar of the order", grid.worst(high - low), "width of the interval"),
-            _window(record, grid, quantity, scheme),
-        ]
-    panels += _errors(record, grid, quantity, scheme)
-    several = of_several(record, scheme)
-    kinds = {panel.kind for panel in panels}
-    pale = (
-        f"Pale colours are orders within ± {allowed:g} of the {promise} one, where the scale jumps."
-    )
-    return _picture(
-        grid, panels, f"map_{quantity}_{scheme}",
-        f"Where does it converge, how fast, how well? {letter}{several}",
-        f"Maps over two swept parameters: verdict on {words.name(quantity)}, its order and its error{several}",
-        pale if "distance" in kinds else "",
-        "Where estimated over true error is pale, two levels alone tell the error." if "factor" in kinds else "",
-    )  # fmt: skip
+def views(
+    experiment: Experiment, record: Record, grid: Grid, found: list[str], worst: Worst, schemes: range
+) -> Iterator[View | str]:  # fmt: skip
+    """Yield a map of each quantity of each scheme; of what is the same for all members a sentence."""
+    for scheme in schemes:
+        several = of_several(record, scheme)
+        for each in _maps(experiment, record, found, scheme):
+            text = shared(each.name, each.values, each.unit) if each.told is None else each.told
+            if text:
+                yield f"{text}{several}"
+            elif np.isfinite(each.values).any():
+                yield _view(record, grid, each, scheme, worst(each.quantity).case)
 
 
-def motion(experiment: Experiment, record: Record, grid: Grid, scheme: int) -> Picture | None:
-    """Draw period and amplitude with their errors; None where no member has either."""
-    time, size = (
-        finest_level.measured(record, name, position(experiment))
-        for name in ("period", "amplitude")
-    )
-    value, exact = time.value[scheme], exact_periods(record)
-    label = style.label("period", time.unit)
-    both = {"scale": style.finite(value, exact), "spread": LOG_SPREAD_OF_PERIODS}
+def _maps(experiment: Experiment, record: Record, found: list[str], scheme: int) -> Iterator[Map]:
+    yield from _motion(experiment, record, scheme)
+    for quantity in found:
+        yield from _order(experiment, record, quantity, scheme)
+        yield from _errors(record, quantity, scheme)
+    for name, check in value_checks(experiment):
+        values = of_check(record, name, check)[scheme]
+        yield Map(
+            f"check_{name}", name, position(experiment), values, check_words(check), badness=np.abs(values),
+            caption="The number that the check of this name asks for.",
+        )  # fmt: skip
+
+
+def _motion(experiment: Experiment, record: Record, scheme: int) -> Iterator[Map]:
+    """Yield period and amplitude with their errors; without friction or force the period first."""
+    both = [_period, _amplitude]
+    for found in both if experiment.model.definition.conservative else both[::-1]:
+        yield from found(position(experiment), record, scheme)
+
+
+def _period(of: str, record: Record, scheme: int) -> Iterator[Map]:
+    time, known = finest_level.measured(record, "period", of), exact_periods(record)
+    value, exact = time.value[scheme], np.where(np.isfinite(known), known, np.nan)
+    if not np.isfinite(value).any():
+        return
+    label, at = style.label("period", time.unit), f"Of level {whole(record, 'level')[-1]}."
     with np.errstate(invalid="ignore", divide="ignore"):
-        relative = time.error[scheme] / value
-    rows: list[tuple[str, Floats, str, dict[str, Any]]] = []
-    if np.isfinite(value).any():
-        rows += [
-            ("Period", value, label, both),
-            ("Exact period", np.where(np.isfinite(exact), exact, np.nan), label, both),
-            ("Relative error of the period", finest_level.period_error(record, -1)[scheme], "|period / exact − 1|", {}),
-            ("Error bar of the period", relative, "estimated error / period", {}),
-        ]  # fmt: skip
-    if np.isfinite(size.value[scheme]).any():
-        rows += [
-            ("Amplitude", size.value[scheme], style.label("amplitude", size.unit), {}),
-            ("Error bar of the amplitude", size.error[scheme], style.label("estimated error", size.unit), {}),
-        ]  # fmt: skip
-    panels = [
-        Panel(title, grid.worst(values), text, **more)
-        for title, values, text, more in rows
-        # what is the same for all members is a number, no map
-        if finest_level.varies(values)
-    ]
-    if not panels:
-        return None
-    several = of_several(record, scheme)
-    bars = (
-        f"Numbers of level {whole(record, 'level')[-1]}. The error bars come from the two finest levels alone: "
-        "where they agree with the true error, they can be trusted where it is not known."
+        bar = time.error[scheme] / value
+    error = finest_level.period_error(record, -1)[scheme]
+    yield Map("period", "period", of, value, label, time.unit, at, spread=LOG_SPREAD_OF_PERIODS)
+    yield Map("period_error", "error of the period", of, error, "|period / exact − 1|", caption=at)
+    guessed = "From the two finest levels alone. Where it agrees with the error, it can be trusted."
+    text = "estimated error / period"
+    yield Map("period_bar", "error bar of the period", of, bar, text, caption=guessed)
+    label, spread = f"exact {label}", LOG_SPREAD_OF_PERIODS
+    yield Map("period_exact", "exact period", of, exact, label, time.unit, spread=spread)
+
+
+def _amplitude(of: str, record: Record, scheme: int) -> Iterator[Map]:
+    size = finest_level.measured(record, "amplitude", of)
+    value, bar = size.value[scheme], size.error[scheme]
+    if not np.isfinite(value).any():
+        return
+    label, at = style.label("amplitude", size.unit), f"Of level {whole(record, 'level')[-1]}."
+    yield Map("amplitude", "amplitude", of, value, label, size.unit, at)
+    text = style.label("estimated error", size.unit)
+    yield Map("amplitude_bar", "error bar of the amplitude", of, bar, text, size.unit)
+
+
+def _order(experiment: Experiment, record: Record, quantity: str, scheme: int) -> Iterator[Map]:
+    """Yield the verdict on a quantity, its order, the interval of that, and the levels it rests on."""
+    letter = words.symbol(quantity)
+    if f"{quantity}_reason" in record:
+        yield _reasons(record, quantity, scheme)
+    if not whole(record, "triple"):
+        return
+    allowed = tolerance(experiment, quantity, record.words("scheme")[scheme])
+    away = finest_level.deviation(record, quantity)[scheme]
+    order, low, high = (part[scheme] for part in finest_level.orders(record, quantity))
+    yield Map(
+        f"{quantity}_order", f"order of {letter}", quantity, away,
+        f"order of {letter} − {promised_text(record, quantity, scheme)}", badness=np.abs(away), kind="distance",
+        tolerance=allowed, number=order, told=shared(f"order of {letter}", np.round(order, 3), form="order"),
+        caption=f"Pale colours are orders within ± {allowed:g} of the {due(record, quantity)} one, where the scale "
+        "jumps.",
+    )  # fmt: skip
+    text = "width of the interval"
+    yield Map(f"{quantity}_bar", f"error bar of the order of {letter}", quantity, high - low, text)
+    yield _window(record, quantity, scheme)
+
+
+def _errors(record: Record, quantity: str, scheme: int) -> Iterator[Map]:
+    """Yield the error of the finest level, and how far its estimate can be trusted."""
+    found, letter = finest_level.error(record, quantity), words.symbol(quantity)
+    unit, level = norm_unit(record, quantity), whole(record, "level")[-1]
+    text = style.label(f"{found.kind} error of {letter} ({TYPICAL_NORM})", unit)
+    best, estimate = style.positive(found.best[scheme]), found.estimate[scheme]
+    yield Map(
+        f"{quantity}_error", f"error of {letter}", quantity, best, text, unit, f"Of level {level}."
     )
-    return _picture(
-        grid, panels, f"map_period_{scheme}", f"Period and amplitude{several}",
-        f"Maps of the period, the exact period, the error of the period and the amplitude{several}", bars,
-    )  # fmt: skip
+    if not np.isfinite(estimate).any():
+        return
+    with np.errstate(invalid="ignore", divide="ignore"):
+        if found.kind == "true":
+            ratio = style.positive(estimate / found.true[scheme])
+            yield Map(
+                f"{quantity}_trust", f"estimated over true error of {letter}", quantity, ratio,
+                "estimated / true error", badness=np.abs(np.log(ratio)), kind="factor",
+                caption="Where it is pale, two levels alone tell the error.",
+            )  # fmt: skip
+            return
+        width = style.positive((found.high - found.low)[scheme] / estimate)
+    name = f"error bar of the error of {letter}"
+    yield Map(f"{quantity}_error_bar", name, quantity, width, "relative width")
 
 
-def numbers(experiment: Experiment, record: Record, grid: Grid, scheme: int) -> Picture | None:
-    """Draw the numbers that checks are about and no other map shows; None where there are none."""
-    name, panels = record.words("scheme")[scheme], []
-    for check in experiment.checks:
-        inner = check.measured
-        if inner.kind == "value" and inner.at.case is None and inner.value not in SHOWN_ALREADY:
-            values = measured(record, check.id, "value")[scheme]
-            if inner.at.scheme in (None, name) and np.isfinite(values).any():
-                of = f" of {words.symbol(inner.quantity)}" if inner.quantity else ""
-                text = f"{inner.value}{of}".replace("_", " ")
-                panels.append(Panel(check.id, grid.worst(values, np.abs(values)), text))
-    if not panels:
-        return None
-    several = of_several(record, scheme)
-    return _picture(
-        grid, panels, f"map_checks_{scheme}", f"Numbers of the checks{several}",
-        f"Maps of the numbers that checks ask for{several}", "Each panel has the name of its check.",
-    )  # fmt: skip
-
-
-def _picture(
-    grid: Grid, panels: list[Panel], name: str, title: str, alt: str, *caption: str
-) -> Picture:  # fmt: skip
-    """Draw panels, and explain what is grey, dotted or gathered in blocks; nothing that is not there."""
-    has_gaps = any(not np.isfinite(panel.table).all() for panel in panels)
-    text = style.sentences(
-        *caption,
-        "Grey hatched cells have no such number." if has_gaps else "",
-        "The dotted line is the separatrix, where the exact period is infinite." if grid.separatrix[0].size else "",
-        grid.note,
-    )  # fmt: skip
-    return Picture(name, title, text, alt, draw(grid, panels))
-
-
-def _codes(title: str, grid: Grid, values: Floats, codes: list[tuple[int, str, str]]) -> Panel:
+def _coded(
+    stem: str, name: str, quantity: str, values: Floats, codes: list[tuple[int, str, str]], **more: Any
+) -> Map:  # fmt: skip
     """Return a map of whole numbers, each with its text, to which its count is added, and colour; the last is worst."""
     place, texts = np.full(values.shape, np.nan), []
     for i, (code, text, colour) in enumerate(codes):
         place[values == code] = i
         count = words.number(int(np.sum(values == code)), "integer")
         texts.append((f"{text} ({count})", colour))
-    return Panel(title, grid.worst(place), kind="code", codes=tuple(texts))
+    return Map(stem, name, quantity, place, kind="code", codes=tuple(texts), **more)
 
 
-def _reasons(record: Record, grid: Grid, quantity: str, scheme: int) -> Panel:
+def _reasons(record: Record, quantity: str, scheme: int) -> Map:
     """Return the map of the reasons of the verdicts; of several members in a cell the worst."""
     reason = pick(record, f"{quantity}_reason", scheme=scheme)
     meanings = record.meanings(f"{quantity}_reason")
@@ -183,10 +200,12 @@ def _reasons(record: Record, grid: Grid, quantity: str, scheme: int) -> Panel:
     ranked = sorted(counted, key=lambda row: (SEVERITY[REASONS[meanings[row[1]]]], row[0]))
     named = [(code, meanings[code]) for _, code in ranked]
     codes = [(code, f"{REASONS[word]}: {word}", style.REASON_COLOURS[word]) for code, word in named]
-    return _codes("Verdict", grid, reason, codes)
+    name = f"verdict on {words.symbol(quantity)}"
+    told = shared_verdict(record, quantity, scheme)
+    return _coded(f"{quantity}_verdict", name, quantity, reason, codes, told=told)
 
 
-def _window(record: Record, grid: Grid, quantity: str, scheme: int) -> Panel:
+def _window(record: Record, quantity: str, scheme: int) -> Map:
     """Return the map of the coarsest level that the stated order rests on."""
     from matplotlib import colormaps
     from matplotlib.colors import to_hex
@@ -199,70 +218,80 @@ def _window(record: Record, grid: Grid, quantity: str, scheme: int) -> Panel:
         for level, shade in shades
         if np.any(first == level)
     ]
-    return _codes("Levels used for the order", grid, first, codes)
+    name = f"levels used for the order of {words.symbol(quantity)}"
+    told = f"{name} {codes[0][1]}" if len(codes) == 1 and np.all(first == codes[0][0]) else ""
+    texts = tuple(text for _, text, _ in codes)
+    return _coded(f"{quantity}_levels", name, quantity, first, codes, told=told, texts=texts)
 
 
-def _errors(record: Record, grid: Grid, quantity: str, scheme: int) -> list[Panel]:
-    found, level = finest_level.error(record, quantity), whole(record, "level")[-1]
-    text = f"{found.kind} error of {words.symbol(quantity)} ({TYPICAL_NORM})"
-    text = style.label(text, norm_unit(record, quantity))
-    best, estimate = style.positive(found.best[scheme]), found.estimate[scheme]
-    panels = [Panel(f"Error on level {level}", grid.worst(best), text)]
-    if not np.isfinite(estimate).any():
-        return panels
-    with np.errstate(invalid="ignore", divide="ignore"):
-        if found.kind == "true":
-            ratio = style.positive(estimate / found.true[scheme])
-            worst, text = grid.worst(ratio, np.abs(np.log(ratio))), "estimated / true error"
-            return [*panels, Panel("Can the estimate be trusted?", worst, text, "factor")]
-        width = style.positive((found.high - found.low)[scheme] / estimate)
-    return [*panels, Panel("Error bar of the error", grid.worst(width), "relative width")]
+def _view(record: Record, grid: Grid, each: Map, scheme: int, worst: int) -> View:
+    """Draw a map, and explain what is grey, dotted or gathered in blocks; nothing that is not there."""
+    table = grid.worst(each.values, each.badness)
+    figure = draw(grid, each, table)
+    ax, several = figure.axes[0], of_several(record, scheme)
+    is_ringed = ring(ax, float(grid.x.values[worst]), float(grid.y.values[worst]), on_map=True)
+    title = f"{each.name[:1].upper()}{each.name[1:]}{several}"
+    text = style.sentences(
+        each.caption,
+        "Grey hatched cells have no such number." if not np.isfinite(table).all() else "",
+        "The dotted line is the separatrix, where the exact period is infinite." if grid.separatrix[0].size else "",
+        grid.note,
+    )  # fmt: skip
+    values = None
+    if each.kind != "code" or each.texts:
+        values = np.full((len(record["scheme"]), each.values.size), np.nan)
+        values[scheme] = each.values if each.number is None else each.number
+    return View(
+        each.name, Picture(f"map_{each.stem}_{scheme}", title, text, f"{title} over two swept parameters", figure),
+        each.quantity, values, None, each.unit, each.texts, (scheme,), several.removeprefix(", "), ((0, 1),),
+        worst if is_ringed else None,
+    )  # fmt: skip
 
 
-def draw(grid: Grid, panels: list[Panel]) -> Figure:
-    """Return a figure with the panels in rows of three, all over the same two parameters."""
-    columns = [(LEFT + i * (WIDE + GAP), WIDE) for i in range(PANELS_A_ROW)]
-    figure, axes = rows_of(len(panels), columns, TALL, ABOVE, BELOW)
-    for i, (ax, panel) in enumerate(zip(axes, panels, strict=True)):
-        image = _cells(ax, grid, panel)
-        _frame(ax, grid, panel.title, first=i % PANELS_A_ROW == 0)
-        _mark(ax, grid.separatrix)
-        if panel.kind == "code":
-            _legend(ax, panel)
-        elif image is not None:
-            box, high = ax.get_position(), figure.get_figheight()
-            bar = figure.add_axes((box.x0, box.y0 - 0.62 / high, box.width, 0.11 / high))
-            _scale(bar, image, panel)
+def draw(grid: Grid, each: Map, table: Floats) -> Figure:
+    """Return a figure with one map and its scale or legend at the right."""
+    high = ABOVE + TALL + BELOW
+    figure = style.canvas(high)
+    at = (LEFT / style.WIDTH, BELOW / high, WIDE / style.WIDTH, TALL / high)
+    ax = figure.add_axes(at, gid=style.MEMBER)
+    image = _cells(ax, grid, each, table)
+    _frame(ax, grid, each.label or each.name)
+    _mark(ax, grid.separatrix)
+    if each.kind == "code":
+        _legend(ax, each)
+    elif image is not None:
+        left = (LEFT + WIDE + 2 * BAR) / style.WIDTH
+        bar = figure.add_axes((left, at[1], BAR / style.WIDTH, at[3]))
+        _scale(bar, image, each, table)
     return figure
 
 
-def _cells(ax: Axes, grid: Grid, panel: Panel) -> Any:
-    many = panel.table.size > BORDERED
+def _cells(ax: Axes, grid: Grid, each: Map, table: Floats) -> Any:
+    many = table.size > BORDERED
     ax.patch.set(facecolor=style.MISSING, hatch="////", edgecolor="#b4b4b4", linewidth=0.0)
-    if not np.isfinite(panel.table).any():
+    if not np.isfinite(table).any():
         style.remark(ax, "no value anywhere")
         return None
-    cmap, norm = _colours(panel)
+    cmap, norm = _colours(each, table)
     border: Any = {"edgecolors": "none" if many else "#8c8c8c", "linewidth": 0.0 if many else 0.4}
-    table = np.ma.masked_invalid(panel.table)
-    return ax.pcolormesh(*grid.borders, table, cmap=cmap, norm=norm, **border, rasterized=many)
+    shown = np.ma.masked_invalid(table)
+    return ax.pcolormesh(*grid.borders, shown, cmap=cmap, norm=norm, **border, rasterized=many)
 
 
-def _colours(panel: Panel) -> tuple[Any, Any]:
-    """Return the colour map of a panel and how values become its numbers."""
+def _colours(each: Map, table: Floats) -> tuple[Any, Any]:
+    """Return the colour map of a map and how values become its numbers."""
     from matplotlib import colormaps
     from matplotlib.colors import BoundaryNorm, ListedColormap, LogNorm, Normalize
 
-    if panel.kind == "code":
-        borders = np.arange(len(panel.codes) + 1) - 0.5
-        colours = [colour for _, colour in panel.codes]
-        return ListedColormap(colours), BoundaryNorm(borders, len(panel.codes))
-    if panel.kind == "distance":
-        return pale_within(panel.tolerance), Normalize(-ORDER_RANGE, ORDER_RANGE)
-    if panel.kind == "factor":
+    if each.kind == "code":
+        borders = np.arange(len(each.codes) + 1) - 0.5
+        colours = [colour for _, colour in each.codes]
+        return ListedColormap(colours), BoundaryNorm(borders, len(each.codes))
+    if each.kind == "distance":
+        return pale_within(each.tolerance), Normalize(-ORDER_RANGE, ORDER_RANGE)
+    if each.kind == "factor":
         return colormaps["PuOr"], LogNorm(0.5, 2.0)
-    values = style.finite(panel.table if panel.scale is None else panel.scale)
-    low, high, logarithmic = limits(values, panel.spread)
+    low, high, logarithmic = limits(style.finite(table), each.spread)
     return colormaps["viridis"], (LogNorm if logarithmic else Normalize)(low, high)
 
 
@@ -290,20 +319,15 @@ def limits(values: Floats, spread: float = LOG_SPREAD) -> tuple[float, float, bo
     return low - room, high + room, False
 
 
-def _frame(ax: Axes, grid: Grid, title: str, first: bool) -> None:
-    for which, key, shown in (("x", grid.x, True), ("y", grid.y, first)):
-        axis = getattr(ax, f"{which}axis")
+def _frame(ax: Axes, grid: Grid, title: str) -> None:
+    for which, key in (("x", grid.x), ("y", grid.y)):
         if key.is_log:
             style.log_axis(ax, which, *getattr(ax, f"get_{which}lim")())
         if key.words:
-            axis.set_ticks(key.distinct, key.words)
-        if shown:
-            getattr(ax, f"set_{which}label")(key.label, fontsize=8.5, labelpad=2)
-        else:
-            axis.set_tick_params(labelleft=False)
-    ax.set_title(title, fontsize=9)
+            getattr(ax, f"{which}axis").set_ticks(key.distinct, key.words)
+        getattr(ax, f"set_{which}label")(key.label)
+    ax.set_title(f"{title[:1].upper()}{title[1:]}")
     ax.grid(visible=False)
-    ax.tick_params(labelsize=7.5)
 
 
 def _mark(ax: Axes, ridge: tuple[Floats, Floats]) -> None:
@@ -322,37 +346,33 @@ def _mark(ax: Axes, ridge: tuple[Floats, Floats]) -> None:
     ax.set(xlim=ends[0], ylim=ends[1])
 
 
-def _legend(ax: Axes, panel: Panel) -> None:
+def _legend(ax: Axes, each: Map) -> None:
     from matplotlib.patches import Patch
 
     edge: Any = {"edgecolor": "#404040", "linewidth": 0.4}
-    ax.legend(
-        handles=[Patch(facecolor=colour, label=text, **edge) for text, colour in panel.codes],
-        loc="upper left", bbox_to_anchor=(-0.02, -0.19), ncols=1 if len(panel.codes) <= 4 else 2, fontsize=7.5,
-        handlelength=1.2, borderaxespad=0.0, columnspacing=0.8, labelspacing=0.3,
-    )  # fmt: skip
+    handles = [Patch(facecolor=colour, label=text, **edge) for text, colour in each.codes]
+    # the worst above
+    ax.legend(handles=handles[::-1], **style.BESIDE, handlelength=1.2)
 
 
-def _scale(ax: Axes, image: Any, panel: Panel) -> None:
-    """Draw the colour bar below a panel."""
+def _scale(ax: Axes, image: Any, each: Map, table: Floats) -> None:
+    """Draw the colour bar beside a map."""
     from matplotlib.ticker import MaxNLocator
 
-    values = style.finite(panel.table)
+    values = style.finite(table)
     low, high = float(image.norm.vmin), float(image.norm.vmax)
     below, above = values.min() < low, values.max() > high
     beyond = "both" if below and above else "min" if below else "max" if above else "neither"
-    bar = ax.figure.colorbar(image, cax=ax, orientation="horizontal", extend=beyond)
-    bar.set_label(panel.label, fontsize=8.5, labelpad=2)
-    bar.ax.tick_params(labelsize=7.5)
+    bar = ax.figure.colorbar(image, cax=ax, extend=beyond)
     bar.outline.set_linewidth(0.5)
     bar.ax.grid(visible=False)
-    if panel.kind == "distance":
-        bar.set_ticks([-ORDER_RANGE, -panel.tolerance, 0.0, panel.tolerance, ORDER_RANGE])
-        bar.ax.set_xticklabels([f"{x:+g}".replace("-", "−") if x else "0" for x in bar.get_ticks()])
-    elif panel.kind == "factor":
+    if each.kind == "distance":
+        bar.set_ticks([-ORDER_RANGE, -each.tolerance, 0.0, each.tolerance, ORDER_RANGE])
+        bar.ax.set_yticklabels([f"{x:+g}".replace("-", "−") if x else "0" for x in bar.get_ticks()])
+    elif each.kind == "factor":
         bar.set_ticks([0.5, 0.7, 1.0, 1.4, 2.0], labels=["0.5", "0.7", "1", "1.4", "2"])
         bar.ax.minorticks_off()
     elif type(image.norm).__name__ == "LogNorm":
-        style.log_ticks(bar.ax.xaxis, low, high, most=5)
+        style.log_ticks(bar.ax.yaxis, low, high, most=5)
     else:
-        bar.ax.xaxis.set_major_locator(MaxNLocator(5))
+        bar.ax.yaxis.set_major_locator(MaxNLocator(5))

@@ -5,7 +5,8 @@ Few members are points; many are counted in cells, so that a page stays small ho
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -18,6 +19,7 @@ from vibsim.report import finest_level, style
 from vibsim.report.choice import position, tolerance
 from vibsim.report.data import due, flags, norm_unit, of_several, promised_text, whole
 from vibsim.report.figures.panels import rows_of
+from vibsim.report.figures.view import View, Worst, ring, shared
 from vibsim.report.style import Picture
 from vibsim.report.sweep_layout import Key, bins, place_in
 from vibsim.report.text import words
@@ -26,7 +28,8 @@ from vibsim.report.types import Axes, Experiment
 Masks = dict[str, Flags]
 """Which members come to each verdict, shape (case,)."""
 FEWEST, BARS = 60, 50  # of fewer members a histogram says nothing; bars of one
-MOST_ROWS = 6  # most schemes, and most keys, that have a row; the members' table has all
+MOST_ROWS = 6  # most schemes that have a row of histograms
+MOST_PANELS = 6  # most keys that have a panel; the members' table has all
 MOST_POINTS = 4000  # most members that are drawn as points
 ORDER_FRAME = 1.5  # distance from the promised order at which the frame ends
 SHARES = 24  # most bars of shares along a key
@@ -74,6 +77,17 @@ def histograms(experiment: Experiment, record: Record, quantity: str) -> Picture
     )
 
 
+def _legend(ax: Axes, masks: Masks) -> None:
+    """Say above a panel which colour is which verdict."""
+    from matplotlib.patches import Patch
+
+    handles = [
+        Patch(color=style.STATUS_COLOURS[word], label=word) for word in masks if masks[word].any()
+    ]
+    place: Any = {"loc": "lower left", "bbox_to_anchor": (0.0, 0.99), "borderaxespad": 0.1}
+    ax.legend(handles=handles, ncols=3, fontsize=7, handlelength=0.9, columnspacing=0.8, **place)
+
+
 def _explain(ax: Axes, status: NDArray[Any]) -> None:
     from matplotlib.patches import Patch
 
@@ -115,61 +129,137 @@ def _histogram(
     return int(np.sum(~usable))
 
 
-def projections(
-    experiment: Experiment, record: Record, keys: list[Key], quantity: str, scheme: int
-) -> Picture:
-    """Draw order, error and shares of the verdicts of one scheme against every swept key."""
-    from matplotlib.ticker import FuncFormatter, MaxNLocator
+def views(
+    experiment: Experiment, record: Record, keys: list[Key], found: list[str], worst: Worst, schemes: range
+) -> Iterator[View | str]:  # fmt: skip
+    """Yield order, error and verdict of each quantity of each scheme against every swept key."""
+    for scheme in schemes:
+        for quantity in found:
+            if f"{quantity}_status" in record:
+                draw = _Projection(record, keys, quantity, scheme, worst(quantity).case)
+                yield from draw.order(
+                    tolerance(experiment, quantity, record.words("scheme")[scheme])
+                )
+                yield from draw.error()
+                yield draw.shares()
 
-    letter, shown = words.symbol(quantity), keys[:MOST_ROWS]
-    columns = ((0.68, 2.5), (3.78, 2.3), (6.5, 2.3))
-    figure, axes = rows_of(3 * len(shown), columns, 1.45, 0.0, 0.5)
-    status = flags(record, f"{quantity}_status")[scheme]
-    masks = {word: status == word for word in SEVERITY}
-    away = finest_level.deviation(record, quantity)[scheme]
-    error = finest_level.error(record, quantity)
-    size = np.log10(style.positive(error.best[scheme]))
-    allowed = tolerance(experiment, quantity, record.words("scheme")[scheme])
-    for i, key in enumerate(shown):
-        order, error_size, share = row = axes[3 * i : 3 * i + 3]
-        order.axhspan(-allowed, allowed, **style.ALLOWED)
-        _draw_members(order, key, away, masks, (-ORDER_FRAME, ORDER_FRAME))
-        text = f"order of {letter} − {promised_text(record, quantity, scheme)}"
-        order.set_ylabel(text, fontsize=8.5)
-        _draw_members(error_size, key, size, masks, None)
-        # an axis of logarithms
-        error_size.yaxis.set_major_locator(MaxNLocator(5, integer=True))
-        error_size.yaxis.set_major_formatter(FuncFormatter(lambda y, _: style.power(round(y))))
-        _draw_shares(share, key, masks)
-        for ax in row:
-            _frame(ax, key)
-    measure = style.label(f"{error.kind} error".capitalize(), norm_unit(record, quantity))
-    for ax, title in zip(axes, ("Order", measure, "Share"), strict=False):
-        ax.set_title(title, fontsize=9)
-    axes[2].legend(
-        loc="lower right", bbox_to_anchor=(1.0, 0.99), ncols=3, fontsize=7, handlelength=0.9,
-        columnspacing=0.8, borderaxespad=0.1,
-    )  # fmt: skip
-    several, more = of_several(record, scheme), len(keys) - len(shown)
-    return Picture(
-        name=f"projections_{quantity}_{scheme}",
-        title=f"Where do members fail? {letter}{several}",
-        caption=style.sentences(
-            "Each row shows all members against one swept key, whatever the others are: left the stated order less "
-            f"the {due(record, quantity)} one, with its tolerance in grey; then the error on level "
-            f"{whole(record, 'level')[-1]}; right what share of the members near a value comes to which verdict. A "
-            "key whose shares do not vary does not matter.",
-            "Darker cells hold more members; FAIL lies over INCONCLUSIVE over PASS."
-            if away.size > MOST_POINTS
-            else "",
+
+@dataclass(frozen=True)
+class _Projection:
+    """What the views of a quantity of one scheme against every swept key have in common."""
+
+    record: Record
+    keys: list[Key]
+    quantity: str
+    scheme: int
+    worst: int
+
+    @property
+    def masks(self) -> Masks:
+        """Which members come to each verdict."""
+        status = flags(self.record, f"{self.quantity}_status")[self.scheme]
+        return {word: status == word for word in SEVERITY}
+
+    def order(self, allowed: float) -> Iterator[View | str]:
+        """Yield the stated order, less the one that is due."""
+        record, quantity, name = (
+            self.record,
+            self.quantity,
+            f"order of {words.symbol(self.quantity)}",
+        )
+        order = finest_level.orders(record, quantity)[0]
+        away = finest_level.deviation(record, quantity)[self.scheme]
+        if not np.isfinite(away).any():
+            return
+        if text := shared(name, np.round(order[self.scheme], 3), form="order"):
+            yield f"{text}{of_several(record, self.scheme)}"
+            return
+        axes = self._axes()
+        for ax, key in zip(axes, self.keys, strict=False):
+            ax.axhspan(-allowed, allowed, **style.ALLOWED)
+            _draw_members(ax, key, away, self.masks, (-ORDER_FRAME, ORDER_FRAME))
+        label = f"{name} − {promised_text(record, quantity, self.scheme)}"
+        beyond = (
             "Orders beyond the frame are drawn at its edge, members without an order at the lower edge."
             if np.any(~(np.abs(away) < ORDER_FRAME))
+            else ""
+        )
+        band = f"Grey: the tolerance around the {due(record, quantity)} order."
+        places = np.clip(np.nan_to_num(away, nan=-ORDER_FRAME), -ORDER_FRAME, ORDER_FRAME)
+        yield self._view("order", name, label, axes, f"{band} {beyond}".rstrip(), order, places)
+
+    def error(self) -> Iterator[View | str]:
+        """Yield the error of the finest level."""
+        from matplotlib.ticker import FuncFormatter, MaxNLocator
+
+        error, name = (
+            finest_level.error(self.record, self.quantity),
+            f"error of {words.symbol(self.quantity)}",
+        )
+        unit = norm_unit(self.record, self.quantity)
+        size = np.log10(style.positive(error.best[self.scheme]))
+        if not np.isfinite(size).any():
+            return
+        axes = self._axes()
+        for ax, key in zip(axes, self.keys, strict=False):
+            _draw_members(ax, key, size, self.masks, None)
+            # an axis of logarithms
+            ax.yaxis.set_major_locator(MaxNLocator(5, integer=True))
+            ax.yaxis.set_major_formatter(FuncFormatter(lambda y, _: style.power(round(y))))
+        told = f"Of level {whole(self.record, 'level')[-1]}."
+        label = style.label(f"{error.kind} {name}", unit)
+        yield self._view("error", name, label, axes, told, error.best, size, unit)
+
+    def shares(self) -> View:
+        """Return what share of the members near a value of a key comes to which verdict."""
+        axes = self._axes()
+        for ax, key in zip(axes, self.keys, strict=False):
+            _draw_shares(ax, key, self.masks)
+        told = (
+            "Shares of the verdicts near a value. A key whose shares do not vary does not matter."
+        )
+        name = f"verdict on {words.symbol(self.quantity)}"
+        return self._view("verdict", name, "share", axes, told, None, None)
+
+    def _axes(self) -> list[Axes]:
+        columns = [(0.72 + 2.9 * i, 2.35) for i in range(3)]
+        return rows_of(min(len(self.keys), MOST_PANELS), columns, 1.9, 0.3, 0.5)[1]
+
+    def _view(
+        self, kind: str, name: str, label: str, axes: list[Axes], told: str, values: Floats | None,
+        place: Floats | None, unit: str = "",
+    ) -> View:  # fmt: skip
+        """Finish the axes of a view, and mark the worst member."""
+        record, rings = self.record, []
+        for i, (ax, key) in enumerate(zip(axes, self.keys, strict=False)):
+            _frame(ax, key)
+            if i == 0:
+                _legend(ax, self.masks)
+            if i % 3 == 0:
+                ax.set_ylabel(label, fontsize=8.5)
+            if place is not None:
+                ax.set_gid(style.MEMBER)
+                rings.append(ring(ax, float(key.values[self.worst]), float(place[self.worst])))
+        several, more = of_several(record, self.scheme), len(self.keys) - len(axes)
+        text = style.sentences(
+            "Each panel shows all members against one swept key, whatever the others are.",
+            told,
+            "Darker cells hold more members; FAIL lies over INCONCLUSIVE over PASS."
+            if len(record["case"]) > MOST_POINTS and place is not None
             else "",
-            f"{more} more keys are not shown; the table of members has them." if more else "",
-        ),
-        alt=f"Order and error of {words.name(quantity)} and the shares of verdicts against every swept key{several}",
-        figure=figure,
-    )
+            f"{more} more keys are not shown; the table of members has them." if more > 0 else "",
+        )
+        title, figure = f"{name[:1].upper()}{name[1:]}{several}", axes[0].get_figure(root=True)
+        stem = f"projections_{self.quantity}_{kind}_{self.scheme}"
+        places = None
+        if place is not None:
+            places = np.full((len(record["scheme"]), place.size), np.nan)
+            places[self.scheme] = place
+        return View(
+            name, Picture(stem, title, text, f"{title} against every swept key", figure), self.quantity, values,
+            places, unit, schemes=(self.scheme,), of=several.removeprefix(", "),
+            panels=tuple((i, None) for i in range(len(axes))), worst=self.worst if any(rings) else None,
+        )  # fmt: skip
 
 
 def _frame(ax: Axes, key: Key) -> None:

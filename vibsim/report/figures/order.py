@@ -64,7 +64,7 @@ def _caption(kinds: set[str], is_settled: bool | None, many: bool, due: str) -> 
         True: f"Right: the stated order of every scheme with its interval (hollow: of the finest three levels, where "
         f"none is stated); the stroke is the {due} one.",
         False: "Right: the order from three levels, at the coarsest of them; it should settle inside a grey band. "
-        "Beyond the frame levels are too coarse, within round-off, or grow without bound.",
+        "Beyond the frame: too coarse, within round-off, or growing without bound.",
     }
     return style.sentences(
         f"Left: {' and '.join(filter(None, [shown, true]))} against dt.",

@@ -44,7 +44,7 @@ def solution(record: Record, quantity: str, member: Member) -> Picture:
     trust = (
         " (lines), and the true error (dots). Dots on the lines mean that the estimate can be trusted."
         if is_known
-        else ". No exact solution is known here, so the estimate stands alone."
+        else "."
     )
     return Picture(
         name=f"solution_{quantity}_{member.stem}",

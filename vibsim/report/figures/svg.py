@@ -6,7 +6,8 @@ three more points: ids come from the name of the figure, colours are attributes 
 replace, and what a script needs to find values again stands beside the curves:
 
 ``<g data-axis="time" data-box="left top width height" data-x="low high" data-y="low high" data-log="xy">``
-    a panel whose axes have a group id (``ax.set_gid("time")``); its limits are in units of its labels
+    a panel whose axes have a group id (``ax.set_gid("time")``); its limits are in units of its labels. Of a panel with
+    members the page holds their places (`vibsim.report.page.explorer`)
 ``<g data-axis="long" data-window="width" ...>``, ``<g data-axis="overview" ...>``
     panels of a long series (``ax.set_gid("long width")``), of which a page shows a part, and all of its time
 ``<g data-curve="label" data-key="key">``

@@ -1,8 +1,9 @@
-"""What was found of every member along one swept parameter: order, error and verdict; period and amplitude."""
+"""Curves over one swept parameter: period and amplitude, order, error and verdict, and numbers of checks."""
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -11,142 +12,264 @@ from numpy.typing import NDArray
 from vibsim.core.array_types import Floats
 from vibsim.core.record import Record
 from vibsim.core.vocabulary import SEVERITY, TYPICAL_NORM
-from vibsim.report import finest_level, frame, style
+from vibsim.report import finest_level, frame, style, sweep_layout
 from vibsim.report.choice import position, promises
 from vibsim.report.data import due, exact_periods, flags, norm_unit, whole
 from vibsim.report.figures import separatrix
 from vibsim.report.figures.panels import explosive, stacked
+from vibsim.report.figures.view import (
+    View,
+    Worst,
+    check_words,
+    of_check,
+    ring,
+    shared,
+    shared_verdict,
+    value_checks,
+)  # fmt: skip
 from vibsim.report.finest_level import Measured
 from vibsim.report.style import Picture
 from vibsim.report.sweep_layout import Along
 from vibsim.report.text import words
-from vibsim.report.types import Axes, Experiment
+from vibsim.report.types import Axes, Experiment, ValueCheck
 
+TALL, ENTRY = 3.0, 0.18  # least height of a panel, height of an entry of a legend [inch]
+RISE = 0.17  # by which a worse verdict stands higher
 MOST_MARKERS = 60  # most members that get a marker each; above, a line says it better
 DEEP = 1e-16  # errors below this part of the largest leave the frame
 LOG_RATIO = 10.0
 """Where some amplitudes leave the frame, others that many times a usual one are drawn on a logarithmic scale."""
 
 
-def orders(experiment: Experiment, record: Record, along: Along, quantity: str) -> Picture:
-    """Draw the stated order of every member and its error, with their intervals, and the verdict as a strip below."""
-    schemes, letter = record.words("scheme"), words.symbol(quantity)
-    row = 0.17 if style.crowded(record) else 0.3
-    axes = stacked([2.3, 1.9, row * max(2, len(schemes))])
-    _draw_orders(axes[0], experiment, record, along, quantity)
-    kind, leaves = _draw_errors(axes[1], record, along, quantity)
-    _draw_verdicts(axes[2], along, flags(record, f"{quantity}_status"), schemes)
-    marked = _finish(axes, experiment, along)
-    error = (
-        "the true one (dots), and what two levels alone say of it (lines, with the interval of the order)"
-        if kind == "true"
-        else "estimated from two levels, with the interval of the order"
-    )
-    return Picture(
-        name=f"sweep_order_{quantity}",
-        title=f"Order and error of every member: {letter}",
-        caption="Top: the order that each member's levels state; a grey band is an order that is "
-        f"{due(record, quantity)}, with the tolerance of its check. Then the error of the finest level"
-        f"{':' if kind == 'true' else ','} {error}. Bottom: what can be said of it. Members "
-        f"that fail or stay open are worth a look one by one.{marked}{f' {frame.LEAVING}' if leaves else ''}",
-        alt=f"Stated order of {words.name(quantity)}, its error and its verdict against the swept parameter",
-        figure=axes[0].get_figure(root=True),
-    )
+def views(
+    experiment: Experiment, record: Record, along: Along, found: list[str], worst: Worst
+) -> Iterator[View | str]:
+    """Yield a view of each quantity along one key; of what is the same for all members a sentence."""
+    draw = _Drawing(experiment, record, along, worst)
+    both = [draw.period, draw.amplitude]
+    for draw_one in both if experiment.model.definition.conservative else both[::-1]:
+        yield from draw_one()
+    for quantity in found:
+        if whole(record, "triple"):
+            yield from draw.order(quantity)
+        yield from draw.error(quantity)
+        yield from draw.verdict(quantity)
+    for name, check in value_checks(experiment):
+        yield from draw.number(name, check)
 
 
-def period(experiment: Experiment, record: Record, along: Along) -> Picture | None:
-    """Draw the period of every member and its relative error; None where no member has a period."""
-    found, exact = (
-        finest_level.measured(record, "period", position(experiment)),
-        exact_periods(record),
-    )
-    if not np.isfinite(found.value).any():
-        return None
-    is_known = bool(np.isfinite(exact).any())
-    axes = stacked([2.4, 2.4] if is_known else [2.6])
-    _draw_numbers(axes[0], record, along, found, exact if is_known else None)
-    if is_known:
-        _draw_period_errors(axes[1], record, along, found)
-    marked = _finish(axes, experiment, along)
-    several = bool(whole(record, "pair"))
-    bars = ", with its error bar from the two finest levels" if several else ""
-    caption = f"Top: the measured period{bars}, and the exact one. Bottom: its relative error"
-    caption += (
-        "; from level to level it should fall by the same factor, so lines of successive levels are evenly spaced, "
-        "and where they are not the coarse levels are too coarse. Grey: the error that the two finest levels predict "
-        "for the finest without knowing the exact period."
-        if several
-        else "."
-    )
-    return Picture(
-        name="period",
-        title="Period over the swept parameter",
-        caption=(caption if is_known else f"The measured period on the finest level{bars}.")
-        + marked,
-        alt="Period and its relative error against the swept parameter",
-        figure=axes[0].get_figure(root=True),
-    )
+@dataclass(frozen=True)
+class _Drawing:
+    """What the views along one key have in common."""
+
+    experiment: Experiment
+    record: Record
+    along: Along
+    worst: Worst
+
+    @property
+    def _tall(self) -> float:
+        """The height of a panel with room for its legend [inch]."""
+        return max(TALL, ENTRY * len(self.record["scheme"]) * len(self.along.lines))
+
+    def _view(
+        self, ax: Axes, stem: str, name: str, caption: str, quantity: str, values: Floats | None, *,
+        places: Floats | None = None, unit: str = "",
+    ) -> View:  # fmt: skip
+        """Finish the axes of a view, and mark the worst member."""
+        key, worst = self.along.key, self.worst(quantity)
+        marked = _finish(ax, self.experiment, self.along)
+        drawn = values if places is None else places
+        assert drawn is not None
+        place = float(key.values[worst.case]), float(drawn[worst.scheme, worst.case])
+        ax.set_gid(style.MEMBER)
+        is_ringed = ring(ax, *place)
+        alt = f"{name[:1].upper()}{name[1:]} of every member against {key.key}"
+        text = style.sentences(caption, marked)
+        figure = ax.get_figure(root=True)
+        keys = [one.key for one in sweep_layout.keys(self.record)]
+        return View(
+            name, Picture(stem, f"{name[:1].upper()}{name[1:]}", text, alt, figure), quantity, values, places,
+            unit, schemes=tuple(range(len(drawn))), panels=((keys.index(key.key), None),),
+            worst=worst.case if is_ringed else None,
+        )  # fmt: skip
+
+    def period(self) -> Iterator[View | str]:
+        """Yield the period with its error bar, and its relative error on several levels."""
+        record, quantity = self.record, position(self.experiment)
+        found, exact = finest_level.measured(record, "period", quantity), exact_periods(record)
+        if not np.isfinite(found.value).any():
+            return
+        if text := shared("period", found.value, found.unit):
+            yield text
+        else:
+            is_known, several = bool(np.isfinite(exact).any()), bool(whole(record, "pair"))
+            (ax,) = stacked([self._tall])
+            _draw_numbers(ax, record, self.along, found, exact if is_known else None)
+            yield self._view(
+                ax, "period", "period",
+                f"On the finest level{', with its error bar from the two finest levels' * several}"
+                f"{'; and the exact one' * is_known}.",
+                quantity, found.value, unit=found.unit,
+            )  # fmt: skip
+        error = finest_level.period_error(record, -1)
+        if text := shared("error of the period", error, form="norm"):
+            yield text
+        elif np.isfinite(error).any():
+            (ax,) = stacked([self._tall])
+            _draw_period_errors(ax, record, self.along, found)
+            yield self._view(
+                ax, "period_error", "error of the period",
+                "From level to level it should fall by the same factor, so lines of successive levels are evenly "
+                "spaced. Where they are not, the coarse levels are too coarse. Grey: what the two finest levels "
+                "predict without the exact period." if whole(record, "pair") else "",
+                quantity, error,
+            )  # fmt: skip
+
+    def amplitude(self) -> Iterator[View | str]:
+        """Yield the amplitude with its error bar, and the error bar alone."""
+        experiment, record, along = self.experiment, self.record, self.along
+        quantity = position(experiment)
+        found = finest_level.measured(record, "amplitude", quantity)
+        if not np.isfinite(found.value).any():
+            return
+        size = frame.sizes(record, quantity)
+        bounded = frame.is_bounded(found.value, size)
+        if not bounded.any():
+            bounded = np.isfinite(found.value)
+        # what is beyond the frame has no bar across it
+        barred = bounded & frame.is_bounded(found.error, size)
+        value = np.where(bounded, found.value, np.nan)
+        error = np.where(barred, found.error, np.nan)
+        if text := shared("amplitude", found.value, found.unit):
+            yield text
+        else:
+            (ax,) = stacked([self._tall])
+            # amplitudes that hardly differ need long numbers
+            ax.yaxis.set_label_coords(-0.115, 0.5)
+            _draw_numbers(ax, record, along, replace(found, error=error), None)
+            usual = style.finite(value)
+            is_wide = usual.size > 0 and float(usual.max()) > LOG_RATIO * float(np.median(usual))
+            if explosive([value.ravel()]) or (is_wide and explosive([found.value.ravel()])):
+                # a motion that a scheme damps away would fill the frame with its decades
+                least = np.nanmin(np.append(size, np.nanmax(value))) / frame.UNBOUNDED
+                style.fit_log_axis(ax, "y", np.maximum(value, least), room=2.0)
+            else:
+                ax.set_ylim(*_room(replace(found, value=value, error=error), None))
+            leaves = _mark_members(ax, along, found.value)
+            yield self._view(
+                ax, "amplitude", "amplitude",
+                style.sentences(
+                    "Half the height between the last peak and the last trough, on the finest level.",
+                    "Members that go over the top have none." if experiment.model.definition.turn else "",
+                    frame.LEAVING if leaves else "",
+                ),
+                quantity, found.value, unit=found.unit,
+            )  # fmt: skip
+        if not whole(record, "pair") or not np.isfinite(found.error).any():
+            return
+        name = "error bar of the amplitude"
+        if text := shared(name, found.error, found.unit, "norm"):
+            yield text
+            return
+        (ax,) = stacked([self._tall])
+        _draw_error_bars(ax, record, along, found, error)
+        leaves = _mark_members(ax, along, found.error)
+        yield self._view(
+            ax, "amplitude_error", name,
+            style.sentences("Estimated from the two finest levels.", frame.LEAVING if leaves else ""),
+            quantity, found.error, unit=found.unit,
+        )  # fmt: skip
+
+    def order(self, quantity: str) -> Iterator[View | str]:
+        """Yield the stated order of every member with its interval."""
+        name, order = (
+            f"order of {words.symbol(quantity)}",
+            finest_level.orders(self.record, quantity)[0],
+        )
+        if text := shared(name, np.round(order, 3), form="order"):
+            yield text
+        elif np.isfinite(order).any():
+            (ax,) = stacked([self._tall])
+            _draw_orders(ax, self.experiment, self.record, self.along, quantity)
+            band = f"Grey: an order that is {due(self.record, quantity)}, with the tolerance of its check."
+            yield self._view(
+                ax, f"sweep_order_{quantity}", name, f"Stated by each member's levels, with its interval. {band}",
+                quantity, order,
+            )  # fmt: skip
+
+    def error(self, quantity: str) -> Iterator[View | str]:
+        """Yield the error of every member at the finest level."""
+        name, error = (
+            f"error of {words.symbol(quantity)}",
+            finest_level.error(self.record, quantity),
+        )
+        unit = norm_unit(self.record, quantity)
+        if text := shared(name, error.best, unit, "norm"):
+            yield text
+        elif np.isfinite(error.best).any():
+            (ax,) = stacked([self._tall])
+            kind, leaves = _draw_errors(ax, self.record, self.along, quantity)
+            told = "At the finest level: true (dots), and what two levels alone say of it (lines)"
+            told = told if kind == "true" else "At the finest level, estimated from two levels"
+            told = (
+                f"{told}, with the interval of the order."
+                if whole(self.record, "pair")
+                else "True."
+            )
+            yield self._view(
+                ax, f"sweep_error_{quantity}", name, style.sentences(told, frame.LEAVING if leaves else ""),
+                quantity, error.best, unit=unit,
+            )  # fmt: skip
+
+    def verdict(self, quantity: str) -> Iterator[View | str]:
+        """Yield the verdict on every member's order, one row per scheme."""
+        name = f"verdict on {words.symbol(quantity)}"
+        if f"{quantity}_status" not in self.record:
+            return
+        status = flags(self.record, f"{quantity}_status")
+        if text := shared_verdict(self.record, quantity):
+            yield text
+            return
+        row = 0.17 if style.crowded(self.record) else 0.3
+        (ax,) = stacked([row * max(2, len(status))])
+        _draw_verdicts(ax, self.along, status, self.record.words("scheme"))
+        ranks = list(SEVERITY)
+        rank = np.array([[ranks.index(word) for word in of_scheme] for of_scheme in status])
+        yield self._view(
+            ax, f"sweep_verdict_{quantity}", name, "", quantity, None,
+            places=np.arange(len(status))[:, None] + RISE * rank,
+        )  # fmt: skip
+
+    def number(self, name: str, check: ValueCheck) -> Iterator[View | str]:
+        """Yield the number that a check asks for of every member."""
+        values = of_check(self.record, name, check)
+        if text := shared(name, values):
+            yield text
+        elif np.isfinite(values).any():
+            (ax,) = stacked([self._tall])
+            found = finest_level.Measured(
+                check_words(check), "", values, np.full(values.shape, np.nan)
+            )
+            _draw_numbers(ax, self.record, self.along, found, None)
+            ax.set_title(name)
+            yield self._view(ax, f"sweep_check_{name}", name, "", position(self.experiment), values)
 
 
-def amplitude(experiment: Experiment, record: Record, along: Along) -> Picture | None:
-    """Draw the amplitude of every member with its error bar; None where no member swings."""
-    found = finest_level.measured(record, "amplitude", position(experiment))
-    if not np.isfinite(found.value).any():
-        return None
-    size = frame.sizes(record, position(experiment))
-    bounded = frame.is_bounded(found.value, size)
-    if not bounded.any():
-        bounded = np.isfinite(found.value)
-    # what is beyond the frame has no bar across it
-    barred = bounded & frame.is_bounded(found.error, size)
-    value, error = np.where(bounded, found.value, np.nan), np.where(barred, found.error, np.nan)
-    several = bool(whole(record, "pair"))
-    axes = stacked([2.0, 1.5] if several else [3.7 if style.crowded(record) else 2.2])
-    for ax in axes:
-        # amplitudes that hardly differ need long numbers
-        ax.yaxis.set_label_coords(-0.115, 0.5)
-    _draw_numbers(axes[0], record, along, replace(found, error=error), None)
-    usual = style.finite(value)
-    is_wide = usual.size > 0 and float(usual.max()) > LOG_RATIO * float(np.median(usual))
-    if explosive([value.ravel()]) or (is_wide and explosive([found.value.ravel()])):
-        # a motion that a scheme damps away would fill the frame with its decades
-        least = np.nanmin(np.append(size, np.nanmax(value))) / frame.UNBOUNDED
-        style.fit_log_axis(axes[0], "y", np.maximum(value, least), room=2.0)
-    else:
-        axes[0].set_ylim(*_room(replace(found, value=value, error=error), None))
-    leaves = _mark_members(axes[0], along, found.value)
-    if several:
-        _draw_error_bars(axes[1], record, along, found, error)
-        leaves |= _mark_members(axes[1], along, found.error)
-    below = " Bottom: its error, estimated from the two finest levels." if several else ""
-    if several and experiment.model.definition.turn is not None:
-        below += " Members that go over the top have no amplitude."
-    marked = _finish(axes, experiment, along)
-    return Picture(
-        name="amplitude",
-        title="Amplitude over the swept parameter",
-        caption=f"{'Top: half' if several else 'Half'} the height between the last peak and the last trough, on the "
-        f"finest level.{below}{marked}{f' {frame.LEAVING}' if leaves else ''}",
-        alt=f"Amplitude{' and its estimated error' if several else ''} against the swept parameter",
-        figure=axes[0].get_figure(root=True),
-    )
-
-
-def _finish(axes: list[Axes], experiment: Experiment, along: Along) -> str:
-    """Give the common axis its scale, label and separatrix; return the sentence on the latter."""
+def _finish(ax: Axes, experiment: Experiment, along: Along) -> str:
+    """Give the axis of the key its scale, label and separatrix; return the sentence on the latter."""
     key = along.key
     if key.is_log:
         room = (key.distinct[-1] / key.distinct[0]) ** 0.03
-        style.log_axis(axes[-1], "x", float(key.distinct[0] / room), float(key.distinct[-1] * room))
+        style.log_axis(ax, "x", float(key.distinct[0] / room), float(key.distinct[-1] * room))
     if key.words:
-        axes[-1].set_xticks(key.distinct, key.words)
-    axes[-1].set_xlabel(key.label)
+        ax.set_xticks(key.distinct, key.words)
+    ax.set_xlabel(key.label)
     is_alone = len(along.lines) == 1 and not along.follows
     found = separatrix.on_line(experiment, key).tolist() if is_alone else []
-    for ax in axes:
-        for x in found:
-            ax.axvline(x, color="black", linestyle=(0, (1, 2)), linewidth=1.0, zorder=1)
-    return " Dotted: the separatrix, where the exact period is infinite." if found else ""
+    for x in found:
+        ax.axvline(x, color="black", linestyle=(0, (1, 2)), linewidth=1.0, zorder=1)
+    return "Dotted: the separatrix, where the exact period is infinite." if found else ""
 
 
 def _draw_orders(
@@ -158,18 +281,19 @@ def _draw_orders(
         text = f"{due(record, quantity)}, {order:g} ± {tolerance:g}"
         ax.axhline(order, **style.REFERENCE, label=text)
     value, low, high = finest_level.orders(record, quantity)
+    several = len(record["scheme"]) > 1
     for s, scheme in enumerate(record.words("scheme")):
-        look = style.look(s) | {"linestyle": "-", "markersize": 4, "linewidth": 0.8}
-        for k, (_, members) in enumerate(along.lines):
+        for k, (name, members) in enumerate(along.lines):
+            look = style.look(s * len(along.lines) + k) | {"markersize": 4, "linewidth": 0.8}
             x = along.key.values[members]
             _interval(ax, x, low[s, members], high[s, members], look["color"])
-            _line(ax, x, value[s, members], label="" if k else style.entry(scheme), **look)
+            label = _text(scheme if several else "", name) or style.entry(scheme)
+            _line(ax, x, value[s, members], label=label, **look | {"linestyle": "-"})
     if promised:
         least, most = promised[0][0], promised[-1][0]
         bottom, top = style.limits(value, np.array([least - 0.25, most + 0.25]))
         ax.set_ylim(max(bottom, least - 3), min(top, most + 2))
     ax.set_ylabel(f"order of {words.symbol(quantity)} ({TYPICAL_NORM})")
-    ax.set_title("Stated order with its interval")
     style.beside(ax, **({"fontsize": 7.5} if style.crowded(record) else {}))
 
 
@@ -188,15 +312,21 @@ def _draw_errors(ax: Axes, record: Record, along: Along, quantity: str) -> tuple
     )
     true, estimate = style.no_zeros(found.true), style.no_zeros(found.estimate)
     for s, scheme in enumerate(schemes):
-        look = style.look(s)
-        several = f", {scheme}" if len(schemes) > 1 else ""
-        for k, (_, members) in enumerate(along.lines):
+        for k, (name, members) in enumerate(along.lines):
+            look, named = (
+                style.look(s * len(along.lines) + k),
+                _text(scheme if len(schemes) > 1 else "", name),
+            )
             x, here = along.key.values[members], (s, members)
             _interval(ax, x, low[here], high[here], look["color"])
-            text = "" if k else f"estimated{several}"
+            text = named or "estimated"
             _line(ax, x, estimate[here], color=look["color"], linewidth=1.0, label=text)
             if np.isfinite(true[here]).any():
-                text = "" if k else f"true{several}"
+                text = (
+                    f"_true, {named}"
+                    if named and np.isfinite(estimate[here]).any()
+                    else named or "true"
+                )
                 dots = look | {"linestyle": "none", "markersize": 4, "markerfacecolor": "white"}
                 _line(ax, x, true[here], label=text, **dots)
     leaves = False
@@ -205,8 +335,8 @@ def _draw_errors(ax: Axes, record: Record, along: Along, quantity: str) -> tuple
         if style.fit_log_axis(ax, "y", np.concatenate(values, axis=None), below=0.005, least=DEEP):
             leaves = _mark_members(ax, along, found.best)
             break
-    ax.set_ylabel(style.label(f"error of {words.symbol(quantity)}", norm_unit(record, quantity)))
-    ax.set_title(f"Error on level {whole(record, 'level')[-1]} ({TYPICAL_NORM} norm)")
+    text = f"error of {words.symbol(quantity)} ({TYPICAL_NORM})"
+    ax.set_ylabel(style.label(text, norm_unit(record, quantity)))
     if not style.crowded(record):
         style.beside(ax)
     return found.kind, leaves
@@ -220,14 +350,14 @@ def _draw_verdicts(ax: Axes, along: Along, status: NDArray[Any], schemes: list[s
         xs, ys = [np.empty(0)], [np.empty(0)]
         for s in range(len(schemes)):
             found = x[status[s][order] == word]
-            thinned = style.thin(found, np.full(found.size, s + 0.17 * i))
+            thinned = style.thin(found, np.full(found.size, s + RISE * i))
             xs, ys = [*xs, thinned[0]], [*ys, thinned[1]]
         ax.plot(
             np.concatenate(xs), np.concatenate(ys), linestyle="none", marker=style.STATUS_MARKERS[word],
             markersize=3.5 if many else 5, color=style.STATUS_COLOURS[word], markeredgecolor="black",
             markeredgewidth=0.3, label=f"{word} ({int((status == word).sum())})", clip_on=False,
         )  # fmt: skip
-    ax.set_yticks(np.arange(len(schemes)) + 0.17, schemes, fontsize=8.0 if many else 8.5)
+    ax.set_yticks(np.arange(len(schemes)) + RISE, schemes, fontsize=8.0 if many else 8.5)
     ax.set_ylim(-0.3, len(schemes) - 0.3)
     ax.grid(visible=False, axis="y")
     if not many:
@@ -252,10 +382,11 @@ def _draw_numbers(
         for s, scheme in enumerate(schemes):
             value, error = found.value[s, members], found.error[s, members]
             label = _text(scheme if len(schemes) > 1 else "", name) or f"level {level}"
-            look = _mark(s, s + k, len(schemes))
+            look = _mark(s, s * len(along.lines) + k, len(schemes))
             _interval(ax, x, value - error, value + error, look["color"])
-            dashes = "none" if x.size <= MOST_MARKERS else "-"
-            _line(ax, x, value, linestyle=dashes, label=label, **look)
+            # beside the exact line dots are seen better
+            dashes = "none" if exact is not None and x.size <= MOST_MARKERS else "-"
+            _line(ax, x, value, linestyle=dashes, linewidth=1.0, label=label, **look)
     ax.set_ylim(*_room(found, exact))
     ax.set_ylabel(style.label(found.name, found.unit))
     ax.set_title(f"{found.name.capitalize()}, level {level}")
@@ -300,15 +431,17 @@ def _draw_period_errors(ax: Axes, record: Record, along: Along, found: Measured)
 def _draw_error_bars(ax: Axes, record: Record, along: Along, found: Measured, held: Floats) -> None:
     """Draw the estimated error of a number of the finest level, in a frame that holds the errors `held`."""
     for s, scheme in enumerate(record.words("scheme")):
-        for k, (_, members) in enumerate(along.lines):
-            look = style.look(s if len(along.lines) == 1 else s + k) | {"markersize": 4}
-            error, text = style.no_zeros(found.error[s, members]), "" if k else style.entry(scheme)
+        for k, (name, members) in enumerate(along.lines):
+            look = style.look(s * len(along.lines) + k) | {"markersize": 4}
+            text = _text(scheme if len(record["scheme"]) > 1 else "", name) or style.entry(scheme)
+            error = style.no_zeros(found.error[s, members])
             _line(ax, along.key.values[members], error, **look, label=text)
     # of a motion that is damped away the error falls for ever
     shown = held if np.isfinite(held).any() else found.error
     style.fit_log_axis(ax, "y", shown, least=DEEP, room=2.0)
     ax.set_ylabel(style.label("estimated error", found.unit))
-    ax.set_title(f"Error bar of the {found.name}")
+    if len(along.lines) > 1 and not style.crowded(record):
+        style.beside(ax, fontsize=8)
 
 
 def _mark_members(ax: Axes, along: Along, values: Floats) -> bool:

@@ -97,10 +97,9 @@ def order_and_stability(experiment: Experiment, record: Record) -> Picture | Non
     return Picture(
         name="order_and_stability",
         title="Theory beside measurement: growth and phase error per period",
-        caption="Curves: what the matrix of one step predicts, solid where the amplitude grows or the peaks come "
-        "early, dotted where it decays or they come late. Dots: what was measured. The slope of a curve is the order "
-        "of that error. A scheme without a curve at the top neither grows nor decays by theory; its dots are "
-        "what rounding or the interpolation of peaks leaves. Triangles at the upper edge are limits of stability."
+        caption="Curves: theory, solid where the amplitude grows or the peaks come early, dotted where it decays "
+        "or they come late. Dots: measured. The slope of a curve is the order of that error. A scheme without a "
+        "curve at the top neither grows nor decays by theory. Triangles at the upper edge are limits of stability."
         + _sentence(alike),
         alt="Growth per period and phase error per period of every scheme against w dt, predicted and measured",
         figure=axes[0].get_figure(root=True),
@@ -245,9 +244,8 @@ def growing(experiment: Experiment, record: Record) -> Picture | None:
         name="growing",
         title="Unstable runs: growth predicted and measured",
         caption="Runs whose w dt is at or beyond the limit of stability of their scheme; the legend has the factor by "
-        "which the amplitude grows in each natural period, measured and by theory. On the logarithmic scale a "
-        "constant factor in every step is a straight line; it should become parallel to the dashed one, the factor "
-        "that the matrix of one step predicts. How far above or below depends on the start.",
+        "which the amplitude grows in each natural period, measured and by theory. The lines should become parallel "
+        "to the dashed ones of theory. How far above or below depends on the start.",
         alt=f"{words.name(quantity)} of unstable runs against time, linear and logarithmic, with the predicted growth",
         figure=upper.get_figure(root=True),
     )

@@ -59,14 +59,13 @@ def overlay(record: Record, quantity: str, member: Member) -> Picture:
             f"{letter}{words.lowered(levels[0])} is {letter} on level {levels[0]}, and so on. Top: the differences "
             f"between successive levels{what}",
             f"Then {SPREAD}" if spread else "",
-            "Below it: the ratio of successive differences; it should settle at the dashed line. Near a zero crossing "
-            "a ratio of two small numbers means nothing: it is left out."
+            "Below it: the ratio of successive differences, which should settle at the dashed line; none near a zero "
+            "crossing."
             if ratios
             else "",
-            "Last: the order at each time, from the sizes of the differences in a window of half a period, with its "
-            "interval as a band. Grey dots: uncertain, the two differences have different shapes there or are near "
-            "round-off (interval wider than 1). Gaps: within round-off, or nothing differs. Circles: the last point, "
-            "which stands for itself."
+            "Last: the order at each time, over a window of half a period, with its interval. Grey dots: uncertain "
+            "(interval wider than 1). Gaps: within round-off, or nothing differs. Circle: the last time step, judged "
+            "separately."
             if orders
             else "",
         ),

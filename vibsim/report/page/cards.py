@@ -16,12 +16,15 @@ from vibsim.report.evidence import figure
 from vibsim.report.lead import is_trap
 from vibsim.report.tables import checks as check_tables
 from vibsim.report.tables import published
+from vibsim.report.tables.table import Column, Table
 from vibsim.report.text import assertions, changes, reasons, words
 from vibsim.report.types import Check, Experiment, Measurement
 
-BADGES = {"PASS": "passed", "INCONCLUSIVE": "undecided", "FAIL": "failed"}
 SAID_BY_THE_LINE = ("value", "equal", "converges")
 """Kinds of checks of which the line says all where they pass."""
+ALIKE = (
+    6  # checks on a number, or on solutions that are equal, from which on their lines are a table
+)
 WIDE = 1.0  # an interval that reaches further below its order is worth a sentence
 
 
@@ -37,14 +40,35 @@ def cards(
     ]
 
 
-def badge(asserted: Check | None, status: str) -> str:
-    """Return the word on a check: passed, as claimed, trap caught, refuted, undecided or failed."""
-    if status == "PASS" and asserted is not None:
-        if asserted.kind == "claim":
-            return "as claimed" if asserted.holds else "refuted"
-        if is_trap(asserted):
-            return "trap caught"
-    return BADGES.get(status, status)
+def gathered(
+    made: list[dict[str, Any]], decides: str | None
+) -> tuple[list[dict[str, Any]], list[dict[str, Any]]]:
+    """Return the cards that stand alone, and the many alike, of which the line says all, as tables of lines.
+
+    The check that decides stands alone.
+    """
+    groups = []
+    for kind in SAID_BY_THE_LINE[:2]:
+        plain = [
+            c for c in made
+            if c["measures"] == kind and c["badge"] == words.BADGES["PASS"] and c["id"] != decides and not c["note"]
+        ]  # fmt: skip
+        if len(plain) < ALIKE:
+            continue
+        made = [c for c in made if c not in plain]
+        wanted = {c["wanted"] for c in plain}
+        names = ["check", "got"] if len(wanted) == 1 else ["check", "wanted", "got"]
+        rows = tuple(tuple(c["what" if name == "check" else name] for name in names) for c in plain)
+        groups.append(
+            {
+                "what": f"{plain[0]['what']}, and {len(plain) - 1} more",
+                "wanted": wanted.pop() if len(wanted) == 1 else "as listed",
+                "table": Table(
+                    f"checks_{kind}", "Checks that passed", tuple(map(Column, names)), rows
+                ),
+            }
+        )
+    return made, groups
 
 
 def card(experiment: Experiment, record: Record, check: Mapping[str, Any]) -> dict[str, Any]:
@@ -76,7 +100,7 @@ def card(experiment: Experiment, record: Record, check: Mapping[str, Any]) -> di
         "id": check["id"],
         "status": status,
         "measures": measured.kind if measured else check["kind"],
-        "badge": badge(asserted, status),
+        "badge": words.badge(check),
         "what": assertions.about(asserted) if asserted else assertions.OF_TOLERANCE,
         "source": assertions.source(asserted) if asserted else "",
         "wanted": _wanted(experiment, asserted, check),
@@ -167,8 +191,8 @@ def _keeps_promise(record: Record, measured: Measurement | None, check: Mapping[
 
 
 def _alone(check: Mapping[str, Any]) -> str:
-    """Return the commands that run the listed members alone, a line for each; of a check that passes the first."""
-    listed = (check.get("results") or [])[: 1 if check["status"] == "PASS" else None]
+    """Return the commands that run the listed members alone, a line for each."""
+    listed = check.get("results") or []
     lines: dict[str, str] = {}
     for result in listed:
         if result.get("command"):

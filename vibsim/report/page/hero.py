@@ -144,13 +144,13 @@ def _order(record: Record, lead: Lead) -> Iterator[Number]:
     due = f"the scheme promises {promised}" if of == "promised" else f"{promised} is expected"
     due = f"what is {of} depends on the member" if promised == of else due
     facts = lead.result.get("facts") or {}
-    norm = data.norm_index(record)
+    norm = data.norm_index(record, lead.norm)
     if lead.is_on_order:
         order, low, high = (facts.get(f"order{end}") for end in ("", "_low", "_high"))
     else:
         order, low, high = data.stated_order(record, quantity, member, norm)
     reason = lead.result.get("reason") if lead.is_on_order else None
-    orders = finest_level.orders(record, quantity)[0][member.scheme]
+    orders = finest_level.orders(record, quantity, lead.norm)[0][member.scheme]
     if f"{quantity}_status" in record:
         # what is undecided has an estimate at most
         orders = orders[data.flags(record, f"{quantity}_status")[member.scheme] != "INCONCLUSIVE"]
@@ -188,7 +188,7 @@ def _error(record: Record, lead: Lead) -> Iterator[Number]:
             note = "the levels do not tell it"
             yield {"label": "Error of the finest level", "value": "not known", "note": note}
         return
-    mean = error / drawn.root_of_duration(record, member.case)
+    mean = error / math.sqrt(drawn.duration(record, member.case))
     unit = data.norm_unit(record, quantity, "linf")
     size = (
         f"{words.number(100.0 * relative, 'brief')} % of the size of {words.symbol(quantity)}, "

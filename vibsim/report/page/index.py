@@ -22,15 +22,14 @@ from vibsim.report.text import words
 
 UNREADABLE = ("DAMAGED", "MISSING")
 """Words for an experiment whose verdict cannot be read: it counts as failed."""
-TRAP, AS_CLAIMED = "trap caught", "as claimed"
-"""Marks of an experiment whose check expected a failure and got it, and of one that refuted a statement."""
+MARKS = words.TRAP, words.REFUTED
+"""Words on checks that a card has, too: that something went wrong, as expected."""
 FILTERS = (
     ("PASS", "passed"),
     ("INCONCLUSIVE", "undecided"),
     ("FAIL", "failed"),
     ("UNREADABLE", "damaged or missing"),
-    (TRAP, TRAP),
-    (AS_CLAIMED, AS_CLAIMED),
+    *((mark, mark) for mark in MARKS),
 )
 """What cards can be filtered by, with its words."""
 HEADERS = (
@@ -73,7 +72,7 @@ class Row:
     broken: int = 0  # number of runs that broke down
     headline: Headline = field(default_factory=Headline)
     marks: Sequence[tuple[str, int]] = ()
-    """`TRAP` and `AS_CLAIMED`, with the number of checks."""
+    """Which of `MARKS` its checks have, with the number of checks."""
 
     @property
     def key(self) -> str:
@@ -180,7 +179,7 @@ def headline(checks: Sequence[Mapping[str, Any]]) -> Headline:
     """
     ranked = sorted(checks, key=lambda check: -SEVERITY[check["status"]])
     found = [(check, _decides(check)) for check in ranked]
-    wanted = [(check, result) for check, result in found if not is_trap(check)]
+    wanted = [(check, result) for check, result in found if not words.is_trap(check)]
     for _, result in wanted:
         order, relative = (words.fact(result, name) for name in ("order", "relative_error"))
         if result.get("status") == "INCONCLUSIVE":
@@ -203,22 +202,9 @@ def headline(checks: Sequence[Mapping[str, Any]]) -> Headline:
 
 
 def marks(checks: Sequence[Mapping[str, Any]]) -> list[tuple[str, int]]:
-    """Return `TRAP` and `AS_CLAIMED` with the number of checks that passed because something went wrong."""
-    passed = [check for check in checks if check["status"] == "PASS"]
-    refuted = [check for check in passed if is_refuted(check)]
-    traps = [check for check in passed if is_trap(check) and check not in refuted]
-    return [(mark, len(found)) for mark, found in ((TRAP, traps), (AS_CLAIMED, refuted)) if found]
-
-
-def is_refuted(check: Mapping[str, Any]) -> bool:
-    """Say whether a check expects a statement to be false."""
-    return bool(check["kind"] == "claim" and check["expected"] == "false")
-
-
-def is_trap(check: Mapping[str, Any]) -> bool:
-    """Say whether a check expects something else than a success: a failure, or a statement to be false."""
-    is_failure = str(check["expected"]).startswith(("FAIL", "INCONCLUSIVE"))
-    return is_refuted(check) or is_failure
+    """Return those of `MARKS` that checks have, with the number of checks."""
+    found = [words.badge(check) for check in checks]
+    return [(mark, found.count(mark)) for mark in MARKS if mark in found]
 
 
 def _heading(rows: Sequence[Row]) -> str:

@@ -17,7 +17,8 @@ from vibsim.core.vocabulary import TYPICAL_NORM
 from vibsim.experiment.collection import ADHOC, ENDINGS
 from vibsim.report import choice, data, lead, style
 from vibsim.report.figures import drawing, gallery, of_source, thumbnail
-from vibsim.report.page import cards, hero, player
+from vibsim.report.figures.view import View
+from vibsim.report.page import cards, explorer, hero, player
 from vibsim.report.style import Picture
 from vibsim.report.tables import best, checks, degrees, levels, members, published, theory, work
 from vibsim.report.tables.latex import to_latex
@@ -31,7 +32,10 @@ NOTHING: Mapping[str, Any] = {}
 MOST_ROWS = 8  # of a table that the page itself holds; the CSV file holds all
 ROOM = 220  # cells of all tables of numbers together; a table beyond is a file only
 BYTES = 1_000_000  # of all figures behind tabs; figures beyond are files only
-FIGURES = 8  # most figures behind the tabs of a section
+FIGURES = 6  # most figures behind the tabs of a section
+COPIED = (
+    40_000  # letters of a table that a page holds whole, to be copied; a longer one is a file only
+)
 LONG_HEADING = 90  # letters of a caption of which a heading has the first words only
 PYTHON = """\
 from vibsim import Experiment, analyse, simulate, verdicts
@@ -90,10 +94,8 @@ def write(
             "source": sourced,
             "motion": [drawn.add(picture) for picture in below.motion],
         }
-        tabs = {
-            "belief": drawn.tabs(below.belief, FIGURES),
-            "members": drawn.tabs(below.members, FIGURES),
-        }
+        tabs = {"belief": drawn.tabs(below.belief, FIGURES)}
+        views = drawn.views(below.members)
         small = thumbnail.thumbnail(experiment, convergence, shown[0])
     replace_files(directory / "figures", {**drawn.files, "thumbnail.svg": small.encode()})
     listed, others = _tables(experiment, convergence)
@@ -116,6 +118,7 @@ def write(
     made = cards.cards(experiment, convergence, summary)
     if "hero_evidence" in names and decisive.entry is not None:
         made = [c | {"picture": None} if c["id"] == decisive.entry["id"] else c for c in made]
+    alone, alike = cards.gathered(made, decisive.entry["id"] if decisive.entry else None)
     failures, more = words.broken(summary), len(summary.get("failures") or [])
     page = environment().get_template("report.html").render(
         hero.context(experiment, convergence, summary, decisive)
@@ -125,16 +128,22 @@ def write(
             "title": experiment.title,
             "status": summary["status"],
             "lead": next((c for c in made if decisive.entry and c["id"] == decisive.entry["id"]), None),
-            "figures": drawings | tabs,
+            "figures": drawings | tabs | {"members": views},
             "reading": {name: _captions(group) for name, group in drawings.items()}
-            | {name: _captions(p for _, group in found for p in group) for name, found in tabs.items()},
-            "checks": made,
-            "reading_of_checks": _reading_of_checks(made),
+            | {name: _captions(p for _, group in found for p in group) for name, found in tabs.items()}
+            | {"members": _readings(view.picture for view, _ in views)},
+            "members": explorer.content(experiment, convergence, [view for view, _ in views]),
+            "worst": explorer.worst(experiment, convergence, [view for view, _ in views]),
+            "shared": below.shared,
+            "checks": alone,
+            "alike": alike,
+            "reading_of_checks": _reading_of_checks(alone),
             "failures": broken and cut(broken),
             "unlisted": f"In all {failures} runs broke down; listed are the first {more}."
             if failures > more
             else "",
             "numbers_shown": [cut(table) for table in listed],
+            "tables": {table.name: copied(table) for table in (*printed, *listed)},
             "scales": scales,
             "undrawn": of_source.undrawn(sources, has_player=bool(moving)),
             "player_source": of_source.of_player(experiment),
@@ -190,6 +199,18 @@ class _Drawn:
                 self.left_out.append(tab.label)
         return found
 
+    def views(self, views: Sequence[View]) -> list[tuple[View, str]]:
+        """Return the views of members with their markup, as long as the page has room; the others are files only."""
+        found = []
+        for view in views:
+            picture, text = self.add(view.picture)
+            self.room -= len(text)
+            if self.room >= 0:
+                found.append((view, text))
+            else:
+                self.left_out.append(picture.title)
+        return found
+
 
 def _captions(drawn: Iterable[tuple[Picture, str]]) -> list[tuple[str, str]]:
     """Return how to read each kind of picture, once: what stands before the first colon of its title, and a caption."""
@@ -198,6 +219,15 @@ def _captions(drawn: Iterable[tuple[Picture, str]]) -> list[tuple[str, str]]:
         kind = picture.title.partition(":")[0].partition("?")[0]
         found.setdefault(kind, (kind + "?" * ("?" in picture.title), picture.caption))
     return list(found.values())
+
+
+def _readings(pictures: Iterable[Picture]) -> list[tuple[str, str]]:
+    """Return how to read pictures, each caption once, by the title of the first that has it."""
+    found: dict[str, str] = {}
+    for picture in pictures:
+        if picture.caption:
+            found.setdefault(picture.caption, picture.title)
+    return [(title, caption) for caption, title in found.items()]
 
 
 def _reading_of_checks(made: Iterable[Mapping[str, Any]]) -> list[tuple[str, str]]:
@@ -210,10 +240,21 @@ def _reading_of_checks(made: Iterable[Mapping[str, Any]]) -> list[tuple[str, str
 
 
 def cut(table: Table) -> tuple[str, Table, str]:
-    """Return the heading of a table, its first rows, and a sentence on the rows that only its file has."""
-    more = len(table.rows) - MOST_ROWS
-    told = f"{more} more rows are in tables/{table.name}.csv." if more > 0 else ""
-    return _heading(table.caption), replace(table, rows=table.rows[:MOST_ROWS]), told
+    """Return the heading of a table, its first rows in whole blocks, and a sentence on the rows of its file alone."""
+    shown = table.rows[:MOST_ROWS]
+    if len(shown) < len(table.rows) and (heads := table.heads):
+        # a block is shown whole, but the first
+        last = table.rows[len(shown)][:heads]
+        shown = tuple(row for row in shown if row[:heads] != last) or shown
+    more = len(table.rows) - len(shown)
+    told = f"{more} more rows are in tables/{table.name}.csv." if more else ""
+    return _heading(table.caption), replace(table, rows=shown).without_empty(), told
+
+
+def copied(table: Table) -> dict[str, str]:
+    """Return what buttons copy of a table: all of it, by the name of the format; nothing of a very long one."""
+    found = {"CSV": to_csv(table), "LaTeX": to_latex(table)}
+    return found if max(map(len, found.values())) <= COPIED else {}
 
 
 @cache

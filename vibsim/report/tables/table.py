@@ -61,12 +61,13 @@ class Table:
         if any(len(row) != len(self.columns) for row in self.rows):
             raise ValueError(f"table {self.name}: a row does not have {len(self.columns)} cells")
 
-    def without_empty(self, headers: Collection[str]) -> Table:
-        """Return the table without those columns of some headers that hold nothing."""
+    def without_empty(self, headers: Collection[str] | None = None) -> Table:
+        """Return the table without those columns of some headers, or of all but the heads, that hold nothing."""
         kept = [
             i
             for i, column in enumerate(self.columns)
-            if column.header not in headers or any(row[i] is not None for row in self.rows)
+            if not (column.header in headers if headers is not None else i >= self.heads)
+            or any(not is_nothing(row[i]) for row in self.rows)
         ]
         rows = tuple(tuple(row[i] for i in kept) for row in self.rows)
         return replace(self, columns=tuple(self.columns[i] for i in kept), rows=rows)
@@ -87,6 +88,11 @@ class Table:
             if form == "norm" and nonzero and not 0.1 <= min(nonzero) <= max(nonzero) < 1e4
             else form
         )
+
+
+def is_nothing(cell: Cell) -> bool:
+    """Say whether a cell holds nothing."""
+    return cell is None or (isinstance(cell, float) and math.isnan(cell))
 
 
 Fill = Callable[[Member, int], Cell]
@@ -174,6 +180,6 @@ def _harmless(text: str) -> str:
 
 
 def _exact(cell: Cell) -> str:
-    if cell is None or (isinstance(cell, float) and math.isnan(cell)):
+    if cell is None or is_nothing(cell):
         return ""
     return repr(float(cell)) if isinstance(cell, float) else str(cell)

@@ -1,12 +1,10 @@
 // Plots of a page: a line that follows the pointer through all plots of one kind, zoom of their common time axis, and
 // curves that their legend entries switch off. vibsim/report/figures/svg.py says what a panel (data-axis) carries.
-// Nothing is loaded; without this script every plot is as it was drawn.
+// Nothing is loaded; without this script every plot is as it was drawn. What it shares with others is in svg.js.
 (() => {
-"use strict";
 const NAMES = { time: "t", long: "t", step: "dt" };
 const LEAST = 1 / 200; // of the whole time, the least that is shown
 const NEAR = 8; // how far from a point its value is shown [point]
-const LETTER = 4.7; // about the width of a letter [point]
 const HINT = "Point at a plot to read its values. Drag to zoom in time, double-click to see all of it, click a legend "
   + "entry to hide it. Keys: arrows, + and −, Shift with arrows, 0.";
 const LONG_HINT = "Drag to move along the time, in the strip below to any of it. Wheel, + and − zoom, Shift with arrows moves on, "
@@ -15,16 +13,7 @@ const LINEAR = { to: (v) => v, from: (v) => v };
 const LOGARITHMIC = { to: Math.log10, from: (v) => 10 ** v };
 const groups = new Map(); // by kind of axis: panels, view (null: whole), at (null: no line)
 
-const numbers = (text) => text.split(" ").map(Number);
-const between = (value, low, high) => Math.min(Math.max(value, low), high);
-const signed = (number) => String(number).replace("-", "−");
 const nearest = (values, to) => values.reduce((a, b) => (Math.abs(b - to) < Math.abs(a - to) ? b : a), Infinity);
-const setAll = (node, attributes) => {
-  for (const key in attributes) node.setAttribute(key, attributes[key]);
-  return node;
-};
-const make = (name, attributes, parent) =>
-  parent.appendChild(setAll(document.createElementNS("http://www.w3.org/2000/svg", name), attributes));
 
 // What a panel holds
 
@@ -99,13 +88,6 @@ function valuesOf(panel, at) {
   });
 }
 
-function written(value) {
-  const size = Math.abs(value);
-  if (value === 0 || (size >= 1e-3 && size < 1e5)) return signed(Number(value.toPrecision(4)));
-  const [digits, power] = value.toExponential(3).split("e");
-  return `${signed(Number(digits))}·10${power.replace("+", "").replace(/./g, (c) => "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"["-0123456789".indexOf(c)])}`;
-}
-
 const nameOf = (group) => `${NAMES[group.kind]} = ${written(group.at)}`;
 
 // The line, and the values beside it
@@ -127,26 +109,6 @@ function draw(group) {
     const isFirst = group.panels.find((p) => p.svg === panel.svg) === panel;
     writeValues(panel, x, isFirst ? [{ text: nameOf(group) }, ...panel.rows] : panel.rows);
   }
-}
-
-function writeValues({ over, left, top, width, height }, x, rows) {
-  if (!rows.length) return;
-  const box = make("g", { "font-size": 8 }, over);
-  // to measure letters would lay out the page for every panel
-  const wide = Math.max(...rows.map(({ colour, text }) => LETTER * text.length + (colour ? 18 : 8)));
-  const paper = { fill: "#ffffff", "fill-opacity": 0.86, rx: 2, width: wide, height: 10.5 * rows.length + 4 };
-  make("rect", paper, box);
-  rows.forEach(({ y, colour, text }, i) => {
-    const down = 10.5 * (i + 1);
-    make("text", { x: colour ? 14 : 4, y: down }, box).textContent = text;
-    if (!colour) return;
-    make("path", { d: `M4 ${down - 3}h7`, stroke: colour, "stroke-width": 2 }, box);
-    if (y < top || y > top + height) return;
-    make("circle", { cx: x, cy: y, r: 2.4, fill: "#ffffff", stroke: colour, "stroke-width": 1.2 }, over);
-  });
-  const start = x + 6 + wide <= left + width ? x + 6 : Math.max(x - 6 - wide, 0);
-  box.setAttribute("transform", `translate(${start} ${top + 2})`);
-  over.append(box);
 }
 
 // Zoom
@@ -213,7 +175,7 @@ function pan(group, { panel, view, x }, to) {
 function listen(svg) {
   const own = panels.filter((panel) => panel.svg === svg);
   let start = null; // of a selection
-  const pointOf = (event) => new DOMPoint(event.clientX, event.clientY).matrixTransform(svg.getScreenCTM().inverse());
+  const pointOf = (event) => pointIn(svg, event);
   const under = (event) => {
     const { x, y } = pointOf(event);
     const panel = own.find((p) => x >= p.left && x <= p.left + p.width && y >= p.top && y <= p.top + p.height);
@@ -327,7 +289,8 @@ function listenToEntry(node) {
   });
 }
 
-const panels = [...document.querySelectorAll("g[data-axis]")].map(readPanel);
+const panels = [...document.querySelectorAll("g[data-axis]:not([data-axis=member])")].map(readPanel);
+document.querySelectorAll("[data-entry]").forEach(listenToEntry);
 if (!panels.length) return;
 const back = document.body.appendChild(document.createElement("button"));
 const said = document.body.appendChild(document.createElement("p"));
@@ -337,7 +300,6 @@ setAll(said, { class: "said", role: "status" });
 const hint = (text) => Object.assign(document.createElement("p"), { className: "soft hint", textContent: text });
 (panels[0].svg.closest("section") ?? document.body).append(hint(HINT));
 new Set(panels.map((panel) => panel.svg)).forEach(listen);
-document.querySelectorAll("[data-entry]").forEach(listenToEntry);
 const long = panels.find((panel) => panel.first);
 if (long) {
   long.svg.after(hint(LONG_HINT));

@@ -23,7 +23,7 @@ def setup(experiment: Experiment, record: Record) -> Iterator[tuple[str, str]]:
     keys = {key for axis in axes for key in axis.keys}
     sizes = {p.key: data.pretty_unit(p.unit) for p in model.parameters}
     units = {state.name: data.pretty_unit(state.unit) for state in model.states}
-    yield "Model", f"{model.title}: {model.equation}"
+    yield "Model", model.title
     for name, spec in experiment.model.tables.items():
         steps = (
             "no step contains one of its points"

@@ -77,6 +77,27 @@ def passed(statuses: Sequence[str], one: str = "check", many: str = "checks") ->
     return f"{statuses.count('PASS')} of {len(statuses)} {one if len(statuses) == 1 else many}"
 
 
+BADGES = {"PASS": "passed", "INCONCLUSIVE": "undecided", "FAIL": "failed"}
+TRAP, REFUTED = "trap caught", "refuted"
+"""Words on a check that expected a failure and got it, and on a statement that is false as the experiment expects."""
+
+
+def badge(check: Mapping[str, Any]) -> str:
+    """Return the word on a check of a summary: passed, as claimed, trap caught, refuted, undecided or failed."""
+    if check["status"] != "PASS":
+        return BADGES.get(check["status"], str(check["status"]))
+    if check["kind"] == "claim":
+        return REFUTED if is_trap(check) else "as claimed"
+    return TRAP if is_trap(check) else BADGES["PASS"]
+
+
+def is_trap(check: Mapping[str, Any]) -> bool:
+    """Say whether a check of a summary expects a failure, or a statement to be false."""
+    if check["kind"] == "claim":
+        return bool(check["expected"] == "false")
+    return str(check["expected"]).startswith(("FAIL", "INCONCLUSIVE"))
+
+
 def broken(summary: Mapping[str, Any]) -> int:
     """Return the number of runs that broke down, listed or not."""
     return int(summary.get("failure_count") or len(summary.get("failures") or []))

@@ -1,0 +1,127 @@
+"""The members of a sweep as data of a page: where each stands in the views, its numbers, its verdict, its command.
+
+A page stays small, so of very many members some can be pointed at: those of an even grid, and the worst ones.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from shlex import quote
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vibsim.core.record import Record
+from vibsim.report import data, style, sweep_layout
+from vibsim.report.figures.view import View
+from vibsim.report.sweep_layout import Key
+from vibsim.report.text import words
+from vibsim.report.types import Experiment
+
+POINTS = 2000
+"""Most points of a view that can be pointed at; a page holds some of very many members."""
+
+
+def worst(
+    experiment: Experiment, record: Record, views: Sequence[View]
+) -> list[tuple[str, str, str]]:
+    """Return the members that are marked: the letters of the quantities, its name, and the command that runs it."""
+    found: dict[int, dict[str, None]] = {}
+    for view in views:
+        if view.worst is not None:
+            found.setdefault(view.worst, {})[words.symbol(view.quantity)] = None
+    start, end = _around(experiment)
+    return [
+        (
+            ", ".join(letters),
+            data.case_name(record, case),
+            f"{start}{int(record['case'][case])}{end}",
+        )
+        for case, letters in found.items()
+    ]
+
+
+def _around(experiment: Experiment) -> tuple[str, str]:
+    """Return what stands before and behind the number of a member in its command."""
+    start, _, end = quote(f"{experiment.word}@0").rpartition("0")
+    return f".venv/bin/vibsim run {start}", end
+
+
+def content(experiment: Experiment, record: Record, views: Sequence[View]) -> dict[str, Any] | None:
+    """Return what the script of a page reads; None without a view in which members have a place."""
+    shown = [view for view in views if view.panels]
+    if not shown:
+        return None
+    keys = sweep_layout.keys(record)
+    most = POINTS // max(len(view.schemes) for view in shown)
+    marked = [view.worst for view in shown if view.worst is not None]
+    cases = listed(keys, len(record["case"]), most, marked)
+    quantities = dict.fromkeys(view.quantity for view in shown)
+    return {
+        "command": _around(experiment),
+        "count": len(record["case"]),
+        "cases": record["case"][cases].tolist(),
+        "keys": [
+            {"name": key.key, "unit": key.unit, "words": key.words, "values": _numbers(key.values[cases], 6)}
+            for key in keys
+        ],
+        "schemes": record.words("scheme"),
+        "verdicts": {name: found for name in quantities if (found := _verdicts(record, name, cases))},
+        "views": {view.picture.name: _view(view, cases) for view in shown},
+    }  # fmt: skip
+
+
+def listed(keys: Sequence[Key], count: int, most: int, marked: Iterable[int]) -> NDArray[np.intp]:
+    """Return the positions of at most about `most` members, and of those that are marked, in ascending order.
+
+    Of a grid they are a coarser grid: even ones of the values of each key.
+    """
+    if count <= most:
+        return np.arange(count)
+    room, kept = most, np.ones(count, dtype=bool)
+    for i, key in enumerate(sorted(keys, key=lambda key: key.distinct.size)):
+        # keys of few values leave room for the others
+        part = max(int(room ** (1.0 / (len(keys) - i))), 1)
+        chosen = key.distinct[style.spaced(key.distinct.size, part)]
+        kept &= np.isin(key.values, chosen)
+        room //= min(part, key.distinct.size)
+    if not most / 4 <= kept.sum() <= most:
+        kept = np.isin(np.arange(count), style.spaced(count, most))
+    return np.union1d(np.flatnonzero(kept), np.fromiter(marked, dtype=np.intp))
+
+
+def _view(view: View, cases: NDArray[np.intp]) -> dict[str, Any]:
+    def of(values: Any, digits: int = 5) -> list[Any] | None:
+        return (
+            None if values is None else [_numbers(values[s, cases], digits) for s in view.schemes]
+        )
+
+    position = None if view.worst is None else int(np.searchsorted(cases, view.worst))
+    return {
+        "name": view.name, "unit": view.unit, "texts": view.texts, "quantity": view.quantity,
+        "schemes": view.schemes, "panels": view.panels, "values": of(view.values), "places": of(view.places),
+        "worst": position,
+    }  # fmt: skip
+
+
+def _verdicts(record: Record, quantity: str, cases: NDArray[np.intp]) -> dict[str, Any] | None:
+    """Return the verdicts on a quantity as numbers of texts, by scheme and member."""
+    if f"{quantity}_status" not in record:
+        return None
+    status, reason = (
+        data.flags(record, f"{quantity}_{of}")[:, cases] for of in ("status", "reason")
+    )
+    texts, place = np.unique((status + " (" + reason + ")").astype(str), return_inverse=True)
+    on = words.symbol(quantity)
+    return {"on": on, "texts": texts.tolist(), "of": place.reshape(status.shape).tolist()}
+
+
+def _numbers(values: Any, digits: int) -> list[float | int | None]:
+    """Return numbers of some significant digits; None for those that do not exist."""
+    rounded = (float(f"{value:.{digits}g}") for value in values.tolist())
+    return [
+        None if not math.isfinite(x) else int(x) if x.is_integer() and abs(x) < 1e6 else x
+        for x in rounded
+    ]
