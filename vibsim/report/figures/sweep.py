@@ -294,7 +294,7 @@ def _draw_orders(
         bottom, top = style.limits(value, np.array([least - 0.25, most + 0.25]))
         ax.set_ylim(max(bottom, least - 3), min(top, most + 2))
     ax.set_ylabel(f"order of {words.symbol(quantity)} ({TYPICAL_NORM})")
-    style.beside(ax, **({"fontsize": 7.5} if style.crowded(record) else {}))
+    _beside(ax, along, fontsize=7.5 if style.crowded(record) else 8.5)
 
 
 def _draw_errors(ax: Axes, record: Record, along: Along, quantity: str) -> tuple[str, bool]:
@@ -338,7 +338,7 @@ def _draw_errors(ax: Axes, record: Record, along: Along, quantity: str) -> tuple
     text = f"error of {words.symbol(quantity)} ({TYPICAL_NORM})"
     ax.set_ylabel(style.label(text, norm_unit(record, quantity)))
     if not style.crowded(record):
-        style.beside(ax)
+        _beside(ax, along)
     return found.kind, leaves
 
 
@@ -390,7 +390,7 @@ def _draw_numbers(
     ax.set_ylim(*_room(found, exact))
     ax.set_ylabel(style.label(found.name, found.unit))
     ax.set_title(f"{found.name.capitalize()}, level {level}")
-    style.beside(ax, fontsize=7.5 if style.crowded(record) else 8)
+    _beside(ax, along, fontsize=7.5 if style.crowded(record) else 8)
 
 
 def _room(found: Measured, exact: Floats | None) -> tuple[float, float]:
@@ -425,7 +425,7 @@ def _draw_period_errors(ax: Axes, record: Record, along: Along, found: Measured)
     style.fit_log_axis(ax, "y", *error.values(), room=2.0)
     ax.set(ylabel="|period / exact − 1|", title="Relative error of the period")
     if not style.crowded(record):
-        style.beside(ax, fontsize=8)
+        _beside(ax, along, fontsize=8)
 
 
 def _draw_error_bars(ax: Axes, record: Record, along: Along, found: Measured, held: Floats) -> None:
@@ -441,7 +441,7 @@ def _draw_error_bars(ax: Axes, record: Record, along: Along, found: Measured, he
     style.fit_log_axis(ax, "y", shown, least=DEEP, room=2.0)
     ax.set_ylabel(style.label("estimated error", found.unit))
     if len(along.lines) > 1 and not style.crowded(record):
-        style.beside(ax, fontsize=8)
+        _beside(ax, along, fontsize=8)
 
 
 def _mark_members(ax: Axes, along: Along, values: Floats) -> bool:
@@ -476,7 +476,17 @@ def _interval(ax: Axes, x: Floats, low: Floats, high: Floats, colour: str) -> No
 
 
 def _text(*parts: str) -> str:
-    return style.entry(", ".join(part for part in parts if part))
+    """Join the words of a legend entry; of a line that differs in one key its value is enough."""
+    short = (part if ", " in part else part.rpartition(" = ")[2] for part in parts if part)
+    return style.entry(", ".join(short))
+
+
+def _beside(ax: Axes, along: Along, **options: Any) -> None:
+    """Put the legend beside the axes, below the key in which lines differ."""
+    key = along.lines[0][0].rpartition(" = ")[0]
+    if key and ", " not in key:
+        options |= {"title": key, "title_fontsize": 8, "alignment": "left"}
+    style.beside(ax, **options)
 
 
 def _mark(scheme: int, colour: int, count: int) -> dict[str, Any]:
