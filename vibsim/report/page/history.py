@@ -7,9 +7,7 @@ disk may load a script, but no data. What it holds is data: an entry of another 
 
 from __future__ import annotations
 
-import base64
 import csv
-import hashlib
 import json
 from collections.abc import Mapping
 from contextlib import suppress
@@ -94,8 +92,3 @@ def _is_entry(entry: Any) -> bool:
     if not isinstance(entry, dict) or not isinstance(entry.get("made"), int):
         return False
     return all(isinstance(entry.get(key), str) for key in ("status", "number"))
-
-
-def digest_of(script: str) -> str:
-    """Return the digest of a script as a Content-Security-Policy writes it."""
-    return f"sha256-{base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()}"

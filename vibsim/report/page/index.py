@@ -14,7 +14,7 @@ from vibsim import store
 from vibsim.core.errors import FileError
 from vibsim.core.vocabulary import SEVERITY, worst
 from vibsim.experiment.collection import ADHOC
-from vibsim.report.page import history, source_figures
+from vibsim.report.page import history, policy, source_figures
 from vibsim.report.page.page import environment, markup
 from vibsim.report.tables.checks import error_of, measured_order, number_of
 from vibsim.report.tables.table import Column, Table, to_csv
@@ -122,7 +122,7 @@ def write_index(results: Path) -> None:
         "figures": source_figures.listed(results, sorted(folders)),
         "history": history.FILE,
         "script": markup(_script()),
-        "script_digest": history.digest_of(_script()),
+        "script_digest": policy.digest_of(_script()),
     }
     store.write_text(results / "index.html", template.render(context))
     cells = tuple(line for row in rows for line in _lines(row))

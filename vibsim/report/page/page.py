@@ -18,7 +18,7 @@ from vibsim.experiment.collection import ADHOC, ENDINGS
 from vibsim.report import choice, data, lead, style
 from vibsim.report.figures import drawing, gallery, of_source, thumbnail
 from vibsim.report.figures.view import View
-from vibsim.report.page import cards, explorer, hero, player
+from vibsim.report.page import cards, explorer, hero, player, policy
 from vibsim.report.style import Picture
 from vibsim.report.tables import best, checks, degrees, levels, members, published, theory, work
 from vibsim.report.tables.latex import to_latex
@@ -162,7 +162,7 @@ def write(
             "python": _python(experiment),
         }
     )  # fmt: skip
-    store.write_text(directory / "report.html", page)
+    store.write_text(directory / "report.html", policy.sealed(page))
 
 
 class _Drawn:

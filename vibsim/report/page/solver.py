@@ -15,7 +15,7 @@ from vibsim.core.record import Record
 from vibsim.experiment.solver import SolverExperiment, restore
 from vibsim.report import style
 from vibsim.report.figures import drawing, thumbnail
-from vibsim.report.page import study
+from vibsim.report.page import policy, study
 from vibsim.report.page.cards import provenance_rows
 from vibsim.report.page.page import environment, replace_files
 from vibsim.report.tables import checks as check_tables
@@ -65,7 +65,7 @@ def write(
         "facts": "summary.json",
     }
     page = environment().get_template("study.html").render(context)
-    store.write_text(directory / "report.html", page)
+    store.write_text(directory / "report.html", policy.sealed(page))
 
 
 def _card(

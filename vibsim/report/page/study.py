@@ -12,6 +12,7 @@ from vibsim.convergence import LadderVerdict
 from vibsim.convergence.study.figure import convergence_figure, shows_curves
 from vibsim.core.vocabulary import worst
 from vibsim.report import style
+from vibsim.report.page import policy
 from vibsim.report.page.page import environment
 from vibsim.report.style import Picture
 from vibsim.report.tables.table import Column, Table
@@ -64,7 +65,7 @@ def write(
         "facts": "verdict.json",
     }
     page = environment().get_template("study.html").render(context)
-    store.write_text(directory / "report.html", page)
+    store.write_text(directory / "report.html", policy.sealed(page))
     text = json.dumps(content, indent=1, ensure_ascii=False)
     store.write_text(directory / "verdict.json", text + "\n")
 
