@@ -241,7 +241,8 @@ def _draw_orders(
         colour, dashes = (part[k % style.MANY] for part in (style.COLOURS, style.DASHES))
         group = style.of_level(levels[i])
         band: dict[str, Any] = {"color": colour, "alpha": 0.18, "linewidth": 0, "gid": group}
-        ax.fill_between(t[:-1], low[:-1], high[:-1], where=sure[:-1].tolist(), **band)
+        borders = (np.where(sure, end, np.nan)[:-1] for end in (low, high))
+        ax.fill_between(*style.thin_band(t[:-1], *borders), **band)
         inner = style.thin(t[:-1], np.where(sure, order, np.nan)[:-1])
         line: dict[str, Any] = {"color": colour, "linestyle": dashes, "linewidth": 1.3}
         ax.plot(*inner, label=_triple(levels, i), gid=group, **line)
