@@ -59,13 +59,11 @@ def overlay(record: Record, quantity: str, member: Member) -> Picture:
             f"{letter}{words.lowered(levels[0])} is {letter} on level {levels[0]}, and so on. Top: the differences "
             f"between successive levels{what}",
             f"Then {SPREAD}" if spread else "",
-            "Below it: the ratio of successive differences, which should settle at the dashed line; none near a zero "
-            "crossing."
+            "Below it: their ratio, which should settle at the dashed line; none near a zero crossing."
             if ratios
             else "",
-            "Last: the order at each time, over a window of half a period, with its interval. Grey dots: uncertain "
-            "(interval wider than 1). Gaps: within round-off, or nothing differs. Circle: the last time step, judged "
-            "separately."
+            "Last: the order over time, with its interval. Grey dots: uncertain (interval wider than 1). Gaps: "
+            "round-off, or nothing differs. Circle: the last time step, judged separately."
             if orders
             else "",
         ),
