@@ -54,6 +54,21 @@ def test_thinning_leaves_short_series_alone():
     assert style.thin(t, t, 4)[0] is t
 
 
+def test_a_thinned_band_is_nowhere_narrower_and_keeps_long_gaps():
+    t = np.linspace(0, 1, 100_001)
+    low, high = np.sin(40 * t) - 0.1, np.sin(40 * t) + 0.1
+    low[54_321], high[70_000] = -9.0, 9.0
+    low[80_000:90_000] = high[80_000:90_000] = np.nan
+    x, least, most = style.thin_band(t, low, high)
+    assert x.size <= 2 * style.THINNED_POINTS
+    assert np.all(np.diff(x) > 0)
+    there = np.isfinite(low) & np.isfinite(np.interp(t, x, least))
+    assert there.sum() > 89_000
+    assert np.all(np.interp(t, x, least)[there] <= low[there])
+    assert np.all(np.interp(t, x, most)[there] >= high[there])
+    assert np.isnan(least[(x > 0.81) & (x < 0.89)]).all()
+
+
 def test_a_log_tick_is_written_as_a_power():
     assert style.log_tick(1e-12) == "10⁻¹²"
     assert style.log_tick(2e-3) == "2·10⁻³"

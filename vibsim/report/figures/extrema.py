@@ -72,8 +72,8 @@ def local(experiment: Experiment, record: Record, shown: list[Member]) -> Pictur
         name=f"extrema_{case}",
         title="Local periods and amplitudes, and the phase error from peak to peak",
         caption="Lines with markers: peaks interpolated by a parabola; faint circles: from grid points alone. Dashed: "
-        f"exact. Bottom: how much earlier than {reference} each peak comes; a straight line means the same phase "
-        "error in every period. Wide and pale: a curve with which others coincide."
+        f"exact. Bottom: how much earlier than {reference} each peak comes; straight: the same in every period. "
+        "Wide and pale: a curve with which others coincide."
         f"{f' {frame.LEAVING}' if leaves else ''}",
         alt="Local period, local amplitude and phase error against the number of the peak",
         figure=axes[0].get_figure(root=True),

@@ -59,13 +59,11 @@ def overlay(record: Record, quantity: str, member: Member) -> Picture:
             f"{letter}{words.lowered(levels[0])} is {letter} on level {levels[0]}, and so on. Top: the differences "
             f"between successive levels{what}",
             f"Then {SPREAD}" if spread else "",
-            "Below it: the ratio of successive differences, which should settle at the dashed line; none near a zero "
-            "crossing."
+            "Below it: their ratio, which should settle at the dashed line; none near a zero crossing."
             if ratios
             else "",
-            "Last: the order at each time, over a window of half a period, with its interval. Grey dots: uncertain "
-            "(interval wider than 1). Gaps: within round-off, or nothing differs. Circle: the last time step, judged "
-            "separately."
+            "Last: the order over time, with its interval. Grey dots: uncertain (interval wider than 1). Gaps: "
+            "round-off, or nothing differs. Circle: the last time step, judged separately."
             if orders
             else "",
         ),
@@ -241,7 +239,8 @@ def _draw_orders(
         colour, dashes = (part[k % style.MANY] for part in (style.COLOURS, style.DASHES))
         group = style.of_level(levels[i])
         band: dict[str, Any] = {"color": colour, "alpha": 0.18, "linewidth": 0, "gid": group}
-        ax.fill_between(t[:-1], low[:-1], high[:-1], where=sure[:-1].tolist(), **band)
+        borders = (np.where(sure, end, np.nan)[:-1] for end in (low, high))
+        ax.fill_between(*style.thin_band(t[:-1], *borders), **band)
         inner = style.thin(t[:-1], np.where(sure, order, np.nan)[:-1])
         line: dict[str, Any] = {"color": colour, "linestyle": dashes, "linewidth": 1.3}
         ax.plot(*inner, label=_triple(levels, i), gid=group, **line)

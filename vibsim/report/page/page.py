@@ -213,12 +213,15 @@ class _Drawn:
 
 
 def _captions(drawn: Iterable[tuple[Picture, str]]) -> list[tuple[str, str]]:
-    """Return how to read each kind of picture, once: what stands before the first colon of its title, and a caption."""
-    found: dict[str, tuple[str, str]] = {}
+    """Return how to read each kind of picture, once: what stands before the first colon of its title, and a caption.
+
+    A caption that several kinds share stands once, too.
+    """
+    found: dict[str, Picture] = {}
     for picture, _ in drawn:
         kind = picture.title.partition(":")[0].partition("?")[0]
-        found.setdefault(kind, (kind + "?" * ("?" in picture.title), picture.caption))
-    return list(found.values())
+        found.setdefault(kind + "?" * ("?" in picture.title), picture)
+    return _readings(replace(picture, title=kind) for kind, picture in found.items())
 
 
 def _readings(pictures: Iterable[Picture]) -> list[tuple[str, str]]:
