@@ -146,7 +146,9 @@ def test_without_results_a_movie_says_what_to_run(made: Made, capsys: Capture) -
     for path in made.small.glob("level_*.nc"):
         path.unlink()
     assert made.vibsim("movie", made.file) == 1
-    assert "there are no results yet: vibsim run" in capsys.readouterr().err
+    told = capsys.readouterr().err
+    assert "there are no results yet: vibsim run" in told
+    assert "looked in " in told
 
 
 def test_your_own_solver_has_no_movie(capsys: Capture) -> None:

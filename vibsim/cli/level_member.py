@@ -26,7 +26,9 @@ def made(plan: Plan, results: Path, case: int, word: str) -> tuple[list[int], li
     levels = [level.level for level in plan.levels]
     found = [level for level in levels if (results / _place(plan, level, case)[0]).is_file()]
     if not found:
-        raise VibsimError(f"{plan.key}: there are no results yet: vibsim run {word}")
+        raise VibsimError(
+            f"{plan.key}: there are no results yet: vibsim run {word} (looked in {results})"
+        )
     return levels, found
 
 

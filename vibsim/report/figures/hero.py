@@ -316,7 +316,12 @@ def _across(ax: Axes, key: sweep_layout.Key) -> None:
 
 def _ring(ax: Axes, x: float, y: float) -> None:
     if math.isfinite(x) and math.isfinite(y):
-        look: dict[str, Any] = {"markerfacecolor": "none", "markeredgewidth": 1.8, "zorder": 6}
+        look: dict[str, Any] = {
+            "markerfacecolor": "none",
+            "markeredgewidth": 1.8,
+            "zorder": 6,
+            "clip_on": False,
+        }
         ax.plot(
             [x], [y], "o", color="black", markersize=9, **look, label="decides", linestyle="none"
         )
