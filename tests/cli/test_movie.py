@@ -52,15 +52,20 @@ def test_a_movie_has_its_frames_and_the_same_bytes_every_time(
             assert container.streams.video[0].average_rate == 5
 
 
-def test_frames_are_numbered_and_those_of_a_longer_movie_go(made: Made, tmp_path: Path) -> None:
+def test_frames_are_numbered_and_those_of_a_longer_movie_stay(
+    made: Made, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     folder = tmp_path / "frames"
     assert made.vibsim("movie", made.file, "--frames", 5, "--frames-to", folder) == 0
-    (folder / "frame_notes.png").write_text("mine")
+    names = [f"frame_{k:04d}.png" for k in range(5)]
+    assert sorted(path.name for path in folder.iterdir()) == names
     first = (folder / "frame_0000.png").read_bytes()
-    assert made.vibsim("movie", made.file, "--frames", 3, "--frames-to", folder) == 0
-    names = [f"frame_{k:04d}.png" for k in range(3)]
-    assert sorted(path.name for path in folder.iterdir()) == [*names, "frame_notes.png"]
+    assert made.vibsim("movie", made.file, "--frames", 5, "--frames-to", folder) == 0
     assert (folder / "frame_0000.png").read_bytes() == first
+    capsys.readouterr()
+    assert made.vibsim("movie", made.file, "--frames", 3, "--frames-to", folder) == 2
+    assert "has the frames of a longer movie: take another folder" in capsys.readouterr().err
+    assert sorted(path.name for path in folder.iterdir()) == names
 
 
 def test_the_drawing_moves_as_the_level_file_says(made: Made, tmp_path: Path) -> None:

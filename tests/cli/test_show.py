@@ -104,7 +104,10 @@ def test_what_is_drawn_can_be_chosen(made: Made, capsys: Capture) -> None:
 @pytest.mark.parametrize(
     ("option", "told"),
     [
-        (("--quantity", "thet"), "--quantity: thet: is not in this file: did you mean 'theta'?"),
+        (
+            ("--quantity", "thet"),
+            "--quantity: thet: is not in this experiment: did you mean 'theta'?",
+        ),
         (("--scheme", "rk5"), "did you mean 'rk4'?"),
         (("--level", 9), "--level: 9: must be one of 6, 7, 8"),
         (("--case", 1), "--case: 1: must be from 0 to 0"),

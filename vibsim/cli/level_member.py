@@ -75,7 +75,7 @@ def chosen(option: str, wanted: str | None, names: Sequence[str]) -> str:
     if wanted is None:
         return names[0]
     if wanted not in names:
-        raise refusal(option, wanted, "is not in this file", nearest(wanted, names))
+        raise refusal(option, wanted, "is not in this experiment", nearest(wanted, names))
     return wanted
 
 

@@ -47,16 +47,18 @@ def movie(options: Namespace) -> int:
     _check_numbers(options, form)
     film = _film(plan, options, form)
     frames = drawing.frames(film, DOTS.get(form, DEFAULT_DOTS))
-    frames = _counted(_kept(frames, options.frames_to), film.t.size)
+    count, said = film.t.size, "1 frame" if film.t.size == 1 else f"{film.t.size} frames"
+    if options.frames_to is not None:
+        _check_folder(options.frames_to, count)
+    frames = _counted(_kept(frames, options.frames_to), count)
     if output is None:
         for _ in frames:
             pass
     else:
         write_bytes(output, encoding.movie(frames, _fps(options, form), form))
-        seconds = film.t.size / _fps(options, form)
-        print(f"{output}: {film.t.size} frames, {seconds:.1f} s")
+        print(f"{output}: {said}, {count / _fps(options, form):.1f} s")
     if options.frames_to is not None:
-        print(f"{options.frames_to}: {film.t.size} frames")
+        print(f"{options.frames_to}: {said}")
     if film.is_cut:
         last = f"{film.stop:.5g}"
         print(
@@ -163,24 +165,30 @@ def _check_times(options: Namespace, runs: Sequence[Run]) -> None:
         raise refusal("--from", f"{start:g}", "leaves no time to be shown")
 
 
+def _check_folder(folder: Path, count: int) -> None:
+    """Refuse a folder with frames that would stay beside the new ones."""
+    if folder.exists() and not folder.is_dir():
+        raise refusal("--frames-to", folder, "must be a folder, this is a file")
+    numbers = (
+        re.fullmatch(r"frame_(\d{4,})\.png", path.name) for path in folder.glob("frame_*.png")
+    )
+    if any(number is not None and int(number[1]) >= count for number in numbers):
+        raise refusal(
+            "--frames-to", folder, "has the frames of a longer movie: take another folder"
+        )
+
+
 def _kept(frames: Iterator[Pixels], folder: Path | None) -> Iterator[Pixels]:
-    """Yield frames, each after it was written to a folder; frames of a longer movie are removed there."""
+    """Yield frames, each after it was written to a folder."""
     from vibsim.report.movie import encoding
 
     if folder is None:
         yield from frames
         return
-    if folder.exists() and not folder.is_dir():
-        raise refusal("--frames-to", folder, "must be a folder, this is a file")
     folder.mkdir(parents=True, exist_ok=True)
-    names = set()
     for k, frame in enumerate(frames):
-        names.add(f"frame_{k:04d}.png")
         write_bytes(folder / f"frame_{k:04d}.png", encoding.png(frame))
         yield frame
-    for path in folder.glob("frame_*.png"):
-        if re.fullmatch(r"frame_\d{4,}\.png", path.name) and path.name not in names:
-            path.unlink()
 
 
 def _counted(frames: Iterator[Pixels], count: int) -> Iterator[Pixels]:

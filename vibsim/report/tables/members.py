@@ -105,11 +105,10 @@ def digits(record: Record) -> str:
     if not swept(record):
         return ""
     count = len(record["case"]) * len(record["scheme"])
-    measured = "every digit" if count <= LISTED else f"{DIGITS} significant digits"
-    return (
-        f"`tables/members.csv` lists all {words.number(count, 'integer')} members: swept values with every digit, "
-        f"measured numbers with {measured}."
-    )
+    listed = f"`tables/members.csv` lists all {words.number(count, 'integer')} members"
+    if count <= LISTED:
+        return f"{listed}."
+    return f"{listed}: swept values with every digit, measured numbers with {DIGITS} significant digits."
 
 
 SCHEME = "\0"  # stands for the name of a scheme, which may hold anything, until all else is written
