@@ -118,7 +118,9 @@ def test_a_signal_ends_it(file: Path, tmp_path: Path) -> None:
     """It shows the faults of each version of the file, goes on, and ends with the status of the signal."""
     file.write_text("title: one\nmodel: {kind: pendulm}\n")
     command = [sys.executable, "-m", "vibsim", "watch", str(file), "--results", str(tmp_path / "r")]
-    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as process:
+    with subprocess.Popen(
+        command, stderr=subprocess.PIPE, text=True, preexec_fn=_heeds_interrupts
+    ) as process:
         try:
             assert process.stderr is not None
             assert "did you mean 'pendulum'?" in _told(process.stderr)
@@ -130,6 +132,11 @@ def test_a_signal_ends_it(file: Path, tmp_path: Path) -> None:
             process.kill()
     assert process.returncode == 130
     assert "Traceback" not in rest
+
+
+def _heeds_interrupts() -> None:
+    """Undo what the background of a shell does: its programs ignore this signal."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
 
 
 def _told(stream: IO[str]) -> str:
