@@ -183,8 +183,13 @@ class Stress:
         if left := processes(str(self.results)):
             self.faults.append(f"{name}: left {[words(pid) for pid in left]}")
         if left := list(self.folder.joinpath("tmp").glob("vibsim-*")):
-            self.faults.append(f"{name}: left {left}")
-            shutil.rmtree(left[0])
+            texts = [path.read_text() for path in left if path.is_file()]
+            self.faults.append(f"{name}: left {left}: {texts}")
+            for path in left:
+                if path.is_dir():
+                    shutil.rmtree(path)
+                else:
+                    path.unlink()
         self.try_lock(name)
 
     def try_lock(self, name: str) -> None:

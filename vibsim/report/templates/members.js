@@ -94,7 +94,7 @@ function listen(details) {
   const words = caption.querySelector("span") ?? caption.appendChild(document.createElement("span"));
   const code = caption.querySelector("code") ?? caption.appendChild(document.createElement("code"));
   Object.assign(caption, { className: "member" });
-  caption.setAttribute("role", "status");
+  words.setAttribute("role", "status");
   Object.assign(copy, { type: "button", className: "copy", textContent: "Copy the command", hidden: !code.textContent });
   copy.addEventListener("click", () => copyText(copy, code.textContent));
   code.before(" ");
