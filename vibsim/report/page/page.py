@@ -32,7 +32,7 @@ NOTHING: Mapping[str, Any] = {}
 MOST_ROWS = 8  # of a table that the page itself holds; the CSV file holds all
 ROOM = 220  # cells of all tables of numbers together; a table beyond is a file only
 BYTES = 1_000_000  # of all figures behind tabs; figures beyond are files only
-FIGURES = 5  # most figures behind the tabs of a section
+FIGURES = 6  # most figures behind the tabs of a section
 COPIED = (
     40_000  # letters of a table that a page holds whole, to be copied; a longer one is a file only
 )
