@@ -160,9 +160,9 @@ def over_members(
         drawn = maps.views(experiment, record, grid, found, worst, schemes)
     else:
         drawn = members.views(experiment, record, keys, found, worst, schemes)
-    views, told = list[View](), list[str]()
-    for one in drawn:
-        (told if isinstance(one, str) else views).append(one)  # type: ignore[arg-type]
+    shown = list(drawn)
+    views = [one for one in shown if isinstance(one, View)]
+    told = [one for one in shown if isinstance(one, str)]
     for quantity in found if data.whole(record, "pair") else ():
         # the verdict that colours them is on the order
         picture = members.histograms(experiment, record, quantity)

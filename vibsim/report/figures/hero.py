@@ -16,6 +16,7 @@ from vibsim.core.record import Record
 from vibsim.report import choice, data, finest_level, style, sweep_layout
 from vibsim.report.data import Member
 from vibsim.report.figures import panels, time
+from vibsim.report.figures.view import ring
 from vibsim.report.lead import Lead
 from vibsim.report.style import Picture
 from vibsim.report.text import findings, words
@@ -314,19 +315,6 @@ def _across(ax: Axes, key: sweep_layout.Key) -> None:
     ax.set_xlabel(key.label)
 
 
-def _ring(ax: Axes, x: float, y: float) -> None:
-    if math.isfinite(x) and math.isfinite(y):
-        look: dict[str, Any] = {
-            "markerfacecolor": "none",
-            "markeredgewidth": 1.8,
-            "zorder": 6,
-            "clip_on": False,
-        }
-        ax.plot(
-            [x], [y], "o", color="black", markersize=9, **look, label="decides", linestyle="none"
-        )
-
-
 def _curves(
     record: Record, lead: Lead, along: sweep_layout.Along, values: Floats, text: str
 ) -> Axes:
@@ -337,7 +325,12 @@ def _curves(
         ax.plot(x, y, color=style.COLOURS[i % style.MANY], linewidth=1.6, label=name or None, **few)
     _across(ax, along.key)
     _scaled(ax, "y", values)
-    _ring(ax, float(along.key.values[lead.member.case]), float(values[lead.member.case]))
+    ring(
+        ax,
+        float(along.key.values[lead.member.case]),
+        float(values[lead.member.case]),
+        label="decides",
+    )
     if ax.get_legend_handles_labels()[0]:
         ax.legend(loc="best", fontsize=8, handlelength=1.8)
     return ax
@@ -375,7 +368,7 @@ def _map(lead: Lead, grid: sweep_layout.Grid, values: Floats, text: str) -> Axes
     ax.plot(
         [x], [y], "o", color="white", markersize=11, markerfacecolor="none", markeredgewidth=3.0
     )
-    _ring(ax, x, y)
+    ring(ax, x, y, label="decides")
     return ax
 
 
@@ -386,7 +379,7 @@ def _dots(lead: Lead, key: sweep_layout.Key, values: Floats, text: str) -> Axes:
     )
     _across(ax, key)
     _scaled(ax, "y", values)
-    _ring(ax, float(key.values[lead.member.case]), float(values[lead.member.case]))
+    ring(ax, float(key.values[lead.member.case]), float(values[lead.member.case]), label="decides")
     return ax
 
 
@@ -425,7 +418,7 @@ def orders(experiment: Experiment, record: Record, lead: Lead) -> Picture | None
         _across(ax, key)
         ax.set_ylim(*style.limits(shown[known], around))
         case = lead.member.case
-        _ring(ax, float(key.values[case]), float(shown[case]))
+        ring(ax, float(key.values[case]), float(shown[case]), label="decides")
     inside = known & (np.abs(order - promised) <= allowed)
     kept, every = (words.number(int(n), "integer") for n in (inside.sum(), order.size))
     title = (

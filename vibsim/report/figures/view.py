@@ -91,14 +91,19 @@ def shared(name: str, values: Floats, unit: str = "", form: str = "step") -> str
     return f"{name} {number} {unit}".rstrip() + who
 
 
-def ring(ax: Axes, x: float, y: float, *, on_map: bool = False) -> bool:
-    """Draw a ring around the worst member; say whether it has a place on the axes."""
-    if not (np.isfinite(x) and np.isfinite(y)):
-        return False
-    look: dict[str, Any] = {"linestyle": "none", "markerfacecolor": "none", "zorder": 6}
+def ring(ax: Axes, x: float, y: float, *, on_map: bool = False, label: str | None = None) -> bool:
+    """Draw a ring around the worst member, whole at an edge, too; say whether it has a place on the axes."""
     limits = ax.get_xlim(), ax.get_ylim()
+    if not all(low <= at <= high for at, (low, high) in zip((x, y), limits, strict=True)):
+        return False
+    look: dict[str, Any] = {
+        "linestyle": "none",
+        "markerfacecolor": "none",
+        "zorder": 6,
+        "clip_on": False,
+    }
     if on_map:
         ax.plot([x], [y], "o", color="white", markersize=11, markeredgewidth=3.0, **look)
-    ax.plot([x], [y], "o", color="black", markersize=9, markeredgewidth=1.8, **look)
+    ax.plot([x], [y], "o", color="black", markersize=9, markeredgewidth=1.8, label=label, **look)
     ax.set(xlim=limits[0], ylim=limits[1])
-    return all(low <= at <= high for at, (low, high) in zip((x, y), limits, strict=True))
+    return True
