@@ -1,7 +1,8 @@
 """Frames as a movie file: MP4, WebM or GIF, the same bytes every time.
 
 MP4 and WebM are written by FFmpeg's libraries (package ``av``, which brings them), GIF by Pillow. Every video is
-encoded by one thread, because what several write depends on their number. No file holds a date.
+encoded by one thread, because what several write depends on their number, and x264 without its machine code for
+single processors, because what that writes was once seen to change from run to run. No file holds a date.
 
 Source: vibration text, section 3.2 (formats of movies, and codecs).
 """
@@ -18,7 +19,7 @@ from vibsim.core.errors import VibsimError
 from vibsim.report.movie.drawing import COLOURS, Pixels
 
 VIDEOS: dict[str, tuple[str, dict[str, str]]] = {
-    "mp4": ("libx264", {"crf": "20", "preset": "fast", "threads": "1"}),
+    "mp4": ("libx264", {"crf": "20", "preset": "fast", "threads": "1", "x264-params": "asm=0"}),
     "webm": ("libvpx-vp9", {"crf": "32", "b": "0", "cpu-used": "5", "threads": "1"}),
 }
 """Codec and its options by the ending of a file."""
