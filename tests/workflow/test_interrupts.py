@@ -121,6 +121,25 @@ def test_a_killed_run_leaves_nothing_at_work_and_no_lock(
     wait_for(lambda: nothing_is_left(tmp_path))
 
 
+def test_an_interrupt_that_a_library_takes_for_its_own_fault_is_one() -> None:
+    """As it happens where it comes while numpy imports its C code."""
+    program = """
+import os, signal, sys
+from vibsim.cli import arguments, main
+def parsed(_):
+    try:
+        os.kill(os.getpid(), signal.SIGINT)
+        signal.pause()
+    except BaseException:
+        raise ImportError("failed to import") from None
+arguments.parsed = parsed
+sys.exit(main())
+"""
+    command = [sys.executable, "-c", program]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=LIMIT, check=False)
+    assert (done.returncode, done.stderr) == (130, TOLD)
+
+
 @pytest.mark.slow
 def test_a_signal_that_is_ignored_stays_so(tmp_path: Path) -> None:
     """As `nohup` does: a run goes on when its terminal goes away."""

@@ -89,12 +89,19 @@ def ended_by(status: int) -> int:
     return number if number in ENDS else 0
 
 
+def check_interrupted() -> None:
+    """Raise the request to end once more: C code takes what is raised in its imports for a fault of the import."""
+    if _request:
+        raise Interrupted(_request)
+
+
 def known_pid() -> int:
     """Return the process that a user knows as this command, and may send a signal to."""
     return _supervisor or os.getpid()
 
 
 _supervisor = 0
+_request = 0
 
 
 def _heeded() -> set[signal.Signals]:
@@ -137,6 +144,8 @@ def _work(
 
 def _interrupt(number: int, _: object) -> None:
     """Unwind the stack, once; what falls on the way out is no news."""
+    global _request
+    _request = number
     for other in ENDS:
         signal.signal(other, signal.SIG_IGN)
     sys.unraisablehook = lambda _: None
