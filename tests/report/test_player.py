@@ -40,6 +40,11 @@ MODELS = {
         {"kind": "oscillator", "damping": {"linear": 0.2}, "force": "2*cos(3*t)"},
         {"u": 1.0},
     ),
+    # the force that makes this the solution names the coefficient of damping, a parameter with a path
+    "manufactured": (
+        {"kind": "oscillator", "damping": {"linear": 0.2}, "exact": "cos(t)"},
+        {},
+    ),
 }
 
 

@@ -36,14 +36,13 @@ def motion(
 
 
 def parameters(experiment: Experiment, record: Record, case: int) -> Mapping[str, Any]:
-    """Return the parameters of a member: what is swept has its value."""
+    """Return the parameters of a member by their names in formulas: what is swept has its value."""
     found: dict[str, Any] = dict(experiment.model.parameters)
     for name in data.swept(record):
         section, _, key = data.swept_label(record, name)[0].partition(".")
         if section == "model":
             found[key] = data.pick(record, name, case=case).item()
-    # a declared parameter goes by its own name in formulas
-    return {key.rpartition(".")[2]: value for key, value in found.items()}
+    return {row.name: found[row.key] for row in experiment.model.definition.parameters}
 
 
 def window(span: float, period: float) -> float:
