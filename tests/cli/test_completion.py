@@ -37,6 +37,7 @@ from vibsim.schemes import SCHEMES
         (["list", "schema", ""], []),
         (["explain", ""], sorted(REASONS)),
         (["explain", "exact", ""], []),
+        (["theory", "rkn"], ["rkn4"]),
         (["new", "mine.yaml", "--model", "pend"], ["pendulum"]),
         (["new", "mine.yaml", "--like", "theta_c"], ["theta_convergence"]),
         (["judge", "x.csv", "--restrict", "m"], ["mean"]),

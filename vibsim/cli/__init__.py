@@ -64,5 +64,7 @@ def _perform(arguments: Sequence[str]) -> int:
 
 def _failed(error: Exception) -> int:
     from vibsim.cli.failure import report
+    from vibsim.cli.run.supervise import check_interrupted
 
+    check_interrupted()
     return report(error)

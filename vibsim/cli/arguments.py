@@ -115,6 +115,8 @@ def commands() -> Iterator[Command]:
     reason = _row("reason", _word, "REASON", text, nargs="?")
     text = "Explain the reason of a verdict: what it means and what would settle the question."
     yield "explain", "commands.explain", text, (reason,)
+    text = "Print the theory of a scheme on u'' + w^2 u = 0 as formulas in w dt."
+    yield "theory", "commands.theory", text, tuple(_theory())
     text = "experiment whose report is opened (default: the index over all results)"
     page = _row("experiment", _word, "EXPERIMENT", text, nargs="?")
     text = "Open a report in the browser; print its path where there is none."
@@ -180,6 +182,15 @@ def _new() -> Iterator[_Row]:
     yield _row("file", _path, "FILE", "experiment file to write; one that is there is kept")
     yield _row("--model", _word, "KIND", "kind of the model (default: pendulum)")
     yield _row("--like", _word, "EXPERIMENT", "begin with the text of a shipped experiment")
+
+
+def _theory() -> Iterator[_Row]:
+    """Yield the options of ``vibsim theory``."""
+    yield _row("scheme", _word, "SCHEME", "scheme, such as rk4")
+    text = "option of the scheme, such as beta=1/6"
+    yield _row("options", _word, "NAME=VALUE", text, nargs="*")
+    yield _row("--terms", _positive, "N", "terms of each series (default: 4)", default=4)
+    yield _flag("--latex", "write the formulas as LaTeX")
 
 
 def _show() -> Iterator[_Row]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import textwrap
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from typing import TYPE_CHECKING
 
 from vibsim.cli import terminal
@@ -14,7 +14,7 @@ from vibsim.core.errors import nearest
 if TYPE_CHECKING:
     from vibsim.models import Model
     from vibsim.models.base import Parameter
-    from vibsim.schemes import AnyOption, Scheme
+    from vibsim.schemes import AnyOption, Options, Scheme
 
 _WIDEST = 100
 Row = tuple[str, str]
@@ -30,12 +30,32 @@ def in_full(what: str, name: str) -> list[str]:
         Where there is none of that name, with the nearest.
     """
     from vibsim.models import MODELS
+
+    if what == "schemes":
+        return laid_out(_scheme(scheme_named(name)))
+    if name not in MODELS:
+        raise refusal("NAME", name, "is no model", nearest(name, sorted(MODELS)))
+    return laid_out(_model(MODELS[name]))
+
+
+def scheme_named(name: str) -> Scheme:
+    """Return a scheme that was asked for on the command line.
+
+    Raises
+    ------
+    InputError
+        Where there is none of that name, with the nearest.
+    """
     from vibsim.schemes import SCHEMES
 
-    known = sorted(MODELS if what == "models" else SCHEMES)
-    if name not in known:
-        raise refusal("NAME", name, f"is no {what.removesuffix('s')}", nearest(name, known))
-    rows = list(_model(MODELS[name]) if what == "models" else _scheme(SCHEMES[name]))
+    if name not in SCHEMES:
+        raise refusal("NAME", name, "is no scheme", nearest(name, sorted(SCHEMES)))
+    return SCHEMES[name]
+
+
+def laid_out(found: Iterable[Row]) -> list[str]:
+    """Return the lines of rows, labels before texts, no wider than the terminal."""
+    rows = list(found)
     width = max(len(label) for label, _ in rows)
     columns = min(terminal.columns(), _WIDEST)
     lines = []
@@ -83,18 +103,28 @@ def _scheme(scheme: Scheme) -> Iterator[Row]:
 
 def facts(scheme: Scheme) -> tuple[str, ...]:
     """Return order, kind of step, symplectic or not, forces per step and stability limit, with default options."""
-    from vibsim.theory import stability_limit
-
     forces = str(scheme.force_evaluations)
     symplectic = "yes" if scheme.symplectic else "no"
     if scheme.adaptive:
         return "-", "adaptive", symplectic, forces, "chooses its own steps"
     options = scheme.defaults()
-    limit = stability_limit(scheme, options)
-    stable = {math.inf: "none", 0.0: "grows at every step"}.get(limit, f"w dt < {limit:.6g}")
     kind = "explicit" if scheme.explicit else "implicit"
     per_step = forces if scheme.explicit else f"{forces} x iterations"
-    return f"{scheme.orders(options).position:g}", kind, symplectic, per_step, stable
+    return (
+        f"{scheme.orders(options).position:g}",
+        kind,
+        symplectic,
+        per_step,
+        stable_until(scheme, options),
+    )
+
+
+def stable_until(scheme: Scheme, options: Options) -> str:
+    """Return the stability limit of a scheme with equal steps."""
+    from vibsim.theory import stability_limit
+
+    limit = stability_limit(scheme, options)
+    return {math.inf: "none", 0.0: "grows at every step"}.get(limit, f"w dt < {limit:.6g}")
 
 
 def choices(option: AnyOption) -> str:

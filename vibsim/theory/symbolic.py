@@ -8,6 +8,7 @@ Source: vibration text (B), equations (18)-(20), sections 5.6 and 7.2, exercises
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
 
@@ -67,13 +68,24 @@ def phase_error_series(stepper: Stepper, terms: int = TERMS) -> Any:
     return _polynomial(1.0 - _principal(stepper, terms).square.shifted(-2) ** -HALF, terms)
 
 
-def solution(stepper: Stepper) -> Any:
-    """Return ``u^n`` for ``u(0) = I``, ``u'(0) = V``, of a scheme that has two roots and no parasitic one.
+@dataclass(frozen=True)
+class TwoRoots:
+    """What the solution of a scheme without parasitic roots consists of, in the symbols of this module.
 
-    ``u^n = r^n (u^0 cos(n th) + (u^1/r - u^0 cos th) sin(n th)/sin th)``, r the growth per step and th = w~ dt.
-    ValueError where the scheme has parasitic roots, or a start that is no step.
+    ``u^n = r^n (u^0 cos(n th) + (u^1/r - u^0 cos(th)) sin(n th)/sin(th))``, ``u^0 = I``.
     """
-    from sympy import acos, cos, sin, sqrt
+
+    growth: Any
+    """r, the growth of the amplitude per step."""
+    cosine: Any
+    """cos(th), th = w~ dt."""
+    first: tuple[Any, Any]
+    """What ``u^1`` has of I and of ``V dt``, for ``u(0) = I``, ``u'(0) = V``."""
+
+
+def two_roots(stepper: Stepper) -> TwoRoots:
+    """Return the parts of the solution; ValueError with parasitic roots, or a start that is no step."""
+    from sympy import sqrt
 
     step, first = _matrices(stepper)
     polynomial = [value[0] for value in characteristic_of(step[None])]
@@ -81,14 +93,23 @@ def solution(stepper: Stepper) -> Any:
     # u^2 - T u^1 + D u^0 for u_0 = 1 and for v_0 dt = 1
     gaps = (step @ first)[0] - first[0] * trace + np.array([1, 0], dtype=object) * determinant
     if any(polynomial[3:]) or any(gaps):
-        raise ValueError("a scheme with parasitic roots has no solution with two terms")
-    n, begin, push = symbol("n"), symbol("I"), symbol("V") / symbol("w") * symbol("p")
+        raise ValueError(
+            "the scheme has parasitic roots, so that its solution has more than two terms"
+        )
     r = sqrt(_expression(determinant))
-    angle = acos(_expression(trace) / (2 * r))
-    one = _expression(first[0, 0]) * begin + _expression(first[0, 1]) * push
-    return r**n * (
-        begin * cos(n * angle) + (one / r - begin * cos(angle)) * sin(n * angle) / sin(angle)
-    )
+    one, other = map(_expression, first[0])
+    return TwoRoots(r, _expression(trace) / (2 * r), (one, other))
+
+
+def solution(stepper: Stepper) -> Any:
+    """Return ``u^n`` for ``u(0) = I``, ``u'(0) = V``, as one formula; ValueError where there is no `two_roots`."""
+    from sympy import acos, cos, sin
+
+    parts, n, begin = two_roots(stepper), symbol("n"), symbol("I")
+    angle = acos(parts.cosine)
+    first = parts.first[0] * begin + parts.first[1] * symbol("V") / symbol("w") * symbol("p")
+    swing = (first / parts.growth - begin * cos(angle)) * sin(n * angle) / sin(angle)
+    return parts.growth**n * (begin * cos(n * angle) + swing)
 
 
 @lru_cache(maxsize=64)

@@ -112,7 +112,7 @@ def _of(settings: dict[str, object], name: str, given: Sequence[str]) -> Iterabl
         from vibsim.models import MODELS
 
         return MODELS
-    if name == "name" and given[:1] == ["schemes"]:
+    if name == "scheme" or (name == "name" and given[:1] == ["schemes"]):
         from vibsim.schemes import SCHEMES
 
         return SCHEMES

@@ -1,0 +1,125 @@
+"""``vibsim theory``: the formulas that are printed, worked out, are the numbers of the theory."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import pytest
+
+from vibsim import theory
+from vibsim.cli import main
+from vibsim.plan import checkout
+from vibsim.schemes import FIXED_STEP, SCHEMES
+
+Capture = pytest.CaptureFixture[str]
+P = 0.1
+
+
+def rows(words: Sequence[str], capsys: Capture) -> dict[str, str]:
+    """Return what is printed, by its labels; lines that go on are joined."""
+    assert main(["theory", *words]) == 0
+    found: dict[str, str] = {}
+    label = ""
+    for line in capsys.readouterr().out.splitlines():
+        head, text = line[:17].strip(), line[17:]
+        label = head or label
+        found[label] = f"{found.get(label, '')} {text}".strip()
+    return found
+
+
+def value(formula: str, **names: complex) -> Any:
+    """Work out a printed formula, in which a space between two factors is a product."""
+    text = re.sub(r"(?<=[\w)]) (?=[\w(])", "*", formula).replace("^", "**")
+    return eval(text, {"sqrt": np.sqrt, **names})
+
+
+def series(row: str) -> str:
+    return row.partition(" = ")[2].partition(" + O(")[0]
+
+
+@pytest.mark.parametrize("kind", FIXED_STEP)
+def test_what_is_printed_is_the_theory_of_the_scheme(kind: str, capsys: Capture) -> None:
+    found = rows([kind, "--terms", "5"], capsys)
+    stepper = SCHEMES[kind].stepper(SCHEMES[kind].defaults())
+    numbers = theory.roots(stepper, P)
+    assert value(series(found["amplitude"]), p=P) == pytest.approx(
+        np.exp(float(numbers.log_growth)), abs=1e-8
+    )
+    assert value(series(found["frequency"]), p=P) == pytest.approx(
+        float(numbers.angle) / P, abs=1e-8
+    )
+    assert value(series(found["phase"]), p=P) == pytest.approx(
+        float(theory.phase_error_per_period(stepper, P)), abs=1e-8
+    )
+    step = theory.amplification(stepper, P).matrix.rounded
+    polynomial = found["roots"].removesuffix(" = 0")
+    # roots that are 0 are not written
+    for root in (root for root in np.linalg.eigvals(step) if abs(root) > 1e-6):
+        assert abs(value(polynomial, p=P, x=complex(root))) < 1e-7
+
+
+@pytest.mark.parametrize("words", [["rk4"], ["newmark", "beta=1/6"], ["central"]], ids=" ".join)
+def test_the_solution_that_is_printed_is_the_discrete_one(
+    words: list[str], capsys: Capture
+) -> None:
+    text = rows(words, capsys)["solution"]
+    parts = re.search(r"with r = (.*) cos\(th\) = (.*) u_1 = (.*)", text)
+    assert parts is not None
+    r, cosine, first = parts.groups()
+    begin, push, n = 1.1, -0.6, np.arange(200)
+    th = np.arccos(value(cosine, p=P))
+    growth, one = value(r, p=P), value(first, p=P, I=begin, V=push, dt=P)
+    swing = (one / growth - begin * np.cos(th)) * np.sin(n * th) / np.sin(th)
+    options = {"beta": 1 / 6} if "newmark" in words else {}
+    scheme = SCHEMES[words[0]]
+    stepper = scheme.stepper({**scheme.defaults(), **options})
+    wanted, _ = theory.discrete(stepper, 1.0, P, begin, push, n)
+    np.testing.assert_allclose(growth**n * (begin * np.cos(n * th) + swing), wanted, atol=1e-7)
+
+
+def test_the_documents_have_the_series_of_every_scheme(capsys: Capture) -> None:
+    """Schemes with the same series share a row."""
+    kinds: dict[tuple[str, str], list[str]] = {}
+    for kind in FIXED_STEP:
+        found = rows([kind, "--terms", "3"], capsys)
+        row = (series(found["amplitude"]), series(found["frequency"]))
+        kinds.setdefault(row, []).append(f"`{kind}`")
+    table = [f"| {', '.join(names)} | {' | '.join(row)} |" for row, names in kinds.items()]
+    assert "\n".join(table) in (checkout() / "docs/schemes.md").read_text()
+
+
+def test_formulas_are_written_as_latex(capsys: Capture) -> None:
+    found = rows(["central", "--latex", "--terms", "2"], capsys)
+    assert found["frequency"] == r"w~/w = 1 + \frac{p^{2}}{24} + O(p^{4})"
+
+
+def test_a_scheme_with_parasitic_roots_has_no_written_solution(capsys: Capture) -> None:
+    assert rows(["ab2"], capsys)["solution"].startswith(
+        "not written: the scheme has parasitic roots"
+    )
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (["rk5"], "rk5: is no scheme"),
+        (["dop853"], "dop853: chooses its own steps"),
+        (["newmark", "bet=1"], "bet: is no option of newmark: did you mean 'beta'?"),
+        (["newmark", "beta"], "beta: needs a value: such as beta=0.25"),
+        (["newmark", "beta=7"], "7: is no value of this option: 0 to 1"),
+        (["newmark", "beta=a"], "a: is no value of this option: 0 to 1"),
+        (["central", "start=late"], "late: is no value of this option: centred |"),
+        (["central", "frequency_correction=1"], "is no value of this option: true | false"),
+        (["rk4", "rk2"], "rk2: is no option of rk4: it has none"),
+        (["rk4", "a=1"], "is no option of rk4: it has none"),
+    ],
+    ids=lambda words: " ".join(words) if isinstance(words, list) else "",
+)
+def test_what_is_no_scheme_or_option_is_refused(
+    words: list[str], told: str, capsys: Capture
+) -> None:
+    assert main(["theory", *words]) == 2
+    assert told in capsys.readouterr().err
