@@ -67,6 +67,19 @@ def test_a_table_that_converges_passes(table: Callable[..., str], capsys: Captur
     assert out.endswith("1 quantity, 1 passed: PASS\n")
 
 
+def test_values_are_written_so_that_their_differences_show(
+    table: Callable[..., str], tmp_path: Path, capsys: Capture
+) -> None:
+    sizes = [2.0**-k for k in range(3, 12)]
+    path = table("h,u\n" + "".join(f"{h},{1 + 0.3 * h**4!r}\n" for h in sizes))
+    assert main(["judge", path, "--h", "h", "--order", "4", "--report", str(tmp_path)]) == 0
+    lines = [line.split() for line in capsys.readouterr().out.splitlines()]
+    shown = [words[1] for words in lines if len(words) > 6 and words[0][0].isdigit()]
+    page = (tmp_path / "report.html").read_text()
+    assert len(shown) == len(set(shown)) == len(sizes)
+    assert all(text in page for text in shown)
+
+
 def test_without_quantities_every_other_column_is_judged(
     table: Callable[..., str], capsys: Capture
 ) -> None:

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from types import MappingProxyType
 from typing import Any
 
@@ -278,6 +279,16 @@ def number(value: float | None, digits: int) -> str:
         mantissa, has_power, exponent = f"{value:.{digits - 1}e}".partition("e")
         mantissa = mantissa.rstrip("0").rstrip(".") if "." in mantissa else mantissa
     return f"{mantissa}e{int(exponent)}" if has_power else mantissa
+
+
+def digits_of_values(values: Iterable[float | None]) -> int:
+    """Return how many significant digits show the smallest difference of neighbouring values, 8 at least."""
+    known = [value for value in values if value is not None]
+    steps = [abs(a - b) for a, b in pairwise(known) if a != b]
+    if not steps:
+        return 8
+    digits = 2 + math.log10(max(map(abs, known))) - math.log10(min(steps))
+    return math.ceil(min(max(8, digits), 17))
 
 
 def at_most(bound: float) -> str:

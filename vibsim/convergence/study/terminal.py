@@ -6,7 +6,7 @@ import math
 import textwrap
 from collections.abc import Iterator, Sequence
 
-from vibsim.convergence.study.sentences import number
+from vibsim.convergence.study.sentences import digits_of_values, number
 from vibsim.convergence.study.verdict_data import Level, VerdictData
 
 COLUMNS = 100
@@ -25,7 +25,8 @@ def _lines(verdict: VerdictData, columns: int) -> Iterator[str]:
     for text in filter(None, (verdict.sentence, verdict.advice)):
         yield textwrap.indent(textwrap.fill(text, columns - 2), "  ")
     yield ""
-    rows = [_head(verdict), *(_row(level, verdict) for level in verdict.levels)]
+    digits = digits_of_values(level.value for level in verdict.levels) if verdict.is_number else 4
+    rows = [_head(verdict), *(_row(level, digits) for level in verdict.levels)]
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     bars = ["", *_bars(verdict.levels)]
     if any(bars):
@@ -41,8 +42,7 @@ def _head(verdict: VerdictData) -> Sequence[str]:
     return verdict.size_name, value, error, "difference", "ratio", "order"
 
 
-def _row(level: Level, verdict: VerdictData) -> Sequence[str]:
-    digits = 8 if verdict.is_number else 4
+def _row(level: Level, digits: int) -> Sequence[str]:
     return (
         number(level.h, 6),
         number(level.value, digits),

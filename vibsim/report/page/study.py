@@ -10,12 +10,13 @@ from typing import Any
 from vibsim import store
 from vibsim.convergence import LadderVerdict
 from vibsim.convergence.study.figure import convergence_figure, shows_curves
+from vibsim.convergence.study.sentences import digits_of_values, number
 from vibsim.core.vocabulary import worst
 from vibsim.report import style
 from vibsim.report.page import policy
 from vibsim.report.page.page import environment
 from vibsim.report.style import Picture
-from vibsim.report.tables.table import Column, Table
+from vibsim.report.tables.table import Column, Table, Written
 from vibsim.report.text import findings, words
 
 UNSEEN = (
@@ -151,8 +152,9 @@ def _table(verdict: LadderVerdict) -> Table:
         Column("ratio", form="norm"),
         Column("order", form="order"),
     )
+    digits = digits_of_values(row.value for row in verdict.levels) if verdict.is_number else 4
     rows = tuple(
-        (row.h, row.value, row.error, row.difference, row.ratio, row.order)
+        (row.h, _value(row.value, digits), row.error, row.difference, row.ratio, row.order)
         for row in verdict.levels
     )
     caption = (
@@ -162,6 +164,10 @@ def _table(verdict: LadderVerdict) -> Table:
     if not verdict.is_number:
         caption += " Norms are root mean squares over the common points."
     return Table("levels", caption, columns, rows)
+
+
+def _value(value: float | None, digits: int) -> Written | None:
+    return None if value is None else Written(value, words.printed(number(value, digits)))
 
 
 def _picture(name: str, verdict: LadderVerdict) -> Picture:
