@@ -278,9 +278,9 @@ def rule(check: ValueCheck, notation: Notation = PLAIN) -> str:
     if key != "equals":
         return f"{key} {notation.number(wanted)}"
     # counted numbers are equal, or apart by more
-    if VALUES[check.value].measure == "count" and check.allowed < 0.5:
-        return f"equal to {notation.number(wanted, 15)}"
-    return f"equal to {notation.digits(repr(wanted))} within {notation.number(check.allowed)}"
+    is_counted = VALUES[check.value].measure == "count" and check.allowed < 0.5
+    within = "" if is_counted else f" within {notation.number(check.allowed)}"
+    return f"equal to {notation.number(wanted, 15)}{within}"
 
 
 def describe(f: Found, check: ValueCheck) -> Description:

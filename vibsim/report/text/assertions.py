@@ -87,7 +87,7 @@ def _measured(check: Measurement) -> str:
                 ("is below", check.below),
                 ("is above", check.above),
             )
-            given = [f" {verb} {words.PAGE.digits(repr(x))}" for verb, x in bounds if x is not None]
+            given = [f" {verb} {words.PAGE.number(x, 15)}" for verb, x in bounds if x is not None]
             near = (("rtol", check.rtol), ("atol", check.atol))
             tolerances = [f"{key} {words.PAGE.number(x)}" for key, x in near if x is not None]
             extra = f" ({', '.join(tolerances)})" if tolerances else ""
