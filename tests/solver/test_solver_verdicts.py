@@ -21,12 +21,12 @@ Levels = Callable[[int, float], float]
 
 
 def experiment(
-    folder: Path, checks: str, more: str = "", h: Sequence[float] = H
+    folder: Path, checks: str, more: str = "", h: Sequence[float] = H, u: str = "{}"
 ) -> SolverExperiment:
     file = folder / "study.yaml"
     file.write_text(
         f"title: a study\nsolver: {{command: 'solve {{h}} {{output}} {{a}}'}}\nrefine: {{h: {list(h)}{more}}}\n"
-        f"quantities: {{u: {{}}}}\nsweep: {{a: [1.0, 2.0]}}\nchecks: {checks}\n"
+        f"quantities: {{u: {u}}}\nsweep: {{a: [1.0, 2.0]}}\nchecks: {checks}\n"
     )
     return from_file(file)
 
@@ -91,6 +91,58 @@ def test_an_accuracy_is_open_where_the_order_is(tmp_path: Path) -> None:
     trap = "[{accurate: u, relative: 0.1}, {converges: u, order: 2, expect: {status: FAIL}}]"
     left, _ = judged(experiment(tmp_path, trap, h=few), three)
     assert left.results[0].verdict.reason == "pre_asymptotic"
+
+
+def test_exact_values_decide_the_limit_and_the_error(tmp_path: Path) -> None:
+    checks = "[{converges: u, order: 2}, {accurate: u, absolute: 1e-3}]"
+    # the error of member a = 1, 2 is a/1024 at the finest level
+    order, accuracy = judged(experiment(tmp_path, checks, u="{exact: 1}"), second)
+    assert (order.status, accuracy.status) == ("PASS", "FAIL")
+    assert order.results[0].verdict.is_exact_known
+    assert [r.verdict.error for r in accuracy.results] == pytest.approx([2 / 1024, 1 / 1024], 1e-3)
+    assert [r.verdict.reason for r in accuracy.results] == ["mismatch", "match"]
+    # a formula in the swept number, right for member a = 1 alone
+    order, accuracy = judged(experiment(tmp_path, checks, u="{exact: 1 + (a - 1)/100}"), second)
+    assert [r.verdict.reason for r in order.results] == ["wrong_limit", "asymptotic"]
+    assert [r.verdict.reason for r in accuracy.results] == ["mismatch", "match"]
+
+
+def test_exact_values_of_a_field_are_a_formula_in_its_coordinates(tmp_path: Path) -> None:
+    quantity = "{coordinates: [x, t], exact: a*x + t**2}"
+    found = experiment(tmp_path, "[{converges: u, order: 1}]", u=quantity)
+
+    def read(member: int) -> list[Any]:
+        records = []
+        for i, h in enumerate(H):
+            # in another order than the file names them, and with the error a h (1 + t) at each point
+            t, x = np.linspace(0.0, 1.0, 2 ** (i + 2) + 1), np.linspace(0.0, 2.0, 2 ** (i + 2) + 1)
+            a = member + 1.0
+            values = a * x[None, :] + t[:, None] ** 2 + a * h * (1.0 + t[:, None])
+            records.append(
+                level_output.record(
+                    found, i, member, {"u": GridValues(values, ("t", "x"), {"x": x, "t": t}, "u")}
+                )
+            )
+        return records
+
+    (results,) = analysis.judge_members(found, read)
+    assert results.status == "PASS"
+    t = np.linspace(0.0, 1.0, 5)
+    for result in results.results:
+        size = np.sqrt(np.mean((1.0 + t) ** 2)) * (result.member + 1.0) / 32
+        assert result.verdict.error == pytest.approx(size, rel=1e-12)
+
+
+def test_stated_noise_hides_no_failure_as_an_order(tmp_path: Path) -> None:
+    rng = np.random.default_rng(7)
+
+    def noisy(member: int, h: float) -> float:
+        return 1.0 + 1e-4 * float(rng.standard_normal())
+
+    (found,) = judged(experiment(tmp_path, "[{converges: u, order: 2}]"), noisy)
+    assert found.status != "PASS"
+    (found,) = judged(experiment(tmp_path, "[{converges: u}]", u="{noise: 1e-3}"), noisy)
+    assert {result.verdict.reason for result in found.results} == {"exact"}
 
 
 def test_zero_has_no_relative_error(tmp_path: Path) -> None:

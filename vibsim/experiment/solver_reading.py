@@ -23,6 +23,7 @@ from vibsim.experiment.schema.solver import (
     MOST_LEVELS,
     RESERVED,
     Kind,
+    QuantitySection,
     SolverCheck,
     SolverConvergesCheck,
     SolverDocument,
@@ -69,6 +70,8 @@ def read_solver(source: Source, collection: str, file: Path) -> SolverExperiment
     has_level = "levels" in _keys(source.data.get("refine"))
     solver = _solver(document.solver, names, has_level=has_level, report=report)
     checks = _checks(document, report)
+    numbers_of = [key for key, values in _written(source.data.get("sweep")) if not _is_text(values)]
+    _check_exact(document.quantities, numbers_of, report)
     report.raise_any()
     assert solver is not None
     step = next(iter(sizes))
@@ -288,6 +291,23 @@ def _check_template(
         if name not in used:
             rule = f"is no placeholder of `{kind}:`, so it would change nothing"
             report.add(("sweep", name), rule, f"write {{{name}}} where it belongs", at_key=True)
+
+
+def _check_exact(
+    quantities: Mapping[str, QuantitySection], swept: Sequence[str], report: Report
+) -> None:
+    """Check that exact values are formulas in what is known of a quantity."""
+    for name, quantity in quantities.items():
+        path: Path_ = ("quantities", name, "exact")
+        known = (*(quantity.coordinates or ()), *swept)
+        if quantity.exact is None:
+            continue
+        try:
+            parse(quantity.exact, known)
+        except ExpressionError as error:
+            of = f" in {', '.join(known)}" if known else ", here without names"
+            hint = error.hint or ("" if quantity.coordinates else "name its coordinates as well")
+            report.add(path, f"must be a formula{of} ({error.rule})", hint, quantity.exact)
 
 
 # ---- checks and files

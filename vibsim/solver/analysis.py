@@ -274,6 +274,7 @@ def restored(
         expected=getattr(check, "order", None) if is_order else None,
         at_least=getattr(check, "at_least", None) if is_order else None,
         size_name=experiment.step,
+        is_exact_known=experiment.quantities[str(check.about)].exact is not None,
         dims=tuple(dim.removeprefix(head) for dim in dims),
         coords={dim.removeprefix(head): found[dim] for dim in dims if dim in found},
         values=found[values]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -17,11 +17,19 @@ from vibsim.convergence.study.common_points import common_values
 from vibsim.convergence.study.grid_values import GridValues
 from vibsim.convergence.study.judgement import verdicts
 from vibsim.convergence.study.sentences import at_most, number
+from vibsim.core.array_types import Floats
 from vibsim.core.errors import InputError, VibsimError
 from vibsim.core.vocabulary import REASON_NAMES, REASONS, STATUSES
 from vibsim.experiment.schema.checks import Expect
-from vibsim.experiment.schema.solver import SolverAccurateCheck, SolverCheck, SolverConvergesCheck
+from vibsim.experiment.schema.solver import (
+    QuantitySection,
+    SolverAccurateCheck,
+    SolverCheck,
+    SolverConvergesCheck,
+)
 from vibsim.experiment.solver import SolverExperiment
+from vibsim.formula import parse
+from vibsim.formula import values as formula_values
 
 
 @dataclass(frozen=True)
@@ -49,7 +57,8 @@ def judge(
         Where the levels have no common points.
     """
     promise = _promise(experiment, check)
-    restrict = experiment.quantities[str(check.about)].restrict
+    quantity = experiment.quantities[str(check.about)]
+    restrict = quantity.restrict
     try:
         (found,) = verdicts(
             _steps(experiment),
@@ -57,6 +66,8 @@ def judge(
             quantity=check.about,
             order=promise.order if promise else None,
             at_least=promise.at_least if promise else None,
+            exact=_exact(quantity, experiment.parameters_of(member), values[0].dims),
+            noise=quantity.noise,
             restrict=restrict,
         )
     except InputError as error:
@@ -71,6 +82,21 @@ def judge(
     code = np.array([REASON_NAMES.index(found.reason)], dtype=np.int8)
     compared = STATUSES[int(as_expected(check.expect, code)[0])]
     return SolverResult(member, found, compared, facts, away)
+
+
+def _exact(
+    quantity: QuantitySection, parameters: Mapping[str, Any], dims: Sequence[str]
+) -> Callable[..., Floats] | Floats | None:
+    """Return the exact values of a quantity of a member, as a function of its coordinates where it has some."""
+    if quantity.exact is None:
+        return None
+    numbers = {name: value for name, value in parameters.items() if not isinstance(value, str)}
+    tree = parse(quantity.exact, (*(quantity.coordinates or ()), *numbers))
+
+    def at(*points: Floats) -> Floats:
+        return formula_values(tree, {**numbers, **dict(zip(dims, points, strict=True))})
+
+    return at if dims else at()
 
 
 def _place(values: Sequence[GridValues], restrict: str) -> str:
@@ -128,7 +154,8 @@ def _accuracy(
     asked = check.accuracy * (size if check.is_relative else 1.0)
     error = None if found.error is None else abs(found.error)
     bound = found.error_bound
-    decides = is_known_order(found.reason) and error is not None and bound is not None
+    is_error_known = found.is_exact_known or is_known_order(found.reason)
+    decides = is_error_known and error is not None and bound is not None
     if found.reason == "non_finite":
         reason = "non_finite"
     elif not asked > 0.0:

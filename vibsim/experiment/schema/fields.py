@@ -21,7 +21,9 @@ from pydantic import (
     Discriminator,
     Field,
     GetJsonSchemaHandler,
+    StringConstraints,
     Tag,
+    WithJsonSchema,
 )
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
@@ -200,6 +202,15 @@ class _Formula:
         return result
 
 
+def _as_text(value: Any) -> Any:
+    """Return a number as the text of a formula."""
+    if isinstance(value, int | float) and not isinstance(value, bool):
+        return repr(value)
+    if not isinstance(value, str):
+        raise refused("must be a formula, or a number")
+    return value
+
+
 def _no_default(schema: dict[str, Any]) -> None:
     """Leave the default out of the schema: an empty id stands for a generated one."""
     schema.pop("default", None)
@@ -220,4 +231,11 @@ Text = Annotated[str, Field(min_length=1), AfterValidator(_printable)]
 """Text that may have several lines."""
 Line = Annotated[Text, AfterValidator(_one_line)]
 """Text on one line."""
+FormulaText = Annotated[
+    str,
+    StringConstraints(min_length=1),
+    BeforeValidator(_as_text),
+    WithJsonSchema({"type": ["string", "number"], "minLength": 1}),
+]
+"""A formula as text, or a number."""
 Output = Literal["verdict", "best"]

@@ -13,12 +13,9 @@ from typing import Annotated, Any, Literal
 
 from pydantic import (
     AfterValidator,
-    BeforeValidator,
     Discriminator,
     Field,
     StrictBool,
-    StringConstraints,
-    WithJsonSchema,
     create_model,
 )
 from pydantic_core import PydanticCustomError
@@ -26,6 +23,7 @@ from pydantic_core import PydanticCustomError
 from vibsim.experiment.schema.fields import (
     FORMULA,
     TABLE,
+    FormulaText,
     Line,
     MadeSection,
     Number,
@@ -136,23 +134,6 @@ def scheme_names(data: Any) -> Iterator[str]:
 
 
 MAX_DECLARED = 50
-
-
-def _as_text(value: Any) -> Any:
-    """Return a number as the text of a formula."""
-    if isinstance(value, int | float) and not isinstance(value, bool):
-        return repr(value)
-    if not isinstance(value, str):
-        raise refused("must be a formula, or a number")
-    return value
-
-
-FormulaText = Annotated[
-    str,
-    StringConstraints(min_length=1),
-    BeforeValidator(_as_text),
-    WithJsonSchema({"type": ["string", "number"], "minLength": 1}),
-]
 
 
 def _declared(names: Mapping[str, float]) -> Mapping[str, float]:

@@ -15,7 +15,9 @@ from vibsim.experiment.schema.fields import (
     MAX_ENTRIES,
     STAND_IN,
     Count,
+    FormulaText,
     Line,
+    NonNegative,
     Number,
     Positive,
     Section,
@@ -107,6 +109,10 @@ class QuantitySection(Section):
     """Names of the coordinates that it must have; when left out, a number, or the coordinates that the file has."""
     restrict: Restriction = "subset"
     """How levels are brought to common points."""
+    exact: FormulaText | None = None
+    """The exact values, if they are known: a number, or a formula in its coordinates and in swept numbers."""
+    noise: NonNegative | None = None
+    """How noisy each level is (an iteration that stops early, printed digits): the root mean square of the noise."""
 
 
 class SolverConvergesCheck(MeasuringCheck):
