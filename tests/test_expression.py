@@ -20,6 +20,7 @@ from vibsim.formula import (
     Negate,
     Number,
     constant,
+    derivative,
     evaluate,
     names_in,
     parse,
@@ -221,7 +222,7 @@ def test_constant_must_be_finite(text: str) -> None:
     [
         "-" * 200 + "1",
         "(" * 300 + "1" + ")" * 300,
-        "1" + "+1" * 150,
+        "1" + "*1" * 150,
         "sin(" * 120 + "1" + ")" * 120,
         "not " * 120 + "1 < 2",
         "1 if 2 else " * 120 + "3",
@@ -237,6 +238,22 @@ def test_depth_limit_is_exact() -> None:
     assert constant("-" * (MAX_DEPTH - 1) + "1") in (1.0, -1.0)
     with pytest.raises(ExpressionError, match="deeper than 100"):
         constant("-" * MAX_DEPTH + "1")
+
+
+@pytest.mark.parametrize("count", [99, 100, 101, 160, 999])
+def test_a_sum_may_have_any_number_of_terms(count: int) -> None:
+    assert constant("+".join(["1"] * count)) == count
+    assert constant("-".join(["1"] * count)) == 2 - count
+    signs = ["+", "-"] * count
+    text = "".join(f"{sign}x" for sign in signs[:count])[1:]
+    read = parse(text, ["x"])
+    assert evaluate(read, {"x": 0.5}) == 0.5 * (count % 2)
+    assert evaluate(derivative(read, "x"), {}) == count % 2
+
+
+def test_a_sum_of_up_to_100_terms_is_added_from_left_to_right() -> None:
+    text = "+".join(f"1e{k % 17}" for k in range(MAX_DEPTH))
+    assert constant(text) == eval(text)
 
 
 @pytest.mark.parametrize("word", ["and", "or", "<"])

@@ -35,6 +35,8 @@ _COMPARE = {ast.Lt: "<", ast.LtE: "<=", ast.Gt: ">", ast.GtE: ">=", ast.Eq: "=="
 _FOREIGN = re.compile(r"[^A-Za-z0-9_.+\-*/()<>=!, ]")
 _NUMBER = re.compile(r"(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?")
 MAX_DEPTH = 100
+TERMS = 16
+"""Terms of a long sum that are added one after the other."""
 TOO_DEEP = f"must not nest deeper than {MAX_DEPTH} operations"
 _JOINED = re.compile(r"(?<![A-Za-z0-9_.])(\d+\.?\d*|\.\d+)(?=[A-Za-z_])(?![eE][+-]?\d)")
 """A number that runs into a name: a forgotten ``*``."""
@@ -133,7 +135,7 @@ class _Reader:
 
     def convert(self, node: ast.expr, depth: int) -> Expression:
         if depth >= MAX_DEPTH:
-            raise self.fault(node, TOO_DEEP, "group long sums with parentheses")
+            raise self.fault(node, TOO_DEEP, "group long products with parentheses")
         match node:
             case ast.Constant():
                 return self.number(node)
@@ -154,6 +156,8 @@ class _Reader:
             case ast.IfExp():
                 ways = (node.test, node.body, node.orelse)
                 return Call("where", tuple(self.convert(part, depth + 1) for part in ways))
+            case ast.BinOp() if depth + _terms(node) > MAX_DEPTH:
+                return self.long_sum(node, depth)
             case ast.BinOp() if type(node.op) in _BINARY:
                 return self.binary(node, depth)
             case ast.Compare():
@@ -192,6 +196,25 @@ class _Reader:
                 node.right, f"an exponent must be at most {MAX_POWER}, is {exponent:g}"
             )
         return Binary(_BINARY[type(node.op)], left, right)
+
+    def long_sum(self, node: ast.expr, depth: int) -> Expression:
+        """Read a sum that would be nested too deeply: as sums of some terms, which are added in pairs."""
+        terms: list[tuple[ast.expr, bool]] = []
+        while isinstance(node, ast.BinOp) and isinstance(node.op, ast.Add | ast.Sub):
+            terms.append((node.right, isinstance(node.op, ast.Sub)))
+            node = node.left
+        terms.append((node, False))
+        terms.reverse()
+        below = depth + TERMS + (len(terms) // TERMS).bit_length()
+        sums = []
+        for first in range(0, len(terms), TERMS):
+            (head, is_taken), *rest = terms[first : first + TERMS]
+            total = self.convert(head, below)
+            total = Negate(total) if is_taken else total
+            for term, is_taken in rest:
+                total = Binary("-" if is_taken else "+", total, self.convert(term, below))
+            sums.append(total)
+        return paired(sums, partial(Binary, "+"))
 
     def compare(self, node: ast.Compare, depth: int) -> Expression:
         """Read a comparison; a chained one is the product of its links."""
@@ -232,6 +255,14 @@ class _Reader:
         if len(node.args) != wanted:
             raise self.fault(node, f"{function} takes {wanted} argument(s), has {len(node.args)}")
         return Call(function, tuple(self.convert(argument, depth + 1) for argument in node.args))
+
+
+def _terms(node: ast.expr) -> int:
+    """Return how many terms a sum has; 0 of anything else."""
+    count = 0
+    while isinstance(node, ast.BinOp) and isinstance(node.op, ast.Add | ast.Sub):
+        node, count = node.left, count + 1
+    return count and count + 1
 
 
 def shorten(text: str, length: int = 60) -> str:
