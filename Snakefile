@@ -8,11 +8,8 @@ from vibsim.cli.workflow import names_of
 from vibsim.cli.run.supervise import children_end_with_this
 
 root = Path(workflow.basedir)
-results = config.get("results", root / "results")
 # What allows programs of users to run is read from the command line alone, never from a file.
-names = names_of(
-    config.get("experiments", []), results, root, workflow.config_settings.config
-)
+names = names_of(config, root, workflow.config_settings.config)
 
 
 # Jobs run the vibsim that stands beside this Python, whatever else is installed.

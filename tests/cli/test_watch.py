@@ -101,6 +101,8 @@ def test_options_are_those_of_the_run(monkeypatch: pytest.MonkeyPatch, file: Pat
     options = ["--results", "there", "--cores", "2", "-q", "--allow-commands"]
     (found,) = watched(monkeypatch, file, [], *options)
     assert found[2:] == ["--results", "there", "--cores", "2", "--quiet", "--allow-commands"]
+    (found,) = watched(monkeypatch, file, [], "--set", "time.end=1", "--set", "initial.u=0")
+    assert found[2:] == ["--set", "time.end=1", "--set", "initial.u=0"]
     (found,) = watched(monkeypatch, file, [], "-v")
     assert found[2:] == ["--verbose"]
     _options(Path(found[1]), *found[2:])

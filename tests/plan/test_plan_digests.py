@@ -106,8 +106,6 @@ def test_no_two_jobs_share_a_digest(plan_of: Plans) -> None:
 
 
 def test_the_place_of_the_file_is_no_part_of_the_digests(plan_of: Plans, tmp_path: Path) -> None:
-    from vibsim.plan import Choice, load
-
     here = plan_of()
     there = tmp_path / "there" / "tiny.yaml"
     there.parent.mkdir()
@@ -121,6 +119,22 @@ def test_paths_follow_the_contract(plan_of: Plans) -> None:
     assert swept.cases == 2
     assert swept.shards[0].path == "adhoc/tiny/level_05/shard_0000.nc"
     assert [(s.start, s.stop) for s in swept.shards] == [(0, 2)] * 3
+
+
+def test_a_setting_has_the_levels_of_an_edit_and_results_that_tell_of_it(
+    plan_of: Plans,
+) -> None:
+    plain, other = plan_of(), plan_of(("g: 1.0", "g: 1.5"))
+    file = Path(plan_of().file)
+    given = load(Choice("adhoc", file, settings=("model.g=1.5",)), cached=True)
+    assert digests(given)[0] == digests(other)[0] != digests(plain)[0]
+    assert given.content == other.content
+    assert (given.analysis, given.report) != (other.analysis, other.report)
+    assert given.experiment.settings == given.settings == ("model.g=1.5",)
+    # a plan that is kept is one of its settings
+    assert load(Choice("adhoc", file), cached=True) == plain
+    assert load(Choice("adhoc", file, settings=("model.g=1.5",)), cached=True) == given
+    assert from_json(to_json(given), given.file, given.key) == given
 
 
 def test_a_plan_survives_json(plan_of: Plans) -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import html
+import json
 import os
 from dataclasses import replace
 
@@ -9,6 +11,7 @@ import pytest
 
 from vibsim.cli.chosen_plans import plans_of
 from vibsim.cli.run import command, reasons
+from vibsim.store.provenance import read_provenance
 
 from .conftest import TEXT, Place
 
@@ -103,6 +106,42 @@ def test_a_run_says_first_what_changed(place: Place, capsys: pytest.CaptureFixtu
     # what was never made has no reason to be made again
     command._tell_changes(plans, place.folder / "new")
     assert capsys.readouterr().err == ""
+
+
+def test_a_setting_is_told_recorded_and_taken_back(place: Place) -> None:
+    given = ("--set", "model.g=1.5", "--set", "title=On 'the' moon {x}")
+    whole = ["level_06", "level_07", "level_08", "level_09", "analyse", "report", "index"]
+    first = place.run("--dry-run", *given).stdout.splitlines()[0]
+    assert first == "adhoc/tiny: model.g: 1.0 -> 1.5: levels 6 to 9, analysis, report"
+    ended = place.run(*given)
+    assert ended.returncode == 0, ended.stderr
+    assert "adhoc/tiny: model.g: 1.0 -> 1.5\n" in ended.stderr
+    words = "--set model.g=1.5 --set 'title=On '\"'\"'the'\"'\"' moon {x}'"
+    assert f"PASS  adhoc/tiny {words}  theta: order" in ended.stdout
+    summary = json.loads((place.tiny / "summary.json").read_text())
+    assert summary["settings"] == list(given[1::2])
+    assert summary["title"] == "On 'the' moon {x}"
+    page = html.unescape((place.tiny / "report.html").read_text())
+    assert f".venv/bin/vibsim run tiny.yaml {words}</code>" in page
+    assert f"the run had {words}</dd>" in page
+    assert 'from_yaml("tiny.yaml", settings=["model.g=1.5", "title=' in page
+    made = read_provenance(place.tiny / "convergence.nc")
+    assert made["settings"] == list(given[1::2])
+    # the file without the settings is another experiment again, and that is said
+    assert place.jobs() == whole
+    back = place.run("--dry-run").stdout.splitlines()[0]
+    assert back == "adhoc/tiny: model.g: 1.5 -> 1.0: levels 6 to 9, analysis, report"
+    # an edit to the same value simulates nothing again, and has the same bytes
+    levels = {name: found for name, found in place.content().items() if "level_" in name}
+    place.change("g: 1.0", "g: 1.5")
+    place.change("A tiny pendulum", "On 'the' moon {x}")
+    assert place.jobs() == whole[4:]
+    told = place.run("--dry-run").stdout.splitlines()[0]
+    assert told.startswith("adhoc/tiny: --set model.g=1.5: removed; --set ")
+    assert place.run().returncode == 0
+    now = place.content()
+    assert {name: now[name] for name in levels} == levels
+    assert "settings" not in json.loads((place.tiny / "summary.json").read_text())
 
 
 @pytest.mark.slow

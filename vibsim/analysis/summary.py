@@ -12,6 +12,7 @@ from vibsim.analysis.check_verdicts import Verdict
 from vibsim.apriori.formal_orders import columns_of
 from vibsim.checks.verdict_text import Wording
 from vibsim.core.record import Record
+from vibsim.core.set_option import set_options
 from vibsim.core.vocabulary import FORMAT, jsonable, worst
 
 if TYPE_CHECKING:
@@ -38,15 +39,18 @@ def summarise(
     dict
         Ready for JSON: no NaN, no infinity, no numpy type. With a sweep the `WORST` results of each check and the
         first `WORST` failures are listed, each with the swept ``values`` and the ``command`` that runs its member
-        alone; ``counts`` and ``failure_count`` count all of them, and ``where`` tells where they are.
+        alone; ``settings`` are those of the command line, where there were any;
+        ``counts`` and ``failure_count`` count all of them, and ``where`` tells where they are.
     """
     record = convergence if isinstance(convergence, Record) else Record.from_xarray(convergence)
     most = None if experiment.sweep is None else WORST
+    given = {"settings": list(experiment.settings)} if experiment.settings else {}
     plain: dict[str, Any] = jsonable(
         {
             "vibsim_format": FORMAT,
             "collection": experiment.collection,
             "experiment": experiment.name,
+            **given,
             "title": experiment.title,
             "status": worst(verdict.status for verdict in verdicts),
             "checks": [_check(experiment, record, verdict, most) for verdict in verdicts],
@@ -76,7 +80,7 @@ def _member(experiment: Experiment, record: Record, case: int) -> dict[str, Any]
     at = record.place("case", case)
     return {
         "values": {key: values[at] for key, values in columns_of(record).items()},
-        "command": f"vibsim run {quote(f'{experiment.word}@{case}')}",
+        "command": f"vibsim run {quote(f'{experiment.word}@{case}')}{set_options(experiment.settings)}",
     }
 
 

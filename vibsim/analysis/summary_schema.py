@@ -105,8 +105,13 @@ def schema() -> dict[str, Any]:
         "checks": {"type": "array", "items": _object(check)},
         "failures": {"type": "array", "items": _object(failure, member)},
         "failure_count": COUNT,
+        "settings": {
+            "type": "array",
+            "items": TEXT,
+            "description": "what the command line gave in place of values of the file, as KEY=VALUE",
+        },
         "digest": TEXT,
         "integrity": TEXT,
     }
     head = {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": "summary.json"}
-    return head | _object(whole, ("digest", "integrity"))
+    return head | _object(whole, ("settings", "digest", "integrity"))

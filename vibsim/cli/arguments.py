@@ -66,6 +66,8 @@ def commands() -> Iterator[Command]:
     """Yield all commands."""
     text = "results folder (default: results/ of the checkout)"
     results = _row("--results", _path, "DIR", text)
+    text = "a value in place of one of the file, such as model.g=1.62; may be repeated"
+    settings = _row("--set", _word, "KEY=VALUE", text, dest="settings", action="append", default=[])
     files = _row("experiments", _word, "FILE", _NAMES, nargs="+")
     verify = (
         "compare every result with its digest, also where size, time and inode are as they were"
@@ -78,6 +80,7 @@ def commands() -> Iterator[Command]:
     options: tuple[_Row, ...] = (
         results,
         _row("experiments", _word, "EXPERIMENT", _NAMES, nargs="*"),
+        settings,
         cores,
         _flag("--dry-run", "show what would run and why"),
         _flag("--verify", verify),
@@ -89,13 +92,18 @@ def commands() -> Iterator[Command]:
     yield "run", "run.command", "Run experiments and show every verdict.", options
     file = _row("file", _path, "FILE", "experiment file")
     text = "Run an experiment file, and again whenever it is saved."
-    yield "watch", "commands.watch", text, (results, file, cores, allow, *_detail())
-    yield "check", "commands.plan", "Validate experiment files, without running them.", (files,)
+    yield "watch", "commands.watch", text, (results, file, settings, cores, allow, *_detail())
+    yield (
+        "check",
+        "commands.plan",
+        "Validate experiment files, without running them.",
+        (files, settings),
+    )
     text = "Show members, jobs, steps, memory, disk space and time of experiments before they run."
     as_json = _flag("--json", "print the plans as JSON")
-    yield "plan", "commands.plan", text, (results, files, as_json)
+    yield "plan", "commands.plan", text, (results, files, settings, as_json)
     text = "Show verdicts, and the solution of the finest level down the screen."
-    yield "show", "commands.show", text, (results, *_show())
+    yield "show", "commands.show", text, (results, settings, *_show())
     text = "Judge whether the results of any solver converge."
     yield "judge", "commands.judge", text, tuple(_judge())
     what: _Row = "what", {"choices": LISTS}
@@ -123,7 +131,7 @@ def commands() -> Iterator[Command]:
     yield "open", "commands.open", text, (results, page)
 
     text = "Write the movie of an experiment that has been run: MP4, WebM or GIF, or numbered PNG frames."
-    yield "movie", "commands.movie", text, (results, *_movie())
+    yield "movie", "commands.movie", text, (results, settings, *_movie())
 
     shell: _Row = "shell", {"choices": SHELLS, "help": "the shell; `words` is what its script asks"}
     text = "Print what a shell needs to complete commands, options and names."
@@ -134,6 +142,7 @@ def commands() -> Iterator[Command]:
     discard = "delete a damaged or outdated input, so that the next run makes it again"
     job = (
         results,
+        settings,
         _row("--digest", _word, "SHA256", digest),
         _flag("--discard", discard),
     )

@@ -20,18 +20,22 @@ def resolve(experiment: Experiment) -> Experiment:
     return resolved
 
 
-def plans_of(words: Sequence[str], *, cached: bool = False) -> list[Plan]:
+def plans_of(
+    words: Sequence[str], settings: Sequence[str] = (), *, cached: bool = False
+) -> list[Plan]:
     """Return the plans of files, experiments or collections; without `words` those of the default collections.
+
+    The `settings` stand in place of values of all files.
 
     With `cached`, plans that were made before will do. InputError with every word that names nothing and the faults of
     all files.
     """
-    return list(load_all(choose(words, checkout()), resolve, cached=cached).values())
+    return list(load_all(choose(words, checkout(), settings), resolve, cached=cached).values())
 
 
-def one_plan_of(word: str) -> Plan:
+def one_plan_of(word: str, settings: Sequence[str] = ()) -> Plan:
     """Return the plan of one experiment, perhaps one that was made before; InputError where `word` is a collection."""
-    choices = choose([word], checkout())
+    choices = choose([word], checkout(), settings)
     if len(choices) != 1:
         rule = "must be one experiment, not a collection"
         raise InputError([Fault("command line", 0, "EXPERIMENT", word, rule)])

@@ -7,6 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from vibsim.cli.terminal import clean, painted
+from vibsim.core.set_option import set_options
 from vibsim.core.vocabulary import SEVERITY, order_interval
 
 Entry = Mapping[str, Any]
@@ -109,4 +110,7 @@ def numbers(check: Entry) -> list[str]:
 
 
 def _name(entry: Entry) -> str:
-    return f"{entry['collection']}/{entry['experiment']}"
+    """Return the name of an experiment, with what the command line gave in place of values of its file."""
+    return clean(
+        f"{entry['collection']}/{entry['experiment']}{set_options(entry.get('settings', ()))}"
+    )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -12,15 +12,16 @@ from vibsim.cli.jobs.solve import check_allowed
 from vibsim.plan import Names
 
 
-def names_of(
-    experiments: Sequence[str], results: str, root: Path, command_line: Mapping[str, Any]
-) -> Names:
+def names_of(config: Mapping[str, Any], root: Path, command_line: Mapping[str, Any]) -> Names:
     """Return the names for the workflow of some experiments.
 
     Parameters
     ----------
-    experiments, results, root
-        As for `vibsim.plan.Names.of`.
+    config
+        The ``experiments`` with the ``settings`` of all of them, and the ``results`` folder, as for
+        `vibsim.plan.Names.of`; without any the default experiments as they are, and the folder of the checkout.
+    root
+        The checkout.
     command_line
         What ``--config`` says on the command line: ``allow_commands=true`` lets programs of users run.
 
@@ -30,7 +31,9 @@ def names_of(
         Where a file is refused, the results folder is, or a program that is not allowed to run.
     """
     is_allowed = str(command_line.get("allow_commands")).lower() == "true"
-    names = Names.of(experiments, results, root, resolve, is_allowed)
+    experiments, settings = config.get("experiments", []), config.get("settings", [])
+    results = str(config.get("results", root / "results"))
+    names = Names.of(experiments, results, root, resolve, is_allowed, settings)
     results_folder.check(names.results, names.plans)
     check_allowed(names.plans.values(), is_allowed)
     return names

@@ -226,6 +226,7 @@ class ExperimentSpec(Section):
     scaling: Scaling | None = None
     """Present where the run is made in the characteristic units of the model."""
     _file: Path | None = PrivateAttr(default=None)
+    _settings: tuple[str, ...] = PrivateAttr(default=())
 
     @classmethod
     def made_of(cls, spec: ExperimentSpec) -> Self:
@@ -238,6 +239,11 @@ class ExperimentSpec(Section):
     def file(self) -> Path | None:
         """Where the experiment was read; not part of its identity."""
         return self._file
+
+    @property
+    def settings(self) -> tuple[str, ...]:
+        """What a command line gave in place of values of the file, as ``KEY=VALUE``; not part of its identity."""
+        return self._settings
 
     @property
     def word(self) -> str:

@@ -66,7 +66,12 @@ class Experiment(ExperimentSpec):
 
     @classmethod
     def from_yaml(
-        cls, path: str | Path, *, collection: str | None = None, configs: Path | None = None
+        cls,
+        path: str | Path,
+        *,
+        collection: str | None = None,
+        configs: Path | None = None,
+        settings: Sequence[str] = (),
     ) -> Self:
         """Read an experiment file, whose name without the ending is the experiment's.
 
@@ -78,6 +83,9 @@ class Experiment(ExperimentSpec):
             Name of the collection; by default that of `vibsim.experiment.collection_of`.
         configs
             The folder of collections; by default that of the checkout.
+        settings
+            Values in place of those of the file, each as ``KEY=VALUE`` with a dotted key and YAML behind it:
+            ``model.g=1.62``, ``schemes[0].start=first_order``.
 
         Raises
         ------
@@ -86,7 +94,7 @@ class Experiment(ExperimentSpec):
         """
         from vibsim.experiment.reading import from_file
 
-        return from_file(cls, Path(path), collection, configs)
+        return from_file(cls, Path(path), collection, configs, settings)
 
     @classmethod
     def from_dict(
@@ -135,8 +143,12 @@ def _with_kind(check: Check) -> dict[str, Any]:
     return data
 
 
-def restore(content: Mapping[str, Any], file: Path | None = None) -> Experiment:
-    """Return the experiment that `content`, made by `canonical`, describes; `file` is where it was read, if known.
+def restore(
+    content: Mapping[str, Any], file: Path | None = None, settings: tuple[str, ...] = ()
+) -> Experiment:
+    """Return the experiment that `content`, made by `canonical`, describes.
+
+    `file` is where it was read, if known, and `settings` are what a command line gave in place of its values.
 
     Raises
     ------
@@ -147,7 +159,7 @@ def restore(content: Mapping[str, Any], file: Path | None = None) -> Experiment:
     data["sweep"] = data["sweep"] and {"axes": data["sweep"]}
     data["checks"] = [_without_kind(check) for check in data["checks"]]
     experiment = Experiment.made_of(ExperimentSpec.model_validate(data))
-    experiment._file = file
+    experiment._file, experiment._settings = file, settings
     if experiment.model.tables:
         from vibsim.experiment.tables.file import attach
 

@@ -8,6 +8,7 @@ from typing import Any
 from pydantic import ValidationError
 
 from vibsim.core.errors import Fault, InputError, nearest
+from vibsim.core.set_option import set_in
 from vibsim.experiment.kinds import Kinds
 from vibsim.experiment.yaml.parse import MAX_FAULTS, Path_, Source, dotted
 
@@ -63,9 +64,11 @@ class Report:
             return
         place = self.source.place(path)
         nested = place is not None and not place.text
-        line = place.line if place and not (at_key or nested) else self._line(path)
+        file, line = self._above(path)
+        if place and not (at_key or nested or place.setting):
+            line = place.line
         written = place.text if place and place.text else "" if value is None else str(value)
-        self.faults.add(Fault(self.source.file, line, dotted(path), shorten(written), rule, hint))
+        self.faults.add(Fault(file, line, dotted(path), shorten(written), rule, hint))
         if len(self.faults) == MAX_FAULTS:
             self.faults.add(Fault(self.source.file, 0, "", "", "has more faults than are listed"))
             self.raise_any()
@@ -77,13 +80,15 @@ class Report:
         self.add(path, rule, hint, value, at_key)
         self.faulty.add(path)
 
-    def _line(self, path: Path_) -> int:
-        """Return the line of the nearest key above `path` that the file has, 0 without one."""
+    def _above(self, path: Path_) -> tuple[str, int]:
+        """Return where the nearest key at or above `path` stands: the file with its line, or a setting without one."""
         for length in range(len(path), 0, -1):
             place = self.source.place(path[:length])
+            if place is not None and place.setting:
+                return set_in(self.source.file, shorten(place.setting)), 0
             if place is not None:
-                return place.key_line
-        return self.source.top.line if self.source.top else 0
+                return self.source.file, place.key_line
+        return self.source.file, self.source.top.line if self.source.top else 0
 
     def add_unknown_key(self, path: Path_, value: object, known: list[str]) -> None:
         """Note a key that is none of those `known` in its mapping."""

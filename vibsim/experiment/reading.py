@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from numbers import Integral, Real
 from pathlib import Path
 from typing import Any
@@ -27,6 +27,7 @@ from vibsim.experiment.schema.document import Document, Every
 from vibsim.experiment.schema.fields import IDENTIFIER
 from vibsim.experiment.schema.model_and_schemes import scheme_names
 from vibsim.experiment.schema.published import claims
+from vibsim.experiment.settings import with_settings
 from vibsim.experiment.validation import read_document
 from vibsim.experiment.yaml.parse import MAX_DEPTH, Source, read
 from vibsim.models import MODELS, Model
@@ -46,10 +47,14 @@ _PERIODIC = re.compile(rf"(.+)\1{{{MAX_REPEATS - 1}}}$")
 
 
 def from_file(
-    kind: type[AnyExperiment], path: Path, collection: str | None, configs: Path | None
+    kind: type[AnyExperiment],
+    path: Path,
+    collection: str | None,
+    configs: Path | None,
+    settings: Sequence[str] = (),
 ) -> AnyExperiment:
     """Read the experiment file at `path`; see `vibsim.experiment.Experiment.from_yaml`."""
-    source = read(path, list(Document.model_fields))
+    source = with_settings(read(path, list(Document.model_fields)), settings)
     if (place := source.place((SOLVER,))) is not None:
         rule = "belongs to an experiment with a solver of the user, which vibsim run makes"
         hint = "in Python, vibsim.judge compares levels"
@@ -202,7 +207,7 @@ def build(
     if model.kind in report.kinds.own_models:
         spec.model.hold(report.kinds.own_models[model.kind])
     experiment = kind.made_of(spec)
-    experiment._file = file
+    experiment._file, experiment._settings = file, source.settings
     size_limits.check_files(experiment, report)
     report.raise_any()
     return members.update_tables(experiment)

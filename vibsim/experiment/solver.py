@@ -63,11 +63,17 @@ class SolverExperiment(Section):
     resources: ResourcesSection
     checks: tuple[SolverCheck, ...]
     _file: Path | None = PrivateAttr(default=None)
+    _settings: tuple[str, ...] = PrivateAttr(default=())
 
     @property
     def file(self) -> Path | None:
         """Where the experiment was read; not part of its identity."""
         return self._file
+
+    @property
+    def settings(self) -> tuple[str, ...]:
+        """What a command line gave in place of values of the file, as ``KEY=VALUE``; not part of its identity."""
+        return self._settings
 
     @property
     def folder(self) -> Path:
@@ -162,11 +168,13 @@ class SolverExperiment(Section):
         return data
 
 
-def restore(content: Mapping[str, Any], file: Path | None) -> SolverExperiment:
-    """Return the experiment with this `content`; `file` is where it was read."""
+def restore(
+    content: Mapping[str, Any], file: Path | None, settings: tuple[str, ...] = ()
+) -> SolverExperiment:
+    """Return the experiment with this `content`; `file` is where it was read, with which `settings`."""
     checks = [{k: v for k, v in check.items() if k != "kind"} for check in content["checks"]]
     found = SolverExperiment.model_validate({**content, "checks": checks})
-    found._file = file
+    found._file, found._settings = file, settings
     return found
 
 

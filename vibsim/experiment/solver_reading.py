@@ -90,7 +90,7 @@ def read_solver(source: Source, collection: str, file: Path) -> SolverExperiment
         resources=document.resources,
         checks=checks,
     )
-    found._file = file
+    found._file, found._settings = file, source.settings
     _check_files(found, report)
     report.raise_any()
     return found

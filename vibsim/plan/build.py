@@ -49,8 +49,11 @@ def build(experiment: Experiment) -> Plan:
     levels = tuple(_level(experiment, content, level, values) for level in experiment.levels)
     groups, trajectories = _groups(levels), experiment.trajectories
     loads = [load_of(experiment, level) for level in experiment.levels]
-    made = {"levels": [[shard.digest for shard in level.shards] for level in levels]}
-    analysis = job_digest("analyse", in_numbers(analysed(content)), made)
+    made: dict[str, Any] = {
+        "levels": [[shard.digest for shard in level.shards] for level in levels]
+    }
+    told = told_settings(experiment.settings)
+    analysis = job_digest("analyse", in_numbers(analysed(content)), made | told)
     extrapolation = ""
     if experiment.output == "best":
         extrapolation = job_digest("extrapolate", in_numbers(extrapolated(content)), made)
@@ -77,6 +80,11 @@ def build(experiment: Experiment) -> Plan:
         inputs=tuple((t.file, t.content) for t in experiment.model.tables.values()),
         packages=packages,
     )
+
+
+def told_settings(settings: tuple[str, ...]) -> dict[str, Any]:
+    """Return what the digest of an analysis has of the settings that its results tell of; of none, nothing."""
+    return {"settings": list(settings)} if settings else {}
 
 
 def job_digest(

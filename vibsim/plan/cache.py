@@ -9,6 +9,7 @@ into commands.
 from __future__ import annotations
 
 import hashlib
+import json
 from collections.abc import Callable, Iterable
 from dataclasses import replace
 from typing import TYPE_CHECKING
@@ -48,7 +49,7 @@ def load(choice: Choice, resolve: Resolver | None = None, *, cached: bool = Fals
     word = str(choice.file) if choice.case is None else f"{choice.file}@{choice.case}"
 
     def build() -> Plan:
-        return replace(_built(choice, resolve), file=word)
+        return replace(_built(choice, resolve), file=word, settings=choice.settings)
 
     def dump(plan: Plan) -> bytes | None:
         # a file that changed while it was read is not kept under the digest of the old bytes
@@ -68,9 +69,10 @@ def load(choice: Choice, resolve: Resolver | None = None, *, cached: bool = Fals
 
 def _built(choice: Choice, resolve: Resolver | None) -> Plan:
     from vibsim.experiment import Experiment, reading
+    from vibsim.experiment.settings import with_settings
     from vibsim.experiment.yaml.parse import read
 
-    source = read(choice.file, reading.KEYS)
+    source = with_settings(read(choice.file, reading.KEYS), choice.settings)
     if reading.SOLVER in source.data:
         from vibsim.experiment.solver_reading import read_solver
         from vibsim.plan import solver_plan
@@ -120,7 +122,8 @@ def _key(choice: Choice) -> str:
     except InputError:
         return ""
     libraries = repr(versions(NUMERICAL + DRAWING))
-    words = (choice.collection, choice.name, str(choice.case), code_digest.everything(), libraries)
+    words = [choice.collection, choice.name, str(choice.case), code_digest.everything(), libraries]
+    words.append(json.dumps(choice.settings))
     return _sha256(b"\0".join([*(word.encode() for word in words), content]))
 
 

@@ -23,6 +23,8 @@ class Choice:
     file: Path
     case: int | None = None
     """The member of its sweep that is meant, alone; None for all of them."""
+    settings: tuple[str, ...] = ()
+    """What stands in place of values of the file, as ``KEY=VALUE`` (`vibsim.experiment.settings`)."""
 
     @property
     def name(self) -> str:
@@ -48,12 +50,12 @@ def experiments(root: Path) -> list[Choice]:
     return [_choice(file, root) for file in sorted((root / "configs").glob("*/*.yaml"))]
 
 
-def choose(words: Sequence[str], root: Path) -> list[Choice]:
+def choose(words: Sequence[str], root: Path, settings: Sequence[str] = ()) -> list[Choice]:
     """Find the experiments that `words` name, each once, in the order named.
 
     Words are files, names of experiments (``name`` or ``collection/name``) or collections; none of them means the
     default collections. A file or a name followed by ``@`` and a number means that member of the sweep alone. The
-    experiments of the checkout `root` are known by name.
+    experiments of the checkout `root` are known by name. The `settings` hold for each of them.
 
     Raises
     ------
@@ -73,7 +75,7 @@ def choose(words: Sequence[str], root: Path) -> list[Choice]:
     faults.extend(_clashes(list(chosen.values())))
     if faults:
         raise InputError(faults)
-    return list(chosen.values())
+    return [replace(choice, settings=tuple(settings)) for choice in chosen.values()]
 
 
 Found = tuple[list[Choice], tuple[str, str] | None]

@@ -105,6 +105,8 @@ class Plan:
     """Every other file that the experiment was read from: its path from there, and the SHA-256 of its bytes."""
     packages: tuple[tuple[str, str, str], ...] = ()
     """Group, kind and digest of the code of every model and scheme that an installed package offers."""
+    settings: tuple[str, ...] = ()
+    """What a command line gave in place of values of the file, as ``KEY=VALUE``; no level depends on it."""
     file: str = ""
     """Where the experiment was read, as a command line names it; no digest depends on it."""
 
@@ -113,7 +115,7 @@ class Plan:
         """The experiment that the digests were made of, also when its file has changed since."""
         from vibsim.experiment import restore
 
-        return restore(self.content, self.source_file)
+        return restore(self.content, self.source_file, self.settings)
 
     @property
     def source_file(self) -> Path | None:

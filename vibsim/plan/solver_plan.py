@@ -15,7 +15,7 @@ from vibsim.core.errors import Fault, InputError
 from vibsim.core.vocabulary import FORMAT
 from vibsim.experiment.solver import SolverExperiment
 from vibsim.plan import code_digest
-from vibsim.plan.build import job_digest
+from vibsim.plan.build import job_digest, told_settings
 from vibsim.plan.digests import digest_of, solved, solved_and_judged
 from vibsim.plan.jobs import Batch, LevelJob, Plan, ShardJob, shard_path
 from vibsim.plan.versions import DRAWING, NUMERICAL, versions
@@ -54,8 +54,12 @@ def build(experiment: SolverExperiment) -> Plan:
                 ShardJob(member, member, member + 1, shard_path(key, level, number), digest)
             )
         levels.append(_level(level, tuple(shards), experiment))
-    made = {"levels": [[shard.digest for shard in level.shards] for level in levels]}
-    analysis = job_digest("judge_levels", solved_and_judged(content), made)
+    made: dict[str, Any] = {
+        "levels": [[shard.digest for shard in level.shards] for level in levels]
+    }
+    analysis = job_digest(
+        "judge_levels", solved_and_judged(content), made | told_settings(experiment.settings)
+    )
     return Plan(
         collection=experiment.collection,
         name=experiment.name,

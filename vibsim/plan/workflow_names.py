@@ -10,6 +10,7 @@ from itertools import chain, count
 from pathlib import Path
 from typing import Any
 
+from vibsim.core.set_option import OPTION
 from vibsim.plan import code_digest
 from vibsim.plan.cache import Resolver, load_all
 from vibsim.plan.choose import choose
@@ -93,6 +94,8 @@ class Names:
     results: Path
     allows_commands: bool = False
     """Whether programs of the user may run."""
+    settings: tuple[str, ...] = ()
+    """What stands in place of values of the files."""
 
     @staticmethod
     def of(
@@ -101,16 +104,19 @@ class Names:
         root: Path,
         resolve: Resolver | None = None,
         allows_commands: bool = False,
+        settings: Sequence[str] = (),
     ) -> Names:
-        """Load the plans of `experiments` (files, names, collections; none means the default)."""
-        folder = Path(results).absolute()
-        return Names(
-            load_all(choose(experiments, root), resolve, cached=True), folder, allows_commands
-        )
+        """Load the plans of `experiments` (files, names, collections; none means the default), all with `settings`."""
+        plans = load_all(choose(experiments, root, settings), resolve, cached=True)
+        return Names(plans, Path(results).absolute(), allows_commands, tuple(settings))
 
     def level_flags(self, wildcards: Any, input: Any) -> str:  # noqa: A002
         """Return further options of jobs that make levels, which Snakemake does not compare; see `file`."""
         return "--allow-commands" if self.allows_commands else ""
+
+    def given(self, wildcards: Any, input: Any) -> list[str]:  # noqa: A002
+        """Return the options that give every job the settings, which Snakemake does not compare; see `file`."""
+        return [word for text in self.settings for word in (OPTION, text)]
 
     @property
     def experiment_pattern(self) -> str:

@@ -20,6 +20,7 @@ from vibsim.convergence.study.verdict_data import Level
 from vibsim.core.array_types import Floats
 from vibsim.core.errors import VibsimError
 from vibsim.core.record import Record, Variable, attributes
+from vibsim.core.set_option import set_options
 from vibsim.core.vocabulary import FORMAT, REASON_NAMES, SEVERITY, STATUSES, jsonable, worst
 from vibsim.experiment.schema.solver import SolverCheck
 from vibsim.experiment.solver import SolverExperiment
@@ -102,11 +103,13 @@ def _bare(verdict: LadderVerdict) -> LadderVerdict:
 
 def summarise(experiment: SolverExperiment, checks: Sequence[CheckResults]) -> dict[str, Any]:
     """Return the summary of an experiment, as `vibsim.analysis.summary.summarise` does."""
+    given = {"settings": list(experiment.settings)} if experiment.settings else {}
     plain: dict[str, Any] = jsonable(
         {
             "vibsim_format": FORMAT,
             "collection": experiment.collection,
             "experiment": experiment.name,
+            **given,
             "title": experiment.title,
             "status": worst(check.status for check in checks),
             "checks": [_check(experiment, check) for check in checks],
@@ -163,7 +166,8 @@ def _result(experiment: SolverExperiment, result: SolverResult) -> dict[str, Any
     }
     if experiment.sweep is None:
         return found
-    flag = "" if experiment.solver.kind == "files" else " --allow-commands"
+    flag = set_options(experiment.settings)
+    flag += "" if experiment.solver.kind == "files" else " --allow-commands"
     return found | {
         "values": experiment.parameters_of(result.member),
         "command": f"vibsim run {quote(f'{experiment.word}@{result.member}')}{flag}",

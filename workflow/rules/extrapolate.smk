@@ -15,5 +15,6 @@ rule extrapolate:
     params:
         digest=names.extrapolation_digest,
         file=names.file,
+        given=names.given,
     shell:
-        'exec > {log:q} 2>&1; cd / && exec vibsim extrapolate {params.file:q} --results "$OLDPWD" --discard --digest {params.digest:q}'
+        'exec > {log:q} 2>&1; cd / && exec vibsim extrapolate {params.file:q} {params.given:q} --results "$OLDPWD" --discard --digest {params.digest:q}'

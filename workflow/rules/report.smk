@@ -31,5 +31,6 @@ rule report:
     params:
         digest=names.report_digest,
         file=names.file,
+        given=names.given,
     shell:
-        'exec > {log:q} 2>&1; cd / && exec vibsim report {params.file:q} --results "$OLDPWD" --discard --digest {params.digest:q}'
+        'exec > {log:q} 2>&1; cd / && exec vibsim report {params.file:q} {params.given:q} --results "$OLDPWD" --discard --digest {params.digest:q}'

@@ -19,6 +19,7 @@ for simulation in names.simulations:
             levels=simulation.levels,
             shard=simulation.shard,
             file=simulation.file,
+            given=names.given,
             flags=names.level_flags,
         shell:
-            'exec > {log:q} 2>&1; cd / && exec vibsim simulate {params.file:q} --level {params.levels:q} --shard {params.shard:q} --results "$OLDPWD" --threads {threads:q} --digest {params.digest:q} {params.flags}'
+            'exec > {log:q} 2>&1; cd / && exec vibsim simulate {params.file:q} {params.given:q} --level {params.levels:q} --shard {params.shard:q} --results "$OLDPWD" --threads {threads:q} --digest {params.digest:q} {params.flags}'

@@ -39,7 +39,7 @@ def movie(options: Namespace) -> int:
     """
     from vibsim.report.movie import drawing, encoding
 
-    plan = one_plan_of(options.experiment)
+    plan = one_plan_of(options.experiment, options.settings)
     output = options.output
     if output is None and options.frames_to is None:
         output = Path(f"{re.sub(r'[^A-Za-z0-9_]', '_', plan.name)}.mp4")

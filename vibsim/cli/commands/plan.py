@@ -25,7 +25,7 @@ _HEAD = ("level", "steps", "kept every", "files", "member-steps", "disk", "memor
 
 def check(options: Namespace) -> int:
     """Validate experiment files and say that they are valid."""
-    for item in plans_of(options.experiments):
+    for item in plans_of(options.experiments, options.settings):
         levels = ", ".join(str(level.level) for level in item.levels)
         print(f"{item.file}: valid ({_members(item)}, levels {levels})")
     return 0
@@ -34,7 +34,7 @@ def check(options: Namespace) -> int:
 def plan(options: Namespace) -> int:
     """Show members, jobs, steps, memory, disk space and time; refuse what does not fit on this machine."""
     results = chosen_results(options)
-    plans = plans_of(options.experiments)
+    plans = plans_of(options.experiments, options.settings)
     if options.json:
         print(json.dumps([_entry(item) for item in plans], indent=1))
     else:

@@ -25,7 +25,7 @@ def show(options: Namespace) -> int:
     if options.what.endswith(".nc"):
         _draw(level_member.read(Path(options.what), options.case or 0), options, options.what)
         return 0
-    plan = one_plan_of(options.what)
+    plan = one_plan_of(options.what, options.settings)
     results = chosen_results(options)
     case = options.case or 0
     levels, made = level_member.made(plan, results, case, options.what)

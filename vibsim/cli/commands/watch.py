@@ -7,6 +7,7 @@ import subprocess
 import sys
 import time
 from argparse import Namespace
+from collections.abc import Sequence
 from pathlib import Path
 
 from vibsim.cli.chosen_plans import one_plan_of
@@ -33,7 +34,7 @@ def watch(options: Namespace) -> int:
     if file.suffix not in ENDINGS or not file.is_file():
         raise refusal("FILE", file, "must be an experiment file that is there (.yaml)")
     while True:
-        watched = _files(file)
+        watched = _files(file, options.settings)
         before = _saved(watched)
         subprocess.run(_command(options), env=os.environ | supervise.environment(), check=False)
         print(f"watching {file}: save it to run again, Ctrl-C to end", file=sys.stderr, flush=True)
@@ -47,15 +48,17 @@ def _command(options: Namespace) -> list[str]:
         words += ["--results", str(options.results)]
     if options.cores:
         words += ["--cores", str(options.cores)]
+    for text in options.settings:
+        words += ["--set", text]
     if options.detail:
         words.append({"full": "--verbose", "quiet": "--quiet"}[options.detail])
     return words + ["--allow-commands"] * options.allow_commands
 
 
-def _files(file: Path) -> list[Path]:
+def _files(file: Path, settings: Sequence[str]) -> list[Path]:
     """Return the file and the tables that it names, these only as long as it is valid."""
     try:
-        return [file, *(file.parent / name for name, _ in one_plan_of(str(file)).inputs)]
+        return [file, *(file.parent / name for name, _ in one_plan_of(str(file), settings).inputs)]
     except VibsimError:
         return [file]
 

@@ -6,7 +6,7 @@ from argparse import Namespace
 from typing import TYPE_CHECKING
 
 from vibsim.cli import made_files
-from vibsim.cli.jobs.common import check_digest, one_plan, open_levels, provenance, titled
+from vibsim.cli.jobs.common import check_digest, one_plan, open_levels, titled, with_settings
 from vibsim.plan.digests import analysed
 
 if TYPE_CHECKING:
@@ -34,7 +34,7 @@ def analyse(options: Namespace) -> int:
             (titled(part, f"{plan.key}: comparison of levels") for part in parts),
             cases=plan.cases,
             digest=plan.analysis,
-            provenance=provenance(plan, analysed(plan.content)),
+            provenance=with_settings(plan, analysed(plan.content)),
         )
     record = joined(thin)
     summary = summarise(experiment, verdicts(experiment, record), record)

@@ -43,7 +43,7 @@ def chosen_results(options: Namespace) -> Path:
 def one_plan(options: Namespace) -> tuple[Plan, Path]:
     """Return the plan of the experiment of a job, and the results folder."""
     results = chosen_results(options)
-    plan = one_plan_of(options.experiment)
+    plan = one_plan_of(options.experiment, options.settings)
     results_folder.check_folders(results, plan.key)
     return plan, results
 
@@ -91,6 +91,11 @@ def provenance(plan: Plan, uses: dict[str, Any]) -> dict[str, Any]:
     python = ".".join(map(str, sys.version_info[:3]))
     versions = {"vibsim": vibsim.__version__, "python": python, **plan.versions}
     return {"experiment": uses, "versions": versions}
+
+
+def with_settings(plan: Plan, uses: dict[str, Any]) -> dict[str, Any]:
+    """Return what a file says of its making that also tells which settings the command line had."""
+    return provenance(plan, uses) | ({"settings": list(plan.settings)} if plan.settings else {})
 
 
 def check_levels(plan: Plan, options: Namespace, results: Path) -> None:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from vibsim import store
 from vibsim.cli import made_files
-from vibsim.cli.jobs.common import check_levels, provenance, titled
+from vibsim.cli.jobs.common import check_levels, titled, with_settings
 from vibsim.core.record import Record
 from vibsim.experiment.solver import restore
 from vibsim.plan import Plan
@@ -17,7 +17,7 @@ from vibsim.solver import analysis
 
 def judge_levels(plan: Plan, options: Namespace, results: Path) -> int:
     """Compare all levels; write ``convergence.nc`` and ``summary.json``."""
-    experiment = restore(plan.content, plan.source_file)
+    experiment = restore(plan.content, plan.source_file, plan.settings)
     check_levels(plan, options, results)
 
     def read(member: int) -> list[Record]:
@@ -32,7 +32,7 @@ def judge_levels(plan: Plan, options: Namespace, results: Path) -> int:
         folder / "convergence.nc",
         record,
         digest=plan.analysis,
-        provenance=provenance(plan, uses),
+        provenance=with_settings(plan, uses),
     )
     summary = analysis.summarise(experiment, checks)
     store.write_json(folder / "summary.json", summary, digest=plan.analysis)

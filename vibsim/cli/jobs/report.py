@@ -13,9 +13,9 @@ from vibsim.cli.jobs.common import (
     check_digest,
     chosen_results,
     one_plan,
-    provenance,
     read_all,
     refusal,
+    with_settings,
 )
 from vibsim.core.errors import nearest
 
@@ -53,7 +53,7 @@ def report(options: Namespace) -> int:
         summary,
         options.out or results / plan.key,
         formats=formats,
-        provenance=provenance(plan, plan.content) | {"digest": plan.analysis},
+        provenance=with_settings(plan, plan.content) | {"digest": plan.analysis},
     )
     if options.out is None:
         made_files.add(results, plan.key, _written(results / plan.key))

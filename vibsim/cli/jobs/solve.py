@@ -45,7 +45,7 @@ def make(plan: Plan, level: int, job: ShardJob, path: Path, threads: int) -> Non
     from vibsim.experiment.solver import restore
     from vibsim.solver import level_output, run
 
-    experiment = restore(plan.content, plan.source_file)
+    experiment = restore(plan.content, plan.source_file, plan.settings)
     values = {**experiment.sizes_of(level), **experiment.parameters_of(job.start)}
     words = ", ".join(f"{name} = {value}" for name, value in values.items())
     member = "" if experiment.sweep is None else f", member {job.start}"

@@ -44,7 +44,7 @@ def run(options: Namespace) -> int:
 def _run(options: Namespace) -> int:
     results = chosen_results(options)
     # Everything is validated before anything is written but the cache of plans.
-    plans = plans_of(options.experiments, cached=True)
+    plans = plans_of(options.experiments, options.settings, cached=True)
     check_allowed(plans, options.allow_commands)
     results_folder.check(results, [plan.key for plan in plans])
     resources.check(plans, results)
@@ -115,7 +115,7 @@ def _tell_deleted(results: Path) -> bool:
 
 def _refuse_edited(plans: Sequence[Plan], options: Namespace) -> None:
     """Refuse to go on with plans of files that say something else now: their results would be those of neither."""
-    now = plans_of(options.experiments, cached=True)
+    now = plans_of(options.experiments, options.settings, cached=True)
     files = dict.fromkeys(plan.file for plan in plans if plan not in now)
     if files:
         rule = "was edited while it was run; run it again"

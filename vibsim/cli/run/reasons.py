@@ -14,6 +14,7 @@ from vibsim.cli import settings
 from vibsim.cli.jobs.common import provenance
 from vibsim.cli.run.snakemake import Job
 from vibsim.core.errors import FileError
+from vibsim.core.set_option import set_options
 from vibsim.plan import Plan
 from vibsim.plan.digests import analysed, solved_and_judged
 from vibsim.store import read_json
@@ -57,6 +58,12 @@ def _told(plan: Plan, made: Mapping[str, Any]) -> str:
             case dict() as before:
                 now = {key: now.get(key, value) for key, value in before.items()}
                 found = settings.differences(before, now)
+    if not found:
+        before, now = (
+            {set_options([text]).strip(): "given" for text in texts}
+            for texts in (made.get("settings", ()), plan.settings)
+        )
+        found = settings.differences(before, now)
     if not found:
         return (
             "the solver, its inputs or the code of vibsim changed"

@@ -173,7 +173,11 @@ def run(
     """
     results_folder.clean(results, [plan.key for plan in plans])
     config = results / ".vibsim/run.json"
-    content = {"experiments": [plan.file for plan in plans], "results": str(results)}
+    content = {
+        "experiments": [plan.file for plan in plans],
+        "settings": plans[0].settings if plans else (),
+        "results": str(results),
+    }
     write_text(config, json.dumps(content))
     reading, writing = os.pipe()
     command = [sys.executable, "-P", "-m", "vibsim.cli.run.snakemake_process", str(os.getpid())]

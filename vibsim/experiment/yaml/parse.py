@@ -63,6 +63,8 @@ class Node:
     keys: dict[Any, int] | None = None
     """Line of every key of a mapping."""
     children: dict[Any, Node] | None = None
+    setting: str = ""
+    """What the command line says of it and of all in it, where that stands in place of the file."""
 
 
 @dataclass(frozen=True)
@@ -73,6 +75,8 @@ class Place:
     key_line: int
     text: str
     """The value as written, if it is a scalar."""
+    setting: str = ""
+    """The setting of the command line that it came from; empty where it stands in the file."""
 
 
 @dataclass(frozen=True)
@@ -85,17 +89,20 @@ class Source:
     top: Node | None = None
     faults: tuple[Fault, ...] = ()
     """What is wrong with the file although it could be read: duplicate keys and tags."""
+    settings: tuple[str, ...] = ()
+    """What a command line gave in place of values of the file, as ``KEY=VALUE``."""
 
     def place(self, path: Path_) -> Place | None:
         """Return where the value at `path` stands, None where nothing stands there."""
         node = self.top
-        key_line = 0
+        key_line, setting = 0, ""
         for key in path:
             if node is None or node.children is None or key not in node.children:
                 return None
             parent, node = node, node.children[key]
             key_line = parent.keys[key] if parent.keys is not None else node.line
-        return Place(node.line, key_line, node.text) if node else None
+            setting = node.setting or setting
+        return Place(node.line, key_line, node.text, setting) if node else None
 
 
 def read(path: Path, keys: Collection[str] = ()) -> Source:

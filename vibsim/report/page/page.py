@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
@@ -13,6 +14,7 @@ from typing import Any
 from vibsim import store
 from vibsim.core.errors import VibsimError, nearest
 from vibsim.core.record import Record
+from vibsim.core.set_option import set_options
 from vibsim.core.vocabulary import TYPICAL_NORM
 from vibsim.experiment.collection import ADHOC, ENDINGS
 from vibsim.report import choice, data, lead, style
@@ -40,7 +42,7 @@ LONG_HEADING = 90  # letters of a caption of which a heading has the first words
 PYTHON = """\
 from vibsim import Experiment, analyse, simulate, verdicts
 
-experiment = Experiment.from_yaml("{file}"){alone}
+experiment = Experiment.from_yaml("{file}"{given}){alone}
 convergence = analyse(experiment, {{level: simulate(experiment, level) for level in experiment.levels}})
 for verdict in verdicts(experiment, convergence):
     print(verdict.id, verdict.status, verdict.reason)"""
@@ -158,7 +160,7 @@ def write(
             "experiment_file": experiment_file.text(experiment),
             "experiment_shown": experiment_file.shown(experiment),
             "provenance": list(cards.provenance_rows(provenance)),
-            "target": quote(experiment.word),
+            "target": quote(experiment.word) + set_options(experiment.settings),
             "python": _python(experiment),
         }
     )  # fmt: skip
@@ -349,4 +351,6 @@ def _python(experiment: Experiment) -> str:
     if not at or word.endswith(ENDINGS):
         file, case = word, ""
     named = f"configs/{file}.yaml" if is_ours else file
-    return PYTHON.format(file=named, alone=f".alone({case})" if case else "")
+    settings = experiment.settings
+    given = f", settings={json.dumps(settings, ensure_ascii=False)}" if settings else ""
+    return PYTHON.format(file=named, given=given, alone=f".alone({case})" if case else "")

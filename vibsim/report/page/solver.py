@@ -22,6 +22,7 @@ from vibsim.report.tables import checks as check_tables
 from vibsim.report.tables.latex import to_latex
 from vibsim.report.tables.table import Cell, Column, Table, to_csv
 from vibsim.report.text import words
+from vibsim.report.text.setting import not_in_file
 from vibsim.report.types import Plan
 from vibsim.solver import analysis
 
@@ -35,7 +36,7 @@ def write(
     provenance: Mapping[str, Any] | None = None,
 ) -> None:
     """Write ``report.html``, ``figures/`` and ``tables/``; arguments as for `vibsim.report.write`."""
-    experiment = restore(plan.content, plan.source_file)
+    experiment = restore(plan.content, plan.source_file, plan.settings)
     cards, tables = [], [check_tables.checks(summary)]
     figures: dict[str, bytes] = {}
     for check, entry in zip(experiment.checks, summary["checks"], strict=True):
@@ -139,6 +140,7 @@ def _setup(experiment: SolverExperiment) -> Iterator[tuple[str, str]]:
         {"command": "Command", "python": "Function", "files": "Files"}[experiment.solver.kind],
         experiment.solver.text,
     )
+    yield from not_in_file(experiment.settings)
     if experiment.solver.inputs:
         yield "Inputs", ", ".join(experiment.solver.inputs)
     for name, sizes in experiment.sizes.items():

@@ -2,18 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
 from vibsim.core.record import Record
+from vibsim.core.set_option import set_options
 from vibsim.core.vocabulary import HIGHEST
 from vibsim.report import data
 from vibsim.report.text import words
 from vibsim.report.types import Axis, Experiment, SchemeSpec
 
 LISTED = 8  # most values of a key that are written out
+
+
+def not_in_file(settings: Sequence[str]) -> Iterator[tuple[str, str]]:
+    """Yield what the command line gave in place of values of the file."""
+    if settings:
+        yield "Not as in the file", f"the run had{set_options(settings)}"
 
 
 def setup(experiment: Experiment, record: Record) -> Iterator[tuple[str, str]]:
@@ -24,6 +31,7 @@ def setup(experiment: Experiment, record: Record) -> Iterator[tuple[str, str]]:
     sizes = {p.key: data.pretty_unit(p.unit) for p in model.parameters}
     units = {state.name: data.pretty_unit(state.unit) for state in model.states}
     yield "Model", model.title
+    yield from not_in_file(experiment.settings)
     for name, spec in experiment.model.tables.items():
         steps = (
             "no step contains one of its points"

@@ -1,0 +1,159 @@
+"""Values that a command line gives in place of those of an experiment file: ``model.g=1.62``, ``schemes[0].start=...``.
+
+The value is YAML, read as in a file. The rest of the content keeps its lines, and a fault names the setting that a
+value came from.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+from vibsim.core.errors import Fault, InputError
+from vibsim.core.set_option import set_in
+from vibsim.experiment.faults import shorten
+from vibsim.experiment.yaml.parse import Node, Path_, Source, dotted, parse
+
+FORM = "must be KEY=VALUE, e.g. model.g=1.62 or schemes[0].kind=rk4"
+_VALUE = "value"
+_INDEX = re.compile(r"\[(\d{1,9})\]\.?")
+_SWEEP = ("sweep",)
+
+
+def with_settings(source: Source, settings: Sequence[str]) -> Source:
+    """Return the content of a file with values replaced or added, one setting after the other.
+
+    Raises
+    ------
+    InputError
+        With every setting that cannot be read, or that names no place.
+    """
+    faults: list[Fault] = []
+    for text in settings:
+        try:
+            source = _with_one(source, text)
+        except InputError as error:
+            faults.extend(error.faults)
+    if faults:
+        raise InputError(faults)
+    return replace(source, settings=(*source.settings, *settings))
+
+
+@dataclass(frozen=True)
+class _Refusal:
+    """Makes the error of a setting."""
+
+    file: str
+    key: str
+    value: str
+
+    def error(self, rule: str, hint: str = "") -> InputError:
+        return InputError([Fault(self.file, 0, self.key, self.value, rule, hint)])
+
+
+def _with_one(source: Source, text: str) -> Source:
+    key, is_given, value = text.partition("=")
+    key = key.strip()
+    file = set_in(source.file, shorten(text))
+    if not is_given or not key:
+        raise _Refusal(file, "", "").error(FORM)
+    refuse = _Refusal(file, shorten(key), shorten(value))
+    assert source.top is not None
+    path = _path(source.top, key, refuse)
+    top = _put(source.top, path, replace(_node(value, refuse), setting=text), text)
+    return replace(source, data=top.value, top=top)
+
+
+def _node(value: str, refuse: _Refusal) -> Node:
+    """Return what a value means, read as behind a key of a file."""
+    try:
+        found = parse(f"{_VALUE}: {value}".encode(), refuse.file)
+        faults = found.faults
+    except InputError as error:
+        faults = error.faults
+    if faults:
+        raise refuse.error(faults[0].rule.partition(", first on line")[0], faults[0].hint)
+    top = found.top
+    if top is None or top.children is None or top.children.keys() != {_VALUE}:
+        raise refuse.error("must be one value")
+    return top.children[_VALUE]
+
+
+def _path(top: Node, key: str, refuse: _Refusal) -> Path_:
+    """Return the place that a key means in the content of a file: a key there may itself have dots."""
+    path: Path_ = ()
+    node: Node | None = top
+    rest = key
+    while rest:
+        if index := _INDEX.match(rest):
+            place = int(index[1])
+            _check_index(node, path, place, refuse)
+            path, rest = (*path, place), rest[index.end() :]
+        else:
+            name = _name(node, path, rest)
+            if not name:
+                raise refuse.error(FORM)
+            _check_name(node, path, refuse)
+            path, rest = (*path, name), rest.removeprefix(name).removeprefix(".")
+        node = (node.children or {}).get(path[-1]) if node else None
+    return path
+
+
+def _name(node: Node | None, path: Path_, rest: str) -> str:
+    """Return the next key: the longest one that is there, else up to the next dot, of a sweep up to the end."""
+    known = [key for key in (node.keys if node else None) or () if _begins(rest, key)]
+    end = r"[^\[]*" if path == _SWEEP else r"[^.\[]*"
+    found = re.match(end, rest)
+    return max(known, key=len) if known else found[0] if found else ""
+
+
+def _begins(rest: str, key: str) -> bool:
+    return bool(key) and (rest == key or rest.startswith((f"{key}.", f"{key}[")))
+
+
+def _check_index(node: Node | None, path: Path_, place: int, refuse: _Refusal) -> None:
+    where = dotted(path)
+    if node is None or not isinstance(node.value, list):
+        raise refuse.error(f"{where or 'the file'} is no list")
+    count = len(node.value)
+    if place >= count:
+        there = f"choose from [0] to [{count - 1}]" if count else "it is empty"
+        raise refuse.error(f"{where} has no entry [{place}]", there)
+
+
+def _check_name(node: Node | None, path: Path_, refuse: _Refusal) -> None:
+    where = dotted(path)
+    if node is None or node.value is None or node.keys is not None or _is_scheme(path, node):
+        return
+    if isinstance(node.value, list):
+        raise refuse.error(f"{where} is a list", f"name an entry by its number, e.g. {where}[0]")
+    raise refuse.error(f"{where} is a value and has no keys")
+
+
+def _is_scheme(path: Path_, node: Node) -> bool:
+    """Tell whether an entry of `schemes` is a plain word, which stands for its kind."""
+    return len(path) == 2 and path[0] == "schemes" and isinstance(node.value, str)
+
+
+def _put(node: Node, path: Path_, new: Node, setting: str, above: Path_ = ()) -> Node:
+    """Return a copy of a node with `new` at a place in it; the node itself may stand elsewhere, too, as an alias."""
+    if not path:
+        return new
+    if _is_scheme(above, node):
+        kind = {"kind": node}
+        node = replace(node, value={"kind": node.value}, text="", keys={"kind": node.line}, children=kind)  # fmt: skip
+    first, rest = path[0], path[1:]
+    inner = (node.children or {}).get(first)
+    if inner is None:
+        inner = Node(None, 0, setting=setting)
+    inner = _put(inner, rest, new, setting, (*above, first))
+    children: dict[Any, Node] = {**(node.children or {}), first: inner}
+    if isinstance(first, int):
+        value: Any = [inner.value if i == first else old for i, old in enumerate(node.value)]
+        return replace(node, value=value, children=children)
+    keys = {first: 0, **(node.keys or {})}
+    return replace(
+        node, value={**(node.value or {}), first: inner.value}, text="", keys=keys, children=children
+    )  # fmt: skip
