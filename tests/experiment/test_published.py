@@ -139,7 +139,7 @@ def test_every_row_is_a_claim() -> None:
     assert [c.that.id for c in (one, two, three)] == [one.id, two.id, three.id]
     assert one.that.at.model_dump(exclude_none=True) == {"level": 7, "scheme": "rk4"}
     assert (one.that.value, one.that.equals, one.that.atol) == (TABLE["value"], 1.12e8, 5e4)
-    assert (one.source, three.source) == (TABLE["source"], "the text")
+    assert (one.source, three.source) == (TABLE["source"], None)
     assert one.claim == "Relative error of the energy: scheme rk4, level 7: 1.120 10^8"
     assert (one.holds, one.note, two.holds, two.note) == (True, None, False, "rounded")
     assert three.that.at.model_dump(exclude_none=True) == {"scheme": "rk4", "step": 3}

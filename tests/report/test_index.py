@@ -13,6 +13,7 @@ import samples
 from test_page import make, read
 
 from vibsim import report, store
+from vibsim.experiment.schema import citation
 from vibsim.report.page import cards, history
 from vibsim.report.page.index import Headline, headline
 from vibsim.report.text import words
@@ -311,3 +312,22 @@ def test_a_name_in_code_or_a_dotted_path_stays_as_it_is():
     text = "theta at initial.theta = 1 (`theta: 2`), theta_0, of theta."
     told = "θ at initial.theta = 1 (`theta: 2`), theta_0, of θ."
     assert words.labelled(text, "theta") == told
+
+
+def test_a_card_and_the_table_say_where_an_experiment_and_its_claims_stand(tmp_path):
+    order = {"converges": "theta", "order": 2}
+    claim = {"claim": "it falls", "source": "a text, exercise 18 b", "that": order}
+    places = "a text, sections 2.3 and 10.10"
+    exp = samples.experiment(source=places, checks=[order, claim], collection="a", name="named")
+    put(tmp_path, "a", "named", exp)
+    put(tmp_path, "b", "unnamed", samples.experiment(source=None, collection="b", name="unnamed"))
+    report.write_index(tmp_path)
+    page = (tmp_path / "index.html").read_text()
+    assert page.count(f"{places}</p>") == 1
+    assert page.count("None") == page.count("None yet")
+    found = [tuple(row[name] for name in ("source", *citation.PLACES)) for row in lines(tmp_path)]
+    assert found == [
+        ("a text", "2.3 and 10.10", "", "", ""),
+        ("a text", "", "", "", "18 b"),
+        ("", "", "", "", ""),
+    ]

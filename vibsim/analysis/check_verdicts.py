@@ -46,6 +46,8 @@ class Verdict:
     """For every status but PASS, where in a sweep its results lie; see `vibsim.checks.sweep_regions`."""
     note: str | None = None
     """What the experiment says to a reader of a claim."""
+    source: str | None = None
+    """Where a claim stands."""
 
 
 def verdicts(experiment: Experiment, convergence: xarray.Dataset | Record) -> list[Verdict]:
@@ -110,4 +112,5 @@ def _verdict(
         counts=counts,
         where=found,
         note=getattr(check, "note", None),
+        source=getattr(check, "source", None),
     )

@@ -14,6 +14,7 @@ from vibsim.checks.verdict_text import Wording
 from vibsim.core.record import Record
 from vibsim.core.set_option import set_options
 from vibsim.core.vocabulary import FORMAT, jsonable, worst
+from vibsim.experiment.schema import citation
 
 if TYPE_CHECKING:
     import xarray
@@ -52,6 +53,7 @@ def summarise(
             "experiment": experiment.name,
             **given,
             "title": experiment.title,
+            "source": citation.fields(experiment.source),
             "status": worst(verdict.status for verdict in verdicts),
             "checks": [_check(experiment, record, verdict, most) for verdict in verdicts],
             "failures": _failures(experiment, record, most),
@@ -70,7 +72,7 @@ def _check(
         vars(row) | {"sentence": wording.sentence(row)} | _member(experiment, record, row.case)
         for row in verdict.results.worst(most)
     ]
-    return {**vars(verdict), "results": rows}
+    return {**vars(verdict), "results": rows, "source": citation.fields(verdict.source)}
 
 
 def _member(experiment: Experiment, record: Record, case: int) -> dict[str, Any]:

@@ -16,6 +16,7 @@ from vibsim.checks.order import BESIDE
 from vibsim.checks.solver_facts import LEVELS, SOLVER_FACTS
 from vibsim.checks.tolerance import BOUND
 from vibsim.core.vocabulary import BY_TOLERANCE, FORMAT, REASON_NAMES, STATUSES
+from vibsim.experiment.schema.citation import FIELDS
 
 TEXT = {"type": "string"}
 NUMBER = {"type": ["number", "null"]}
@@ -35,6 +36,17 @@ def _object(
         "additionalProperties": False,
         **more,
     }
+
+
+SOURCE = {
+    "anyOf": [
+        {"type": "null"},
+        _object(
+            {name: TEXT if name == "text" else {"type": ["string", "null"]} for name in FIELDS}
+        ),
+    ],
+    "description": "the text where it stands, and the numbers of what is meant there",
+}
 
 
 def _fact(field: Field) -> dict[str, Any]:
@@ -86,6 +98,7 @@ def schema() -> dict[str, Any]:
         "counts": _object(dict.fromkeys(STATUSES, COUNT)),
         "where": {"type": "object"},
         "note": {"type": ["string", "null"]},
+        "source": SOURCE,
     }
     failure = {
         "scheme": TEXT,
@@ -101,6 +114,7 @@ def schema() -> dict[str, Any]:
         "collection": TEXT,
         "experiment": TEXT,
         "title": TEXT,
+        "source": SOURCE,
         "status": STATUS,
         "checks": {"type": "array", "items": _object(check)},
         "failures": {"type": "array", "items": _object(failure, member)},

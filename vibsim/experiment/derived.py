@@ -57,7 +57,7 @@ def alone(experiment: AnyExperiment, case: int) -> AnyExperiment:
     published = _published_of(experiment.published, case, unit)
     ours = [check for check in experiment.written if check.measured.member in (None, case)]
     checks: list[Check] = [_of_member(check, unit) for check in ours]
-    checks += claims(published, experiment.source)
+    checks += claims(published)
     positions = model.definition.positions if not checks else ()
     checks += [ConvergesCheck(id=f"check_{i}", converges=u) for i, u in enumerate(positions, 1)]
     found = experiment.model_copy(

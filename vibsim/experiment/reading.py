@@ -277,7 +277,7 @@ def _checks(document: Any, setting: size_limits.Setting, report: Report) -> tupl
     checks = finish_checks(given, setting, report)
     ids = [check.id if check is not None else "" for check in document.checks]
     check_published(document.published, ids, setting, report)
-    rows = [] if report.faults else claims(document.published, document.source)
+    rows = [] if report.faults else claims(document.published)
     return (*checks, *rows)
 
 

@@ -22,6 +22,7 @@ from vibsim.core.errors import VibsimError
 from vibsim.core.record import Record, Variable, attributes
 from vibsim.core.set_option import set_options
 from vibsim.core.vocabulary import FORMAT, REASON_NAMES, SEVERITY, STATUSES, jsonable, worst
+from vibsim.experiment.schema import citation
 from vibsim.experiment.schema.solver import SolverCheck
 from vibsim.experiment.solver import SolverExperiment
 from vibsim.solver import level_output
@@ -111,6 +112,7 @@ def summarise(experiment: SolverExperiment, checks: Sequence[CheckResults]) -> d
             "experiment": experiment.name,
             **given,
             "title": experiment.title,
+            "source": citation.fields(experiment.source),
             "status": worst(check.status for check in checks),
             "checks": [_check(experiment, check) for check in checks],
             "failures": [],
@@ -137,6 +139,7 @@ def _check(experiment: SolverExperiment, found: CheckResults) -> dict[str, Any]:
         "counts": found.counts,
         "where": {},
         "note": None,
+        "source": None,
     }
 
 

@@ -18,6 +18,7 @@ from vibsim.cli.jobs.common import (
     with_settings,
 )
 from vibsim.core.errors import nearest
+from vibsim.experiment.schema import citation
 
 FORMATS = ("svg", "png", "pdf")
 """Formats of figures, as in `vibsim.report.style`, which takes long to import."""
@@ -41,10 +42,11 @@ def report(options: Namespace) -> int:
     }
     found = read_all(options, results, readers)
     summary = found[plan.summary]
-    if summary["title"] != plan.title:
-        summary["title"] = plan.title
+    named = {"title": plan.title, "source": citation.fields(plan.source)}
+    if summary != summary | named:
+        summary |= named
         if options.out is None:
-            # No number depends on the title: after another one the analysis need not run again.
+            # No number depends on title and source: after other ones the analysis need not run again.
             store.write_json(results / plan.summary, summary, digest=plan.analysis)
             made_files.add(results, plan.key, ["summary.json"])
     write(

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self
 from pydantic import BeforeValidator, ConfigDict, Discriminator, Field, StrictBool, WithJsonSchema
 
 from vibsim.core.vocabulary import ORDER_TOLERANCE, REASONS, TYPICAL_NORM, Norm, Status
+from vibsim.experiment.schema.citation import Citation
 from vibsim.experiment.schema.fields import (
     MAX_LEVEL,
     STAND_IN,
@@ -379,7 +380,7 @@ class ClaimCheck(Section):
     """Name of the check, unique in the file; `check_1` and so on when left out."""
     claim: Text
     """The statement, in words."""
-    source: Text | None = None
+    source: Citation | None = None
     """Where the statement stands."""
     that: Measured
     """The check that measures it."""

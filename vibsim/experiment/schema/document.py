@@ -11,6 +11,7 @@ from pydantic.json_schema import GenerateJsonSchema
 
 from vibsim.experiment.kinds import Kinds
 from vibsim.experiment.schema.checks import Check
+from vibsim.experiment.schema.citation import Citation
 from vibsim.experiment.schema.fields import (
     MAX_ENTRIES,
     MAX_LEVEL,
@@ -157,7 +158,7 @@ class Document(Section):
 
     title: Text
     """What the experiment shows, in a line."""
-    source: Text | None = None
+    source: Citation | None = None
     """What the experiment comes from."""
     units: Annotated[dict[str, str], WithJsonSchema(UNITS_SCHEMA)] = Field({})
     """Units of the file's own, such as ``rod: 4.9 m``: every number with a unit may name them."""

@@ -7,6 +7,7 @@ from typing import Annotated, Literal, get_args
 
 from pydantic import AfterValidator, Field
 
+from vibsim.experiment.schema.citation import Citation
 from vibsim.experiment.schema.fields import MAX_ENTRIES, FrozenDict, Positive, Section, Text, short
 
 Shows = Literal[
@@ -27,7 +28,7 @@ class FigureOfSource(Section):
 
     shows: Shows
     """What it shows."""
-    source: Text
+    source: Citation
     """Where it stands: the text, and the number of the figure."""
     quantities: Annotated[tuple[Text, ...], short(MAX_ENTRIES)] = ()
     """What is drawn over time, each in a panel; the position when left out."""

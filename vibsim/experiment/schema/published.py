@@ -12,6 +12,7 @@ from typing import Annotated, Any, NamedTuple
 from pydantic import BeforeValidator, Field, StrictBool, WithJsonSchema
 
 from vibsim.experiment.schema.checks import At, ClaimCheck, LevelOrBest, PublishedAt, ValueCheck
+from vibsim.experiment.schema.citation import Citation
 from vibsim.experiment.schema.fields import MAX_ENTRIES, Section, Text, refused, short
 
 _POWER = r"(?:\s*(?:[x*·×]|\\cdot)?\s*10\s*\^\s*(?:\{\s*([-+]?\d{1,3})\s*\}|([-+]?\d{1,3}))|[eE]([-+]?\d{1,3}))"
@@ -84,7 +85,7 @@ class PublishedTable(Section):
 
     title: Text
     """What the table shows."""
-    source: Text | None = None
+    source: Citation | None = None
     """Where it stands; the experiment's `source` when left out."""
     value: Text
     """The value that is printed, one of those of a `value` check."""
@@ -106,16 +107,16 @@ def row_at(row: PublishedRow) -> At:
     return At(scheme=row.scheme, level=row.level, **dict(row.at))
 
 
-def claims(tables: Iterable[PublishedTable], source: str | None) -> tuple[ClaimCheck, ...]:
-    """Return the claim of every row; `source` is that of the experiment."""
+def claims(tables: Iterable[PublishedTable]) -> tuple[ClaimCheck, ...]:
+    """Return the claim of every row."""
     return tuple(
-        _claim(table, row, row_id(i, j), source)
+        _claim(table, row, row_id(i, j))
         for i, table in enumerate(tables, 1)
         for j, row in enumerate(table.rows, 1)
     )
 
 
-def _claim(table: PublishedTable, row: PublishedRow, id_: str, source: str | None) -> ClaimCheck:
+def _claim(table: PublishedTable, row: PublishedRow, id_: str) -> ClaimCheck:
     places = [f"scheme {row.scheme}"]
     if row.level is not None:
         places.append("extrapolated" if row.level == "best" else f"level {row.level}")
@@ -126,7 +127,7 @@ def _claim(table: PublishedTable, row: PublishedRow, id_: str, source: str | Non
     return ClaimCheck(
         id=id_,
         claim=f"{table.title}: {', '.join(places)}: {row.printed}",
-        source=table.source or source,
+        source=table.source,
         that=that,
         holds=row.holds,
         note=row.note,

@@ -10,6 +10,7 @@ from pydantic import BeforeValidator, ConfigDict, Discriminator, Field
 
 from vibsim.core.vocabulary import Restriction
 from vibsim.experiment.schema.checks import Accuracy, Expect, MeasuringCheck, by_key, one_of
+from vibsim.experiment.schema.citation import Citation
 from vibsim.experiment.schema.document import Levels, json_schema
 from vibsim.experiment.schema.fields import (
     MAX_ENTRIES,
@@ -167,7 +168,7 @@ class SolverDocument(Section):
 
     title: Text
     """What the experiment shows, in a line."""
-    source: Text | None = None
+    source: Citation | None = None
     """What the experiment comes from."""
     solver: SolverSection
     """How a level is made."""

@@ -14,6 +14,7 @@ from vibsim import store
 from vibsim.core.errors import FileError
 from vibsim.core.vocabulary import SEVERITY, worst
 from vibsim.experiment.collection import ADHOC
+from vibsim.experiment.schema import citation
 from vibsim.report.page import history, policy, source_figures
 from vibsim.report.page.page import environment, markup
 from vibsim.report.tables.checks import error_of, measured_order, number_of
@@ -33,9 +34,9 @@ FILTERS = (
 )
 """What cards can be filtered by, with its words."""
 HEADERS = (
-    "collection", "experiment", "title", "experiment status", "check", "kind", "text", "quantity", "expected",
-    "status", "reason", "scheme", "case", "order", "order_low", "order_high", "levels", "value",
-    "error", "error_bound", "relative_error", "advice", "failures",
+    "collection", "experiment", "title", "source", *citation.PLACES, "experiment status",
+    "check", "kind", "text", "quantity", "expected", "status", "reason", "scheme", "case", "order",
+    "order_low", "order_high", "levels", "value", "error", "error_bound", "relative_error", "advice", "failures",
 )  # fmt: skip
 _FLOAT = re.compile(r"\b\d[\d.]*e[-+]?\d+\b")
 LONGEST = 90  # characters of a finding that stands in place of numbers
@@ -68,6 +69,8 @@ class Row:
     passed: int = 0
     link: str = ""
     picture: str = ""
+    source: Mapping[str, str | None] | None = None
+    """Where it comes from, by `citation.FIELDS`."""
     checks: Sequence[Mapping[str, Any]] = ()
     broken: int = 0  # number of runs that broke down
     headline: Headline = field(default_factory=Headline)
@@ -91,12 +94,17 @@ class Row:
         return f"{self.passed} of {len(self.checks)}"
 
     @property
+    def stands(self) -> str:
+        """Where it comes from, in a line."""
+        return citation.line(self.source) if self.source else ""
+
+    @property
     def search(self) -> str:
         """What a search looks through, in small letters."""
         found = (result.get("scheme") for check in self.checks for result in check["results"])
         asked = (check["quantity"] for check in self.checks)
         known = dict.fromkeys(str(word) for word in (*found, *asked) if word)
-        return " ".join((self.title, self.key, *known)).lower()
+        return " ".join((self.title, self.key, self.stands, *known)).lower()
 
 
 def write_index(results: Path) -> None:
@@ -156,7 +164,8 @@ def _row(results: Path, folder: Path) -> Row:
     return Row(
         collection, name, summary["title"], summary["status"], _why(checks),
         sum(check["status"] == "PASS" for check in checks), relative("report.html"),
-        relative("figures/thumbnail.svg"), checks, words.broken(summary), headline(checks), marks(checks),
+        relative("figures/thumbnail.svg"), summary.get("source"), checks, words.broken(summary), headline(checks),
+        marks(checks),
     )  # fmt: skip
 
 
@@ -225,9 +234,18 @@ def _decides(check: Mapping[str, Any]) -> Mapping[str, Any]:
 
 def _lines(row: Row) -> Iterator[tuple[Any, ...]]:
     """Yield one line per check, with the worst of its results; one line for an experiment that cannot be read."""
-    head = (row.collection, row.name, row.title, row.status)
+    head = (row.collection, row.name, row.title)
     if not row.checks:
-        yield (*head, *[None] * 5, row.status, row.why, *[None] * 11, row.broken)
+        yield (
+            *head,
+            *_source(row),
+            row.status,
+            *[None] * 5,
+            row.status,
+            row.why,
+            *[None] * 11,
+            row.broken,
+        )
     of_check = ("id", "kind", "text", "quantity", "expected", "status", "reason")
     for check in row.checks:
         decides = _decides(check)
@@ -238,4 +256,18 @@ def _lines(row: Row) -> Iterator[tuple[Any, ...]]:
             number_of(decides),
             *error_of(decides),
         )
-        yield (*head, *map(check.get, of_check), *measured, check.get("advice"), row.broken)
+        yield (
+            *head,
+            *_source(row, check),
+            row.status,
+            *map(check.get, of_check),
+            *measured,
+            check.get("advice"),
+            row.broken,
+        )
+
+
+def _source(row: Row, check: Mapping[str, Any] | None = None) -> tuple[str | None, ...]:
+    """Return where a check stands, by `citation.FIELDS`: its own source, else that of its experiment."""
+    source = (check or {}).get("source") or row.source or {}
+    return tuple(source.get(name) for name in citation.FIELDS)
