@@ -2,7 +2,13 @@
 
 from __future__ import annotations
 
+import ast
+import inspect
+import sys
+from collections import ChainMap
 from collections.abc import Iterable, Mapping
+from functools import cache
+from itertools import pairwise
 from types import MappingProxyType
 from typing import Annotated, Any, Literal
 
@@ -193,10 +199,39 @@ class Document(Section):
 
 
 class _Generator(GenerateJsonSchema):
-    """Leaves out the titles that pydantic makes from the names of keys."""
+    """Takes the texts below fields as their descriptions; leaves out the titles that pydantic makes from names.
+
+    Pydantic would read these texts whenever vibsim starts (`use_attribute_docstrings`), which takes a tenth of a
+    second. Only a schema needs them.
+    """
 
     def field_title_should_be_set(self, schema: Any) -> bool:
         return False
+
+    def model_schema(self, schema: Any) -> dict[str, Any]:
+        found, kind = super().model_schema(schema), schema["cls"]
+        kinds = (base for base in kind.mro() if issubclass(base, Section))
+        told = ChainMap(*(_texts_of_module(c.__module__).get(c.__name__, {}) for c in kinds))
+        for name, field in kind.model_fields.items():
+            if field.description is None and name in told:
+                found["properties"][field.alias or name]["description"] = told[name]
+        return found
+
+
+@cache
+def _texts_of_module(name: str) -> dict[str, dict[str, str]]:
+    """Return the texts below the fields of each class of a module, by the names of class and field."""
+    tree = ast.parse(inspect.getsource(sys.modules[name]))
+    found: dict[str, dict[str, str]] = {}
+    for body in (part for part in tree.body if isinstance(part, ast.ClassDef)):
+        for field, text in pairwise(body.body):
+            match field, text:
+                case (
+                    ast.AnnAssign(target=ast.Name(id=key)),
+                    ast.Expr(value=ast.Constant(value=str(words))),
+                ):
+                    found.setdefault(body.name, {})[key] = inspect.cleandoc(words)
+    return found
 
 
 def json_schema(kind: type[Section]) -> dict[str, Any]:
@@ -222,14 +257,10 @@ def installed_schema() -> dict[str, Any]:
             ...,
         ),
     }
-    told = {name: Document.model_fields[name].description for name in rows}
     fields: dict[str, Any] = {
-        name: (kind, Field(default, description=told[name]))
-        for name, (kind, default) in rows.items()
+        name: (kind, Field(default)) for name, (kind, default) in rows.items()
     }
     doc = Document.__doc__
-    whole = create_model("Document", __base__=Document, __doc__=doc, **fields)
-    whole.model_config["use_attribute_docstrings"] = False
-    found = json_schema(whole)
+    found = json_schema(create_model("Document", __base__=Document, __doc__=doc, **fields))
     found["$defs"]["SweepSection"]["patternProperties"] = swept_options(SCHEMES.values())
     return found

@@ -52,7 +52,6 @@ class Section(BaseModel):
     model_config = ConfigDict(
         extra="forbid",
         frozen=True,
-        use_attribute_docstrings=True,
         allow_inf_nan=False,
         defer_build=True,
     )
@@ -67,12 +66,6 @@ class Section(BaseModel):
     def normal(cls, written: Mapping[str, Any]) -> tuple[Mapping[str, Any], str]:
         """Return what is written with every abbreviation written out, and the rule that it breaks, if it does."""
         return written, ""
-
-
-class MadeSection(Section):
-    """A part that is made from a registry: its descriptions are given, and not looked for in a source file."""
-
-    model_config = ConfigDict(use_attribute_docstrings=False)
 
 
 class FrozenDict(dict[str, Any]):

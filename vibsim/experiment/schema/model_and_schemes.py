@@ -25,7 +25,6 @@ from vibsim.experiment.schema.fields import (
     TABLE,
     FormulaText,
     Line,
-    MadeSection,
     Number,
     Positive,
     Section,
@@ -68,7 +67,7 @@ def scheme_section(scheme: Scheme) -> type[Section]:
         fields[EVENTS.name] = (Literal[EVENTS.choices] | None, treatment)
     doc = f"{scheme.title} ({scheme.source})."
     name = f"{_class_name(scheme.kind)}Scheme"
-    return create_model(name, __base__=MadeSection, __doc__=doc, **fields)
+    return create_model(name, __base__=Section, __doc__=doc, **fields)
 
 
 def _bounded(**bounds: float | None) -> Any:
@@ -162,7 +161,7 @@ def _formula_type(model: Model, field: FormulaField) -> Any:
         fields[word] = (value, Field(default=None, description=f"b of {text}"))
     if not fields:
         return FormulaText
-    return by_shape(create_model(name, __base__=MadeSection, **fields), FormulaText)
+    return by_shape(create_model(name, __base__=Section, **fields), FormulaText)
 
 
 @cache
@@ -185,4 +184,4 @@ def model_section(model: Model) -> type[Section]:
         words = "names that the formulas use, with their values"
         fields["parameters"] = (Declared, Field(default={}, description=words))
     doc = f"{model.title}: {model.equation} ({model.source})."
-    return create_model(_class_name(model.kind), __base__=MadeSection, __doc__=doc, **fields)
+    return create_model(_class_name(model.kind), __base__=Section, __doc__=doc, **fields)
