@@ -13,7 +13,7 @@ from test_player import made
 from vibsim import report
 from vibsim.report.figures import scenes
 from vibsim.report.page import history, player
-from vibsim.report.page.page import environment
+from vibsim.report.page.templates import environment
 
 pytestmark = pytest.mark.slow
 

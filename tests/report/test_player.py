@@ -11,7 +11,7 @@ import samples
 
 from vibsim.report.figures import scenes
 from vibsim.report.page import player
-from vibsim.report.page.page import environment
+from vibsim.report.page.templates import environment
 
 PENDULUM = {"kind": "pendulum"}
 DRAGGED = {"kind": "pendulum", "drag": 0.4}

@@ -16,7 +16,7 @@ from vibsim.experiment.schema.figures import KINDS
 from vibsim.report import lead, style
 from vibsim.report.figures import accuracy, of_source
 from vibsim.report.page import player, source_figures
-from vibsim.report.page.page import environment
+from vibsim.report.page.templates import environment
 
 ROOT = Path(__file__).parents[2]
 CONFIGS = ROOT / "configs"

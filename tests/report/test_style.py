@@ -16,7 +16,7 @@ from vibsim import report
 from vibsim.report import style
 from vibsim.report.data import Member
 from vibsim.report.figures import drawing, time
-from vibsim.report.page.page import TEMPLATES
+from vibsim.report.page.templates import TEMPLATES
 
 VALUES = st.lists(
     st.floats(allow_infinity=False, width=32) | st.just(float("nan")), min_size=1, max_size=400

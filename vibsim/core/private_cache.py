@@ -1,11 +1,11 @@
 """The user's private cache: the one place that vibsim loads code from, or anything else that it trusts as its own work.
 
-It holds compiled kernels, references, plans, and what modules import, each kind in a folder of its own inside of
-``$VIBSIM_CACHE_DIR``, else of ``vibsim`` in the user's cache folder. A seal tells a damaged entry from a whole one and
-says which entry it is, but anybody can make a seal. What keeps others out is the file system: no one but the user, and
-root, can write to the folders or replace them. A folder that others can write to is refused and not changed, since
-closing it afterwards would leave what they put there; a folder of ours that others can only read is closed to them.
-What cannot be kept is made again.
+It holds compiled kernels and templates, references, plans, and what modules import, each kind in a folder of its own
+inside of ``$VIBSIM_CACHE_DIR``, else of ``vibsim`` in the user's cache folder. A seal tells a damaged entry from a
+whole one and says which entry it is, but anybody can make a seal. What keeps others out is the file system: no one but
+the user, and root, can write to the folders or replace them. A folder that others can write to is refused and not
+changed, since closing it afterwards would leave what they put there; a folder of ours that others can only read is
+closed to them. What cannot be kept is made again.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from vibsim.core import regular_files
 
 Thing = TypeVar("Thing")
 
-KINDS = ("imports", "kernels", "plans", "references")
+KINDS = ("imports", "kernels", "plans", "references", "templates")
 MOST_BYTES = 2**29
 """Size of the folder of a kind, at most."""
 MOST_OF_ENTRY = 2**26

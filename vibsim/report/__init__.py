@@ -6,7 +6,17 @@ imported where they are used, so that importing this package costs next to nothi
 
 from __future__ import annotations
 
-from vibsim.report.page.index import write_index
-from vibsim.report.page.page import write
+from typing import TYPE_CHECKING
+
+from vibsim.core.lazy import loader
+
+if TYPE_CHECKING:
+    from vibsim.report.page.index import write_index
+    from vibsim.report.page.page import write
 
 __all__ = ["write", "write_index"]
+
+__getattr__ = loader(
+    __name__,
+    {"write": "vibsim.report.page.page", "write_index": "vibsim.report.page.index"},
+)

@@ -20,13 +20,9 @@ from vibsim.report.figures import (
 )
 from vibsim.report.lead import Lead
 from vibsim.report.style import Picture
-from vibsim.report.tables.table import Column, Table
+from vibsim.report.tables.source_figures import PLAYER
 from vibsim.report.types import Experiment
 
-PLAYER = "player"
-"""What is shown by the player of the page and not drawn here."""
-HEADERS = ("figure", "shows", "place")
-"""Of the table of figures; the place is the id of an element of the page."""
 Draw = Callable[[Experiment, Record, Lead], Picture | None]
 
 
@@ -106,16 +102,6 @@ def undrawn(
         for asked, drawn in found
         if not (has_player if asked.shows == PLAYER else drawn)
     ]
-
-
-def table(found: Iterable[tuple[FigureOfSource, Sequence[Picture]]]) -> Table | None:
-    """Return which figure of the source stands where on the page; None where none is asked for."""
-    rows = []
-    for asked, drawn in found:
-        places = [picture.name for picture in drawn] or [PLAYER] * (asked.shows == PLAYER)
-        rows += [(asked.source, asked.shows.replace("_", " "), place) for place in places]
-    columns = tuple(map(Column, HEADERS))
-    return Table("figures", "Figures of the source", columns, tuple(rows)) if rows else None
 
 
 def opening(source: str) -> str:

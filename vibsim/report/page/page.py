@@ -6,7 +6,6 @@ import json
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
-from functools import cache
 from pathlib import Path
 from shlex import quote
 from typing import Any
@@ -21,15 +20,25 @@ from vibsim.report import choice, data, lead, style
 from vibsim.report.figures import drawing, gallery, of_source, thumbnail
 from vibsim.report.figures.view import View
 from vibsim.report.page import cards, explorer, hero, player, policy
+from vibsim.report.page.templates import environment, markup
 from vibsim.report.style import Picture
-from vibsim.report.tables import best, checks, degrees, levels, members, published, theory, work
+from vibsim.report.tables import (
+    best,
+    checks,
+    degrees,
+    levels,
+    members,
+    published,
+    source_figures,
+    theory,
+    work,
+)
 from vibsim.report.tables.latex import to_latex
 from vibsim.report.tables.scales import table as scales_table
 from vibsim.report.tables.table import Table, to_csv
-from vibsim.report.text import equation, experiment_file, glossary, setting, words
-from vibsim.report.types import Environment, Experiment, Plan
+from vibsim.report.text import equation, experiment_file, setting, words
+from vibsim.report.types import Experiment, Plan
 
-TEMPLATES = Path(__file__).parents[1] / "templates"
 NOTHING: Mapping[str, Any] = {}
 MOST_ROWS = 8  # of a table that the page itself holds; the CSV file holds all
 ROOM = 220  # cells of all tables of numbers together; a table beyond is a file only
@@ -105,7 +114,7 @@ def write(
     printed = published.tables(experiment, convergence, summary)
     broken = checks.failures(summary, convergence)
     every = [*printed, *listed, *others, scales, checks.checks(summary), broken]
-    every += [of_source.table(sources), members.table(convergence, position)]
+    every += [source_figures.table(sources), members.table(convergence, position)]
     files = {}
     for table in every:
         if table is not None:
@@ -260,46 +269,6 @@ def copied(table: Table) -> dict[str, str]:
     """Return what buttons copy of a table: all of it, by the name of the format; nothing of a very long one."""
     found = {"CSV": to_csv(table), "LaTeX": to_latex(table)}
     return found if max(map(len, found.values())) <= COPIED else {}
-
-
-@cache
-def environment() -> Environment:
-    """Return the jinja2 environment of the templates, with escaping always on."""
-    from jinja2 import Environment, FileSystemLoader, StrictUndefined
-
-    made = Environment(
-        loader=FileSystemLoader(TEMPLATES), autoescape=True, undefined=StrictUndefined, trim_blocks=True,
-        lstrip_blocks=True,
-    )  # fmt: skip
-    made.filters |= {"code": _code, "drawn": _drawn, "explained": glossary.explained}
-    made.globals |= {"term": glossary.term}
-    return made
-
-
-def _code(text: str) -> str:
-    """Escape a text, and set what stands between backticks as code."""
-    from markupsafe import Markup, escape
-
-    parts = text.split("`")
-    if len(parts) % 2 == 0:
-        return escape(text)
-    pieces = [
-        Markup("<code>{}</code>").format(p) if i % 2 else escape(p) for i, p in enumerate(parts)
-    ]
-    return Markup("").join(pieces)
-
-
-def markup(text: str) -> str:
-    """Mark a drawing of our own as markup; its texts were escaped when it was drawn."""
-    from markupsafe import Markup
-
-    return Markup(text)
-
-
-def _drawn(picture: Picture) -> str:
-    """Return the SVG element of the picture of a check."""
-    with style.applied():
-        return markup(drawing.element(picture))
 
 
 def replace_files(directory: Path, files: Mapping[str, bytes], others: Sequence[str] = ()) -> None:

@@ -17,7 +17,8 @@ from vibsim.report import style
 from vibsim.report.figures import drawing, thumbnail
 from vibsim.report.page import policy, study
 from vibsim.report.page.cards import provenance_rows
-from vibsim.report.page.page import environment, replace_files
+from vibsim.report.page.page import replace_files
+from vibsim.report.page.templates import environment
 from vibsim.report.tables import checks as check_tables
 from vibsim.report.tables.latex import to_latex
 from vibsim.report.tables.table import Cell, Column, Table, to_csv

@@ -11,7 +11,7 @@ from pathlib import Path
 from urllib.parse import quote
 
 from vibsim.core import regular_files
-from vibsim.report.figures.of_source import HEADERS
+from vibsim.report.tables.source_figures import HEADERS
 
 FILE = "tables/figures.csv"
 """Within the results of an experiment."""

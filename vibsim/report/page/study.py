@@ -14,7 +14,7 @@ from vibsim.convergence.study.sentences import digits_of_values, number
 from vibsim.core.vocabulary import worst
 from vibsim.report import style
 from vibsim.report.page import policy
-from vibsim.report.page.page import environment
+from vibsim.report.page.templates import environment
 from vibsim.report.style import Picture
 from vibsim.report.tables.table import Column, Table, Written
 from vibsim.report.text import findings, words

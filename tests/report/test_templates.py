@@ -1,0 +1,79 @@
+"""Compiled templates: kept in the private cache alone, made again where an entry is no good, and no need of it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from jinja2 import environment as jinja
+
+from vibsim.core import private_cache
+from vibsim.report.page import templates
+
+NAME = "study.html"
+
+
+@pytest.fixture
+def home(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    monkeypatch.setenv("VIBSIM_CACHE_DIR", str(tmp_path / "cache"))
+    private_cache._opened.cache_clear()
+    yield tmp_path / "cache/templates"
+    private_cache._opened.cache_clear()
+
+
+@pytest.fixture
+def compiled(monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """Return the names of the templates that are compiled from now on."""
+    names: list[str] = []
+    right = jinja.Environment.compile
+
+    def compile_(self: jinja.Environment, source: str, name: str, *more: object) -> object:
+        names.append(name)
+        return right(self, source, name, *more)  # type: ignore[call-overload]
+
+    monkeypatch.setattr(jinja.Environment, "compile", compile_)
+    return names
+
+
+def again() -> None:
+    """Load a template as another process would."""
+    templates.environment.__wrapped__().get_template(NAME)
+
+
+def test_a_template_is_compiled_once(home: Path, compiled: list[str]) -> None:
+    again()
+    again()
+    assert compiled == [NAME]
+    assert len(list(home.iterdir())) == 1
+
+
+@pytest.mark.parametrize("bad", [b"", b"no seal", None])
+def test_an_entry_that_is_no_good_is_made_again(
+    home: Path, compiled: list[str], bad: bytes | None
+) -> None:
+    again()
+    (entry,) = home.iterdir()
+    whole = entry.read_bytes()
+    # without `bad`, whole but for one bit
+    entry.write_bytes(bytes([whole[0] ^ 1]) + whole[1:] if bad is None else bad)
+    again()
+    assert compiled == [NAME] * 2
+    assert entry.read_bytes() == whole
+
+
+def test_another_text_is_another_entry(
+    home: Path, compiled: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(templates, "TEMPLATES", tmp_path)
+    for text in ("one", "two", "one"):
+        (tmp_path / NAME).write_text(text)
+        assert templates.environment.__wrapped__().get_template(NAME).render() == text
+    assert compiled == [NAME] * 2
+
+
+def test_no_cache_is_no_fault(compiled: list[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(private_cache, "opened", lambda kind: None)
+    again()
+    again()
+    assert compiled == [NAME] * 2
