@@ -18,9 +18,9 @@ from vibsim import Experiment, analyse, simulate
 from vibsim.analysis import analyse_records, verdicts
 from vibsim.checks.accurate import BASES
 from vibsim.checks.fields import name_of
+from vibsim.checks.notation import PLAIN
 from vibsim.checks.order_context import Corner
 from vibsim.checks.order_text import _Phrases, in_words
-from vibsim.checks.sentences import PLAIN
 from vibsim.comparison.order_evidence import CAUSES
 from vibsim.core.record import Record, Variable
 from vibsim.core.vocabulary import DRIFTS, REASON_NAMES, REASONS, STATUSES

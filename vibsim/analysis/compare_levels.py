@@ -30,11 +30,11 @@ from vibsim.core.vocabulary import (
     SERIES,
     STATUSES,
     TYPICAL_NORM,
+    is_error_part,
 )
 from vibsim.experiment.storage import RUNNING, asked, lean_series
 from vibsim.models import centred
 from vibsim.models.events import TREATMENTS
-from vibsim.models.shared.phase_amplitude_names import is_error_part
 from vibsim.observe.common_grid import SAME_AT_EVERY_LEVEL
 from vibsim.observe.member_block import CENTRED, MemberBlock, block_of
 from vibsim.observe.missed_pulses import missed_variables

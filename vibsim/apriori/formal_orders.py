@@ -16,10 +16,10 @@ from vibsim import plan, theory
 from vibsim.apriori.roundoff_floor import SPACING_AT_ONE
 from vibsim.core.array_types import Flags, Floats, Integers
 from vibsim.core.record import Record
+from vibsim.core.vocabulary import PHASE, is_error_part, whole_of
 from vibsim.formula import values
 from vibsim.models import Model, tree
 from vibsim.models.shared.free import free_oscillation, why_not_free
-from vibsim.models.shared.phase_amplitude_names import PHASE, is_error_part, whole_of
 from vibsim.schemes import Options, Scheme
 from vibsim.schemes.base import ORDER_AT_CORNERS, is_on_the_mesh
 from vibsim.schemes.orders import Beginning, depends_on_velocity, is_autonomous

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from vibsim.checks.fields import LEVEL, Field
+from vibsim.checks.notation import PLAIN, Notation, beside
 from vibsim.checks.outcome import (
     MATCH,
     MISMATCH,
@@ -26,15 +27,7 @@ from vibsim.checks.outcome import (
     as_expected,
     is_open,
 )
-from vibsim.checks.sentences import (
-    NOT_FINITE,
-    PLAIN,
-    Description,
-    Found,
-    Notation,
-    beside,
-    cost_in_words,
-)
+from vibsim.checks.sentences import NOT_FINITE, Description, Found, cost_in_words
 from vibsim.checks.value import unit_of_quantity
 from vibsim.comparison.finest_error import FinestError, error_of_finest
 from vibsim.comparison.order_evidence import judgement
@@ -42,7 +35,7 @@ from vibsim.comparison.quantity_comparison import Comparison
 from vibsim.convergence.verdict import Judgement
 from vibsim.core.array_types import Codes
 from vibsim.core.record import Record
-from vibsim.core.vocabulary import REASON_NAMES, TYPICAL_NORM
+from vibsim.core.vocabulary import ERROR_FACTS, REASON_NAMES, TYPICAL_NORM
 from vibsim.observe.member_block import MemberBlock
 
 if TYPE_CHECKING:
@@ -52,12 +45,12 @@ if TYPE_CHECKING:
 BASES = ("none", "exact", "extrapolated")
 """What an error is measured against; files hold a position here."""
 NONE, EXACT, EXTRAPOLATED = range(len(BASES))
-ERROR = {
-    "error": Field("L2 norm over time of the error of the finest level"),
-    "error_bound": Field("upper bound of that error"),
-    "relative_error": Field("that error over the norm of the solution"),
-}
-"""Facts on the error of the finest level, of every check that states it."""
+_TEXTS = (
+    "L2 norm over time of the error of the finest level",
+    "upper bound of that error",
+    "that error over the norm of the solution",
+)
+ERROR = dict(zip(ERROR_FACTS, map(Field, _TEXTS), strict=True))
 FIELDS = {
     **ERROR,
     "size": Field("L2 norm over time of the solution"),

@@ -48,8 +48,7 @@ from vibsim.convergence.thresholds import (
 from vibsim.convergence.verdict import Judgement
 from vibsim.core.array_types import Codes, Floats
 from vibsim.core.record import Record, Variable, attributes
-from vibsim.core.vocabulary import TYPICAL_NORM
-from vibsim.models.shared.phase_amplitude_names import AMPLITUDE, PHASE
+from vibsim.core.vocabulary import AMPLITUDE, PHASE, TYPICAL_NORM
 from vibsim.observe.member_block import MemberBlock
 
 if TYPE_CHECKING:

@@ -25,7 +25,7 @@ from vibsim.checks.sentences import Found, cost_in_words, growth_in_words
 from vibsim.checks.stable import ALIKE
 from vibsim.comparison.exact_availability import has_exact
 from vibsim.core.record import Record
-from vibsim.models.shared.phase_amplitude_names import is_error_part, whole_of
+from vibsim.core.vocabulary import is_error_part, whole_of
 from vibsim.observe.member_block import fastest
 
 if TYPE_CHECKING:

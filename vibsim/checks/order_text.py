@@ -12,9 +12,10 @@ from itertools import pairwise
 from typing import TYPE_CHECKING
 
 from vibsim.checks.order_context import OrderContext
-from vibsim.checks.sentences import Description, Found, Template, order_interval
+from vibsim.checks.sentences import Description, Found, Template
 from vibsim.convergence.study.sentences import higher_part
 from vibsim.convergence.thresholds import HALF_SPACING
+from vibsim.core.vocabulary import order_interval
 from vibsim.schemes.base import is_on_the_mesh
 
 if TYPE_CHECKING:

@@ -5,8 +5,7 @@ from __future__ import annotations
 import math
 
 from vibsim.checks.sentences import Found
-from vibsim.core.vocabulary import STATUSES, TYPICAL_NORM
-from vibsim.models.shared.phase_amplitude_names import AMPLITUDE, PHASE
+from vibsim.core.vocabulary import AMPLITUDE, PHASE, STATUSES, TYPICAL_NORM
 
 APART = 0.5
 """Orders that differ by less are the same."""

@@ -22,6 +22,7 @@ import numpy as np
 
 from vibsim.apriori.formal_orders import columns_of, stability_limits
 from vibsim.checks.fields import LEVEL, STATUS, Field
+from vibsim.checks.notation import ROUND_OFF
 from vibsim.checks.outcome import (
     FAIL,
     MATCH,
@@ -32,7 +33,7 @@ from vibsim.checks.outcome import (
     UNSTABLE,
     Judged,
 )
-from vibsim.checks.sentences import ROUND_OFF, Description, Found, growth_in_words
+from vibsim.checks.sentences import Description, Found, growth_in_words
 from vibsim.convergence.thresholds import BLOWN_UP
 from vibsim.core.array_types import Flags, Floats
 from vibsim.core.record import Record

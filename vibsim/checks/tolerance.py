@@ -12,8 +12,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from vibsim.checks.fields import Field
+from vibsim.checks.notation import Notation
 from vibsim.checks.outcome import MATCH, MISMATCH, Judged, Outcome, outcome_of
-from vibsim.checks.sentences import Description, Found, Notation
+from vibsim.checks.sentences import Description, Found
 from vibsim.comparison.best_solution import extrapolated
 from vibsim.core.array_types import Floats, Integers
 from vibsim.core.errors import VibsimError

@@ -16,6 +16,7 @@ import numpy as np
 
 from vibsim.apriori.formal_orders import columns_of, options_of
 from vibsim.checks.fields import Field
+from vibsim.checks.notation import PLAIN, ROUND_OFF, Notation
 from vibsim.checks.outcome import (
     MATCH,
     MISMATCH,
@@ -25,15 +26,7 @@ from vibsim.checks.outcome import (
     TOO_FEW_LEVELS,
     Judged,
 )
-from vibsim.checks.sentences import (
-    NOT_FINITE,
-    PLAIN,
-    ROUND_OFF,
-    Description,
-    Found,
-    Notation,
-    cost_in_words,
-)
+from vibsim.checks.sentences import NOT_FINITE, Description, Found, cost_in_words
 from vibsim.comparison import best_values, value_numbers
 from vibsim.comparison.best_values import has_limit
 from vibsim.comparison.quantity_comparison import Comparison

@@ -13,8 +13,9 @@ from typing import TYPE_CHECKING, Any
 from vibsim.apriori.formal_orders import columns_of
 from vibsim.checks import accurate, equal, tolerance, value
 from vibsim.checks.kinds import KINDS
+from vibsim.checks.notation import PLAIN, Notation
 from vibsim.checks.outcome import Result, compared_reason, truth
-from vibsim.checks.sentences import PLAIN, Description, Found, Notation
+from vibsim.checks.sentences import Description, Found
 from vibsim.core.record import Record
 from vibsim.core.vocabulary import BY_TOLERANCE, worst
 

@@ -18,9 +18,8 @@ from vibsim.convergence.local_order import local_order, window_points
 from vibsim.convergence.thresholds import ORDINARY_ORDER
 from vibsim.core.array_types import Floats
 from vibsim.core.record import Variable, attributes
-from vibsim.core.vocabulary import MEMBER, OF_LEVEL, SERIES, TYPICAL_NORM
+from vibsim.core.vocabulary import MEMBER, OF_LEVEL, SERIES, TYPICAL_NORM, is_error_part
 from vibsim.models import ENERGIES
-from vibsim.models.shared.phase_amplitude_names import is_error_part
 from vibsim.observe.member_block import CENTRED, by_level, plain_name
 from vibsim.observe.oscillation import period_scale
 

@@ -26,9 +26,8 @@ from vibsim.convergence.differences import largest, safe_ratio
 from vibsim.convergence.thresholds import ABOVE_ROUND_OFF, HALF_SPACING
 from vibsim.convergence.verdict import Judgement, judge, judge_together
 from vibsim.core.array_types import Codes, Flags, Floats
-from vibsim.core.vocabulary import NORMS, ORDER_TOLERANCE, REASON_NAMES, TYPICAL_NORM
+from vibsim.core.vocabulary import NORMS, ORDER_TOLERANCE, REASON_NAMES, TYPICAL_NORM, is_error_part
 from vibsim.models import ENERGIES
-from vibsim.models.shared.phase_amplitude_names import is_error_part
 from vibsim.observe import predicted_oscillation
 from vibsim.observe.member_block import plain_name, stored
 

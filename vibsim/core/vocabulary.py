@@ -62,6 +62,8 @@ DECISIVE: Mapping[str, str] = MappingProxyType(
     }
 )
 """Kind of a check to the fact that decides it; no check has that of one before it in this order."""
+ERROR_FACTS = ("error", "error_bound", "relative_error")
+"""Facts on the error of the finest level, of every check that states it."""
 
 
 def decisive_number(facts: Mapping[str, Any]) -> float | None:
@@ -109,3 +111,15 @@ def jsonable(value: Any) -> Any:
 
 HIGHEST = "highest_omega_dt"
 """Name of the highest angular frequency of small oscillations times the step, where it is not that of a period."""
+PHASE, AMPLITUDE = "_phase_error", "_amplitude_error"
+"""What follows the name of the position in the names of the parts of its error."""
+
+
+def is_error_part(name: str) -> bool:
+    """Tell whether a quantity is a part of a position's error."""
+    return name.endswith((PHASE, AMPLITUDE))
+
+
+def whole_of(name: str) -> str:
+    """Return the position that a part belongs to; any other quantity as it is."""
+    return name.removesuffix(PHASE).removesuffix(AMPLITUDE)

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from vibsim.core.vocabulary import is_error_part
 from vibsim.experiment.data import ExperimentSpec
-from vibsim.models.shared.phase_amplitude_names import is_error_part
 
 SMALL = 200_000
 """Samples of one variable up to which ``samples: auto`` keeps every step of a level."""

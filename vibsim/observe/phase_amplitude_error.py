@@ -17,16 +17,11 @@ import numpy as np
 from vibsim.apriori.formal_orders import formal_orders, is_promised
 from vibsim.convergence.thresholds import ABOVE_ROUND_OFF, MEASUREMENT_FACTOR
 from vibsim.core.array_types import Flags, Floats, Integers
+from vibsim.core.vocabulary import AMPLITUDE, PHASE, is_error_part, whole_of
 from vibsim.experiment.storage import asked
 from vibsim.formula import values
 from vibsim.models import tree
-from vibsim.models.shared.phase_amplitude_names import (
-    AMPLITUDE,
-    PHASE,
-    has_error_parts,
-    is_error_part,
-    whole_of,
-)
+from vibsim.models.shared.phase_amplitude_names import has_error_parts
 from vibsim.observe.member_block import MemberBlock
 from vibsim.observe.oscillation import period_scale
 from vibsim.observe.thresholds import MOST_UNASKED, WINDOW_POINTS

@@ -16,6 +16,7 @@ import numpy as np
 
 from vibsim.core.array_types import Floats
 from vibsim.core.record import Record
+from vibsim.report.superscripts import power
 from vibsim.report.types import Axes, Figure
 
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
@@ -79,10 +80,6 @@ _RC: dict[Any, Any] = {
     "xtick.labelsize": 8.5,
     "ytick.labelsize": 8.5,
 }
-
-SUPERSCRIPTS = "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"
-RAISE = str.maketrans("-0123456789", SUPERSCRIPTS)  # digits to superscripts
-LOWER = str.maketrans(SUPERSCRIPTS, "-0123456789")
 
 
 @dataclass(frozen=True)
@@ -209,11 +206,6 @@ def entry(text: str) -> str:
 def sentences(*parts: str) -> str:
     """Join the sentences of a caption that are there."""
     return " ".join(part for part in parts if part)
-
-
-def power(exponent: int) -> str:
-    """Write a power of ten in Unicode."""
-    return "10" + str(exponent).translate(RAISE)
 
 
 def label(text: str, unit: str, exponent: int = 0) -> str:

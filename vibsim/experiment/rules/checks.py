@@ -7,7 +7,7 @@ from itertools import count
 from typing import Any
 
 from vibsim.core.errors import nearest
-from vibsim.core.vocabulary import BY_TOLERANCE, REASONS
+from vibsim.core.vocabulary import BY_TOLERANCE, REASONS, is_error_part
 from vibsim.experiment.faults import Report
 from vibsim.experiment.rules.check_places import (
     Scope,
@@ -36,11 +36,7 @@ from vibsim.experiment.value_names import VALUES, Value
 from vibsim.experiment.yaml.parse import Path_
 from vibsim.models import BUDGET, centred, has_budget, has_solution
 from vibsim.models.shared.free import why_not_free
-from vibsim.models.shared.phase_amplitude_names import (
-    error_parts,
-    has_error_parts,
-    is_error_part,
-)
+from vibsim.models.shared.phase_amplitude_names import error_parts, has_error_parts
 
 ENERGIES = ("energy", "energy_deviation")
 """The energies that are known exactly where they are conserved."""

@@ -6,10 +6,8 @@ compared (`vibsim.observe.phase_amplitude_error`).
 
 from __future__ import annotations
 
+from vibsim.core.vocabulary import AMPLITUDE, PHASE
 from vibsim.models.base import Model
-
-PHASE, AMPLITUDE = "_phase_error", "_amplitude_error"
-"""What follows the name of the position."""
 
 
 def has_error_parts(model: Model) -> bool:
@@ -22,13 +20,3 @@ def error_parts(model: Model) -> tuple[str, ...]:
     if not has_error_parts(model):
         return ()
     return tuple(name + end for name in model.positions for end in (PHASE, AMPLITUDE))
-
-
-def is_error_part(name: str) -> bool:
-    """Tell whether a quantity is a part of a position's error."""
-    return name.endswith((PHASE, AMPLITUDE))
-
-
-def whole_of(name: str) -> str:
-    """Return the position that a part belongs to; any other quantity as it is."""
-    return name.removesuffix(PHASE).removesuffix(AMPLITUDE)

@@ -21,6 +21,7 @@ from vibsim.report.data import due, flags, norm_unit, of_several, promised_text,
 from vibsim.report.figures.panels import rows_of
 from vibsim.report.figures.view import View, Worst, ring, shared
 from vibsim.report.style import Picture
+from vibsim.report.superscripts import power
 from vibsim.report.sweep_layout import Key, bins, place_in
 from vibsim.report.text import words
 from vibsim.report.types import Axes, Experiment
@@ -205,7 +206,7 @@ class _Projection:
             _draw_members(ax, key, size, self.masks, None)
             # an axis of logarithms
             ax.yaxis.set_major_locator(MaxNLocator(5, integer=True))
-            ax.yaxis.set_major_formatter(FuncFormatter(lambda y, _: style.power(round(y))))
+            ax.yaxis.set_major_formatter(FuncFormatter(lambda y, _: power(round(y))))
         told = f"Of level {whole(self.record, 'level')[-1]}."
         label = style.label(f"{error.kind} {name}", unit)
         yield self._view("error", name, label, axes, told, error.best, size, unit)

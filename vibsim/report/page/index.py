@@ -17,7 +17,7 @@ from vibsim.experiment.collection import ADHOC
 from vibsim.experiment.schema import citation
 from vibsim.report.page import history, policy, source_figures
 from vibsim.report.page.templates import environment, markup
-from vibsim.report.tables.checks import error_of, measured_order, number_of
+from vibsim.report.tables.results import error_of, measured_order, number_of
 from vibsim.report.tables.table import Column, Table, to_csv
 from vibsim.report.text import words
 

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from functools import cache
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from vibsim.report.style import Picture
 from vibsim.report.text import glossary
 from vibsim.report.types import Environment
+
+if TYPE_CHECKING:
+    from vibsim.report.style import Picture
 
 TEMPLATES = Path(__file__).parents[1] / "templates"
 

@@ -14,7 +14,7 @@ from vibsim.core.record import Record
 from vibsim.models import Model
 from vibsim.report import style
 from vibsim.report.data import Member, at, exact_periods, exact_series, flags, swept, unit, whole
-from vibsim.report.style import power
+from vibsim.report.superscripts import power
 from vibsim.report.tables.table import Cell, Column, Table, Written
 from vibsim.report.text import words
 

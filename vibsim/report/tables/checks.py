@@ -5,31 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
-from vibsim.checks.accurate import ERROR
 from vibsim.core.record import Record
-from vibsim.core.vocabulary import decisive_number
 from vibsim.report import data
+from vibsim.report.tables.results import error_of, measured_order, number_of
 from vibsim.report.tables.table import Cell, Column, Table, Written
 from vibsim.report.text import words
 
 ROUND_OFF = 1e-12  # numbers no larger than this have two digits: more would be noise
-
-
-def measured_order(result: Mapping[str, Any]) -> tuple[Cell, Cell, Cell, Cell]:
-    """Return the order of a result, the ends of its interval, and the levels that it rests on."""
-    low, high = words.interval_of(result) or (None, None)
-    window = words.levels_of(result)
-    return words.fact(result, "order"), low, high, words.levels(window) if window else None
-
-
-def number_of(result: Mapping[str, Any]) -> float | None:
-    """Return the number that decides a result."""
-    return decisive_number(result.get("facts") or {})
-
-
-def error_of(result: Mapping[str, Any]) -> tuple[Cell, ...]:
-    """Return the error of the finest level, its bound, and the error over the size of the solution."""
-    return tuple(words.fact(result, name) for name in ERROR)
 
 
 def checks(summary: Mapping[str, Any]) -> Table:

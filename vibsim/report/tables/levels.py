@@ -8,7 +8,7 @@ the scheme's.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -17,21 +17,57 @@ from vibsim.core.record import Record
 from vibsim.core.vocabulary import MEMBER, OF_LEVEL, TYPICAL_NORM
 from vibsim.report import data, frame
 from vibsim.report.data import Member, at, known, time_unit, unit, whole
-from vibsim.report.tables.table import (
-    Cell,
-    Column,
-    Fill,
-    Table,
-    Written,
-    by_level,
-    cells,
-    step_column,
-)
+from vibsim.report.tables.table import Cell, Column, Table, Written
 from vibsim.report.text import words
 
 OWN, CENTRED = "energy_deviation_max_abs", "energy_deviation_d2t_max_abs"
 ROUND_OFF = 1e-13
 """A relative error that is no larger is rounding, and nothing is worth comparing with it."""
+
+
+_Fill = Callable[[Member, int], Cell]
+"""Returns the cell of a member and the position of a level."""
+
+
+def _by_level(
+    record: Record,
+    name: str,
+    caption: str,
+    members: Sequence[Member],
+    filled: Sequence[tuple[Column, _Fill] | None],
+    *,
+    titled: bool = False,
+) -> Table:
+    """Return a table with a row for every member and level.
+
+    `filled` are the columns after scheme, member and level, each with what fills it (None is left out); scheme and
+    member share a column where the table is `titled`.
+    """
+    several = bool(data.swept(record))
+    names = ["scheme", "member"] if several and not titled else ["scheme"]
+    shown = [column for column in filled if column is not None]
+    columns = (*map(Column, names), Column("level", form="integer"), *(c for c, _ in shown))
+    rows = tuple(
+        (
+            *([m.title] if titled else [m.scheme_name, m.case_name])[: len(names)],
+            level,
+            *(fill(m, i) for _, fill in shown),
+        )
+        for m in members
+        for i, level in enumerate(whole(record, "level"))
+    )
+    return Table(name, caption, columns, rows, heads=len(names) * several)
+
+
+def _cells(values: Floats, kind: type[int] | type[float] = float) -> _Fill:
+    """Return what fills a column with numbers of shape (scheme, case, level)."""
+    return lambda member, i: kind(values[member.scheme, member.case, i])
+
+
+def _step_column(record: Record) -> tuple[Column, _Fill]:
+    """Return the column of the time steps."""
+    column = Column("dt", time_unit(record, "dt"), "step")
+    return column, lambda member, i: float(data.steps_of(record, member.case)[i])
 
 
 def orders(
@@ -44,7 +80,7 @@ def orders(
     floors = {member: data.floor_norm(record, quantity, member, norm) for member in shown}
     notes = {member: _notes(record, quantity, member) for member in shown}
 
-    def of(name: str) -> Fill:
+    def of(name: str) -> _Fill:
         name = f"{quantity}_{name}"
         found = {
             m: [
@@ -57,7 +93,7 @@ def orders(
 
     filled = (
         (Column("steps", form="integer"), lambda member, i: int(record["steps"][i])),
-        step_column(record),
+        _step_column(record),
         (Column("difference", measure, "norm"), of("difference_norm")) if pairs else None,
         (Column("ratio", form="order"), of("ratio_norm")) if triples else None,
         (Column("order", form="order"), of("observed_order")) if triples else None,
@@ -67,7 +103,7 @@ def orders(
     )
     caption = f"{letter}: {norm} norm of {f'{letter}(level) − {letter}(next level)' if pairs else 'its error'}"
     caption += "; ratio and order from three levels starting here" if triples else ""
-    return by_level(record, f"orders_{quantity}_{norm}", caption, shown, filled)
+    return _by_level(record, f"orders_{quantity}_{norm}", caption, shown, filled)
 
 
 def _notes(record: Record, quantity: str, member: Member) -> list[str]:
@@ -94,7 +130,7 @@ def maxima(record: Record, shown: Sequence[Member]) -> Table | None:
     if OWN not in record:
         return None
     measure, several = unit(record, OWN), len(whole(record, "level")) > 1
-    filled: list[tuple[Column, Fill] | None] = []
+    filled: list[tuple[Column, _Fill] | None] = []
     for name, text, ratio in (
         (OWN, "max |dE|", "ratio"),
         (f"{OWN}_interior", "max |dE| without the last point", "ratio, without"),
@@ -102,13 +138,15 @@ def maxima(record: Record, shown: Sequence[Member]) -> Table | None:
         # lean records leave the second out
         if name in record:
             values = np.asarray(record[name], dtype=np.float64)
-            filled.append((Column(text, measure, "norm"), cells(values)))
+            filled.append((Column(text, measure, "norm"), _cells(values)))
             is_sound = np.asarray(record["status"]) == 0
             filled.append(
-                (Column(ratio, form="order"), cells(_ratios(values, is_sound))) if several else None
+                (Column(ratio, form="order"), _cells(_ratios(values, is_sound)))
+                if several
+                else None
             )
     caption = "Largest energy deviation over every step; the last point has its own end formula"
-    return by_level(record, "energy_maxima", caption, shown, filled, titled=True)
+    return _by_level(record, "energy_maxima", caption, shown, filled, titled=True)
 
 
 def _ratios(values: Floats, is_sound: Flags) -> Floats:
@@ -128,14 +166,14 @@ def scalars(record: Record, shown: Sequence[Member]) -> Table | None:
     time, angle = unit(record, "period"), unit(record, "amplitude")
     usable = np.where(np.isfinite(exact), exact, np.nan)[:, None]
     filled = (
-        (Column("period", time, "full"), cells(period)),
+        (Column("period", time, "full"), _cells(period)),
         (Column("exact period", time, "full"), lambda member, i: float(exact[member.case])),
-        (Column("relative error", form="norm"), cells(period / usable - 1.0)),
+        (Column("relative error", form="norm"), _cells(period / usable - 1.0)),
         # the peak of a run that grows without bound may have either sign
-        (Column("amplitude", angle, "full"), cells(np.abs(record["amplitude"]))),
+        (Column("amplitude", angle, "full"), _cells(np.abs(record["amplitude"]))),
     )
     caption = "Period (interpolated) and amplitude"
-    return by_level(record, "scalars", caption, shown, filled, titled=True)
+    return _by_level(record, "scalars", caption, shown, filled, titled=True)
 
 
 def velocities(record: Record) -> Table | None:
@@ -172,13 +210,13 @@ def velocities(record: Record) -> Table | None:
         "the own velocity is less accurate, as with Euler-Cromer, whose velocity is of first order only"
     )
     filled = (
-        step_column(record),
-        (Column("max |dE|/E(0), own velocity", form="small"), cells(own)),
-        (Column("max |dE|/E(0), [D₂ₜu]", form="small"), cells(second)),
+        _step_column(record),
+        (Column("max |dE|/E(0), own velocity", form="small"), _cells(own)),
+        (Column("max |dE|/E(0), [D₂ₜu]", form="small"), _cells(second)),
         (Column("second over first", form="norm"), quotient),
         (Column("drift of the energy, own velocity"), drift) if is_named else None,
     )
-    return by_level(record, "energy_velocities", caption, data.everyone(record), filled)
+    return _by_level(record, "energy_velocities", caption, data.everyone(record), filled)
 
 
 def _plain(quotient: float) -> Cell:
@@ -211,13 +249,13 @@ def events(record: Record) -> Table | None:
         return float(times[0] - times[1]) if is_same else None
 
     filled = (
-        step_column(record),
-        (Column("events", form="integer"), cells(count, int)),
-        (Column("first", seconds, "value"), cells(first)),
-        (Column("last", seconds, "value"), cells(last)),
-        (Column("at rest from", seconds, "value"), cells(rest))
+        _step_column(record),
+        (Column("events", form="integer"), _cells(count, int)),
+        (Column("first", seconds, "value"), _cells(first)),
+        (Column("last", seconds, "value"), _cells(last)),
+        (Column("at rest from", seconds, "value"), _cells(rest))
         if np.isfinite(rest).any()
         else None,
         (Column("last, less that of the next finer level", seconds, "small"), change),
     )
-    return by_level(record, "events", caption, data.everyone(record), filled)
+    return _by_level(record, "events", caption, data.everyone(record), filled)

@@ -5,12 +5,9 @@ from __future__ import annotations
 import csv
 import io
 import math
-from collections.abc import Callable, Collection, Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 
-from vibsim.core.array_types import Floats
-from vibsim.core.record import Record
-from vibsim.report.data import Member, steps_of, swept, time_unit, whole
 from vibsim.report.text import words
 
 Cell = str | int | float | None
@@ -93,51 +90,6 @@ class Table:
 def is_nothing(cell: Cell) -> bool:
     """Say whether a cell holds nothing."""
     return cell is None or (isinstance(cell, float) and math.isnan(cell))
-
-
-Fill = Callable[[Member, int], Cell]
-"""Returns the cell of a member and the position of a level."""
-
-
-def by_level(
-    record: Record,
-    name: str,
-    caption: str,
-    members: Sequence[Member],
-    filled: Sequence[tuple[Column, Fill] | None],
-    *,
-    titled: bool = False,
-) -> Table:
-    """Return a table with a row for every member and level.
-
-    `filled` are the columns after scheme, member and level, each with what fills it (None is left out); scheme and
-    member share a column where the table is `titled`.
-    """
-    several = bool(swept(record))
-    names = ["scheme", "member"] if several and not titled else ["scheme"]
-    shown = [column for column in filled if column is not None]
-    columns = (*map(Column, names), Column("level", form="integer"), *(c for c, _ in shown))
-    rows = tuple(
-        (
-            *([m.title] if titled else [m.scheme_name, m.case_name])[: len(names)],
-            level,
-            *(fill(m, i) for _, fill in shown),
-        )
-        for m in members
-        for i, level in enumerate(whole(record, "level"))
-    )
-    return Table(name, caption, columns, rows, heads=len(names) * several)
-
-
-def cells(values: Floats, kind: type[int] | type[float] = float) -> Fill:
-    """Return what fills a column with numbers of shape (scheme, case, level)."""
-    return lambda member, i: kind(values[member.scheme, member.case, i])
-
-
-def step_column(record: Record) -> tuple[Column, Fill]:
-    """Return the column of the time steps."""
-    column = Column("dt", time_unit(record, "dt"), "step")
-    return column, lambda member, i: float(steps_of(record, member.case)[i])
 
 
 def _text(cell: Cell, form: str) -> str:

@@ -7,10 +7,10 @@ import re
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from vibsim.checks.sentences import Notation, order_interval
+from vibsim.checks.notation import Notation
+from vibsim.core.vocabulary import AMPLITUDE, PHASE, is_error_part, order_interval, whole_of
 from vibsim.experiment.value_names import VALUES
-from vibsim.models.shared.phase_amplitude_names import AMPLITUDE, PHASE, is_error_part, whole_of
-from vibsim.report.style import power
+from vibsim.report.superscripts import power
 
 NAMES = {
     "theta": ("θ", "the angle θ"),
