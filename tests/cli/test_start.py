@@ -29,6 +29,7 @@ NUMBERS = {"numpy", "pydantic", "netCDF4", "llvmlite", "yaml"}
         (["show", "FILE"], SLOW | NUMBERS - {"numpy", "netCDF4"}),
         (["show", "FILE", "--no-plot"], SLOW | NUMBERS - {"numpy"}),
         (["diff", "FILE", "FILE"], SLOW | NUMBERS),
+        (["report", "--results", "RESULTS"], SLOW - {"jinja2"} | NUMBERS),
     ],
     ids=lambda words: " ".join(words) if isinstance(words, list) else "",
 )
@@ -42,7 +43,8 @@ def test_a_command_starts_without_libraries_that_take_long(
         "main(sys.argv[1:])"
     )
     (made.small / "report.html").touch()
-    named = [str(made.file) if word == "FILE" else word for word in words]
+    places = {"FILE": str(made.file), "RESULTS": str(made.results)}
+    named = [places.get(word, word) for word in words]
     if "FILE" in words:
         named += ["--results", str(made.results)]
     command = [sys.executable, "-c", program, *named]
