@@ -18,8 +18,8 @@ from vibsim.core.record import Record, Variable
 from vibsim.core.vocabulary import REASONS
 from vibsim.models import MODELS
 from vibsim.report import data, finest_level, style, sweep_layout
-from vibsim.report.figures import maps, members, separatrix
 from vibsim.report.figures import order as figures_order
+from vibsim.report.figures.sweeps import maps, members, separatrix
 from vibsim.report.page import explorer
 from vibsim.report.sweep_layout import Key
 

@@ -15,19 +15,17 @@ from vibsim.report.figures import (
     energy,
     extrema,
     long_series,
-    maps,
-    members,
     motion,
     order,
     plane,
     solution,
-    sweep,
     theory,
     time,
     work,
 )
-from vibsim.report.figures.separatrix import with_separatrix
-from vibsim.report.figures.view import View
+from vibsim.report.figures.sweeps import maps, members, sweep
+from vibsim.report.figures.sweeps.separatrix import with_separatrix
+from vibsim.report.figures.sweeps.view import View
 from vibsim.report.lead import Lead
 from vibsim.report.style import Picture
 from vibsim.report.text import words

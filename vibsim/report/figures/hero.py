@@ -16,7 +16,7 @@ from vibsim.core.record import Record
 from vibsim.report import choice, data, finest_level, style, sweep_layout
 from vibsim.report.data import Member
 from vibsim.report.figures import panels, time
-from vibsim.report.figures.view import ring
+from vibsim.report.figures.sweeps.view import ring
 from vibsim.report.lead import Lead
 from vibsim.report.style import Picture
 from vibsim.report.text import findings, words

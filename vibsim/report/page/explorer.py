@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from vibsim.core.record import Record
 from vibsim.core.set_option import set_options
 from vibsim.report import data, style, sweep_layout
-from vibsim.report.figures.view import View
+from vibsim.report.figures.sweeps.view import View
 from vibsim.report.sweep_layout import Key
 from vibsim.report.text import words
 from vibsim.report.types import Experiment

@@ -18,7 +18,7 @@ from vibsim.core.vocabulary import TYPICAL_NORM
 from vibsim.experiment.collection import ADHOC, ENDINGS
 from vibsim.report import choice, data, lead, style
 from vibsim.report.figures import drawing, gallery, of_source, thumbnail
-from vibsim.report.figures.view import View
+from vibsim.report.figures.sweeps.view import View
 from vibsim.report.page import cards, explorer, hero, player, policy
 from vibsim.report.page.templates import environment, markup
 from vibsim.report.style import Picture

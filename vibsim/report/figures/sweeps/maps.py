@@ -14,7 +14,7 @@ from vibsim.core.vocabulary import REASONS, SEVERITY, TYPICAL_NORM
 from vibsim.report import finest_level, style
 from vibsim.report.choice import position, tolerance
 from vibsim.report.data import due, exact_periods, norm_unit, of_several, pick, promised_text, whole
-from vibsim.report.figures.view import (
+from vibsim.report.figures.sweeps.view import (
     View,
     Worst,
     check_words,

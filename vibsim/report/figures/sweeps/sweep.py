@@ -15,9 +15,9 @@ from vibsim.core.vocabulary import SEVERITY, TYPICAL_NORM
 from vibsim.report import finest_level, frame, style, sweep_layout
 from vibsim.report.choice import position, promises
 from vibsim.report.data import due, exact_periods, flags, norm_unit, whole
-from vibsim.report.figures import separatrix
 from vibsim.report.figures.panels import explosive, stacked
-from vibsim.report.figures.view import (
+from vibsim.report.figures.sweeps import separatrix
+from vibsim.report.figures.sweeps.view import (
     View,
     Worst,
     check_words,

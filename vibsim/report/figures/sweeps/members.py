@@ -19,7 +19,7 @@ from vibsim.report import finest_level, style
 from vibsim.report.choice import position, tolerance
 from vibsim.report.data import due, flags, norm_unit, of_several, promised_text, whole
 from vibsim.report.figures.panels import rows_of
-from vibsim.report.figures.view import View, Worst, ring, shared
+from vibsim.report.figures.sweeps.view import View, Worst, ring, shared
 from vibsim.report.style import Picture
 from vibsim.report.superscripts import power
 from vibsim.report.sweep_layout import Key, bins, place_in

@@ -1,0 +1,1 @@
+"""The figures of a sweep: curves, maps and members over the swept values."""
