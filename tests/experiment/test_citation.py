@@ -10,7 +10,7 @@ import yaml
 from experiment_files import GOOD, file_faults, write
 
 from vibsim.experiment import Experiment
-from vibsim.experiment.schema.citation import FIELDS, PLACES, fields, line
+from vibsim.experiment.citation import FIELDS, PLACES, fields, line
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 B = "vibration text"

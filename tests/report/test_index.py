@@ -13,7 +13,7 @@ import samples
 from test_page import make, read
 
 from vibsim import report, store
-from vibsim.experiment.schema import citation
+from vibsim.experiment import citation
 from vibsim.report.page import cards, history
 from vibsim.report.page.index import Headline, headline
 from vibsim.report.text import words

@@ -14,7 +14,7 @@ from vibsim.checks.verdict_text import Wording
 from vibsim.core.record import Record
 from vibsim.core.set_option import set_options
 from vibsim.core.vocabulary import FORMAT, jsonable, worst
-from vibsim.experiment.schema import citation
+from vibsim.experiment import citation
 
 if TYPE_CHECKING:
     import xarray

@@ -16,7 +16,7 @@ from vibsim.checks.order import BESIDE
 from vibsim.checks.solver_facts import LEVELS, SOLVER_FACTS
 from vibsim.checks.tolerance import BOUND
 from vibsim.core.vocabulary import BY_TOLERANCE, FORMAT, REASON_NAMES, STATUSES
-from vibsim.experiment.schema.citation import FIELDS
+from vibsim.experiment.citation import FIELDS
 
 TEXT = {"type": "string"}
 NUMBER = {"type": ["number", "null"]}

@@ -22,7 +22,7 @@ from vibsim.core.errors import VibsimError
 from vibsim.core.record import Record, Variable, attributes
 from vibsim.core.set_option import set_options
 from vibsim.core.vocabulary import FORMAT, REASON_NAMES, SEVERITY, STATUSES, jsonable, worst
-from vibsim.experiment.schema import citation
+from vibsim.experiment import citation
 from vibsim.experiment.schema.solver import SolverCheck
 from vibsim.experiment.solver import SolverExperiment
 from vibsim.solver import level_output

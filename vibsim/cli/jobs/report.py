@@ -18,7 +18,7 @@ from vibsim.cli.jobs.common import (
     with_settings,
 )
 from vibsim.core.errors import nearest
-from vibsim.experiment.schema import citation
+from vibsim.experiment import citation
 
 FORMATS = ("svg", "png", "pdf")
 """Formats of figures, as in `vibsim.report.style`, which takes long to import."""

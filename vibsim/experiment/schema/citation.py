@@ -1,11 +1,4 @@
-"""Where something stands in a text: one line that people read, and the same in fields for programs.
-
-A source is the name of a text and what of it is meant, in this order, each at most once::
-
-    TEXT, section 10.2, equation (85), figure 3, and exercise 18 b
-
-Numbers are joined by commas, "and" and "to" (``sections 2.3 and 10.1``). Any other line names a text as a whole.
-"""
+"""A source as an experiment file names it: a line, or its fields (`vibsim.experiment.citation`)."""
 
 from __future__ import annotations
 
@@ -15,50 +8,8 @@ from typing import Annotated, Any
 
 from pydantic import BeforeValidator, WithJsonSchema
 
+from vibsim.experiment.citation import FIELDS, LIST, line
 from vibsim.experiment.schema.fields import Text, refused
-
-FIELDS = {
-    "text": "What the text is called.",
-    "section": "Number of the section, or several.",
-    "equation": "Number of the equation, or several.",
-    "figure": "Number of the figure, or several.",
-    "exercise": "Number of the exercise, or several.",
-}
-"""What a source may name, in the order of its line, with the meaning."""
-PLACES = tuple(FIELDS)[1:]
-_AND = r"(?:, and |, | and )"
-_NUMBER = r"(?:[A-Z0-9][\w.'-]*(?: [a-z](?!\w))?|[a-z](?!\w))(?:-[a-z](?!\w))?"
-_ITEM = rf"(?:{_NUMBER}|\({_NUMBER}\))"
-_LIST = re.compile(rf"{_ITEM}(?:(?:{_AND}| to ){_ITEM})*")
-_PLACED = f"{_AND}(?:{'|'.join(PLACES)})s? "
-_SOURCE = re.compile(
-    f"(?P<text>(?:(?!{_PLACED}).)+)"
-    + "".join(rf"(?:{_AND}{name}s? (?P<{name}>{_LIST.pattern}))?" for name in PLACES),
-    re.DOTALL,
-)
-
-
-def fields(source: str | None) -> dict[str, str | None] | None:
-    """Return a source by its `FIELDS`: numbers as written, without brackets; None for what it does not name."""
-    if source is None:
-        return None
-    found = _SOURCE.fullmatch(source)
-    if found is None:
-        return {"text": source} | dict.fromkeys(PLACES)
-    numbers = {name: found[name] and re.sub("[()]", "", found[name]) for name in PLACES}
-    return {"text": found["text"]} | numbers
-
-
-def line(source: Mapping[str, str | None]) -> str:
-    """Return the line of a source that is given by its `FIELDS`."""
-    parts = [source["text"] or ""]
-    for name in PLACES:
-        if number := source.get(name):
-            plural = "s" if re.search(f"{_AND}| to ", number) else ""
-            if name == "equation":
-                number = re.sub(r"\b(?!and\b|to\b)[\w.'-]+", r"(\g<0>)", number)
-            parts.append(f"{name}{plural} {number}")
-    return ", ".join(parts)
 
 
 def _written(written: Any) -> Any:
@@ -71,7 +22,7 @@ def _written(written: Any) -> Any:
         if not isinstance(value, str):
             # 10.10 as a number would be section 10.1
             raise refused(f'has a {name} that is no text: write "..." around it')
-        if name != "text" and not _LIST.fullmatch(value):
+        if name != "text" and not LIST.fullmatch(value):
             raise refused(f"has a {name} that is no number such as 10.2, or several: {value}")
     if not written.get("text"):
         raise refused("must name a text")

@@ -13,8 +13,8 @@ from urllib.parse import quote
 from vibsim import store
 from vibsim.core.errors import FileError
 from vibsim.core.vocabulary import SEVERITY, worst
+from vibsim.experiment import citation
 from vibsim.experiment.collection import ADHOC
-from vibsim.experiment.schema import citation
 from vibsim.report.page import history, policy, source_figures
 from vibsim.report.page.templates import environment, markup
 from vibsim.report.tables.results import error_of, measured_order, number_of
