@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-_SUPERSCRIPTS = "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"
-RAISE = str.maketrans("-0123456789", _SUPERSCRIPTS)
+RAISE = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 """Digits to superscripts."""
-LOWER = str.maketrans(_SUPERSCRIPTS, "-0123456789")
-"""Superscripts to digits."""
 
 
 def power(exponent: int) -> str:
