@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
@@ -31,6 +32,13 @@ def plans_of(
     all files.
     """
     return list(load_all(choose(words, checkout(), settings), resolve, cached=cached).values())
+
+
+def tell_notes(plans: Sequence[Plan]) -> None:
+    """Say on stderr what files say and probably do not mean."""
+    for plan in plans:
+        for remark in plan.remarks:
+            print(remark, file=sys.stderr, flush=True)
 
 
 def one_plan_of(word: str, settings: Sequence[str] = ()) -> Plan:

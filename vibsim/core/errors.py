@@ -79,16 +79,27 @@ class StaleFileError(FileError):
 MOST_CHOICES = 60
 """So many choices are listed; of more, the nearest are named."""
 _NEAREST = 3
+_CLOSE = 0.6
+"""How alike two words are that may be meant for each other, from 0 to 1."""
 
 
 def nearest(value: object, choices: Sequence[str]) -> str:
     """Name the choice nearest to what a user wrote; where none is near, list all, or of many the nearest."""
     if not choices:
         return ""
-    close = difflib.get_close_matches(str(value), choices, n=1, cutoff=0.6)
+    written = str(value)
+    close: Sequence[str] = difflib.get_close_matches(written, choices, n=1, cutoff=_CLOSE)
+    if not close:
+        # by capital letters alone, or a part of the name
+        small = {choice.casefold(): choice for choice in reversed(choices)}
+        alike = difflib.get_close_matches(written.casefold(), list(small), n=1, cutoff=_CLOSE)
+        close = [small[found] for found in alike]
+    if not close and len(written) > 1:
+        longer = [choice for choice in choices if written.casefold() in choice.casefold()]
+        close, choices = longer if len(longer) == 1 else [], longer or choices
     if close:
         return f"did you mean '{close[0]}'?"
-    return listed(choices, str(value))
+    return listed(choices, written)
 
 
 def listed(choices: Sequence[str], value: str = "") -> str:

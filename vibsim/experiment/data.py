@@ -227,6 +227,7 @@ class ExperimentSpec(Section):
     """Present where the run is made in the characteristic units of the model."""
     _file: Path | None = PrivateAttr(default=None)
     _settings: tuple[str, ...] = PrivateAttr(default=())
+    _notes: tuple[tuple[int, str], ...] = PrivateAttr(default=())
 
     @classmethod
     def made_of(cls, spec: ExperimentSpec) -> Self:
@@ -244,6 +245,11 @@ class ExperimentSpec(Section):
     def settings(self) -> tuple[str, ...]:
         """What a command line gave in place of values of the file, as ``KEY=VALUE``; not part of its identity."""
         return self._settings
+
+    @property
+    def notes(self) -> tuple[tuple[int, str], ...]:
+        """What the file says and probably does not mean: line (0 without one) and text; not part of its identity."""
+        return self._notes
 
     @property
     def word(self) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from typing import Any
 
 from pydantic import ValidationError
@@ -47,6 +48,8 @@ class Report:
         self.source = source
         self.kinds = kinds or Kinds()
         self.faults: set[Fault] = set(source.faults)
+        self.notes: set[Fault] = set()
+        """What is allowed, and probably not meant."""
         self.faulty: set[Path_] = set()
         """Places of malformed values; nothing more is said about them."""
 
@@ -62,16 +65,23 @@ class Report:
         """
         if path in self.faulty:
             return
+        self.faults.add(self._fault(path, rule, hint, value, at_key))
+        if len(self.faults) == MAX_FAULTS:
+            self.faults.add(Fault(self.source.file, 0, "", "", "has more faults than are listed"))
+            self.raise_any()
+
+    def note(self, path: Path_, rule: str, hint: str = "") -> None:
+        """Note what the value at `path` means, where something else is probably meant."""
+        self.notes.add(self._fault(path, rule, hint, None, False))
+
+    def _fault(self, path: Path_, rule: str, hint: str, value: object, at_key: bool) -> Fault:
         place = self.source.place(path)
         nested = place is not None and not place.text
         file, line = self._above(path)
         if place and not (at_key or nested or place.setting):
             line = place.line
         written = place.text if place and place.text else "" if value is None else str(value)
-        self.faults.add(Fault(file, line, dotted(path), shorten(written), rule, hint))
-        if len(self.faults) == MAX_FAULTS:
-            self.faults.add(Fault(self.source.file, 0, "", "", "has more faults than are listed"))
-            self.raise_any()
+        return Fault(file, line, dotted(path), shorten(written), rule, hint)
 
     def add_malformed(
         self, path: Path_, rule: str, hint: str = "", value: object = None, at_key: bool = False
@@ -123,6 +133,10 @@ class Report:
             for name in map(str, value):
                 self.add((*path, name), "unknown key", nearest(name, list(_FORMS)), at_key=True)
             return path
+        if kind == "check" and isinstance(value, dict):
+            hint = _nearest_key(value, rule)
+        if kind == "tuple_type" and isinstance(value, str | int):
+            hint = f"write [{value}]"
         if kind == "literal_error":
             hint = nearest(value, re.findall(r"'([^']*)'", context["expected"]))
         if kind in ("missing", "too_long", "tuple_type"):
@@ -143,10 +157,26 @@ class Report:
         kind = value.get("kind")
         self.add((*path, "kind"), rule, nearest(kind if "kind" in value else "", kinds), kind)
 
+    @property
+    def told(self) -> tuple[tuple[int, str], ...]:
+        """The notes as lines of the file, 0 where there is none, and texts."""
+        found = []
+        for row in sorted(self.notes):
+            setting = row.file.removeprefix(self.source.file).removeprefix(", ")
+            found.append((row.line, str(replace(row, file=setting, line=0))))
+        return tuple(found)
+
     def raise_any(self) -> None:
         """Raise `InputError` with every fault, if there is one."""
         if self.faults:
             raise InputError(self.faults)
+
+
+def _nearest_key(value: dict[Any, Any], rule: str) -> str:
+    """Name the key that one of a mapping is near to, of those that a rule lists."""
+    known = re.split(", | or ", rule.partition(" the key ")[2])
+    hints = (nearest(key, known) for key in value)
+    return next((hint for hint in hints if hint.startswith("did you mean")), "")
 
 
 def _whole_list(path: Path_, rule: str) -> tuple[Path_, str]:

@@ -14,7 +14,7 @@ from vibsim.experiment.collection import collection_of
 from vibsim.experiment.data import AnyExperiment, ExperimentSpec, ModelSpec
 from vibsim.experiment.faults import MISSING, Report, shorten
 from vibsim.experiment.kinds import Kinds
-from vibsim.experiment.rules import members, size_limits, timing
+from vibsim.experiment.rules import members, size_limits, timing, unlikely
 from vibsim.experiment.rules import schemes as scheme_rules
 from vibsim.experiment.rules.checks import check_published, finish_checks
 from vibsim.experiment.rules.figures import check_figures
@@ -210,6 +210,8 @@ def build(
     experiment._file, experiment._settings = file, source.settings
     size_limits.check_files(experiment, report)
     report.raise_any()
+    unlikely.note_unlikely(document.checks, setting, report)
+    experiment._notes = report.told
     return members.update_tables(experiment)
 
 

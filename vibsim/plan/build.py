@@ -77,6 +77,7 @@ def build(experiment: Experiment) -> Plan:
         report=job_digest("report", content, {"analysis": analysis}, DRAWING),
         content=content,
         versions={**versions(NUMERICAL), **_versions_of(packages)},
+        notes=experiment.notes,
         inputs=tuple((t.file, t.content) for t in experiment.model.tables.values()),
         packages=packages,
     )

@@ -14,6 +14,7 @@ from pathlib import Path
 from types import UnionType
 from typing import TYPE_CHECKING, Any, get_args, get_origin, get_type_hints
 
+from vibsim.core.errors import Fault
 from vibsim.experiment.collection import ENDINGS
 
 if TYPE_CHECKING:
@@ -107,6 +108,8 @@ class Plan:
     """Group, kind and digest of the code of every model and scheme that an installed package offers."""
     settings: tuple[str, ...] = ()
     """What a command line gave in place of values of the file, as ``KEY=VALUE``; no level depends on it."""
+    notes: tuple[tuple[int, str], ...] = ()
+    """What the file says and probably does not mean, each with its line, 0 without one."""
     file: str = ""
     """Where the experiment was read, as a command line names it; no digest depends on it."""
 
@@ -122,6 +125,12 @@ class Plan:
         """The experiment file; one member alone is named by the file and its number."""
         named = self.file if self.file.endswith(ENDINGS) else self.file.rpartition("@")[0]
         return Path(named) if named else None
+
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """The notes with their places."""
+        file = str(self.source_file or "")
+        return tuple(str(Fault(file, line, "", "", f"note: {text}")) for line, text in self.notes)
 
     @property
     def has_solver(self) -> bool:

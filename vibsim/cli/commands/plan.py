@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from vibsim.cli import resources
-from vibsim.cli.chosen_plans import plans_of
+from vibsim.cli.chosen_plans import plans_of, tell_notes
 from vibsim.cli.jobs.common import chosen_results
 from vibsim.cli.resources import amount, duration, size
 from vibsim.plan import Plan
@@ -27,6 +27,7 @@ def check(options: Namespace) -> int:
     """Validate experiment files and say that they are valid."""
     for item in plans_of(options.experiments, options.settings):
         levels = ", ".join(str(level.level) for level in item.levels)
+        tell_notes([item])
         print(f"{item.file}: valid ({_members(item)}, levels {levels})")
     return 0
 
@@ -35,6 +36,7 @@ def plan(options: Namespace) -> int:
     """Show members, jobs, steps, memory, disk space and time; refuse what does not fit on this machine."""
     results = chosen_results(options)
     plans = plans_of(options.experiments, options.settings)
+    tell_notes(plans)
     if options.json:
         print(json.dumps([_entry(item) for item in plans], indent=1))
     else:

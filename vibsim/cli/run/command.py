@@ -14,7 +14,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from vibsim.cli import failure, outcome_text, resources, results_folder, terminal
-from vibsim.cli.chosen_plans import plans_of
+from vibsim.cli.chosen_plans import plans_of, tell_notes
 from vibsim.cli.jobs.common import chosen_results, refusal
 from vibsim.cli.jobs.simulate import is_made
 from vibsim.cli.jobs.solve import check_allowed
@@ -53,6 +53,8 @@ def _run(options: Namespace) -> int:
     if options.allow_commands:
         # on the command line alone: what a file says is not heard
         arguments += ["--config", "allow_commands=true"]
+    if options.detail != "quiet":
+        tell_notes(plans)
     if options.dry_run and options.junit:
         raise refusal("--junit", options.junit, "a dry run has no verdicts to write")
     if options.dry_run:

@@ -8,7 +8,9 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import BeforeValidator, ConfigDict, Discriminator, Field, StrictBool, WithJsonSchema
+from pydantic_core import PydanticCustomError
 
+from vibsim.core.errors import nearest
 from vibsim.core.vocabulary import ORDER_TOLERANCE, REASONS, TYPICAL_NORM, Norm, Status
 from vibsim.experiment.schema.citation import Citation
 from vibsim.experiment.schema.fields import (
@@ -151,10 +153,22 @@ class EqualCheck(MeasuringCheck):
         return self.equal[1]
 
 
+_ORDER = "must be scheme (the order that the scheme promises), or a number greater than 0"
+_HALVING = "order 2: half the step, a quarter of the error"
+
+
 def _order(value: Any) -> Any:
-    if value != "scheme" and number(value) <= 0.0:
-        raise refused("must be 'scheme' or a number greater than 0")
-    return value if value == "scheme" else number(value)
+    if value == "scheme":
+        return value
+    try:
+        found = number(value)
+    except PydanticCustomError as error:
+        meant = nearest(value, ["scheme"])
+        hint = meant if meant.startswith("did you mean") else _HALVING
+        raise refused(_ORDER, hint) from error
+    if found <= 0.0:
+        raise refused(_ORDER, _HALVING)
+    return found
 
 
 def _level(value: Any) -> Any:

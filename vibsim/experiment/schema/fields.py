@@ -32,6 +32,7 @@ from vibsim.formula import ExpressionError, constant
 
 IDENTIFIER = r"^[a-z0-9_]+$"
 _CONTROL = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\ud800-\udfff\ufffe\uffff]")
+_COMMA = re.compile(r"[-+]?\d+,\d+")
 MAX_LEVEL = 40
 STAND_IN = "?"
 """Takes the place of text that is faulty and cannot be left out; nothing is said about it a second time."""
@@ -118,6 +119,8 @@ def by_shape(mapping: Any, other: Any) -> Any:
 def number(value: Any) -> float:
     """Return `value` as a finite float; text is worked out as a constant formula."""
     if isinstance(value, str):
+        if _COMMA.fullmatch(value):
+            raise refused("must have a decimal point", f"write {value.replace(',', '.')}")
         try:
             return constant(value)
         except ExpressionError as error:
@@ -144,6 +147,18 @@ def whole(value: Any) -> int:
     if isinstance(value, bool) or not is_whole:
         raise refused("must be a whole number")
     return int(value)
+
+
+def exponent(value: Any) -> int:
+    """Return `value` as the number of a level, which is no number of steps."""
+    found = whole(value)
+    if found > MAX_LEVEL:
+        steps = f"{found} steps are level {found.bit_length() - 1}"
+        meaning = (
+            f"level n has 2^n steps; {steps}" if found.bit_count() == 1 else "level n has 2^n steps"
+        )
+        raise refused(f"must be at most {MAX_LEVEL}", f"{meaning} (times `base_steps:` of `time:`)")
+    return found
 
 
 def short(limit: int) -> BeforeValidator:
@@ -214,7 +229,7 @@ Number = Annotated[float, FORMULA]
 Positive = Annotated[float, Field(gt=0), FORMULA]
 Fraction = Annotated[float, Field(gt=0, lt=1), FORMULA]
 NonNegative = Annotated[float, Field(ge=0), FORMULA]
-Level = Annotated[int, Field(ge=0, le=MAX_LEVEL), BeforeValidator(whole)]
+Level = Annotated[int, Field(ge=0, le=MAX_LEVEL), BeforeValidator(exponent)]
 Count = Annotated[int, Field(ge=1), BeforeValidator(whole)]
 Index = Annotated[int, Field(ge=0), BeforeValidator(whole)]
 Identifier = Annotated[str, Field(pattern=IDENTIFIER)]

@@ -1,0 +1,151 @@
+"""Values that are allowed and hardly anybody means have a note; what is wrong names what was meant."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from vibsim.cli import main
+from vibsim.core.errors import InputError, nearest
+from vibsim.experiment import Experiment
+
+ROOT = Path(__file__).parents[2]
+PLAIN: dict[str, Any] = {
+    "title": "A pendulum",
+    "model": {"kind": "pendulum"},
+    "initial": {"theta": 1.0},
+    "time": {"end": 20.0},
+    "levels": [6, 7, 8],
+    "schemes": ["central"],
+}
+
+
+def notes(**changes: Any) -> list[str]:
+    return [text for _, text in Experiment.from_dict(PLAIN | changes).notes]
+
+
+def check(**keys: Any) -> list[str]:
+    return notes(checks=[keys])
+
+
+TOLD = {
+    "angle": (
+        {"initial": {"theta": 60}},
+        "initial.theta: 60 rad are 9.5 turns: 60 degrees are written `60 degree`",
+    ),
+    "negative angle": ({"initial": {"theta": -90}}, "initial.theta: 90 rad are 14 turns"),
+    "list": ({"sweep": {"initial.theta": [0.1, 30]}}, "sweep.initial.theta: 30 rad are"),
+    "rule": (
+        {"sweep": {"initial.theta": {"linspace": [10, 90, 5]}}},
+        "sweep.initial.theta: 90 rad are",
+    ),
+    "zip": (
+        {"sweep": {"zip": {"initial.theta": [10, 20], "model.L": [1, 2]}}},
+        "sweep.zip.initial.theta: 20 rad are",
+    ),
+    "relative": (
+        {"checks": [{"accurate": "theta", "relative": 5}]},
+        "checks[0].relative: is 5 times the size of theta",
+    ),
+    "order": (
+        {"checks": [{"converges": "theta", "order": 2, "tolerance": 10}]},
+        "checks[0].tolerance: lets every order up to 12 pass",
+    ),
+    "digits": (
+        {"checks": [{"value": "period", "equals": 6.7}]},
+        "checks[0].equals: has no tolerance, and is compared to 1e-9 of it: `atol: 0.05`",
+    ),
+    "of a claim": (
+        {"checks": [{"claim": "it is so", "that": {"value": "period", "equals": 6.71}}]},
+        "checks[0].that.equals: has no tolerance, and is compared to 1e-9 of it: `atol: 0.005`",
+    ),
+}
+
+
+@pytest.mark.parametrize(("changes", "told"), TOLD.values(), ids=TOLD)
+def test_what_hardly_anybody_means_has_a_note(changes: dict[str, Any], told: str) -> None:
+    (found,) = notes(**changes)
+    assert found.startswith(told)
+
+
+MEANT = {
+    "turn": {"initial": {"theta": 6.28}},
+    "formula": {"initial": {"theta": "20*pi"}},
+    "degrees": {"initial": {"theta": "60 degree"}},
+    "swept degrees": {"sweep": {"initial.theta": ["10 degree", "90 degree"]}},
+    "count of a rule": {"sweep": {"initial.theta": {"linspace": [0.1, 3, 50]}}},
+    "velocity": {"initial": {"omega": 60}},
+    "displacement": {"model": {"kind": "spring"}, "initial": {"u": 60}},
+    "tolerance": {"checks": [{"value": "period", "equals": 6.7, "atol": 0.1}]},
+    "many digits": {"checks": [{"value": "period", "equals": 6.70024879}]},
+    "zero": {"checks": [{"value": "end", "quantity": "theta", "equals": 0}]},
+    "border": {"checks": [{"value": "period", "below": 6.7}]},
+    "accurate": {"checks": [{"accurate": "theta", "relative": 0.05}]},
+}
+MEANT["count"] = {
+    "model": {"kind": "linear_pendulum"},
+    "checks": [{"value": "exact_degree", "equals": 2}],
+}
+
+
+@pytest.mark.parametrize("changes", MEANT.values(), ids=MEANT)
+def test_what_may_well_be_meant_has_none(changes: dict[str, Any]) -> None:
+    assert notes(**changes) == []
+
+
+def test_shipped_experiments_mean_what_they_say() -> None:
+    files = sorted((ROOT / "configs/showcase").glob("*.yaml"))
+    assert files
+    assert [file for file in files if Experiment.from_yaml(file).notes] == []
+
+
+def test_commands_print_notes_with_their_place_and_go_on(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "small.yaml"
+    file.write_text(
+        "title: T\nmodel: {kind: pendulum}\ninitial: {theta: 60}\ntime: {end: 20}\n"
+        "levels: [5, 6]\nschemes: [central]\n"
+    )
+    told = f"{file}:3: note: initial.theta: 60: 60 rad are 9.5 turns"
+    for command in (["check"], ["plan"], ["run", "--dry-run", "--results", str(tmp_path / "r")]):
+        # the second time from the plan that is kept
+        for _ in range(2):
+            assert main([*command, str(file)]) == 0
+            assert capsys.readouterr().err.startswith(told)
+    assert main(["run", "-q", "--dry-run", "--results", str(tmp_path / "r"), str(file)]) == 0
+    assert capsys.readouterr().err == ""
+    assert main(["check", str(file), "--set", "initial.theta=45"]) == 0
+    told = f"{file}: note: --set initial.theta=45: initial.theta: 45: 45 rad are 7.2 turns"
+    assert capsys.readouterr().err.startswith(told)
+
+
+REFUSED = {
+    "capitals": ({"schemes": ["RK4"]}, "did you mean 'rk4'?"),
+    "part": ({"schemes": ["Euler"]}, "choose from backward_euler, euler_cromer"),
+    "key of time": ({"time": {"end": 20, "dt": 0.1}}, "did you mean 'base_dt'?"),
+    "order": (
+        {"checks": [{"converges": "theta", "order": "two"}]},
+        "two: must be scheme (the order that the scheme promises), or a number greater than 0: "
+        "order 2: half the step, a quarter of the error",
+    ),
+    "kind of a check": ({"checks": [{"converge": "theta"}]}, "did you mean 'converges'?"),
+    "steps as levels": ({"levels": [6, 256]}, "level n has 2^n steps; 256 steps are level 8"),
+    "odd level": ({"levels": [6, 100]}, "must be at most 40: level n has 2^n steps (times"),
+    "one scheme": ({"schemes": "rk4"}, "must be a list: write [rk4]"),
+    "comma": ({"initial": {"theta": "1,5"}}, "must have a decimal point: write 1.5"),
+}
+
+
+@pytest.mark.parametrize(("changes", "told"), REFUSED.values(), ids=REFUSED)
+def test_a_slip_names_what_was_meant(changes: dict[str, Any], told: str) -> None:
+    with pytest.raises(InputError) as error:
+        Experiment.from_dict(PLAIN | changes)
+    assert told in str(error.value)
+
+
+def test_the_nearest_choice_is_that_of_the_same_letters() -> None:
+    assert nearest("g", ["G", "L", "g"]) == "did you mean 'g'?"
+    assert nearest("two", ["scheme"]) == "choose from scheme"

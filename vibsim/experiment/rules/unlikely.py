@@ -1,0 +1,92 @@
+"""Values that are allowed, and that hardly anybody means: each gets a note, and the experiment goes on."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from decimal import Decimal
+from typing import Any
+
+from vibsim.experiment.faults import Report
+from vibsim.experiment.rules.size_limits import Setting
+from vibsim.experiment.schema.checks import AccurateCheck, Check, ConvergesCheck, ValueCheck
+from vibsim.experiment.value_names import VALUES
+from vibsim.experiment.yaml.parse import Path_
+
+TURN = 2.0 * math.pi
+EXACT_DIGITS = 9
+"""Numbers that are written with so many digits are meant to be compared to 1e-9 of them."""
+
+
+def note_unlikely(checks: Sequence[Check | None], setting: Setting, report: Report) -> None:
+    """Note what a file says and probably does not mean; `checks` as written, None for a malformed one."""
+    _angles(setting, report)
+    for i, check in enumerate(checks):
+        if check is None:
+            continue
+        inner = check.measured
+        path: Path_ = ("checks", i) if inner is check else ("checks", i, "that")
+        match inner:
+            case AccurateCheck(relative=float(part)) if part >= 1.0:
+                rule = f"is {part:g} times the size of {inner.accurate}, which nearly everything is below"
+                report.note((*path, "relative"), rule, f"{part:g} percent are {part / 100:g}")
+            case ConvergesCheck() if _is_wide(inner):
+                rule = f"lets every order up to {float(inner.order) + inner.tolerance:g} pass"
+                report.note((*path, "tolerance"), rule, "it is a distance of orders, such as 0.1")
+            case ValueCheck(equals=float(number), rtol=None, atol=None):
+                _digits((*path, "equals"), inner.value, number, report)
+
+
+def _is_wide(check: ConvergesCheck) -> bool:
+    return check.order != "scheme" and check.tolerance >= float(check.order)
+
+
+def _angles(setting: Setting, report: Report) -> None:
+    """Note angles of more than a turn that are plain numbers: they are in rad, and degrees may be meant."""
+    model = setting.model
+    if model is None:
+        return
+    for state in model.states:
+        if state.unit != "rad":
+            continue
+        for path, values in _plain(report.source.data, state.name):
+            largest = max(map(abs, values), default=0.0)
+            if largest > TURN:
+                rule = f"{largest:g} rad are {largest / TURN:.2g} turns"
+                report.note(path, rule, f"{largest:g} degrees are written `{largest:g} degree`")
+
+
+def _plain(data: Mapping[str, Any], name: str) -> Iterator[tuple[Path_, list[float]]]:
+    """Yield the places of an initial value, in its section and in the sweep, with what are plain numbers there."""
+    for path in (
+        ("initial", name),
+        ("sweep", f"initial.{name}"),
+        ("sweep", "zip", f"initial.{name}"),
+    ):
+        found: Any = data
+        for key in path:
+            found = found.get(key) if isinstance(found, Mapping) else None
+        if isinstance(found, Mapping):
+            # of a rule the first two numbers are values
+            found = [x for rule in found.values() if isinstance(rule, list) for x in rule[:2]]
+        entries = found if isinstance(found, list) else [found]
+        if all(isinstance(x, int | float) and not isinstance(x, bool) for x in entries):
+            yield path, [float(x) for x in entries]
+
+
+def _digits(path: Path_, name: str, number: float, report: Report) -> None:
+    """Note a measured number of few digits without a tolerance."""
+    row, place = VALUES.get(name), report.source.place(path)
+    if row is None or row.measure == "count" or number == 0.0:
+        return
+    text = place.text if place and place.text else repr(number)
+    try:
+        last = Decimal(text).as_tuple()
+    except ArithmeticError:
+        # a formula is meant exactly
+        return
+    assert isinstance(last.exponent, int)
+    if len(last.digits) < EXACT_DIGITS:
+        half = Decimal(5).scaleb(last.exponent - 1)
+        rule = "has no tolerance, and is compared to 1e-9 of it"
+        report.note(path, rule, f"`atol: {float(half):g}` compares the digits that are written")
