@@ -49,7 +49,7 @@ def test_a_check_is_kept_as_written(check: dict[str, Any]) -> None:
     experiment = spring(check, claim)
     plain, claimed = experiment.checks
     assert plain.kind in check
-    assert plain.model_dump(mode="json", exclude_none=True) == {"id": "check_1", **check}
+    assert plain.model_dump(mode="json", exclude_none=True) == {"id": "check_1", "at": {}, **check}
     assert claimed.that == plain.model_copy(update={"id": "check_2"})
     assert (claimed.note, claimed.holds) == ("the text errs", False)
     assert restore(json.loads(json.dumps(canonical(experiment)))) == experiment

@@ -11,11 +11,13 @@ from typing import TYPE_CHECKING, Any, NamedTuple, overload
 import numpy as np
 from numpy.typing import NDArray
 
+from vibsim.apriori.formal_orders import columns_of
 from vibsim.checks.fields import Facts, facts_of
 from vibsim.core.array_types import Codes, Flags, Floats, Integers
 from vibsim.core.record import Record
 from vibsim.core.vocabulary import REASON_NAMES, REASONS, SEVERITY, STATUSES, decisive_number
 from vibsim.experiment.data import schemes_of
+from vibsim.experiment.sweep_columns import members_with
 
 if TYPE_CHECKING:
     from vibsim.experiment import Experiment
@@ -125,18 +127,27 @@ def outcome_of(
         schemes = [names.index(check.first)]
     else:
         schemes = list(schemes_of(experiment, check))
-    member, status = None if check is None else check.member, STATUS_OF[judged.reason]
+    status = STATUS_OF[judged.reason]
     return Outcome(
         schemes=[names[i] for i in schemes],
         scheme_index=schemes,
         cases=cases,
-        case_index=np.arange(len(cases)) if member is None else np.flatnonzero(cases == member),
+        case_index=np.flatnonzero(about_members(record, check)),
         status=status,
         reason=judged.reason.astype(np.int8),
         compared=status if judged.compared is None else judged.compared.astype(np.int8),
         away=judged.away,
         facts={**facts, **judged.facts},
     )
+
+
+def about_members(record: Record, check: Measurement | None) -> Flags:
+    """Say which members a check is about, shape (case,); None stands for the tolerance, which is about all."""
+    cases = np.asarray(record["case"])
+    if check is None:
+        return np.ones(len(cases), dtype=np.bool_)
+    found = members_with(columns_of(record), check.swept, len(cases))
+    return found if check.member is None else found & (cases == check.member)
 
 
 @dataclass(frozen=True)

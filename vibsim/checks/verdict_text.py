@@ -116,10 +116,13 @@ class Wording:
                 told += f" The check detected {expected}, as intended."
             elif reason == "mismatch":
                 told += f" The check expects {expected}."
+        asked = self._asked()
+        if total == 1 and asked:
+            told = f"With {asked}: {told}"
         if total > 1:
             head = f"{status} in {counts[status]} of {total} results"
             if status == "PASS":
-                head = f"All {total} results passed"
+                head = f"All {total} results{asked and f' with {asked}'} passed"
             elif status in where:
                 head = where[status]["text"]
             told = f"{head}. The hardest is {self._place(result, brackets=True)}. {told}"
@@ -128,6 +131,14 @@ class Wording:
         holds = truth(self.check, status, result.reason)
         decided = "cannot be decided" if holds is None else f"is {'true' if holds else 'false'}"
         return f"The statement {decided}. {told}"
+
+    def _asked(self) -> str:
+        """Name the swept values of the members that the check is about; empty where it is about every one."""
+        swept = {} if self._measured is None else self._measured.swept
+        return ", ".join(
+            f"{key} = {self.notation.number(value) if isinstance(value, float) else value}"
+            for key, value in swept.items()
+        )
 
     def _place(self, result: Result, brackets: bool = False) -> str:
         """Name the scheme, and of a sweep the member with its swept values, these perhaps in brackets."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any, TypeVar
 
-from vibsim.experiment.data import AnyExperiment, SchemeSpec, Sweep, check_member
+from vibsim.experiment.data import AnyExperiment, ExperimentSpec, SchemeSpec, Sweep, check_member
 from vibsim.experiment.faults import Report
 from vibsim.experiment.rules import size_limits
 from vibsim.experiment.rules.checks import check_published, finish_checks
@@ -24,7 +24,7 @@ from vibsim.experiment.schema.fields import FrozenDict
 from vibsim.experiment.schema.figures import LEVEL, FigureOfSource
 from vibsim.experiment.schema.published import PublishedTable, claims
 from vibsim.experiment.schema.sweep import as_option
-from vibsim.experiment.sweep_columns import columns
+from vibsim.experiment.sweep_columns import columns, members_with
 from vibsim.experiment.validation import read_value
 from vibsim.experiment.yaml.parse import Source
 
@@ -54,8 +54,14 @@ def alone(experiment: AnyExperiment, case: int) -> AnyExperiment:
     end = swept.get("time.end", float(experiment.natural_end(parameters)))
     # where times are fractions of a member's end, they become times
     unit = end if experiment.end_varies else 1.0
-    published = _published_of(experiment.published, case, unit)
-    ours = [check for check in experiment.written if check.measured.member in (None, case)]
+    published = _published_of(experiment, case, unit)
+    own = columns(experiment, case, case + 1)
+    ours = [
+        check
+        for check in experiment.written
+        if check.measured.member in (None, case)
+        and members_with(own, check.measured.swept, 1).all()
+    ]
     checks: list[Check] = [_of_member(check, unit) for check in ours]
     checks += claims(published)
     positions = model.definition.positions if not checks else ()
@@ -87,12 +93,14 @@ def _scheme(swept: dict[str, Any], scheme: SchemeSpec) -> SchemeSpec:
     return scheme.model_copy(update={"options": FrozenDict(options)})
 
 
-def _published_of(
-    tables: Sequence[PublishedTable], case: int, unit: float
-) -> tuple[PublishedTable, ...]:
-    found = []
-    for table in tables:
-        ours = (row for row in table.rows if row.at.case in (None, case))
+def _published_of(experiment: ExperimentSpec, case: int, unit: float) -> tuple[PublishedTable, ...]:
+    found, here = [], columns(experiment, case, case + 1)
+    for table in experiment.published:
+        ours = (
+            row
+            for row in table.rows
+            if row.at.case in (None, case) and members_with(here, row.at.swept, 1).all()
+        )
         rows = tuple(row.model_copy(update={"at": _at_of_member(row.at, unit)}) for row in ours)
         if rows:
             found.append(table.model_copy(update={"rows": rows}))
@@ -110,12 +118,13 @@ def _of_member(check: Check, unit: float) -> Check:
         return check.model_copy(update={"that": _of_member(check.that, unit)})
     if isinstance(check, ValueCheck):
         return check.model_copy(update={"at": _at_of_member(check.at, unit)})
+    update: dict[str, Any] = {"at": check.at.without_members()}
     of_every = isinstance(check, ConvergesCheck | AccurateCheck)
-    return check if of_every else check.model_copy(update={"case": None})
+    return check.model_copy(update=update if of_every else update | {"case": None})
 
 
 def _at_of_member(at: AnyAt, unit: float) -> AnyAt:
-    return at.model_copy(update={"case": None, "t": None if at.t is None else at.t * unit})
+    return at.without_members(case=None, t=None if at.t is None else at.t * unit)
 
 
 def with_levels(experiment: AnyExperiment, levels: Sequence[int]) -> AnyExperiment:

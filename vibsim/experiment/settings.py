@@ -19,7 +19,8 @@ from vibsim.experiment.yaml.parse import Node, Path_, Source, dotted, parse
 FORM = "must be KEY=VALUE, e.g. model.g=1.62 or schemes[0].kind=rk4"
 _VALUE = "value"
 _INDEX = re.compile(r"\[(\d{1,9})\]\.?")
-_SWEEP = ("sweep",)
+_OF_MEMBERS = (("sweep",), ("at",))
+"""Sections of which keys have dots themselves: those that are swept."""
 
 
 def with_settings(source: Source, settings: Sequence[str]) -> Source:
@@ -102,9 +103,9 @@ def _path(top: Node, key: str, refuse: _Refusal) -> Path_:
 
 
 def _name(node: Node | None, path: Path_, rest: str) -> str:
-    """Return the next key: the longest one that is there, else up to the next dot, of a sweep up to the end."""
+    """Return the next key: the longest one that is there, else up to the next dot, of swept keys up to the end."""
     known = [key for key in (node.keys if node else None) or () if _begins(rest, key)]
-    end = r"[^\[]*" if path == _SWEEP else r"[^.\[]*"
+    end = r"[^\[]*" if path[-1:] in _OF_MEMBERS else r"[^.\[]*"
     found = re.match(end, rest)
     return max(known, key=len) if known else found[0] if found else ""
 

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from vibsim.core.array_types import Floats, Integers
+from vibsim.core.array_types import Flags, Floats, Integers
 from vibsim.experiment.schema.sweep import Axis, Draw, Linspace, Logspace, Values, as_option
 
 if TYPE_CHECKING:
@@ -24,6 +24,8 @@ if TYPE_CHECKING:
 
 Column = NDArray[Any]
 """Values of one key, float64 or text."""
+SAME, EPS = 1e-9, 1e-14
+"""A number names a swept value that is it to this part of itself, and to that of the largest one of the sweep."""
 _PER_COUNT = 4
 """Numbers that Philox gives at each value of its counter."""
 _DIGITS = 60
@@ -87,6 +89,24 @@ def columns_of(axes: Sequence[Axis], start: int, stop: int) -> dict[str, Column]
             )
             blocks, place = [np.concatenate(pair) for pair in zip(*ends, strict=True)], turn - first
         found |= {key: block[place] for key, block in zip(axis.keys, blocks, strict=True)}
+    return found
+
+
+def matching(column: Column, value: float | str) -> Flags:
+    """Say where a column has a value: a word as it is, a number to `SAME` of it."""
+    if column.dtype.kind == "U" or isinstance(value, str):
+        return np.asarray(column.astype(str) == str(value))
+    largest = float(np.max(np.abs(column), initial=0.0))
+    return np.asarray(np.abs(column - value) <= SAME * abs(value) + EPS * largest)
+
+
+def members_with(
+    columns: Mapping[str, Column], swept: Mapping[str, float | str], count: int
+) -> Flags:
+    """Say which of `count` members have every one of some values by dotted key, shape (count,)."""
+    found = np.ones(count, dtype=np.bool_)
+    for key, value in swept.items():
+        found &= matching(columns[key], value)
     return found
 
 

@@ -66,6 +66,8 @@ class Units:
         is itself refused, `path` becomes one of the faulty places.
         """
         refused: set[str | int] = set()
+        if _is_swept_value(path) and isinstance(written, str):
+            return self._plain_number(path, written), refused
         if path[0] not in ("model", "initial", "time", "sweep"):
             return written, refused
         entries: Iterable[tuple[str | int, Any]] = ()
@@ -89,7 +91,8 @@ class Units:
         return found, refused
 
     def _plain_number(self, path: Path_, text: str) -> Any:
-        keys = path if path[0] != "sweep" else [key for key in path if "." in str(key)][:1]
+        is_member = path[0] == "sweep" or _is_swept_value(path)
+        keys = [key for key in path if "." in str(key)][:1] if is_member else path
         key = ".".join(map(str, keys))
         if key.startswith("schemes.") or key in self.texts:
             return text
@@ -133,6 +136,11 @@ class Units:
             except UnitError as error:
                 self._refuse(("units", name), error, value)
                 self.broken.add(name)
+
+
+def _is_swept_value(path: Path_) -> bool:
+    """Tell whether a check or a printed number names a swept value there: ``checks[0].at.model.omega``."""
+    return path[0] in ("checks", "published") and path[-2:-1] == ("at",) and "." in str(path[-1])
 
 
 def _check_name(name: str) -> None:

@@ -5,11 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from vibsim.core.errors import nearest
 from vibsim.experiment.data import TimeSpec
 from vibsim.experiment.faults import Report
 from vibsim.experiment.rules.size_limits import Setting
-from vibsim.experiment.schema.checks import At
+from vibsim.experiment.schema.checks import At, Members
+from vibsim.experiment.sweep_columns import Column, columns_of, matching, members_with
 from vibsim.experiment.value_names import Value
 from vibsim.experiment.yaml.parse import Path_
 
@@ -66,6 +69,49 @@ def check_scheme_and_case(at: At, scope: Scope) -> None:
     if at.scheme is not None:
         known_scheme(at.scheme, scope.at("scheme"))
     check_case(at.case, scope.at("case"))
+    check_members(at, at.case, scope)
+
+
+def check_members(at: Members, case: int | None, scope: Scope) -> None:
+    """Check that there are members with the given values; the scope is that of `at`, or of a row of a printed table."""
+    setting = scope.setting
+    if scope.path[0] == "published":
+        scope = scope.at("at")
+    if not at.swept or not setting.knows_sweep:
+        return
+    known = [*type(at).model_fields, *setting.sweep.keys]
+    unknown = [key for key in at.swept if key not in setting.sweep.keys]
+    for key in unknown:
+        hint = nearest(key, known)
+        scope.at(key).refuse("unknown key", hint, _told(at.swept[key]), at_key=True)
+    if case is not None and not unknown:
+        scope.at(next(iter(at.swept))).refuse("must not be given together with case", at_key=True)
+    for axis in setting.sweep.axes:
+        wanted = {key: at.swept[key] for key in axis.keys if key in at.swept}
+        columns = columns_of([axis], 0, axis.count) if wanted else {}
+        for key, value in wanted.items():
+            if not matching(columns[key], value).any():
+                hint = _nearest_values(columns[key], value)
+                scope.at(key).refuse("not a value of the sweep", hint, _told(value))
+                break
+        else:
+            if wanted and not members_with(columns, wanted, axis.count).any():
+                last = list(wanted)[-1]
+                scope.at(last).refuse(f"no member has this together with {next(iter(wanted))}")
+
+
+def _told(value: float | str) -> str:
+    return value if isinstance(value, str) else f"{value:.12g}"
+
+
+def _nearest_values(column: Column, value: float | str) -> str:
+    """Name the values of a column on both sides of one that it has not, or what it has of words."""
+    known = np.unique(column)
+    if isinstance(value, str) or known.dtype.kind == "U":
+        return nearest(value, [str(word) for word in known])
+    place = int(np.searchsorted(known, value))
+    near = [f"{x:.12g}" for x in known[max(place - 1, 0) : place + 1]]
+    return f"nearest {'is' if len(near) == 1 else 'are'} {' and '.join(near)}"
 
 
 def check_case(case: int | None, scope: Scope) -> None:

@@ -13,6 +13,7 @@ from vibsim.experiment.rules.check_places import (
     Scope,
     check_case,
     check_level,
+    check_members,
     check_place,
     check_scheme_and_case,
     known_scheme,
@@ -126,6 +127,9 @@ def _check(check: Check, scope: Scope) -> None:
     if isinstance(inner, StableCheck | ConservesCheck | EqualCheck):
         check_level(inner.level, scope.at("level"))
         check_case(inner.case, scope.at("case"))
+        check_members(inner.at, inner.case, scope.at("at"))
+    if isinstance(inner, ConvergesCheck | AccurateCheck):
+        check_members(inner.at, None, scope.at("at"))
     if not isinstance(inner, ValueCheck | EqualCheck):
         known_schemes(inner.schemes, scope.at("schemes"))
     match inner:

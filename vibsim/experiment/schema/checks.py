@@ -56,6 +56,55 @@ class Expect(Section):
     """The expected reason; any reason when left out."""
 
 
+def _swept_value(value: Any) -> Any:
+    """Return a swept value as a sweep has it: a number, also of a formula, or the word of an option."""
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if not isinstance(value, str):
+        return number(value)
+    try:
+        return number(value)
+    except PydanticCustomError:
+        return value
+
+
+SweptValue = Annotated[float | str, BeforeValidator(_swept_value)]
+
+
+def _describe_members(schema: dict[str, Any]) -> None:
+    value = {"type": ["number", "string", "boolean"], "description": "One of the swept values."}
+    schema["patternProperties"] = {r"^(model|initial|time|schemes)\..+$": value}
+    schema["additionalProperties"] = False
+
+
+class Members(Section):
+    """The members of the sweep that a check is about: those with the given value under each swept key."""
+
+    model_config = ConfigDict(extra="allow", json_schema_extra=_describe_members)
+    __pydantic_extra__: dict[str, SweptValue]
+    stand_ins = MappingProxyType({})
+    other_values = SweptValue
+
+    @property
+    def swept(self) -> Mapping[str, float | str]:
+        """The values by dotted key of the sweep; none of them stands for every member."""
+        return self.__pydantic_extra__ or {}
+
+    def without_members(self, **changes: Any) -> Self:
+        """Return the same of an experiment without a sweep, and with other `changes`."""
+        return type(self)(
+            **{**{name: getattr(self, name) for name in type(self).model_fields}, **changes}
+        )
+
+
+_At = Annotated[
+    Members,
+    Field(
+        description="Values of swept keys, such as `model.omega: 1.4`; every member when left out."
+    ),
+]
+
+
 class MeasuringCheck(Section):
     """What every check that measures something has."""
 
@@ -81,6 +130,12 @@ class MeasuringCheck(Section):
         return found
 
     @property
+    def swept(self) -> Mapping[str, float | str]:
+        """The swept values, by dotted key, of the members that the check speaks of; none stands for every one."""
+        found: Members | None = getattr(self, "at", None)
+        return found.swept if found is not None else {}
+
+    @property
     def expected_verdict(self) -> Expect | None:
         """The verdict that passes, of a check that may say so; None of the others."""
         found: Expect | None = getattr(self, "expect", None)
@@ -102,6 +157,7 @@ class StableCheck(MeasuringCheck):
     schemes: _Schemes = None
     level: _Level = None
     case: _Case = None
+    at: _At = Members()
 
     @property
     def expects_pass(self) -> bool:
@@ -121,6 +177,7 @@ class ConservesCheck(MeasuringCheck):
     schemes: _Schemes = None
     level: _Level = None
     case: _Case = None
+    at: _At = Members()
 
     @property
     def about(self) -> str | None:
@@ -141,6 +198,7 @@ class EqualCheck(MeasuringCheck):
     """How far apart they may be; derived from the number of steps and the machine precision when left out."""
     level: _Level = None
     case: _Case = None
+    at: _At = Members()
 
     @property
     def first(self) -> str:
@@ -192,9 +250,10 @@ LevelOrBest = Annotated[
 def _describe_best(schema: dict[str, Any]) -> None:
     description = "`best: true` is the same as `level: best`."
     schema["properties"]["best"] = {"const": True, "description": description}
+    _describe_members(schema)
 
 
-class PublishedAt(Section):
+class PublishedAt(Members):
     """Where else a printed number is taken, beside its scheme and level."""
 
     t: Number | None = None
@@ -244,6 +303,7 @@ class ConvergesCheck(MeasuringCheck):
     norm: Norm = TYPICAL_NORM
     """The norm over time in which differences are measured."""
     schemes: _Schemes = None
+    at: _At = Members()
     expect: Expect = Expect()
     """The verdict that passes; PASS when left out."""
 
@@ -293,6 +353,7 @@ class AccurateCheck(Accuracy):
     """The error of the finest level, in the L2 norm over time, is small enough."""
 
     schemes: _Schemes = None
+    at: _At = Members()
 
 
 DEFAULT_RTOL, DEFAULT_ATOL = 1e-9, 1e-12

@@ -121,7 +121,7 @@ def _claim(table: PublishedTable, row: PublishedRow, id_: str) -> ClaimCheck:
     if row.level is not None:
         places.append("extrapolated" if row.level == "best" else f"level {row.level}")
     given = row.at.model_dump(exclude_none=True)
-    places += [f"{name} {value:g}" for name, value in given.items()]
+    places += [f"{k} {v if isinstance(v, str) else f'{v:g}'}" for k, v in given.items()]
     own = {"id": id_, "value": table.value, "quantity": table.quantity, "at": row_at(row)}
     that = ValueCheck(**own, equals=row.meaning.number, atol=row.meaning.half_unit)
     return ClaimCheck(

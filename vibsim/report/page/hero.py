@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from vibsim.checks.outcome import about_members
 from vibsim.checks.value import unit_of
 from vibsim.checks.verdict_text import expectation
 from vibsim.comparison.best_values import WORDS, scalars
@@ -134,7 +135,10 @@ def _measured(experiment: Experiment, record: Record, lead: Lead) -> Iterator[Nu
 
 
 def _order(record: Record, lead: Lead) -> Iterator[Number]:
-    """Yield the observed order with its interval, of a sweep the range over all members, and the promised one."""
+    """Yield the observed order with its interval, of a sweep the range over its members, and the promised one.
+
+    The members are those that the check is about.
+    """
     quantity, member = lead.quantity, lead.member
     if f"{quantity}_order" not in record:
         return
@@ -151,10 +155,11 @@ def _order(record: Record, lead: Lead) -> Iterator[Number]:
         order, low, high = data.stated_order(record, quantity, member, norm)
     reason = lead.result.get("reason") if lead.is_on_order else None
     orders = finest_level.orders(record, quantity, lead.norm)[0][member.scheme]
+    shown = about_members(record, lead.measured if lead.is_on_order else None)
     if f"{quantity}_status" in record:
         # what is undecided has an estimate at most
-        orders = orders[data.flags(record, f"{quantity}_status")[member.scheme] != "INCONCLUSIVE"]
-    every = style.finite(orders)
+        shown &= data.flags(record, f"{quantity}_status")[member.scheme] != "INCONCLUSIVE"
+    every = style.finite(orders[shown])
     if lead.is_on_order and lead.result.get("status") == "INCONCLUSIVE":
         order = None
     if data.swept(record) and every.size > 1:

@@ -6,8 +6,12 @@ import math
 from collections.abc import Iterator, Mapping
 from typing import Any
 
+import numpy as np
+
+from vibsim.apriori.formal_orders import columns_of
 from vibsim.checks.fields import measured
 from vibsim.core.record import Record
+from vibsim.experiment.sweep_columns import members_with
 from vibsim.experiment.value_names import VALUES
 from vibsim.report import data
 from vibsim.report.tables.table import Cell, Column, Table, Written
@@ -65,6 +69,7 @@ def _columns(record: Record, table: PublishedTable) -> tuple[Column, ...]:
         for key in ("t", "step", "case")
         if any(getattr(row.at, key) is not None for row in table.rows)
     ]
+    at += dict.fromkeys(key for row in table.rows for key in row.at.swept)
     return (
         Column("scheme"), Column("level"), Column("dt", data.time_unit(record, "dt"), "step"),
         *(Column(key, form="step") for key in at),
@@ -94,9 +99,11 @@ def _row(
     columns: tuple[Column, ...],
     checks: Mapping[str, Any],
 ) -> Iterator[Cell]:
-    headers = {column.header for column in columns}
+    headers = [column.header for column in columns]
     # without a member it is the first
     case = 0 if row.at.case is None else data.place_of(record, row.at.case) or 0
+    if row.at.swept:
+        case = int(np.argmax(members_with(columns_of(record), row.at.swept, len(record["case"]))))
     ours = float(measured(record, name, "value")[record.words("scheme").index(row.scheme), case])
     levels: list[int | str] = [*data.whole(record, "level")]
     level = levels[-1] if row.level is None else row.level
@@ -106,6 +113,7 @@ def _row(
     # the extrapolated solution has no step
     yield steps.get(level, math.nan)
     yield from (getattr(row.at, key) for key in ("t", "step", "case") if key in headers)
+    yield from (row.at.swept.get(header) for header in headers if "." in header)
     yield row.printed
     yield Written(ours, words.like(ours, row.printed))
     yield ours - row.meaning.number
