@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from vibsim.checks import reductions
 from vibsim.checks.fields import MEMBERS, Field, stated
 from vibsim.checks.kinds import KINDS
 from vibsim.checks.order import BESIDE
@@ -67,6 +68,9 @@ def schema() -> dict[str, Any]:
         if kind == "converges":
             of_kind |= {name: _fact(field) for name, field in BESIDE.items()}
         facts.append(_object(of_kind, title=f"facts of a check `{kind}`"))
+        if kind == "value":
+            of_all = of_kind | {name: _fact(field) for name, field in reductions.FACTS.items()}
+            facts.append(_object(of_all, title="facts of a check `value` with `take`"))
     reached = {"error_bound": _fact(BOUND), "state": TEXT}
     facts.append(_object(reached, title=f"facts of the check `{BY_TOLERANCE}`"))
     for kind, meanings in SOLVER_FACTS.items():

@@ -6,7 +6,7 @@ import json
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from vibsim.checks import accurate, energy, equal, order, order_text, stable, value
+from vibsim.checks import accurate, energy, equal, order, order_text, reductions, stable, value
 from vibsim.checks.fields import Field, measured, stated, variables
 from vibsim.checks.outcome import Judged, Outcome, outcome_of
 from vibsim.checks.sentences import Description
@@ -35,7 +35,7 @@ class Kind(NamedTuple):
 KINDS: Mapping[str, Kind] = {
     "converges": Kind(order.FIELDS, order.measure, order.judge, order_text.describe),
     "accurate": Kind(accurate.FIELDS, accurate.measure, accurate.judge, accurate.describe),
-    "value": Kind(value.FIELDS, value.measure, value.judge, value.describe),
+    "value": Kind(value.FIELDS, value.measure, reductions.judge, reductions.describe),
     "stable": Kind(stable.FIELDS, stable.measure, stable.judge, stable.describe),
     "conserves": Kind(energy.FIELDS, energy.measure, energy.judge, energy.describe),
     "equal": Kind(equal.FIELDS, equal.measure, equal.judge, equal.describe),

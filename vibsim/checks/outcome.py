@@ -47,7 +47,8 @@ class Outcome:
     cases: NDArray[Any]
     """Global index of every member, shape (case,)."""
     case_index: Integers
-    """Positions of the members that the check is about."""
+    """Positions of the members that the check is about, the same for every scheme; or those that decide, shape
+    (scheme, 1), where a result is of all members together."""
     status: NDArray[Any]
     """Measured, index into `STATUSES`."""
     reason: NDArray[Any]
@@ -62,11 +63,17 @@ class Outcome:
     @property
     def total(self) -> int:
         """Number of results."""
-        return len(self.scheme_index) * len(self.case_index)
+        return len(self.scheme_index) * int(self.case_index.shape[-1])
+
+    @property
+    def is_of_all(self) -> bool:
+        """Whether a result is of all members together."""
+        return self.case_index.ndim > 1
 
     @property
     def _at(self) -> tuple[Integers, Integers]:
-        return np.array(self.scheme_index, dtype=np.int64)[:, None], self.case_index[None]
+        cases = self.case_index if self.is_of_all else self.case_index[None]
+        return np.array(self.scheme_index, dtype=np.int64)[:, None], cases
 
     @cached_property
     def chosen(self) -> NDArray[Any]:
@@ -113,6 +120,8 @@ class Judged(NamedTuple):
     """A check that expects a PASS need not give it."""
     facts: Facts = MappingProxyType({})
     """Facts beside the fields that were measured."""
+    members: Integers | None = None
+    """Of a number of all members, the position of the one that decides, shape (scheme, 1)."""
 
 
 def outcome_of(
@@ -132,7 +141,9 @@ def outcome_of(
         schemes=[names[i] for i in schemes],
         scheme_index=schemes,
         cases=cases,
-        case_index=np.flatnonzero(about_members(record, check)),
+        case_index=np.flatnonzero(about_members(record, check))
+        if judged.members is None
+        else judged.members[schemes],
         status=status,
         reason=judged.reason.astype(np.int8),
         compared=status if judged.compared is None else judged.compared.astype(np.int8),
@@ -228,8 +239,9 @@ class Results(Sequence[Result]):
 
     def _one(self, number: int) -> Result:
         outcome = self._outcome
-        row, column = divmod(int(number), len(outcome.case_index))
-        scheme, case = outcome.scheme_index[row], int(outcome.case_index[column])
+        row, column = divmod(int(number), outcome.case_index.shape[-1])
+        cases = outcome.case_index[row] if outcome.is_of_all else outcome.case_index
+        scheme, case = outcome.scheme_index[row], int(cases[column])
         return Result(
             scheme=outcome.schemes[row],
             case=int(outcome.cases[case]),

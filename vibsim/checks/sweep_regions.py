@@ -40,8 +40,10 @@ def where(record: Record, outcome: Outcome) -> dict[str, Any]:
         them together hold `IN_BOX` of the results) and ``bins`` (``from``, ``to``, and the ``share`` of the results in
         it that have the status), and for one of words ``shares``; and ``text``, a sentence. Empty without a sweep.
     """
+    if outcome.is_of_all or outcome.total == 1:
+        return {}
     columns = {key: values[outcome.case_index] for key, values in columns_of(record).items()}
-    if not columns or outcome.total == 1:
+    if not columns:
         return {}
     bins = {key: _bins(values) for key, values in columns.items()}
     found: dict[str, Any] = {}

@@ -54,6 +54,8 @@ FIELDS = {
         of_figure=True,
     ),
 }
+DIRECTION_ASKED = {1.0: "rising", -1.0: "falling", 0.0: "neither rising nor falling throughout"}
+"""What is asked of a direction, by the number that stands for it."""
 UNKNOWN, SETTLED, MOVING = -1, 0, 1
 """What finer levels do to a number that misses what is asked: not known, too little, perhaps enough."""
 REACH = 3.0
@@ -112,8 +114,11 @@ def measure(
     value, bound = (np.broadcast_to(one, block.shape) for one in best_values.value(name, place))
     fulfilled, _ = compare(check, value)
     numbers = np.full((*block.shape, len(levels)), np.nan)
-    if "level" in VALUES[name].at and not (block.lean and np.all(fulfilled)):
+    if "level" in VALUES[name].at and not (block.lean and np.all(fulfilled) and not check.take):
         numbers = _by_level(name, place)
+    if check.take is not None and has_limit(name, at.level):
+        # every member has a part in the number of all
+        bound = np.where(np.isnan(bound), REACH * _last_change(numbers), bound)
     own = own_levels(name, levels) or tuple(levels)
     level = place.level if place.level in own else own[-1]
     needed, first = _prospects(check, numbers[..., : len(own)], own, int(level), fulfilled)
@@ -141,6 +146,19 @@ def _by_level(name: str, place: value_numbers.Place) -> Floats:
     return np.stack([value_numbers.value(name, row) for row in rows], axis=-1)
 
 
+def _last_change(numbers: Floats) -> Floats:
+    """Return by how much the finest levels still change a number, shape (scheme, case); NaN for one level.
+
+    Half of the change before counts as well: one change may be small by chance.
+    """
+    if numbers.shape[-1] < 2:
+        return np.full(numbers.shape[:-1], np.nan)
+    with np.errstate(all="ignore"):
+        change = np.abs(np.diff(numbers[..., -3:], axis=-1))
+        change[..., :-1] *= 0.5
+        return np.asarray(np.max(change, axis=-1))
+
+
 def _prospects(
     check: ValueCheck, numbers: Floats, levels: Sequence[int], level: int, fulfilled: Flags
 ) -> tuple[Any, Any]:
@@ -155,9 +173,7 @@ def _prospects(
     code = np.full(fulfilled.shape, UNKNOWN)
     if len(levels) > 1:
         with np.errstate(all="ignore"):
-            change = np.abs(np.diff(numbers[..., -3:], axis=-1))
-            change[..., :-1] *= 0.5
-            last = np.max(change, axis=-1)
+            last = _last_change(numbers)
             code[away[..., -1] <= REACH * last] = MOVING
             code[away[..., -1] > REACH * last] = SETTLED
     return np.where(fulfilled, UNKNOWN, code), np.where(fulfilled, -1, first)
@@ -211,6 +227,9 @@ def unit_of(experiment: Experiment, record: Record, check: ValueCheck) -> str:
     A scaled run, and a model without units, have none: the convergence Record says so.
     """
     time, measure = ("s" if has_time_unit(record) else ""), VALUES[check.value].measure
+    if check.take is not None and check.take not in ("largest", "smallest", "mean"):
+        # a swept value has its own unit, a direction none
+        return ""
     of_time = {"time": "s", "frequency": "rad s-1", "l1": "s", "l2": "sqrt(s)"}
     unit = of_time.get(measure, "") if time else ""
     if measure not in ("quantity", "l1", "l2", "position"):
@@ -268,6 +287,8 @@ def _border(check: ValueCheck) -> tuple[str, float]:
 def rule(check: ValueCheck, notation: Notation = PLAIN) -> str:
     """Say what a number should be."""
     key, wanted = _border(check)
+    if check.take == "monotone":
+        return DIRECTION_ASKED[wanted]
     if key != "equals":
         return f"{key} {notation.number(wanted)}"
     # counted numbers are equal, or apart by more
@@ -304,7 +325,7 @@ def describe(f: Found, check: ValueCheck) -> Description:
                 f"Add finer `levels:` until there are {VALUES[check.value].finer_levels + 1}.",
                 brief,
             )
-    finer, cost = _finer_levels(f)
+    finer, cost = finer_levels(f)
     return Description(
         f"{told} is {brief}; it may or may not be {asked}.",
         f"Add levels {finer[0]} and {finer[-1]} to `levels:` ({cost}) to shrink the error bound, or ask for the "
@@ -328,7 +349,7 @@ def _measured(f: Found, check: ValueCheck) -> str:
     return f"{told}, with an error of at most {f.notation.number(bound, 2)}"
 
 
-def _finer_levels(f: Found) -> tuple[list[int], str]:
+def finer_levels(f: Found) -> tuple[list[int], str]:
     """Return the next finer levels, and what they cost in words."""
     finer = [f.experiment.levels[-1] + 1 + i for i in range(FINER)]
     return finer, cost_in_words(f.experiment, finer)
@@ -346,7 +367,7 @@ def _on_mismatch(f: Found, check: ValueCheck) -> str:
         return f"Ask for a finer level (`at: {_at(check, first)}`), where the number is as asked, or c{change}."
     if f.fact("levels_needed") == SETTLED:
         return f"C{change}, `model:` or `initial:`. Finer levels will not help."
-    finer, cost = _finer_levels(f)
+    finer, cost = finer_levels(f)
     ask = f" and ask for one (`at: {_at(check, finer[-1])}`)"
     if check.at.level in (None, f.experiment.levels[-1], "best"):
         ask = ""

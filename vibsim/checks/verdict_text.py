@@ -125,7 +125,9 @@ class Wording:
                 head = f"All {total} results{asked and f' with {asked}'} passed"
             elif status in where:
                 head = where[status]["text"]
-            told = f"{head}. The hardest is {self._place(result, brackets=True)}. {told}"
+            is_of_all = check is not None and check.kind == "value" and check.take is not None
+            hardest = f"scheme {result.scheme}" if is_of_all else self._place(result, brackets=True)
+            told = f"{head}. The hardest is {hardest}. {told}"
         if self.check is None or self.check.kind != "claim":
             return told
         holds = truth(self.check, status, result.reason)

@@ -60,6 +60,8 @@ def alone(experiment: AnyExperiment, case: int) -> AnyExperiment:
         check
         for check in experiment.written
         if check.measured.member in (None, case)
+        # what is of all members together is of none alone
+        and getattr(check.measured, "take", None) is None
         and members_with(own, check.measured.swept, 1).all()
     ]
     checks: list[Check] = [_of_member(check, unit) for check in ours]

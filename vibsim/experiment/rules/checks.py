@@ -227,6 +227,7 @@ def _value(check: ValueCheck, scope: Scope) -> None:
             if getattr(check, name) is not None and given != "equals":
                 scope.at(name).refuse("is used with equals only", at_key=True)
     place = scope.at("at")
+    _reduction(check, scope)
     row = _known_value(check.value, scope.at("value"))
     if row is None:
         check_scheme_and_case(check.at, place)
@@ -235,6 +236,42 @@ def _value(check: ValueCheck, scope: Scope) -> None:
     if check.quantity is not None and check.at.scheme is not None:
         _has_quantity(check.quantity, [(check.at.scheme, place.at("scheme"))])
     check_place(check.at, row, place)
+
+
+def _reduction(check: ValueCheck, scope: Scope) -> None:
+    """Check that a number of all members is taken over one swept key, with every other one fixed."""
+    if any(scope.at(key).is_faulty for key in ("over", "take", "at")):
+        return
+    if check.take is None or check.over is None:
+        if (check.take is None) != (check.over is None):
+            missing = "take" if check.take is None else "over"
+            scope.at(missing).refuse("required key is missing: over and take belong together")
+        return
+    if check.take == "monotone" and check.equals not in (1.0, -1.0, 0.0):
+        rule = "takes `equals: 1` (it rises), `equals: -1` (it falls) or `equals: 0` (neither)"
+        scope.at("take").refuse(rule, value=check.take)
+    if not scope.setting.knows_sweep:
+        return
+    axes = scope.setting.sweep.axes
+    keys = [key for axis in axes for key in axis.keys if not key.startswith("schemes.")]
+    if check.over not in keys:
+        hint = nearest(check.over, keys) if keys else "there is no sweep of numbers"
+        scope.at("over").refuse("is no swept key with numbers", hint, check.over)
+        return
+    if check.at.case is not None or check.over in check.at.swept:
+        scope.at("over").refuse("is fixed by `at:`", "leave one of them out", check.over)
+        return
+    for axis in axes:
+        fixed = set(axis.keys) & set(check.at.swept)
+        if check.over in axis.keys:
+            if fixed:
+                hint = "leave it out of `at:`"
+                scope.at("over").refuse(f"moves together with {min(fixed)}", hint, check.over)
+            elif axis.count == 1:
+                scope.at("over").refuse("has one value only", value=check.over)
+        elif axis.count > 1 and not fixed:
+            hint = f"name its value, as in `at: {{{axis.keys[0]}: ...}}`"
+            scope.at("over").refuse(f"{axis.keys[0]} varies, too", hint, check.over)
 
 
 def _equal(check: EqualCheck, scope: Scope) -> None:

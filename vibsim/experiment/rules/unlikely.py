@@ -33,12 +33,17 @@ def note_unlikely(checks: Sequence[Check | None], setting: Setting, report: Repo
             case ConvergesCheck() if _is_wide(inner):
                 rule = f"lets every order up to {float(inner.order) + inner.tolerance:g} pass"
                 report.note((*path, "tolerance"), rule, "it is a distance of orders, such as 0.1")
-            case ValueCheck(equals=float(number), rtol=None, atol=None):
+            case ValueCheck(equals=float(number), rtol=None, atol=None) if _is_measured(inner):
                 _digits((*path, "equals"), inner.value, number, report)
 
 
 def _is_wide(check: ConvergesCheck) -> bool:
     return check.order != "scheme" and check.tolerance >= float(check.order)
+
+
+def _is_measured(check: ValueCheck) -> bool:
+    """Tell whether a number has digits of its own: no direction, and no value of the sweep."""
+    return check.take in (None, "largest", "smallest", "mean")
 
 
 def _angles(setting: Setting, report: Report) -> None:

@@ -32,6 +32,7 @@ from vibsim.experiment.schema.fields import (
 )
 from vibsim.experiment.value_names import VALUES
 
+Take = Literal["largest", "smallest", "mean", "where_largest", "where_smallest", "monotone"]
 Drift = Literal["none", "bounded", "linear", "quadratic"]
 SOLUTIONS = ("exact", "discrete")
 """What a scheme may be compared with beside another scheme; no scheme has such a name."""
@@ -373,6 +374,11 @@ class ValueCheck(MeasuringCheck):
     """The quantity that it is of, where it is of one."""
     at: At = At()
     """Where it is taken."""
+    over: Text | None = None
+    """The swept key over which one number is taken of all members: see `take`."""
+    take: Take | None = None
+    """That number: the `largest`, the `smallest` or the `mean`, the value of the key `where_largest` or
+    `where_smallest` is, or `monotone`: 1 where it rises with the key, -1 where it falls, else 0."""
     equals: Number | None = None
     """The number that it must equal, within `rtol` and `atol`."""
     below: Number | None = None
@@ -383,6 +389,15 @@ class ValueCheck(MeasuringCheck):
     """Relative tolerance of `equals`."""
     atol: NonNegative | None = None
     """Absolute tolerance of `equals`."""
+
+    @classmethod
+    def normal(cls, written: Mapping[str, Any]) -> tuple[Mapping[str, Any], str]:
+        """Return what is written with ``level: best`` for a number of all members, where there is such a level."""
+        row, at = VALUES.get(str(written.get("value"))), written.get("at") or {}
+        is_plain = isinstance(at, Mapping) and not {"level", "best"} & set(at)
+        if "take" not in written or row is None or not row.best or not is_plain:
+            return written, ""
+        return {**written, "at": {**at, "level": "best"}}, ""
 
     @property
     def allowed(self) -> float:

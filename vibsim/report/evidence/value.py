@@ -31,6 +31,9 @@ def picture(
     experiment: Experiment, record: Record, check: ValueCheck, name: str, member: Member
 ) -> Picture | None:
     """Draw a number by level, or how far it is from the one that it should equal; None where no level has one."""
+    if check.take not in (None, "largest", "smallest"):
+        # no number of one member is the one that is asked for
+        return None
     found = _values(experiment, record, check, name, member)
     if found is None or not np.isfinite(found[0]).any():
         return None

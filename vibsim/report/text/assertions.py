@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from vibsim.checks.accurate import rule
+from vibsim.checks.reductions import TAKEN
 from vibsim.checks.value import SAMPLED, what
 from vibsim.core.vocabulary import TYPICAL_NORM
 from vibsim.report.text import words
@@ -71,7 +72,8 @@ def _measured(check: Measurement) -> str:
             order = (
                 "the order of its scheme" if check.order == "scheme" else f"order {check.order:g}"
             )
-            only = f", {_listed(check.schemes)}" if check.schemes else ""
+            named = [_listed(check.schemes)] if check.schemes else []
+            only = "".join(f", {part}" for part in [*named, *_swept(check)])
             why = f" ({check.expect.reason})" if check.expect.reason else ""
             trap = f", expected to end as {check.expect.status}{why}"
             return (
@@ -79,8 +81,8 @@ def _measured(check: Measurement) -> str:
                 f"{'' if check.expect.status == 'PASS' else trap}"
             )
         case "accurate":
-            only = f" ({_listed(check.schemes)})" if check.schemes else ""
-            return f"{words.title(check.accurate)} is {rule(check, words.PAGE)} at the finest level{only}"
+            told = f"{words.title(check.accurate)} is {rule(check, words.PAGE)} at the finest level"
+            return f"{told}{_where(check)}"
         case "value":
             bounds = (
                 ("equals", check.equals),
@@ -113,7 +115,10 @@ def subject(check: Measurement) -> str:
     told, is_sampled = what(check, words.PAGE), check.value in SAMPLED
     keys = ("level", "scheme", "case") if is_sampled else PLACES
     places = ((key, getattr(check.at, key)) for key in keys)
-    where = ", ".join(f"{key} {value}" for key, value in places if value is not None)
+    parts = [f"{key} {value}" for key, value in places if value is not None]
+    where = ", ".join([*parts, *_swept(check)])
+    if check.take is not None:
+        told = f"{TAKEN[check.take]} {told} over {check.over}"
     return f"{told}{(f' ({where})' if is_sampled else f' at {where}') if where else ''}"
 
 
@@ -121,9 +126,18 @@ def _where(check: Measurement) -> str:
     """Say in brackets which schemes, which level and which member a check is about."""
     names = getattr(check, "schemes", None)
     parts = [_listed(names)] if names else []
-    places = ((key, getattr(check, key)) for key in ("level", "case"))
+    places = ((key, getattr(check, key, None)) for key in ("level", "case"))
     parts += [f"{key} {value}" for key, value in places if value is not None]
+    parts += _swept(check)
     return f" ({', '.join(parts)})" if parts else ""
+
+
+def _swept(check: Measurement) -> list[str]:
+    """Name the swept values of the members that a check is about."""
+    return [
+        f"{key} = {value if isinstance(value, str) else words.number(value, 'step')}"
+        for key, value in check.swept.items()
+    ]
 
 
 def _listed(names: tuple[str, ...]) -> str:
