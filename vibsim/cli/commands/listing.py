@@ -116,7 +116,7 @@ def _checks() -> Iterable[tuple[str, str]]:
 
     drifts = "{conserves: energy | energy_d2t, drift: none | bounded | linear | quadratic}"
     equal = "{equal: [scheme, scheme | exact | discrete], quantity:, atol:}"
-    value = "{value: NAME, quantity:, at:, equals | below | above:}"
+    value = "{value: NAME, quantity:, at:, over:, take:, equals | below | above:}"
     text = "a statement of a source, with the check that decides it"
     yield "converges", "a quantity converges with an order: {converges: q, order: scheme | number}"
     accurate = "{accurate: q, relative | absolute: number}"
