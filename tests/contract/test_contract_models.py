@@ -54,6 +54,16 @@ MODELS: dict[str, tuple[Content, dict[str, float], tuple[str, ...]]] = {
         {"u": 1.0},
         ("u", "v"),
     ),
+    "system": (
+        {
+            "coordinates": ["x", "y"],
+            "acceleration": {"x": "-k*x + 0.2*(y - x)", "y": "-y - 0.2*(y - x) - 0.1*vy"},
+            "outputs": {"stretch": "y - x"},
+            "parameters": {"k": 1.3},
+        },
+        {"x": 1.0},
+        ("x", "y", "vx", "vy"),
+    ),
 }
 EVERYWHERE = {
     "energy": ("scheme", "case", "t"),
@@ -73,6 +83,7 @@ OUTPUTS = {
     "circuit": ["capacitor_voltage", "source_voltage"],
     "elastic_pendulum": ["angle", "wire_length", "wire_force"],
     "oscillator": ["dissipated_energy", "work_done", "energy_budget"],
+    "system": ["stretch", "dissipated_energy", "work_done", "energy_budget"],
 }
 
 

@@ -10,8 +10,10 @@ from typing import Any
 
 import pytest
 
+from vibsim.cli.entry import needed
 from vibsim.core.errors import Fault, InputError
 from vibsim.experiment import Experiment
+from vibsim.models import MODELS
 
 GOOD = """\
 title: A pendulum
@@ -71,3 +73,8 @@ def file_faults(folder: Path, text: str | bytes) -> tuple[Fault, ...]:
     with pytest.raises(InputError) as caught:
         Experiment.from_yaml(write(folder, text))
     return caught.value.faults
+
+
+def smallest_section(kind: str) -> dict[str, str]:
+    """Return a section `model` with what must be written alone."""
+    return {"kind": kind, **{field.name: field.default for field in needed(MODELS[kind])}}

@@ -6,7 +6,7 @@ import json
 from typing import Any
 
 import pytest
-from experiment_files import build, faults_of, only_fault
+from experiment_files import build, faults_of, only_fault, smallest_section
 from test_experiment_faults import change_model
 
 from vibsim.experiment import VALUES, Experiment, canonical, restore
@@ -191,7 +191,7 @@ def test_what_is_exact_must_be_known(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.mark.parametrize("kind", MODELS)
 def test_the_centred_difference_is_a_quantity_beside_an_own_velocity(kind: str) -> None:
     model = MODELS[kind]
-    changes: dict[str, Any] = {"model": {"kind": kind}, "initial": {}}
+    changes: dict[str, Any] = {"model": smallest_section(kind), "initial": {}}
     whole = build(schemes=["central", "rk4"], **changes)
     if model.events is not None:
         assert whole.quantities == quantities(model)

@@ -29,10 +29,14 @@ class Case:
     end: float = 2.0
     formulas: dict[str, str] = field(default_factory=dict)
     declared: tuple[str, ...] = ()
+    names: tuple[str, ...] = ()
+    """Of the coordinates, where a file names them."""
 
     @property
     def model(self):
         model = MODELS[self.kind]
+        if self.names:
+            model = model.named(self.names)
         if model.written is not None:
             model = model.written(self.formulas, self.declared)
         terms = frozenset(name for name in model.optional if self.numbers.get(name, 0.0))
@@ -104,6 +108,60 @@ def followed(t, beta, gamma):
     place, speed = (0.3 * math.sin(2 * t), 0.1 * t * t), (0.6 * math.cos(2 * t), 0.2 * t)
     wanted = -1.2 * math.sin(2 * t), 0.2
     return tuple(a - f for a, f in zip(wanted, elastic(place, speed, t, beta, gamma), strict=True))
+
+
+def double_pendulum(u, v, t, g, m1, m2, l1, l2):
+    """From the mass matrix of Lagrange's equations, solved for the accelerations."""
+    (a, b), (va, vb) = u, v
+    coupling = m2 * l1 * l2 * math.cos(a - b)
+    matrix = [[(m1 + m2) * l1**2, coupling], [coupling, m2 * l2**2]]
+    turning = m2 * l1 * l2 * math.sin(a - b)
+    right = [
+        -turning * vb**2 - (m1 + m2) * g * l1 * math.sin(a),
+        turning * va**2 - m2 * g * l2 * math.sin(b),
+    ]
+    return tuple(np.linalg.solve(matrix, right))
+
+
+UPPER = (
+    "-g*(2*m1 + m2)*sin(a) - m2*g*sin(a - 2*b) - 2*sin(a - b)*m2*(vb**2*l2 + va**2*l1*cos(a - b))"
+)
+LOWER = "va**2*l1*(m1 + m2) + g*(m1 + m2)*cos(a) + vb**2*l2*m2*cos(a - b)"
+INERTIA = "(2*m1 + m2 - m2*cos(2*a - 2*b))"
+DOUBLE_PENDULUM = {
+    "acceleration.a": f"({UPPER})/(l1*{INERTIA})",
+    "acceleration.b": f"2*sin(a - b)*({LOWER})/(l2*{INERTIA})",
+    "kinetic": "0.5*(m1 + m2)*(l1*va)**2 + 0.5*m2*(l2*vb)**2 + m2*l1*l2*va*vb*cos(a - b)",
+    "potential": "-(m1 + m2)*g*l1*cos(a) - m2*g*l2*cos(b)",
+    "outputs.height": "-l1*cos(a) - l2*cos(b)",
+}
+
+
+def chain(u, v, t, k, c):
+    """Three masses 1, 2 and 1 between two walls, with dampers along the springs."""
+    place, speed = (0.0, *u, 0.0), (0.0, *v, 0.0)
+    pulls = [
+        k * (place[i + 1] - place[i]) + c * (speed[i + 1] - speed[i]) for i in range(len(u) + 1)
+    ]
+    return tuple((pulls[i + 1] - pulls[i]) / m for i, m in enumerate((1.0, 2.0, 1.0)))
+
+
+def wanted(t):
+    """The accelerations of ``sin t``, ``t^2/2`` and ``cos 2t - 1``."""
+    return -math.sin(t), 1.0, -4.0 * math.cos(2 * t)
+
+
+def wanted_motion(t):
+    place = math.sin(t), 0.5 * t * t, math.cos(2 * t) - 1.0
+    return place, (math.cos(t), t, -2.0 * math.sin(2 * t))
+
+
+CHAIN = {
+    "force.q1": "k*(q2 - 2*q1) + c*(vq2 - 2*vq1)",
+    "force.q2": "k*(q3 - 2*q2 + q1) + c*(vq3 - 2*vq2 + vq1)",
+    "force.q3": "k*(q2 - 2*q3) + c*(vq2 - 2*vq3)",
+    "mass.q2": "2",
+}
 
 
 # the velocity keeps its sign where there is drag, whose second derivative jumps with it
@@ -219,5 +277,78 @@ CASES = {
         {"beta": 0.7, "gamma": 0.4},
         formulas={"exact_x": "0.3*sin(2*t)", "exact_y": "0.1*t**2"},
         initial=(0.0, 0.0, 0.6, 0.0),
+    ),
+    "system-van_der_pol": Case(
+        "system",
+        lambda u, v, t: 0.8 * (1.0 - u * u) * v - u,
+        {"parameters.mu": 0.8},
+        formulas={"acceleration.u": "mu*(1 - u**2)*v - u"},
+        declared=("mu",),
+    ),
+    "system-mathieu": Case(
+        "system",
+        lambda u, v, t: -(1.2 + 0.4 * math.cos(2.0 * t)) * u,
+        {"parameters.p": 1.2},
+        formulas={
+            "acceleration.math": "-(p + 0.4*cos(2*t))*math",
+            "outputs.samples": "2*math - vmath",
+        },
+        declared=("p",),
+        names=("math",),
+    ),
+    "system-damped": Case(
+        "system",
+        lambda u, v, t: (0.3 * math.sin(t) - 0.4 * v - 2.0 * u) / 1.5,
+        formulas={"force.u": "0.3*sin(t) - 0.4*v - 2*u", "mass.u": "1.5"},
+    ),
+    "system-followed": Case(
+        "system",
+        lambda u, v, t: tuple(
+            x + y
+            for x, y in zip(
+                chain(u, v, t, 1.3, 0.2),
+                (
+                    a - b
+                    for a, b in zip(wanted(t), chain(*wanted_motion(t), t, 1.3, 0.2), strict=True)
+                ),
+                strict=True,
+            )
+        ),
+        {"parameters.k": 1.3, "parameters.c": 0.2},
+        formulas=CHAIN | {"exact.q1": "sin(t)", "exact.q2": "0.5*t**2", "exact.q3": "cos(2*t) - 1"},
+        declared=("k", "c"),
+        names=("q1", "q2", "q3"),
+        initial=(0.0, 0.0, 0.0, 1.0, 0.0, 0.0),
+    ),
+    "system-chain": Case(
+        "system",
+        lambda u, v, t: chain(u, v, t, 1.3, 0.2),
+        {"parameters.k": 1.3, "parameters.c": 0.2},
+        formulas=CHAIN,
+        declared=("k", "c"),
+        names=("q1", "q2", "q3"),
+        initial=(0.5, -0.2, 0.1, 0.3, 0.4, -0.6),
+    ),
+    "system-free_chain": Case(
+        "system",
+        lambda u, v, t: chain(u, v, t, 1.3, 0.0),
+        {"parameters.k": 1.3, "parameters.c": 0.0},
+        formulas={key: text.partition(" + c*")[0] for key, text in CHAIN.items()},
+        declared=("k", "c"),
+        names=("q1", "q2", "q3"),
+        initial=(0.5, -0.2, 0.1, 0.3, 0.4, -0.6),
+    ),
+    "system-double_pendulum": Case(
+        "system",
+        lambda u, v, t: double_pendulum(u, v, t, 2.0, 1.0, 0.7, 1.1, 0.8),
+        {
+            f"parameters.{k}": x
+            for k, x in {"g": 2, "m1": 1, "m2": 0.7, "l1": 1.1, "l2": 0.8}.items()
+        },
+        formulas=DOUBLE_PENDULUM,
+        declared=("g", "m1", "m2", "l1", "l2"),
+        names=("a", "b"),
+        initial=(0.8, -0.3, 0.2, 0.5),
+        end=1.0,
     ),
 }

@@ -13,9 +13,10 @@ from vibsim.core.errors import nearest
 
 if TYPE_CHECKING:
     from vibsim.models import Model
-    from vibsim.models.base import Parameter
+    from vibsim.models.base import FormulaField, Parameter
     from vibsim.schemes import AnyOption, Options, Scheme
 
+COORDINATES = "1 to 64 names; the velocity of x is vx, that of u alone v"
 _WIDEST = 100
 Row = tuple[str, str]
 """A label, empty where the last one goes on, and a text."""
@@ -145,6 +146,8 @@ def _model(model: Model) -> Iterator[Row]:
     if not model.formulas:
         shape = "linear" if model.linear else "nonlinear"
         yield "is", f"{shape}, {'conservative' if model.conservative else 'not conservative'}"
+    if model.named is not None:
+        yield "coordinates", COORDINATES
     for number, state in enumerate(model.states):
         yield "" if number else "initial", f"{state.name}: {state.long_name}{unit_text(state.unit)}"
     for number, row in enumerate(model.parameters):
@@ -157,7 +160,14 @@ def _model(model: Model) -> Iterator[Row]:
         yield label, f"{output.name}: {output.long_name}{unit_text(output.unit)}"
     if not model.formulas:
         yield "exact solution", "known" if model.exact is not None else "not known"
-    yield "write", f"model: {{kind: {model.kind}}}"
+    required = "".join(f", {field.name}: {field.default}" for field in needed(model))
+    yield "write", f"model: {{kind: {model.kind}{required}}}"
+
+
+def needed(model: Model) -> tuple[FormulaField, ...]:
+    """Return the formulas that a file must write, or what stands in their place."""
+    replaced = {field.instead_of for field in model.formulas}
+    return tuple(field for field in model.formulas if field.name in replaced)
 
 
 def unit_text(unit: str) -> str:

@@ -6,7 +6,7 @@ import textwrap
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
-from vibsim.cli.entry import parameter_text, unit_text
+from vibsim.cli.entry import COORDINATES, needed, parameter_text, unit_text
 
 if TYPE_CHECKING:
     from vibsim.models import Model
@@ -43,9 +43,15 @@ def _lines(model: Model, schema: str) -> Iterator[str]:
     yield from _column(
         [(f"  {row.key}: {row.default!r}", parameter_text(row)) for row in model.parameters]
     )
+    if model.named is not None:
+        yield from _column([(f"  coordinates: [{', '.join(model.positions)}]", COORDINATES)])
+    required = needed(model)
     yield from _column(
         [
-            (f"  # {field.name}: {field.default}".rstrip(), field.description)
+            (
+                f"  {'' if field in required else '# '}{field.name}: {field.default}".rstrip(),
+                field.description,
+            )
             for field in model.formulas
         ]
     )

@@ -101,8 +101,11 @@ def put_moves(module: Module, count: int) -> None:
         module.define(head, *lines)
     module.define("first_of(q)", f"return {components('q')[0]}")
     pairs = zip(components("q"), components("w"), strict=True)
-    sizes = " + ".join(f"abs({part})" for pair in pairs for part in pair)
-    module.define("size_of(q, w)", f"return {sizes}")
+    first, *rest = (f"abs({part})" for pair in pairs for part in pair)
+    # a sum of many terms in one line would be nested too deeply
+    module.define(
+        "size_of(q, w)", f"size = {first}", *(f"size = size + {x}" for x in rest), "return size"
+    )
 
 
 def put_further(module: Module, count: int) -> None:

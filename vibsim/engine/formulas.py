@@ -23,7 +23,7 @@ MOST_INLINE = 64
 """Calls of functions up to which each becomes part of the formula: each then takes 0.1 s to compile, and 3 MB."""
 _MODE = "mode"
 _MARK = "_"
-"""Behind the names of parameters in a kernel."""
+"""Behind the names of states and parameters in a kernel."""
 
 
 def n_parameters(stepper: Stepper, model: Model) -> int:
@@ -80,7 +80,7 @@ def put_formulas(
     }
     if stepper.implicit:
         formulas["slopes"] = {
-            f"_slope_{i}_{name}": expression.derivative(formula, name)
+            f"_slope_{i}_{name}": expression.derivative(formula, name + _MARK)
             for names in (model.positions, model.velocities)
             for i, formula in enumerate(accelerations)
             for name in names
@@ -117,9 +117,10 @@ def put_energy_with(module: Module, model: Model) -> None:
 
 
 def marked(model: Model) -> Callable[[Formula], Expression]:
-    """Return what reads a formula, its parameters marked so that no name of a user is one of the kernel's text."""
+    """Return what reads a formula, its names marked so that no name of a user is one of the kernel's text."""
+    states = (state.name for state in model.states)
     with_marks: dict[Expression, Expression] = {
-        Name(name): Name(name + _MARK) for name in parameter_names(model)
+        Name(name): Name(name + _MARK) for name in (*states, *parameter_names(model))
     }
 
     def put(formula: Formula) -> Expression:
@@ -149,11 +150,12 @@ def put_functions(
     """
     names = parameter_names(model)
     unpack = [f"{name}{_MARK} = p[{i}]" for i, name in enumerate(names)]
-    arguments = f"{model.position}, {model.velocity}, t, p"
+    arguments = f"{model.position}{_MARK}, {model.velocity}{_MARK}, t, p"
     if model.coordinates > 1:
         arguments = "_u, _v, t, p"
         values = ", ".join(f"_{name}[{k}]" for name in "uv" for k in range(model.coordinates))
-        unpack.insert(0, f"{', '.join((*model.positions, *model.velocities))} = {values}")
+        states = ", ".join(f"{state.name}{_MARK}" for state in model.states)
+        unpack.insert(0, f"{states} = {values}")
     for function, results in formulas.items():
         lines = list(unpack)
         if model.events is not None and function in ("acceleration", "slopes"):

@@ -76,7 +76,9 @@ class ModelSpec(Section):
     parameters: Numbers
     """By the place of each in the section: ``m``, ``damping.linear``, ``parameters.k``."""
     formulas: Annotated[dict[str, str], AfterValidator(FrozenDict)] = FrozenDict()
-    """What the file writes as formulas, by the names of `vibsim.models.Model.formulas`."""
+    """What the file writes as formulas: the keys are those of `vibsim.models.Model.written`."""
+    coordinates: tuple[Text, ...] = ()
+    """Their names, where the model leaves these to a file (`vibsim.models.Model.named`)."""
     tables: Annotated[dict[str, TableSpec], AfterValidator(FrozenDict)] = FrozenDict()
     """Tables that stand in place of formulas, by the same names."""
     terms: tuple[Text, ...] = ()
@@ -91,7 +93,8 @@ class ModelSpec(Section):
     @property
     def base(self) -> Model:
         """The model of this kind, without what the section says of it."""
-        return self._own or MODELS[self.kind]
+        model = self._own or MODELS[self.kind]
+        return model.named(self.coordinates) if model.named is not None else model
 
     @property
     def definition(self) -> Model:

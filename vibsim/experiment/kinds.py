@@ -7,7 +7,11 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from vibsim.models import MODELS, Model
+from vibsim.models.system import MOST, coordinate_faults
 from vibsim.schemes import SCHEMES, Scheme
+
+COORDINATES = "coordinates"
+"""The key under which a file names the coordinates of its equations."""
 
 
 @dataclass(frozen=True)
@@ -23,6 +27,21 @@ class Kinds:
         if not isinstance(kind, str):
             return None
         return self.own_models.get(kind) or MODELS.get(kind)
+
+    def model_of(self, section: Any) -> Model | None:
+        """Return the model that a section ``model`` describes, with the coordinates that it names, but no formulas.
+
+        None where there is no such model, or its coordinates cannot have these names.
+        """
+        given = section if isinstance(section, Mapping) else {}
+        found = self.model(given.get("kind"))
+        if found is None or found.named is None or given.get(COORDINATES) is None:
+            return found
+        names = given[COORDINATES]
+        if not isinstance(names, list | tuple) or not all(isinstance(x, str) for x in names):
+            return None
+        is_sound = 0 < len(names) <= MOST and not any(coordinate_faults(names))
+        return found.named(tuple(names)) if is_sound else None
 
     def scheme(self, kind: Any) -> Scheme | None:
         """Return the scheme of a kind; None where there is none."""

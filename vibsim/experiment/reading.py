@@ -19,6 +19,7 @@ from vibsim.experiment.rules import schemes as scheme_rules
 from vibsim.experiment.rules.checks import check_published, finish_checks
 from vibsim.experiment.rules.figures import check_figures
 from vibsim.experiment.rules.levels import rising_levels
+from vibsim.experiment.rules.model import are_known
 from vibsim.experiment.rules.model import equation as read_equation
 from vibsim.experiment.rules.scaling import Numbers, characteristic
 from vibsim.experiment.rules.sweep import read_sweep
@@ -137,9 +138,7 @@ def build(
     document = read_document(source, report)
     swept = sorted(set(_keys(source.data.get("sweep"))))
     # a model section with a fault elsewhere still names its model
-    section = source.data.get("model")
-    named = section.get("kind") if isinstance(section, Mapping) else None
-    of_kind = report.kinds.model(named)
+    of_kind = report.kinds.model_of(source.data.get("model"))
     equation = read_equation(
         document.model, of_kind, swept, file.parent if file else Path(), report
     )
@@ -151,7 +150,7 @@ def build(
     initial = _initial(document.initial, model or of_kind, parameters, report)
     order = source.data.get("sweep")
     sweep, is_whole = read_sweep(document, order, model, schemes, not knows_schemes, report)
-    if time is not None and is_whole and model is not None and parameters:
+    if time is not None and is_whole and model is not None and are_known(model, parameters):
         of_members = members.MemberNumbers(model, parameters, time, sweep.axes)
         for table in equation.tables:
             members.check_length(of_members, table, report)
@@ -187,6 +186,7 @@ def build(
             kind=model.kind,
             parameters=dict(numbers.parameters),
             formulas=equation.formulas,
+            coordinates=model.positions if model.named is not None else (),
             tables=equation.tables,
             terms=equation.terms,
         ),
@@ -260,7 +260,7 @@ def _initial(
         if state.minimum is not None and found[state.name] < state.minimum:
             rule = f"must be at least {state.minimum:g}"
             report.add(("initial", state.name), rule, value=found[state.name])
-    start = model.start(parameters) if model.start and parameters else {}
+    start = model.start(parameters) if model.start and are_known(model, parameters) else {}
     size = max(map(abs, start.values()), default=0.0)
     for name, value in start.items():
         near = math.isclose(found[name], value, rel_tol=SAME_START, abs_tol=SAME_START * size)

@@ -47,9 +47,7 @@ class Units:
         """Units that the file defines."""
         self.broken: set[str] = set()
         """Names of units whose definition is refused; nothing is said about what is measured in them."""
-        section = data.get("model")
-        kind = section.get("kind") if isinstance(section, dict) else None
-        self.model = report.kinds.model(kind)
+        self.model = report.kinds.model_of(data.get("model"))
         self.units, self.texts = _wanted_units(self.model)
         if isinstance(data.get("units"), dict):
             self._define_all(data["units"])
@@ -94,7 +92,7 @@ class Units:
         is_member = path[0] == "sweep" or _is_swept_value(path)
         keys = [key for key in path if "." in str(key)][:1] if is_member else path
         key = ".".join(map(str, keys))
-        if key.startswith("schemes.") or key in self.texts:
+        if key.startswith("schemes.") or {key, f"{key.rpartition('.')[0]}.*"} & self.texts:
             return text
         has_formulas = self.model is not None and bool(self.model.formulas)
         is_declared = has_formulas and key.startswith(f"model.{DECLARED}.")
@@ -174,7 +172,10 @@ def _constant(value: Any) -> float:
 
 
 def _wanted_units(model: Model | None) -> tuple[dict[str, str], set[str]]:
-    """Return the unit of every dotted key that has one, and the keys of names, formulas and counts, which have none."""
+    """Return the unit of every dotted key that has one, and the keys of names, formulas and counts, which have none.
+
+    Of a key with ``.*`` behind it these are all keys below.
+    """
     units = {"time.end": "s", "time.base_dt": "s"}
     units |= {"time.periods": "1", "time.steps_per_period": "1"}
     texts = {"model.kind", "time.base_steps"}
@@ -186,6 +187,7 @@ def _wanted_units(model: Model | None) -> tuple[dict[str, str], set[str]]:
         key = f"model.{row.name}"
         units |= {f"{key}.{word}": unit for word, unit in row.term_units.items()}
         texts |= {key, *(f"{key}.{name}" for name in (TABLE, *(row.table or ())))}
+        texts |= {f"{key}.*"} if row.of else set()
     return units, texts
 
 

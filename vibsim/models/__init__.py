@@ -30,6 +30,7 @@ from vibsim.models.pendulum import PENDULUM
 from vibsim.models.physical_pendulum import PHYSICAL_PENDULUM
 from vibsim.models.sliding_box import SLIDING_BOX
 from vibsim.models.spring import SPRING
+from vibsim.models.system import SYSTEM
 from vibsim.models.vehicle import VEHICLE
 from vibsim.models.washing_machine import WASHING_MACHINE
 
@@ -46,6 +47,7 @@ _ALL = (
     CIRCUIT,
     DUFFING,
     ELASTIC_PENDULUM,
+    SYSTEM,
 )
 MODELS = Registry[Model]("vibsim.models", _ALL, fault_of)
 

@@ -9,14 +9,14 @@ from __future__ import annotations
 import keyword
 import math
 import re
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cache
 from typing import TYPE_CHECKING, Any, Literal
 
 from vibsim.core.array_types import Floats
 from vibsim.core.registry import hash_fault
-from vibsim.formula import CONSTANTS, FUNCTIONS, Expression, ExpressionError, parse
+from vibsim.formula import CONSTANTS, FUNCTIONS, ONE, Expression, ExpressionError, Name, parse
 from vibsim.models.events import Events
 from vibsim.models.table import Lookup, Table
 
@@ -96,6 +96,15 @@ class FormulaField:
     """How many times the equation differentiates it: it and all of its derivatives but the last must not jump."""
     along: str = "t"
     """What its own name is at a time: a formula in ``t`` and the parameters of the model."""
+    of: Literal["", "coordinate", "output"] = ""
+    """What has a formula of its own, under its name: every coordinate, or every output, which a user names; empty where
+    the field is one formula."""
+    beside: str = ""
+    """The field beside which alone it has a meaning; empty where it needs none."""
+    instead_of: str = ""
+    """The field whose place it takes."""
+    positive: bool = False
+    """Whether its value must be greater than 0."""
 
 
 @dataclass(frozen=True)
@@ -158,7 +167,10 @@ class Model:
     formulas: tuple[FormulaField, ...] = ()
     """What a user writes as formulas."""
     written: Callable[[Mapping[str, str], tuple[str, ...]], Model] | None = None
-    """The model of such formulas, by name, with declared parameters; see `vibsim.models.oscillator`."""
+    """The model of such formulas, by name, with declared parameters; see `vibsim.models.oscillator`. Formulas of single
+    coordinates and outputs have the name of the field before their own: ``acceleration.x``."""
+    named: Callable[[tuple[str, ...]], Model] | None = None
+    """The model whose coordinates have such names; None where a user does not name them."""
     with_table: Callable[[Table, bool], Model] | None = None
     """The model with a table instead of a formula, and whether all steps meet its points (`Lookup.is_met`)."""
     lookup: Lookup | None = None
@@ -251,6 +263,7 @@ def fault_of(model: object) -> str:
             return f"its formula of {name}, {error.text}: {error.rule}"
     # what stands in its place in an experiment
     made = {
+        "named": model.named and model.named(model.positions),
         "variant": model.variant and model.variant(frozenset()),
         "written": model.written and model.written({}, ()),
     }
@@ -266,6 +279,16 @@ def declared_parameters(names: Iterable[str]) -> tuple[Parameter, ...]:
         Parameter(name, 0.0, "1", f"declared parameter {name}", path=f"parameters.{name}")
         for name in names
     )
+
+
+def speeds(
+    positions: Iterable[str], velocities: Iterable[str], accelerations: Iterable[Expression]
+) -> Iterator[tuple[str, Expression]]:
+    """Yield everything that changes along a motion, with the formula of its rate: the time, positions, velocities."""
+    named = tuple(velocities)
+    yield "t", ONE
+    yield from zip(positions, map(Name, named), strict=True)
+    yield from zip(named, accelerations, strict=True)
 
 
 def has_solution(model: Model) -> bool:

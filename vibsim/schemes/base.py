@@ -150,6 +150,8 @@ def round_off(options: Options, steps: int) -> float:
     return float(UNIT_ROUND_OFF * steps**0.5)
 
 
+MOST_UNKNOWNS = 16
+"""Unknowns of a step, at most: their elimination is written out, n^3/3 operations, which takes seconds to compile."""
 VECTOR = "vector "
 """Before a kind of damping: that of a model with several coordinates."""
 
@@ -214,13 +216,18 @@ class Scheme:
 
     def treats(self, model: Model) -> bool:
         """Tell whether the scheme can treat the forces of a model, and its events."""
-        if self.adaptive and model.events is not None:
+        if (self.adaptive and model.events is not None) or self.unknowns(model) > MOST_UNKNOWNS:
             return False
         return (
             self.velocity_forces
             or not depends_on_velocity(model)
             or _kind_of(model) in dict(self.damped)
         )
+
+    def unknowns(self, model: Model) -> int:
+        """Return how many unknowns a step eliminates on a model: the accelerations at all of its stages."""
+        is_solved = not (self.explicit or self.adaptive) and model.coordinates > 1
+        return model.coordinates * self.force_evaluations if is_solved else 1
 
     def stepper_for(self, model: Model, options: Options) -> Stepper:
         """Return the arithmetic that the options ask for, with its treatment of the model's damping if it has one.

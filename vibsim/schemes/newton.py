@@ -22,7 +22,7 @@ without an end. There is no bisection.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from functools import cache
 from itertools import product
 from typing import Any, TypeVar
@@ -230,8 +230,15 @@ def _iteration(coordinates: int, stages: int) -> Iterator[str]:
     for row, _ in unknowns[1:]:
         yield f"change = abs(r_{row}) if abs(r_{row}) > change else change"
     # a change that is no number is one in the sum as well
-    yield f"change = change + (({' + '.join(f'r_{row}' for row, _ in unknowns)}) * 0.0)"
-    yield f"scale = {' + '.join(terms)}"
+    yield from _summed("total", [f"r_{row}" for row, _ in unknowns])
+    yield "change = change + (total * 0.0)"
+    yield from _summed("scale", terms)
+
+
+def _summed(name: str, terms: Sequence[str]) -> Iterator[str]:
+    """Yield the lines that make `name` the sum of `terms` from the first one on, however many there are."""
+    for i, term in enumerate(terms):
+        yield f"{name} = {f'{name} + ' if i else ''}{term}"
 
 
 def elimination(size: int) -> Iterator[str]:
@@ -244,5 +251,5 @@ def elimination(size: int) -> Iterator[str]:
             )
             yield f"r_{row} = r_{row} - factor * r_{k}"
     for row in reversed(range(size)):
-        rest = "".join(f" - m_{row}_{j} * r_{j}" for j in range(row + 1, size))
-        yield f"r_{row} = (r_{row}{rest}) / m_{row}_{row}"
+        yield from (f"r_{row} = r_{row} - m_{row}_{j} * r_{j}" for j in range(row + 1, size))
+        yield f"r_{row} = r_{row} / m_{row}_{row}"

@@ -10,9 +10,9 @@ import numpy as np
 
 from vibsim.core.array_types import Floats
 from vibsim.engine import Series, Trajectories, energies, lane_for, observed
-from vibsim.formula import Binary, Expression, Name, Number, derivative
+from vibsim.formula import Binary, Expression, Number, derivative
 from vibsim.models import BUDGET, Model, centred, tree
-from vibsim.models.base import Formula
+from vibsim.models.base import Formula, speeds
 from vibsim.simulation.members import Members
 
 SAMPLES_AT_A_TIME = 2**16
@@ -67,7 +67,7 @@ def derived(
     schemes, _, cases, times = solution.states.shape
     found = {name: np.empty((schemes, cases, times)) for name in wanted}
     found["energy_initial"] = np.empty((schemes, cases))
-    parameters = np.stack([group.parameters[p.key] for p in model.parameters], axis=-1)
+    parameters = group.numbers(model)
     lane, piece = lane_for(cases, schemes * times), max(SAMPLES_AT_A_TIME // times, 1)
     for s in range(schemes):
         for first in range(0, cases, piece):
@@ -165,12 +165,9 @@ def _work(samples: _Samples) -> tuple[Floats, Floats]:
 
 def rate(model: Model, formula: Expression) -> Expression:
     """Return how fast a formula changes along a motion of the model."""
-    speeds: list[tuple[str, Expression]] = [("t", Number(1.0))]
-    speeds += zip(model.positions, map(Name, model.velocities), strict=True)
     pushes = (tree(model, acceleration) for acceleration in model.accelerations)
-    speeds += zip(model.velocities, pushes, strict=True)
     total: Expression = Number(0.0)
-    for name, speed in speeds:
+    for name, speed in speeds(model.positions, model.velocities, pushes):
         slope = derivative(formula, name)
         if slope != Number(0.0):
             total = Binary("+", total, Binary("*", slope, speed))

@@ -14,6 +14,7 @@ from vibsim.core.array_types import Floats, Integers
 
 if TYPE_CHECKING:
     from vibsim.experiment import Experiment
+    from vibsim.models import Model
 
 
 @dataclass(frozen=True)
@@ -26,6 +27,11 @@ class Members:
     parameters: Mapping[str, Floats]
     initial: Mapping[str, Floats]
     end: Floats
+
+    def numbers(self, model: Model) -> Floats:
+        """Return the parameters in the order of a model, shape (case, parameter)."""
+        found = [self.parameters[row.key] for row in model.parameters]
+        return np.stack(found, axis=-1) if found else np.empty((len(self.end), 0))
 
 
 def members(experiment: Experiment, start: int, stop: int) -> Members:

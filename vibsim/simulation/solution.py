@@ -34,9 +34,8 @@ def solve(
         Its arrays have the shapes that it says, behind a first axis of schemes.
     """
     model = experiment.model.definition
-    numbers = [group.parameters[p.key] for p in model.parameters]
     initial = np.stack([group.initial[state.name] for state in model.states], axis=-1)
-    parameters = np.stack(numbers, axis=-1) if numbers else np.empty((len(group.end), 0))
+    parameters = group.numbers(model)
     rows = []
     for i, scheme in enumerate(experiment.schemes):
         method, runs = scheme.method, []

@@ -84,7 +84,8 @@ def _of_models(models: Iterable[Model]) -> Iterable[tuple[str, str]]:
         shape = "linear" if model.linear else "nonlinear"
         if model.formulas:
             shape = f"formulas {', '.join(row.name for row in model.formulas)}"
-        yield model.kind, f"{model.title}: {model.equation}; {parameters}; {shape}"
+        told = (f"{model.title}: {model.equation}", parameters, shape)
+        yield model.kind, "; ".join(filter(None, told))
 
 
 def _schemes() -> tuple[Iterable[tuple[str, str]], list[Fault]]:

@@ -151,11 +151,14 @@ def update_tables(experiment: AnyExperiment) -> AnyExperiment:
 def check_jumps(members: MemberNumbers, formulas: Mapping[str, str], report: Report) -> None:
     """Refuse formulas that jump, or whose slope does, where the equation has their derivatives."""
     for row in members.model.formulas:
-        if row.derivatives and row.name in formulas:
-            _check_jumps(row, formulas[row.name], members, report)
+        for key, text in formulas.items() if row.derivatives else ():
+            if key.partition(".")[0] == row.name:
+                _check_jumps(row, key, text, members, report)
 
 
-def _check_jumps(row: FormulaField, text: str, members: MemberNumbers, report: Report) -> None:
+def _check_jumps(
+    row: FormulaField, key: str, text: str, members: MemberNumbers, report: Report
+) -> None:
     (name,) = row.names
     known = [own.name for own in members.model.parameters]
     formula, along = parse(text, (name, *known)), parse(row.along, ("t", *known))
@@ -166,7 +169,7 @@ def _check_jumps(row: FormulaField, text: str, members: MemberNumbers, report: R
             rule = (
                 f"{what} near {name} = {at:.6g}, and the equation has its {WORDS[row.derivatives]}"
             )
-            report.add(("model", row.name), rule, HINTS.get(row.name, OTHERS), text)
+            report.add(("model", *key.split(".")), rule, HINTS.get(row.name, OTHERS), text)
             return
         formula = derivative(formula, name)
 

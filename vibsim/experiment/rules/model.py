@@ -4,28 +4,29 @@ from __future__ import annotations
 
 import keyword
 import re
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from vibsim.core.array_types import Floats
+from vibsim.core.errors import nearest
 from vibsim.experiment.data import TableSpec
-from vibsim.experiment.faults import Report
+from vibsim.experiment.faults import MISSING, Report
+from vibsim.experiment.kinds import COORDINATES
+from vibsim.experiment.rules.potential import check_potential
 from vibsim.experiment.schema.fields import DECLARED, TABLE, Section
 from vibsim.experiment.tables.file import ENDINGS, TableError, read
+from vibsim.experiment.yaml.parse import Path_
 from vibsim.formula import (
     FUNCTIONS,
     MAX_CHARACTERS,
     ONE,
     Binary,
-    Expression,
     ExpressionError,
     derivative,
     evaluate,
-    has_rule,
     is_zero,
     names_in,
     parse,
@@ -35,18 +36,15 @@ from vibsim.formula import (
 )
 from vibsim.models import FormulaField, Model, tree
 from vibsim.models.oscillator import COULOMB
+from vibsim.models.system import coordinate_faults, name_fault
 
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 NONE = "none"
 """Stands for a term that is left out, where others have words as well."""
-AMPLITUDES = (-6, 8)
-"""Powers of 2, from and to, of the amplitudes at which a potential energy is compared with its spring."""
+MOST_NAMED = 8
+"""Most names of a list in a message."""
 MAX_NODES = 5000
 """Operations and names of an equation with its slopes and energies: compiling takes about 3 ms of each."""
-PANELS, POINTS = 32, 16
-"""Panels of an amplitude, and points of each."""
-AGREE = 1e-9
-"""How far both may differ, relative to the largest energy."""
 
 
 @dataclass(frozen=True)
@@ -62,6 +60,11 @@ class Equation:
     """Which of `Model.optional` the equation has."""
 
 
+def are_known(model: Model, parameters: Mapping[str, float]) -> bool:
+    """Tell whether every parameter of a model has a value; without some it may have none at all."""
+    return len(parameters) >= len(model.parameters)
+
+
 def equation(
     section: Any, model: Model | None, swept: Collection[str], folder: Path, report: Report
 ) -> Equation:
@@ -69,6 +72,10 @@ def equation(
 
     `swept` holds the dotted keys that the file sweeps; the paths of tables begin in `folder`.
     """
+    if section is not None and model is None:
+        for i, fault in enumerate(coordinate_faults(getattr(section, COORDINATES, ()))):
+            if fault:
+                report.add(("model", COORDINATES, i), fault, "choose another name")
     if section is None or model is None:
         # what follows from formulas is known only with all of them
         return Equation(model if model is not None and model.written is None else None)
@@ -76,7 +83,7 @@ def equation(
     found = Equation(model, parameters)
     if model.written is not None:
         found = _written(section, model, parameters, folder, report)
-    if found.model is None or found.model.variant is None or not found.parameters:
+    if found.model is None or found.model.variant is None:
         return found
     neutral = {row.name: row.neutral for row in found.model.parameters}
     terms = tuple(
@@ -97,7 +104,9 @@ def _written(
     tables: dict[str, TableSpec] = {}
     for row in model.formulas:
         value = getattr(section, row.name)
-        if isinstance(value, Section) and row.table is not None:
+        if row.of:
+            texts |= _several(row, value, model, known, report)
+        elif isinstance(value, Section) and row.table is not None:
             table = _table(row, row.table, value, folder, report)
             tables |= {row.name: table} if table is not None else {}
         elif isinstance(value, Section):
@@ -107,14 +116,18 @@ def _written(
             report.add(("model", row.name), rule, "leave the key out", at_key=True)
         elif value == NONE and row.terms and NONE not in declared:
             continue
-        elif value is not None and _is_sound(value, row, known, report):
+        elif value is not None and _is_sound(value, row, ("model", row.name), known, report):
             texts[row.name] = value.strip()
+        _check_place(row, section, report)
     if "exact" in texts and section.force is not None:
         rule = "must not be given together with exact, from which it follows"
         report.add(("model", "force"), rule, at_key=True)
     if "exact" in texts and f"damping.{COULOMB}" in parameters:
         rule = "must not be given together with coulomb friction, which may hold the body elsewhere"
         report.add(("model", "exact"), rule, at_key=True)
+    for row in model.formulas:
+        if row.positive:
+            _check_positive(row, texts, declared, report)
     if any(fault.key.split(".")[0] == "model" for fault in report.faults):
         return Equation(None)
     parameters |= {f"{DECLARED}.{name}": value for name, value in declared.items()}
@@ -129,7 +142,8 @@ def _written(
         # an error without a text speaks of the longest formula
         longest = max(texts, key=lambda name: len(texts[name]), default="kind")
         name = exact if error.text else longest
-        report.add(("model", name), error.rule, error.hint, texts.get(name, error.text))
+        path = ("model", *name.split("."))
+        report.add(path, error.rule, error.hint, texts.get(name, error.text))
         return Equation(None)
     keys = {row.key for row in found.parameters}
     for name in sorted(section.model_fields_set & (parameters.keys() - keys)):
@@ -139,10 +153,10 @@ def _written(
     for name, value in (found.start(parameters) if found.start else {}).items():
         if not np.isfinite(value):
             rule = f"must have a finite value at t = 0, where {name} is {value:g}"
-            report.add(("model", exact), rule, value=texts.get(exact))
+            report.add(("model", *exact.split(".")), rule, value=texts.get(exact))
             return Equation(None)
     if any(row.name == "spring" for row in model.formulas):
-        _check_potential(found, parameters, texts, report)
+        check_potential(found, parameters, texts, report)
     return Equation(found, parameters, texts, tables)
 
 
@@ -173,8 +187,13 @@ def _table(
 def _check_length(model: Model) -> None:
     """Refuse an equation that would take long to compile: each call of a function is a page of machine code."""
     accelerations = [tree(model, formula) for formula in model.accelerations]
-    states = (*model.positions, *model.velocities)
-    slopes = [derivative(formula, name) for formula in accelerations for name in states]
+    states = {*model.positions, *model.velocities}
+    slopes = [
+        derivative(formula, name)
+        for formula in accelerations
+        for name in names_in(formula)
+        if name in states
+    ]
     energies = [tree(model, formula) for formula in (model.kinetic_energy, model.potential_energy)]
     formulas = (*accelerations, *slopes, *energies)
     if sum(size(formula, MAX_NODES) for formula in formulas) > MAX_NODES:
@@ -222,16 +241,81 @@ def _term(
     return {row.name: row.terms[word]}
 
 
-def _is_sound(text: str, row: FormulaField, known: Collection[str], report: Report) -> bool:
+def _several(
+    row: FormulaField, written: Any, model: Model, known: Collection[str], report: Report
+) -> dict[str, str]:
+    """Return the formulas of a field with one of each coordinate or output, by field and name: ``acceleration.x``."""
+    if written is None:
+        return {}
+    path: Path_ = ("model", row.name)
+    if not isinstance(written, Mapping):
+        if model.coordinates > 1 and row.names:
+            rule = f"must have a formula for each of {_some(model.positions)}"
+            report.add(path, rule, f"e.g. {{{model.position}: ...}}")
+            return {}
+        is_sound = _is_sound(written, row, path, known, report)
+        return {f"{row.name}.{name}": written.strip() for name in model.positions if is_sound}
+    found: dict[str, str] = {}
+    taken = [*(state.name for state in model.states), *known]
+    for name, text in written.items():
+        if row.of == "coordinate" and name not in model.positions:
+            hint = nearest(name, list(model.positions))
+            report.add((*path, name), "unknown coordinate", hint, at_key=True)
+        elif row.of == "output" and (fault := name_fault(name, tuple(taken))):
+            report.add((*path, name), fault, "choose another name", at_key=True)
+        elif _is_sound(text, row, (*path, name), known, report):
+            found[f"{row.name}.{name}"] = text.strip()
+        taken.append(name)
+    missing = [name for name in model.positions if name not in written]
+    # a name that is misspelt is told already
+    is_told = any(name not in model.positions for name in written)
+    if row.of == "coordinate" and row.names and missing and not is_told:
+        report.add(path, f"must have a formula for each coordinate, has none for {_some(missing)}")
+    return found
+
+
+def _some(names: Sequence[str]) -> str:
+    """Name a few of several coordinates."""
+    return ", ".join(names if len(names) <= MOST_NAMED else [*names[: MOST_NAMED - 1], "..."])
+
+
+def _check_place(row: FormulaField, section: Any, report: Report) -> None:
+    """Note a field that stands beside one that it replaces, or without the one that it belongs to."""
+    given = section.model_fields_set
+    if row.instead_of and not {row.name, row.instead_of} & given:
+        report.add(("model", row.instead_of), MISSING, f"or {row.name}")
+    elif row.instead_of and {row.name, row.instead_of} <= given:
+        rule = f"must not be given together with {row.instead_of}"
+        report.add(("model", row.name), rule, at_key=True)
+    elif row.beside and row.name in given and row.beside not in given:
+        rule = f"has a meaning beside {row.beside} only"
+        report.add(("model", row.name), rule, at_key=True)
+
+
+def _check_positive(
+    row: FormulaField, texts: Mapping[str, str], declared: Mapping[str, float], report: Report
+) -> None:
+    """Refuse formulas in parameters alone whose value is not greater than 0."""
+    for key, text in texts.items():
+        if key.partition(".")[0] == row.name:
+            value = float(values(parse(text, declared), declared))
+            if not 0.0 < value < np.inf:
+                rule = f"must be greater than 0, is {value:g}"
+                report.add(("model", *key.split(".")), rule, value=text)
+
+
+def _is_sound(
+    text: str, row: FormulaField, path: Path_, known: Collection[str], report: Report
+) -> bool:
     """Tell whether a formula of variables and some `known` parameters can be read; note its fault otherwise."""
-    path = ("model", row.name)
     try:
         read_tree = parse(text, (*row.names, *known))
     except ExpressionError as error:
         place = f" at character {error.position + 1}" if error.position < MAX_CHARACTERS else ""
         rule = f"{error.rule}{place}"
         if error.rule.startswith("unknown name"):
-            rule += f"; it may name {', '.join(row.names)} and parameters"
+            named = f"{_some(row.names)} and " if row.names else ""
+            rule += f"; it may name {named}parameters"
         is_file = row.table is not None and text.lower().endswith(ENDINGS)
         hint = f"for a table write {{{TABLE}: {text}}}" if is_file else error.hint
         report.add(path, rule, hint, text)
@@ -251,49 +335,3 @@ def _is_sound(text: str, row: FormulaField, known: Collection[str], report: Repo
         report.add(path, f"a constant in it {error.rule}", error.hint, text)
         return False
     return True
-
-
-def _check_potential(
-    model: Model, parameters: Mapping[str, float], texts: Mapping[str, str], report: Report
-) -> None:
-    """Compare the potential energy with the work of the spring between half and whole amplitudes."""
-    names = (model.position, *(row.name for row in model.parameters))
-    numbers = {row.name: parameters[row.key] for row in model.parameters}
-    spring = parse(texts.get("spring", model.position), names)
-    potential = tree(model, model.potential_energy)
-    is_given = "potential" in texts
-    size = 2.0 ** np.arange(*AMPLITUDES)
-    u = np.concatenate([-size, size])
-    with np.errstate(all="ignore"):
-        coarse, work = (_work(spring, numbers, model.position, u, n) for n in (PANELS, 2 * PANELS))
-        energy = [values(potential, {**numbers, model.position: x}) for x in (u, 0.5 * u)]
-        scale = np.abs(work) + np.abs(energy[0]) + np.abs(energy[1])
-        # the work across a corner or a pole is not known so well
-        is_known = np.abs(work - coarse) <= 0.1 * AGREE * scale
-        is_right = np.abs(energy[0] - energy[1] - work) <= AGREE * scale
-    is_compared = is_known & np.isfinite(energy).all(axis=0)
-    wrong = is_compared & ~is_right
-    if is_given and wrong.any():
-        rule = f"is not the integral of the spring: its slope differs near u = {u[wrong][0]:.3g}"
-        report.add(("model", "potential"), rule, value=texts["potential"])
-    elif is_given and not is_compared.any():
-        rule = "cannot be compared with the spring: one of them has a value nowhere"
-        report.add(("model", "potential"), rule, value=texts["potential"])
-    elif not is_given and not has_rule(spring, model.position):
-        wrong = np.isfinite(work) & ~(is_known & is_right)
-        if wrong.any():
-            rule = "its potential energy cannot be worked out: it has corners, is singular or varies fast"
-            hint = "write the energy as `potential`, a formula whose slope is the spring"
-            report.add(("model", "spring"), rule, hint)
-
-
-def _work(
-    spring: Expression, numbers: Mapping[str, float], position: str, u: Floats, panels: int
-) -> Floats:
-    """Return the integral of the spring from u/2 to u, by Gauss and Legendre's rule in every panel."""
-    place, weight = np.polynomial.legendre.leggauss(POINTS)
-    middle = (2.0 * np.arange(panels)[:, None] + 1.0 + place) / (2.0 * panels)
-    places = u[:, None, None] * (0.5 + 0.5 * middle)
-    force = np.broadcast_to(values(spring, {**numbers, position: places}), places.shape)
-    found: Floats = 0.5 / (2.0 * panels) * u * np.sum(weight * force, axis=(1, 2))
-    return found

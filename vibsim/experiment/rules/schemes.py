@@ -9,12 +9,14 @@ from vibsim.core.errors import nearest
 from vibsim.experiment.data import SchemeSpec
 from vibsim.experiment.faults import Report
 from vibsim.experiment.kinds import Kinds
+from vibsim.experiment.rules.model import MOST_NAMED
 from vibsim.experiment.schema.checks import SOLUTIONS
 from vibsim.experiment.schema.model_and_schemes import TOLERANCE
 from vibsim.experiment.schema.sweep import tolerance_name
-from vibsim.models import MODELS, Model
+from vibsim.formula import names_in
+from vibsim.models import MODELS, Model, tree
 from vibsim.schemes import FIXED_STEP
-from vibsim.schemes.base import EVENTS, VECTOR
+from vibsim.schemes.base import EVENTS, MOST_UNKNOWNS, VECTOR
 
 
 def finish_schemes(
@@ -83,10 +85,18 @@ def _check_forces(kind: str, i: int, model: Model, report: Report) -> None:
         return
     able = [other for other, row in report.kinds.all_schemes().items() if row.treats(model)]
     hint = "choose from " + ", ".join(able) if able else "no scheme can"
-    rule = f"cannot treat {model.kind}, whose acceleration depends on {model.velocity}"
+    rule = f"cannot treat {model.kind}, whose acceleration depends on {_velocities(model)}"
+    unknowns = method.unknowns(model)
     damped = [other for other, _ in method.damped if not other.startswith(VECTOR)]
-    if model.events is not None and method.adaptive:
+    if unknowns > MOST_UNKNOWNS:
+        rule = (
+            f"cannot treat {model.coordinates} coordinates: it solves for {unknowns} unknowns in each step, "
+            f"and can for {MOST_UNKNOWNS} at most"
+        )
+    elif model.events is not None and method.adaptive:
         rule = f"cannot treat {model.kind}: it takes its own steps across events, where the motion is not smooth"
+    elif damped and model.kind in MODELS.built_in and model.coordinates > 1:
+        rule += " in a way that it does not know"
     elif damped and model.kind in MODELS.built_in:
         rule += f" by more than {' or '.join(damped)} damping"
     elif damped:
@@ -94,6 +104,13 @@ def _check_forces(kind: str, i: int, model: Model, report: Report) -> None:
         rule += f" and which declares no {kinds} damping"
         hint += f"; if it is {kinds} damping, write damping=Damping(kind, rate) in the model"
     report.add(("schemes", i), rule, hint, kind)
+
+
+def _velocities(model: Model) -> str:
+    """Name the velocities on which the acceleration depends."""
+    named = {name for row in model.accelerations for name in names_in(tree(model, row))}
+    found = [name for name in model.velocities if name in named] or [model.velocity]
+    return ", ".join(found if len(found) < MOST_NAMED else [*found[: MOST_NAMED - 1], "..."])
 
 
 def _check_events(section: Any, i: int, model: Model, report: Report) -> None:

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 
 from vibsim.experiment.data import TimeSpec
 from vibsim.experiment.faults import MISSING, Report
+from vibsim.experiment.rules.model import are_known
 from vibsim.experiment.schema.document import TimeSection
 from vibsim.models import Model, natural_end
 
@@ -52,7 +53,7 @@ def time_spec(
     if steps is None:
         rule = "periods*steps_per_period must be a whole number"
         report.add(("time", "steps_per_period"), rule, f"it is {product:.15g}")
-    if steps is None or model is None or not parameters:
+    if steps is None or model is None or not are_known(model, parameters):
         return None
     end = float(natural_end(model, section.periods, parameters))
     if not (math.isfinite(end) and end > 0.0):

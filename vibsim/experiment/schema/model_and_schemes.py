@@ -20,6 +20,7 @@ from pydantic import (
 )
 from pydantic_core import PydanticCustomError
 
+from vibsim.experiment.kinds import COORDINATES
 from vibsim.experiment.schema.fields import (
     FORMULA,
     TABLE,
@@ -38,6 +39,7 @@ from vibsim.experiment.schema.fields import (
 )
 from vibsim.experiment.schema.sweep import tolerance_name
 from vibsim.models import FormulaField, Model, Parameter
+from vibsim.models.system import MOST
 from vibsim.schemes import AnyOption, Flag, NumberOption, Option, Scheme
 from vibsim.schemes.base import EVENTS
 
@@ -141,11 +143,24 @@ def _declared(names: Mapping[str, float]) -> Mapping[str, float]:
     return names
 
 
+def _few(formulas: Mapping[str, str]) -> Mapping[str, str]:
+    if len(formulas) > MOST:
+        raise refused(f"must not have more than {MOST} formulas, has {len(formulas)}")
+    return formulas
+
+
 Declared = Annotated[dict[str, Number], AfterValidator(_declared)]
 
 
 def _formula_type(model: Model, field: FormulaField) -> Any:
-    """Return what may stand for a formula: text, and beside it ``{word: coefficient}`` or ``{table: file}``."""
+    """Return what may stand for a formula: text, and beside it ``{word: coefficient}`` or ``{table: file}``.
+
+    Where coordinates or outputs have formulas of their own, it is a mapping of these, or the formula of the only
+    coordinate.
+    """
+    if field.of:
+        several = Annotated[dict[str, FormulaText], Field(min_length=1), AfterValidator(_few)]
+        return several if field.of == "output" else by_shape(several, FormulaText)
     name = f"{_class_name(model.kind)}{_class_name(field.name)}"
     fields: dict[str, Any] = {}
     if field.table is not None:
@@ -172,8 +187,15 @@ def model_section(model: Model) -> type[Section]:
         description = f"{row.description} [{row.unit}]"
         told = Field(default=row.default, description=description)
         fields[row.name] = (_parameter_type(row), told)
+    if model.named is not None:
+        words = "names of the coordinates; the velocity of x is vx, that of u alone v"
+        several = Annotated[tuple[Text, ...], Field(min_length=1), short(MOST)]
+        fields[COORDINATES] = (several, Field(default=model.positions, description=words))
     for field in model.formulas:
         names = ", ".join((*field.names, "parameters"))
+        if model.named is not None:
+            states = "coordinates, velocities, t and " if len(field.names) > 1 else "t and "
+            names = f"{states if field.names else ''}parameters"
         words = f"{field.description}; a formula in {names}"
         words += f"; {field.default} when left out" if field.default else ""
         fields[field.name] = (

@@ -41,9 +41,13 @@ def _head(experiment: Experiment) -> list[str]:
     lines += [f"source: {_value(experiment.source)}"] if experiment.source else []
     model, scaling = experiment.model, experiment.scaling
     named: dict[str, Any] = {"kind": model.kind}
+    if model.coordinates:
+        named["coordinates"] = list(model.coordinates)
     for key, value in (scaling or model).parameters.items():
         _put(named, key.split("."), value)
-    named |= {key: formula for key, formula in model.formulas.items() if key not in named}
+    for key, formula in model.formulas.items():
+        if key not in named:
+            _put(named, key.split("."), formula)
     named |= {name: {"table": spec.file} for name, spec in model.tables.items()}
     lines += [
         f"model: {_value(named)}",

@@ -1,0 +1,202 @@
+"""Experiments with equations of a user: what they take, what they refuse, and all faults at once."""
+
+import pytest
+
+from vibsim import Experiment, InputError, analyse, simulate, verdicts
+from vibsim.experiment.experiment import canonical
+from vibsim.models import MODELS
+from vibsim.schemes import SCHEMES
+from vibsim.theory import exact_degree
+
+PAIR = {
+    "coordinates": ["x", "y"],
+    "acceleration": {"x": "-k*x + y", "y": "-y"},
+    "parameters": {"k": 2},
+}
+
+
+def read(model, **changes):
+    content = {
+        "title": "t",
+        "model": {"kind": "system", **model},
+        "time": {"end": 2.0},
+        "levels": [5, 6, 7, 8],
+        "schemes": ["rk4"],
+    }
+    return Experiment.from_dict(content | changes)
+
+
+def refused(model, **changes):
+    with pytest.raises(InputError) as caught:
+        read(model, **changes)
+    return [str(fault).partition(": ")[2] for fault in caught.value.faults]
+
+
+def judged(experiment):
+    levels = [simulate(experiment, level) for level in experiment.levels]
+    return [(v.status, v.reason) for v in verdicts(experiment, analyse(experiment, levels))]
+
+
+def test_one_equation_needs_no_names():
+    model = read({"acceleration": "mu*(1 - u**2)*v - u", "parameters": {"mu": 1}}).model
+    assert model.coordinates == ("u",)
+    assert model.definition.velocities == ("v",)
+    assert model.definition.equation == "u'' = mu*(1 - u**2)*u' - u"
+    assert not model.definition.conservative
+
+
+def test_the_order_of_keys_does_not_matter_and_that_of_coordinates_does():
+    swapped = {**PAIR, "acceleration": dict(reversed(PAIR["acceleration"].items()))}
+    assert canonical(read(PAIR)) == canonical(read(swapped))
+    other = read({**PAIR, "coordinates": ["y", "x"]})
+    assert other.model.definition.position == "y"
+    assert canonical(other) != canonical(read(PAIR))
+
+
+def test_every_coordinate_is_checked_where_no_check_is_given():
+    assert [check.converges for check in read(PAIR).checks] == ["x", "y"]
+
+
+def test_units_and_sweeps_are_those_of_any_model():
+    experiment = read(
+        PAIR,
+        initial={"x": "180 degree"},
+        sweep={"model.parameters.k": [1, "2e3 g"], "initial.vy": {"linspace": [0, 1, 3]}},
+    )
+    assert experiment.initial["x"] == pytest.approx(3.141592653589793, abs=0)
+    assert experiment.members == 6
+
+
+def test_periods_are_those_of_the_lowest_frequency():
+    experiment = read(
+        {"coordinates": ["x", "y"], "acceleration": {"x": "-4*x", "y": "-0.25*y + x**2"}},
+        time={"periods": 3, "steps_per_period": 32},
+        levels=[0, 1],
+    )
+    assert experiment.time.end == pytest.approx(3 * 4 * 3.141592653589793)
+
+
+def test_a_system_without_parameters_runs_and_converges():
+    assert judged(read({"acceleration": "-sin(u) - 0.1*v"}, initial={"u": 1.0})) == [
+        ("PASS", "asymptotic")
+    ]
+
+
+def test_a_manufactured_motion_is_followed_by_every_state():
+    exact = {"x": "sin(t)", "y": "exp(-t)*cos(2*t)"}
+    checks = [{"converges": name, "order": 4} for name in ("x", "y", "vx", "vy")]
+    experiment = read({**PAIR, "exact": exact}, checks=checks)
+    assert experiment.initial == pytest.approx({"x": 0.0, "y": 1.0, "vx": 1.0, "vy": -1.0})
+    assert judged(experiment) == [("PASS", "asymptotic")] * 4
+
+
+def test_an_exact_degree_is_that_of_the_same_equation_of_another_model():
+    def degree(model):
+        return exact_degree(SCHEMES["central"].stepper_for(model, options), model)
+
+    options = SCHEMES["central"].defaults()
+    own = read({"acceleration": "-2*u"}).model.definition
+    assert degree(own) == degree(MODELS["oscillator"].written({"spring": "2*u"}, ())) > 1
+
+
+@pytest.mark.parametrize(
+    ("model", "told"),
+    [
+        ({}, ["model.acceleration: required key is missing: or force"]),
+        (
+            {"acceleration": "-u + nonsense", "force": {"x": "-u + 2*"}, "mass": 0},
+            [
+                "model.acceleration: -u + nonsense: unknown name 'nonsense' at character 6; it may name u, v, t "
+                "and parameters: choose from e, pi, t, u, v",
+                "model.force: must not be given together with acceleration",
+                "model.force.x: unknown coordinate: choose from u",
+                "model.mass.u: 0: must be greater than 0, is 0",
+            ],
+        ),
+        (
+            {**PAIR, "acceleration": {"x": "-x"}},
+            ["model.acceleration: must have a formula for each coordinate, has none for y"],
+        ),
+        (
+            {**PAIR, "acceleration": {"x": "-x", "z": "-y"}},
+            ["model.acceleration.z: unknown coordinate: choose from x, y"],
+        ),
+        (
+            {**PAIR, "acceleration": "-x"},
+            ["model.acceleration: must have a formula for each of x, y: e.g. {x: ...}"],
+        ),
+        (
+            {**PAIR, "coordinates": ["x", "sin", "1a"]},
+            [
+                "model.coordinates[1]: 'sin' is a function of formulas: choose another name",
+                "model.coordinates[2]: must consist of letters, digits and _, and begin with a letter: "
+                "choose another name",
+            ],
+        ),
+        (
+            {**PAIR, "parameters": {"k": 2, "vx": 1}},
+            ["model.parameters.vx: 'vx' is the velocity x: choose another name"],
+        ),
+        (
+            {**PAIR, "outputs": {"x_end": "x", "sum": "x + q"}},
+            [
+                "model.outputs.sum: x + q: unknown name 'q' at character 5; it may name x, y, vx, vy, t and "
+                "parameters: choose from e, k, pi, t, vx, vy, x, y",
+                "model.outputs.x_end: 'x_end' is what results may call something of 'x': choose another name",
+            ],
+        ),
+        ({**PAIR, "mass": 2}, ["model.mass: has a meaning beside force only"]),
+        (
+            {**PAIR, "exact": {"x": "abs(t - 1)", "y": "t"}},
+            [
+                "model.exact.x: abs(t - 1): its slope jumps near t = 1, and the equation has its second "
+                "derivative: write a solution whose value and slope have no jumps"
+            ],
+        ),
+        (
+            {"coordinates": [f"q{i}" for i in range(65)], "acceleration": {"q0": "-q0"}},
+            ["must not have more than 64 entries, has 65"],
+        ),
+        (
+            {"force": "-u", "mass": "u"},
+            [
+                "model.mass: u: unknown name 'u' at character 1; it may name parameters: choose from e, pi"
+            ],
+        ),
+    ],
+)  # fmt: skip
+def test_all_faults_are_told_at_once(model, told):
+    found = refused(model)
+    assert len(found) == len(told), found
+    for fault, expected in zip(found, told, strict=True):
+        assert expected in fault
+
+
+@pytest.mark.parametrize(
+    ("model", "scheme", "told"),
+    [
+        ({"acceleration": "-u - v**3"}, "velocity_verlet", "whose acceleration depends on v"),
+        (
+            {**PAIR, "acceleration": {"x": "-x", "y": "-y - 0.1*vy"}},
+            "central",
+            "cannot treat system, whose acceleration depends on vy",
+        ),
+        (
+            {
+                "coordinates": [f"q{i}" for i in range(9)],
+                "acceleration": {f"q{i}": f"-q{i}" for i in range(9)},
+            },
+            "gauss4",
+            "cannot treat 9 coordinates: it solves for 18 unknowns in each step, and can for 16 at most",
+        ),
+    ],
+)
+def test_a_scheme_that_does_not_apply_is_refused_with_the_reason(model, scheme, told):
+    (fault,) = refused(model, schemes=[scheme])
+    assert told in fault
+
+
+def test_linear_and_quadratic_damping_of_one_coordinate_are_recognised():
+    for text in ("-u - 2*c*v", "cos(t) - (u + c*abs(v)*v)/2"):
+        model = {"acceleration": text, "parameters": {"c": 0.1}}
+        assert judged(read(model, schemes=["central"], initial={"u": 1.0}))[0][0] == "PASS"

@@ -1,0 +1,194 @@
+"""Systems that a user writes: frequencies, energies, names; a chain against its modes."""
+
+import itertools
+
+import numpy as np
+import pytest
+from model_cases import CASES
+
+from vibsim import Experiment, analyse, simulate
+from vibsim.engine import integrate
+from vibsim.formula import evaluate, parse, values
+from vibsim.models import tree
+from vibsim.models.system import MOST, coordinate_faults, name_fault, written
+from vibsim.schemes import FIXED_STEP, SCHEMES
+from vibsim.schemes.base import MOST_UNKNOWNS
+
+
+def chain(count, k="k"):
+    """Masses 1 between walls, held by equal springs, whose motion is known by its modes."""
+    names = tuple(f"q{i}" for i in range(count))
+    sides = ("0", *names, "0")
+    return written(
+        names,
+        {
+            f"acceleration.{name}": f"{k}*({sides[i]} - 2*{name} + {sides[i + 2]})"
+            for i, name in enumerate(names)
+        },
+        ("k",),
+    )
+
+
+def modes(count, k):
+    """Frequencies and shapes of these, from the text books."""
+    j = np.arange(1, count + 1)
+    shapes = np.sqrt(2.0 / (count + 1)) * np.sin(np.pi * np.outer(j, j) / (count + 1))
+    return 2.0 * np.sqrt(k) * np.sin(0.5 * np.pi * j / (count + 1)), shapes
+
+
+@pytest.mark.parametrize("count", [1, 2, 5, 64])
+def test_frequencies_are_those_of_the_modes(count):
+    model = chain(count)
+    k = np.array([0.5, 2.0, 2.0])
+    found = model.natural_frequency({"parameters.k": k})
+    np.testing.assert_allclose(found, [modes(count, x)[0][0] for x in k], rtol=1e-11)
+    if count > 1:
+        found = model.highest_frequency({"parameters.k": k})
+        np.testing.assert_allclose(found, [modes(count, x)[0][-1] for x in k], rtol=1e-13)
+
+
+@pytest.mark.parametrize(("text", "known"), [("u", False), ("-u + 1/p", True), ("0*u", False)])
+def test_a_frequency_that_is_none_is_no_number(text, known):
+    model = written(("u",), {"acceleration.u": text}, ("p",))
+    assert np.isfinite(model.natural_frequency({"parameters.p": 1.0})) == known
+
+
+@pytest.mark.parametrize("count", [2, 64])
+def test_a_chain_moves_as_its_modes_do(count):
+    """By a scheme of order 4, compiled, against cosines; the energy is found and is that of the springs."""
+    model, k = chain(count), 1.7
+    w, shapes = modes(count, k)
+    start = np.zeros(count)
+    start[0] = 1.0
+    end, steps = 6.0, 2000
+    scheme = SCHEMES["pefrl"]
+    arrays = np.array([[k]]), np.array([[*start, *np.zeros(count)]]), np.array([end / steps])
+    run = integrate(model, scheme, scheme.defaults(), *arrays, steps, steps, lane="scalar")
+    exact = shapes @ (np.cos(w * end) * (shapes.T @ start))
+    np.testing.assert_allclose(run.states[:count, 0, -1], exact, rtol=0.0, atol=1e-10)
+    assert model.conservative
+    states = np.random.default_rng(2).normal(size=2 * count)
+    at = dict(zip((s.name for s in model.states), states, strict=True)) | {"k": k}
+    stretch = np.diff([0.0, *states[:count], 0.0])
+    found = evaluate(tree(model, model.potential_energy), at)
+    assert found == pytest.approx(0.5 * k * np.sum(stretch**2), rel=1e-12)
+    found = evaluate(tree(model, model.kinetic_energy), at)
+    assert found == pytest.approx(0.5 * np.sum(states[count:] ** 2), rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("names", "formulas", "potential", "is_conservative"),
+    [
+        (("u",), {"acceleration.u": "mu*(1 - u**2)*v - u"}, "u**2/2", False),
+        (("u",), {"acceleration.u": "-sin(u)"}, "1 - cos(u)", True),
+        (("u",), {"acceleration.u": "(cos(t) - 2*u)/mu"}, "u**2/mu", False),
+        (("u",), {"force.u": "cos(t) - 2*u", "mass.u": "mu"}, "u**2", False),
+        (("u",), {"acceleration.u": "-(1 + mu*cos(t))*u"}, "u**2/2", False),
+        (("u",), {"acceleration.u": "-cos(t)*u"}, "0", False),
+        (("x", "y"), {"acceleration.x": "-2*x*y", "acceleration.y": "-x**2 - y"}, "x**2*y + y**2/2", True),
+        # around the origin: no energy has such a force
+        (("x", "y"), {"acceleration.x": "-y", "acceleration.y": "x"}, "0", False),
+        (("x", "y"), {"acceleration.x": "vy", "acceleration.y": "-vx"}, "0", True),
+        (
+            ("x", "y"),
+            {"force.x": "y - x", "force.y": "x - y - mu*vy", "mass.x": "2", "mass.y": "mu"},
+            "(x - y)**2/2",
+            False,
+        ),
+    ],
+)  # fmt: skip
+def test_the_energy_is_found_where_there_is_one(names, formulas, potential, is_conservative):
+    model = written(names, formulas, ("mu",))
+    rng = np.random.default_rng(4)
+    at = {state.name: rng.normal(size=9) for state in model.states} | {"mu": 0.7, "t": 0.3}
+    found = values(tree(model, model.potential_energy), at)
+    expected = values(parse(potential, at), at)
+    np.testing.assert_allclose(np.broadcast_to(found, 9), expected + np.zeros(9), rtol=1e-11)
+    assert model.conservative == is_conservative
+
+
+def test_what_feeds_the_motion_of_van_der_pol_is_negative_damping():
+    model = written(("u",), {"acceleration.u": "mu*(1 - u**2)*v - u"}, ("mu",))
+    at = {"u": 0.5, "v": 2.0, "mu": 0.7}
+    power = evaluate(tree(model, model.dissipation), at)
+    assert power == pytest.approx(-0.7 * (1 - 0.25) * 4.0, rel=1e-14)
+    assert model.driving is None
+
+
+COMPILED = ("system-van_der_pol", "system-mathieu", "system-double_pendulum", "system-chain")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", COMPILED)
+@pytest.mark.parametrize("kind", FIXED_STEP)
+def test_compiled_and_plain_give_the_same_bits(name, kind):
+    case, scheme = CASES[name], SCHEMES[kind]
+    if not scheme.treats(case.model):
+        assert case.model.velocity not in ("vmath",)
+        return
+    lanes = ["plain", "scalar"]
+    if case.coordinates == 1 and scheme.explicit:
+        lanes.append("blocks")
+    runs = [case.run(scheme, 64, lane=lane, with_series=True, n_extrema=4) for lane in lanes]
+    for one, other in itertools.pairwise(runs):
+        assert one.states.tobytes() == other.states.tobytes()
+        np.testing.assert_array_equal(one.gathered.ranges, other.gathered.ranges)
+        np.testing.assert_array_equal(one.series.deviation_running, other.series.deviation_running)
+
+
+def test_names_of_users_are_no_names_of_kernels():
+    """Words that the text of a kernel, Python or C has for something else."""
+    names = ("p", "math", "samples", "int", "vector", "stats", "double", "_u"[1:], "state", "run")
+    formulas = {f"acceleration.{name}": f"-({i} + p**2)*{name}" for i, name in enumerate(names, 1)}
+    model = written(names, formulas, ())
+    plain = [f"x{i}" for i in range(len(names))]
+    same = {f"acceleration.{x}": f"-({i} + x0**2)*{x}" for i, x in enumerate(plain, 1)}
+    start = np.linspace(0.1, 1.0, 2 * len(names))[None]
+    scheme = SCHEMES["rk4"]
+    runs = [
+        integrate(m, scheme, {}, np.empty((1, 0)), start, np.array([0.1]), 20, 1, lane=lane)
+        for m in (model, written(tuple(plain), same, ()))
+        for lane in ("plain", "scalar")
+    ]
+    assert len({run.states.tobytes() for run in runs}) == 1
+
+
+def test_schemes_are_refused_where_their_equations_are_too_many():
+    few, many = chain(MOST_UNKNOWNS // 2), chain(MOST)
+    refused = {kind for kind, scheme in SCHEMES.items() if not scheme.treats(many)}
+    assert refused == {kind for kind, s in FIXED_STEP.items() if not s.explicit}
+    assert all(scheme.treats(few) for scheme in SCHEMES.values())
+
+
+def test_names_of_files_are_refused():
+    """Every variable that is not one of a state, and whatever would become one behind a word of a state."""
+    experiment = Experiment.from_dict(
+        {
+            "title": "t",
+            "model": {"kind": "system", "acceleration": {"q": "-q - 0.1*vq"}, "coordinates": ["q"],
+                      "outputs": {"twice": "2*q"}},
+            "initial": {"q": 1.0},
+            "time": {"end": 20.0, "base_steps": 64},
+            "levels": [0, 1, 2],
+            "schemes": ["rk4", "dop853"],
+            "sweep": {"initial.q": [1.0, 2.0]},
+        }
+    )  # fmt: skip
+    levels = [simulate(experiment, level) for level in experiment.levels]
+    names = {
+        str(name) for data in (*levels, analyse(experiment, levels)) for name in data.variables
+    }
+    own = {name for name in names if name.partition("_")[0] in ("q", "vq", "twice")}
+    suffixes = {name.partition("_")[2] for name in own}
+    others = names - own
+    assert len(others) > 40
+    stems = {name.removesuffix(f"_{suffix}") for name in others for suffix in suffixes}
+    assert {name for name in others | stems if not name_fault(name)} == set()
+    assert not any(map(name_fault, ("q", "omega", "x", "theta_1", "force", "size", "z2")))
+
+
+@pytest.mark.parametrize(
+    "names", [("x", "x"), ("x", "vx"), ("vx", "x"), ("x", "x_min"), ("x_min", "x"), ("t",), ("e",)]
+)
+def test_names_that_cannot_be_told_apart_are_refused(names):
+    assert any(coordinate_faults(names))

@@ -1,0 +1,68 @@
+"""Whether a potential energy is that of its spring, by comparison with the work that the spring does."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from vibsim.core.array_types import Floats
+from vibsim.experiment.faults import Report
+from vibsim.formula import Expression, has_rule, parse, values
+from vibsim.models import Model, tree
+
+AMPLITUDES = (-6, 8)
+"""Powers of 2, from and to, of the amplitudes at which a potential energy is compared with its spring."""
+PANELS, POINTS = 32, 16
+"""Panels of an amplitude, and points of each."""
+AGREE = 1e-9
+"""How far both may differ, relative to the largest energy."""
+
+
+def check_potential(
+    model: Model, parameters: Mapping[str, float], texts: Mapping[str, str], report: Report
+) -> None:
+    """Compare the potential energy with the work of the spring between half and whole amplitudes.
+
+    `texts` holds the formulas of the file by their fields.
+    """
+    names = (model.position, *(row.name for row in model.parameters))
+    numbers = {row.name: parameters[row.key] for row in model.parameters}
+    spring = parse(texts.get("spring", model.position), names)
+    potential = tree(model, model.potential_energy)
+    is_given = "potential" in texts
+    size = 2.0 ** np.arange(*AMPLITUDES)
+    u = np.concatenate([-size, size])
+    with np.errstate(all="ignore"):
+        coarse, work = (_work(spring, numbers, model.position, u, n) for n in (PANELS, 2 * PANELS))
+        energy = [values(potential, {**numbers, model.position: x}) for x in (u, 0.5 * u)]
+        scale = np.abs(work) + np.abs(energy[0]) + np.abs(energy[1])
+        # the work across a corner or a pole is not known so well
+        is_known = np.abs(work - coarse) <= 0.1 * AGREE * scale
+        is_right = np.abs(energy[0] - energy[1] - work) <= AGREE * scale
+    is_compared = is_known & np.isfinite(energy).all(axis=0)
+    wrong = is_compared & ~is_right
+    if is_given and wrong.any():
+        rule = f"is not the integral of the spring: its slope differs near u = {u[wrong][0]:.3g}"
+        report.add(("model", "potential"), rule, value=texts["potential"])
+    elif is_given and not is_compared.any():
+        rule = "cannot be compared with the spring: one of them has a value nowhere"
+        report.add(("model", "potential"), rule, value=texts["potential"])
+    elif not is_given and not has_rule(spring, model.position):
+        wrong = np.isfinite(work) & ~(is_known & is_right)
+        if wrong.any():
+            rule = "its potential energy cannot be worked out: it has corners, is singular or varies fast"
+            hint = "write the energy as `potential`, a formula whose slope is the spring"
+            report.add(("model", "spring"), rule, hint)
+
+
+def _work(
+    spring: Expression, numbers: Mapping[str, float], position: str, u: Floats, panels: int
+) -> Floats:
+    """Return the integral of the spring from u/2 to u, by Gauss and Legendre's rule in every panel."""
+    place, weight = np.polynomial.legendre.leggauss(POINTS)
+    middle = (2.0 * np.arange(panels)[:, None] + 1.0 + place) / (2.0 * panels)
+    places = u[:, None, None] * (0.5 + 0.5 * middle)
+    force = np.broadcast_to(values(spring, {**numbers, position: places}), places.shape)
+    found: Floats = 0.5 / (2.0 * panels) * u * np.sum(weight * force, axis=(1, 2))
+    return found

@@ -1,0 +1,474 @@
+r"""A system of equations that a user writes: ``x'' = a(x, y, ..., x', y', ..., t)`` for each of its coordinates.
+
+The velocity of x is named vx; of a system with the one coordinate u it is v. Instead of accelerations there may be
+forces and masses, ``m x'' = F``; a mass is a number, since a mass that depends on the position has further terms, which
+accelerations have. Everything is dimensionless.
+
+Energy: kinetic ``sum m v^2/2`` and a potential V, unless a user writes them. Of each force the terms that name
+positions alone are taken; V is their work from the origin,
+``-sum_i int_0^(x_i) F_i(x_1, ..., x_(i-1), s, 0, ..., 0) ds``. That is done where it is found by rules and its gradient
+is these forces; else V is 0. The power of everything else follows from the equations, ``P = dE/dt``, and a system is
+conservative where P vanishes. Both are tested at places and parameters of all kinds, because two formulas of one
+function need not look alike.
+
+Frequencies are those of small oscillations about the origin, ``w^2`` the positive eigenvalues of ``-da/dx`` at t = 0.
+
+Instead of forces a motion may be written for each coordinate: what is missing in the equations is then added, and the
+motion starts on it (a manufactured solution; vibration text (B), section 2.2 and exercises 9 and 23).
+"""
+
+from __future__ import annotations
+
+import keyword
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cache, cached_property, partial
+from typing import Any
+
+import numpy as np
+
+from vibsim.core.array_types import Floats
+from vibsim.formula import (
+    CONSTANTS,
+    FUNCTIONS,
+    ZERO,
+    Binary,
+    Expression,
+    Name,
+    Negate,
+    Number,
+    derivative,
+    has_rule,
+    integral,
+    minus,
+    names_in,
+    over,
+    parse,
+    plus,
+    put,
+    times,
+    to_formula,
+    values,
+)
+from vibsim.formula.algebra import is_jump
+from vibsim.formula.tree import paired, walk
+from vibsim.models.base import (
+    BUDGET,
+    ENERGIES,
+    Damping,
+    FormulaField,
+    Model,
+    Numbers,
+    Output,
+    Parameter,
+    State,
+    declared_parameters,
+    speeds,
+)
+from vibsim.models.shared.manufactured import Manufactured
+from vibsim.models.shared.mechanical import damping_of
+
+MOST = 64
+"""Coordinates, at most."""
+NUMBERS = (
+    *("period", "amplitude", "frequency", "growth_per_period", "relative_energy_error"),
+    *("peak", "trough", "scalar", "theory", "measured", "work", "energy_drift", "check"),
+)
+"""What results hold with further words behind it, beside the energies."""
+SECTIONS = ("initial", "model", "schemes", "time")
+"""What the names of swept values begin with."""
+TAKEN = frozenset(
+    """
+    t scheme case decay_rate level pair triple norm check steps dt end index extremum size_over
+    first_peak last_peak status last_step failure_time natural_frequency omega_dt
+    highest_omega_dt stability_limit size_over_exact force_evaluations_total accepted_steps
+    exact_period
+    """.split()  # noqa: SIM905
+)
+"""Other names of variables in results, and what would have such a name with a word of theirs behind it."""
+TESTS = 24
+"""Places at which formulas are compared."""
+AGREE = 1e-9
+"""How far they may differ, to the size of their terms."""
+SHOWN = 6
+"""Equations that are shown; of more, the first ones and the last one."""
+
+
+def velocities_of(coordinates: tuple[str, ...]) -> tuple[str, ...]:
+    """Name the velocities."""
+    return ("v",) if coordinates == ("u",) else tuple(f"v{name}" for name in coordinates)
+
+
+def name_fault(name: str, others: tuple[str, ...] = ()) -> str:
+    """Say why a name cannot be that of a coordinate, a velocity or an output beside others; nothing where it can."""
+    if not re.fullmatch("[A-Za-z][A-Za-z0-9_]*", name):
+        return "must consist of letters, digits and _, and begin with a letter"
+    if keyword.iskeyword(name):
+        return f"'{name}' is a word of the grammar of formulas and cannot be a name"
+    if name in FUNCTIONS or name in CONSTANTS:
+        return f"'{name}' is a {'function' if name in FUNCTIONS else 'constant'} of formulas"
+    stored = (*ENERGIES, *BUDGET, *NUMBERS)
+    if name in TAKEN or name in stored or name in others:
+        return f"'{name}' has another meaning already, in formulas or in results"
+    pairs = [*((name, of) for of in (*stored, *SECTIONS, *others)), *((of, name) for of in others)]
+    for longer, shorter in pairs:
+        if longer.startswith(f"{shorter}_"):
+            return f"'{longer}' is what results may call something of '{shorter}'"
+    return ""
+
+
+def coordinate_faults(coordinates: Sequence[str]) -> Iterator[str]:
+    """Yield for each name why it cannot be that of a coordinate beside those before it; nothing where it can."""
+    before: list[str] = []
+    for name in coordinates:
+        velocity = velocities_of(tuple(coordinates) if len(coordinates) == 1 else (name, ""))[0]
+        fault = name_fault(name, tuple(before))
+        yield fault or name_fault(velocity, (*before, name))
+        before += [name, velocity]
+
+
+def fields(coordinates: tuple[str, ...]) -> tuple[FormulaField, ...]:
+    """Return what a user may write about a system with these coordinates."""
+    velocities = velocities_of(coordinates)
+    states, known = (*coordinates, *velocities), (*coordinates, *velocities, "t")
+    first = coordinates[0]
+    return (
+        FormulaField(
+            "acceleration", known, f"-{first}", "acceleration of each coordinate", of="coordinate"
+        ),
+        FormulaField(
+            "force",
+            known,
+            "",
+            "force on each coordinate, instead of its acceleration",
+            of="coordinate",
+            instead_of="acceleration",
+        ),
+        FormulaField(
+            "mass",
+            (),
+            "",
+            "mass of each coordinate, or of all, beside its force; 1 when left out",
+            of="coordinate",
+            beside="force",
+            positive=True,
+        ),
+        FormulaField(
+            "potential", states, "", "potential energy, where it cannot be found from the forces"
+        ),
+        FormulaField("kinetic", states, "", "kinetic energy, where it is not the sum of m v**2/2"),
+        FormulaField(
+            "outputs", known, "", "further series, each with a name of your own", of="output"
+        ),
+        FormulaField(
+            "exact",
+            ("t",),
+            "",
+            "exact solution of each coordinate, for which forces are then added",
+            of="coordinate",
+            derivatives=2,
+        ),
+    )
+
+
+@dataclass(frozen=True)
+class Written:
+    """The formulas of a user, read."""
+
+    coordinates: tuple[str, ...]
+    formulas: Mapping[str, str]
+    declared: tuple[str, ...]
+
+    @cached_property
+    def velocities(self) -> tuple[str, ...]:
+        """Names of the velocities."""
+        return velocities_of(self.coordinates)
+
+    @cached_property
+    def states(self) -> tuple[str, ...]:
+        """All positions, then all velocities."""
+        return (*self.coordinates, *self.velocities)
+
+    @cached_property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """Those that are declared."""
+        return declared_parameters(self.declared)
+
+    def read(self, key: str, default: str = "") -> Expression:
+        """Return a formula by its key; `default` where it is not written."""
+        return parse(self.formulas.get(key, default), (*self.states, "t", *self.declared))
+
+    @cached_property
+    def masses(self) -> tuple[Expression, ...]:
+        """The mass of every coordinate; 1 of one that has an acceleration."""
+        return tuple(self.read(f"mass.{name}", "1") for name in self.coordinates)
+
+    @cached_property
+    def own_accelerations(self) -> tuple[Expression, ...]:
+        """The accelerations without the forces of a manufactured solution."""
+        found = []
+        for name, mass in zip(self.coordinates, self.masses, strict=True):
+            if f"force.{name}" in self.formulas:
+                found.append(over(self.read(f"force.{name}"), mass))
+            else:
+                found.append(self.read(f"acceleration.{name}", f"-{name}"))
+        return tuple(found)
+
+    @cached_property
+    def manufactured(self) -> Manufactured | None:
+        """The motion that is written down, where it is."""
+        keys = [f"exact.{name}" for name in self.coordinates]
+        if keys[0] not in self.formulas:
+            return None
+        texts = tuple(self.formulas[key] for key in keys)
+        return Manufactured(tuple(map(self.read, keys)), texts, self.states, self.parameters)
+
+    @cached_property
+    def accelerations(self) -> tuple[Expression, ...]:
+        """The accelerations."""
+        own, motion = self.own_accelerations, self.manufactured
+        if motion is None:
+            return own
+        return tuple(plus(a, push) for a, push in zip(own, motion.forces(own), strict=True))
+
+    @cached_property
+    def kinetic(self) -> Expression:
+        """The kinetic energy."""
+        if "kinetic" in self.formulas:
+            return self.read("kinetic")
+        pairs = zip(self.masses, self.velocities, strict=True)
+        half = [times(times(Number(0.5), m), Binary("**", Name(v), Number(2.0))) for m, v in pairs]
+        return paired(half, partial(Binary, "+"))
+
+    @cached_property
+    def potential(self) -> Expression:
+        """The potential energy, 0 where none is known."""
+        if "potential" in self.formulas:
+            return self.read("potential")
+        moving, total = {*self.velocities, "t"}, []
+        forces = []
+        for mass, a in zip(self.masses, self.own_accelerations, strict=True):
+            still = (term for term in _terms(a) if moving.isdisjoint(names_in(term)))
+            force: Expression = ZERO
+            for term in still:
+                force = plus(force, term)
+            forces.append(times(mass, force))
+        for i, (name, force) in enumerate(zip(self.coordinates, forces, strict=True)):
+            for later in self.coordinates[i + 1 :]:
+                if later in names_in(force):
+                    force = put(force, later, ZERO)
+            if not has_rule(force, name):
+                return ZERO
+            work = integral(force, name)
+            total.append(minus(ZERO, work))
+        found: Expression = paired(total, plus)
+        slopes = (derivative(found, name) for name in self.coordinates)
+        sums = ([slope, force] for slope, force in zip(slopes, forces, strict=True))
+        return found if all(map(self.vanishes, sums)) else ZERO
+
+    @cached_property
+    def powers(self) -> tuple[Expression, ...]:
+        """The terms of the power ``dE/dt``."""
+        found = (
+            times(derivative(energy, name), speed)
+            for name, speed in speeds(self.coordinates, self.velocities, self.accelerations)
+            for energy in (self.kinetic, self.potential)
+        )
+        return tuple(term for term in found if term != ZERO)
+
+    def vanishes(self, terms: Any) -> bool:
+        """Tell whether a sum is 0 wherever it has a value, and that it has one somewhere."""
+        rng = np.random.default_rng(21)
+        numbers = {name: rng.uniform(-1.0, 1.0, TESTS) for name in self.states}
+        numbers |= {name: rng.uniform(0.3, 1.7, TESTS) for name in ("t", *self.declared)}
+        found = [np.broadcast_to(values(term, numbers), TESTS) for term in terms]
+        if not found:
+            return True
+        total, size = np.sum(found, axis=0), np.sum(np.abs(found), axis=0)
+        known = np.isfinite(total)
+        return bool(known.any() and np.all(np.abs(total[known]) <= AGREE * size[known]))
+
+    @cached_property
+    def stiffness(self) -> dict[tuple[int, int], Expression]:
+        """Entries of ``-da/dx`` at the origin and t = 0 that are not 0, in the parameters, by row and column."""
+        found = {}
+        for i, a in enumerate(self.own_accelerations):
+            named = names_in(a)
+            for j, name in enumerate(self.coordinates):
+                if name not in named:
+                    continue
+                slope = derivative(a, name)
+                for state in (*self.states, "t"):
+                    if state in names_in(slope):
+                        slope = put(slope, state, ZERO)
+                if slope != ZERO:
+                    found[i, j] = minus(ZERO, slope)
+        return found
+
+    def frequencies(self, parameters: Numbers) -> Floats:
+        """Return the angular frequencies of small oscillations, increasing, NaN behind the last, shape (..., n)."""
+        numbers = {row.name: np.asarray(parameters[row.key], float) for row in self.parameters}
+        shape = np.broadcast_shapes(*(number.shape for number in numbers.values()))
+        matrix = np.zeros((*shape, len(self.coordinates), len(self.coordinates)))
+        for (i, j), formula in self.stiffness.items():
+            matrix[..., i, j] = values(formula, numbers)
+        # of a matrix that is not finite nothing is known
+        is_known = np.isfinite(matrix).all(axis=(-2, -1), keepdims=True)
+        squares = np.linalg.eigvals(np.where(is_known, matrix, 0.0))
+        largest = np.max(np.abs(squares), axis=-1, keepdims=True)
+        is_one = (squares.real > 1e-12 * largest) & (np.abs(squares.imag) <= 1e-9 * largest)
+        return np.sort(np.sqrt(np.where(is_one, squares.real, np.nan)), axis=-1)
+
+    def natural_frequency(self, parameters: Numbers) -> Any:
+        """Return the lowest one; NaN where there is none."""
+        return self.frequencies(parameters)[..., 0]
+
+    def highest_frequency(self, parameters: Numbers) -> Any:
+        """Return the highest one; NaN where there is none."""
+        return np.fmax.reduce(self.frequencies(parameters), axis=-1)
+
+
+def _terms(node: Expression) -> Iterator[Expression]:
+    """Yield the terms of a sum, also of one that is multiplied by what names nothing but parameters."""
+    match node:
+        case Binary("+", left, right):
+            yield from _terms(left)
+            yield from _terms(right)
+        case Binary("-", left, right):
+            yield from _terms(left)
+            yield from (Negate(term) for term in _terms(right))
+        case Negate(operand):
+            yield from (Negate(term) for term in _terms(operand))
+        case Binary("/", left, right):
+            yield from (over(term, right) for term in _terms(left))
+        case Binary("*", left, right) if len(_sum := list(_terms(right))) > 1:
+            yield from (times(left, term) for term in _sum)
+        case Binary("*", left, right) if len(_sum := list(_terms(left))) > 1:
+            yield from (times(term, right) for term in _sum)
+        case _:
+            yield node
+
+
+def named(coordinates: tuple[str, ...]) -> Model:
+    """Return the system with these coordinates and no formulas."""
+    return written(coordinates, {}, ())
+
+
+def written(
+    coordinates: tuple[str, ...], formulas: Mapping[str, str], declared: tuple[str, ...]
+) -> Model:
+    """Return the system of formulas, with declared parameters.
+
+    Parameters
+    ----------
+    formulas
+        By the names of `fields`; those of coordinates and outputs as ``acceleration.x``.
+
+    Raises
+    ------
+    ExpressionError
+        Where a formula names something else than its field allows, or an exact solution has derivatives that are too
+        long.
+    """
+    return system(coordinates, tuple(sorted(formulas.items())), declared)
+
+
+@cache
+def system(
+    coordinates: tuple[str, ...],
+    formulas: tuple[tuple[str, str], ...],
+    declared: tuple[str, ...],
+) -> Model:
+    """Return the system of formulas; see `written`."""
+    own = Written(coordinates, dict(formulas), declared)
+    motion = own.manufactured
+    more: dict[str, Any] = {}
+    is_conservative = motion is None and own.vanishes(own.powers)
+    if not is_conservative:
+        power: Expression = paired(own.powers, plus) if own.powers else ZERO
+        drives = "t" in names_in(power)
+        more = {"driving": power} if drives else {"dissipation": minus(ZERO, power)}
+    if motion is not None:
+        more |= {"exact": motion.exact, "start": motion.start}
+    words = "coordinate", "velocity"
+    states = tuple(
+        State(name, "1", f"{word} {of}" if len(coordinates) > 1 else word)
+        for word, names in zip(words, (own.coordinates, own.velocities), strict=True)
+        for name, of in zip(names, own.coordinates, strict=True)
+    )
+    outputs = (key.partition(".") for key, _ in formulas)
+    if len(coordinates) == 1:
+        more |= {"linear": _is_linear(own), "damping": _damping(own)}
+    else:
+        more |= {"linear": False, "highest_frequency": own.highest_frequency}
+    first, *rest = own.accelerations
+    return Model(
+        kind="system",
+        title="System of equations",
+        source="the experiment file",
+        equation=_equation(own),
+        states=states,
+        parameters=own.parameters,
+        acceleration=first,
+        further_accelerations=tuple(rest),
+        kinetic_energy=own.kinetic,
+        potential_energy=own.potential,
+        energy_unit="1",
+        conservative=is_conservative,
+        natural_frequency=own.natural_frequency,
+        outputs=tuple(
+            Output(name, "1", name, own.read(f"outputs.{name}"))
+            for field, _, name in outputs
+            if field == "outputs"
+        ),
+        formulas=fields(coordinates),
+        written=partial(written, coordinates),
+        named=named,
+        **more,
+    )
+
+
+def _is_linear(own: Written) -> bool:
+    """Tell whether the acceleration of the only coordinate is a number times it, beside what does not name it."""
+    (a,), (u,) = own.accelerations, own.coordinates
+    jumps = (part for part in walk(a) if is_jump(part) and u in names_in(part))
+    return not any(jumps) and {*own.states, "t"}.isdisjoint(names_in(derivative(a, u)))
+
+
+def _damping(own: Written) -> Damping | None:
+    """Return the damping of the only coordinate, where it is linear or quadratic with a constant rate."""
+    (a,), (v,) = own.accelerations, own.velocities
+    force: Expression = ZERO
+    for term in _terms(a):
+        if v in names_in(term):
+            force = minus(force, term)
+    found = damping_of(force, v) if force != ZERO else None
+    if found is None or not {*own.states, "t"}.isdisjoint(names_in(found[1])):
+        return None
+    return Damping(*found)
+
+
+def _equation(own: Written) -> str:
+    """Return the equations of motion as a user would write them."""
+    speeds = dict(zip(own.velocities, own.coordinates, strict=True))
+    lines = []
+    for name, a in zip(own.coordinates, own.own_accelerations, strict=True):
+        for velocity, position in speeds.items():
+            if velocity in names_in(a):
+                a = put(a, velocity, Name(f"{position}'"))
+        lines.append(f"{name}'' = {to_formula(a)}")
+    if len(lines) > SHOWN:
+        lines = [*lines[: SHOWN // 2], "...", lines[-1]]
+    told = ", ".join(lines)
+    if own.manufactured is None:
+        return told
+    motion = (
+        f"{name} = {text}"
+        for name, text in zip(own.coordinates, own.manufactured.texts, strict=True)
+    )
+    return f"{told}, with forces added such that {', '.join(motion)}"
+
+
+SYSTEM = replace(named(("u",)), equation="x'' = a(x, y, ..., x', y', ..., t) for each coordinate x")
+"""The system of one coordinate without formulas, under the equation of all."""
