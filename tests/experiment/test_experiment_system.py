@@ -135,7 +135,7 @@ def test_an_exact_degree_is_that_of_the_same_equation_of_another_model():
         ),
         (
             {**PAIR, "parameters": {"k": 2, "vx": 1}},
-            ["model.parameters.vx: 'vx' is the velocity x: choose another name"],
+            ["model.parameters.vx: 'vx' is the velocity: choose another name"],
         ),
         (
             {**PAIR, "outputs": {"x_end": "x", "sum": "x + q"}},

@@ -115,6 +115,33 @@ def test_what_feeds_the_motion_of_van_der_pol_is_negative_damping():
     assert model.driving is None
 
 
+@pytest.mark.parametrize(
+    ("x", "y", "superposed"),
+    [
+        ("-2*x + y", "x - y", True),
+        ("-x + p*vy", "-y - p*vx", True),
+        ("-x**3", "-y", False),
+        ("-x", "-y - vy", False),
+        ("-x", "-sign(y)", False),
+    ],
+)
+def test_a_sum_of_linear_motions_has_their_energy(x, y, superposed):
+    """On it the energy of RK4 is of order 5, and that of Gauss's method exact."""
+    model = written(("x", "y"), {"acceleration.x": x, "acceleration.y": y}, ("p",))
+    assert model.superposed == superposed
+    orders = [SCHEMES[kind].formal_order("energy", model, {}) for kind in ("rk4", "gauss4")]
+    assert orders == ([5.0, np.inf] if superposed else [4.0, 4.0])
+    if not superposed:
+        return
+    drifts = []
+    for kind, steps in (("rk4", 40), ("rk4", 80), ("gauss4", 40)):
+        arrays = np.array([[0.4]]), np.array([[1.0, 0.2, -0.3, 0.5]]), np.array([6.0 / steps])
+        run = integrate(model, SCHEMES[kind], {}, *arrays, steps, 1)
+        drifts.append(run.gathered.deviation[0])
+    assert np.log2(drifts[0] / drifts[1]) == pytest.approx(5.0, abs=0.1)
+    assert drifts[2] < 1e-14
+
+
 COMPILED = ("system-van_der_pol", "system-mathieu", "system-double_pendulum", "system-chain")
 
 

@@ -181,6 +181,8 @@ class Model:
     """The highest angular frequency of small oscillations, which a step has to resolve; None: the natural one."""
     further_accelerations: tuple[Formula, ...] = ()
     """Of the coordinates behind the first one."""
+    superposed: bool = False
+    """Whether the motion of several coordinates is a sum of linear, conservative ones: the energy has their orders."""
 
     @property
     def coordinates(self) -> int:

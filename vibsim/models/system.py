@@ -391,17 +391,18 @@ def system(
         more = {"driving": power} if drives else {"dissipation": minus(ZERO, power)}
     if motion is not None:
         more |= {"exact": motion.exact, "start": motion.start}
-    words = "coordinate", "velocity"
+    words = "position", "velocity"
     states = tuple(
-        State(name, "1", f"{word} {of}" if len(coordinates) > 1 else word)
+        State(name, "1", word)
         for word, names in zip(words, (own.coordinates, own.velocities), strict=True)
-        for name, of in zip(names, own.coordinates, strict=True)
+        for name in names
     )
     outputs = (key.partition(".") for key, _ in formulas)
     if len(coordinates) == 1:
         more |= {"linear": _is_linear(own), "damping": _damping(own)}
     else:
         more |= {"linear": False, "highest_frequency": own.highest_frequency}
+        more["superposed"] = is_conservative and _has_constant_slopes(own)
     first, *rest = own.accelerations
     return Model(
         kind="system",
@@ -434,6 +435,14 @@ def _is_linear(own: Written) -> bool:
     (a,), (u,) = own.accelerations, own.coordinates
     jumps = (part for part in walk(a) if is_jump(part) and u in names_in(part))
     return not any(jumps) and {*own.states, "t"}.isdisjoint(names_in(derivative(a, u)))
+
+
+def _has_constant_slopes(own: Written) -> bool:
+    """Tell whether the accelerations are linear in all states, with constant coefficients."""
+    varying = {*own.states, "t"}
+    slopes = (derivative(a, s) for a in own.accelerations for s in own.states if s in names_in(a))
+    jumps = (part for a in own.accelerations for part in walk(a) if is_jump(part))
+    return all(varying.isdisjoint(names_in(part)) for part in (*slopes, *jumps))
 
 
 def _damping(own: Written) -> Damping | None:

@@ -41,7 +41,7 @@ def _named(model: Model) -> frozenset[str]:
 class Orders:
     """Powers of dt with which the errors of a scheme vanish, infinite where a quantity is exact.
 
-    Those of the energy differ between a linear, conservative model and any other one.
+    Those of the energy differ between a linear, conservative model, or a sum of such motions, and any other one.
     """
 
     position: float
@@ -94,10 +94,11 @@ class Orders:
 def _of_quantities(orders: Orders, model: Model) -> tuple[Mapping[str, float], float]:
     """Return the orders of quantities of a model, and that of its energy and whatever is not named."""
     is_simple = model.linear and model.conservative
+    is_sum = is_simple or model.superposed
     linear = orders.position if orders.position_linear is None else orders.position_linear
     position = linear if is_simple else orders.position
-    energy = orders.energy_linear if is_simple else orders.energy
-    given = orders.energy_d2t_linear if is_simple else orders.energy_d2t
+    energy = orders.energy_linear if is_sum else orders.energy
+    given = orders.energy_d2t_linear if is_sum else orders.energy_d2t
     energy_d2t = min(energy, 2.0) if given is None else given
     velocity_d2t = min(position, 2.0) if orders.velocity_d2t is None else orders.velocity_d2t
     of_both = min(position, orders.velocity)
