@@ -204,3 +204,19 @@ def test_levels_that_notice_an_event_at_one_point_have_no_wrong_limit() -> None:
     (found,) = verdicts(made, analyse(made, [simulate(made, level) for level in made.levels]))
     assert (found.status, found.reason) == ("INCONCLUSIVE", "non_smooth"), found.text
     assert "events: located" in found.advice
+
+
+def test_the_times_of_all_events_are_stored_of_every_level() -> None:
+    made = experiment(**BALL, time={"end": 5.0}, levels=[6, 7], schemes=["rk4"], checks=[])
+    levels = [simulate(made, level) for level in made.levels]
+    record = analyse(made, levels)
+    assert record["event_time"].dims == ("scheme", "case", "level", "event")
+    kept = record.sizes["event"]
+    for i, level in enumerate(levels):
+        count = int(level.event_count[0, 0])
+        # impact k is at sqrt(2) (1 + 2 (0.8 + ... + 0.8^(k - 1)))
+        impacts = 2.0**0.5 * (1.0 + 2.0 * np.cumsum([0.0, *0.8 ** np.arange(1, count)]))
+        times = level["event_time"][0, 0]
+        np.testing.assert_allclose(times[:count], impacts, rtol=1e-13)
+        assert np.isnan(times[count:]).all()
+        np.testing.assert_array_equal(record["event_time"][0, 0, i, :kept], times)

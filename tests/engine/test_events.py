@@ -126,6 +126,19 @@ def test_turns_that_are_events_have_their_time_and_height(lane):
     assert left.extrema.trough_time[0, 0] != left.events.first_event_time[0]
 
 
+@pytest.mark.parametrize("lane", ["plain", "scalar"])
+def test_times_of_all_events_are_kept_as_far_as_there_is_room(lane):
+    impacts = math.sqrt(2.0) * (1.0 + 2.0 * np.cumsum([0.0, *0.8 ** np.arange(1, 4)]))
+    for room in (0, 2, 6):
+        numbers = {}, (1.0, 0.0), 7.0, 100
+        found = runs_of.run(BALL, "rk4", *numbers, n_events=room, lane=lane).events
+        assert found.event_count[0] == 4
+        assert found.event_time.shape == (1, room)
+        kept = min(room, 4)
+        np.testing.assert_allclose(found.event_time[0, :kept], impacts[:kept], rtol=1e-14)
+        assert np.isnan(found.event_time[0, kept:]).all()
+
+
 @pytest.mark.parametrize("events", TREATMENTS)
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_box_that_sticks_stays_where_it_is_to_the_bit(kind, events):

@@ -39,7 +39,7 @@ def motion(block: MemberBlock, compared: Mapping[str, Comparison]) -> Table:
     """Return the variables of the convergence Record that belong to the motion of every scheme, member and level."""
     if block.lean:
         return {}
-    table = _theory(block) | _drift(block) | _extrema(block) | _running(block)
+    table = _theory(block) | _drift(block) | _side_by_side(block) | _running(block)
     table |= _beside(block, compared)
     words = "largest stable w dt: infinite for none, 0 where every step grows"
     limits = predicted_oscillation.limits(block)
@@ -115,19 +115,20 @@ def _drift(block: MemberBlock) -> Table:
     }
 
 
-def _extrema(block: MemberBlock) -> Table:
-    """Return the peaks and troughs of every level side by side, NaN behind those of coarse levels."""
+def _side_by_side(block: MemberBlock) -> Table:
+    """Return peaks, troughs and times of events of every level side by side, NaN behind those of coarse levels."""
     rows = [block.records[level] for level in block.grid.levels]
+    parts = ("_time", "", "_time_grid", "_grid")
+    of_extrema = {f"{kind}{part}": "extremum" for kind in ("peak", "trough") for part in parts}
     table: Table = {}
-    for kind in ("peak", "trough"):
-        for name in (f"{kind}{of}" for of in ("_time", "", "_time_grid", "_grid")):
-            if all(name in row for row in rows):
-                longest = max(row[name].shape[-1] for row in rows)
-                found = np.full((*block.shape, len(rows), longest), np.nan)
-                for i, row in enumerate(rows):
-                    found[:, :, i, : row[name].shape[-1]] = row[name]
-                attrs = rows[-1].variable(name).attrs
-                table[name] = Variable((*OF_LEVEL, "extremum"), found, attrs)
+    for name, along in (of_extrema | {"event_time": "event"}).items():
+        if all(name in row for row in rows):
+            longest = max(row[name].shape[-1] for row in rows)
+            found = np.full((*block.shape, len(rows), longest), np.nan)
+            for i, row in enumerate(rows):
+                found[:, :, i, : row[name].shape[-1]] = row[name]
+            attrs = rows[-1].variable(name).attrs
+            table[name] = Variable((*OF_LEVEL, along), found, attrs)
     return table
 
 

@@ -27,6 +27,7 @@ start = start_of = step = turning = with_mode = unbound
 # rest, and the grid point behind, since it may leave the other way, which is a turn. LOST: what sliding or impacts have
 # cost so far. DONE: work of driving forces so far, whose power has a corner at every event: summed piece by piece.
 # TURN_TIME, TURN: time and height of the last event that was a peak, and behind them of the last that was a trough.
+# Behind all of these stand the times of the first events, as many as there is room for.
 EVENT_COUNT, FIRST_EVENT, LAST_EVENT, REST_TIME = range(N_STATS, N_STATS + 4)
 HALTED, HALTED_GRID, LOST, DONE, TURN_TIME, TURN = range(N_STATS + 4, N_STATS + 10)
 N_STATS_EVENTS = N_STATS + 12
@@ -220,6 +221,9 @@ def note_event(
     if stats[case, EVENT_COUNT] == 0.0:
         stats[case, FIRST_EVENT] = t
     stats[case, LAST_EVENT] = t
+    place = N_STATS_EVENTS + math.floor(stats[case, EVENT_COUNT])
+    if place < stats.shape[1]:
+        stats[case, place] = t
     stats[case, EVENT_COUNT] += 1.0
     stats[case, REST_TIME] = t if after == 0.0 else math.nan
     kind = turning(before, after)

@@ -61,14 +61,17 @@ class Extrema:
 
 @dataclass(frozen=True)
 class EventTimes:
-    """The events of members of a model that has some (`vibsim.models.events`); arrays of shape (case,)."""
+    """The events of members of a model that has some (`vibsim.models.events`); arrays of shape (case,) unless told."""
 
     event_count: Floats
+    """All events, those for whose times there was no room among them."""
     first_event_time: Floats
     """NaN where there was none."""
     last_event_time: Floats
     rest_time: Floats
     """From when on the member was at rest to the end; NaN where it moved."""
+    event_time: Floats
+    """Times of the first events, NaN behind the last, shape (case, event)."""
 
 
 @dataclass(frozen=True)

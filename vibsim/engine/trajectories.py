@@ -48,6 +48,7 @@ def integrate(
     with_gathered: bool = True,
     with_series: bool = False,
     n_extrema: int = 0,
+    n_events: int = 0,
 ) -> Trajectories:
     """Step every member from t = 0.
 
@@ -71,6 +72,8 @@ def integrate(
         Whether samples have more than position and velocity.
     n_extrema
         How many peaks and troughs of a member are kept.
+    n_events
+        Of how many events of a member the times are kept, where anything is gathered.
 
     Raises
     ------
@@ -93,7 +96,7 @@ def integrate(
     if has_work:
         last_row = "LOST_ROW" if has_events else "DRIVEN_ROW"
     n_rows = rows[last_row] + 1 if with_series else 2 * count
-    columns = events.N_STATS_EVENTS if has_events else count * gather.N_STATS
+    columns = events.N_STATS_EVENTS + n_events if has_events else count * gather.N_STATS
     samples = np.full((n_rows, members, steps // every + 1), np.nan)
     stats = np.full((members, columns if with_gathered else 0), np.nan)
     n_counts = extrema.N_COUNTS_KEPT if n_extrema else gather.N_COUNTS
@@ -127,7 +130,9 @@ def integrate(
         gathered=results.gathered_of(stats, counts, numbers[3], count) if with_gathered else None,
         series=results.series_of(samples, count, has_work, has_events) if with_series else None,
         extrema=results.Extrema(*kept, *found) if n_extrema else None,
-        events=results.EventTimes(*of_events) if has_events and with_gathered else None,
+        events=results.EventTimes(*(*of_events, stats[:, events.N_STATS_EVENTS :]))
+        if has_events and with_gathered
+        else None,
     )
 
 

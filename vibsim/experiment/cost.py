@@ -42,6 +42,8 @@ GATHERED_D2T = 8
 """Bytes beside these where a scheme has another velocity than the centred difference."""
 EXTREMUM = 64
 """Bytes of a peak and a trough: time and height, of the parabola and of the grid."""
+EVENT = 8
+"""Bytes of the time of an event."""
 CONSTANT = 48
 """Bytes that are kept of a member whatever the schemes: index, frequency, swept values."""
 FILE = 33_000
@@ -130,6 +132,8 @@ class Load:
     """Work of a step of all implicit schemes together, which one member takes as long as many."""
     extrema: int = 0
     """Peaks, and troughs, that are kept of a scheme and member."""
+    events: int = 0
+    """Events whose times are kept of a scheme and member."""
     d2t: bool = False
     """Whether a scheme has another velocity than the centred difference."""
     own: float = 0.0
@@ -139,16 +143,21 @@ class Load:
     def stored(self) -> int:
         """Bytes on disk of one member."""
         series = self.schemes * self.series + self.exact
-        numbers = BYTES_BESIDE_SERIES + EXTREMUM * self.extrema + (GATHERED_D2T if self.d2t else 0)
+        numbers = BYTES_BESIDE_SERIES + self._kept + (GATHERED_D2T if self.d2t else 0)
         return 8 * self.samples * series + numbers * self.schemes + CONSTANT
+
+    @property
+    def _kept(self) -> int:
+        """Bytes of the extrema and events of a scheme and member."""
+        return EXTREMUM * self.extrema + EVENT * self.events
 
     @property
     def held(self) -> int:
         """Bytes in memory of one member at the peak of a job."""
         series = self.schemes * self.series + EXACT_SCRATCH * self.exact
-        # extrema of several schemes are held twice while they are put together
-        extrema = EXTREMUM * self.extrema * (2 if self.schemes > 1 else 1)
-        return 8 * self.samples * series + (SCRATCH + extrema) * self.schemes
+        # those of several schemes are held twice while they are put together
+        kept = self._kept * (2 if self.schemes > 1 else 1)
+        return 8 * self.samples * series + (SCRATCH + kept) * self.schemes
 
     @property
     def shard(self) -> int:
@@ -214,13 +223,20 @@ def analysis_disk(loads: Sequence[Load], members: int, is_lean: bool) -> int:
         once, each = COMPARED_SERIES
         size += loads[0].samples * (once + each * len(loads))
         size += EXTREMUM * len(loads) * max(load.extrema for load in loads) + COMPARED_NUMBERS
+        size += EVENT * len(loads) * max(load.events for load in loads)
         file += COMPARED_SERIES_FILE
     return loads[0].schemes * members * size + file
 
 
 def load_of(experiment: ExperimentSpec, level: int) -> Load:
     """Return what one member of `experiment` costs at `level`."""
-    from vibsim.experiment.storage import extrema_kept, is_bounded, sampling, stored_series
+    from vibsim.experiment.storage import (
+        events_kept,
+        extrema_kept,
+        is_bounded,
+        sampling,
+        stored_series,
+    )
     from vibsim.models import has_solution
     from vibsim.schemes.adaptive import seconds
 
@@ -247,6 +263,7 @@ def load_of(experiment: ExperimentSpec, level: int) -> Load:
         work=sum(explicit for explicit, _ in works),
         iterated=sum(iterated for _, iterated in works),
         extrema=0 if lean else extrema_kept(steps, experiment.trajectories),
+        events=0 if lean or model.events is None else events_kept(experiment.trajectories),
         d2t=experiment.own_velocity or not lean,
         own=sum(own),
     )

@@ -17,6 +17,8 @@ MOST_EXTREMA = 512
 """Peaks, and troughs, that are kept of a scheme and member."""
 FEWEST_EXTREMA = 16
 """As many are kept of however many members."""
+MOST_EVENTS = 512
+"""Events whose times are kept of a scheme and member."""
 RUNNING = "_running_max"
 """Behind the name of an energy deviation: its largest absolute value over every step so far."""
 _OF_PEAKS = "phase_error_slope"
@@ -69,7 +71,15 @@ def extrema_kept(steps: int, trajectories: int) -> int:
     There cannot be more than half as many as steps. Among many `trajectories` (schemes times members) fewer are kept,
     so that they take no more room than a series does (`SMALL`); all are counted.
     """
-    kept = min(steps // 2 + 1, MOST_EXTREMA)
+    return _fewer(min(steps // 2 + 1, MOST_EXTREMA), trajectories)
+
+
+def events_kept(trajectories: int) -> int:
+    """Return of how many events a level keeps the times, of every scheme and member: of fewer among many."""
+    return _fewer(MOST_EVENTS, trajectories)
+
+
+def _fewer(kept: int, trajectories: int) -> int:
     while kept > FEWEST_EXTREMA and kept * trajectories > SMALL:
         kept = max(kept // 2, FEWEST_EXTREMA)
     return kept

@@ -165,6 +165,7 @@ def _level(
             "every": every,
             "series": [*stored_series(experiment), "lean" if is_bounded(experiment) else "all"],
             "extrema": load.extrema,
+            "events": load.events,
             "own ends": experiment.end_varies,
             "code": code_of(experiment.model.kind, kinds),
             "versions": versions(NUMERICAL),

@@ -17,6 +17,7 @@ from vibsim.engine import EventTimes, Extrema, Gathered, Trajectories
 from vibsim.experiment.storage import (
     RUNNING,
     asks_for_peaks,
+    events_kept,
     extrema_kept,
     is_bounded,
     stored_series,
@@ -95,7 +96,7 @@ def simulate_record(
     group = members(experiment, start, experiment.members if stop is None else stop)
     steps, every = experiment.steps(level), plan.sampling(experiment, level)
     is_lean, wanted = is_bounded(experiment), stored_series(experiment)
-    kept = extrema_kept(steps, len(experiment.schemes) * experiment.members)
+    kept = extrema_kept(steps, experiment.trajectories)
     of_states = {state.name for state in model.states}.union(ENERGIES)
     of_states |= {output.name for output in model.outputs}
     found = solve(
@@ -106,6 +107,7 @@ def simulate_record(
         threads=threads,
         with_series=not of_states.issuperset(wanted),
         n_extrema=0 if is_lean and not asks_for_peaks(experiment) else kept,
+        n_events=0 if is_lean or model.events is None else events_kept(experiment.trajectories),
     )
     run = found.gathered
     assert run is not None
@@ -128,6 +130,7 @@ def simulate_record(
         **outcomes,
         **(_extrema(model, found.extrema) if found.extrema else {}),
         **(_table(MEMBER, _events(found.events)) if found.events else {}),
+        **(_event_times(found.events) if found.events and not is_lean else {}),
         **(_table(MEMBER, _own_steps(run)) if has_adaptive(experiment) else {}),
         **_table(("case",), _constants(model, group, steps)),
     }
@@ -340,6 +343,12 @@ def _events(found: EventTimes) -> Iterable[Row]:
     yield "last_event_time", found.last_event_time, "time of the last event", "s"
     words = "time from which the member was at rest to the end"
     yield "rest_time", found.rest_time, words, "s"
+
+
+def _event_times(found: EventTimes) -> dict[str, Variable]:
+    """Return the times of single events."""
+    words = "times of the first events, NaN behind the last"
+    return _table((*MEMBER, "event"), [("event_time", found.event_time, words, "s")])
 
 
 def _own_steps(run: Gathered) -> Iterable[Row]:

@@ -8,7 +8,7 @@ from functools import cached_property
 from vibsim.experiment.cost import Load, load_of
 from vibsim.experiment.data import ExperimentSpec, SchemeSpec, Sweep, TimeSpec
 from vibsim.experiment.faults import Report
-from vibsim.experiment.storage import extrema_kept, is_lean, stride
+from vibsim.experiment.storage import events_kept, extrema_kept, is_lean, stride
 from vibsim.models import Model, quantities
 
 MAX_MEMBERS = 10**7
@@ -99,7 +99,8 @@ class Setting:
     def load(self, level: int) -> Load:
         """Return what `level` asks of a job."""
         steps, d2t = self.steps(level), bool(self.own)
-        if self.model is not None and self.model.events is not None:
+        has_events = self.model is not None and self.model.events is not None
+        if has_events:
             d2t = False
         samples = steps // self.stride(level) + 1
         if is_lean(self.samples, self.steps(self.levels[0]), self.trajectories):
@@ -108,7 +109,17 @@ class Setting:
         # with the running maximum of the energy deviation
         series = max(known, _SMALLEST_MODEL) + 1 + (_D2T if d2t else 0)
         extrema = extrema_kept(steps, self.trajectories)
-        return Load(self.scheme_count, steps, samples, series, exact=2, extrema=extrema, d2t=True)
+        events = events_kept(self.trajectories) if has_events else 0
+        return Load(
+            self.scheme_count,
+            steps,
+            samples,
+            series,
+            exact=2,
+            extrema=extrema,
+            events=events,
+            d2t=True,
+        )
 
 
 def check(setting: Setting, report: Report) -> None:
