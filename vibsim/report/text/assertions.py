@@ -63,10 +63,11 @@ def source(check: Check) -> str:
     if check.kind != "claim":
         return ""
     stands = f"{check.source}. " if check.source else ""
-    return f"{stands}Measured by: {_measured(check.that)}."
+    return f"{stands}Measured by: {measured(check.that)}."
 
 
-def _measured(check: Measurement) -> str:
+def measured(check: Measurement) -> str:
+    """Return what a check measures, and what is expected of it."""
     match check.kind:
         case "converges":
             order = (
@@ -111,7 +112,7 @@ def subject(check: Measurement) -> str:
     if check.kind == "equal":
         return f"{words.title(check.quantity)} by {check.first}{_where(check)}"
     if check.kind != "value":
-        return _measured(check)
+        return measured(check)
     told, is_sampled = what(check, words.PAGE), check.value in SAMPLED
     keys = ("level", "scheme", "case") if is_sampled else PLACES
     places = ((key, getattr(check.at, key)) for key in keys)

@@ -1,0 +1,155 @@
+"""The catalogue of the two texts: every row has its place, what it names exists, no false sentence passes as true."""
+
+from __future__ import annotations
+
+import copy
+import re
+import runpy
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from vibsim.cli.arguments import commands
+from vibsim.experiment.schema import citation
+
+ROOT = Path(__file__).parents[1]
+CATALOGUE = runpy.run_path(str(ROOT / "workflow/catalogue.py"))
+LISTED, KNOWN = CATALOGUE["data"](), CATALOGUE["experiments"]()
+ROWS = [row for kind in ("things", "errata") for row in LISTED[kind].values()]
+PAGE = (ROOT / "docs/catalogue.md").read_text("utf-8")
+THINGS, ERRATA = 202, 58
+"""What was counted in the texts: things that they describe, and places where they are wrong."""
+SECTIONS = {
+    "pendulum lecture": "1.1 1.2 1.3 2.1 2.2 2.3 2.4 2.5 2.6 3",
+    "vibration text": (
+        "1.1 1.2 2.1 2.2 2.3 3 3.1 3.2 3.3 3.4 3.5 4.1 4.2 4.3 4.4 4.5 4.6 5.1 5.2 5.3 5.4 5.5 5.6 6.1 6.2 7 7.1 7.2 "
+        "7.3 7.4 8 8.1 8.2 8.3 8.4 8.5 8.6 8.7 8.8 10.1 10.2 10.3 10.4 10.5 10.6 10.7 10.8 10.9 10.10"
+    ),
+}
+"""The sections of both texts that have a content of their own."""
+
+
+def changed(kind: str, number: int, **content: Any) -> dict[str, Any]:
+    found = copy.deepcopy(LISTED)
+    found[kind][number] = {"source": "vibration text, section 1.2", "says": "it holds", **content}
+    return found
+
+
+def test_the_page_is_current_and_its_lists_are_sound(capsys: pytest.CaptureFixture[str]) -> None:
+    assert CATALOGUE["main"](["--check"]) == 0, (
+        f"run python workflow/catalogue.py: {capsys.readouterr().out}"
+    )
+
+
+def test_another_page_is_not_current(tmp_path: Path) -> None:
+    page = tmp_path / "catalogue.md"
+    assert CATALOGUE["main"](["--check"], page) == 1
+    page.write_text(PAGE.replace("CONFIRMED", "OPEN", 1), "utf-8")
+    assert CATALOGUE["main"](["--check"], page) == 1
+    assert CATALOGUE["main"]([], page) == 0
+    assert page.read_text("utf-8") == PAGE
+
+
+def test_no_row_is_missing() -> None:
+    assert sorted(LISTED["things"]) == list(range(1, THINGS + 1))
+    assert sorted(LISTED["errata"]) == list(range(1, ERRATA + 1))
+    marks = re.findall(r"^\| (E?\d+) \|", PAGE, re.MULTILINE)
+    wanted = {*map(str, range(1, THINGS + 1)), *(f"E{i}" for i in range(1, ERRATA + 1))}
+    assert set(marks) == wanted
+
+
+@pytest.mark.parametrize(
+    ("found", "word"),
+    [
+        (changed("things", 1, shown_by=["vibration_text/nothing"]), "nothing does not exist"),
+        (changed("things", 1, shown_by=["vibration_text/resonance#no"]), "#no does not exist"),
+        (changed("things", 1, shown_by=["vibration_text/resonance#about_unity"]), "refutes it"),
+        (changed("things", 1), "things, 1: has none of shown_by, see, open"),
+        (changed("errata", 1, truth="x", open="it"), "errata, 1: has none of shown_by, not_run"),
+        (changed("errata", 36, truth="x", not_run="y"), "no erratum names the check"),
+    ],
+)
+def test_a_faulty_row_is_told(found: dict[str, Any], word: str) -> None:
+    (told, *_) = CATALOGUE["faults"](found, KNOWN)
+    assert word in told
+
+
+def test_a_statement_of_nobody_is_not_refuted() -> None:
+    name = "vibration_text/resonance"
+    (check,) = [c for c in KNOWN[name].checks if c.id == "about_unity"]
+    ours = KNOWN[name].model_copy(
+        update={"checks": (check.model_copy(update={"source": "beside the text"}),)}
+    )
+    found = CATALOGUE["faults"](
+        LISTED, KNOWN | {"own/one": ours.model_copy(update={"name": "one"})}
+    )
+    assert found == ["own/one#about_unity: a statement of no text is refuted: say what is true"]
+
+
+def test_what_a_row_refers_to_is_there() -> None:
+    known = {name for name, *_ in commands()}
+    for row in ROWS:
+        see = row.get("see", "")
+        if see.startswith("vibsim "):
+            assert see.split()[1] in known, see
+        elif see:
+            path, _, anchor = see.partition("#")
+            text = (ROOT / path).read_text("utf-8")
+            headings = re.findall(r"^#+ (.+)$", text, re.MULTILINE)
+            anchors = {re.sub(r"[^\w -]", "", h).lower().replace(" ", "-") for h in headings}
+            assert not anchor or anchor in anchors, see
+
+
+def test_every_row_has_a_place_in_a_text() -> None:
+    for row in ROWS:
+        found = citation.fields(row["source"])
+        assert found is not None
+        assert found["text"] in SECTIONS, row
+        assert found["section"] or found["exercise"], row
+
+
+@pytest.mark.parametrize(
+    ("text", "section"), [(t, s) for t, named in SECTIONS.items() for s in named.split()]
+)
+def test_every_section_leads_to_what_shows_it(text: str, section: str) -> None:
+    part = PAGE.partition(f"## {text.capitalize()}\n")[2].partition("\n## ")[0]
+    lines = part.partition(f"### Section {section}\n")[2].partition("\n### ")[0]
+    assert re.search(r"\| (CONFIRMED|CORRECTED|OPEN|PROVIDED) \|", lines)
+
+
+@pytest.mark.parametrize("number", range(1, 24))
+def test_every_exercise_leads_to_what_answers_it(number: int) -> None:
+    part = PAGE.rpartition("### Exercises\n")[2]
+    assert re.search(
+        rf"\| exercise {number} \|[^|]*\|[^|]*(configs|python\.md)[^|]*\| (CONFIRMED|PROVIDED) \|",
+        part,
+    )
+
+
+@pytest.mark.parametrize("number", range(1, 18))
+def test_every_figure_of_the_vibration_text_leads_to_its_experiment(number: int) -> None:
+    assert re.search(rf"\| figure {number} \|[^|]*\|[^|]*configs[^|]*\| CONFIRMED \|", PAGE)
+
+
+def test_an_open_row_says_why_and_a_false_statement_what_is_true() -> None:
+    lines = [line.split(" | ") for line in PAGE.splitlines() if re.match(r"\| E?\d* \|", line)]
+    cells = [(line[4], line[5].rstrip(" |"), line[1:]) for line in lines if len(line) > 5]
+    assert len(cells) > THINGS + ERRATA
+    for badge, told, line in cells:
+        if badge in ("OPEN", "CORRECTED"):
+            assert len(told) > 10, line
+    for name, experiment in KNOWN.items():
+        for check in experiment.checks:
+            if check.kind == "claim" and not check.holds:
+                assert check.note, f"{name}#{check.id}: a refuted claim says what is true"
+
+
+def test_every_experiment_on_the_texts_is_in_the_catalogue() -> None:
+    missing = [name for name in KNOWN if f"../configs/{name}.yaml" not in PAGE]
+    ours = [
+        name
+        for name in missing
+        if KNOWN[name].source and KNOWN[name].source.startswith(tuple(SECTIONS))
+    ]
+    assert ours == []

@@ -1,0 +1,219 @@
+"""The catalogue of the two source texts, ``docs/catalogue.md``: ``python workflow/catalogue.py [--check]``.
+
+Written from ``docs/catalogue.yaml``, which lists what the texts describe and where they are wrong, and from the claims
+of the shipped experiments. It holds no number that a run would have to measure.
+"""
+
+from __future__ import annotations
+
+import re
+import sys
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from vibsim.experiment import Experiment
+from vibsim.experiment.schema import citation
+from vibsim.report.text import assertions
+
+ROOT = Path(__file__).resolve().parents[1]
+PAGE = ROOT / "docs" / "catalogue.md"
+TEXTS = ("pendulum lecture", "vibration text")
+CORRECTION = "correction of the "
+"""Begins the source of a claim that says what is true where a text is wrong."""
+CONFIRMED, CORRECTED, OPEN, PROVIDED = "CONFIRMED", "CORRECTED", "OPEN", "PROVIDED"
+EXERCISES = "Exercises"
+WAYS = {"things": ("shown_by", "see", "open"), "errata": ("shown_by", "not_run")}
+"""What a row of each list has at least one of."""
+HEAD = """# The two source texts, section by section
+
+What the pendulum lecture and the vibration text describe, and which experiment shows it. Exercises follow the sections.
+`.venv/bin/vibsim run NAME` runs an experiment, and its page has the measured numbers.
+
+| badge | meaning |
+|---|---|
+| CONFIRMED | an experiment shows it; a statement is decided by the check that is named |
+| CORRECTED | the text says something else than what is true; the row says what is |
+| OPEN | something is missing, and the row says what |
+| PROVIDED | a command or a page does what the text asks for; nothing is measured |
+
+`python workflow/catalogue.py` writes this page from [catalogue.yaml](catalogue.yaml) and the experiment files.
+Numbers 1 to {things} count what the texts describe, E1 to E{errata} the places where they are wrong. Rows without a
+number come from the files of experiments. Figures are also in [a list of their own](figures.md).
+"""
+
+
+@dataclass(frozen=True)
+class Row:
+    """A line of the page."""
+
+    source: str
+    number: str
+    says: str
+    shown: str
+    badge: str
+    told: str
+    """What is true, what is missing, or what decides."""
+
+
+def experiments() -> dict[str, Experiment]:
+    """Return the shipped experiments by ``collection/name``."""
+    paths = sorted((ROOT / "configs").glob("*/*.yaml"))
+    return {f"{path.parent.name}/{path.stem}": Experiment.from_yaml(path) for path in paths}
+
+
+def data() -> dict[str, Any]:
+    """Return what ``docs/catalogue.yaml`` holds."""
+    found: dict[str, Any] = yaml.safe_load((ROOT / "docs/catalogue.yaml").read_text("utf-8"))
+    return found
+
+
+def faults(listed: dict[str, Any], known: dict[str, Experiment]) -> list[str]:
+    """Return what is wrong with the lists: names that do not exist, and statements that their checks contradict."""
+    checks = {f"{name}#{c.id}": c for name, experiment in known.items() for c in experiment.checks}
+    refuted = {name: c for name, c in checks.items() if c.kind == "claim" and not c.holds}
+    found, named = [], set()
+    every = [(kind, *row) for kind in WAYS for row in listed[kind].items()]
+    for kind, number, content in every:
+        where = f"{kind}, {number}"
+        shown = content.get("shown_by", [])
+        unknown = [name for name in shown if name not in (checks if "#" in name else known)]
+        found += [f"{where}: {name} does not exist" for name in unknown]
+        if not set(WAYS[kind]) & set(content):
+            found.append(f"{where}: has none of {', '.join(WAYS[kind])}")
+        if kind == "errata":
+            named.update(shown)
+        else:
+            found += [f"{where}: {name} refutes it" for name in shown if name in refuted]
+    for name, claim in refuted.items():
+        if not str(claim.source).startswith(TEXTS):
+            found.append(f"{name}: a statement of no text is refuted: say what is true")
+        elif name not in named:
+            found.append(f"{name}: a text is refuted, and no erratum names the check")
+    return found
+
+
+def rows(listed: dict[str, Any], known: dict[str, Experiment]) -> Iterator[Row]:
+    """Yield the rows of the two lists, and of every claim on the texts."""
+    for number, thing in listed["things"].items():
+        measured = CONFIRMED if thing.get("shown_by") else PROVIDED
+        badge = OPEN if "open" in thing else measured
+        shown = ", ".join(_places(thing))
+        yield Row(thing["source"], str(number), thing["says"], shown, badge, thing.get("open", ""))
+    for number, row in listed["errata"].items():
+        told = f"True is: {row['truth']}"
+        if "not_run" in row:
+            told += f". Nothing is run: {row['not_run']}"
+        shown = ", ".join(_places(row))
+        yield Row(row["source"], f"E{number}", row["says"], shown, CORRECTED, told)
+    for name, experiment in known.items():
+        for check in experiment.checks:
+            if check.kind != "claim" or not check.source:
+                continue
+            source = check.source.removeprefix(CORRECTION)
+            if not source.startswith(TEXTS):
+                continue
+            decides = assertions.measured(check.that)
+            is_corrected = not check.holds or source != check.source
+            told = f"False: {decides}. {check.note or ''}" if not check.holds else decides
+            badge = CORRECTED if is_corrected else CONFIRMED
+            yield Row(source, "", check.claim, _link(f"{name}#{check.id}"), badge, told)
+
+
+def unnamed(found: Sequence[Row], known: dict[str, Experiment]) -> Iterator[Row]:
+    """Yield a row for every experiment on the texts that no other one shows."""
+    shown = " ".join(row.shown for row in found)
+    for name, experiment in known.items():
+        if str(experiment.source).startswith(TEXTS) and _link(name) not in shown:
+            yield Row(str(experiment.source), "", experiment.title, _link(name), CONFIRMED, "")
+
+
+def _places(row: dict[str, Any]) -> Iterator[str]:
+    yield from map(_link, row.get("shown_by", ()))
+    see = row.get("see")
+    if see:
+        yield f"`{see}`" if see.startswith("vibsim ") else f"[{see}]({see.removeprefix('docs/')})"
+
+
+def _link(name: str) -> str:
+    experiment, _, check = name.partition("#")
+    link = f"[{experiment.partition('/')[2]}](../configs/{experiment}.yaml)"
+    return f"{link} `{check}`" if check else link
+
+
+def _heading(row: Row) -> tuple[str, list[str]]:
+    """Return the text, and the sections under which a row stands."""
+    found = citation.fields(row.source)
+    assert found is not None
+    text, section = found["text"], found["section"]
+    if text not in TEXTS:
+        raise ValueError(f"{row.source}: no text of these: {', '.join(TEXTS)}")
+    return text, re.findall(r"[\d.]+", section) if section else [EXERCISES]
+
+
+def _place(row: Row) -> str:
+    """Return equation, figure and exercise of a row."""
+    found = citation.fields(row.source)
+    assert found is not None
+    named = {name: found[name] for name in citation.PLACES[1:]}
+    return citation.line({"text": "", **named}).removeprefix(", ")
+
+
+def _order(section: str) -> tuple[bool, list[int]]:
+    return section == EXERCISES, [int(part) for part in re.findall(r"\d+", section)]
+
+
+def _line(row: Row) -> str:
+    cells = (row.number, _place(row), row.says, row.shown, row.badge, row.told)
+    return "| " + " | ".join(cell.replace("|", "\\|").replace("\n", " ") for cell in cells) + " |"
+
+
+def page(listed: dict[str, Any], known: dict[str, Experiment]) -> str:
+    """Return the page."""
+    found: dict[str, dict[str, list[Row]]] = {text: {} for text in TEXTS}
+    whole = list(rows(listed, known))
+    for row in (*whole, *unnamed(whole, known)):
+        text, sections = _heading(row)
+        for section in sections:
+            found[text].setdefault(section, []).append(row)
+    lines = [HEAD.format(things=len(listed["things"]), errata=len(listed["errata"]))]
+    for text, parts in found.items():
+        lines.append(f"## {text.capitalize()}\n")
+        for section in sorted(parts, key=_order):
+            lines.append(f"### {section if section == EXERCISES else f'Section {section}'}\n")
+            lines.append(
+                "| no. | place | what it says | shown by | badge | decided by, or what is true |"
+            )
+            lines.append("|---|---|---|---|---|---|")
+            ordered = (
+                sorted(parts[section], key=_exercise) if section == EXERCISES else parts[section]
+            )
+            lines += [*map(_line, ordered), ""]
+    return "\n".join(lines)
+
+
+def _exercise(row: Row) -> list[int]:
+    return [int(part) for part in re.findall(r"\d+", _place(row))][:1]
+
+
+def main(arguments: list[str], path: Path = PAGE) -> int:
+    """Write the page, or with ``--check`` say whether it is current; return 1 if it is not, or if a list is wrong."""
+    listed, known = data(), experiments()
+    wrong = faults(listed, known)
+    if wrong:
+        print(*wrong, sep="\n")
+        return 1
+    text = page(listed, known)
+    if "--check" not in arguments:
+        path.write_text(text, encoding="utf-8")
+        return 0
+    is_current = path.is_file() and path.read_text("utf-8") == text
+    print("the catalogue is current" if is_current else f"{path.name} is not current")
+    return 0 if is_current else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
