@@ -17,21 +17,21 @@ import yaml
 
 from vibsim.experiment import Experiment
 from vibsim.experiment.schema import citation
+from vibsim.report.page.source_statements import CONFIRMED, CORRECTED, CORRECTION, OPEN
 from vibsim.report.text import assertions
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGE = ROOT / "docs" / "catalogue.md"
 TEXTS = ("pendulum lecture", "vibration text")
-CORRECTION = "correction of the "
-"""Begins the source of a claim that says what is true where a text is wrong."""
-CONFIRMED, CORRECTED, OPEN, PROVIDED = "CONFIRMED", "CORRECTED", "OPEN", "PROVIDED"
+PROVIDED = "PROVIDED"
 EXERCISES = "Exercises"
 WAYS = {"things": ("shown_by", "see", "open"), "errata": ("shown_by", "not_run")}
 """What a row of each list has at least one of."""
 HEAD = """# The two source texts, section by section
 
 What the pendulum lecture and the vibration text describe, and which experiment shows it. Exercises follow the sections.
-`.venv/bin/vibsim run NAME` runs an experiment, and its page has the measured numbers.
+`.venv/bin/vibsim run NAME` runs an experiment. Its page has the measured numbers, and `results/index.html` has those
+of every statement.
 
 | badge | meaning |
 |---|---|
@@ -118,7 +118,9 @@ def rows(listed: dict[str, Any], known: dict[str, Experiment]) -> Iterator[Row]:
                 continue
             decides = assertions.measured(check.that)
             is_corrected = not check.holds or source != check.source
-            told = f"False: {decides}. {check.note or ''}" if not check.holds else decides
+            told = (
+                decides if check.holds else f"True is: {check.note}. Asked and not found: {decides}"
+            )
             badge = CORRECTED if is_corrected else CONFIRMED
             yield Row(source, "", check.claim, _link(f"{name}#{check.id}"), badge, told)
 

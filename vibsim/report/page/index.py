@@ -15,7 +15,7 @@ from vibsim.core.errors import FileError
 from vibsim.core.vocabulary import SEVERITY, worst
 from vibsim.experiment import citation
 from vibsim.experiment.collection import ADHOC
-from vibsim.report.page import history, policy, source_figures
+from vibsim.report.page import history, policy, source_figures, source_statements
 from vibsim.report.page.templates import environment, markup
 from vibsim.report.tables.results import error_of, measured_order, number_of
 from vibsim.report.tables.table import Column, Table, to_csv
@@ -128,6 +128,7 @@ def write_index(results: Path) -> None:
         "own": [row for row in rows if row.collection == ADHOC],
         "shipped": [(key, list(group)) for key, group in groupby(shipped, lambda r: r.collection)],
         "figures": source_figures.listed(results, sorted(folders)),
+        "statements": source_statements.listed((row.name, row.link, row.checks) for row in rows),
         "history": history.FILE,
         "script": markup(_script()),
         "script_digest": policy.digest_of(_script()),

@@ -49,10 +49,10 @@ def listed(results: Path, folders: Iterable[Path]) -> list[tuple[str, list[Place
             # of several pictures the first one has the link
             if place and (folder.name, shows) not in {(p.name, p.shows) for p in places}:
                 places.append(Place(folder.name, shows, f"{page}#{quote(place)}"))
-    return sorted(((f, p) for f, p in found.items() if f and p), key=lambda row: _order(row[0]))
+    return sorted(((f, p) for f, p in found.items() if f and p), key=lambda row: order(row[0]))
 
 
-def _order(figure: str) -> list[tuple[int, str]]:
+def order(figure: str) -> list[tuple[int, str]]:
     """Order figures by their numbers: figure 2 stands before figure 10."""
     return [
         (int(part), "") if part.isdigit() else (0, part) for part in _NUMBER.split(figure.lower())

@@ -1,0 +1,79 @@
+"""The statements of the source texts over all experiments: what was measured of each, by text and section."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from vibsim.experiment.schema import citation
+from vibsim.report.page.source_figures import order
+from vibsim.report.text import words
+
+CORRECTION = "correction of the "
+"""Begins the source of a claim that says what is true where a text is wrong."""
+CONFIRMED, CORRECTED, OPEN = "CONFIRMED", "CORRECTED", "OPEN"
+_NUMBER = re.compile(r"[A-Z0-9][\w.'-]*(?: [a-z]\b)?")
+
+
+@dataclass(frozen=True)
+class Statement:
+    """A statement of a text, and what a run found of it."""
+
+    place: str
+    """Equation, figure and exercise, where it has a section; else empty."""
+    text: str
+    """The statement, and what was measured."""
+    note: str
+    """What is true, where the statement is not."""
+    badge: str
+    experiment: str
+    link: str
+    """The page of the experiment; empty where it has none."""
+
+
+def listed(
+    experiments: Iterable[tuple[str, str, Iterable[Mapping[str, Any]]]],
+) -> list[tuple[str, list[Statement]]]:
+    """Return the statements under the section, or the exercise, where they stand, in their order.
+
+    Parameters
+    ----------
+    experiments
+        Name, link of the page, and the checks of the summary, of every experiment.
+    """
+    found: dict[tuple[str, str, str], list[Statement]] = {}
+    for name, link, checks in experiments:
+        for check in checks:
+            # summaries of older versions have no source
+            source = check.get("source")
+            if check["kind"] == "claim" and source and any(source[p] for p in citation.PLACES):
+                for place in _places(source):
+                    found.setdefault(place, []).append(_statement(check, source, name, link))
+    ordered = sorted(found, key=lambda p: (p[0], citation.PLACES.index(p[1]), order(p[2])))
+    return [(citation.line({"text": p[0], p[1]: p[2]}), found[p]) for p in ordered]
+
+
+def _statement(
+    check: Mapping[str, Any], source: Mapping[str, str | None], name: str, link: str
+) -> Statement:
+    is_corrected = words.is_trap(check) or str(source["text"]).startswith(CORRECTION)
+    badge = CORRECTED if is_corrected else CONFIRMED
+    places = {key: source[key] for key in citation.PLACES[1:]} if source["section"] else {}
+    return Statement(
+        citation.line({"text": "", **places}).removeprefix(", "),
+        str(check["text"]).removeprefix("Claim: "),
+        str(check["note"] or ""),
+        badge if check["status"] == "PASS" else OPEN,
+        name,
+        link,
+    )
+
+
+def _places(source: Mapping[str, str | None]) -> Iterator[tuple[str, str, str]]:
+    """Yield the text, the kind and the number of every section that is named, else of every equation and so on."""
+    kind = next(kind for kind in citation.PLACES if source[kind])
+    text = str(source["text"]).removeprefix(CORRECTION)
+    for number in _NUMBER.findall(str(source[kind])):
+        yield text, kind, number
