@@ -153,3 +153,33 @@ def test_every_experiment_on_the_texts_is_in_the_catalogue() -> None:
         if KNOWN[name].source and KNOWN[name].source.startswith(tuple(SECTIONS))
     ]
     assert ours == []
+
+
+EXERCISES = (ROOT / "docs/exercises.md").read_text("utf-8").split("\n## ")[1:]
+
+
+def test_every_exercise_has_an_answer_that_runs_and_passes_through_checks_that_exist() -> None:
+    assert [part.split(".")[0] for part in EXERCISES] == [str(i) for i in range(1, 24)]
+    checks = {f"{name}#{c.id}" for name, experiment in KNOWN.items() for c in experiment.checks}
+    for part in EXERCISES:
+        named = re.findall(r"`([a-z_0-9]+)(#[a-z_0-9]+)?`", part)
+        assert named or "(python.md#" in part, part
+        for name, check in named:
+            full = f"vibration_text/{name}{check}"
+            assert full in (checks if check else KNOWN), full
+
+
+def test_numbers_of_answers_are_those_that_checks_ask_for() -> None:
+    """A number beside a check with a bound on a value agrees with it to the digits that it has."""
+    checked = 0
+    for part in EXERCISES:
+        for number, name, id_ in re.findall(r"(\d[\d.e-]*\d)\D{0,40}\(`(\w+)#(\w+)`", part):
+            experiment = KNOWN[f"vibration_text/{name}"]
+            (check,) = [c for c in experiment.checks if c.id == id_]
+            value = check.measured
+            if value.kind == "value" and value.equals is None:
+                told = float(number)
+                assert value.below is None or told < value.below, (name, id_, told)
+                assert value.above is None or told > value.above, (name, id_, told)
+                checked += 1
+    assert checked >= 8

@@ -42,7 +42,8 @@ of every statement.
 
 `python workflow/catalogue.py` writes this page from [catalogue.yaml](catalogue.yaml) and the experiment files.
 Numbers 1 to {things} count what the texts describe, E1 to E{errata} the places where they are wrong. Rows without a
-number come from the files of experiments. Figures are also in [a list of their own](figures.md).
+number come from the files of experiments. Figures are also in [a list of their own](figures.md), and
+[the exercises](exercises.md) have a page with their answers.
 """
 
 
