@@ -64,7 +64,7 @@ def test_frames_are_numbered_and_those_of_a_longer_movie_stay(
     assert (folder / "frame_0000.png").read_bytes() == first
     capsys.readouterr()
     assert made.vibsim("movie", made.file, "--frames", 3, "--frames-to", folder) == 2
-    assert "has the frames of a longer movie: take another folder" in capsys.readouterr().err
+    assert "choose an empty folder" in capsys.readouterr().err
     assert sorted(path.name for path in folder.iterdir()) == names
 
 

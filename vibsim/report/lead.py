@@ -58,15 +58,22 @@ def is_trap(check: Check | None) -> bool:
 
 
 def find(experiment: Experiment, record: Record, summary: Mapping[str, Any]) -> Lead:
-    """Return the check that decides: the worst one; of those that passed, one on an order that is no trap."""
+    """Return the check that decides: the worst one; of those that passed the most telling that is no trap.
+
+    The most telling is on an order, and the least that two solutions are equal: that says how well the steps were
+    computed, and seldom what was asked. Of equals the first decides.
+    """
     position = choice.position(experiment)
     asserted = {check.id: check for check in experiment.checks}
 
-    def rank(entry: Mapping[str, Any]) -> tuple[int, bool, bool, bool]:
+    def rank(entry: Mapping[str, Any]) -> tuple[int, bool, int]:
         check = asserted.get(entry["id"])
         kind = check.measured.kind if check else entry["kind"]
-        is_claim = check is not None and check.kind == "claim"
-        return -SEVERITY[entry["status"]], is_trap(check), kind != "converges", is_claim
+        if kind == "converges":
+            telling = int(check is not None and check.kind == "claim")
+        else:
+            telling = 3 if kind == "equal" else 2
+        return -SEVERITY[entry["status"]], is_trap(check), telling
 
     listed = [entry for entry in summary["checks"] if entry.get("results")]
     if not listed:

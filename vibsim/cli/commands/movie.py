@@ -174,7 +174,7 @@ def _check_folder(folder: Path, count: int) -> None:
     )
     if any(number is not None and int(number[1]) >= count for number in numbers):
         raise refusal(
-            "--frames-to", folder, "has the frames of a longer movie: take another folder"
+            "--frames-to", folder, "has more frames than this movie: choose an empty folder"
         )
 
 

@@ -43,8 +43,8 @@ def motion(record: Record, quantity: str, member: Member) -> Picture:
     if has_errors:
         errors = {i: values - best for i, values in series.items()}
         exponent = _draw_errors(axes[1], t, errors, looks)
-        of = "the exact solution" if is_known else "the extrapolated one"
-        axes[1].set_title(f"Difference of each level from {of}", fontweight="normal", fontsize=9)
+        of = "exact" if is_known else "extrapolated"
+        axes[1].set_title(f"Each level minus the {of} solution", fontweight="normal", fontsize=9)
         axes[1].set_ylabel(style.label(f"error of {letter}", measure, exponent))
     axes[-1].set_xlabel(data.time_label(record))
     told = (

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Collection, Mapping
 from typing import Any
 
@@ -74,6 +75,8 @@ CLAIMS = {
     "INCONCLUSIVE": "Undecided: ",
 }
 """Status of a statement, and whether it is expected to be false, to what stands before it in a title."""
+_FORMULA = re.compile(r"\S+ *[=<>≤≥]|\w dt\b|\w+[(^]")
+"""With what a statement begins that opens with a formula, whose letters stay as they are."""
 LONG_CLAIM = 110  # most letters of a statement in a title
 NOTHING_ASKED = (
     "Without a check there is no verdict. Add `checks:` to the experiment, such as `- {{converges: {position}}}`, and "
@@ -122,7 +125,9 @@ def _of_claim(lead: Lead) -> str:
     check = lead.asserted
     if check is None or check.kind != "claim":
         return ""
-    claim = check.claim[:1].upper() + check.claim[1:]
+    claim = check.claim
+    if _FORMULA.match(claim) is None:
+        claim = claim[:1].upper() + claim[1:]
     claim = claim if len(claim) <= LONG_CLAIM else f"{claim[: LONG_CLAIM - 1]}…"
     status = lead.entry["status"]
     is_false = not check.holds and status != "INCONCLUSIVE"

@@ -93,7 +93,7 @@ _NUMBERS = {
 """What a number that is as expected needs: of several levels, of one, of none, and one that is counted."""
 _BY_KIND = {
     "stable": Reason(
-        "The scheme grows or does not grow, as the check expects.",
+        "The growth of the amplitude is as the check expects.",
         "A growth factor that agrees with the predicted one. If the scheme has a limit, w dt should be well within or "
         "well beyond it; if not, a finer level should show whether the growth becomes smaller.",
     ),
