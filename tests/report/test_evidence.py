@@ -119,7 +119,7 @@ def test_a_large_sweep_without_series_has_the_order_alone():
     (found,) = pictures(ORDER, time={"end": 3.0}, **many)
     assert len(found.figure.axes) == 1
     assert len(dots(found)) == 1
-    assert found.caption.startswith("central, initial.theta = ")
+    assert found.caption.startswith("central, initial θ = ")
 
 
 def test_names_of_a_user_are_text():

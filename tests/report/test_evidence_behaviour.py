@@ -66,7 +66,7 @@ def test_every_kind_of_check_has_a_picture(kind, is_claim):
 def test_the_member_that_decides_is_drawn(kind):
     _, _, (found,) = run(KINDS[kind], sweep={"initial.u": [0.5, 1.0, 2.0]})
     assert found.figure is not None
-    assert "initial.u = " in found.caption
+    assert "initial u = " in found.caption
 
 
 def test_the_error_of_every_level_is_marked_and_the_finest_one_counts():

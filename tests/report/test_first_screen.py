@@ -265,3 +265,17 @@ def test_of_several_schemes_the_one_that_decides_is_named():
     title = "The angle θ converges at first order, not at second, in 1 of 2 schemes"
     assert shown["finding"] == title
     assert all(number["label"].endswith(", wrong") for number in shown["numbers"])
+
+
+def test_curves_of_the_first_screen_are_told_apart_without_colours_and_the_ring_is_named():
+    exp = samples.experiment(
+        sweep={"initial.theta": [0.5, 1.0, 2.0], "model.g": {"linspace": [1.0, 4.0, 5]}}
+    )
+    record, _, decisive = found(exp)
+    with style.applied():
+        ax = drawn.response(exp, record, decisive).figure.axes[0]
+    curves = [line for line in ax.lines if not line.get_label().startswith("_")]
+    looks = {(line.get_marker(), str(line._unscaled_dash_pattern)) for line in curves}
+    assert len(looks) == len(curves) == 3
+    assert [line.get_label() for line in curves] == [f"initial θ = {x}" for x in ("0.5", "1", "2")]
+    assert ax.get_title(loc="left").endswith("ring: the member that decides")

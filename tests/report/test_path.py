@@ -7,6 +7,7 @@ import samples
 from vibsim import simulate
 from vibsim.report import choice, data
 from vibsim.report.figures import gallery, plane
+from vibsim.report.text import words
 
 CONTENT = {
     "model": {"kind": "elastic_pendulum", "beta": 0.9, "Theta": 40},
@@ -61,10 +62,25 @@ def test_the_curves_are_the_levels_and_the_reference(levels):
         assert low < y.min() <= y.max() < high
 
 
+@pytest.mark.parametrize(
+    ("key", "told"),
+    [
+        ("initial.theta = -0.3 rad", "initial θ = −0.3 rad"),
+        ("model.parameters.gamma = 1, model.damping.linear = 0", "gamma = 1, linear damping = 0"),
+        ("schemes.trap.start = centred", "start of trap = centred"),
+        ("time.end = 3 s", "end = 3 s"),
+    ],
+)
+def test_members_are_named_in_words(key, told):
+    assert words.swept(key) == told
+
+
 def test_members_of_a_sweep_have_panels_of_their_own():
     _, rec, shown, picture = drawn(sweep={"model.gamma": [0.0, 0.5]})
     titles = [ax.get_title() for ax in picture.figure.axes]
-    assert titles == [data.case_name(rec, case) for case in sorted({m.case for m in shown})]
+    assert titles == [
+        words.swept(data.case_name(rec, case)) for case in sorted({m.case for m in shown})
+    ]
 
 
 def test_a_body_at_rest_and_one_coordinate_have_no_path():

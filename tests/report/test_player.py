@@ -222,7 +222,7 @@ def test_a_run_that_is_shown_whole_is_not_called_cut_where_its_members_differ_in
     time = {"periods": 5, "steps_per_period": 2}
     exp, record = made("spring", sweep=sweep, time=time, levels=[5, 6, 7])
     text = element(exp, record)
-    assert "model.w = 2 " in text
+    assert "w = 2 " in text
     assert "are shown" not in text
 
 

@@ -130,11 +130,11 @@ def test_members_are_divided_into_figures_and_panels() -> None:
     }
     ((_, pictures),), _ = drawn(spring(figure, sweep=sweep, levels=[5, 6]))
     assert [picture.title.rpartition(", ")[2] for picture in pictures] == [
-        "initial.u = 1 m",
-        "initial.u = 2 m",
+        "initial u = 1 m",
+        "initial u = 2 m",
     ]
     titles = [ax.get_title(loc="left") for ax in pictures[0].figure.axes]
-    assert titles == [f"model.w = {w} rad s⁻¹" for w in (1, 2, 3)]
+    assert titles == [f"w = {w} rad s⁻¹" for w in (1, 2, 3)]
     _, t, line = lines(pictures[1])[2][-1]
     assert line == pytest.approx(3.0 * t)
 
@@ -151,7 +151,7 @@ def test_what_is_left_out_is_said() -> None:
     assert "7 runs in a panel" in picture.caption
     names = [name for name, *_ in lines(picture)[0]]
     assert len(names) == 7
-    assert names[-1] == "model.w = 2 rad s⁻¹"
+    assert names[-1] == "w = 2 rad s⁻¹"
 
 
 def test_a_velocity_that_jumps_has_gaps_and_the_position_none() -> None:

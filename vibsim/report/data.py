@@ -19,6 +19,7 @@ from vibsim.core.record import Record
 from vibsim.core.vocabulary import TYPICAL_NORM
 from vibsim.report.style import finite, label
 from vibsim.report.superscripts import RAISE
+from vibsim.report.text.words import swept as in_words
 from vibsim.simulation.scaled import has_time_unit
 
 ABOVE = 3.0  # a difference counts as more than round-off when it exceeds this many times the floor
@@ -40,8 +41,13 @@ class Member:
 
     @property
     def title(self) -> str:
-        """Name of the scheme, with the member where there is a sweep."""
-        return f"{self.scheme_name}, {self.case_name}" if self.case_name else self.scheme_name
+        """Name of the scheme, with the member where there is a sweep, in the words of a page."""
+        return f"{self.scheme_name}, {self.case_words}" if self.case_name else self.scheme_name
+
+    @property
+    def case_words(self) -> str:
+        """Name of the member in the words of a page; empty without a sweep."""
+        return in_words(self.case_name)
 
     @property
     def stem(self) -> str:

@@ -16,6 +16,7 @@ from vibsim.core.array_types import Floats
 from vibsim.core.record import Record
 from vibsim.report.data import swept, swept_label
 from vibsim.report.style import label
+from vibsim.report.text import words
 
 LARGEST_TO_SCALE = 1e100  # swept values from here on are not drawn to scale
 LOG_RATIO = 30.0
@@ -38,8 +39,13 @@ class Key:
 
     @property
     def label(self) -> str:
-        """Dotted key with its unit, for an axis."""
-        return label(self.key, self.unit)
+        """Name with its unit, for an axis."""
+        return label(self.name, self.unit)
+
+    @property
+    def name(self) -> str:
+        """Name in the words of a page."""
+        return words.swept(self.key)
 
     @cached_property
     def is_log(self) -> bool:
@@ -48,7 +54,7 @@ class Key:
 
     def text(self, value: float) -> str:
         """Write a value of this key."""
-        return self.words[int(value)] if self.words else f"{value:.6g}"
+        return self.words[int(value)] if self.words else words.number(value, "step")
 
 
 def keys(record: Record) -> list[Key]:
@@ -192,7 +198,9 @@ def along_of(found: list[Key]) -> Along | None:
     lines = []
     for code in np.unique(number):
         members = order[number[order] == code]
-        name = ", ".join(f"{key.key} = {key.text(float(key.values[members[0]]))}" for key in others)
+        name = ", ".join(
+            f"{key.name} = {key.text(float(key.values[members[0]]))}" for key in others
+        )
         lines.append((name, members))
     return Along(longest, tuple(lines))
 

@@ -123,6 +123,6 @@ def _of_members(
     frame.points(ax, [x[member.case]], shown[[member.case]], [True])
     caption = (
         f"{member.scheme_name}, all {words.number(count, 'integer')} members (no time series are kept). The one "
-        f"that decides, {member.case_name}, is filled{more if usable(beside).size else ''}."
+        f"that decides, {member.case_words}, is filled{more if usable(beside).size else ''}."
     )
     return evidence(caption, up.title, figure)

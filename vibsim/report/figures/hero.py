@@ -42,8 +42,13 @@ def _panel(width: float, title: str, left: float = 0.72, right: float = 0.14) ->
     figure = Figure(figsize=(width, HEIGHT))
     box = (left / width, 0.46 / HEIGHT, (width - left - right) / width, (HEIGHT - 0.78) / HEIGHT)
     ax = figure.add_axes(box)
-    ax.set_title(title, fontweight="normal", fontsize=8.5, color=style.GREY)
+    _name(ax, title)
     return ax
+
+
+def _name(ax: Axes, title: str) -> None:
+    """Write what the vertical axis, or the colour, shows above the axes."""
+    ax.set_title(title, fontweight="normal", fontsize=8.5, color=style.GREY)
 
 
 def _root(ax: Axes) -> Figure:
@@ -321,16 +326,12 @@ def _curves(
     ax = _panel(LEFT, text)
     for i, (name, cases) in enumerate(along.lines):
         x, y = along.key.values[cases], values[cases]
-        few: dict[str, Any] = {"marker": "o", "markersize": 3.5} if x.size <= 40 else {}
-        ax.plot(x, y, color=style.COLOURS[i % style.MANY], linewidth=1.6, label=name or None, **few)
+        few: dict[str, Any] = {"markersize": 3.5} if x.size <= 40 else {"marker": ""}
+        look = style.look(i) | few
+        ax.plot(x, y, **look, linewidth=1.6, label=name or None)
     _across(ax, along.key)
     _scaled(ax, "y", values)
-    ring(
-        ax,
-        float(along.key.values[lead.member.case]),
-        float(values[lead.member.case]),
-        label="decides",
-    )
+    _mark(ax, along.key.values, values, lead)
     if ax.get_legend_handles_labels()[0]:
         ax.legend(loc="best", fontsize=8, handlelength=1.8)
     return ax
@@ -351,24 +352,14 @@ def _map(lead: Lead, grid: sweep_layout.Grid, values: Floats, text: str) -> Axes
         style.log_axis(ax, "y", float(grid.borders[1][0]), float(grid.borders[1][-1]), most=5)
     if grid.y.words:
         ax.set_yticks(grid.y.distinct, grid.y.words)
-    ax.set_title(
-        f"{text} over {grid.x.key} and {grid.y.label}",
-        fontsize=8.5,
-        color=style.GREY,
-        fontweight="normal",
-    )
+    _name(ax, f"{text} over {grid.x.name} and {grid.y.name}")
     ax.set_ylabel(grid.y.label)
     ax.grid(visible=False)
     inside = ax.inset_axes((1.03, 0.0, 0.035, 1.0))
     bar = _root(ax).colorbar(mesh, cax=inside)
     if is_log:
         style.log_ticks(bar.ax.yaxis, *ends, most=5)
-    case = lead.member.case
-    x, y = float(grid.x.values[case]), float(grid.y.values[case])
-    ax.plot(
-        [x], [y], "o", color="white", markersize=11, markerfacecolor="none", markeredgewidth=3.0
-    )
-    ring(ax, x, y, label="decides")
+    _mark(ax, grid.x.values, grid.y.values, lead, on_map=True)
     return ax
 
 
@@ -379,8 +370,15 @@ def _dots(lead: Lead, key: sweep_layout.Key, values: Floats, text: str) -> Axes:
     )
     _across(ax, key)
     _scaled(ax, "y", values)
-    ring(ax, float(key.values[lead.member.case]), float(values[lead.member.case]), label="decides")
+    _mark(ax, key.values, values, lead)
     return ax
+
+
+def _mark(ax: Axes, x: Floats, y: Floats, lead: Lead, *, on_map: bool = False) -> None:
+    """Draw a ring around the member that decides, and say so above the axes, where a legend hides no curve."""
+    case = lead.member.case
+    if ring(ax, float(x[case]), float(y[case]), on_map=on_map):
+        _name(ax, f"{ax.get_title(loc='left')} · ring: the member that decides")
 
 
 def orders(experiment: Experiment, record: Record, lead: Lead) -> Picture | None:
@@ -417,8 +415,7 @@ def orders(experiment: Experiment, record: Record, lead: Lead) -> Picture | None
         ax.plot(key.values, shown, ".", color=style.COLOURS[0], markersize=4)
         _across(ax, key)
         ax.set_ylim(*style.limits(shown[known], around))
-        case = lead.member.case
-        ring(ax, float(key.values[case]), float(shown[case]), label="decides")
+        _mark(ax, key.values, shown, lead)
     inside = known & (np.abs(order - promised) <= allowed)
     kept, every = (words.number(int(n), "integer") for n in (inside.sum(), order.size))
     title = (

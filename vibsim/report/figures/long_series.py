@@ -84,7 +84,7 @@ def long_series(record: Record, quantity: str, member: Member) -> Picture | None
     of = "level" if rows[0].group else "scheme"
     return Picture(
         f"long_{quantity}_{member.stem}",
-        f"{words.title(quantity)}(t) over {span / period:.0f} periods, {member.case_name or f'a panel for each {of}'}",
+        f"{words.title(quantity)}(t) over {span / period:.0f} periods, {member.case_words or f'a panel for each {of}'}",
         f"A panel for each {of}, with the {'exact solution' if is_known else 'finest level'} in grey. "
         "The strip below has the error of the first panel over the whole time."
         + (

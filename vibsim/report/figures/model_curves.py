@@ -96,7 +96,9 @@ def spring(experiment: Experiment, record: Record) -> Picture | None:
         formula = tree(model, model.acceleration)
         pull = values(formula, {**at, position: 0.0}) - values(formula, {**at, position: u})
         force = np.broadcast_to(pull * numbers.get("m", 1.0), u.shape)
-        curves.setdefault(force.tobytes(), (data.case_name(record, case) or "spring", force))
+        curves.setdefault(
+            force.tobytes(), (words.swept(data.case_name(record, case)) or "spring", force)
+        )
     (ax,) = panels.stacked([2.8])
     for k, (text, force) in enumerate(list(curves.values())[: style.MANY]):
         look = style.look(k)

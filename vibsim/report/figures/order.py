@@ -44,7 +44,7 @@ def against_step(experiment: Experiment, record: Record, quantity: str, case: in
     there = _has_order(right, record, quantity, case)
     is_settled = draw(right, experiment, record, quantity, members) if there else None
     legend_above(figure, left)
-    name, letter = data.case_name(record, case), words.symbol(quantity)
+    name, letter = words.swept(data.case_name(record, case)), words.symbol(quantity)
     return Picture(
         name=f"order_{quantity}_{case}",
         title=f"How fast does the error shrink? {letter}{f', {name}' if name else ''}",

@@ -76,7 +76,9 @@ def _common(record: Record, member: Member, by: str | None) -> str:
     """Return the words of what divides members: nothing, the whole member, or a swept key."""
     if by is None:
         return ""
-    return member.case_name if by == MEMBER else data.case_name(record, member.case, by)
+    return words.swept(
+        member.case_name if by == MEMBER else data.case_name(record, member.case, by)
+    )
 
 
 def _picture(
@@ -166,7 +168,7 @@ def _named(
     for i in style.spaced(len(members), style.MANY):
         member = members[i]
         parts = [member.scheme_name] if several else []
-        parts += [data.case_name(record, member.case, key) for key in own]
+        parts += [words.swept(data.case_name(record, member.case, key)) for key in own]
         found.append((", ".join(parts) or member.scheme_name, member))
     return tuple(found)
 

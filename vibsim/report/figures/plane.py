@@ -132,7 +132,7 @@ def path(experiment: Experiment, record: Record, shown: list[Member]) -> Picture
     if data.swept(record):
         cases = sorted({member.case for member in shown})[:PANELS_A_ROW]
         groups = [[member for member in shown if member.case == case] for case in cases]
-        panels = [(found[0].case_name, found, len(levels) - 1) for found in groups]
+        panels = [(found[0].case_words, found, len(levels) - 1) for found in groups]
     else:
         panels = [(f"level {levels[i]}", shown, i) for i in style.spaced(len(levels), PANELS_A_ROW)]
     references = [_points(record, names, members[0], None) for _, members, _ in panels]

@@ -43,7 +43,10 @@ def precision(experiment: Experiment, record: Record, case: int) -> Picture | No
     for ax in axes[1:]:
         ax.tick_params(labelleft=False)
     legend_above(figure, axes[0])
-    name, is_adaptive = case_name(record, case), any(line.is_adaptive for line in found)
+    name, is_adaptive = (
+        words.swept(case_name(record, case)),
+        any(line.is_adaptive for line in found),
+    )
     return Picture(
         name=f"work_precision_{case}",
         title=f"Work and precision{f': {name}' if name else ''}",

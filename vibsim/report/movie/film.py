@@ -80,7 +80,7 @@ def run(experiment: Experiment, record: Record, scheme: str, quantity: str) -> R
     step = words.number(float(t[-1]) / int(str(record.attrs["steps"])), "brief")
     parts = [scheme] if len(record.words("scheme")) > 1 else []
     parts += [f"level {int(record['level'])}, dt = {step} {data.time_unit(record)}".strip()]
-    parts += [name for name in [data.case_name(record, 0)] if name]
+    parts += [name for name in [words.swept(data.case_name(record, 0))] if name]
     return Run(
         title=", ".join(parts),
         scheme=scheme,

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Iterator, Mapping
 from typing import Any
 
@@ -35,8 +34,6 @@ MEASURED = {
 }  # fmt: skip
 """Kind of a check to the name of the number that decides it."""
 
-_SECTION = re.compile(r"\b(?:model|initial|schemes)\.(?:parameters\.)?")
-"""What a swept key begins with."""
 Number = dict[str, str]
 """``label``, ``value`` with its unit, and ``note`` of a large number."""
 
@@ -79,12 +76,13 @@ def numbers(experiment: Experiment, record: Record, lead: Lead) -> Iterator[Numb
         yield from _order(record, lead)
     if lead.measured is None or lead.measured.kind != "accurate":
         yield from _error(record, lead)
-    if data.swept(record) and lead.result.get("command"):
-        text = _SECTION.sub("", lead.member.case_name)
+    is_of_one = lead.entry is not None and sum(lead.entry["counts"].values()) < 2
+    if data.swept(record) and lead.result.get("command") and not is_of_one:
+        text = ", ".join(
+            part.replace(" ", "\N{NO-BREAK SPACE}") for part in lead.member.case_words.split(", ")
+        )
         command = f".venv/bin/{lead.result['command']}"
-        is_one = lead.entry is not None and sum(lead.entry["counts"].values()) < 2
-        label = "Member" if is_one else "Hardest member"
-        yield {"label": label, "value": text, "note": f"To run it alone: `{command}`"}
+        yield {"label": "Hardest member", "value": text, "note": f"To run it alone: `{command}`"}
     yield from _best(experiment, record, lead)
     level, dt = data.whole(record, "level")[-1], data.steps_of(record, lead.member.case)
     step = f"{words.number(float(dt[-1]), 'step')} {data.time_unit(record, 'dt')}".rstrip()

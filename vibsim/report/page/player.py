@@ -144,7 +144,7 @@ def _title(
     several = len({one.scheme for one, _, _ in chosen}) > 1 or len(record["scheme"]) > 1
     parts = [member.scheme_name] if several else []
     parts += [text.strip()]
-    parts += [member.case_name] if member.case_name else []
+    parts += [member.case_words] if member.case_name else []
     return ", ".join(parts)
 
 

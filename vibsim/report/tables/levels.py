@@ -29,6 +29,11 @@ _Fill = Callable[[Member, int], Cell]
 """Returns the cell of a member and the position of a level."""
 
 
+def _key(member: Member) -> str:
+    """Return the name of a scheme, and of a member with its keys as the experiment file has them."""
+    return ", ".join(filter(None, [member.scheme_name, member.case_name]))
+
+
 def _by_level(
     record: Record,
     name: str,
@@ -49,7 +54,7 @@ def _by_level(
     columns = (*map(Column, names), Column("level", form="integer"), *(c for c, _ in shown))
     rows = tuple(
         (
-            *([m.title] if titled else [m.scheme_name, m.case_name])[: len(names)],
+            *([_key(m)] if titled else [m.scheme_name, m.case_name])[: len(names)],
             level,
             *(fill(m, i) for _, fill in shown),
         )

@@ -101,9 +101,11 @@ def title(experiment: Experiment, record: Record, lead: Lead, printed: Collectio
         return f"{told}{against}{_of_some(record, entry)}"
     if entry["id"] in printed:
         return f"All {len(printed)} printed numbers are as expected"
-    numbers = sum(check.kind == "value" for check in experiment.checks)
-    if numbers > 1 and lead.asserted is not None and lead.asserted.kind == "value":
-        told = f"All {numbers} numbers are as expected"
+    asked = [check.value for check in experiment.checks if check.kind == "value"]
+    if len(asked) > 1 and lead.asserted is not None and lead.asserted.kind == "value":
+        told = f"All {len(asked)} numbers are as expected"
+        if len(set(asked)) == 1:
+            told = f"{_opened(f'the {words.PAGE.value(asked[0])}')} is as expected in all {len(asked)} checks"
     return f"{told}{_caught(experiment, lead)}"
 
 

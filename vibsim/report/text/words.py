@@ -70,6 +70,26 @@ def labelled(text: str, quantity: str | None) -> str:
     return "`".join(parts)
 
 
+_KEY = re.compile(r"\b(initial|model(?:\.parameters)?|schemes|time)\.(\w+)(?:\.(\w+))?")
+"""A swept key: its section, and one or two names."""
+
+
+def swept(text: str) -> str:
+    """Return a text with swept keys in the words of a page, such as `linear damping` for `model.damping.linear`.
+
+    Dotted keys belong to experiment files, tables and commands.
+    """
+
+    def key(found: re.Match[str]) -> str:
+        section, outer, inner = found.groups()
+        if section == "initial":
+            return f"initial {symbol(outer)}"
+        between = " of " if section == "schemes" else " "
+        return f"{inner}{between}{outer}" if inner else outer
+
+    return _KEY.sub(key, text).replace(" = -", " = −")
+
+
 def passed(statuses: Sequence[str], one: str = "check", many: str = "checks") -> str:
     """Say how many of some checks passed: `9 of 9 checks`."""
     if not statuses:

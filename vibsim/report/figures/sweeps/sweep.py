@@ -84,7 +84,7 @@ class _Drawing:
         place = float(key.values[worst.case]), float(drawn[worst.scheme, worst.case])
         ax.set_gid(style.MEMBER)
         is_ringed = ring(ax, *place)
-        alt = f"{name[:1].upper()}{name[1:]} of every member against {key.key}"
+        alt = f"{name[:1].upper()}{name[1:]} of every member against {key.name}"
         text = style.sentences(caption, marked)
         figure = ax.get_figure(root=True)
         keys = [one.key for one in sweep_layout.keys(self.record)]
