@@ -203,4 +203,4 @@ def test_an_error_in_a_norm_is_drawn_on_a_logarithmic_scale():
     assert found.figure.axes[0].get_yscale() == "log"
     heights = np.log(sorted(y for _, y in dots(found)))
     assert np.diff(heights) == pytest.approx(np.diff(heights)[0], rel=0.1)
-    assert "error linf of θ [rad]" in texts(found)
+    assert "largest error of θ [rad]" in texts(found)

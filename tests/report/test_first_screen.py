@@ -19,7 +19,7 @@ from vibsim.experiment.schema.checks import MEASURED
 from vibsim.report import data, lead, style
 from vibsim.report.figures import hero as drawn
 from vibsim.report.page import cards, hero, index
-from vibsim.report.text import changes, equation, experiment_file, findings, glossary
+from vibsim.report.text import changes, equation, experiment_file, findings, glossary, words
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 WRONG_AS_TRAP = [{"kind": "central", "label": "wrong", "start": "first_order"}]
@@ -279,3 +279,42 @@ def test_curves_of_the_first_screen_are_told_apart_without_colours_and_the_ring_
     assert len(looks) == len(curves) == 3
     assert [line.get_label() for line in curves] == [f"initial θ = {x}" for x in ("0.5", "1", "2")]
     assert ax.get_title(loc="left").endswith("ring: the member that decides")
+
+
+def test_the_schemes_of_the_first_screen_have_markers_of_their_own_and_many_levels_a_legend_beside_their_curves():
+    exp = samples.experiment(
+        levels={"from": 5, "to": 10}, schemes=["central", "rk4", "euler_cromer"]
+    )
+    record, _, decisive = found(exp)
+    with style.applied():
+        steps = drawn.against_step(exp, record, decisive).figure.axes[0]
+        curves = drawn.differences(record, decisive).figure.axes[0]
+    named = [line for line in steps.lines if line.get_label() in record.words("scheme")]
+    assert len({line.get_marker() for line in named}) == len(named) == 3
+    highest = max(np.max(line.get_ydata()) for line in curves.lines)
+    low, high = curves.get_ylim()
+    assert len(curves.lines) == 5
+    rows = 2
+    assert (high - highest) / (high - low) > rows * drawn.STRIP / (1 + rows * drawn.STRIP)
+
+
+@pytest.mark.parametrize(
+    ("part", "told"), [(6e-4, "0.060 %"), (1e-5, "0.0010 %"), (9.4e-6, "9.4·10⁻⁶"), (0.0, "0")]
+)
+def test_a_very_small_part_is_no_power_of_ten_of_a_per_cent(part, told):
+    assert words.share(part) == told
+
+
+def test_a_sentence_of_a_terminal_is_told_with_powers_of_ten():
+    told = words.PAGE.powers("The error is 3.4e-5 (0.0075 %), at most 1e-04; rk4 and 2e3x stay.")
+    assert told == "The error is 3.4·10⁻⁵ (0.0075 %), at most 10⁻⁴; rk4 and 2e3x stay."
+
+
+def test_one_exact_scheme_of_several_does_not_give_the_title():
+    exp = samples.experiment(
+        model={"kind": "spring", "w": 1.0}, initial={"u": 1.0, "v": 0.0}, time={"end": 2.0},
+        levels={"from": 4, "to": 8}, schemes=["crank_nicolson", "central"],
+        checks=[{"converges": "energy_deviation", "order": "scheme"}],
+    )  # fmt: skip
+    title = "The energy deviation dE = E(t) − E(0) converges at the order that each of 2 schemes promises"
+    assert first(exp)["finding"] == title

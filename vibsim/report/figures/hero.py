@@ -32,6 +32,8 @@ SIZES = {
     "linf_interior": ("largest error without the last point", 0.0),
 }  # fmt: skip
 """Of a norm over time what it is as a size of the error, and over which power of the duration."""
+ONE_COLUMN = 3  # entries of a legend that stands within the axes
+STRIP = 0.12  # of the height of the axes, for a row of a legend
 LONG = 24  # letters of a label above which it is set smaller
 
 
@@ -86,7 +88,14 @@ def differences(record: Record, lead: Lead) -> Picture | None:
     ax.set_xlim(float(t[0]), float(t[-1]) if t[-1] > t[0] else 1.0)
     ax.set_xlabel(data.time_label(record))
     size = 8.0 if max(len(curve.label) for curve in shown) < LONG else 6.0
-    ax.legend(loc="best", fontsize=size, handlelength=1.6, borderaxespad=0.2)
+    columns = 1
+    if len(shown) > ONE_COLUMN and not wild:
+        # a strip of its own, where it hides no curve
+        columns, (low, high) = 3, ax.get_ylim()
+        ax.set_ylim(low, high + STRIP * (high - low) * -(-len(shown) // columns))
+    ax.legend(
+        loc="upper left" if columns > 1 else "best", ncols=columns, fontsize=size, handlelength=1.6, borderaxespad=0.2,
+    )  # fmt: skip
     return Picture(
         "hero_differences",
         _title_of_differences(record, lead, len(shown)),
@@ -129,7 +138,8 @@ def against_step(experiment: Experiment, record: Record, lead: Lead) -> Picture 
         estimate, true = (one / scale for one in _errors(record, quantity, member, lead.norm))
         colour = style.COLOURS[s % style.MANY]
         is_lead = s == lead.member.scheme
-        mark: dict[str, Any] = {"color": colour, "linestyle": "none", "marker": "o"}
+        shape = style.MARKERS[s % style.MANY]
+        mark: dict[str, Any] = {"color": colour, "linestyle": "none", "marker": shape}
         alone = len(names) == 1
         text = "estimated" if alone else style.entry(names[s])
         mark["gid"] = None if alone else text

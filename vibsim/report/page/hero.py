@@ -193,11 +193,7 @@ def _error(record: Record, lead: Lead) -> Iterator[Number]:
         return
     mean = error / math.sqrt(drawn.duration(record, member.case))
     unit = data.norm_unit(record, quantity, "linf")
-    size = (
-        f"{words.number(100.0 * relative, 'brief')} % of the size of {words.symbol(quantity)}, "
-        if relative
-        else ""
-    )
+    size = f"{words.share(relative)} of the size of {words.symbol(quantity)}, " if relative else ""
     steps = words.number(int(record["steps"][-1]), "integer")
     yield {
         "label": f"Error of {words.symbol(quantity)} at {steps} steps{data.of_several(record, member.scheme)}",

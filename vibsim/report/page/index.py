@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import groupby
@@ -30,7 +29,8 @@ FILTERS = (
     ("INCONCLUSIVE", "undecided"),
     ("FAIL", "failed"),
     ("UNREADABLE", "damaged or missing"),
-    *((mark, mark) for mark in MARKS),
+    (words.TRAP, "with a trap caught"),
+    (words.REFUTED, "with a statement refuted"),
 )
 """What cards can be filtered by, with its words."""
 HEADERS = (
@@ -38,7 +38,6 @@ HEADERS = (
     "check", "kind", "text", "quantity", "expected", "status", "reason", "scheme", "case", "order",
     "order_low", "order_high", "levels", "value", "error", "error_bound", "relative_error", "advice", "failures",
 )  # fmt: skip
-_FLOAT = re.compile(r"\b\d[\d.]*e[-+]?\d+\b")
 LONGEST = 90  # characters of a finding that stands in place of numbers
 
 
@@ -205,7 +204,7 @@ def headline(checks: Sequence[Mapping[str, Any]]) -> Headline:
     for check, result in passed:
         sentence = str(result.get("sentence") or "")
         text = words.labelled(sentence.partition("; ")[0].rstrip("."), check["quantity"])
-        text = _FLOAT.sub(lambda number: words.PAGE.digits(number.group()), text)
+        text = words.PAGE.powers(text)
         if text:
             return Headline(text=f"{text[: LONGEST - 1]}…" if len(text) > LONGEST else text)
     return Headline()

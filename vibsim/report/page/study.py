@@ -23,6 +23,8 @@ UNSEEN = (
     "Levels can agree with each other and still approach a wrong answer. Only an exact solution shows that, and none "
     "was given."
 )
+NO_BEST = {True: "the levels do not tell it", False: "a field has no single value"}
+"""Why there is no best value, by whether the quantity is a number."""
 CAPTION = (
     "Both axes are logarithmic: an error of order p is a line of slope p. The dashed line has the "
     "{word} slope {order}."
@@ -89,9 +91,10 @@ def numbers(verdict: LadderVerdict) -> list[dict[str, str]]:
     rows = (
         ("Observed order", words.number(verdict.order, "order"), "; ".join(filter(None, [span, wanted]))),
         ("Error of the finest level", words.number(abs(verdict.error) if verdict.error is not None else None, "brief"),
-         f"{words.number(100.0 * share, 'brief')} % of its size" if share is not None else ""),
+         f"{words.share(share)} of its size" if share is not None else ""),
         ("Best value", words.number(verdict.best, "value"),
-         f"± {words.number(verdict.best_bound, 'brief')}, extrapolated" if verdict.best_bound is not None else ""),
+         NO_BEST[verdict.is_number] if verdict.best_bound is None
+         else f"± {words.number(verdict.best_bound, 'brief')}, extrapolated"),
     )  # fmt: skip
     keys = ("label", "value", "note")
     return [
@@ -127,6 +130,7 @@ def card(name: str, verdict: LadderVerdict, asked: str, files: Sequence[str]) ->
     return {
         "heading": verdict.quantity,
         "verdict": verdict,
+        "sentence": words.PAGE.powers(verdict.sentence),
         "facts": rows,
         "numbers": numbers(verdict),
         "table": _table(verdict),

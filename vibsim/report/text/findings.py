@@ -161,6 +161,9 @@ def _by_check(experiment: Experiment, record: Record, lead: Lead) -> str:
     if kind == "converges":
         # of a trap, what was found says more than that it was expected
         word = lead.result["reason"] if reason == "match" else reason
+        if word == "exact" and _of_each(record, lead):
+            # one of them is exact, as it promises; the others have an order
+            word = "asymptotic"
         return ON_ORDER.get(word, ON_ORDER["mismatch"]).format_map(filled)
     if reason == "non_finite":
         return BROKE_DOWN
@@ -201,20 +204,25 @@ def _phrases(experiment: Experiment, record: Record, lead: Lead) -> dict[str, st
             tame, wild = f"{is_are} stable", grow
             found = (tame, wild) if measured.stable else (wild, tame)
             filled |= {"stability": found[0], "not_stability": f"{found[1]}, against what is asked"}
-    promised = {
-        float(x)
-        for x in data.formal_orders(record, lead.quantity).ravel()
-        if f"{lead.quantity}_formal_order" in record
-    }
-    is_of_scheme = getattr(measured, "order", None) == "scheme" and len(promised) > 1
-    if is_of_scheme and len(named) > 1:
-        filled |= {
-            "at": f"at the order that each of {len(named)} schemes promises",
-            "everywhere": "",
-        }
-    elif is_of_scheme:
+    if each := _of_each(record, lead):
+        filled |= {"at": f"at the order that each of {each} schemes promises", "everywhere": ""}
+    elif _has_own_orders(record, lead):
         filled["at"] = "at the order that its scheme promises"
     return filled
+
+
+def _has_own_orders(record: Record, lead: Lead) -> bool:
+    """Say whether a check asks for the order of the scheme, and not all orders of the record are one."""
+    if getattr(lead.measured, "order", None) != "scheme":
+        return False
+    name = lead.quantity
+    return f"{name}_formal_order" in record and len(set(data.formal_orders(record, name).flat)) > 1
+
+
+def _of_each(record: Record, lead: Lead) -> int:
+    """Return how many schemes a check asks for the order that each of them promises; 0 where it is one order."""
+    named = getattr(lead.measured, "schemes", None) or record.words("scheme")
+    return len(named) if len(named) > 1 and _has_own_orders(record, lead) else 0
 
 
 def _apart(order: float | None, expected: float | None) -> dict[str, str]:

@@ -123,10 +123,19 @@ def broken(summary: Mapping[str, Any]) -> int:
     return int(summary.get("failure_count") or len(summary.get("failures") or []))
 
 
+ERRORS = {
+    "error_linf": "largest error", "error_linf_interior": "largest error without the last point",
+    "error_l1": "error in the L1 norm", "error_l2": "error in the L2 norm",
+}  # fmt: skip
+"""Words for the errors in a norm."""
 DIGITS = {"brief": 2, "close": 7, "full": 10, "step": 6, "value": 12}  # significant digits of forms
+LEAST_PERCENT = 1e-5  # of a whole, that is written in per cent
 MOST_DIGITS = 11  # characters of a mantissa that are read
-PROSE = {"phase", "amplitude"} | {name.partition("_")[0] for name in VALUES}
+PROSE = {"phase", "amplitude", "largest"} | {name.partition("_")[0] for name in VALUES}
 """With what the name of a value, or of a part of an error, begins."""
+
+
+_FLOAT = re.compile(r"\b\d[\d.]*e[-+]?\d+\b")
 
 
 class _Page(Notation):
@@ -136,7 +145,7 @@ class _Page(Notation):
         return title(name)
 
     def value(self, name: str) -> str:
-        return name.replace(CENTRED, " by [D₂ₜu]").replace("_", " ")
+        return ERRORS.get(name, name.replace(CENTRED, " by [D₂ₜu]").replace("_", " "))
 
     def opening(self, text: str) -> str:
         # a letter of mathematics stays as it is
@@ -152,6 +161,10 @@ class _Page(Notation):
         if abs(float(mantissa)) != 1.0:
             return f"{mantissa}·{ten}"
         return f"-{ten}" if mantissa.startswith("-") else ten
+
+    def powers(self, text: str) -> str:
+        """Write the powers of ten in a sentence that was made for a terminal."""
+        return _FLOAT.sub(lambda found: self.digits(found.group()), text)
 
 
 PAGE = _Page()
@@ -177,6 +190,11 @@ def number(value: Any, form: str = "norm") -> str:
         return text
     mantissa, dot, exponent = text.partition("·")
     return mantissa.rstrip("0").rstrip(".") + dot + exponent
+
+
+def share(part: float) -> str:
+    """Write a part of a whole: in per cent, or as a power of ten where it is very small."""
+    return f"{number(100.0 * part, 'brief')} %" if part >= LEAST_PERCENT else number(part, "brief")
 
 
 def printed(text: str) -> str:
