@@ -499,3 +499,14 @@ def test_of_many_members_an_even_part_can_be_pointed_at_and_the_worst():
     few = explorer.listed([key(row, str(i)) for i, row in enumerate(cloud)], 5000, 2000, [])
     assert 1500 <= few.size <= 2000
     assert explorer.listed(keys, 2000, 2000, []).size == 2000
+
+
+def test_curves_of_many_schemes_differ_in_their_dashes_too():
+    schemes = ["central", "rk4", "heun", "euler_cromer"]
+    sweep = {"initial.theta": {"linspace": [0.1, 2.0, 90]}}
+    exp = samples.experiment(sweep=sweep, schemes=schemes, levels=[5, 6, 7])
+    views, _ = samples.views(exp, samples.record(exp), "theta")
+    for name in ("sweep_order_theta", "sweep_error_theta", "period"):
+        lines = views[name].picture.figure.axes[0].lines
+        named = [line for line in lines if line.get_label() in schemes]
+        assert len({str(line._unscaled_dash_pattern) for line in named}) == len(named) == 4, name

@@ -149,6 +149,8 @@ def _wanted(experiment: Experiment, asserted: Check | None, check: Mapping[str, 
     told = ""
     if asked.kind == "converges":
         told = assertions.order_asked(asked, words.fact(check["results"][0], "expected"))
+    elif asked.kind == "conserves":
+        told = assertions.DRIFTS[asked.drift]
     told = told or words.labelled(expectation(experiment, asked, words.PAGE), None)
     return told if asserted.kind != "claim" or asserted.holds else f"not: {told}"
 

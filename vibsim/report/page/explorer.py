@@ -37,7 +37,7 @@ def worst(
     return [
         (
             ", ".join(letters),
-            data.case_name(record, case),
+            words.swept(data.case_name(record, case)),
             f"{start}{int(record['case'][case])}{end}",
         )
         for case, letters in found.items()

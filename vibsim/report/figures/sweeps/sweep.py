@@ -288,7 +288,7 @@ def _draw_orders(
             x = along.key.values[members]
             _interval(ax, x, low[s, members], high[s, members], look["color"])
             label = _text(scheme if several else "", name) or style.entry(scheme)
-            _line(ax, x, value[s, members], label=label, **look | {"linestyle": "-"})
+            _line(ax, x, value[s, members], label=label, **look)
     if promised:
         least, most = promised[0][0], promised[-1][0]
         bottom, top = style.limits(value, np.array([least - 0.25, most + 0.25]))
@@ -320,7 +320,8 @@ def _draw_errors(ax: Axes, record: Record, along: Along, quantity: str) -> tuple
             x, here = along.key.values[members], (s, members)
             _interval(ax, x, low[here], high[here], look["color"])
             text = named or "estimated"
-            _line(ax, x, estimate[here], color=look["color"], linewidth=1.0, label=text)
+            plain = {"color": look["color"], "linestyle": look["linestyle"]}
+            _line(ax, x, estimate[here], **plain, linewidth=1.0, label=text)
             if np.isfinite(true[here]).any():
                 text = (
                     f"_true, {named}"
@@ -382,10 +383,12 @@ def _draw_numbers(
         for s, scheme in enumerate(schemes):
             value, error = found.value[s, members], found.error[s, members]
             label = _text(scheme if len(schemes) > 1 else "", name) or f"level {level}"
-            look = _mark(s, s * len(along.lines) + k, len(schemes))
+            number = s * len(along.lines) + k
+            look = _mark(s, number, len(schemes))
             _interval(ax, x, value - error, value + error, look["color"])
             # beside the exact line dots are seen better
-            dashes = "none" if exact is not None and x.size <= MOST_MARKERS else "-"
+            has_dots = exact is not None and x.size <= MOST_MARKERS
+            dashes = "none" if has_dots else style.look(number)["linestyle"]
             _line(ax, x, value, linestyle=dashes, linewidth=1.0, label=label, **look)
     ax.set_ylim(*_room(found, exact))
     ax.set_ylabel(style.label(found.name, found.unit))
