@@ -17,9 +17,9 @@ from vibsim.apriori.roundoff_floor import norm_of_floor
 from vibsim.core.array_types import Floats
 from vibsim.core.record import Record
 from vibsim.core.vocabulary import TYPICAL_NORM
+from vibsim.report.names import swept as in_words
 from vibsim.report.style import finite, label
 from vibsim.report.superscripts import RAISE
-from vibsim.report.text.words import swept as in_words
 from vibsim.simulation.scaled import has_time_unit
 
 ABOVE = 3.0  # a difference counts as more than round-off when it exceeds this many times the floor

@@ -10,17 +10,10 @@ from typing import Any
 from vibsim.checks.notation import Notation
 from vibsim.core.vocabulary import AMPLITUDE, PHASE, is_error_part, order_interval, whole_of
 from vibsim.experiment.value_names import VALUES
+from vibsim.report.names import NAMES as NAMES
+from vibsim.report.names import swept as swept
 from vibsim.report.superscripts import power
 
-NAMES = {
-    "theta": ("θ", "the angle θ"),
-    "omega": ("ω", "the angular velocity ω"),
-    "energy": ("E", "the energy E"),
-    "kinetic_energy": ("T", "the kinetic energy T"),
-    "potential_energy": ("V", "the potential energy V"),
-    "energy_deviation": ("dE", "the energy deviation dE = E(t) − E(0)"),
-}
-"""Letter and words of quantities; others go by their name."""
 CENTRED = "_d2t"
 """Ends the name of a quantity that is made with the centred difference ``[D_2t u]`` of the position."""
 PARTS = {PHASE: ("φ({})", "phase error of {}"), AMPLITUDE: ("a({})", "amplitude error of {}")}
@@ -68,26 +61,6 @@ def labelled(text: str, quantity: str | None) -> str:
     parts = text.split("`")
     parts[::2] = [word.sub(lambda found: title(found.group()), part) for part in parts[::2]]
     return "`".join(parts)
-
-
-_KEY = re.compile(r"\b(initial|model(?:\.parameters)?|schemes|time)\.(\w+)(?:\.(\w+))?")
-"""A swept key: its section, and one or two names."""
-
-
-def swept(text: str) -> str:
-    """Return a text with swept keys in the words of a page, such as `linear damping` for `model.damping.linear`.
-
-    Dotted keys belong to experiment files, tables and commands.
-    """
-
-    def key(found: re.Match[str]) -> str:
-        section, outer, inner = found.groups()
-        if section == "initial":
-            return f"initial {symbol(outer)}"
-        between = " of " if section == "schemes" else " "
-        return f"{inner}{between}{outer}" if inner else outer
-
-    return _KEY.sub(key, text).replace(" = -", " = −")
 
 
 def passed(statuses: Sequence[str], one: str = "check", many: str = "checks") -> str:
