@@ -131,8 +131,8 @@ INERTIA = "(2*m1 + m2 - m2*cos(2*a - 2*b))"
 DOUBLE_PENDULUM = {
     "acceleration.a": f"({UPPER})/(l1*{INERTIA})",
     "acceleration.b": f"2*sin(a - b)*({LOWER})/(l2*{INERTIA})",
-    "kinetic": "0.5*(m1 + m2)*(l1*va)**2 + 0.5*m2*(l2*vb)**2 + m2*l1*l2*va*vb*cos(a - b)",
-    "potential": "-(m1 + m2)*g*l1*cos(a) - m2*g*l2*cos(b)",
+    "kinetic.0": "0.5*(m1 + m2)*(l1*va)**2 + 0.5*m2*(l2*vb)**2 + m2*l1*l2*va*vb*cos(a - b)",
+    "potential.0": "-(m1 + m2)*g*l1*cos(a) - m2*g*l2*cos(b)",
     "outputs.height": "-l1*cos(a) - l2*cos(b)",
 }
 

@@ -41,7 +41,14 @@ def coupled_pendulums(t, y):
     return vx, vz, -1.1 * x + 0.1 * z, -1.1 * z + 0.1 * x
 
 
+def mass_chain(t, y):
+    """Twelve masses between walls, with springs whose force has a quadratic part."""
+    stretch = np.diff([0.0, *y[:12], 0.0])
+    return *y[12:], *np.diff(stretch + 0.25 * stretch**2)
+
+
 CASES = [
+    ("mass_chain", 0, mass_chain),
     ("van_der_pol", 0, van_der_pol),
     *(("mathieu", case, mathieu(delta)) for case, delta in enumerate((0.15, 0.25, 0.35))),
     ("double_pendulum", 0, double_pendulum),
@@ -70,7 +77,7 @@ def test_the_motion_is_that_of_the_equation_written_out_by_hand(name, case, righ
         size = np.max(np.abs(series))
         np.testing.assert_allclose(found[state.name][0], series, rtol=0.0, atol=1e-11 * size)
         assert bounds[state.name][0] <= 1e-11 * size
-        last = level[state.name].isel(case=case, t=-1).sel(scheme="rk4")
+        last = level[state.name].isel(case=case, t=-1, scheme=-1 if name == "mathieu" else 0)
         assert abs(float(last) - series[-1]) < 1e-5 * size
 
 

@@ -14,6 +14,7 @@ from vibsim.experiment.collection import collection_of
 from vibsim.experiment.data import AnyExperiment, ExperimentSpec, ModelSpec
 from vibsim.experiment.faults import MISSING, Report, shorten
 from vibsim.experiment.kinds import Kinds
+from vibsim.experiment.repeat import with_repeats
 from vibsim.experiment.rules import members, size_limits, timing, unlikely
 from vibsim.experiment.rules import schemes as scheme_rules
 from vibsim.experiment.rules.checks import check_published, finish_checks
@@ -135,6 +136,7 @@ def build(
     report = Report(source, kinds)
     for what, text in (("experiment", name), ("collection", collection)):
         check_name(f"the name of the {what}, '{shorten(text)}',", text, report)
+    source = with_repeats(source, report)
     document = read_document(source, report)
     swept = sorted(set(_keys(source.data.get("sweep"))))
     # a model section with a fault elsewhere still names its model

@@ -96,9 +96,9 @@ class FormulaField:
     """How many times the equation differentiates it: it and all of its derivatives but the last must not jump."""
     along: str = "t"
     """What its own name is at a time: a formula in ``t`` and the parameters of the model."""
-    of: Literal["", "coordinate", "output"] = ""
-    """What has a formula of its own, under its name: every coordinate, or every output, which a user names; empty where
-    the field is one formula."""
+    of: Literal["", "coordinate", "output", "term"] = ""
+    """What has a formula of its own, under its name: every coordinate, or every output, which a user names; or every
+    term of a sum, under its number. Empty where the field is one formula."""
     beside: str = ""
     """The field beside which alone it has a meaning; empty where it needs none."""
     instead_of: str = ""

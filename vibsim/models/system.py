@@ -155,9 +155,19 @@ def fields(coordinates: tuple[str, ...]) -> tuple[FormulaField, ...]:
             positive=True,
         ),
         FormulaField(
-            "potential", states, "", "potential energy, where it cannot be found from the forces"
+            "potential",
+            states,
+            "",
+            "potential energy, or its terms, where it cannot be found",
+            of="term",
         ),
-        FormulaField("kinetic", states, "", "kinetic energy, where it is not the sum of m v**2/2"),
+        FormulaField(
+            "kinetic",
+            states,
+            "",
+            "kinetic energy, or its terms, where it is not the sum of m v**2/2",
+            of="term",
+        ),
         FormulaField(
             "outputs", known, "", "further series, each with a name of your own", of="output"
         ),
@@ -199,6 +209,11 @@ class Written:
         """Return a formula by its key; `default` where it is not written."""
         return parse(self.formulas.get(key, default), (*self.states, "t", *self.declared))
 
+    def terms(self, name: str) -> list[Expression]:
+        """Return the terms of a sum that is written, in their order; none where it is not."""
+        keys = [key for key in self.formulas if key.partition(".")[0] == name]
+        return [self.read(key) for key in sorted(keys, key=lambda key: int(key.partition(".")[2]))]
+
     @cached_property
     def masses(self) -> tuple[Expression, ...]:
         """The mass of every coordinate; 1 of one that has an acceleration."""
@@ -235,8 +250,8 @@ class Written:
     @cached_property
     def kinetic(self) -> Expression:
         """The kinetic energy."""
-        if "kinetic" in self.formulas:
-            return self.read("kinetic")
+        if terms := self.terms("kinetic"):
+            return paired(terms, plus)
         pairs = zip(self.masses, self.velocities, strict=True)
         half = [times(times(Number(0.5), m), Binary("**", Name(v), Number(2.0))) for m, v in pairs]
         return paired(half, partial(Binary, "+"))
@@ -244,8 +259,8 @@ class Written:
     @cached_property
     def potential(self) -> Expression:
         """The potential energy, 0 where none is known."""
-        if "potential" in self.formulas:
-            return self.read("potential")
+        if terms := self.terms("potential"):
+            return paired(terms, plus)
         moving, total = {*self.velocities, "t"}, []
         forces = []
         for mass, a in zip(self.masses, self.own_accelerations, strict=True):

@@ -248,6 +248,13 @@ def _several(
     if written is None:
         return {}
     path: Path_ = ("model", row.name)
+    if row.of == "term":
+        terms = written if isinstance(written, tuple) else (written,)
+        places = [(*path, i) if isinstance(written, tuple) else path for i in range(len(terms))]
+        pairs = zip(terms, places, strict=True)
+        sound = [_is_sound(text, row, place, known, report) for text, place in pairs]
+        keys = (f"{row.name}.{i}" for i in range(len(terms)))
+        return {key: text.strip() for key, text, ok in zip(keys, terms, sound, strict=True) if ok}
     if not isinstance(written, Mapping):
         if model.coordinates > 1 and row.names:
             rule = f"must have a formula for each of {_some(model.positions)}"

@@ -134,7 +134,7 @@ def scheme_names(data: Any) -> Iterator[str]:
                 continue
 
 
-MAX_DECLARED = 50
+MAX_DECLARED, MOST_TERMS = 50, 1000
 
 
 def _declared(names: Mapping[str, float]) -> Mapping[str, float]:
@@ -156,9 +156,12 @@ def _formula_type(model: Model, field: FormulaField) -> Any:
     """Return what may stand for a formula: text, and beside it ``{word: coefficient}`` or ``{table: file}``.
 
     Where coordinates or outputs have formulas of their own, it is a mapping of these, or the formula of the only
-    coordinate.
+    coordinate; where it is a sum of terms, a list of them, or one.
     """
     if field.of:
+        if field.of == "term":
+            terms = Annotated[tuple[FormulaText, ...], Field(min_length=1), short(MOST_TERMS)]
+            return tagged({"one": FormulaText, "several": terms}, Discriminator(_one_or_several))
         several = Annotated[dict[str, FormulaText], Field(min_length=1), AfterValidator(_few)]
         return several if field.of == "output" else by_shape(several, FormulaText)
     name = f"{_class_name(model.kind)}{_class_name(field.name)}"
@@ -191,6 +194,11 @@ def model_section(model: Model) -> type[Section]:
         words = "names of the coordinates; the velocity of x is vx, that of u alone v"
         several = Annotated[tuple[Text, ...], Field(min_length=1), short(MOST)]
         fields[COORDINATES] = (several, Field(default=model.positions, description=words))
+        words = "indices with first and last value: every key and entry with {i} in it is written out for each i"
+        fields["repeat"] = (
+            dict[str, tuple[int, int]] | None,
+            Field(default=None, description=words),
+        )
     for field in model.formulas:
         names = ", ".join((*field.names, "parameters"))
         if model.named is not None:

@@ -48,6 +48,10 @@ def _head(experiment: Experiment) -> list[str]:
     for key, formula in model.formulas.items():
         if key not in named:
             _put(named, key.split("."), formula)
+    for key in ("kinetic", "potential"):
+        terms = named.get(key)
+        if isinstance(terms, dict):
+            named[key] = [terms[str(i)] for i in range(len(terms))]
     named |= {name: {"table": spec.file} for name, spec in model.tables.items()}
     lines += [
         f"model: {_value(named)}",

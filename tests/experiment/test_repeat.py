@@ -1,0 +1,92 @@
+"""Equations that are written once for many coordinates: the same as if each were written out."""
+
+import pytest
+
+from vibsim import Experiment, InputError
+from vibsim.experiment.experiment import canonical
+
+
+def content(model, **changes):
+    return {
+        "title": "t",
+        "model": {"kind": "system", **model},
+        "time": {"end": 1.0},
+        "levels": [4, 5, 6],
+        "schemes": ["rk4"],
+        **changes,
+    }
+
+
+CHAIN = {
+    "repeat": {"i": [1, 3]},
+    "coordinates": ["q{i}"],
+    "force": {"q{i}": "k*(q{i+1} - 2*q{i} + q{ i - 1 })"},
+    "mass": {"q{i}": "1 + {i}/2", "q2": "3"},
+    "potential": ["k*(q{i} - q{i-1})**2/2", "k*q3**2/2"],
+    "outputs": {"stretch{i}": "q{i} - q{i-1}"},
+    "parameters": {"k": 2.0, "q0": 0.0, "q4": 0.0},
+}
+WRITTEN = {
+    "coordinates": ["q1", "q2", "q3"],
+    "force": {
+        "q1": "k*(q2 - 2*q1 + q0)",
+        "q2": "k*(q3 - 2*q2 + q1)",
+        "q3": "k*(q4 - 2*q3 + q2)",
+    },
+    "mass": {"q1": "1 + 1/2", "q2": "3", "q3": "1 + 3/2"},
+    "potential": ["k*(q1 - q0)**2/2", "k*(q2 - q1)**2/2", "k*(q3 - q2)**2/2", "k*q3**2/2"],
+    "outputs": {"stretch1": "q1 - q0", "stretch2": "q2 - q1", "stretch3": "q3 - q2"},
+    "parameters": {"k": 2.0, "q0": 0.0, "q4": 0.0},
+}
+
+
+def test_a_chain_is_what_it_is_written_out():
+    short = Experiment.from_dict(content(CHAIN, initial={"q{i}": "{i}/4", "vq2": 1}))
+    long = Experiment.from_dict(
+        content(WRITTEN, initial={"q1": 0.25, "q2": 0.5, "q3": 0.75, "vq2": 1})
+    )
+    assert canonical(short) == canonical(long)
+
+
+def test_two_indices_make_a_lattice():
+    model = {
+        "repeat": {"i": [0, 1], "j": [0, 2]},
+        "coordinates": ["u{i}_{j}"],
+        "acceleration": {"u{i}_{j}": "-u{i}_{j}", "u0_0": "-2*u0_0"},
+    }
+    found = Experiment.from_dict(content(model)).model
+    assert found.coordinates == ("u0_0", "u0_1", "u0_2", "u1_0", "u1_1", "u1_2")
+    assert found.formulas["acceleration.u0_0"] == "-2*u0_0"
+    assert found.formulas["acceleration.u1_2"] == "-u1_2"
+
+
+@pytest.mark.parametrize(
+    ("changes", "told"),
+    [
+        ({"repeat": {"i": [1]}}, ["model.repeat.i: ", "must be [first, last]"]),
+        ({"repeat": {"i": [3, 1]}}, ["model.repeat.i: ", "must be [first, last]"]),
+        ({"repeat": 3}, ["model.repeat: ", "must be a mapping of indices"]),
+        ({"repeat": {"i": [1, 2000]}}, ["must not have more than 1000 values together, has 2000"]),
+        ({"repeat": {"i": [0, 3]}}, ["'{i-1}' becomes -1"]),
+        (
+            {"force": {"q{i}": "-q{j}"}},
+            ["model.force.q{i}: -q{j}: '{j}' holds an index that the key does not have"],
+        ),
+        ({"force": {"q{i}": "-q{i*2}"}}, ["braces must hold an index"]),
+        ({"repeat": {"i": [1, 65]}}, ["must not have more than 64 entries, has 65"]),
+        (
+            {"parameters": {"k": 2.0, "q0": 0.0}},
+            ["model.force.q3: k*(q4 - 2*q3 + q2): unknown name 'q4'"],
+        ),
+    ],
+)
+def test_what_cannot_be_repeated_is_refused(changes, told):
+    with pytest.raises(InputError) as caught:
+        Experiment.from_dict(content({**CHAIN, **changes}))
+    for words in told:
+        assert words in str(caught.value)
+
+
+def test_braces_without_repeat_are_no_formula():
+    with pytest.raises(InputError, match="is not allowed in a formula"):
+        Experiment.from_dict(content({"acceleration": "-u{i}"}))

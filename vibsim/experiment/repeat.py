@@ -1,0 +1,125 @@
+"""Equations that are alike, written once: ``repeat: {i: [1, 64]}`` makes as many of every key with ``{i}`` in it.
+
+That happens to the content of a file before anything else reads it. In the sections ``model`` and ``initial`` a key
+with its value, and an entry of a list, are repeated for all values of the indices that they hold in braces: ``{i}``,
+``{i+1}``, ``{i-2}``. A key that is written out takes the place of a repeated one.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from itertools import product
+from math import prod
+from typing import Any
+
+from vibsim.core.errors import nearest
+from vibsim.experiment.faults import Report
+from vibsim.experiment.yaml.parse import Path_, Source
+
+REPEAT = "repeat"
+MOST_VALUES = 1000
+"""Values of all indices together, at most."""
+_INDEX = re.compile(r"\{\s*([A-Za-z]\w*)\s*(?:([+-])\s*(\d{1,4}))?\s*\}")
+_BRACE = re.compile(r"[{}]")
+
+
+def with_repeats(source: Source, report: Report) -> Source:
+    """Return the content with every repeated key written out; what is wrong with an index is noted."""
+    data = source.data
+    section = data.get("model") if isinstance(data, Mapping) else None
+    if not isinstance(section, Mapping) or section.get(REPEAT) is None:
+        return source
+    indices = _indices(section[REPEAT], report)
+    if not indices:
+        return source
+    writer = _Writer(indices, report)
+    model = {key: value for key, value in section.items() if key != REPEAT}
+    found = {**data, "model": writer.mapping(("model",), model)}
+    if isinstance(data.get("initial"), Mapping):
+        found["initial"] = writer.mapping(("initial",), data["initial"])
+    return replace(source, data=found)
+
+
+def _indices(written: Any, report: Report) -> dict[str, range]:
+    """Return the values of every index; none where one of them is faulty."""
+    found = {}
+    rule = "must be a mapping of indices to [first, last], two whole numbers"
+    if not isinstance(written, Mapping) or not written:
+        report.add_malformed(("model", REPEAT), rule, "e.g. {i: [1, 64]}")
+        return {}
+    for name, ends in written.items():
+        path: Path_ = ("model", REPEAT, name)
+        whole = isinstance(ends, list | tuple) and all(type(end) is int for end in ends)
+        if not re.fullmatch(r"[A-Za-z]\w*", str(name)):
+            report.add(path, "an index must be a name", "e.g. i", at_key=True)
+        elif not whole or len(ends) != 2 or not 0 <= ends[0] <= ends[1]:
+            report.add(path, "must be [first, last], whole numbers from 0 on", "e.g. [1, 64]")
+        else:
+            found[name] = range(ends[0], ends[1] + 1)
+    if len(found) < len(written):
+        return {}
+    count = prod(map(len, found.values()))
+    if count > MOST_VALUES:
+        rule = f"must not have more than {MOST_VALUES} values together, has {count}"
+        report.add(("model", REPEAT), rule, at_key=True)
+        return {}
+    return found
+
+
+class _Writer:
+    """Writes out what holds an index."""
+
+    def __init__(self, indices: Mapping[str, range], report: Report) -> None:
+        self.indices, self.report = indices, report
+
+    def mapping(self, path: Path_, written: Mapping[str, Any]) -> dict[str, Any]:
+        """Return a mapping with its keys written out, in their order; those without an index take precedence."""
+        found: dict[str, Any] = {}
+        for key, value in written.items():
+            for values in self._values((*path, key), str(key)):
+                own = self._put((*path, key), str(key), values)
+                if own == key or own not in written:
+                    found[own] = self._value((*path, key), value, values)
+        return found
+
+    def _value(self, path: Path_, value: Any, values: Mapping[str, int]) -> Any:
+        if isinstance(value, Mapping):
+            return self.mapping(path, value)
+        if isinstance(value, list | tuple):
+            return [
+                self._put((*path, i), item, own) if isinstance(item, str) else item
+                for i, item in enumerate(value)
+                for own in (self._values((*path, i), item) if isinstance(item, str) else [{}])
+            ]
+        return self._put(path, value, values) if isinstance(value, str) else value
+
+    def _values(self, path: Path_, text: str) -> Iterator[dict[str, int]]:
+        """Yield the values of the indices in a text, the last one fastest; once nothing where it has none."""
+        names = dict.fromkeys(match[1] for match in _INDEX.finditer(text))
+        known = {name: self.indices[name] for name in names if name in self.indices}
+        for values in product(*known.values()):
+            yield dict(zip(known, values, strict=True))
+
+    def _put(self, path: Path_, text: str, values: Mapping[str, int]) -> str:
+        """Return a text with numbers in the places of its indices."""
+
+        def number(match: re.Match[str]) -> str:
+            name, sign, more = match.groups()
+            if name not in values:
+                rule = f"'{match[0]}' holds an index that the key does not have"
+                hint = nearest(name, list(values)) if values else f"put {{{name}}} into the key"
+                self.report.add(path, rule, hint, text)
+                return "0"
+            value = values[name] + int(f"{sign or '+'}{more or 0}")
+            if value < 0:
+                rule = f"'{match[0]}' becomes {value}, but a number in a name is at least 0"
+                self.report.add(path, rule, "begin with a larger index", text)
+            return str(abs(value))
+
+        found = _INDEX.sub(number, text)
+        if _BRACE.search(found):
+            rule = "braces must hold an index, alone or with + or - and a number"
+            self.report.add(path, rule, "e.g. {i+1}", text)
+        return found
