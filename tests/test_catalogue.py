@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 from vibsim.cli.arguments import commands
-from vibsim.experiment.schema import citation
+from vibsim.experiment import citation
 
 ROOT = Path(__file__).parents[1]
 CATALOGUE = runpy.run_path(str(ROOT / "workflow/catalogue.py"))

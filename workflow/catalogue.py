@@ -15,8 +15,7 @@ from typing import Any
 
 import yaml
 
-from vibsim.experiment import Experiment
-from vibsim.experiment.schema import citation
+from vibsim.experiment import Experiment, citation
 from vibsim.report.page.source_statements import CONFIRMED, CORRECTED, CORRECTION, OPEN
 from vibsim.report.text import assertions
 

@@ -8,7 +8,7 @@ import pytest
 import samples
 
 from vibsim import report, store
-from vibsim.experiment.schema import citation
+from vibsim.experiment import citation
 from vibsim.report.page.source_statements import listed
 
 

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from vibsim.experiment.schema import citation
+from vibsim.experiment import citation
 from vibsim.report.page.source_figures import order
 from vibsim.report.text import words
 
