@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import pytest
 from experiment_files import build, only_fault
 
+from vibsim.experiment import Experiment
+from vibsim.models.events import Crossings
+from vibsim.report.text.experiment_file import text
 from vibsim.schemes import FIXED_STEP
 
 BOX: dict[str, Any] = {"model": {"kind": "sliding_box"}, "initial": {"u": 1.0}}
@@ -71,3 +75,68 @@ def test_the_treatment_of_events_can_be_swept() -> None:
 def test_one_fault(changes: dict[str, Any], key: str, rule: str) -> None:
     fault = only_fault(**{"schemes": ["rk4"], **changes})
     assert (fault.key, rule in fault.rule) == (key, True), fault
+
+
+OWN: dict[str, Any] = {"kind": "oscillator", "parameters": {"gap": 0.5}}
+STRUCK = OWN | {"events": [{"when": "u - gap", "rising": True, "then": {"v": "-0.8*v"}}]}
+
+
+def with_event(**event: Any) -> dict[str, Any]:
+    return {"model": OWN | {"events": [{"when": "u - gap", **event}]}}
+
+
+def test_events_and_a_stop_are_read_and_written_back(tmp_path: Path) -> None:
+    kicked = {"when": "sin(t)", "then": {"u": "u/2", "v": 1}}
+    model = STRUCK | {"events": [*STRUCK["events"], kicked], "stop": "u < -2 or v > 9"}
+    made = build(model=model, initial={}, schemes=["rk4"])
+    rows = made.model.definition.events
+    assert isinstance(rows, Crossings)
+    assert [(row.direction, row.ends) for row in rows.rows] == [(1, False), (0, False), (-1, True)]
+    assert "v -> -0.8*v where u - gap rises to 0" in made.model.definition.equation
+    path = tmp_path / "again.yaml"
+    path.write_text(text(made), encoding="utf-8")
+    again = Experiment.from_yaml(path)
+    assert again.model == made.model
+    assert made.schemes[0].options["events"] == "located"
+
+
+@pytest.mark.parametrize(
+    ("changes", "key", "rule"),
+    [
+        (with_event(when="u - gapp"), "model.events[0].when", "unknown name 'gapp'"),
+        (with_event(when="u > gap"), "model.events[0].when", "and no comparison"),
+        (with_event(when="gap"), "model.events[0].when", "never changes: it names neither t nor"),
+        (with_event(then={"w": "0"}), "model.events[0].then.w", "unknown state"),
+        (with_event(then={"v": "-w"}), "model.events[0].then.v", "unknown name 'w'"),
+        (with_event(falling=False), "model.events[0].falling", "the event would never happen"),
+        (with_event(falling=False, rising=False), "model.events[0].falling", "would never happen"),
+        (with_event(rising="yes"), "model.events[0].rising", "must be true or false"),
+        ({"model": OWN | {"events": [{"then": {}}]}}, "model.events[0].when", "is missing"),
+        ({"model": OWN | {"events": STRUCK["events"] * 9}}, "model.events", "more than 8 entries"),
+        ({"model": OWN | {"stop": "u"}}, "model.stop", "must be a comparison"),
+        ({"model": OWN | {"stop": "u == 0"}}, "model.stop", "must not compare by == or !="),
+        ({"model": OWN | {"stop": "gap < 0"}}, "model.stop", "never changes"),
+        ({"model": OWN | {"stop": "u > gap"}}, "model.stop", "holds at the start already"),
+        ({"model": STRUCK | {"damping": {"coulomb": 0.1}}}, "model.damping.coulomb", "or a stop"),
+        ({"model": STRUCK | {"exact": "sin(t)"}, "initial": {}}, "model.exact", "or a stop"),
+        ({"model": STRUCK, "schemes": ["rk4", "dop853"]}, "schemes[1]", "its own steps across"),
+    ],
+)
+def test_what_is_wrong_with_events_is_said(changes: dict[str, Any], key: str, rule: str) -> None:
+    fault = only_fault(**{"initial": {"u": 1.0}, "schemes": ["rk4"], **changes})
+    assert fault.key == key
+    assert rule in f"{fault.rule}: {fault.hint}"
+
+
+def test_a_stop_that_holds_at_the_start_of_one_member_names_it() -> None:
+    sweep = {"initial.u": [-1.0, -0.2, 0.4]}
+    fault = only_fault(model=OWN | {"stop": "u + gap > 0"}, initial={}, sweep=sweep)
+    assert fault.key == "model.stop"
+    assert "where initial.u = -0.2" in fault.rule
+    # on the border the motion may go in, or not
+    for v, is_refused in ((-1.0, True), (1.0, False)):
+        changes: dict[str, Any] = {"model": OWN | {"stop": "u < 0"}, "initial": {"v": v}}
+        if is_refused:
+            assert only_fault(**changes).key == "model.stop"
+        else:
+            build(**changes)

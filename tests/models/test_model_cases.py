@@ -11,8 +11,8 @@ from model_cases import CASES
 
 from vibsim.formula import evaluate, values
 from vibsim.models import MODELS, has_budget, tree
+from vibsim.models.base import rate
 from vibsim.schemes import FIXED_STEP
-from vibsim.simulation.derived import rate
 
 EVERY = pytest.mark.parametrize("case", CASES.values(), ids=CASES)
 

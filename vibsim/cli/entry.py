@@ -155,6 +155,11 @@ def _model(model: Model) -> Iterator[Row]:
     for number, field in enumerate(model.formulas):
         default = f" (default {field.default})" if field.default else ""
         yield "" if number else "formulas", f"{field.name}: {field.description}{default}"
+    if model.takes_events:
+        yield (
+            "events",
+            "events: states get new values where a formula crosses 0; stop: the motion ends there",
+        )
     for number, output in enumerate(model.outputs):
         label = "" if number else "also stored"
         yield label, f"{output.name}: {output.long_name}{unit_text(output.unit)}"

@@ -20,17 +20,18 @@ from vibsim.engine.kernel_stubs import P, State, called, unbound
 
 # bound by the kernel (`vibsim.engine.kernel_stubs`)
 GATHER = LOCATED = WORK = True
-first_mode = guard = guard_on_mesh = landed = lost = mode_of = powers = settled = spent = unbound
-start = start_of = step = turning = with_mode = unbound
+first_mode = followed = guard = guard_on_mesh = held = landed = lost = mode_of = powers = unbound
+settled = spent = start = start_of = step = turning = with_mode = unbound
 
 # Columns of `stats` behind those of `vibsim.engine.gather`. HALTED and HALTED_GRID: the mode before the body came to
 # rest, and the grid point behind, since it may leave the other way, which is a turn. LOST: what sliding or impacts have
-# cost so far. DONE: work of driving forces so far, whose power has a corner at every event: summed piece by piece.
+# cost so far. DONE, TAKEN: work of driving forces and of damping so far, whose powers have corners at events: summed
+# piece by piece.
 # TURN_TIME, TURN: time and height of the last event that was a peak, and behind them of the last that was a trough.
 # Behind all of these stand the times of the first events, as many as there is room for.
 EVENT_COUNT, FIRST_EVENT, LAST_EVENT, REST_TIME = range(N_STATS, N_STATS + 4)
-HALTED, HALTED_GRID, LOST, DONE, TURN_TIME, TURN = range(N_STATS + 4, N_STATS + 10)
-N_STATS_EVENTS = N_STATS + 12
+HALTED, HALTED_GRID, LOST, DONE, TAKEN, TURN_TIME, TURN = range(N_STATS + 4, N_STATS + 11)
+N_STATS_EVENTS = N_STATS + 13
 
 MOST_EVENTS = 256
 """Events of a step; a member with more comes to rest until the next grid point."""
@@ -48,6 +49,7 @@ def begun(stats: Any, case: int, u: float, v: float, p: P) -> P:
         stats[case, EVENT_COUNT] = 0.0
         stats[case, LOST] = 0.0
         stats[case, DONE] = 0.0
+        stats[case, TAKEN] = 0.0
         if mode == 0.0:
             stats[case, REST_TIME] = 0.0
     return with_mode(p, mode, 0.0)
@@ -70,7 +72,7 @@ def passed(
     """
     t = n * dt
     if mode_of(p) == 0.0:
-        ahead, own, following = u, 0.0, state
+        ahead, own, following = u, held(v), state
     else:
         ahead = state[0]
         following, own = step(state, t - start_of(p), dt, p)
@@ -84,12 +86,13 @@ def passed(
         if GATHER:
             note_piece(record, variant, (u, v, ahead, own, t - dt, dt), p)
         if guard_on_mesh(ahead, own, t, p) < 0.0:
-            before, own_before = mode_of(p), own
+            before, came = mode_of(p), (ahead, own)
             ahead, own, mode = settled(ahead, own, t, u, p)
+            if GATHER:
+                note_event(record, t, t, came, before, (ahead, own), mode, p)
             p = with_mode(p, mode, t)
             count = 1
-            if GATHER:
-                note_event(record, t, t, ahead, before, mode, lost(own_before, own))
+    p = with_mode(p, followed(ahead, own, t, p), start_of(p))
     if count > 0:
         p = with_mode(p, mode_of(p), t)
         following = anew(variant, ahead, own, dt, p)
@@ -118,12 +121,12 @@ def across(
         t = t + tau if tau < left else end
         before = mode_of(p)
         u, v, mode = settled(ahead, own, t, math.inf, p)
-        p = with_mode(p, mode, t)
         if GATHER:
-            note_event(record, t, end, u, before, mode, lost(own, v))
+            note_event(record, t, end, (ahead, own), before, (u, v), mode, p)
+        p = with_mode(p, mode, t)
     if GATHER:
         stats, _, case = record
-        stats[case, LOST] = stats[case, LOST] + lost(v, 0.0)
+        stats[case, LOST] = stats[case, LOST] + lost((u, v), (u, 0.0), t, p)
         stats[case, REST_TIME] = t
         stats[case, HALTED] = math.nan
     return u, 0.0, with_mode(p, 0.0, end), MOST_EVENTS
@@ -131,7 +134,7 @@ def across(
 
 @called
 def note_piece(record: Any, variant: int, piece: tuple[float, ...], p: P) -> None:
-    """Add what a smooth piece costs, and the work of driving forces along it, by Simpson's rule.
+    """Add what a smooth piece costs, and the work of damping and driving forces along it, by Simpson's rule.
 
     Parameters
     ----------
@@ -141,11 +144,16 @@ def note_piece(record: Any, variant: int, piece: tuple[float, ...], p: P) -> Non
     stats, _, case = record
     u, v, ahead, own, t, dt = piece
     stats[case, LOST] = stats[case, LOST] + spent(u, ahead)
-    if WORK:
-        middle, speed = leap(variant, u, v, t, 0.5 * dt, p)
-        inner = powers(middle, speed, t + 0.5 * dt, p)[1]
-        ends = powers(u, v, t, p)[1] + powers(ahead, own, t + dt, p)[1]
-        stats[case, DONE] = stats[case, DONE] + dt * (ends + 4.0 * inner) / 6.0
+    if WORK:  # noqa: SIM102
+        if mode_of(p) != 0.0:
+            middle, speed = leap(variant, u, v, t, 0.5 * dt, p)
+            taken, done = powers(u, v, t, p)
+            taken_between, done_between = powers(middle, speed, t + 0.5 * dt, p)
+            taken_last, done_last = powers(ahead, own, t + dt, p)
+            sum_taken = (taken + taken_last) + 4.0 * taken_between
+            sum_done = (done + done_last) + 4.0 * done_between
+            stats[case, TAKEN] = stats[case, TAKEN] + dt * sum_taken / 6.0
+            stats[case, DONE] = stats[case, DONE] + dt * sum_done / 6.0
 
 
 @called
@@ -205,14 +213,22 @@ def landing(variant: int, u: float, v: float, t: float, left: float, p: P) -> fl
 
 @called
 def note_event(
-    record: Any, t: float, grid: float, u: float, before: float, after: float, cost: float
+    record: Any, t: float, grid: float, came: Any, before: float, goes: Any, after: float, p: P
 ) -> None:
     """Write the event at time `t`, where the member came to rest there, and the peak or trough that it is.
 
     A member that rests and then leaves the way it came has turned where it came to rest.
+
+    Parameters
+    ----------
+    came, before
+        Position and velocity before the event, and the mode.
+    goes, after
+        The same behind it.
     """
     stats, counts, case = record
-    stats[case, LOST] = stats[case, LOST] + cost
+    stats[case, LOST] = stats[case, LOST] + lost(came, goes, t, p)
+    u = goes[0]
     since, point = t, grid
     if before == 0.0:
         since, point, before = stats[case, REST_TIME], stats[case, HALTED_GRID], stats[case, HALTED]
@@ -226,7 +242,7 @@ def note_event(
         stats[case, place] = t
     stats[case, EVENT_COUNT] += 1.0
     stats[case, REST_TIME] = t if after == 0.0 else math.nan
-    kind = turning(before, after)
+    kind = turning(before, after, came[1], goes[1])
     if kind != 0.0:
         note_turning(stats, counts, case, since, point, u, kind)
         side = 0 if kind > 0.0 else 2

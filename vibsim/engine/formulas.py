@@ -14,14 +14,16 @@ from vibsim.engine.text import Module, collect
 from vibsim.formula import Binary, Call, Compare, Expression, Name, Number
 from vibsim.formula.algebra import filled
 from vibsim.models import Model
-from vibsim.models.base import Formula, parameter_names, tree
-from vibsim.models.events import Friction, Impact
+from vibsim.models.base import Formula, parameter_names, rate, tree
+from vibsim.models.events import Crossings, Friction, Impact
 from vibsim.models.table import BEND, BENDS, HEADER, HEIGHT, HEIGHTS
 from vibsim.schemes.base import Stepper
 
 MOST_INLINE = 64
 """Calls of functions up to which each becomes part of the formula: each then takes 0.1 s to compile, and 3 MB."""
 _MODE = "mode"
+_TUPLES = ("guards", "guard_rates")
+"""Functions that return a tuple, however many results they have."""
 _MARK = "_"
 """Behind the names of states and parameters in a kernel."""
 
@@ -167,7 +169,7 @@ def put_functions(
             if function in scaled:
                 lines.append(f"{result} = {result} * p[{len(names) + n_between(model)}]")
         returned = ", ".join(results)
-        if always_tuple:
+        if always_tuple or function in _TUPLES:
             returned = f"({returned},)"
         elif model.coordinates > 1 and function == "acceleration":
             returned = f"vector({returned})"
@@ -232,6 +234,21 @@ def _of_events(
         case Impact(restitution, near, slow):
             results = {"_restitution": restitution, "_near": near, "_slow": slow}
             return {"impact_of": {name: put(formula) for name, formula in results.items()}}
+        case Crossings(rows):
+            guards = [tree(model, row.guard) for row in rows]
+            found = {
+                "guards": {f"_guard_{k}": put(guard) for k, guard in enumerate(guards)},
+                "guard_rates": {
+                    f"_rate_{k}": put(rate(model, guard)) for k, guard in enumerate(guards)
+                },
+            }
+            states = [state.name for state in model.states]
+            for k, row in enumerate(rows):
+                new = dict(row.then)
+                found[f"crossed_{k}"] = {
+                    f"_new_{name}": put(new.get(name, name)) for name in states
+                }
+            return found
 
 
 def _with_functions(module: Module, formula: Expression, suffix: str, is_rare: bool) -> Expression:

@@ -6,6 +6,8 @@ these functions; they know the model by ``drive`` and ``limit``.
 
 from __future__ import annotations
 
+from typing import Any
+
 from vibsim.engine.kernel_stubs import P, unbound
 
 # bound by the kernel (`vibsim.engine.kernel_stubs`)
@@ -40,6 +42,16 @@ def guard_on_mesh(u: float, v: float, t: float, p: P) -> float:
     return guard(u, v, t, p)
 
 
+def followed(u: float, v: float, t: float, p: P) -> float:
+    """Return the mode at the end of a smooth piece, without an event: the same."""
+    return mode_of(p)
+
+
+def held(v: float) -> float:
+    """Return the velocity of a body at rest."""
+    return 0.0
+
+
 def landed(u: float, v: float) -> tuple[float, float]:
     """Return position and velocity at a located event, where the body is at rest."""
     return u, 0.0
@@ -58,12 +70,12 @@ def spent(u: float, ahead: float) -> float:
     return abs(ahead - u)
 
 
-def lost(before: float, after: float) -> float:
+def lost(came: Any, goes: Any, t: float, p: P) -> float:
     """Return what an event costs beside the path: nothing."""
     return 0.0
 
 
-def turning(before: float, after: float) -> float:
+def turning(before: float, after: float, v: float, own: float) -> float:
     """Return 1 for a peak between two modes, -1 for a trough, 0 for neither."""
     if before * after < 0.0:
         return before

@@ -6,6 +6,8 @@ model by ``impact_of``.
 
 from __future__ import annotations
 
+from typing import Any
+
 from vibsim.engine.kernel_stubs import P, unbound
 
 # bound by the kernel (`vibsim.engine.kernel_stubs`)
@@ -25,6 +27,16 @@ def guard(u: float, v: float, t: float, p: P) -> float:
 def guard_on_mesh(u: float, v: float, t: float, p: P) -> float:
     """Return a number below 0 at a grid point where the body falls and is near the ground (text, section 10.9)."""
     return 1.0 if mode_of(p) == 0.0 or v > 0.0 else u - impact_of(u, v, t, p)[1]
+
+
+def followed(u: float, v: float, t: float, p: P) -> float:
+    """Return the mode at the end of a smooth piece, without an event: the same."""
+    return mode_of(p)
+
+
+def held(v: float) -> float:
+    """Return the velocity of a body at rest."""
+    return 0.0
 
 
 def landed(u: float, v: float) -> tuple[float, float]:
@@ -51,11 +63,12 @@ def spent(u: float, ahead: float) -> float:
     return 0.0
 
 
-def lost(before: float, after: float) -> float:
+def lost(came: Any, goes: Any, t: float, p: P) -> float:
     """Return half of what the square of the velocity has lost."""
+    before, after = came[1], goes[1]
     return 0.5 * (before * before - after * after)
 
 
-def turning(before: float, after: float) -> float:
+def turning(before: float, after: float, v: float, own: float) -> float:
     """Return -1 where the body bounces, which is a trough, and 0 where it stays."""
     return -1.0 if after != 0.0 else 0.0

@@ -17,7 +17,16 @@ from typing import Any
 
 from vibsim.core.errors import SimulationError
 from vibsim.elementary import primitives
-from vibsim.engine import block_loop, coordinates, friction, gather, impact, member_loop, rows
+from vibsim.engine import (
+    block_loop,
+    coordinates,
+    crossings,
+    friction,
+    gather,
+    impact,
+    member_loop,
+    rows,
+)
 from vibsim.engine.formulas import (
     marked,
     n_between,
@@ -31,7 +40,7 @@ from vibsim.engine.stages import stages
 from vibsim.engine.text import Module, collect, divided, plain_code
 from vibsim.models import Model, has_budget
 from vibsim.models.base import Formula
-from vibsim.models.events import Friction
+from vibsim.models.events import Crossings, Friction, Impact
 from vibsim.native.kernel_cache import Kernel, load
 from vibsim.schemes.base import HANDED, Stepper, handed
 
@@ -55,6 +64,8 @@ def kernel(
 """What is called from outside, with `vibsim.engine.member_loop.run` or that of blocks."""
 _STEPPING = "f2 f2 f2 f1 i i i i i i f f3 f2 i2 f3 f1"
 """Its arguments, as `vibsim.native.linking.link` has them."""
+_OF_EVENTS = {Friction: friction, Impact: impact, Crossings: crossings}
+"""What a kernel binds for each kind of events."""
 _OBSERVING = "f2 f2 f1 i i f3 f3"
 """Arguments of `vibsim.engine.member_loop.observe`."""
 
@@ -211,8 +222,10 @@ def _put_events(module: Module, model: Model, stepper: Stepper) -> None:
     module.define("start_of(p)", f"return p[{first + 1}]")
     module.define("with_mode(p, mode, start)", f"return ({', '.join(places)},)")
     collect(module, stepper.step, "step", {})
-    kind = friction if isinstance(model.events, Friction) else impact
-    for name in ("first_mode", "guard", "guard_on_mesh", "landed", "settled"):
+    if isinstance(model.events, Crossings):
+        crossings.put_rows(module, model.events, is_located=stepper.events != "mesh")
+    kind = _OF_EVENTS[type(model.events)]
+    for name in ("first_mode", "guard", "guard_on_mesh", "landed", "settled", "followed", "held"):
         collect(module, getattr(kind, name), name, {})
     for name in ("turning", "spent", "lost"):
         collect(module, getattr(kind, name), name, {})

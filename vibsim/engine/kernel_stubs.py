@@ -51,10 +51,15 @@ velocity are vectors (`vibsim.engine.coordinates`); q and w are either:
 ``landed(u, v)``                                                the state at a located event, without its rounding
 ``settled(u, v, t, before, p)``                                 position, velocity and mode behind an event; `before`:
                                                                 position a step before, infinite if located
-``spent(u, ahead)``, ``lost(before, after)``                    what a smooth piece, and an event between two
-                                                                velocities, costs in units of ``cost``
-``turning(before, after)``                                      1 for an event between two modes that is a peak, -1 for
-                                                                a trough, 0 for neither
+``followed(u, v, t, p)``                                        the mode at the end of a smooth piece, without an event
+``held(v)``                                                     the velocity of a member at rest that had this one
+``spent(u, ahead)``, ``lost(came, goes, t, p)``                 what a smooth piece, and an event between two states,
+                                                                costs in units of ``cost``
+``turning(before, after, v, own)``                              1 for an event between two modes and velocities that is
+                                                                a peak, -1 for a trough, 0 for neither
+``guards(u, v, t, p)``, ``guard_rates``                         the formulas of `vibsim.models.events.Crossings`, and
+                                                                how fast they change
+``crossed(k, u, v, t, p)``, ``is_end(k)``                       the state behind event k, and whether it ends the motion
 ==============================================================  =======================================================
 """
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from vibsim.engine.events import DONE, LOST, begun, passed, put_turned
+from vibsim.engine.events import DONE, LOST, TAKEN, begun, passed, put_turned
 from vibsim.engine.extrema import is_turned, note_turned
 from vibsim.engine.gather import (
     DISSIPATED_ROW,
@@ -188,7 +188,7 @@ def first_work(q: Any, w: Any, p: P) -> tuple[float, float]:
 def next_work(work: tuple[float, float], stats: Any, case: int, point: Any) -> tuple[float, float]:
     """Return the sums of the powers after one more point: position, velocity, time and parameters."""
     if EVENTS:
-        return work[0], stats[case, DONE]
+        return stats[case, TAKEN], stats[case, DONE]
     q, w, t, p = point
     dissipated, driven = powers(q, w, t, p)
     return work[0] + dissipated, work[1] + driven

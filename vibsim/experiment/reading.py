@@ -18,6 +18,7 @@ from vibsim.experiment.repeat import with_repeats
 from vibsim.experiment.rules import members, size_limits, timing, unlikely
 from vibsim.experiment.rules import schemes as scheme_rules
 from vibsim.experiment.rules.checks import check_published, finish_checks
+from vibsim.experiment.rules.crossings import check_stop
 from vibsim.experiment.rules.figures import check_figures
 from vibsim.experiment.rules.levels import rising_levels
 from vibsim.experiment.rules.model import are_known
@@ -157,6 +158,7 @@ def build(
         for table in equation.tables:
             members.check_length(of_members, table, report)
         members.check_jumps(of_members, equation.formulas, report)
+        check_stop(model, parameters, initial, sweep.axes, report)
     numbers = Numbers(parameters, initial, time)
     if document.scaled:
         numbers = characteristic(numbers, model, swept, report)

@@ -92,7 +92,8 @@ class Units:
         is_member = path[0] == "sweep" or _is_swept_value(path)
         keys = [key for key in path if "." in str(key)][:1] if is_member else path
         key = ".".join(map(str, keys))
-        if key.startswith("schemes.") or {key, f"{key.rpartition('.')[0]}.*"} & self.texts:
+        is_below = f"{key.rpartition('.')[0]}.*"
+        if key.startswith(("schemes.", "model.events.")) or {key, is_below} & self.texts:
             return text
         has_formulas = self.model is not None and bool(self.model.formulas)
         is_declared = has_formulas and key.startswith(f"model.{DECLARED}.")
@@ -178,7 +179,7 @@ def _wanted_units(model: Model | None) -> tuple[dict[str, str], set[str]]:
     """
     units = {"time.end": "s", "time.base_dt": "s"}
     units |= {"time.periods": "1", "time.steps_per_period": "1"}
-    texts = {"model.kind", "time.base_steps"}
+    texts = {"model.kind", "model.stop", "time.base_steps"}
     if model is None:
         return units, texts
     units |= {f"initial.{state.name}": state.unit for state in model.states}

@@ -16,7 +16,18 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from vibsim.core.array_types import Floats
 from vibsim.core.registry import hash_fault
-from vibsim.formula import CONSTANTS, FUNCTIONS, ONE, Expression, ExpressionError, Name, parse
+from vibsim.formula import (
+    CONSTANTS,
+    FUNCTIONS,
+    ONE,
+    Binary,
+    Expression,
+    ExpressionError,
+    Name,
+    Number,
+    derivative,
+    parse,
+)
 from vibsim.models.events import Events
 from vibsim.models.table import Lookup, Table
 
@@ -166,6 +177,8 @@ class Model:
     """Where the motion is not smooth; None where it is smooth throughout."""
     formulas: tuple[FormulaField, ...] = ()
     """What a user writes as formulas."""
+    takes_events: bool = False
+    """Whether a user may write events and a stop as formulas beside them (`vibsim.models.shared.crossings`)."""
     written: Callable[[Mapping[str, str], tuple[str, ...]], Model] | None = None
     """The model of such formulas, by name, with declared parameters; see `vibsim.models.oscillator`. Formulas of single
     coordinates and outputs have the name of the field before their own: ``acceleration.x``."""
@@ -291,6 +304,17 @@ def speeds(
     yield "t", ONE
     yield from zip(positions, map(Name, named), strict=True)
     yield from zip(named, accelerations, strict=True)
+
+
+def rate(model: Model, formula: Expression) -> Expression:
+    """Return how fast a formula changes along a motion of the model."""
+    pushes = (tree(model, acceleration) for acceleration in model.accelerations)
+    total: Expression = Number(0.0)
+    for name, speed in speeds(model.positions, model.velocities, pushes):
+        slope = derivative(formula, name)
+        if slope != Number(0.0):
+            total = Binary("+", total, Binary("*", slope, speed))
+    return total
 
 
 def has_solution(model: Model) -> bool:

@@ -10,8 +10,11 @@ only, never a jump (`vibsim.engine.events`).
   ``|drive| <= limit``: it stays where it is until the drive exceeds the limit. Otherwise it slides on, along the drive.
 - Impact on the ground (B, section 10.9): in flight (mode 1) until the height vanishes; there the velocity v becomes
   ``-restitution*v``, and the body comes to rest for ever (mode 0) where that is at most `eps_v`.
+- Crossings, as a user writes them: a formula, its *guard*, changes its sign along the motion. The states then get new
+  values, or the motion ends there (mode 0; B, section 10.6). The mode says on which side of every guard the motion is:
+  an event happens once for each crossing in its direction, and not again before the guard has gone back.
 
-Source: vibration text (B), sections 10.3 and 10.9; E. Hairer, S. P. Norsett and G. Wanner, Solving Ordinary
+Source: vibration text (B), sections 10.3, 10.6 and 10.9; E. Hairer, S. P. Norsett and G. Wanner, Solving Ordinary
 Differential Equations I, section II.6 (discontinuous equations).
 """
 
@@ -50,6 +53,29 @@ class Impact:
     """Energy that goes per half square of the speed lost: a mass."""
 
 
-Events = Friction | Impact
+@dataclass(frozen=True)
+class Crossing:
+    """One event of `Crossings`; formulas in the states, ``t`` and the parameters."""
+
+    guard: Formula
+    """It changes its sign at the event."""
+    direction: int = 0
+    """-1 where only a fall below 0 is an event, 1 where only a rise above it is, 0 for both."""
+    then: tuple[tuple[str, Formula], ...] = ()
+    """States that change, with their new values by formulas in the values before."""
+    ends: bool = False
+    """Whether the motion ends there: the state stays as it is."""
+
+
+@dataclass(frozen=True)
+class Crossings:
+    """Events where formulas change their signs; at one time the first of them happens first."""
+
+    rows: tuple[Crossing, ...]
+    cost: Formula = "1"
+    """What goes at an event is counted in energy."""
+
+
+Events = Friction | Impact | Crossings
 TREATMENTS = ("located", "mesh")
 """How a scheme treats events: found within the step, or noticed at the grid point behind them."""

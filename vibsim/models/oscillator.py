@@ -7,6 +7,7 @@ them are dimensionless.
 The damping f is a formula in v, linear (``b v``) or quadratic (``b |v| v``, B section 8.2), whatever way it is written:
 schemes that treat these two in their own way recognise them. Coulomb friction, ``{coulomb: b}``, holds the body where
 ``|F - s| <= b`` (`vibsim.models.events`; B, section 10.3); as a formula, ``b sign(v)``, it is a force like any other.
+Events and a stop may be written as well (`vibsim.models.shared.crossings`); no exact solution is then known.
 
 Instead of the force, an exact solution u_e(t) may be written: the force is then ``F = m u_e'' + f(u_e') + s(u_e)`` (a
 manufactured solution; B, section 2.2 and exercise 9), and the motion starts on it.
@@ -37,7 +38,8 @@ from vibsim.formula import (
     values,
 )
 from vibsim.models.base import FormulaField, Model, Numbers, Parameter, declared_parameters
-from vibsim.models.events import Friction
+from vibsim.models.events import Crossings, Friction
+from vibsim.models.shared.crossings import crossings, described
 from vibsim.models.shared.linear_motion import friction_motion
 from vibsim.models.shared.manufactured import Manufactured
 from vibsim.models.shared.mechanical import Forces, mechanical
@@ -106,6 +108,11 @@ class Written:
         return self.read("damping")
 
     @cached_property
+    def crossings(self) -> Crossings | None:
+        """The events, where some are written."""
+        return crossings(self.formulas, ("u", "v", "t", *(row.name for row in self.parameters)))
+
+    @cached_property
     def manufactured(self) -> Manufactured | None:
         """The exact solution u(t), where it is written."""
         if "exact" not in self.formulas:
@@ -154,6 +161,15 @@ def oscillator(
     more: dict[str, Any] = {}
     if own.term == COULOMB:
         more = _friction(own, forces)
+    elif own.crossings is not None:
+        more = {
+            "linear": False,
+            "conservative": False,
+            "exact": None,
+            "exact_period": None,
+            "scales": lambda forces: None,
+            "events": own.crossings,
+        }
     elif own.manufactured is not None:
         more = {"exact": own.manufactured.exact, "start": own.manufactured.start}
     return mechanical(
@@ -164,6 +180,7 @@ def oscillator(
         source="vibration text, section 8, equation (59)",
         equation=_equation(own),
         formulas=FORMULAS,
+        takes_events=True,
         written=written,
         optional=(MASS.name,),
         variant=partial(oscillator, formulas, declared),
@@ -204,7 +221,8 @@ def _equation(own: Written) -> str:
     terms.append(_term(own.spring))
     sides = " + ".join(terms).replace("+ -", "- ")
     if own.manufactured is None:
-        return f"{sides} = {to_formula(own.force)}"
+        behind = described(own.crossings, own.formulas) if own.crossings else ""
+        return f"{sides} = {to_formula(own.force)}{behind}"
     return f"{sides} = F(t), with F such that u = {to_formula(own.read('exact'))}"
 
 

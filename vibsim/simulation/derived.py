@@ -10,9 +10,9 @@ import numpy as np
 
 from vibsim.core.array_types import Floats
 from vibsim.engine import Series, Trajectories, energies, lane_for, observed
-from vibsim.formula import Binary, Expression, Number, derivative
+from vibsim.formula import Number
 from vibsim.models import BUDGET, Model, centred, tree
-from vibsim.models.base import Formula, speeds
+from vibsim.models.base import Formula, rate
 from vibsim.simulation.members import Members
 
 SAMPLES_AT_A_TIME = 2**16
@@ -145,7 +145,7 @@ def _work(samples: _Samples) -> tuple[Floats, Floats]:
     assert series.dissipated is not None
     if model.events is not None:
         (cost,) = samples.values((model.events.cost,))
-        return cost * series.lost, series.driven
+        return cost * series.lost + series.dissipated, series.driven
     powers = [
         Number(0.0) if formula is None else tree(model, formula)
         for formula in (model.dissipation, model.driving)
@@ -161,14 +161,3 @@ def _work(samples: _Samples) -> tuple[Floats, Floats]:
         integral(series.dissipated, values[0], values[2]),
         integral(series.driven, values[1], values[3]),
     )
-
-
-def rate(model: Model, formula: Expression) -> Expression:
-    """Return how fast a formula changes along a motion of the model."""
-    pushes = (tree(model, acceleration) for acceleration in model.accelerations)
-    total: Expression = Number(0.0)
-    for name, speed in speeds(model.positions, model.velocities, pushes):
-        slope = derivative(formula, name)
-        if slope != Number(0.0):
-            total = Binary("+", total, Binary("*", slope, speed))
-    return total

@@ -15,6 +15,7 @@ from vibsim.core.errors import nearest
 from vibsim.experiment.data import TableSpec
 from vibsim.experiment.faults import MISSING, Report
 from vibsim.experiment.kinds import COORDINATES
+from vibsim.experiment.rules.crossings import read_crossings
 from vibsim.experiment.rules.potential import check_potential
 from vibsim.experiment.schema.fields import DECLARED, TABLE, Section
 from vibsim.experiment.tables.file import ENDINGS, TableError, read
@@ -35,7 +36,10 @@ from vibsim.formula import (
     walk,
 )
 from vibsim.models import FormulaField, Model, tree
+from vibsim.models.base import rate
+from vibsim.models.events import Crossings
 from vibsim.models.oscillator import COULOMB
+from vibsim.models.shared.crossings import is_crossing
 from vibsim.models.system import coordinate_faults, name_fault
 
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
@@ -119,6 +123,8 @@ def _written(
         elif value is not None and _is_sound(value, row, ("model", row.name), known, report):
             texts[row.name] = value.strip()
         _check_place(row, section, report)
+    if model.takes_events:
+        texts |= read_crossings(section, model, known, report)
     if "exact" in texts and section.force is not None:
         rule = "must not be given together with exact, from which it follows"
         report.add(("model", "force"), rule, at_key=True)
@@ -128,6 +134,18 @@ def _written(
     for row in model.formulas:
         if row.positive:
             _check_positive(row, texts, declared, report)
+    if any(map(is_crossing, texts)):
+        for name, is_there, why in (
+            ("exact", "exact" in texts, "the motion leaves the exact solution at an event"),
+            (
+                f"damping.{COULOMB}",
+                f"damping.{COULOMB}" in parameters,
+                "friction has events of its own",
+            ),
+        ):
+            if is_there:
+                rule = "must not be given together with events or a stop"
+                report.add(("model", *name.split(".")), rule, why, at_key=True)
     if any(fault.key.split(".")[0] == "model" for fault in report.faults):
         return Equation(None)
     parameters |= {f"{DECLARED}.{name}": value for name, value in declared.items()}
@@ -196,6 +214,11 @@ def _check_length(model: Model) -> None:
     ]
     energies = [tree(model, formula) for formula in (model.kinetic_energy, model.potential_energy)]
     formulas = (*accelerations, *slopes, *energies)
+    if isinstance(model.events, Crossings):
+        rows = model.events.rows
+        guards = [tree(model, row.guard) for row in rows]
+        formulas += (*guards, *(rate(model, guard) for guard in guards))
+        formulas += tuple(tree(model, value) for row in rows for _, value in row.then)
     if sum(size(formula, MAX_NODES) for formula in formulas) > MAX_NODES:
         rule = f"the equation that follows, with its slopes and energies, has more than {MAX_NODES} operations"
         hint = "write a simpler formula, or the energy as `potential` where the model has that"

@@ -120,7 +120,7 @@ def _check_events(section: Any, i: int, model: Model, report: Report) -> None:
     if given is None or is_unsure or model.events is not None:
         return
     able = [kind for kind, other in report.kinds.all_models().items() if other.events is not None]
-    hint = f"models with events are {', '.join(able)}, and oscillator with damping: {{coulomb: c}}"
+    hint = f"models with events are {', '.join(able)}, and oscillator with damping: {{coulomb: c}}, events or stop"
     rule = f"{model.kind} has no events here: its motion is smooth"
     report.add(("schemes", i, EVENTS.name), rule, hint, given)
 

@@ -39,6 +39,7 @@ from vibsim.experiment.schema.fields import (
 )
 from vibsim.experiment.schema.sweep import tolerance_name
 from vibsim.models import FormulaField, Model, Parameter
+from vibsim.models.shared.crossings import MOST_EVENTS, STOP
 from vibsim.models.system import MOST
 from vibsim.schemes import AnyOption, Flag, NumberOption, Option, Scheme
 from vibsim.schemes.base import EVENTS
@@ -182,6 +183,28 @@ def _formula_type(model: Model, field: FormulaField) -> Any:
     return by_shape(create_model(name, __base__=Section, **fields), FormulaText)
 
 
+class Event(MadeSection):
+    """An event that a user writes as formulas."""
+
+    when: Annotated[
+        FormulaText,
+        Field(
+            description="a formula in the states, t and parameters: the event is where it crosses 0"
+        ),
+    ]
+    falling: Annotated[
+        StrictBool | None, Field(description="only where it falls; both ways when left out")
+    ] = None
+    rising: Annotated[StrictBool | None, Field(description="only where it rises")] = None
+    then: Annotated[
+        dict[str, FormulaText],
+        Field(
+            default_factory=dict,
+            description="new values of states, as formulas in the values before the event",
+        ),
+    ]
+
+
 @cache
 def model_section(model: Model) -> type[Section]:
     """Return the class of the section of a model."""
@@ -213,5 +236,11 @@ def model_section(model: Model) -> type[Section]:
     if model.formulas:
         words = "names that the formulas use, with their values"
         fields["parameters"] = (Declared, Field(default={}, description=words))
+    if model.takes_events:
+        words = "events: where a formula crosses 0, states get new values"
+        several = Annotated[tuple[Event, ...], short(MOST_EVENTS)]
+        fields["events"] = (several, Field(default=(), description=words))
+        words = "a comparison, u < 0 say, which ends the motion where it begins to hold"
+        fields[STOP] = (FormulaText | None, Field(default=None, description=words))
     doc = f"{model.title}: {model.equation} ({model.source})."
     return create_model(_class_name(model.kind), __base__=Section, __doc__=doc, **fields)

@@ -7,6 +7,7 @@ import re
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from vibsim.models.shared.crossings import is_crossing, written
 from vibsim.report.types import Check, Experiment, SchemeSpec
 
 WIDTH = 100  # characters of a line
@@ -46,12 +47,13 @@ def _head(experiment: Experiment) -> list[str]:
     for key, value in (scaling or model).parameters.items():
         _put(named, key.split("."), value)
     for key, formula in model.formulas.items():
-        if key not in named:
+        if key not in named and not is_crossing(key):
             _put(named, key.split("."), formula)
     for key in ("kinetic", "potential"):
         terms = named.get(key)
         if isinstance(terms, dict):
             named[key] = [terms[str(i)] for i in range(len(terms))]
+    named |= written(model.formulas)
     named |= {name: {"table": spec.file} for name, spec in model.tables.items()}
     lines += [
         f"model: {_value(named)}",

@@ -1,0 +1,191 @@
+"""Events and stops as formulas: against built-in models, motions known piece by piece, and in every lane."""
+
+import math
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from event_runs import BALL, TREATMENTS, run
+
+from vibsim.engine import integrate
+from vibsim.models.oscillator import written
+from vibsim.schemes import FIXED_STEP
+
+BOUNCE = {"spring": "g", "events.1.falling": "u", "events.1.then.v": "-e*v"}
+FALLING = written(BOUNCE, ("g", "e"))
+BETWEEN = written(
+    {
+        "events.1.rising": "u - right",
+        "events.1.then.v": "-e*v",
+        "events.2.falling": "u + left",
+        "events.2.then.v": "-e*v",
+    },
+    ("left", "right", "e"),
+)
+STOPS = {"left": 0.6, "right": 0.4, "e": 0.9}
+KICKED = written({"events.1.when": "sin(pi*t)", "events.1.then.v": "v + kick"}, ("kick",))
+STOPPED = written({"stop": "u < 0"}, ())
+
+
+def go(model, kind, given, initial, end, steps, **more):
+    """Return the trajectories of one member; declared parameters by their bare names."""
+    parameters = {row.key: given.get(row.name, 1.0) for row in model.parameters}
+    scheme = FIXED_STEP[kind]
+    events, lane = more.pop("events", "located"), more.pop("lane", "plain")
+    numbers = numbers_of_keys(parameters, initial, end / steps)
+    options = {**scheme.defaults(), "events": events}
+    return integrate(model, scheme, options, *numbers, steps, 1, lane=lane, **more)
+
+
+def numbers_of_keys(parameters, initial, dt):
+    return np.array([list(parameters.values())]), np.array([initial], dtype=float), np.array([dt])
+
+
+def rotated(u, v, t):
+    """Return the motion of ``u'' = -u`` after a time."""
+    return u * math.cos(t) + v * math.sin(t), v * math.cos(t) - u * math.sin(t)
+
+
+def between(end):
+    """Return impact times and the last state between two stops, from the phase at which each sinusoid meets one."""
+    u, v, t, times = 0.0, 1.0, 0.0, []
+    while True:
+        # u = size cos(phase - s), and u' = size sin(phase - s), after s more
+        size, phase = math.hypot(u, v), math.atan2(v, u)
+        waits = []
+        for place, sign in ((STOPS["right"], 1.0), (-STOPS["left"], -1.0)):
+            if size > abs(place):
+                wait = (phase - sign * math.acos(place / size)) % (2 * math.pi)
+                waits.append((wait if wait > 1e-9 else 2 * math.pi, place))
+        wait, place = min(waits)
+        if t + wait > end:
+            return times, rotated(u, v, end - t)
+        t += wait
+        v = -STOPS["e"] * rotated(u, v, wait)[1]
+        u = place
+        times.append(t)
+
+
+@pytest.mark.parametrize("events", TREATMENTS)
+@pytest.mark.parametrize("kind", FIXED_STEP)
+def test_a_ball_of_formulas_is_the_bouncing_ball(kind, events):
+    more = {"events": events, "with_series": True, "n_extrema": 5, "n_events": 9}
+    numbers = {"g": 1.0, "restitution": 0.8, "eps_v": 0.0}, (1.0, 0.0), 8.0, 150
+    ball = run(BALL, kind, *numbers, **more)
+    own = go(FALLING, kind, {"g": 1.0, "e": 0.8}, (1.0, 0.0), 8.0, 150, **more)
+    np.testing.assert_allclose(own.states, ball.states, rtol=0, atol=1e-13)
+    assert own.events.event_count == ball.events.event_count
+    assert own.events.event_count[0] >= 4
+    np.testing.assert_allclose(own.events.event_time, ball.events.event_time, rtol=1e-13)
+    np.testing.assert_allclose(own.extrema.trough_time, ball.extrema.trough_time, rtol=1e-12)
+    np.testing.assert_allclose(own.series.lost, ball.series.lost, atol=1e-13)
+
+
+@pytest.mark.parametrize("kind", FIXED_STEP)
+def test_located_stops_and_impacts_leave_a_scheme_its_order(kind):
+    scheme = FIXED_STEP[kind]
+    order = scheme.formal_order("u", BETWEEN, scheme.defaults())
+    times, last = between(12.0)
+    assert len(times) > 6
+    found = []
+    for steps in (4800, 9600, 19200) if order == 1 else (600, 1200, 2400):
+        way = go(BETWEEN, kind, STOPS, (0.0, 1.0), 12.0, steps, n_events=len(times) + 1)
+        assert way.events.event_count[0] == len(times)
+        error = np.abs(way.events.event_time[0, :-1] - times).max()
+        found.append(error + np.abs(way.position[0, -1] - last[0]))
+        quarter = go(STOPPED, kind, {}, (1.0, 0.0), 2.0, steps // 20)
+        found[-1] += abs(quarter.events.rest_time[0] - math.pi / 2)
+    rates = [math.log2(a / b) for a, b in pairwise(found)]
+    assert abs(rates[-1] - order) < (0.35 if order == 1 else 0.25), (rates, found)
+    assert found[-1] < (0.1 if order == 1 else 1e-3)
+
+
+@pytest.mark.parametrize("lane", ["plain", "scalar"])
+def test_a_stop_ends_the_motion_with_the_state_as_it_is(lane):
+    steps = 400
+    way = go(STOPPED, "rk4", {}, (1.0, 0.0), 4.0, steps, lane=lane, with_series=True)
+    assert way.events.rest_time[0] == pytest.approx(math.pi / 2, abs=1e-9)
+    assert way.events.event_count[0] == 1
+    t = np.arange(steps + 1) * (4.0 / steps)
+    ended = t > math.pi / 2
+    assert np.ptp(way.position[0, ended]) == 0.0
+    assert way.position[0, -1] == pytest.approx(0.0, abs=1e-12)
+    np.testing.assert_allclose(way.velocity[0], -np.sin(np.minimum(t, math.pi / 2)), atol=1e-9)
+    assert np.all(way.series.lost == 0.0)
+
+
+def test_a_kicked_oscillator_is_known_between_its_kicks():
+    way = go(KICKED, "rk4", {"kick": 0.3}, (1.0, 0.0), 5.5, 2200, with_series=True, n_events=8)
+    np.testing.assert_allclose(way.events.event_time[0, :5], np.arange(1, 6), atol=1e-13)
+    assert way.events.event_count[0] == 5
+    u, v, lost = 1.0, 0.0, 0.0
+    for _ in range(5):
+        u, v = rotated(u, v, 1.0)
+        lost -= 0.5 * (v + 0.3) ** 2 - 0.5 * v * v
+        v += 0.3
+    u, v = rotated(u, v, 0.5)
+    np.testing.assert_allclose(way.states[:, 0, -1], (u, v), atol=1e-11)
+    assert way.series.lost[0, -1] == pytest.approx(lost, abs=1e-11)
+
+
+@pytest.mark.parametrize(
+    ("way", "times"),
+    [("falling", (0.5, 2.5, 4.5)), ("rising", (1.5, 3.5)), ("when", (0.5, 1.5, 2.5, 3.5, 4.5))],
+)
+@pytest.mark.parametrize("events", TREATMENTS)
+def test_a_body_that_goes_through_has_one_event_for_each_crossing_in_its_direction(
+    way, times, events
+):
+    model = written({f"events.1.{way}": "u", "spring": "pi**2*u"}, ())
+    found = go(model, "gauss4", {}, (1.0, 0.0), 5.2, 520, n_events=9, events=events).events
+    assert found.event_count[0] == len(times)
+    far = 1e-7 if events == "located" else 0.0101
+    np.testing.assert_allclose(found.event_time[0, : len(times)], times, atol=far)
+
+
+def test_who_begins_on_a_guard_goes_to_its_side_by_its_rate():
+    for v, count in ((1.0, 2), (-1.0, 1)):
+        model = written({"events.1.falling": "u", "spring": "pi**2*u"}, ())
+        found = go(model, "gauss4", {}, (0.0, v), 3.5, 350).events
+        assert found.event_count[0] == count, v
+
+
+def test_a_jump_of_the_position_takes_the_energy_of_the_spring_too():
+    model = written({"events.1.rising": "v", "events.1.then.u": "u/2", "damping": "0.1*v"}, ())
+    way = go(model, "gauss4", {}, (1.0, 0.0), 20.0, 1000, with_series=True)
+    u, v = way.states[:, 0]
+    energy = 0.5 * (u * u + v * v)
+    assert way.events.event_count[0] >= 3
+    assert way.series.lost[0, -1] > 0.1
+    left = energy - energy[0] + way.series.lost[0] + way.series.dissipated[0]
+    assert np.max(np.abs(left)) < 1e-7
+
+
+def test_simultaneous_events_happen_one_after_another():
+    texts = {"events.1.falling": "u", "events.2.falling": "2*u", "events.2.then.v": "-v"}
+    found = go(written(texts, ()), "rk4", {}, (1.0, 0.0), 3.0, 100, n_events=4)
+    assert found.events.event_count[0] == 2
+    np.testing.assert_allclose(found.events.event_time[0, :2], math.pi / 2, atol=1e-6)
+    assert found.position.min() > -1e-6
+
+
+def test_a_ball_that_does_not_bounce_stays_on_the_ground():
+    way = go(FALLING, "rk4", {"g": 1.0, "e": 0.0}, (1.0, 0.0), 5.0, 50)
+    assert way.events.rest_time[0] == pytest.approx(math.sqrt(2.0), rel=1e-12)
+    np.testing.assert_allclose(way.states[:, 0, -1], 0.0, atol=1e-12)
+
+
+@pytest.mark.parametrize("events", TREATMENTS)
+def test_lanes_have_the_same_bits(events):
+    more = {"events": events, "with_series": True, "n_extrema": 5, "n_events": 30}
+    plain, compiled = (
+        go(BETWEEN, "ab3", STOPS, (0.0, 1.0), 12.0, 300, lane=lane, **more)
+        for lane in ("plain", "scalar")
+    )
+    for a, b in (
+        (plain.states, compiled.states),
+        (plain.events.event_time, compiled.events.event_time),
+        (plain.series.lost, compiled.series.lost),
+    ):
+        assert a.tobytes() == b.tobytes()
+    assert plain.events.event_count[0] > 6

@@ -1,0 +1,125 @@
+"""Events and a stop as a user writes them, from text to `vibsim.models.events.Crossings`.
+
+They stand among the formulas of a user (`Model.formulas`) under names of their own: ``stop`` is a condition,
+``events.2.falling`` (or ``rising``, or ``when`` for both) the guard of event 2, counted from 1, and ``events.2.then.v``
+the value of the state v behind it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from vibsim.formula import (
+    Binary,
+    Call,
+    Compare,
+    Expression,
+    ExpressionError,
+    minus,
+    names_in,
+    parse,
+    to_formula,
+)
+from vibsim.models.events import Crossing, Crossings
+
+MOST_EVENTS = 8
+"""Events of a model, beside its stop."""
+STOP = "stop"
+DIRECTIONS: Mapping[str, int] = {"falling": -1, "when": 0, "rising": 1}
+"""The last word in the name of a guard."""
+
+
+def is_crossing(name: str) -> bool:
+    """Tell whether a formula is part of an event or a stop."""
+    return name == STOP or name.startswith("events.")
+
+
+def guard_name(number: int, falling: bool, rising: bool) -> str:
+    """Return the name of the guard of an event that happens where it falls, rises, or does either."""
+    word = "when" if falling == rising else "falling" if falling else "rising"
+    return f"events.{number}.{word}"
+
+
+def guard_of(condition: Expression) -> Expression:
+    """Return what falls below 0 where a condition begins to hold: a comparison, or some joined by and, or.
+
+    Raises
+    ------
+    ExpressionError
+        Where it is another formula, or asks for a single value.
+    """
+    match condition:
+        case Compare("<" | "<=", left, right):
+            return minus(left, right)
+        case Compare(">" | ">=", left, right):
+            return minus(right, left)
+        case Compare():
+            rule = "must not compare by == or !=: a motion meets no value exactly"
+            raise ExpressionError("", 0, rule, "write < or >")
+        case Binary("*", left, right):
+            return Call("max", (guard_of(left), guard_of(right)))
+        case Call("max", (left, right)):
+            return Call("min", (guard_of(left), guard_of(right)))
+    raise ExpressionError("", 0, "must be a comparison", "write u < 0, say")
+
+
+def crossings(texts: Mapping[str, str], names: tuple[str, ...]) -> Crossings | None:
+    """Return the events of some formulas, which may hold `names`; the stop is the last one. None where there are none.
+
+    Raises
+    ------
+    ExpressionError
+        Where a formula cannot be read.
+    """
+    rows = []
+    for number in range(1, MOST_EVENTS + 1):
+        head = f"events.{number}."
+        for word, direction in DIRECTIONS.items():
+            if head + word in texts:
+                own = {key: text for key, text in texts.items() if key.startswith(f"{head}then.")}
+                then = tuple((key.split(".")[-1], parse(text, names)) for key, text in own.items())
+                rows.append(Crossing(parse(texts[head + word], names), direction, then))
+    if STOP in texts:
+        rows.append(Crossing(guard_of(parse(texts[STOP], names)), -1, ends=True))
+    return Crossings(tuple(rows)) if rows else None
+
+
+def described(events: Crossings, texts: Mapping[str, str]) -> str:
+    """Return events as they stand behind an equation, each after a comma."""
+    words = {-1: " falls to 0", 0: " = 0", 1: " rises to 0"}
+    parts = []
+    for row in events.rows:
+        if row.ends:
+            parts.append(f"end where {texts[STOP]}")
+            continue
+        changes = [f"{name} -> {_text(value)}" for name, value in row.then]
+        guard = _text(row.guard)
+        parts.append(f"{', '.join(changes) or 'event'} where {guard}{words[row.direction]}")
+    return "".join(f", {part}" for part in parts)
+
+
+def _text(formula: str | Expression) -> str:
+    return formula if isinstance(formula, str) else to_formula(formula)
+
+
+def written(texts: Mapping[str, str]) -> dict[str, Any]:
+    """Return events and stop as they stand in a file."""
+    events = []
+    for name, guard in sorted(texts.items()):
+        head, _, word = name.rpartition(".")
+        if name.startswith("events.") and word in DIRECTIONS and not head.endswith(".then"):
+            event: dict[str, Any] = {"when": guard}
+            event |= {word: True} if DIRECTIONS[word] else {}
+            then = f"{head}.then."
+            changes = {
+                key.removeprefix(then): x for key, x in texts.items() if key.startswith(then)
+            }
+            events.append(event | ({"then": changes} if changes else {}))
+    found: dict[str, Any] = {"events": events} if events else {}
+    return found | ({STOP: texts[STOP]} if STOP in texts else {})
+
+
+def is_constant(guard: Expression, states: tuple[str, ...]) -> bool:
+    """Tell whether a guard depends on no state and not on the time."""
+    return set(names_in(guard)).isdisjoint((*states, "t"))
