@@ -114,6 +114,18 @@ def test_a_stop_ends_the_motion_with_the_state_as_it_is(lane):
     assert np.all(way.series.lost == 0.0)
 
 
+def test_on_the_mesh_a_stop_is_the_first_grid_point_where_it_holds():
+    """As the text ends a motion where |theta| < 1e-3 (B, section 10.6), which may be grid points behind a crossing."""
+    stopped = written({"stop": "abs(u) < 0.05", "spring": "sin(u)", "damping": "0.1*v"}, ())
+    free = written({"spring": "sin(u)", "damping": "0.1*v"}, ())
+    smooth = go(free, "rk4", {}, (2.0, 0.0), 40.0, 400)
+    way = go(stopped, "rk4", {}, (2.0, 0.0), 40.0, 400, events="mesh")
+    first = int(np.argmax(np.abs(smooth.position[0]) < 0.05))
+    assert way.events.rest_time[0] == first * (40.0 / 400)
+    np.testing.assert_array_equal(way.states[:, 0, : first + 1], smooth.states[:, 0, : first + 1])
+    assert np.all(way.states[:, 0, first:] == way.states[:, 0, first : first + 1])
+
+
 def test_a_kicked_oscillator_is_known_between_its_kicks():
     way = go(KICKED, "rk4", {"kick": 0.3}, (1.0, 0.0), 5.5, 2200, with_series=True, n_events=8)
     np.testing.assert_allclose(way.events.event_time[0, :5], np.arange(1, 6), atol=1e-13)

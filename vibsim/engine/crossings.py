@@ -27,7 +27,8 @@ nearest_watched = sides_behind = sides_followed = sides_of = unbound
 def put_rows(module: Module, events: Crossings, *, is_located: bool) -> None:
     """Write what goes through all guards, and what tells one event from another.
 
-    On the mesh an event that is noticed late may be over: it happens where the guard still goes its way.
+    On the mesh a guard that is noticed late may have turned back: an event happens where it still goes its way, and the
+    motion ends whatever it does.
     """
     for text in (side_of, is_watched, nearer, free_side, side_behind, on_its_side):
         collect(module, text, text.__name__, {})
@@ -46,13 +47,16 @@ def put_rows(module: Module, events: Crossings, *, is_located: bool) -> None:
         "return least",
     )
     fires = "side_of(mode, {s}) * g[{k}] < 0.0 and is_watched(side_of(mode, {s}), {d})"
-    fires += "" if is_located else " and side_of(mode, {s}) * r[{k}] < 0.0"
+    goes_on = "" if is_located else " and side_of(mode, {s}) * r[{k}] < 0.0"
     module.define(
         "first_crossed(mode, g, r)",
         *(
             line
-            for k, _, s, d in rows
-            for line in (f"if {fires.format(k=k, s=s, d=d)}:", f"    return {float(k)}")
+            for k, row, s, d in rows
+            for line in (
+                f"if {(fires + ('' if row.ends else goes_on)).format(k=k, s=s, d=d)}:",
+                f"    return {float(k)}",
+            )
         ),
         "return -1.0",
     )
@@ -148,7 +152,7 @@ def guard(u: float, v: float, t: float, p: P) -> float:
 
 
 def guard_on_mesh(u: float, v: float, t: float, p: P) -> float:
-    """Return a number below 0 at a grid point behind a crossing that still goes on."""
+    """Return a number below 0 at a grid point where an event happens, or the motion ends."""
     mode = mode_of(p)
     if mode == 0.0:
         return 1.0

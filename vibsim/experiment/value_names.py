@@ -98,7 +98,7 @@ without the end points
 event_count | none | count | events | number of events, where the motion is not smooth
 first_event_time | none | time | events | time of the first event
 last_event_time | none | time | events | time of the last event
-rest_time | none | time | events | time from which the body was at rest to the end
+rest_time | none | time | events | time from which the body was at rest to the end, or of its stop
 accepted_steps | none | count | | number of steps taken
 force_evaluations | none | count | | number of evaluations of the acceleration; of an implicit scheme those of \
 one iteration per step

@@ -341,7 +341,7 @@ def _events(found: EventTimes) -> Iterable[Row]:
     yield "event_count", found.event_count, words, "1"
     yield "first_event_time", found.first_event_time, "time of the first event", "s"
     yield "last_event_time", found.last_event_time, "time of the last event", "s"
-    words = "time from which the member was at rest to the end"
+    words = "time from which the member was at rest to the end, or of its stop"
     yield "rest_time", found.rest_time, words, "s"
 
 

@@ -17,7 +17,7 @@ from vibsim.core.array_types import Floats
 from vibsim.core.record import Record
 from vibsim.experiment.schema.figures import LEVEL, MEMBER, FigureOfSource
 from vibsim.formula import parse, values
-from vibsim.models.events import Impact
+from vibsim.models.events import Crossings, Impact
 from vibsim.report import choice, data, series, style
 from vibsim.report.data import Member
 from vibsim.report.figures import panels
@@ -186,7 +186,7 @@ def _draw(
             ax.plot(*style.thin(fine, best), color=PALE, linewidth=4.5, label="exact", zorder=1)
             exact.append(best)
     size = max(map(data.largest, exact), default=0.0)
-    drawn, jumps = [], isinstance(model.events, Impact)
+    drawn, jumps = [], isinstance(model.events, Impact | Crossings)
     for k, (text, member) in enumerate(panel.runs):
         t = data.times(record, member.case)
         found = series.on_level(experiment, record, panel.quantity, member, panel.level)
