@@ -8,6 +8,8 @@ import pytest
 from event_runs import BALL, TREATMENTS, run
 
 from vibsim.engine import integrate
+from vibsim.models.base import Model, Parameter, State
+from vibsim.models.events import Crossing, Crossings
 from vibsim.models.oscillator import written
 from vibsim.schemes import FIXED_STEP
 
@@ -185,6 +187,50 @@ def test_a_ball_that_does_not_bounce_stays_on_the_ground():
     way = go(FALLING, "rk4", {"g": 1.0, "e": 0.0}, (1.0, 0.0), 5.0, 50)
     assert way.events.rest_time[0] == pytest.approx(math.sqrt(2.0), rel=1e-12)
     np.testing.assert_allclose(way.states[:, 0, -1], 0.0, atol=1e-12)
+
+
+PLANE = Model(
+    kind="plane",
+    title="Two uncoupled bodies",
+    source="test",
+    equation="x'' = -x, y'' = -g",
+    states=(
+        State("x", "m", "x"),
+        State("y", "m", "y"),
+        State("vx", "m", "x"),
+        State("vy", "m", "y"),
+    ),
+    parameters=(Parameter("g", 1.0, "1", "gravity"),),
+    acceleration="-x",
+    further_accelerations=("-g",),
+    kinetic_energy="0.5*vx**2 + 0.5*vy**2",
+    potential_energy="0.5*x**2 + g*y",
+    energy_unit="J",
+    linear=False,
+    conservative=False,
+    natural_frequency=lambda parameters: parameters["g"],
+    events=Crossings(
+        (Crossing("y", -1, (("vy", "-0.8*vy"),)), Crossing("x - 0.5", 1, (("vx", "-vx"),)))
+    ),
+)
+WALL = {"events.1.rising": "u - 0.5", "events.1.then.v": "-v"}
+
+
+@pytest.mark.parametrize("lane", ["plain", "scalar"])
+@pytest.mark.parametrize("kind", ["rk4", "central", "gauss4", "ab3"])
+def test_events_of_several_coordinates_are_those_of_each_alone(kind, lane):
+    more = {"lane": lane, "with_series": True, "n_events": 20}
+    both = go(PLANE, kind, {"g": 1.0}, (-1.0, 1.0, 0.0, 0.0), 6.0, 600, **more)
+    ball = go(FALLING, kind, {"g": 1.0, "e": 0.8}, (1.0, 0.0), 6.0, 600, **more)
+    struck = go(written(WALL, ()), kind, {}, (-1.0, 0.0), 6.0, 600, **more)
+    np.testing.assert_allclose(both.states[1], ball.position, atol=2e-4)
+    np.testing.assert_allclose(both.states[0], struck.position, atol=2e-4)
+    times = np.sort([*ball.events.event_time[0], *struck.events.event_time[0]])
+    count = int(both.events.event_count[0])
+    assert count == ball.events.event_count[0] + struck.events.event_count[0] >= 4
+    np.testing.assert_allclose(both.events.event_time[0, :count], times[:count], atol=1e-4)
+    np.testing.assert_allclose(both.series.lost[0, -1], ball.series.lost[0, -1], atol=1e-4)
+    assert both.gathered.ranges[0, 1].tolist() == pytest.approx([0.0, 1.0], abs=1e-2)
 
 
 @pytest.mark.parametrize("events", TREATMENTS)

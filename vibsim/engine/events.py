@@ -20,7 +20,9 @@ from vibsim.engine.kernel_stubs import P, State, called, unbound
 
 # bound by the kernel (`vibsim.engine.kernel_stubs`)
 GATHER = LOCATED = WORK = True
-first_mode = followed = guard = guard_on_mesh = held = landed = lost = mode_of = powers = unbound
+first_mode = first_of = followed = guard = guard_on_mesh = held = landed = lost = mode_of = (
+    powers
+) = unbound
 settled = spent = start = start_of = step = turning = with_mode = unbound
 
 # Columns of `stats` behind those of `vibsim.engine.gather`. HALTED and HALTED_GRID: the mode before the body came to
@@ -32,6 +34,10 @@ settled = spent = start = start_of = step = turning = with_mode = unbound
 EVENT_COUNT, FIRST_EVENT, LAST_EVENT, REST_TIME = range(N_STATS, N_STATS + 4)
 HALTED, HALTED_GRID, LOST, DONE, TAKEN, TURN_TIME, TURN = range(N_STATS + 4, N_STATS + 11)
 N_STATS_EVENTS = N_STATS + 13
+_COLUMNS = (
+    *("EVENT_COUNT", "FIRST_EVENT", "LAST_EVENT", "REST_TIME", "HALTED", "HALTED_GRID", "LOST"),
+    *("DONE", "TAKEN", "TURN_TIME", "TURN", "N_STATS_EVENTS"),
+)
 
 MOST_EVENTS = 256
 """Events of a step; a member with more comes to rest until the next grid point."""
@@ -39,6 +45,12 @@ MOST_TRIALS = 200
 """Trials for the time of an event: every third halves the interval."""
 SHARP = 2.0**-52
 """The time is known to this part of the step."""
+
+
+def columns(coordinates: int) -> dict[str, int]:
+    """Return the numbers of these columns, by their names here, behind those of all coordinates."""
+    further = (coordinates - 1) * N_STATS
+    return {name: globals()[name] + further for name in _COLUMNS}
 
 
 @called
@@ -126,10 +138,10 @@ def across(
         p = with_mode(p, mode, t)
     if GATHER:
         stats, _, case = record
-        stats[case, LOST] = stats[case, LOST] + lost((u, v), (u, 0.0), t, p)
+        stats[case, LOST] = stats[case, LOST] + lost((u, v), (u, v - v), t, p)
         stats[case, REST_TIME] = t
         stats[case, HALTED] = math.nan
-    return u, 0.0, with_mode(p, 0.0, end), MOST_EVENTS
+    return u, v - v, with_mode(p, 0.0, end), MOST_EVENTS
 
 
 @called
@@ -228,7 +240,7 @@ def note_event(
     """
     stats, counts, case = record
     stats[case, LOST] = stats[case, LOST] + lost(came, goes, t, p)
-    u = goes[0]
+    u = first_of(goes[0])
     since, point = t, grid
     if before == 0.0:
         since, point, before = stats[case, REST_TIME], stats[case, HALTED_GRID], stats[case, HALTED]
@@ -242,7 +254,7 @@ def note_event(
         stats[case, place] = t
     stats[case, EVENT_COUNT] += 1.0
     stats[case, REST_TIME] = t if after == 0.0 else math.nan
-    kind = turning(before, after, came[1], goes[1])
+    kind = turning(before, after, first_of(came[1]), first_of(goes[1]))
     if kind != 0.0:
         note_turning(stats, counts, case, since, point, u, kind)
         side = 0 if kind > 0.0 else 2

@@ -173,6 +173,12 @@ def put_functions(
             returned = f"({returned},)"
         elif model.coordinates > 1 and function == "acceleration":
             returned = f"vector({returned})"
+        elif model.coordinates > 1 and function.startswith("crossed_"):
+            half = len(results) // 2
+            returned = ", ".join(
+                f"vector({', '.join(part)})"
+                for part in (list(results)[:half], list(results)[half:])
+            )
         lines.append(f"return {returned}")
         module.define(f"{function}{suffix}({arguments})", *lines)
 

@@ -21,6 +21,7 @@ from vibsim.engine import (
     block_loop,
     coordinates,
     crossings,
+    events,
     friction,
     gather,
     impact,
@@ -161,6 +162,7 @@ def _written(
         "PARAMETERS": parameters,
         **block_loop.row_places(states, parameters, with_peaks),
         **gather.sample_rows(count),
+        **events.columns(count),
     }
     if count > 1:
         settings["ZERO"] = coordinates.vector(*[0.0] * count)

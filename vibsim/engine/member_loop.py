@@ -76,7 +76,7 @@ def run(members: Any, span: Any, settings: Any, found: Any, rows: Any) -> None:
         q, w = initial_of(initial, case)
         u, v = first_of(q), first_of(w)
         if EVENTS:
-            p = begun(stats, case, u, v, p)
+            p = begun(stats, case, q, w, p)
             last_event = -1
         energy_0 = 0.0
         if GATHER:

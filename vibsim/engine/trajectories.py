@@ -96,7 +96,8 @@ def integrate(
     if has_work:
         last_row = "LOST_ROW" if has_events else "DRIVEN_ROW"
     n_rows = rows[last_row] + 1 if with_series else 2 * count
-    columns = events.N_STATS_EVENTS + n_events if has_events else count * gather.N_STATS
+    of_events = events.columns(count)
+    columns = of_events["N_STATS_EVENTS"] + n_events if has_events else count * gather.N_STATS
     samples = np.full((n_rows, members, steps // every + 1), np.nan)
     stats = np.full((members, columns if with_gathered else 0), np.nan)
     n_counts = extrema.N_COUNTS_KEPT if n_extrema else gather.N_COUNTS
@@ -123,14 +124,15 @@ def integrate(
         with ThreadPoolExecutor(threads) as pool:
             list(pool.map(task, range(0, members, TASK)))
     found = counts[:, [extrema.PEAK_COUNT, extrema.TROUGH_COUNT]].T if n_extrema else ()
-    of_events = stats[:, events.EVENT_COUNT : events.REST_TIME + 1].T
+    numbers_of_events = stats[:, of_events["EVENT_COUNT"] : of_events["REST_TIME"] + 1].T
+    event_times = stats[:, of_events["N_STATS_EVENTS"] :]
     return Trajectories(
         states=samples[: 2 * count],
         last_step=counts[:, gather.LAST_STEP],
         gathered=results.gathered_of(stats, counts, numbers[3], count) if with_gathered else None,
         series=results.series_of(samples, count, has_work, has_events) if with_series else None,
         extrema=results.Extrema(*kept, *found) if n_extrema else None,
-        events=results.EventTimes(*(*of_events, stats[:, events.N_STATS_EVENTS :]))
+        events=results.EventTimes(*(*numbers_of_events, event_times))
         if has_events and with_gathered
         else None,
     )
