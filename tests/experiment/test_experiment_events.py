@@ -119,6 +119,7 @@ def test_events_and_a_stop_are_read_and_written_back(tmp_path: Path) -> None:
         ({"model": OWN | {"stop": "u > gap"}}, "model.stop", "holds at the start already"),
         ({"model": STRUCK | {"damping": {"coulomb": 0.1}}}, "model.damping.coulomb", "or a stop"),
         ({"model": STRUCK | {"exact": "sin(t)"}, "initial": {}}, "model.exact", "or a stop"),
+        ({"model": STRUCK, "scaled": True}, "scaled", "its events are formulas in the units"),
         ({"model": STRUCK, "schemes": ["rk4", "dop853"]}, "schemes[1]", "its own steps across"),
     ],
 )

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from vibsim.experiment.data import Scaling, TimeSpec
 from vibsim.experiment.faults import Report
 from vibsim.models import MODELS, Model, natural_end
+from vibsim.models.events import Crossings
 from vibsim.models.shared.scales import scaled_parameters, scales
 
 
@@ -76,6 +77,8 @@ def _refusal(model: Model) -> tuple[str, str]:
     if model.lookup is not None:
         what = f"{rule} here: the numbers of its table have units, and stay what they are"
         return what, "leave it out, or write the table's curve as a formula"
+    if isinstance(model.events, Crossings):
+        return f"{rule} here: its events are formulas in the units of the file", "leave it out"
     if model.formulas:
         why = "its spring has no stiffness at u = 0, by which time would be measured"
         return f"{rule}: {why}", "leave it out"
