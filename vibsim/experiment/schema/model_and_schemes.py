@@ -183,7 +183,7 @@ def _formula_type(model: Model, field: FormulaField) -> Any:
     return by_shape(create_model(name, __base__=Section, **fields), FormulaText)
 
 
-class Event(MadeSection):
+class Event(Section):
     """An event that a user writes as formulas."""
 
     when: Annotated[
@@ -238,8 +238,8 @@ def model_section(model: Model) -> type[Section]:
         fields["parameters"] = (Declared, Field(default={}, description=words))
     if model.takes_events:
         words = "events: where a formula crosses 0, states get new values"
-        several = Annotated[tuple[Event, ...], short(MOST_EVENTS)]
-        fields["events"] = (several, Field(default=(), description=words))
+        events = Annotated[tuple[Event, ...], short(MOST_EVENTS)]
+        fields["events"] = (events, Field(default=(), description=words))
         words = "a comparison, u < 0 say, which ends the motion where it begins to hold"
         fields[STOP] = (FormulaText | None, Field(default=None, description=words))
     doc = f"{model.title}: {model.equation} ({model.source})."
