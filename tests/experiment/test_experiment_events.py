@@ -105,6 +105,9 @@ def test_events_and_a_stop_are_read_and_written_back(tmp_path: Path) -> None:
     [
         (with_event(when="u - gapp"), "model.events[0].when", "unknown name 'gapp'"),
         (with_event(when="u > gap"), "model.events[0].when", "and no comparison"),
+        (with_event(when="mod(t, 2) - 1"), "model.events[0].when", "must not jump, as mod does"),
+        (with_event(when="u + abs(sign(v))"), "model.events[0].when", "must not jump, as sign"),
+        (with_event(when="u*(v > 0)"), "model.events[0].when", "as a comparison by > does"),
         (with_event(when="gap"), "model.events[0].when", "never changes: it names neither t nor"),
         (with_event(then={"w": "0"}), "model.events[0].then.w", "unknown state"),
         (with_event(then={"v": "-w"}), "model.events[0].then.v", "unknown name 'w'"),

@@ -12,7 +12,16 @@ from vibsim.core.errors import nearest
 from vibsim.experiment.faults import Report
 from vibsim.experiment.schema.sweep import Axis
 from vibsim.experiment.sweep_columns import columns_of
-from vibsim.formula import MAX_CHARACTERS, Compare, Expression, ExpressionError, parse, values
+from vibsim.formula import (
+    MAX_CHARACTERS,
+    Call,
+    Compare,
+    Expression,
+    ExpressionError,
+    parse,
+    values,
+)
+from vibsim.formula.tree import STEPS, children
 from vibsim.models import Model, tree
 from vibsim.models.base import rate
 from vibsim.models.events import Crossings
@@ -48,6 +57,10 @@ def read_crossings(
             rule = "must be a formula that crosses 0, and no comparison"
             hint = "write u - gap and rising: true for u > gap"
             report.add((*path, "when"), rule, hint, event.when)
+        elif guard is not None and (jumps := _jumps(guard)):
+            rule = f"must not jump, as {jumps} does: it must cross 0"
+            hint = "for kicks with the period T write sin(pi*t/T)"
+            report.add((*path, "when"), rule, hint, event.when)
         elif guard is not None and is_constant(guard, states):
             rule = f"never changes: it names neither t nor {' or '.join(states)}"
             report.add((*path, "when"), rule, value=event.when)
@@ -69,6 +82,19 @@ def read_crossings(
         except ExpressionError as error:
             report.add(("model", STOP), error.rule, error.hint, section.stop)
     return texts
+
+
+def _jumps(node: Expression) -> str:
+    """Name what in a formula jumps; nothing where it does not, as a comparison within `where` need not."""
+    parts = children(node)
+    match node:
+        case Compare(symbol):
+            return f"a comparison by {symbol}"
+        case Call(function) if function in STEPS or function == "mod":
+            return function
+        case Call("where"):
+            parts = parts[1:]
+    return next(filter(None, map(_jumps, parts)), "")
 
 
 def _is_without_way(event: Any, path: tuple[str, str, int], report: Report) -> bool:

@@ -242,8 +242,8 @@ def events(record: Record) -> Table | None:
     if not (count > 0.0).any():
         return None
     caption = (
-        "Events (impacts; turns and starts of a body under friction): where they are located, their times move with "
-        "the level as the error of the scheme does, else by part of a step"
+        "Events (impacts; turns and starts of a body under friction; events of the file): where they are located, "
+        "their times move with the level as the error of the scheme does, else by part of a step"
     )
     seconds = time_unit(record, "first_event_time")
 
