@@ -153,15 +153,14 @@ def _heading(row: Row) -> tuple[str, list[str]]:
     text, section = found["text"], found["section"]
     if text not in TEXTS:
         raise ValueError(f"{row.source}: no text of these: {', '.join(TEXTS)}")
-    return text, re.findall(r"[\d.]+", section) if section else [EXERCISES]
+    return text, citation.numbers(section) if section else [EXERCISES]
 
 
 def _place(row: Row) -> str:
     """Return equation, figure and exercise of a row."""
     found = citation.fields(row.source)
     assert found is not None
-    named = {name: found[name] for name in citation.PLACES[1:]}
-    return citation.line({"text": "", **named}).removeprefix(", ")
+    return citation.place(found)
 
 
 def _order(section: str) -> tuple[bool, list[int]]:

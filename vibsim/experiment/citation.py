@@ -22,6 +22,7 @@ FIELDS = {
 """What a source may name, in the order of its line, with the meaning."""
 PLACES = tuple(FIELDS)[1:]
 _AND = r"(?:, and |, | and )"
+_BETWEEN = re.compile(f"{_AND}| to ")
 _NUMBER = r"(?:[A-Z0-9][\w.'-]*(?: [a-z](?!\w))?|[a-z](?!\w))(?:-[a-z](?!\w))?"
 _ITEM = rf"(?:{_NUMBER}|\({_NUMBER}\))"
 LIST = re.compile(rf"{_ITEM}(?:(?:{_AND}| to ){_ITEM})*")
@@ -41,16 +42,27 @@ def fields(source: str | None) -> dict[str, str | None] | None:
     found = _SOURCE.fullmatch(source)
     if found is None:
         return {"text": source} | dict.fromkeys(PLACES)
-    numbers = {name: found[name] and re.sub("[()]", "", found[name]) for name in PLACES}
-    return {"text": found["text"]} | numbers
+    places = {name: found[name] and re.sub("[()]", "", found[name]) for name in PLACES}
+    return {"text": found["text"]} | places
+
+
+def numbers(several: str) -> list[str]:
+    """Return the numbers that a field names; of a range its two ends."""
+    return _BETWEEN.split(several)
+
+
+def place(source: Mapping[str, str | None]) -> str:
+    """Return what a source names within its section: equation, figure and exercise."""
+    return line({name: source[name] for name in PLACES[1:]})
 
 
 def line(source: Mapping[str, str | None]) -> str:
     """Return the line of a source that is given by its `FIELDS`."""
-    parts = [source["text"] or ""]
+    text = source.get("text")
+    parts = [text] if text else []
     for name in PLACES:
         if number := source.get(name):
-            plural = "s" if re.search(f"{_AND}| to ", number) else ""
+            plural = "s" if len(numbers(number)) > 1 else ""
             if name == "equation":
                 number = re.sub(r"\b(?!and\b|to\b)[\w.'-]+", r"(\g<0>)", number)
             parts.append(f"{name}{plural} {number}")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -14,7 +13,6 @@ from vibsim.report.text import words
 CORRECTION = "correction of the "
 """Begins the source of a claim that says what is true where a text is wrong."""
 CONFIRMED, CORRECTED, OPEN = "CONFIRMED", "CORRECTED", "OPEN"
-_NUMBER = re.compile(r"[A-Z0-9][\w.'-]*(?: [a-z]\b)?")
 
 
 @dataclass(frozen=True)
@@ -60,9 +58,8 @@ def _statement(
 ) -> Statement:
     is_corrected = words.is_trap(check) or str(source["text"]).startswith(CORRECTION)
     badge = CORRECTED if is_corrected else CONFIRMED
-    places = {key: source[key] for key in citation.PLACES[1:]} if source["section"] else {}
     return Statement(
-        citation.line({"text": "", **places}).removeprefix(", "),
+        citation.place(source) if source["section"] else "",
         str(check["text"]).removeprefix("Claim: "),
         str(check["note"] or ""),
         badge if check["status"] == "PASS" else OPEN,
@@ -75,5 +72,5 @@ def _places(source: Mapping[str, str | None]) -> Iterator[tuple[str, str, str]]:
     """Yield the text, the kind and the number of every section that is named, else of every equation and so on."""
     kind = next(kind for kind in citation.PLACES if source[kind])
     text = str(source["text"]).removeprefix(CORRECTION)
-    for number in _NUMBER.findall(str(source[kind])):
+    for number in citation.numbers(str(source[kind])):
         yield text, kind, number
