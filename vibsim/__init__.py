@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from vibsim.experiment import Experiment
     from vibsim.ladder import best
     from vibsim.simulation import simulate
+    from vibsim.store.tree import open as open  # noqa: A004
 
 __version__ = "0.1.0"
 
@@ -28,6 +29,7 @@ _HOME = {
     "analyse": "vibsim.analysis",
     "best": "vibsim.ladder",
     "judge": "vibsim.convergence",
+    "open": "vibsim.store.tree",
     "simulate": "vibsim.simulation",
     "verdicts": "vibsim.analysis",
 }
@@ -51,4 +53,5 @@ __getattr__ = loader(__name__, _HOME)
 
 
 def __dir__() -> list[str]:
-    return __all__
+    # `import *` must not hide the open of Python
+    return [*__all__, "open"]

@@ -144,6 +144,11 @@ def simulate_record(
     names = [scheme.name for scheme in experiment.schemes]
     coords = coordinates(model, names, group, steps, every, same_end=not experiment.end_varies)
     coords |= _table((), [("level", np.array(level, dtype=np.int16), "level", "1")])
+    if found.extrema:
+        # levels keep different numbers of them; with their numbers xarray can put levels side by side
+        number = np.arange(found.extrema.peak.shape[-1], dtype=np.int32)
+        words = "number of the peak or trough, from 0"
+        coords |= _table(("extremum",), [("extremum", number, words, "1")])
     return in_scales(Record(coords, variables, attrs), experiment)
 
 
