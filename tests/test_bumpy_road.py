@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from contextlib import chdir
 from math import pi, sin
 from pathlib import Path
 
 import numpy as np
+import yaml
 from scipy.integrate import solve_ivp
 
+from vibsim import analyse, simulate, verdicts
 from vibsim.experiment import Experiment
 
 FOLDER = Path(__file__).parents[1] / "configs" / "vibration_text"
@@ -27,7 +30,8 @@ def test_the_heights_are_those_of_the_formula() -> None:
     assert np.abs(h - [height(place) for place in x]).max() < 0.51e-4
 
 
-def test_the_claimed_end_is_that_of_another_solver() -> None:
+def by_another_solver(speed: float) -> float:
+    """Return the position at the end of the road, by SciPy from corner to corner of the force."""
     _, h = np.loadtxt(ROAD, delimiter=",", skiprows=3).T
     q = np.empty(801)
     q[1:-1] = (h[:-2] - 2 * h[1:-1] + h[2:]) / 0.1**2
@@ -36,14 +40,42 @@ def test_the_claimed_end_is_that_of_another_solver() -> None:
     for i in range(800):
 
         def right(t: float, y: np.ndarray, i: int = i) -> tuple[float, float]:
-            bend = q[i] + (80 * t - i) * (q[i + 1] - q[i])
-            return y[1], -bend * 8.0**2 - (80 * y[1] + 600 * y[0]) / 60
+            bend = q[i] + (10 * speed * t - i) * (q[i + 1] - q[i])
+            return y[1], -bend * speed**2 - (80 * y[1] + 600 * y[0]) / 60
 
-        span = (i / 80, (i + 1) / 80)
+        span = (i / (10 * speed), (i + 1) / (10 * speed))
         y = solve_ivp(right, span, y, method="DOP853", rtol=3e-14, atol=1e-16).y[:, -1]
+    return float(y[0])
+
+
+def test_the_claimed_end_is_that_of_another_solver() -> None:
+    end = by_another_solver(8.0)
     (claim,) = (
         c
         for c in Experiment.from_yaml(FOLDER / "bumpy_road.yaml").checks
         if c.id == "by_another_solver"
     )
-    assert abs(claim.measured.equals - y[0]) < 1e-9 * abs(y[0])
+    assert abs(claim.measured.equals - end) < 1e-9 * abs(end)
+
+
+def test_steps_from_point_to_point_keep_their_order_at_every_speed() -> None:
+    given = yaml.safe_load((FOLDER / "bumpy_road.yaml").read_text())
+    speeds = [3.7, 13.3]
+    content = {
+        "title": "Two speeds",
+        "model": given["model"],
+        "time": {"steps_per_point": 1},
+        "levels": [0, 1, 2, 3],
+        "schemes": ["rk4"],
+        "sweep": {"model.speed": speeds},
+    }
+    with chdir(FOLDER):
+        experiment = Experiment.from_dict(content)
+    levels = [simulate(experiment, level) for level in experiment.levels]
+    for found in verdicts(experiment, analyse(experiment, levels)):
+        assert (found.status, found.reason) == ("PASS", "asymptotic")
+        assert all(abs(row.facts["order"] - 4) < 0.1 for row in found.results)
+    for case, speed in enumerate(speeds):
+        ends = [float(level.u[0, case, -1]) for level in levels]
+        errors = [abs(end - by_another_solver(speed)) for end in ends[:2]]
+        assert errors[1] < errors[0] / 12 < 1e-7

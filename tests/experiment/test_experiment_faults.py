@@ -103,6 +103,18 @@ CASES: list[tuple[dict[str, Any], str, str, str]] = [
     ({"time": {"end": 1, "periods": 1}}, "time.periods", "together with end", ""),
     ({"time": {"periods": 1}}, "time.steps_per_period", "required key is missing", ""),
     ({"time": {"steps_per_period": 4}}, "time.periods", "required key is missing", ""),
+    (
+        {
+            "model": {"kind": "oscillator", "spring": "k*u", "parameters": {"k": 1.0}},
+            "initial": {"u": 1.0},
+            "checks": [],
+            "time": {"periods": 1, "steps_per_period": 4},
+            "sweep": {"model.parameters.k": [1.0, 0.0]},
+        },
+        "time.periods",
+        "no natural period where model.parameters.k = 0",
+        "leave that member out",
+    ),
     ({"time": {"periods": 1.1, "steps_per_period": 4}}, "time.steps_per_period", "whole", "4.4"),
     (
         {"time": {"periods": 2, "steps_per_period": 4, "base_steps": 2}},

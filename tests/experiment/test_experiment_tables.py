@@ -287,3 +287,59 @@ def test_a_scaled_run_is_refused_for_its_table_and_not_for_its_spring(tmp_path: 
     assert fault.key == "scaled"
     assert "table" in fault.rule
     assert "spring" not in fault.rule
+
+
+def on_points(folder: Path, rows: list[str], time: str, more: str = "") -> Experiment:
+    table(folder, rows)
+    text = TEXT.replace("ROAD", "{table: road.csv}").replace("{end: 2, base_steps: 100}", time)
+    return Experiment.from_yaml(write(folder, text + more))
+
+
+@pytest.mark.parametrize("behind", [0, 30])
+def test_steps_end_at_the_points_at_every_speed(tmp_path: Path, behind: int) -> None:
+    """Of the table of 10 m, `behind` spacings lie behind the start."""
+    rows = [f"{i / 10 - behind / 10:g},{h:g}" for i, h in enumerate(HEIGHTS)]
+    sweep = "sweep: {model.speed: [0.7, 5, 12.3]}\n"
+    found = on_points(tmp_path, rows, "{steps_per_point: 3}", sweep)
+    assert found.time.base_steps == 3 * (100 - behind)
+    assert found.end_varies
+    assert found.model.tables["road"].is_met
+    speeds = np.array([0.7, 5.0, 12.3])
+    ends = found.natural_end({**found.model.parameters, "speed": speeds})
+    np.testing.assert_allclose(speeds * ends, 10.0 - behind / 10, rtol=1e-14)
+    assert restore(canonical(found), found.file) == found
+
+
+@pytest.mark.parametrize(
+    ("rows", "time", "more", "rule"),
+    [
+        (ROWS, "{steps_per_point: 1, end: 2}", "", "together with steps_per_point"),
+        (ROWS, "{steps_per_point: 0}", "", "at least 1"),
+        (ROWS, "{steps_per_point: 1}", "sweep: {model.speed: [2, 0]}", "where model.speed = 0"),
+        ([f"{i / 10 - 0.05:g},0" for i in range(9)], "{steps_per_point: 1}", "", "a point at 0"),
+        (["-2,0", "-1,1", "0,0"], "{steps_per_point: 1}", "", "points behind it"),
+    ],
+)
+def test_steps_from_point_to_point_are_refused_where_there_are_none(
+    tmp_path: Path, rows: list[str], time: str, more: str, rule: str
+) -> None:
+    with pytest.raises(InputError) as caught:
+        on_points(tmp_path, rows, time, more)
+    (fault,) = caught.value.faults
+    assert rule in fault.rule
+    assert fault.line > 0
+
+
+def test_steps_from_point_to_point_need_a_table(tmp_path: Path) -> None:
+    with pytest.raises(InputError) as caught:
+        on_points(tmp_path, ROWS, "{steps_per_point: 1}", "").from_dict(
+            {
+                "title": "No table",
+                "model": {"kind": "spring"},
+                "initial": {"u": 1.0},
+                "time": {"steps_per_point": 1},
+                "levels": [3, 4, 5],
+                "schemes": ["central"],
+            }
+        )
+    assert "needs a model with a table" in str(caught.value)

@@ -29,7 +29,7 @@ from vibsim.experiment.schema.fields import (
 from vibsim.experiment.schema.figures import FigureOfSource
 from vibsim.experiment.schema.published import PublishedTable
 from vibsim.experiment.schema.sweep import Axis
-from vibsim.models import MODELS, Model, centred, natural_end, quantities
+from vibsim.models import MODELS, Model, centred, natural_end, quantities, table_end
 from vibsim.models.table import Table
 from vibsim.schemes import SCHEMES, Scheme
 
@@ -119,6 +119,19 @@ class TimeSpec(Section):
     """Steps at level 0."""
     periods: float | None = None
     """The end in natural periods, where the file gives it so: each member then has its own end."""
+    steps_per_point: int | None = None
+    """Steps at level 0 from a point of the model's table to the next, where the file gives these instead of an end."""
+
+    @property
+    def is_of_model(self) -> bool:
+        """Whether the end follows from the parameters of the model."""
+        return self.periods is not None or self.steps_per_point is not None
+
+    def end_of(self, model: Model, parameters: Mapping[str, Any]) -> Any:
+        """Return the end time of members with these `parameters` (numbers or arrays), unless swept."""
+        if self.periods is not None:
+            return natural_end(model, self.periods, parameters)
+        return self.end if self.steps_per_point is None else table_end(model, parameters)
 
 
 class Scaling(Section):
@@ -190,10 +203,10 @@ class Sweep(Section):
     def fixed_end(self, time: TimeSpec) -> float | None:
         """Return the end that every member has, None where the end varies.
 
-        A number of natural periods counts as different as soon as a parameter of the model is.
+        One that follows from the model counts as different as soon as a parameter of the model is.
         """
         differ = [key for key, low, high in self._spans if low != high]
-        by_model = time.periods is not None and any(key.startswith("model.") for key in differ)
+        by_model = time.is_of_model and any(key.startswith("model.") for key in differ)
         return None if by_model or "time.end" in differ else self.least_end(time)
 
 
@@ -305,9 +318,7 @@ class ExperimentSpec(Section):
 
     def natural_end(self, parameters: Mapping[str, Any]) -> Any:
         """Return the end time of a member with these `parameters` (numbers or arrays), unless swept."""
-        if self.time.periods is None:
-            return self.time.end
-        return natural_end(self.model.definition, self.time.periods, parameters)
+        return self.time.end_of(self.model.definition, parameters)
 
     def steps(self, level: int) -> int:
         """Return the number of steps at `level`: ``base_steps * 2**level``."""

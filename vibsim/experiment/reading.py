@@ -155,6 +155,7 @@ def build(
     sweep, is_whole = read_sweep(document, order, model, schemes, not knows_schemes, report)
     if time is not None and is_whole and model is not None and are_known(model, parameters):
         of_members = members.MemberNumbers(model, parameters, time, sweep.axes)
+        members.check_ends(of_members, report)
         for table in equation.tables:
             members.check_length(of_members, table, report)
         members.check_jumps(of_members, equation.formulas, report)

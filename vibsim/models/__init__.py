@@ -18,6 +18,7 @@ from vibsim.models.base import (
     has_solution,
     natural_end,
     quantities,
+    table_end,
     tree,
 )
 from vibsim.models.bouncing_ball import BOUNCING_BALL
@@ -66,5 +67,6 @@ __all__ = [
     "has_solution",
     "natural_end",
     "quantities",
+    "table_end",
     "tree",
 ]

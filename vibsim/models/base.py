@@ -14,6 +14,8 @@ from dataclasses import dataclass, field
 from functools import cache
 from typing import TYPE_CHECKING, Any, Literal
 
+import numpy as np
+
 from vibsim.core.array_types import Floats
 from vibsim.core.registry import hash_fault
 from vibsim.formula import (
@@ -27,6 +29,7 @@ from vibsim.formula import (
     Number,
     derivative,
     parse,
+    values,
 )
 from vibsim.models.events import Events
 from vibsim.models.table import Lookup, Table
@@ -333,6 +336,15 @@ def parameter_names(model: Model) -> tuple[str, ...]:
 def natural_end(model: Model, periods: float, parameters: Numbers) -> Any:
     """Return the time that a number of natural periods (small oscillations) takes, as a number or an array."""
     return periods * (2.0 * math.pi / model.natural_frequency(parameters))
+
+
+def table_end(model: Model, parameters: Numbers) -> Any:
+    """Return the time at which the last point of the table of `model` is reached, at a constant speed; see `Lookup`."""
+    assert model.lookup is not None
+    numbers = {row.name: parameters[row.key] for row in model.parameters}
+    with np.errstate(divide="ignore"):
+        speed = np.asarray(values(tree(model, model.lookup.place), {**numbers, "t": 1.0}), float)
+        return model.lookup.table.last / speed
 
 
 def has_budget(model: Model) -> bool:

@@ -62,6 +62,11 @@ class Table:
         """Place of the last point."""
         return self.first + (self.points - 1) * self.spacing
 
+    @property
+    def spacings_ahead(self) -> float:
+        """Spacings from the place 0, where motions begin, to the last point; whole where a point is there."""
+        return self.points - 1 + self.first / self.spacing
+
     @cached_property
     def bends(self) -> Floats:
         """Second derivative at every point, shape (point,)."""
@@ -101,6 +106,6 @@ class Lookup:
 
     table: Table
     place: Formula
-    """Where, in ``t`` and the parameters."""
+    """Where, in ``t`` and the parameters: a speed times ``t``."""
     is_met: bool = False
     """Whether a step of every member ends at every point of the table, so that no step has a corner of the force."""

@@ -40,7 +40,7 @@ def members(experiment: Experiment, start: int, stop: int) -> Members:
     parameters, initial = numbers_of(experiment, columns, stop - start)
     end = _filled("time", {"end": experiment.time.end}, columns, stop - start)["end"]
     if experiment.end_varies and "time.end" not in columns:
-        # the end is a number of natural periods, and each member has its own
+        # the end follows from the parameters of each member
         end = np.full(stop - start, experiment.natural_end(parameters), dtype=float)
     return Members(np.arange(start, stop, dtype=np.int64), columns, parameters, initial, end)
 

@@ -20,7 +20,7 @@ from vibsim.experiment.schema.fields import TABLE, FrozenDict
 from vibsim.experiment.schema.sweep import Axis
 from vibsim.experiment.sweep_columns import columns_of
 from vibsim.formula import Expression, derivative, first_jump, parse, put, size, values
-from vibsim.models import FormulaField, Model, natural_end, tree
+from vibsim.models import FormulaField, Model, tree
 
 CHUNK = 2**16
 """Members that are looked at together."""
@@ -73,8 +73,8 @@ class MemberNumbers:
     def _part(self, start: int, stop: int) -> tuple[dict[str, Any], Floats]:
         found = {k: v for k, v in columns_of(self._axes(), start, stop).items() if _matters(k)}
         end = found.get("time.end", np.full(stop - start, self.time.end))
-        if self.time.periods is not None:
-            own = natural_end(self.model, self.time.periods, self._parameters(found))
+        if self.time.is_of_model:
+            own = self.time.end_of(self.model, self._parameters(found))
             end = np.broadcast_to(own, end.shape)
         return found, end
 
@@ -96,6 +96,27 @@ def _matters(key: str) -> bool:
     return key.startswith("model.") or key == "time.end"
 
 
+def check_ends(numbers: MemberNumbers, report: Report) -> None:
+    """Refuse an end that follows from the model where it has none for some member."""
+    if not numbers.time.is_of_model:
+        return
+    for found, end in numbers.members():
+        has_none = ~(np.isfinite(end) & (end > 0.0))
+        if has_none.any():
+            who = _named(found, int(np.argmax(has_none)))
+            if numbers.time.periods is not None:
+                key, rule = "periods", "the model has no natural period"
+            else:
+                key, rule = "steps_per_point", "the vehicle never comes to the end of the table"
+            report.add(("time", key), f"{rule} where {who}", "leave that member out, or give end")
+            return
+
+
+def _named(found: Mapping[str, Any], i: int) -> str:
+    """Name a member by its swept numbers."""
+    return ", ".join([f"{key} = {column[i]:.10g}" for key, column in found.items()][:MOST_NAMED])
+
+
 def check_length(numbers: MemberNumbers, name: str, report: Report) -> None:
     """Refuse a table that ends before a member does."""
     assert numbers.model.lookup is not None
@@ -106,8 +127,7 @@ def check_length(numbers: MemberNumbers, name: str, report: Report) -> None:
         i = int(np.argmax(places))
         if places[i] > most:
             most = float(places[i])
-            swept = [f"{key} = {column[i]:.10g}" for key, column in found.items()]
-            who = ", ".join(swept[:MOST_NAMED])
+            who = _named(found, i)
     if most > table.last + SLACK * table.spacing:
         count = int(np.ceil((most - table.first) / table.spacing - SLACK)) + 1
         rule = f"the table ends at {table.last:.10g} m, but the motion comes to {most:.10g} m"

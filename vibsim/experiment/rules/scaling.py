@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 from vibsim.experiment.data import Scaling, TimeSpec
 from vibsim.experiment.faults import Report
-from vibsim.models import MODELS, Model, natural_end
+from vibsim.models import MODELS, Model
 from vibsim.models.events import Crossings
 from vibsim.models.shared.scales import scaled_parameters, scales
 
@@ -56,9 +56,7 @@ def _scaled(given: Numbers, time: TimeSpec, model: Model) -> Numbers | tuple[str
     found = scaled_parameters(model, given.parameters, given.initial)
     parameters = {name: float(value) for name, value in found.items()}
     initial = {name: value / rows[name] for name, value in given.initial.items()}
-    end = time.end / rows["t"]
-    if time.periods is not None:
-        end = float(natural_end(model, time.periods, parameters))
+    end = float(time.end_of(model, parameters)) if time.is_of_model else time.end / rows["t"]
     if not (0.0 < end < math.inf and all(map(math.isfinite, initial.values()))):
         return "the scaled end or initial values are not finite", ""
     kept = Scaling(

@@ -35,7 +35,8 @@ MAX_RANGE = 2.0**53
 """Values of a range, at most: beyond it, their numbers are no floats."""
 _STEPS = "step counts cannot be swept: every member has the same steps"
 _FIXED = {
-    f"time.{name}": _STEPS for name in ("base_steps", "base_dt", "steps_per_period", "periods")
+    f"time.{name}": _STEPS
+    for name in ("base_steps", "base_dt", "steps_per_period", "periods", "steps_per_point")
 }
 
 

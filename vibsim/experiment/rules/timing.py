@@ -1,4 +1,4 @@
-"""The time section: from the four ways of writing it to an end and a number of steps."""
+"""The time section: from the five ways of writing it to an end and a number of steps."""
 
 from __future__ import annotations
 
@@ -9,8 +9,10 @@ from vibsim.experiment.data import TimeSpec
 from vibsim.experiment.faults import MISSING, Report
 from vibsim.experiment.rules.model import are_known
 from vibsim.experiment.schema.document import TimeSection
-from vibsim.models import Model, natural_end
+from vibsim.models import Model, natural_end, table_end
 
+AT_POINT = 1e-6
+"""How far from a point of a table, in its spacings, a place may be that is meant to be there: rounding."""
 WHOLE_NUMBER = 1e-12
 """How far, relative to it, a number may be from a whole number that is meant."""
 
@@ -26,6 +28,10 @@ def time_spec(
         return None
     given = {name for name in TimeSection.model_fields if getattr(section, name) is not None}
     by_periods = ("periods", "steps_per_period")
+    if section.steps_per_point is not None:
+        rule = "must not be given together with steps_per_point"
+        _refuse(given - {"steps_per_point"}, rule, report)
+        return _by_table(section.steps_per_point, model, parameters, report)
     if section.end is not None:
         _refuse(given & set(by_periods), "must not be given together with end", report)
         if {"base_steps", "base_dt"} <= given:
@@ -60,6 +66,31 @@ def time_spec(
         report.add(("time", "periods"), "the model has no natural period with these parameters")
         return None
     return TimeSpec(end=end, base_steps=steps, periods=section.periods)
+
+
+def _by_table(
+    steps: int, model: Model | None, parameters: Mapping[str, float], report: Report
+) -> TimeSpec | None:
+    """Return the time from the place 0 to the end of the table, with so many steps from point to point."""
+    if model is None or not are_known(model, parameters):
+        return None
+    if model.lookup is None:
+        rule = "needs a model with a table, such as a vehicle whose road is one"
+        report.add(("time", "steps_per_point"), rule, "give end", at_key=True)
+        return None
+    table = model.lookup.table
+    spacings = round(table.spacings_ahead)
+    if spacings < 1 or abs(table.spacings_ahead - spacings) > AT_POINT:
+        rule = "needs a table with a point at 0, where motions begin, and points behind it"
+        hint = f"its points begin at {table.first:.10g} and are {table.spacing:.10g} apart"
+        report.add(("time", "steps_per_point"), rule, hint)
+        return None
+    end = float(table_end(model, parameters))
+    if not (math.isfinite(end) and end > 0.0):
+        rule = "the vehicle never comes to the end of the table with these parameters"
+        report.add(("time", "steps_per_point"), rule)
+        return None
+    return TimeSpec(end=end, base_steps=spacings * steps, steps_per_point=steps)
 
 
 def _refuse(names: set[str], rule: str, report: Report) -> None:

@@ -93,9 +93,11 @@ class TimeSection(Section):
         json_schema_extra={
             "oneOf": [
                 {"required": ["end"]}
-                | _without("periods", "steps_per_period", "base_steps base_dt"),
+                | _without("periods", "steps_per_period", "steps_per_point", "base_steps base_dt"),
                 {"required": ["periods", "steps_per_period"]}
-                | _without("end", "base_steps", "base_dt"),
+                | _without("end", "base_steps", "base_dt", "steps_per_point"),
+                {"required": ["steps_per_point"]}
+                | _without("end", "base_steps", "base_dt", "periods", "steps_per_period"),
             ]
         }
     )
@@ -110,6 +112,8 @@ class TimeSection(Section):
     """Length in natural periods of the model (small oscillations), instead of `end`."""
     steps_per_period: Positive | None = None
     """Steps per natural period at level 0, with `periods`."""
+    steps_per_point: Count | None = None
+    """Steps at level 0 from each point of the model's table to the next; the end is where the table ends."""
 
 
 class LevelRange(Section):

@@ -65,6 +65,8 @@ def _head(experiment: Experiment) -> list[str]:
             "periods": time["periods"],
             "steps_per_period": time["base_steps"] / time["periods"],
         }
+    elif time.get("steps_per_point") is not None:
+        time = {"steps_per_point": time["steps_per_point"]}
     elif time["base_steps"] == 1:
         del time["base_steps"]
     if scaling is not None:
