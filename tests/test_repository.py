@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 import yaml
 
-from vibsim.cli.arguments import parser
+from vibsim.cli.arguments import parsed
 from vibsim.experiment import Experiment
 from vibsim.models import MODELS
 from vibsim.schemes import SCHEMES, Option
@@ -190,7 +190,7 @@ def test_documented_commands_are_understood() -> None:
         if words == [] or words in [[name] for name in alone]:
             continue
         try:
-            parser().parse_args(words)
+            parsed(words)
         except SystemExit:
             pytest.fail(f"vibsim {' '.join(words)} is documented and refused")
 

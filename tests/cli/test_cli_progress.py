@@ -12,6 +12,7 @@ from snakemake_interface_logger_plugins.tests import MockOutputSettings
 
 from vibsim.cli.resources import amount, duration, size
 from vibsim.cli.run import lock, snakemake
+from vibsim.cli.run.executor import Executor
 from vibsim.cli.run.snakemake import Job, Outcome, Progress, follow
 from vibsim.cli.run.snakemake_process import LogHandler, LogHandlerSettings
 
@@ -135,7 +136,7 @@ def test_a_broken_workflow_is_told_in_a_line(
     monkeypatch.setattr(snakemake, "checkout", lambda: root)
     held = lock.hold(tmp_path / "results")
     try:
-        ended = snakemake.run([], tmp_path / "results", held, ["--cores", "1"])
+        ended = snakemake.run([], tmp_path / "results", held, Executor(["--cores", "1"]))
     finally:
         os.close(held)
     assert ended.status in (1, 2)

@@ -44,6 +44,8 @@ class Place:
     """An experiment file and a results folder, both under names that a shell would trip over."""
 
     folder: Path
+    elsewhere: Path | None = None
+    """The results folder, where it is not beside the file."""
 
     @property
     def file(self) -> Path:
@@ -51,7 +53,7 @@ class Place:
 
     @property
     def results(self) -> Path:
-        return self.folder / "re sults {x} 'y' $z"
+        return self.elsewhere or self.folder / "re sults {x} 'y' $z"
 
     @property
     def tiny(self) -> Path:

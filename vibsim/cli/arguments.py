@@ -45,7 +45,11 @@ def parsed(arguments: Sequence[str]) -> argparse.Namespace:
     first = next((word for word in arguments if not word.startswith("-")), None)
     if first is not None and first not in known:
         top.error(f"unknown command '{first}': {nearest(first, known)}")
-    return top.parse_args(arguments)
+    own, handed = list(arguments), list[str]()
+    if first == "run" and "--" in own:
+        border = own.index("--")
+        own, handed = own[:border], own[border + 1 :]
+    return top.parse_args(own, argparse.Namespace(handed=handed))
 
 
 def _perform(module: str, name: str, options: argparse.Namespace) -> int:
@@ -82,6 +86,9 @@ def commands() -> Iterator[Command]:
         _row("experiments", _word, "EXPERIMENT", _NAMES, nargs="*"),
         settings,
         cores,
+        _row("--executor", _word, "NAME", "where jobs run: an executor plug-in of Snakemake"),
+        _row("--jobs", _positive, "N", "jobs that an executor has at once"),
+        _row("--profile", _path, "DIR", "a profile of Snakemake, such as that of a cluster"),
         _flag("--dry-run", "show what would run and why"),
         _flag("--verify", verify),
         allow,

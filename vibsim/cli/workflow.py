@@ -20,6 +20,7 @@ def names_of(config: Mapping[str, Any], root: Path, command_line: Mapping[str, A
     config
         The ``experiments`` with the ``settings`` of all of them, and the ``results`` folder, as for
         `vibsim.plan.Names.of`; without any the default experiments as they are, and the folder of the checkout.
+        ``cores`` and ``overhead`` (megabytes) of a job, where it runs elsewhere.
     root
         The checkout.
     command_line
@@ -33,7 +34,8 @@ def names_of(config: Mapping[str, Any], root: Path, command_line: Mapping[str, A
     is_allowed = str(command_line.get("allow_commands")).lower() == "true"
     experiments, settings = config.get("experiments", []), config.get("settings", [])
     results = str(config.get("results", root / "results"))
-    names = Names.of(experiments, results, root, resolve, is_allowed, settings)
+    more = {key: int(config[key]) for key in ("cores", "overhead") if key in config}
+    names = Names.of(experiments, results, root, resolve, is_allowed, settings, **more)
     results_folder.check(names.results, names.plans)
     check_allowed(names.plans.values(), is_allowed)
     return names

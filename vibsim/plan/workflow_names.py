@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import chain, count
 from pathlib import Path
 from typing import Any
@@ -17,6 +17,8 @@ from vibsim.plan.choose import choose
 from vibsim.plan.digests import digest_of
 from vibsim.plan.jobs import Batch, Plan
 
+PAGE_MEMORY = 300
+"""Megabytes of a job that makes a page: twice of what those of the default run take."""
 _LARGE = 32 * 10**6
 """Bytes of level files from which an analysis has work for more threads than one."""
 
@@ -34,8 +36,8 @@ class Simulation:
     benchmark: str
     """Paths of the log, and of the measured time and memory."""
     threads: int
-    memory: int
-    """Megabytes of a job."""
+    megabytes: int
+    """Memory of a job, without the overhead of an executor."""
     runtime: int | None
     """Minutes of a job; None where nobody says."""
     digests: list[str]
@@ -56,7 +58,7 @@ class Simulation:
         return self.source
 
 
-def _simulation(plan: Plan, batches: Sequence[Batch], rule: str) -> Simulation:
+def _simulation(plan: Plan, batches: Sequence[Batch], rule: str, cores: int) -> Simulation:
     first = batches[0]
     paths, levels = [shard.path for shard in plan.made_by(first)], list(first.levels)
     stem = f"level_{levels[0]:02d}" + (f"_to_{levels[-1]:02d}" if len(levels) > 1 else "")
@@ -69,8 +71,8 @@ def _simulation(plan: Plan, batches: Sequence[Batch], rule: str) -> Simulation:
         paths=paths,
         log=f"{plan.key}/logs/{stem}.log",
         benchmark=f"{plan.key}/benchmarks/{stem}.tsv",
-        threads=first.threads or (_cores() if first.is_divisible else 1),
-        memory=-(-max(batch.memory for batch in batches) // 10**6),
+        threads=first.threads or (cores if first.is_divisible else 1),
+        megabytes=-(-max(batch.memory for batch in batches) // 10**6),
         runtime=first.runtime,
         digests=[batch.digest for batch in batches],
         source=plan.file,
@@ -96,6 +98,10 @@ class Names:
     """Whether programs of the user may run."""
     settings: tuple[str, ...] = ()
     """What stands in place of values of the files."""
+    cores: int = field(default_factory=lambda: len(os.sched_getaffinity(0)))
+    """Cores that a job may use at most."""
+    overhead: int = 0
+    """Megabytes that a job needs for the processes of its executor, beside its own."""
 
     @staticmethod
     def of(
@@ -105,10 +111,14 @@ class Names:
         resolve: Resolver | None = None,
         allows_commands: bool = False,
         settings: Sequence[str] = (),
+        **more: int,
     ) -> Names:
-        """Load the plans of `experiments` (files, names, collections; none means the default), all with `settings`."""
+        """Load the plans of `experiments` (files, names, collections; none means the default), all with `settings`.
+
+        Further fields, such as `cores`, go by their names.
+        """
         plans = load_all(choose(experiments, root, settings), resolve, cached=True)
-        return Names(plans, Path(results).absolute(), allows_commands, tuple(settings))
+        return Names(plans, Path(results).absolute(), allows_commands, tuple(settings), **more)
 
     def level_flags(self, wildcards: Any, input: Any) -> str:  # noqa: A002
         """Return further options of jobs that make levels, which Snakemake does not compare; see `file`."""
@@ -140,7 +150,7 @@ class Names:
                 groups.setdefault((key, batch.levels), []).append(batch)
         names = _different(_rule(key, levels) for key, levels in groups)
         return [
-            _simulation(self.plans[key], found, name)
+            _simulation(self.plans[key], found, name, self.cores)
             for name, ((key, _), found) in zip(names, groups.items(), strict=True)
         ]
 
@@ -159,11 +169,20 @@ class Names:
 
     def analysis_threads(self, wildcards: Any) -> int:
         """Return the threads of an analysis."""
-        return _cores() if self.plans[wildcards.experiment].bytes > _LARGE else 1
+        return self.cores if self.plans[wildcards.experiment].bytes > _LARGE else 1
 
-    def analysis_memory(self, wildcards: Any) -> int:
-        """Return the megabytes of an analysis."""
-        return -(-self.plans[wildcards.experiment].analysis_memory // 10**6)
+    def analysis_memory(self, wildcards: Any, attempt: int) -> int:
+        """Return the megabytes of an analysis; see `memory`."""
+        own = -(-self.plans[wildcards.experiment].analysis_memory // 10**6)
+        return (own + self.overhead) * attempt
+
+    def memory(self, megabytes: int) -> Callable[[Any, int], int]:
+        """Return what gives the memory of a job: with that of its executor, and more where it was not enough before."""
+
+        def asked(wildcards: Any, attempt: int) -> int:
+            return (megabytes + self.overhead) * attempt
+
+        return asked
 
     @property
     def files(self) -> list[str]:
@@ -198,8 +217,3 @@ def _different(names: Iterable[str]) -> list[str]:
         numbered = (f"{name}__{number}" for number in count(2))
         found[next(one for one in chain([name], numbered) if one not in found)] = None
     return list(found)
-
-
-def _cores() -> int:
-    """Return how many cores there are; the workflow gives a job no more than it may use itself."""
-    return len(os.sched_getaffinity(0))

@@ -28,6 +28,8 @@ rule report:
         "{experiment}/logs/report.log",
     benchmark:
         "{experiment}/benchmarks/report.tsv"
+    resources:
+        mem_mb=names.memory(PAGE_MEMORY),
     params:
         digest=names.report_digest,
         file=names.file,

@@ -12,7 +12,7 @@ for simulation in names.simulations:
             simulation.benchmark
         threads: simulation.threads
         resources:
-            mem_mb=simulation.memory,
+            mem_mb=names.memory(simulation.megabytes),
             runtime=simulation.runtime,
         params:
             digest=simulation.digest,

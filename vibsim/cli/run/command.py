@@ -13,12 +13,13 @@ from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from vibsim.cli import failure, outcome_text, resources, results_folder, terminal
+from vibsim.cli import failure, outcome_text, results_folder, terminal
 from vibsim.cli.chosen_plans import plans_of, tell_notes
 from vibsim.cli.jobs.common import chosen_results, refusal
 from vibsim.cli.jobs.simulate import is_made
 from vibsim.cli.jobs.solve import check_allowed
-from vibsim.cli.run import changes, junit, lock, outcome, reasons, snakemake, supervise
+from vibsim.cli.run import changes, executor, junit, lock, outcome, reasons, snakemake, supervise
+from vibsim.cli.run.executor import Executor
 from vibsim.cli.run.snakemake import Job, Progress
 from vibsim.core import private_cache
 from vibsim.core.errors import VibsimError
@@ -47,18 +48,16 @@ def _run(options: Namespace) -> int:
     plans = plans_of(options.experiments, options.settings, cached=True)
     check_allowed(plans, options.allow_commands)
     results_folder.check(results, [plan.key for plan in plans])
-    resources.check(plans, results)
-    arguments = ["--cores", str(options.cores or len(os.sched_getaffinity(0)))]
-    arguments += ["--resources", f"mem_mb={resources.megabytes(plans)}"]
+    where = executor.chosen(options, plans, results)
     if options.allow_commands:
         # on the command line alone: what a file says is not heard
-        arguments += ["--config", "allow_commands=true"]
+        where = replace(where, arguments=["--config", "allow_commands=true", *where.arguments])
     if options.detail != "quiet":
         tell_notes(plans)
     if options.dry_run and options.junit:
         raise refusal("--junit", options.junit, "a dry run has no verdicts to write")
     if options.dry_run:
-        return _dry_run(plans, results, arguments, options)
+        return _dry_run(plans, results, where, options)
     if options.junit:
         junit.check_place(options.junit)
     held = lock.hold(results)
@@ -71,7 +70,7 @@ def _run(options: Namespace) -> int:
     progress = None if is_quiet else Progress()
     jobs: list[Job] = []
     for _ in range(_STAGES):
-        ended = snakemake.run(plans, results, held, arguments, progress)
+        ended = snakemake.run(plans, results, held, where, progress)
         if ended.jobs:
             _refuse_edited(plans, options)
         summaries = [outcome.collect(plan, results) for plan in plans]
@@ -124,7 +123,7 @@ def _refuse_edited(plans: Sequence[Plan], options: Namespace) -> None:
         raise VibsimError("\n".join(f"{file}: {rule}" for file in files))
 
 
-def _dry_run(plans: Sequence[Plan], results: Path, arguments: list[str], options: Namespace) -> int:
+def _dry_run(plans: Sequence[Plan], results: Path, where: Executor, options: Namespace) -> int:
     """Show the jobs; a results folder that does not exist yet is not made for that."""
     with ExitStack() as stack:
         if not results.exists():
@@ -136,11 +135,11 @@ def _dry_run(plans: Sequence[Plan], results: Path, arguments: list[str], options
             print(f"vibsim: would be deleted and made again: {error}", file=sys.stderr)
         for path in changes.leftovers(plans, results):
             print(f"vibsim: would be removed, no longer asked for: {path}", file=sys.stderr)
-        arguments = [*arguments, "--dry-run"]
+        arguments = [*where.arguments, "--dry-run"]
         if bad:
             paths = dict.fromkeys(error.path.relative_to(results).as_posix() for error in bad)
             arguments += ["--forcerun", *paths]
-        ended = snakemake.run(plans, results, held, arguments)
+        ended = snakemake.run(plans, results, held, replace(where, arguments=arguments))
         _check(ended)
         jobs = list(_one_by_one(ended.jobs, plans, results))
         words = list(reasons.in_words(jobs, plans, results))

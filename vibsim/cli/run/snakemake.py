@@ -11,6 +11,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from threading import Thread
@@ -18,6 +19,7 @@ from typing import Any, BinaryIO
 
 from vibsim.cli import resources, results_folder
 from vibsim.cli.run import lock, supervise
+from vibsim.cli.run.executor import Executor
 from vibsim.core import private_cache
 from vibsim.core.errors import VibsimError
 from vibsim.plan import Plan, checkout
@@ -28,6 +30,8 @@ _SEARCH_PATHS = (
     *("BASH_ENV", "HDF5_PLUGIN_PATH", "MPLCONFIGDIR"),
 )
 """Variables with folders and files that code is loaded from."""
+CANCELLING = 60.0
+"""Seconds that an executor has to cancel its jobs."""
 _TELLING = 3
 """From so many finished jobs on, they tell how long the others take."""
 
@@ -150,7 +154,7 @@ def run(
     plans: Sequence[Plan],
     results: Path,
     held: int,
-    arguments: Sequence[str],
+    where: Executor,
     progress: Progress | None = None,
 ) -> Outcome:
     """Run Snakemake on `plans` and return when it has ended.
@@ -159,8 +163,8 @@ def run(
     ----------
     results, held
         The results folder, and the descriptor of its lock, which Snakemake inherits.
-    arguments
-        Further arguments for Snakemake.
+    where
+        Where jobs run.
     progress
         Told how far the run is.
 
@@ -177,14 +181,19 @@ def run(
         "experiments": [plan.file for plan in plans],
         "settings": plans[0].settings if plans else (),
         "results": str(results),
+        **where.config,
     }
     write_text(config, json.dumps(content))
     reading, writing = os.pipe()
+    if where.is_remote:
+        supervise.take_time(CANCELLING)
     command = [sys.executable, "-P", "-m", "vibsim.cli.run.snakemake_process", str(os.getpid())]
+    command.append("remote" if where.is_remote else "here")
     command += ["--logger", "vibsim", "--logger-vibsim-pipe", str(writing)]
     command += ["--snakefile", str(checkout() / "Snakefile")]
     command += ["--workflow-profile", str(checkout() / "workflow/profiles/default")]
-    command += ["--configfile", str(config), "--directory", str(results), "--nocolor", *arguments]
+    command += ["--configfile", str(config), "--directory", str(results), "--nocolor"]
+    command += where.arguments
     with os.fdopen(reading, "rb") as events:
         try:
             process = subprocess.Popen(
@@ -205,13 +214,25 @@ def run(
         try:
             ended = follow(events, progress)
             ended.status = _status(process)
+        except supervise.Interrupted:
+            if where.is_remote:
+                _cancel(process)
+            raise
         finally:
-            # Where this is left early, nothing is worth waiting for: the jobs end with it.
+            # Where this is left early, nothing else is worth waiting for: the jobs here end with it.
             process.kill()
             process.wait()
         reader.join()
     ended.text = b"".join(text).decode(errors="replace")
     return ended
+
+
+def _cancel(process: subprocess.Popen[bytes]) -> None:
+    """Have Snakemake cancel the jobs that it has submitted, and wait until it has."""
+    print("vibsim: cancelling what was submitted", file=sys.stderr, flush=True)
+    process.send_signal(signal.SIGTERM)
+    with suppress(subprocess.TimeoutExpired):
+        process.wait(CANCELLING)
 
 
 def _read(file: BinaryIO, lines: list[bytes]) -> None:

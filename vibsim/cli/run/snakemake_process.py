@@ -61,9 +61,13 @@ class LogHandler(LogHandlerBase):
 
 
 def main() -> None:
-    """Run Snakemake for the process that the first argument names, with the others."""
-    supervise.end_at_once()
-    end_with(int(sys.argv.pop(1)))
+    """Run Snakemake for the process that the first argument names; the second says where jobs run, others follow."""
+    parent, where = int(sys.argv.pop(1)), sys.argv.pop(1)
+    if where == "remote":
+        supervise.end_in_order()
+    else:
+        supervise.end_at_once()
+    end_with(parent)
     gc.set_threshold(YOUNG_OBJECTS)
     # It starts in half the time without what no run of vibsim uses: numbers of NumPy in a profile, addresses in the
     # web, reports of its own, and tables as parameters of rules.

@@ -8,8 +8,10 @@ folder is free.
 
 from __future__ import annotations
 
+import mmap
 import os
 import signal
+import struct
 import sys
 import threading
 import time
@@ -83,6 +85,28 @@ def end_at_once() -> None:
     threading.Thread(target=wait, daemon=True).start()
 
 
+def end_in_order() -> None:
+    """Raise KeyboardInterrupt in the main thread as soon as this process is told to end, once.
+
+    Snakemake then cancels what it has submitted. Further requests must not disturb that.
+    """
+    ends = _heeded()
+    signal.pthread_sigmask(signal.SIG_BLOCK, ends)
+    signal.signal(signal.SIGUSR1, signal.default_int_handler)
+
+    def wait() -> None:
+        signal.sigwait(ends)
+        signal.pthread_kill(threading.main_thread().ident or 0, signal.SIGUSR1)
+
+    threading.Thread(target=wait, daemon=True).start()
+
+
+def take_time(seconds: float) -> None:
+    """Ask the process that supervises this one for more time to end, from now on."""
+    _grace.seek(0)
+    _grace.write(struct.pack("d", seconds))
+
+
 def ended_by(status: int) -> int:
     """Return the signal of `ENDS` that ended a process with exit status `status`, as `subprocess` tells it; else 0."""
     number = -status if status < 0 else status - 128
@@ -100,6 +124,8 @@ def known_pid() -> int:
     return _supervisor or os.getpid()
 
 
+_grace = mmap.mmap(-1, struct.calcsize("d"))
+"""Seconds that the worker asks for to end, in memory that it shares with its supervisor; 0 where it does not."""
 _supervisor = 0
 _request = 0
 
@@ -158,17 +184,31 @@ def _watch(worker: int, ends: set[signal.Signals]) -> tuple[int, int]:
     while True:
         left = max(deadline - time.monotonic(), 0) if asked else 3600.0
         found = signal.sigtimedwait(ends | {signal.SIGCHLD}, left)
-        ended, status = os.waitpid(worker, os.WNOHANG)
-        if ended:
+        if (status := _ended(worker)) is not None:
             return status, asked
         if found and found.si_signo == signal.SIGCHLD:
             continue
         if found and not asked:
-            asked, deadline = found.si_signo, time.monotonic() + _GRACE
+            asked, deadline = found.si_signo, time.monotonic() + max(_GRACE, *_asked_for())
             os.kill(worker, signal.SIGTERM)
         elif asked:
             # out of time, or asked again
             os.kill(worker, signal.SIGKILL)
+
+
+def _ended(worker: int) -> int | None:
+    """Return the wait status of the worker when it has ended, and let go of orphans that have."""
+    while True:
+        process, status = os.waitpid(-1, os.WNOHANG)
+        if process == worker:
+            return status
+        if not process:
+            return None
+
+
+def _asked_for() -> tuple[float]:
+    _grace.seek(0)
+    return struct.unpack("d", _grace.read())
 
 
 def _wait_for_children() -> None:
