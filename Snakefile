@@ -6,7 +6,6 @@ from shlex import quote
 from vibsim.cli.run.lock import hold
 from vibsim.cli.workflow import names_of
 from vibsim.cli.run.supervise import children_end_with_this
-from vibsim.plan.workflow_names import PAGE_MEMORY
 
 root = Path(workflow.basedir)
 # What allows programs of users to run is read from the command line alone, never from a file.
@@ -22,11 +21,6 @@ shell.prefix(f"export PATH={quote(str(Path(sys.executable).parent))}:$PATH; ")
 # Every path below is relative to the results folder, and so are Snakemake's own records. Jobs work elsewhere: what
 # libraries read from the folder that they are in must not come with results.
 workdir: str(names.results)
-
-
-# It looks at everything there is, and takes no time: it is made where the workflow runs.
-localrules:
-    index,
 
 
 wildcard_constraints:

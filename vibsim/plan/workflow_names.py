@@ -176,6 +176,11 @@ class Names:
         own = -(-self.plans[wildcards.experiment].analysis_memory // 10**6)
         return (own + self.overhead) * attempt
 
+    @property
+    def page_memory(self) -> int:
+        """Megabytes of a job that makes a page, without the overhead of an executor."""
+        return PAGE_MEMORY
+
     def memory(self, megabytes: int) -> Callable[[Any, int], int]:
         """Return what gives the memory of a job: with that of its executor, and more where it was not enough before."""
 

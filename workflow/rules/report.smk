@@ -1,4 +1,9 @@
-# The page over all experiments: those chosen, and those that were found among the results.
+# The page over all experiments: those chosen, and those that were found among the results. It takes no time, and is made
+# where the workflow runs.
+localrules:
+    index,
+
+
 rule index:
     input:
         names.indexed,
@@ -29,7 +34,7 @@ rule report:
     benchmark:
         "{experiment}/benchmarks/report.tsv"
     resources:
-        mem_mb=names.memory(PAGE_MEMORY),
+        mem_mb=names.memory(names.page_memory),
     params:
         digest=names.report_digest,
         file=names.file,

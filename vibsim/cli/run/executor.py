@@ -70,10 +70,10 @@ def chosen(options: Namespace, plans: Sequence[Plan], results: Path) -> Executor
 
 
 def _check_name(name: str) -> None:
-    if name == "local" or find_spec(PLUG_IN + name.replace("-", "_")) is not None:
+    if find_spec(PLUG_IN + name.replace("-", "_")) is not None:
         return
     found = (row.name for row in iter_modules() if row.name.startswith(PLUG_IN))
     known = [module.removeprefix(PLUG_IN).replace("_", "-") for module in found]
     package = f"snakemake-executor-plugin-{name}"
     rule = f"there is no such executor; it comes with the package {package}"
-    raise refusal("--executor", name, rule, nearest(name, ["local", *sorted(known)]))
+    raise refusal("--executor", name, rule, nearest(name, sorted(known)))
