@@ -331,15 +331,7 @@ def test_steps_from_point_to_point_are_refused_where_there_are_none(
 
 
 def test_steps_from_point_to_point_need_a_table(tmp_path: Path) -> None:
-    with pytest.raises(InputError) as caught:
-        on_points(tmp_path, ROWS, "{steps_per_point: 1}", "").from_dict(
-            {
-                "title": "No table",
-                "model": {"kind": "spring"},
-                "initial": {"u": 1.0},
-                "time": {"steps_per_point": 1},
-                "levels": [3, 4, 5],
-                "schemes": ["central"],
-            }
-        )
-    assert "needs a model with a table" in str(caught.value)
+    time = "time: {steps_per_point: 1}"
+    text = TEXT.replace("ROAD", "0.1*sin(x)").replace("time: {end: 2, base_steps: 100}", time)
+    with pytest.raises(InputError, match="needs a model with a table"):
+        Experiment.from_yaml(write(tmp_path, text))

@@ -15,7 +15,7 @@ from made_once import change
 from vibsim.plan import Names
 
 from .conftest import Place, here
-from .interrupts import processes
+from .interrupts import processes, words
 
 SCRIPTS = {
     "submit": 'setsid sh "$1" > /dev/null 2>&1 < /dev/null &\necho $!',
@@ -74,15 +74,7 @@ def test_an_interrupt_cancels_what_was_submitted(place: Place, tmp_path: Path) -
 
 def computing(results: Path) -> list[int]:
     """Return the jobs that make levels of some results."""
-    found = processes(str(results))
-    return [pid for pid in found if b"simulate" in arguments(pid)]
-
-
-def arguments(pid: int) -> list[bytes]:
-    try:
-        return Path(f"/proc/{pid}/cmdline").read_bytes().split(b"\0")
-    except OSError:
-        return []
+    return [pid for pid in processes(str(results)) if " simulate " in words(pid)]
 
 
 def test_memory_holds_what_the_executor_needs_and_grows_with_each_attempt(place: Place) -> None:

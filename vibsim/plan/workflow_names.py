@@ -174,7 +174,7 @@ class Names:
     def analysis_memory(self, wildcards: Any, attempt: int) -> int:
         """Return the megabytes of an analysis; see `memory`."""
         own = -(-self.plans[wildcards.experiment].analysis_memory // 10**6)
-        return (own + self.overhead) * attempt
+        return self.memory(own)(wildcards, attempt)
 
     @property
     def page_memory(self) -> int:

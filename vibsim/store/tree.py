@@ -42,11 +42,6 @@ def open(  # noqa: A001
         Where there is no folder with results.
     DamagedFileError
         Where a file is not as it was written.
-
-    Examples
-    --------
-    >>> tree = vibsim.open("results/pendulum_lab/theta_convergence")  # doctest: +SKIP
-    >>> tree["level_09"].theta.sel(scheme="central", case=0).plot()  # doctest: +SKIP
     """
     folder = Path(path)
     if not folder.is_dir():

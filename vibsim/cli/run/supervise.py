@@ -189,7 +189,7 @@ def _watch(worker: int, ends: set[signal.Signals]) -> tuple[int, int]:
         if found and found.si_signo == signal.SIGCHLD:
             continue
         if found and not asked:
-            asked, deadline = found.si_signo, time.monotonic() + max(_GRACE, *_asked_for())
+            asked, deadline = found.si_signo, time.monotonic() + max(_GRACE, _asked_for())
             os.kill(worker, signal.SIGTERM)
         elif asked:
             # out of time, or asked again
@@ -206,9 +206,10 @@ def _ended(worker: int) -> int | None:
             return None
 
 
-def _asked_for() -> tuple[float]:
+def _asked_for() -> float:
     _grace.seek(0)
-    return struct.unpack("d", _grace.read())
+    (seconds,) = struct.unpack("d", _grace.read())
+    return float(seconds)
 
 
 def _wait_for_children() -> None:

@@ -7,12 +7,11 @@ from collections.abc import Mapping
 
 from vibsim.experiment.data import TimeSpec
 from vibsim.experiment.faults import MISSING, Report
+from vibsim.experiment.rules.members import SLACK
 from vibsim.experiment.rules.model import are_known
 from vibsim.experiment.schema.document import TimeSection
 from vibsim.models import Model, natural_end, table_end
 
-AT_POINT = 1e-6
-"""How far from a point of a table, in its spacings, a place may be that is meant to be there: rounding."""
 WHOLE_NUMBER = 1e-12
 """How far, relative to it, a number may be from a whole number that is meant."""
 
@@ -80,7 +79,7 @@ def _by_table(
         return None
     table = model.lookup.table
     spacings = round(table.spacings_ahead)
-    if spacings < 1 or abs(table.spacings_ahead - spacings) > AT_POINT:
+    if spacings < 1 or abs(table.spacings_ahead - spacings) > SLACK:
         rule = "needs a table with a point at 0, where motions begin, and points behind it"
         hint = f"its points begin at {table.first:.10g} and are {table.spacing:.10g} apart"
         report.add(("time", "steps_per_point"), rule, hint)
