@@ -52,7 +52,7 @@ def test_every_reason_and_every_kind_of_check_has_a_title():
         ({"levels": [6, 7]}, "There are too few levels to judge the angle θ"),
         ({"sweep": {"initial.theta": [0.5, 1.0]}}, "The angle θ converges at second order in all 2 members"),
         ({"schemes": ["central", "rk4"]},
-         "The angle θ converges at the order that each of 2 schemes promises"),
+         "The angle θ converges at the order that both schemes promise"),
         ({"checks": [{"value": "period", "below": 1.0}]}, "Period is not as expected"),
         ({"checks": [{"claim": "so", "that": {"value": "period", "above": 1.0}}]}, "So"),
         ({"checks": [{"claim": "dt = 1 is large", "that": {"value": "period", "above": 1.0}}]}, "dt = 1 is large"),
@@ -316,5 +316,5 @@ def test_one_exact_scheme_of_several_does_not_give_the_title():
         levels={"from": 4, "to": 8}, schemes=["crank_nicolson", "central"],
         checks=[{"converges": "energy_deviation", "order": "scheme"}],
     )  # fmt: skip
-    title = "The energy deviation dE = E(t) − E(0) converges at the order that each of 2 schemes promises"
+    title = "The energy deviation dE = E(t) − E(0) converges at the order that both schemes promise"
     assert first(exp)["finding"] == title

@@ -32,7 +32,6 @@ SIZES = {
     "linf_interior": ("largest error without the last point", 0.0),
 }  # fmt: skip
 """Of a norm over time what it is as a size of the error, and over which power of the duration."""
-ONE_COLUMN = 3  # entries of a legend that stands within the axes
 STRIP = 0.12  # of the height of the axes, for a row of a legend
 LONG = 24  # letters of a label above which it is set smaller
 
@@ -57,6 +56,19 @@ def _root(ax: Axes) -> Figure:
     figure = ax.get_figure(root=True)
     assert figure is not None
     return figure
+
+
+def _legend(ax: Axes, columns: int, size: float) -> None:
+    """Write the legend in a strip of its own above the curves, where it hides none."""
+    rows = -(-len(ax.get_legend_handles_labels()[0]) // columns)
+    low, high = ax.get_ylim()
+    if ax.get_yscale() == "log":
+        ax.set_ylim(low, high * (high / low) ** (STRIP * rows))
+    else:
+        ax.set_ylim(low, high + STRIP * (high - low) * rows)
+    ax.legend(
+        loc="upper left", ncols=columns, fontsize=size, handlelength=1.6, borderaxespad=0.2, columnspacing=1.2
+    )  # fmt: skip
 
 
 def differences(record: Record, lead: Lead) -> Picture | None:
@@ -88,14 +100,7 @@ def differences(record: Record, lead: Lead) -> Picture | None:
     ax.set_xlim(float(t[0]), float(t[-1]) if t[-1] > t[0] else 1.0)
     ax.set_xlabel(data.time_label(record))
     size = 8.0 if max(len(curve.label) for curve in shown) < LONG else 6.0
-    columns = 1
-    if len(shown) > ONE_COLUMN and not wild:
-        # a strip of its own, where it hides no curve
-        columns, (low, high) = 3, ax.get_ylim()
-        ax.set_ylim(low, high + STRIP * (high - low) * -(-len(shown) // columns))
-    ax.legend(
-        loc="upper left" if columns > 1 else "best", ncols=columns, fontsize=size, handlelength=1.6, borderaxespad=0.2,
-    )  # fmt: skip
+    _legend(ax, columns=3, size=size)
     return Picture(
         "hero_differences",
         _title_of_differences(record, lead, len(shown)),
@@ -172,7 +177,7 @@ def against_step(experiment: Experiment, record: Record, lead: Lead) -> Picture 
     style.log_axis(ax, "x", float(dt.min()) / 1.4, float(dt.max()) * 1.4, most=4)
     ax.set_ylim(top=min(2.5 * high, style.LARGEST))
     ax.set_xlabel(style.label("time step", data.time_unit(record, "dt")))
-    ax.legend(loc="best", fontsize=7.5, handlelength=1.8, borderaxespad=0.2)
+    _legend(ax, columns=2, size=7.5)
     title, found = "The error at every step", findings.factor(lead)
     if found is not None:
         due = words.fact(lead.result, "expected")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 
 from vibsim.convergence import LadderVerdict
@@ -179,7 +179,7 @@ def _phrases(experiment: Experiment, record: Record, lead: Lead) -> dict[str, st
     measured, what = lead.measured, _named(experiment, lead.quantity)
     facts = lead.result.get("facts") or {}
     order, expected = facts.get("order"), facts.get("expected")
-    named = getattr(measured, "schemes", None) or record.words("scheme")
+    named = _named_schemes(record, lead)
     filled = {
         "what": what, "What": _opened(what), "everywhere": _everywhere(record, lead),
         "at": _at(expected, order), **_apart(order, expected),
@@ -205,23 +205,33 @@ def _phrases(experiment: Experiment, record: Record, lead: Lead) -> dict[str, st
             found = (tame, wild) if measured.stable else (wild, tame)
             filled |= {"stability": found[0], "not_stability": f"{found[1]}, against what is asked"}
     if each := _of_each(record, lead):
-        filled |= {"at": f"at the order that each of {each} schemes promises", "everywhere": ""}
+        schemes = "both schemes promise" if each == 2 else f"each of {each} schemes promises"
+        filled |= {"at": f"at the order that {schemes}", "everywhere": ""}
     elif _has_own_orders(record, lead):
         filled["at"] = "at the order that its scheme promises"
     return filled
 
 
+def _named_schemes(record: Record, lead: Lead) -> Sequence[str]:
+    """Return the schemes that a check is about."""
+    return getattr(lead.measured, "schemes", None) or record.words("scheme")
+
+
 def _has_own_orders(record: Record, lead: Lead) -> bool:
-    """Say whether a check asks for the order of the scheme, and not all orders of the record are one."""
+    """Say whether a check asks for the order of the scheme, and its schemes and members have several."""
     if getattr(lead.measured, "order", None) != "scheme":
         return False
     name = lead.quantity
-    return f"{name}_formal_order" in record and len(set(data.formal_orders(record, name).flat)) > 1
+    if f"{name}_formal_order" not in record:
+        return False
+    every = record.words("scheme")
+    places = [every.index(scheme) for scheme in _named_schemes(record, lead)]
+    return len(set(data.formal_orders(record, name)[places].flat)) > 1
 
 
 def _of_each(record: Record, lead: Lead) -> int:
     """Return how many schemes a check asks for the order that each of them promises; 0 where it is one order."""
-    named = getattr(lead.measured, "schemes", None) or record.words("scheme")
+    named = _named_schemes(record, lead)
     return len(named) if len(named) > 1 and _has_own_orders(record, lead) else 0
 
 
@@ -252,7 +262,7 @@ def _everywhere(record: Record, lead: Lead) -> str:
     """Say of how many members and schemes it holds; empty for one result of the only scheme."""
     assert lead.entry is not None
     total, schemes = sum(lead.entry["counts"].values()), record.words("scheme")
-    named = getattr(lead.measured, "schemes", None) or schemes
+    named = _named_schemes(record, lead)
     kind = lead.measured.kind if lead.measured else ""
     is_named = kind in ("converges", "accurate") and len(named) == 1 < len(schemes)
     by = f" with scheme {named[0]}" if is_named else ""
@@ -261,6 +271,8 @@ def _everywhere(record: Record, lead: Lead) -> str:
     if data.swept(record):
         noun = "members" if total <= len(record["case"]) else "runs"
         return f" in all {words.number(total, 'integer')} {noun}{by}"
+    if total == len(schemes) == 2:
+        return " by both schemes"
     return f" by {'all' if total == len(schemes) else f'{total} of'} {len(schemes)} schemes"
 
 
