@@ -68,7 +68,9 @@ def _flag(name: str, text: str) -> _Row:
 
 def commands() -> Iterator[Command]:
     """Yield all commands."""
-    text = "results folder (default: results/ of the checkout)"
+    text = (
+        "results folder (default: results/ of the checkout, or where vibsim is installed ./results)"
+    )
     results = _row("--results", _path, "DIR", text)
     text = "a value in place of one of the file, such as model.g=1.62; may be repeated"
     settings = _row("--set", _word, "KEY=VALUE", text, dest="settings", action="append", default=[])
