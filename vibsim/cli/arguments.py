@@ -97,6 +97,12 @@ def commands() -> Iterator[Command]:
         *_detail(),
     )
     yield "run", "run.command", "Run experiments and show every verdict.", options
+    text = "experiment, collection or FILE.yaml (default: compare the files of all, recompute none)"
+    named = _row("experiments", _word, "EXPERIMENT", text, nargs="*")
+    text = "compare files with the manifest, and recompute nothing"
+    only = _flag("--files", text)
+    text = "Compare every file with the manifest of its run; recompute, and compare bit for bit."
+    yield "verify", "commands.verify", text, (results, named, settings, only, cores, allow)
     file = _row("file", _path, "FILE", "experiment file")
     text = "Run an experiment file, and again whenever it is saved."
     yield "watch", "commands.watch", text, (results, file, settings, cores, allow, *_detail())
