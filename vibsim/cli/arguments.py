@@ -184,7 +184,11 @@ def commands() -> Iterator[Command]:
     text = "Write the report of an experiment; without one, the index over all results."
     formats = "formats of the figure files: svg, png, pdf; several with commas (default: svg)"
     formats_row = _row("--formats", _word, "LIST", formats)
-    yield "report", "jobs.report", text, (*job, perhaps, folder, formats_row)
+    publish = "copy pages, data, experiment file and metadata (RO-Crate) to a new folder"
+    publish_row = _row("--publish", _path, "DIR", publish)
+    licence = "licence of what is published: its address, or a sentence"
+    publish_rows = (publish_row, _row("--license", _word, "TEXT", licence))
+    yield "report", "commands.report", text, (*job, perhaps, folder, formats_row, *publish_rows)
 
 
 def _detail() -> Iterator[_Row]:
