@@ -104,6 +104,9 @@ def test_what_no_run_made_is_noticed(place: Place, name: str) -> None:
 
 
 def test_a_foreign_folder_and_a_lost_one_are_noticed(place: Place) -> None:
+    for name in ("..etc", ".", "a..b"):
+        (place.results / f".vibsim/made/{name}.jsonl").touch()
+    assert problems(place) == {}
     shutil.copytree(place.tiny, place.results / "other/copy")
     assert list(problems(place)) == [".vibsim/made/other.copy.jsonl"]
     shutil.rmtree(place.results / "other")
@@ -150,6 +153,13 @@ def test_changes_of_runs_are_no_damage(place: Place) -> None:
 
 
 def test_an_interrupted_run_is_no_damage_and_not_whole(place: Place) -> None:
+    # a report begins with its figures, when its page is deleted already
+    (place.tiny / "report.html").unlink()
+    cut(place.tiny / "figures/thumbnail.svg")
+    assert problems(place) == {
+        "adhoc/tiny/figures/thumbnail.svg": "is of a report that was not finished",
+        "adhoc/tiny/report.html": "is missing",
+    }
     shutil.rmtree(place.results)
     done = here("simulate", place.file, "--level", 6, 7, "--results", place.results)
     assert done.returncode == 0, done.stderr

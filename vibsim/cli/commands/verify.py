@@ -7,6 +7,7 @@ in a temporary folder, and its manifest is compared with the files that are ther
 from __future__ import annotations
 
 import os
+import re
 import subprocess
 import sys
 from argparse import Namespace
@@ -19,7 +20,7 @@ from vibsim.cli import made_files, results_folder
 from vibsim.cli.chosen_plans import plans_of
 from vibsim.cli.jobs.common import chosen_results
 from vibsim.cli.jobs.solve import check_allowed
-from vibsim.cli.made_files import Entry
+from vibsim.cli.made_files import BESIDE, Entry
 from vibsim.cli.run import lock, reasons, supervise
 from vibsim.cli.terminal import clean
 from vibsim.core.errors import FileError, VibsimError
@@ -31,6 +32,10 @@ TIMESTAMP = ".snakemake_timestamp"
 """What Snakemake puts into a folder that a job made."""
 LAST = ("convergence.nc", "summary.json", "report.html")
 """Files that every experiment has when its run ends."""
+_MANIFEST = re.compile(r"\w+\.\w+", re.ASCII)
+"""Name of the manifest of an experiment, whose collection and name have no point in them."""
+SHOWN = 8
+"""Up to so many files are named that differ for the same reason."""
 _OVER_ALL = ("index.html", "summary.csv")
 _README = "README.md"
 """Stands in the results folder of a checkout."""
@@ -83,7 +88,7 @@ def experiments(results: Path) -> list[str]:
     """Return the folders of all experiments that have a manifest or files, in order."""
     manifests = made_files.path(results, made_files.INDEX).parent.glob("*.*.jsonl")
     folders = (folder for folder in results.glob("[!.]*/[!.]*") if folder.is_dir())
-    found = {file.stem.replace(".", "/", 1) for file in manifests}
+    found = {file.stem.replace(".", "/") for file in manifests if _MANIFEST.fullmatch(file.stem)}
     return sorted(found | {folder.relative_to(results).as_posix() for folder in folders})
 
 
@@ -95,15 +100,22 @@ def compare(results: Path, key: str) -> tuple[int, dict[str, str]]:
     tuple[int, dict[str, str]]
         How many files the manifest has; and what is wrong, by the path of the file from `results`.
     """
+    folder = results / key
     known, is_whole = made_files.read(results, key)
-    there = set(_files(results / key, is_top=key == made_files.INDEX))
+    there = set(_files(folder, is_top=key == made_files.INDEX))
     if not known and not there:
         return 0, {key or "index.html": "there are no results yet: run it first"}
-    found = {name: _problem(results / key / name, entry) for name, entry in known.items()}
+    found = {name: _problem(folder / name, entry) for name, entry in known.items()}
     if is_whole:
-        found |= dict.fromkeys(there - known.keys(), "is not in the manifest: no run made it")
+        found |= dict.fromkeys(
+            there - known.keys(), "is not in the manifest: no job that ended made it"
+        )
         for name in _OVER_ALL if key == made_files.INDEX else LAST:
             found.setdefault(name, "is not made yet: the last run did not end")
+    if LAST[-1] not in there:
+        # its job begins with figures and tables
+        begun = [name for name in found if name.startswith(BESIDE) and (folder / name).exists()]
+        found |= {name: found[name] and "is of a report that was not finished" for name in begun}
     problems = {(Path(key) / name).as_posix(): text for name, text in sorted(found.items()) if text}
     if not is_whole:
         manifest = made_files.path(results, key)
@@ -164,7 +176,11 @@ def _tell_recomputed(plan: Plan, results: Path, folder: Path) -> int:
     """Print which recomputed files differ from those that are there, and why; return how many."""
     causes = differences(plan, results, folder)
     for cause, names in causes.items():
-        print(clean(f"{plan.key}: recomputed, other bytes ({cause}): {', '.join(names)}"))
+        # data before pages, tables and figures
+        names.sort(key=lambda name: (not name.endswith(".nc"), name))
+        more = f" and {len(names) - SHOWN} more" if len(names) > SHOWN else ""
+        told = ", ".join(names[:SHOWN]) + more
+        print(clean(f"{plan.key}: recomputed, other bytes ({cause}): {told}"))
     if not causes:
         number = len(made_files.load(folder, plan.key))
         print(clean(f"{plan.key}: recomputed, all {number} files have the same bytes"))
