@@ -264,7 +264,7 @@ class Written:
         moving, total = {*self.velocities, "t"}, []
         forces = []
         for mass, a in zip(self.masses, self.own_accelerations, strict=True):
-            still = (term for term in _terms(a) if moving.isdisjoint(names_in(term)))
+            still = (term for term in terms_of(a) if moving.isdisjoint(names_in(term)))
             force: Expression = ZERO
             for term in still:
                 force = plus(force, term)
@@ -344,22 +344,22 @@ class Written:
         return np.fmax.reduce(self.frequencies(parameters), axis=-1)
 
 
-def _terms(node: Expression) -> Iterator[Expression]:
+def terms_of(node: Expression) -> Iterator[Expression]:
     """Yield the terms of a sum, also of one that is multiplied by what names nothing but parameters."""
     match node:
         case Binary("+", left, right):
-            yield from _terms(left)
-            yield from _terms(right)
+            yield from terms_of(left)
+            yield from terms_of(right)
         case Binary("-", left, right):
-            yield from _terms(left)
-            yield from (Negate(term) for term in _terms(right))
+            yield from terms_of(left)
+            yield from (Negate(term) for term in terms_of(right))
         case Negate(operand):
-            yield from (Negate(term) for term in _terms(operand))
+            yield from (Negate(term) for term in terms_of(operand))
         case Binary("/", left, right):
-            yield from (over(term, right) for term in _terms(left))
-        case Binary("*", left, right) if len(_sum := list(_terms(right))) > 1:
+            yield from (over(term, right) for term in terms_of(left))
+        case Binary("*", left, right) if len(_sum := list(terms_of(right))) > 1:
             yield from (times(left, term) for term in _sum)
-        case Binary("*", left, right) if len(_sum := list(_terms(left))) > 1:
+        case Binary("*", left, right) if len(_sum := list(terms_of(left))) > 1:
             yield from (times(term, right) for term in _sum)
         case _:
             yield node
@@ -464,7 +464,7 @@ def _damping(own: Written) -> Damping | None:
     """Return the damping of the only coordinate, where it is linear or quadratic with a constant rate."""
     (a,), (v,) = own.accelerations, own.velocities
     force: Expression = ZERO
-    for term in _terms(a):
+    for term in terms_of(a):
         if v in names_in(term):
             force = minus(force, term)
     found = damping_of(force, v) if force != ZERO else None
