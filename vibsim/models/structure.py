@@ -63,7 +63,7 @@ UNCOUPLED = 1e-12
 """Modes are not coupled by damping where the other entries of ``X' C X`` are below this part of the largest one."""
 ROUNDED = 2.0**-53 / 64.0
 """Relative error that rounding leaves of a motion in its lowest mode, for each unit of ``(w_max/w_min)^2``: forces of
-stiff parts cancel. [measured, of beams of 32 to 1024 degrees of freedom]"""
+stiff parts cancel. [measured, of beams of 32 to 512 degrees of freedom]"""
 TIMES_AT_ONCE = 2**20
 """Modes times times that are worked on at once."""
 
