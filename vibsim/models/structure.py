@@ -146,9 +146,9 @@ class Structure:
             if np.max(np.abs(apart)) > UNCOUPLED * np.max(np.abs(between), initial=0.0):
                 return None
             found += 0.5 * np.diag(between)
-        found[: len(self.ratios)] += (
-            np.array(self.ratios) * self.modes.frequencies[: len(self.ratios)]
-        )
+        if self.ratios:
+            count = len(self.ratios)
+            found[:count] += np.array(self.ratios) * self.modes.frequencies[:count]
         return found
 
     def start_of(self, initial: Floats) -> tuple[Floats, Floats]:
