@@ -14,7 +14,8 @@ function need not look alike.
 Frequencies are those of small oscillations about the origin, ``w^2`` the positive eigenvalues of ``-da/dx`` at t = 0.
 
 Instead of forces a motion may be written for each coordinate: what is missing in the equations is then added, and the
-motion starts on it (a manufactured solution; vibration text (B), section 2.2 and exercises 9 and 23).
+motion starts on it (a manufactured solution; vibration text (B), section 2.2 and exercises 9 and 23). Events and a stop
+may be written as well (`vibsim.models.shared.crossings`).
 """
 
 from __future__ import annotations
@@ -66,6 +67,8 @@ from vibsim.models.base import (
     declared_parameters,
     speeds,
 )
+from vibsim.models.events import Crossings
+from vibsim.models.shared.crossings import crossings, described
 from vibsim.models.shared.manufactured import Manufactured
 from vibsim.models.shared.mechanical import damping_of
 
@@ -229,6 +232,11 @@ class Written:
             else:
                 found.append(self.read(f"acceleration.{name}", f"-{name}"))
         return tuple(found)
+
+    @cached_property
+    def crossings(self) -> Crossings | None:
+        """The events, where some are written."""
+        return crossings(self.formulas, (*self.states, "t", *self.declared))
 
     @cached_property
     def manufactured(self) -> Manufactured | None:
@@ -418,6 +426,9 @@ def system(
     else:
         more |= {"linear": False, "highest_frequency": own.highest_frequency}
         more["superposed"] = is_conservative and _has_constant_slopes(own)
+    if own.crossings is not None:
+        is_conservative = False
+        more |= {"linear": False, "superposed": False, "events": own.crossings}
     first, *rest = own.accelerations
     return Model(
         kind="system",
@@ -439,6 +450,7 @@ def system(
             if field == "outputs"
         ),
         formulas=fields(coordinates),
+        takes_events=True,
         written=partial(written, coordinates),
         named=named,
         **more,
@@ -485,6 +497,8 @@ def _equation(own: Written) -> str:
     if len(lines) > SHOWN:
         lines = [*lines[: SHOWN // 2], "...", lines[-1]]
     told = ", ".join(lines)
+    if own.crossings is not None:
+        told += described(own.crossings, own.formulas)
     if own.manufactured is None:
         return told
     motion = (

@@ -165,9 +165,10 @@ def _written(
     for row in model.formulas:
         if row.positive:
             _check_positive(row, texts, declared, report)
+    exact = next((name for name in texts if name.startswith("exact")), "")
     if any(map(is_crossing, texts)):
         for name, is_there, why in (
-            ("exact", "exact" in texts, "the motion leaves the exact solution at an event"),
+            ("exact", bool(exact), "the motion leaves the exact solution at an event"),
             (
                 f"damping.{COULOMB}",
                 f"damping.{COULOMB}" in parameters,
@@ -180,7 +181,6 @@ def _written(
     if any(fault.key.split(".")[0] == "model" for fault in report.faults):
         return Equation(None)
     parameters |= {f"{DECLARED}.{name}": value for name, value in declared.items()}
-    exact = next((name for name in texts if name.startswith("exact")), "exact")
     try:
         found = model.written(texts, tuple(declared))
         for spec in tables.values():
@@ -190,7 +190,7 @@ def _written(
     except ExpressionError as error:
         # an error without a text speaks of the longest formula
         longest = max(texts, key=lambda name: len(texts[name]), default="kind")
-        name = exact if error.text else longest
+        name = exact if error.text and exact else longest
         path = ("model", *name.split("."))
         report.add(path, error.rule, error.hint, texts.get(name, error.text))
         return Equation(None)
