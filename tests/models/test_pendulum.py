@@ -1,6 +1,7 @@
 """Exact solutions against 40 digits, and the energies against each other."""
 
 import math
+from pathlib import Path
 
 import mpmath
 import numpy as np
@@ -8,6 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from vibsim import Experiment
 from vibsim.models import MODELS
 from vibsim.models.shared.elliptic import agm_quarter_period, carlson_rf, jacobi
 
@@ -169,3 +171,27 @@ def test_integrals(complement):
     assert agm_quarter_period(np.array([complement]))[0] == pytest.approx(true, rel=1e-14)
     value = carlson_rf(np.zeros(1), np.array([complement]), np.ones(1))[0]
     assert value == pytest.approx(true, rel=1e-13)
+
+
+@pytest.mark.parametrize("claim", ["small_swing", "swing_of_two", "swing_of_three"])
+def test_the_periods_of_the_centred_scheme_are_those_of_its_modified_energy(claim):
+    """The numbers of the experiment, from a quadrature over a swing of the energy that the scheme nearly conserves."""
+    file = Path(__file__).parents[2] / "configs/vibration_text/frequency_error_of_swings.yaml"
+    experiment = Experiment.from_yaml(file)
+    (check,) = (check for check in experiment.checks if check.id == claim)
+    theta = (0.1, 1.0, 2.0, 3.0)[check.that.at.case]
+    steps = 2**check.that.at.level
+
+    def period(dt2):
+        def slowness(s):
+            q = theta * mpmath.sin(s)
+            energy = mpmath.cos(q) - mpmath.cos(theta)
+            energy += dt2 * (mpmath.sin(q) ** 2 - mpmath.sin(theta) ** 2) / 24
+            mass = 1 + dt2 * mpmath.cos(q) / 6
+            return theta * mpmath.cos(s) / mpmath.sqrt(2 * energy * mass)
+
+        return 4 * mpmath.quad(slowness, [0, mpmath.pi / 4, mpmath.pi / 2], method="gauss-legendre")
+
+    with mpmath.workdps(30):
+        wanted = period((mpmath.mpf(50) / steps) ** 2) / period(mpmath.mpf(0)) - 1
+    assert check.that.equals == pytest.approx(float(wanted), rel=2e-3)
