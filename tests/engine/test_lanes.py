@@ -73,9 +73,7 @@ VARIED = [
     for kind, scheme in FIXED_STEP.items()
     for options in (scheme.defaults(), *variants(scheme))
 ]
-SMOOTH = {
-    kind: model for kind, model in MODELS.items() if model.events is None and model.coordinates == 1
-}
+SMOOTH = {kind: model for kind, model in MODELS.items() if model.events is None and model.is_alone}
 """Those with events are stepped in other lanes: `test_events`."""
 MODEL_CASES = [
     pytest.param(
