@@ -6,8 +6,6 @@ from pathlib import Path
 from setuptools import setup
 from setuptools.command.build_py import build_py
 
-SHIPPED = ("Snakefile", "configs", "workflow")
-
 
 class BuildWithWorkflow(build_py):
     """Copy the workflow and the shipped experiments to ``vibsim/shipped``; a checkout uses its own."""
@@ -19,15 +17,11 @@ class BuildWithWorkflow(build_py):
             return
         target = Path(self.build_lib) / "vibsim" / "shipped"
         shutil.rmtree(target, ignore_errors=True)
-        for name in SHIPPED:
-            source = Path(__file__).parent / name
-            if source.is_dir():
-                shutil.copytree(
-                    source, target / name, ignore=shutil.ignore_patterns("*.py", "__pycache__")
-                )
-            else:
-                target.mkdir(parents=True, exist_ok=True)
-                shutil.copy(source, target / name)
+        target.mkdir(parents=True)
+        root, unused = Path(__file__).parent, shutil.ignore_patterns("*.py", "__pycache__")
+        shutil.copy(root / "Snakefile", target)
+        for name in ("configs", "workflow"):
+            shutil.copytree(root / name, target / name, ignore=unused)
 
 
 setup(cmdclass={"build_py": BuildWithWorkflow})

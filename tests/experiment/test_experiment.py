@@ -89,9 +89,8 @@ def test_every_model_and_scheme_of_the_registries_can_be_named(kind: str, scheme
             build(model=smallest_section(kind), initial={}, schemes=schemes)
         return
     experiment = build(model=smallest_section(kind), initial={}, schemes=schemes)
-    # on a structure a scheme has one form, that of the defaults
-    options = method.options_on(model) if model.loaded is None else method.options
-    defaults = {option.name: option.default for option in options}
+    defaults = {option.name: option.default for option in method.options_on(model)}
+    defaults = {**method.defaults(), **defaults}
     assert experiment.schemes[1].options == defaults
     assert tuple(experiment.initial) == tuple(state.name for state in MODELS[kind].states)
 

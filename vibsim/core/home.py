@@ -9,16 +9,21 @@ SHIPPED = _PACKAGE / "shipped"
 """What a wheel holds of the checkout (`setup.py` puts it there); a checkout has no such folder."""
 
 
+def is_installed() -> bool:
+    """Tell whether this is an installation rather than a checkout."""
+    return SHIPPED.is_dir()
+
+
 def home() -> Path:
     """Return the folder with ``Snakefile``, ``configs`` and ``workflow``."""
-    return SHIPPED if SHIPPED.is_dir() else _PACKAGE.parent
+    return SHIPPED if is_installed() else _PACKAGE.parent
 
 
 def default_results() -> Path:
     """Return the results folder of the checkout; of an installed vibsim, that in the current folder."""
-    return (Path.cwd() if SHIPPED.is_dir() else home()) / "results"
+    return (Path.cwd() if is_installed() else home()) / "results"
 
 
 def called(command: str) -> str:
     """Return a command of vibsim as a user types it: in the checkout, or anywhere where it is installed."""
-    return command if SHIPPED.is_dir() else f".venv/bin/{command}"
+    return command if is_installed() else f".venv/bin/{command}"

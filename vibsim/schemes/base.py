@@ -224,7 +224,7 @@ class Scheme:
         return tuple(option for option in self.options if isinstance(option, Option))
 
     def options_on(self, model: Model | None) -> tuple[AnyOption, ...]:
-        """Return every option that the scheme has on a model."""
+        """Return every option that has a meaning on a model."""
         if model is not None and model.loaded is not None:
             return tuple(option for option in self.options if option.name in self.weighed)
         has_events = model is not None and model.events is not None and not self.adaptive

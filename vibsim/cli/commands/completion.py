@@ -9,8 +9,6 @@ from __future__ import annotations
 from argparse import Namespace
 from collections.abc import Iterable, Sequence
 
-from vibsim.core.errors import VibsimError
-
 BASH = """\
 # in ~/.bashrc: source <(vibsim completion bash)
 _vibsim() {
@@ -128,9 +126,9 @@ def _experiments() -> list[str]:
     from vibsim.core.home import home
     from vibsim.plan.choose import experiments
 
-    try:
-        found = experiments(home())
-    except VibsimError:
-        return []
-    names = [name for choice in found for name in (choice.collection, choice.name, choice.key)]
+    names = [
+        name
+        for choice in experiments(home())
+        for name in (choice.collection, choice.name, choice.key)
+    ]
     return list(dict.fromkeys(names))

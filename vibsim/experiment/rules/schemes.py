@@ -33,6 +33,7 @@ def finish_schemes(
             several = _specs(section, model, report.kinds)
             found.extend(several)
             if model is not None:
+                _check_options(section, i, model, report)
                 _check_events(section, i, model, report)
                 _check_forces(several[0].kind, i, model, report)
             _check_names(several, i, first, report)
@@ -46,9 +47,10 @@ def _specs(section: Any, model: Model | None, kinds: Kinds) -> list[SchemeSpec]:
     kind = section if isinstance(section, str) else section.kind
     scheme = kinds.scheme(kind)
     assert scheme is not None
-    options: dict[str, Any] = {row.name: row.default for row in scheme.options_on(model)}
-    if model is not None and model.loaded is not None:
-        options = scheme.defaults()
+    options: dict[str, Any] = {
+        **scheme.defaults(),
+        **{row.name: row.default for row in scheme.options_on(model)},
+    }
     name = kind
     if not isinstance(section, str):
         name = section.label or kind
@@ -119,16 +121,22 @@ def _velocities(model: Model) -> str:
     return ", ".join(found if len(found) < MOST_NAMED else [*found[: MOST_NAMED - 1], "..."])
 
 
+def _check_options(section: Any, i: int, model: Model, report: Report) -> None:
+    """Refuse options without a meaning on this model."""
+    if isinstance(section, str):
+        return
+    scheme = report.kinds.scheme(section.kind)
+    assert scheme is not None
+    known = scheme.options_on(model)
+    for option in scheme.options:
+        if option not in known and option.name in section.model_fields_set:
+            rule = f"has no meaning for {model.kind}, on which the scheme has one form"
+            report.add(("schemes", i, option.name), rule, "leave it out", at_key=True)
+
+
 def _check_events(section: Any, i: int, model: Model, report: Report) -> None:
     """Refuse a treatment of events where there are none."""
     given = None if isinstance(section, str) else getattr(section, EVENTS.name, None)
-    if model.loaded is not None and not isinstance(section, str):
-        method = report.kinds.scheme(section.kind)
-        assert method is not None
-        for option in method.options:
-            if option.name in section.model_fields_set and option.name not in method.weighed:
-                rule = f"has no meaning for {model.kind}, on which the scheme has one form"
-                report.add(("schemes", i, option.name), rule, "leave it out", at_key=True)
     is_unsure = any(fault.key.split(".")[0] == "model" for fault in report.faults)
     if given is None or is_unsure or model.events is not None:
         return

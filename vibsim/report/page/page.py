@@ -12,7 +12,7 @@ from typing import Any
 
 from vibsim import store
 from vibsim.core.errors import VibsimError, nearest
-from vibsim.core.home import SHIPPED, called
+from vibsim.core.home import called, home, is_installed
 from vibsim.core.record import Record
 from vibsim.core.set_option import set_options
 from vibsim.core.vocabulary import TYPICAL_NORM
@@ -320,8 +320,9 @@ def _python(experiment: Experiment) -> str:
     file, at, case = word.rpartition("@")
     if not at or word.endswith(ENDINGS):
         file, case = word, ""
-    shipped = f"{SHIPPED}/configs" if SHIPPED.is_dir() else "configs"
-    named = f"{shipped}/{file}.yaml" if is_ours else file
+    named = f"configs/{file}.yaml" if is_ours else file
+    if is_ours and is_installed():
+        named = str(home() / named)
     settings = experiment.settings
     given = f", settings={json.dumps(settings, ensure_ascii=False)}" if settings else ""
     return PYTHON.format(file=named, given=given, alone=f".alone({case})" if case else "")
