@@ -52,6 +52,7 @@ CASES = [
     ("van_der_pol", 0, van_der_pol),
     *(("mathieu", case, mathieu(delta)) for case, delta in enumerate((0.15, 0.25, 0.35))),
     ("double_pendulum", 0, double_pendulum),
+    ("double_pendulum_by_masses", 0, double_pendulum),
     ("coupled_pendulums", 0, coupled_pendulums),
 ]
 
@@ -79,6 +80,17 @@ def test_the_motion_is_that_of_the_equation_written_out_by_hand(name, case, righ
         assert bounds[state.name][0] <= 1e-11 * size
         last = level[state.name].isel(case=case, t=-1, scheme=-1 if name == "mathieu" else 0)
         assert abs(float(last) - series[-1]) < 1e-5 * size
+
+
+def test_the_double_pendulum_by_masses_is_that_by_accelerations():
+    one, other = (read(name) for name in ("double_pendulum", "double_pendulum_by_masses"))
+    first, second = (simulate(experiment, 2) for experiment in (one, other))
+    for name in ("a", "b", "va", "vb", "kinetic_energy", "energy_deviation"):
+        np.testing.assert_allclose(second[name].values, first[name].values, rtol=0.0, atol=1e-11)
+    # potential energies differ by a constant
+    apart = second["potential_energy"].values - first["potential_energy"].values
+    assert np.ptp(apart) < 1e-11
+    assert apart.flat[0] == pytest.approx(3.0, abs=1e-11)
 
 
 def test_the_limit_cycle_has_its_known_period_and_amplitude():
