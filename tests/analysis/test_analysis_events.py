@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from functools import cache
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+import yaml
 
 from vibsim import Experiment, analyse, simulate, verdicts
 from vibsim.core.vocabulary import REASON_NAMES
@@ -220,3 +223,84 @@ def test_the_times_of_all_events_are_stored_of_every_level() -> None:
         np.testing.assert_allclose(times[:count], impacts, rtol=1e-13)
         assert np.isnan(times[count:]).all()
         np.testing.assert_array_equal(record["event_time"][0, 0, i, :kept], times)
+
+
+BEADS = Path(__file__).parents[2] / "configs" / "showcase" / "two_beads.yaml"
+
+
+def impact(number: int) -> float:
+    """Return when the two beads strike each other, from the sinusoid of their distance."""
+    gap, e, size, t = 0.5, 0.9, 2.0, 0.0
+    for _ in range(number):
+        t += math.acos(gap / size)
+        before, size = t, math.hypot(gap, e * math.sqrt(size**2 - gap**2))
+        t += math.acos(gap / size)
+    return before
+
+
+def beads(schemes: list[Any], checks: list[dict[str, Any]]) -> Experiment:
+    content = yaml.safe_load(BEADS.read_text(encoding="utf-8"))
+    return Experiment.from_dict(content | {"schemes": schemes, "checks": checks})
+
+
+def time_of(number: int, **asked: float) -> dict[str, Any]:
+    return {"value": "event_time", "at": {"event": number, "level": "best"}, **asked}
+
+
+def test_the_time_of_an_event_has_an_error_from_the_levels() -> None:
+    t = impact(3)
+    checks = [
+        time_of(3, equals=t, atol=1e-7),
+        time_of(3, equals=t + 1e-3, atol=1e-7),
+        # it agrees, but by chance as far as the levels tell
+        time_of(3, equals=t, atol=1e-13),
+        time_of(3, below=t + 1e-12),
+        time_of(3, above=t - 1e-3),
+        time_of(4, equals=t, atol=1e-7),
+        {"value": "event_time", "at": {"event": 2, "level": 9}, "equals": impact(2), "atol": 1e-8},
+    ]
+    made = beads(["rk4"], checks)
+    record = analyse(made, [simulate(made, level) for level in made.levels])
+    found = verdicts(made, record)
+    assert [(v.status, v.reason) for v in found] == [
+        ("PASS", "match"),
+        ("FAIL", "mismatch"),
+        ("INCONCLUSIVE", "pre_asymptotic"),
+        ("INCONCLUSIVE", "pre_asymptotic"),
+        ("PASS", "match"),
+        ("INCONCLUSIVE", "not_applicable"),
+        ("PASS", "match"),
+    ], [v.text for v in found]
+    value, bound = (float(record[f"check_check_1_{w}"][0, 0]) for w in ("value", "error_bound"))
+    assert abs(value - t) <= bound < 1e-7
+    assert "event_time of event 3 is" in found[0].text
+    assert "fewer events happen" in found[5].text
+
+
+def test_the_time_of_an_event_on_the_mesh_is_not_trusted() -> None:
+    near = [time_of(3, equals=impact(3), atol=0.5), time_of(3, equals=9.0, atol=0.5)]
+    made = beads([SCHEMES["mesh"]], near)
+    found = verdicts(made, analyse(made, [simulate(made, level) for level in made.levels]))
+    for verdict in found:
+        assert (verdict.status, verdict.reason) == ("INCONCLUSIVE", "pre_asymptotic")
+        assert "events are left to the mesh" in verdict.text
+        assert "events: located" in verdict.advice
+
+
+@pytest.mark.parametrize("kind", ["central", "heun", "gauss4", "ab3", "forward_euler"])
+def test_the_bounds_of_the_times_of_events_hold(kind: str) -> None:
+    made = beads([kind], [time_of(k, above=0.0) for k in (1, 2, 3)])
+    record = analyse(made, [simulate(made, level) for level in made.levels])
+    for k in (1, 2, 3):
+        value, bound = (
+            float(record[f"check_check_{k}_{w}"][0, 0]) for w in ("value", "error_bound")
+        )
+        assert abs(value - impact(k)) <= bound < 0.2
+
+
+def test_a_large_sweep_keeps_the_times_that_checks_ask_for(monkeypatch: pytest.MonkeyPatch) -> None:
+    made = beads(["rk4"], [time_of(2, equals=impact(2), atol=1e-7)])
+    monkeypatch.setattr("vibsim.experiment.storage.LEAN", 0)
+    levels = [simulate(made, level) for level in made.levels]
+    assert levels[0].sizes["event"] == 2
+    assert verdicts(made, analyse(made, levels))[0].status == "PASS"

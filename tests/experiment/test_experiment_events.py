@@ -169,6 +169,22 @@ def test_what_is_wrong_with_events_of_a_system_is_said(
     assert rule in f"{fault.rule}: {fault.hint}"
 
 
+@pytest.mark.parametrize(
+    ("check", "key", "rule"),
+    [
+        ({"value": "event_time"}, "checks[0].at", "needs the number of an event"),
+        ({"value": "event_time", "at": {"event": 0}}, "checks[0].at.event", "at least 1"),
+        ({"value": "event_time", "at": {"event": 513}}, "checks[0].at.event", "at most 512"),
+        ({"value": "event_time", "at": {"event": 1.5}}, "checks[0].at.event", "whole number"),
+        ({"value": "rest_time", "at": {"event": 1}}, "checks[0].at.event", "takes no event"),
+    ],
+)
+def test_the_number_of_an_event_is_checked(check: dict[str, Any], key: str, rule: str) -> None:
+    fault = only_fault(**BOX, schemes=["rk4"], checks=[check | {"below": 1.0}])
+    assert fault.key == key
+    assert rule in fault.rule, fault
+
+
 def test_a_stop_that_holds_at_the_start_of_one_member_names_it() -> None:
     sweep = {"initial.u": [-1.0, -0.2, 0.4]}
     fault = only_fault(model=OWN | {"stop": "u + gap > 0"}, initial={}, sweep=sweep)

@@ -5,6 +5,7 @@ import pytest
 from vibsim import Experiment, InputError, analyse, simulate, verdicts
 from vibsim.experiment.experiment import canonical
 from vibsim.models import MODELS
+from vibsim.report.text import experiment_file
 from vibsim.schemes import SCHEMES
 from vibsim.theory import exact_degree
 
@@ -13,6 +14,9 @@ PAIR = {
     "acceleration": {"x": "-k*x + y", "y": "-y"},
     "parameters": {"k": 2},
 }
+
+PUSHED = {"coordinates": ["x", "y"], "force": {"x": "-x", "y": "-y"}}
+"""Two coordinates with forces, for masses of all kinds."""
 
 
 def read(model, **changes):
@@ -158,9 +162,39 @@ def test_an_exact_degree_is_that_of_the_same_equation_of_another_model():
             ["must not have more than 64 entries, has 65"],
         ),
         (
-            {"force": "-u", "mass": "u"},
+            {**PUSHED, "mass": {"x": {"y": "vx"}, "z": 1}},
             [
-                "model.mass: u: unknown name 'u' at character 1; it may name parameters: choose from e, pi"
+                "model.mass.x.y: vx: unknown name 'vx' at character 1; it may name x, y and parameters: "
+                "did you mean 'x'?",
+                "model.mass.z: unknown coordinate: choose from x, y",
+            ],
+        ),
+        (
+            {**PUSHED, "mass": {"x": {"x": 0, "y": 0.5}, "y": {"x": 0.5}}},
+            [
+                "model.mass.x.x: 0: must be greater than 0, is 0",
+                "model.mass.y.x: is that of x and y, which stands there already: leave it out",
+            ],
+        ),
+        (
+            {**PUSHED, "mass": {"x": {"y": 2}}},
+            [
+                "model.mass: must be positive definite, and is not at the start: "
+                "every motion must have a positive kinetic energy"
+            ],
+        ),
+        (
+            {
+                "coordinates": ["a", "b", "c", "d"],
+                "force": dict.fromkeys("abcd", "-a"),
+                "mass": {"a": {"b": 0.1, "c": 0.1}, "c": {"d": 0.1}},
+            },
+            ["must not couple more than 3 coordinates, couples a, b, c, d: solve for the"],
+        ),
+        (
+            {"force": "-u", "mass": "1 + v"},
+            [
+                "model.mass: 1 + v: unknown name 'v' at character 5; it may name u and parameters: choose from e, pi, u"
             ],
         ),
     ],
@@ -172,10 +206,25 @@ def test_all_faults_are_told_at_once(model, told):
         assert expected in fault
 
 
+def test_masses_are_checked_where_every_member_begins_and_are_written_back(tmp_path):
+    model = {**PUSHED, "mass": {"x": {"x": "1 + x", "y": "y/2"}, "y": 2}}
+    (told,) = refused(model, sweep={"initial.x": [0.0, 1.0, -2.0]})
+    assert "not at the start (where initial.x = -2)" in told
+    made = read(model)
+    path = tmp_path / "again.yaml"
+    path.write_text(experiment_file.text(made), encoding="utf-8")
+    assert Experiment.from_yaml(path).model == made.model
+
+
 @pytest.mark.parametrize(
     ("model", "scheme", "told"),
     [
         ({"acceleration": "-u - v**3"}, "velocity_verlet", "whose acceleration depends on v"),
+        (
+            {**PUSHED, "mass": {"x": "1 + y**2"}},
+            "velocity_verlet",
+            "whose acceleration depends on vx",
+        ),
         (
             {**PAIR, "acceleration": {"x": "-x", "y": "-y - 0.1*vy"}},
             "central",

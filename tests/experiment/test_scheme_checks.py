@@ -255,9 +255,16 @@ def test_a_value_can_be_asked_for_where_it_exists(name: str) -> None:
     if row.of != "none":
         check["quantity"] = "energy_deviation" if row.of in ("running", "deviation") else "u"
     at: dict[str, Any] = {"step": 39} if row.needs_time else {}
+    if "event" in row.at:
+        at = {"event": 3}
     if row.needs_events:
-        assert "spring has no events" in fault_of(check).rule
-        build(checks=[check], model={"kind": "sliding_box"}, initial={"u": 1}, schemes=["rk4"])
+        assert "spring has no events" in fault_of(check | {"at": at}).rule
+        build(
+            checks=[check | {"at": at}],
+            model={"kind": "sliding_box"},
+            initial={"u": 1},
+            schemes=["rk4"],
+        )
         return
     spring(check | {"at": at}, samples="all")
     if "step" in row.at:

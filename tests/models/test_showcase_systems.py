@@ -8,6 +8,7 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.special import mathieu_a, mathieu_cem
 
+import vibsim
 from vibsim import Experiment, simulate
 from vibsim.simulation.members import members
 from vibsim.simulation.reference.solve import reference
@@ -47,11 +48,27 @@ def mass_chain(t, y):
     return *y[12:], *np.diff(stretch + 0.25 * stretch**2)
 
 
+def quarter_car(t, y):
+    """Body and wheel, 400 and 40 kg, at 5 m/s on a road with waves 5 m long and 2 cm high."""
+    z, w, vz, vw = y
+    pull = 2e4 * (w - z) + 1500.0 * (vw - vz)
+    road = 0.02 * math.sin(2.0 * math.pi * t)
+    return vz, vw, pull / 400.0, (2e5 * (road - w) - pull) / 40.0
+
+
+def wave_string(t, y):
+    """Centred differences in space of ``u_tt = u_xx`` on 32 parts."""
+    return *y[31:], *(32**2 * np.diff([0.0, *y[:31], 0.0], n=2))
+
+
 CASES = [
+    ("quarter_car", 0, quarter_car),
+    ("wave_string", 0, wave_string),
     ("mass_chain", 0, mass_chain),
     ("van_der_pol", 0, van_der_pol),
     *(("mathieu", case, mathieu(delta)) for case, delta in enumerate((0.15, 0.25, 0.35))),
     ("double_pendulum", 0, double_pendulum),
+    ("double_pendulum_by_masses", 0, double_pendulum),
     ("coupled_pendulums", 0, coupled_pendulums),
 ]
 
@@ -79,6 +96,17 @@ def test_the_motion_is_that_of_the_equation_written_out_by_hand(name, case, righ
         assert bounds[state.name][0] <= 1e-11 * size
         last = level[state.name].isel(case=case, t=-1, scheme=-1 if name == "mathieu" else 0)
         assert abs(float(last) - series[-1]) < 1e-5 * size
+
+
+def test_the_double_pendulum_by_masses_is_that_by_accelerations():
+    one, other = (read(name) for name in ("double_pendulum", "double_pendulum_by_masses"))
+    first, second = (simulate(experiment, 2) for experiment in (one, other))
+    for name in ("a", "b", "va", "vb", "kinetic_energy", "energy_deviation"):
+        np.testing.assert_allclose(second[name].values, first[name].values, rtol=0.0, atol=1e-11)
+    # potential energies differ by a constant
+    apart = second["potential_energy"].values - first["potential_energy"].values
+    assert np.ptp(apart) < 1e-11
+    assert apart.flat[0] == pytest.approx(3.0, abs=1e-11)
 
 
 def test_the_limit_cycle_has_its_known_period_and_amplitude():
@@ -114,6 +142,62 @@ def test_on_the_edge_of_a_tongue_the_motion_is_a_function_of_mathieu(order):
     exact = mathieu_cem(order, q, np.degrees(0.5 * t))[0]
     for name in ("u", "u_exact"):
         np.testing.assert_allclose(np.ravel(data[name]), exact, rtol=0.0, atol=2e-9)
+
+
+def test_behind_the_transient_a_quarter_of_a_car_has_its_frequency_response():
+    level = simulate(read("quarter_car"), 5)
+    m, c, k = np.diag([400.0, 40.0]), np.array([[1500.0, -1500.0], [-1500.0, 1500.0]]), 2e4
+    stiff, t = np.array([[k, -k], [-k, k + 2e5]]), 12.0
+    for case, speed in enumerate((5.0, 10.0, 20.0)):
+        w = 2.0 * math.pi * speed / 5.0
+        response = np.linalg.solve(stiff - w * w * m + 1j * w * c, [0.0, 2e5 * 0.02])
+        expected = (response * np.exp(1j * w * t)).imag
+        found = [level[q].values[1, case, -1] for q in ("z", "w")]
+        # what is left of the transient is exp(-1.577 t) of it
+        np.testing.assert_allclose(found, expected, rtol=0.0, atol=2e-9)
+
+
+def string(parts, courant):
+    """Return the error of the centred scheme against d'Alembert's solution, with a step that follows the mesh."""
+    names = [f"u{i}" for i in range(1, parts)]
+    sides = ["0", *names, "0"]
+    x = np.arange(1, parts) / parts
+    steps = round(1.5 * parts / courant)
+    content = {
+        "title": "t",
+        "model": {
+            "kind": "system",
+            "coordinates": names,
+            "acceleration": {
+                name: f"{parts}**2*({sides[i]} - 2*{name} + {sides[i + 2]})"
+                for i, name in enumerate(names)
+            },
+        },
+        "initial": {name: float(u) for name, u in zip(names, profile(x), strict=True)},
+        "time": {"end": 1.5, "base_steps": steps},
+        "levels": [0],
+        "schemes": ["central"],
+    }
+    last = simulate(Experiment.from_dict(content), 0).isel(t=-1)
+    found = np.array([float(last[name].squeeze()) for name in names])
+    # two waves, each continued beyond the walls as an odd function
+    exact = 0.5 * (profile(x - 1.5) + profile(x + 1.5))
+    return float(np.sqrt(np.sum((found - exact) ** 2) / parts))
+
+
+def profile(x):
+    return np.sin(np.pi * x) + 0.5 * np.sin(2.0 * np.pi * x)
+
+
+def test_the_string_has_the_solution_of_dalembert():
+    """Exactly with dt = dx; of second order where space and time are refined at once."""
+    assert string(16, 1.0) < 1e-12
+    parts = (12, 24, 48)
+    found = [string(n, 0.5) for n in parts]
+    verdict = vibsim.judge([1.0 / n for n in parts], found, order=2, exact=0.0)
+    assert verdict.status == "PASS", verdict.sentence
+    assert verdict.order == pytest.approx(2.0, abs=0.1)
+    assert found[-1] < 1e-2
 
 
 def test_two_pendulums_beat_as_their_modes_do():

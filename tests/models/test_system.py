@@ -107,6 +107,75 @@ def test_the_energy_is_found_where_there_is_one(names, formulas, potential, is_c
     assert model.conservative == is_conservative
 
 
+BY_MASSES = {
+    "mass.a.a": "(m1 + m2)*l1**2",
+    "mass.a.b": "m2*l1*l2*cos(a - b)",
+    "mass.b": "m2*l2**2",
+    "force.a": "-(m1 + m2)*g*l1*sin(a)",
+    "force.b": "-m2*g*l2*sin(b)",
+}
+
+
+def test_masses_of_two_coordinates_give_the_accelerations_that_are_known():
+    """The double pendulum, whose accelerations and energies another case writes out."""
+    case = CASES["system-double_pendulum"]
+    model = written(("a", "b"), BY_MASSES, case.declared)
+    rng = np.random.default_rng(8)
+    at = {s.name: rng.normal(size=50) for s in model.states}
+    at |= {name: rng.uniform(0.5, 2.0, 50) for name in case.declared}
+    formulas = zip(model.accelerations, case.model.accelerations, strict=True)
+    for own, known in (*formulas, (model.kinetic_energy, case.model.kinetic_energy)):
+        expected = values(tree(case.model, known), at)
+        np.testing.assert_allclose(values(tree(model, own), at), expected, rtol=1e-12, atol=1e-12)
+    still = dict.fromkeys(("a", "b"), np.zeros(1))
+    found, known = (
+        values(tree(m, m.potential_energy), at) - values(tree(m, m.potential_energy), at | still)
+        for m in (model, case.model)
+    )
+    np.testing.assert_allclose(found, known, rtol=1e-12, atol=1e-12)
+    assert model.conservative
+
+
+def test_a_cart_with_two_pendulums_moves_as_its_equations_say():
+    """Three coordinates with masses in common, and a fourth one alone whose mass depends on its position."""
+    model = written(
+        ("x", "b", "c", "z"),
+        {
+            "mass.x.x": "m",
+            "mass.b.x": "cos(b)",
+            "mass.x.c": "2*cos(c)",
+            "mass.c": "2",
+            "mass.z": "1 + z**2",
+            "force.x": "-vx",
+            "force.b": "-sin(b)",
+            "force.c": "-2*sin(c)",
+            "force.z": "-z",
+        },
+        ("m",),
+    )
+    rng, m = np.random.default_rng(9), 4.0
+    for _ in range(20):
+        q, w = rng.normal(size=(2, 4))
+        at = dict(zip((s.name for s in model.states), (*q, *w), strict=True)) | {"m": m}
+        cb, cc, sb, sc = np.cos(q[1]), np.cos(q[2]), np.sin(q[1]), np.sin(q[2])
+        matrix = [[m, cb, 2 * cc], [cb, 1.0, 0.0], [2 * cc, 0.0, 2.0]]
+        right = -w[0] + sb * w[1] ** 2 + 2 * sc * w[2] ** 2, -sb, -2 * sc
+        # a bead on the parabola y = z^2/2
+        bead = -q[3] * (1.0 + w[3] ** 2) / (1.0 + q[3] ** 2)
+        expected = [*np.linalg.solve(matrix, right), bead]
+        found = [evaluate(tree(model, a), at) for a in model.accelerations]
+        np.testing.assert_allclose(found, expected, rtol=1e-11, atol=1e-12)
+        assert evaluate(tree(model, model.dissipation), at) == pytest.approx(w[0] ** 2, abs=1e-10)
+
+
+@pytest.mark.parametrize("kind", SCHEMES)
+def test_a_scheme_takes_masses_where_it_takes_the_accelerations(kind):
+    """Masses that depend on positions bring forces that depend on velocities."""
+    case = CASES["system-double_pendulum"]
+    masses = written(("a", "b"), BY_MASSES, case.declared)
+    assert SCHEMES[kind].treats(masses) == SCHEMES[kind].treats(case.model)
+
+
 def test_what_feeds_the_motion_of_van_der_pol_is_negative_damping():
     model = written(("u",), {"acceleration.u": "mu*(1 - u**2)*v - u"}, ("mu",))
     at = {"u": 0.5, "v": 2.0, "mu": 0.7}

@@ -155,7 +155,7 @@ def _beside(block: MemberBlock, compared: Mapping[str, Comparison]) -> Table:
     for i, table in enumerate(experiment.published, 1):
         for j, row in enumerate(table.rows, 1):
             at, of = row_at(row), table.quantity or ""
-            place = value_numbers.Place(block, compared, of, at.level, at.t, at.step)
+            place = value_numbers.Place(block, compared, of, at.level, at.t, at.step, at.event)
             for k, name in enumerate(table.beside):
                 # a value of the motion as a whole is of no quantity
                 own = place if VALUES[name].of != "none" else replace(place, quantity="")

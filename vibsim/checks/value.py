@@ -110,7 +110,9 @@ def measure(
 ) -> Mapping[str, Any]:
     """Return the number, the bound of its error, and what finer levels do to it."""
     at, name, levels = check.at, check.value, block.grid.levels
-    place = value_numbers.Place(block, compared, check.quantity or "", at.level, at.t, at.step)
+    place = value_numbers.Place(
+        block, compared, check.quantity or "", at.level, at.t, at.step, at.event
+    )
     value, bound = (np.broadcast_to(one, block.shape) for one in best_values.value(name, place))
     fulfilled, _ = compare(check, value)
     numbers = np.full((*block.shape, len(levels)), np.nan)
@@ -185,6 +187,7 @@ def judge(
     """Compare a measured number with what the check asks of it.
 
     A limit of several levels that misses what is asked by less than its bound may be right: nothing is decided then.
+    Nor is it where the time of an event meets what is asked, but may be further away.
     """
     name, number, bound = check.value, found["value"], found["error_bound"]
     holds, away = compare(check, number)
@@ -193,6 +196,9 @@ def judge(
     does_not_exist = np.isnan(number) | (np.isinf(number) & (name == "exact_period"))
     infinite = np.isinf(number) & (name != "stability_limit") & ~does_not_exist
     may_be_right = ~(away > bound) & has_limit(name, check.at.level)
+    if has_limit(name, check.at.level) and VALUES[name].needs_events:
+        # a time that the levels leave open agrees by chance, perhaps of another event
+        holds &= bound <= np.maximum(-away, 0.0 if check.equals is None else check.allowed)
     cases = [
         ((_failed(record, check) & ~survives) | infinite, NON_FINITE),
         (does_not_exist, TOO_FEW_LEVELS if _lacks_levels(experiment, check) else NOT_APPLICABLE),
@@ -275,6 +281,8 @@ def what(check: ValueCheck, notation: Notation = PLAIN) -> str:
         when = "at the end" if check.at.step is None else f"at step {check.at.step}"
         return f"{quantity} {when}"
     value = notation.value(check.value)
+    if check.at.event is not None:
+        return f"{value} of event {check.at.event}"
     return f"{value} of {quantity}" if quantity else value
 
 
@@ -312,6 +320,12 @@ def describe(f: Found, check: ValueCheck) -> Description:
             return Description(f"{told} is {brief}; it is not {asked}.", advice, brief)
         case "non_finite":
             return Description(NOT_FINITE[0].format(told), NOT_FINITE[1], brief)
+        case "not_applicable" if check.at.event is not None:
+            return Description(
+                f"{told} does not exist: fewer events happen until the end.",
+                "Ask for an earlier `event:`, or make `time: end` later.",
+                brief,
+            )
         case "not_applicable":
             return Description(
                 f"{told} does not exist here, or was not stored.",
@@ -325,9 +339,12 @@ def describe(f: Found, check: ValueCheck) -> Description:
                 f"Add finer `levels:` until there are {VALUES[check.value].finer_levels + 1}.",
                 brief,
             )
+    may_be = f"{told} is {brief}; it may or may not be {asked}."
+    if _is_on_the_mesh(f, check):
+        return Description(may_be, f"Set `events: located` for scheme {f.scheme_name}.", brief)
     finer, cost = finer_levels(f)
     return Description(
-        f"{told} is {brief}; it may or may not be {asked}.",
+        may_be,
         f"Add levels {finer[0]} and {finer[-1]} to `levels:` ({cost}) to shrink the error bound, or ask for the "
         "number of one level (`at: {level: ...}`).",
         brief,
@@ -345,8 +362,16 @@ def _measured(f: Found, check: ValueCheck) -> str:
     if not has_limit(check.value, check.at.level):
         return told
     if math.isnan(bound):
-        return f"{told}, with an unknown error, because the levels do not approach each other"
+        is_late = _is_on_the_mesh(f, check)
+        why = "events are left to the mesh" if is_late else "the levels do not approach each other"
+        return f"{told}, with an unknown error, because {why}"
     return f"{told}, with an error of at most {f.notation.number(bound, 2)}"
+
+
+def _is_on_the_mesh(f: Found, check: ValueCheck) -> bool:
+    """Say whether a number is of events that are left to the mesh."""
+    options = options_of(f.experiment, columns_of(f.record), f.scheme, f.case)
+    return VALUES[check.value].needs_events and is_on_the_mesh(options)
 
 
 def finer_levels(f: Found) -> tuple[list[int], str]:
@@ -360,8 +385,7 @@ def _on_mismatch(f: Found, check: ValueCheck) -> str:
     change = f"hange `{_border(check)[0]}:`"
     if check.value in COUNTED or not depends_on_level(check.value):
         return f"C{change}."
-    options = options_of(f.experiment, columns_of(f.record), f.scheme, f.case)
-    if VALUES[check.value].needs_events and is_on_the_mesh(options):
+    if _is_on_the_mesh(f, check):
         return f"Set `events: located` for scheme {f.scheme_name}, or c{change}."
     if (first := f.fact("level_as_asked")) > 0:
         return f"Ask for a finer level (`at: {_at(check, first)}`), where the number is as asked, or c{change}."
@@ -379,6 +403,6 @@ def _at(check: ValueCheck, level: int) -> str:
     found: dict[str, Any] = {"level": level}
     if check.at.step is not None and isinstance(check.at.level, int):
         found["step"] = check.at.step * 2 ** (level - check.at.level)
-    found |= {key: getattr(check.at, key) for key in ("t", "scheme", "case")}
+    found |= {key: getattr(check.at, key) for key in ("t", "event", "scheme", "case")}
     told = (f"{key}: {value}" for key, value in found.items() if value is not None)
     return f"{{{', '.join(told)}}}"

@@ -20,7 +20,7 @@ from vibsim.apriori.formal_orders import even_powers, formal_orders
 from vibsim.comparison import value_numbers
 from vibsim.comparison.comparison_variables import Table
 from vibsim.comparison.quantity_comparison import Comparison
-from vibsim.comparison.thresholds import MISSED_EXTREMUM, OF_GRID, OF_PARABOLA
+from vibsim.comparison.thresholds import IRREGULAR, MISSED_EXTREMUM, OF_GRID, OF_PARABOLA
 from vibsim.convergence import gci
 from vibsim.convergence.batches import batches
 from vibsim.convergence.number_extrapolation import Limit, limit, observed_order
@@ -28,7 +28,7 @@ from vibsim.convergence.thresholds import ORDER_ABOVE_ROUND_OFF
 from vibsim.core.array_types import Flags, Floats
 from vibsim.core.record import Variable, attributes
 from vibsim.core.vocabulary import MEMBER
-from vibsim.experiment.value_names import HAVE_LIMITS
+from vibsim.experiment.value_names import HAVE_LIMITS, VALUES
 from vibsim.models import Model
 from vibsim.observe import oscillation
 from vibsim.observe.member_block import MemberBlock
@@ -38,7 +38,8 @@ _AT_POINTS = {"min", "max", "max_abs"}
 _OF_SERIES = {"end", "at"}
 _OF_ROOTS = {"frequency", "error_of_frequency", "phase_error_per_period", "growth_per_period"}
 """Made of the recurrence of the steps, whose round-off is eps/(w dt)^2; by peaks where there is none."""
-_OWN_SIZE = {"period", "frequency", "amplitude", "growth_per_period", "growth_factor"}
+_OF_EVENTS = {name for name in HAVE_LIMITS if VALUES[name].needs_events}
+_OWN_SIZE = {"period", "frequency", "amplitude", "growth_per_period", "growth_factor"} | _OF_EVENTS
 
 
 @dataclass(frozen=True)
@@ -79,11 +80,12 @@ class _Ladder:
     floor: Floats
     size: Floats  # that such a number has: of the solution, or of the number itself
     missed: Floats  # what the points of the finest grid may miss of an extremum
+    safety: Floats  # on the bound; NaN where none can be trusted
 
     def limit(self) -> Limit:
         """Return the limit."""
         found = limit(self.values, self.levels, self.order, self.even, self.floor)
-        return replace(found, bound=found.bound + self.missed)
+        return replace(found, bound=self.safety * found.bound + self.missed)
 
 
 def _ladder(name: str, place: value_numbers.Place) -> _Ladder:
@@ -103,12 +105,16 @@ def _ladder(name: str, place: value_numbers.Place) -> _Ladder:
             relative = relative / np.minimum(block.omega_dt, 1.0) ** 2
         floor = np.broadcast_to(relative * size[..., None], values.shape)
     missed = _missed(block, values, floor, size) if name in _AT_POINTS else np.zeros(size.shape)
-    return _Ladder(place.levels, values, *_promised(name, place), floor, size, missed)
+    safety = np.full(size.shape, 1.0 if block.model.events is None else IRREGULAR)
+    if name in _OF_EVENTS:
+        # an event on the mesh is late by an accident
+        safety = np.where(np.isnan(block.left_to_the_mesh), safety, np.nan)
+    return _Ladder(place.levels, values, *_promised(name, place), floor, size, missed, safety)
 
 
 def _beside_each_other(rows: Sequence[_Ladder]) -> _Ladder:
     """Return ladders of the same levels as one, along a new first axis."""
-    names = ("values", "order", "even", "floor", "size", "missed")
+    names = ("values", "order", "even", "floor", "size", "missed", "safety")
     return _Ladder(rows[0].levels, *(np.stack([getattr(r, name) for r in rows]) for name in names))
 
 

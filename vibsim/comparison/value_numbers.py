@@ -32,6 +32,7 @@ class Place:
     level: int | str | None
     t: float | None
     step: int | None
+    event: int | None = None  # number of an event, from 1
 
     @property
     def missing(self) -> Floats:
@@ -138,6 +139,14 @@ def _max_abs(p: Place, data: Record) -> Floats:
     if f"{p.quantity}_max_abs" in data:
         return p.of_quantity("max_abs")
     return np.asarray(np.maximum(*(np.abs(p.of_quantity(which)) for which in ("min", "max"))))
+
+
+@_needs_data
+def _event_time(p: Place, data: Record) -> Floats:
+    """Return the time of an event by its number; NaN where there are fewer."""
+    times = np.asarray(data["event_time"]) if "event_time" in data else p.missing[..., :0]
+    index = (p.event or 0) - 1
+    return times[..., index] if 0 <= index < times.shape[-1] else p.missing
 
 
 def _max_abs_interior(p: Place) -> Floats:
@@ -248,6 +257,7 @@ GATHERED = (
 
 KNOWN: Mapping[str, Number] = {
     **{name: _gathered(name) for name in GATHERED},
+    "event_time": _event_time,
     "end": _sample,
     "at": _sample,
     "min": _extreme("min", np.min),

@@ -233,7 +233,7 @@ def analysis_disk(loads: Sequence[Load], members: int, is_lean: bool) -> int:
 def load_of(experiment: ExperimentSpec, level: int) -> Load:
     """Return what one member of `experiment` costs at `level`."""
     from vibsim.experiment.storage import (
-        events_kept,
+        event_times,
         extrema_kept,
         is_bounded,
         sampling,
@@ -270,7 +270,7 @@ def load_of(experiment: ExperimentSpec, level: int) -> Load:
         work=sum(explicit for explicit, _ in works),
         iterated=sum(iterated for _, iterated in works),
         extrema=0 if lean else extrema_kept(steps, experiment.trajectories),
-        events=0 if lean or model.events is None else events_kept(experiment.trajectories),
+        events=event_times(experiment),
         d2t=experiment.own_velocity or not lean,
         own=sum(own) + whole,
     )

@@ -18,12 +18,12 @@ from vibsim.experiment.repeat import with_repeats
 from vibsim.experiment.rules import members, size_limits, timing, unlikely
 from vibsim.experiment.rules import schemes as scheme_rules
 from vibsim.experiment.rules.checks import check_published, finish_checks
-from vibsim.experiment.rules.crossings import check_stop
 from vibsim.experiment.rules.figures import check_figures
 from vibsim.experiment.rules.levels import rising_levels
 from vibsim.experiment.rules.model import are_known
 from vibsim.experiment.rules.model import equation as read_equation
 from vibsim.experiment.rules.scaling import Numbers, characteristic
+from vibsim.experiment.rules.starts import Starts, check_starts
 from vibsim.experiment.rules.sweep import read_sweep
 from vibsim.experiment.schema.checks import Check, ConvergesCheck
 from vibsim.experiment.schema.document import Document, Every
@@ -159,7 +159,8 @@ def build(
         for table in equation.tables:
             members.check_length(of_members, table, report)
         members.check_jumps(of_members, equation.formulas, report)
-        check_stop(model, parameters, initial, sweep.axes, report)
+        starts = Starts(model, parameters, initial, sweep.axes)
+        check_starts(starts, equation.formulas, report)
     numbers = Numbers(parameters, initial, time)
     if document.scaled:
         numbers = characteristic(numbers, model, swept, report)

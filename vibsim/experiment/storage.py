@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from vibsim.core.vocabulary import is_error_part
 from vibsim.experiment.data import ExperimentSpec
+from vibsim.experiment.value_names import MOST_EVENTS
 
 SMALL = 200_000
 """Samples of one variable up to which ``samples: auto`` keeps every step of a level."""
@@ -17,8 +18,6 @@ MOST_EXTREMA = 512
 """Peaks, and troughs, that are kept of a scheme and member."""
 FEWEST_EXTREMA = 16
 """As many are kept of however many members."""
-MOST_EVENTS = 512
-"""Events whose times are kept of a scheme and member."""
 RUNNING = "_running_max"
 """Behind the name of an energy deviation: its largest absolute value over every step so far."""
 _OF_PEAKS = "phase_error_slope"
@@ -77,6 +76,16 @@ def extrema_kept(steps: int, trajectories: int) -> int:
 def events_kept(trajectories: int) -> int:
     """Return of how many events a level keeps the times, of every scheme and member: of fewer among many."""
     return _fewer(MOST_EVENTS, trajectories)
+
+
+def event_times(experiment: ExperimentSpec) -> int:
+    """Return of how many events a level keeps the times; where storage is bounded, of as many as checks ask for."""
+    if experiment.model.definition.events is None:
+        return 0
+    checks = (check.measured for check in experiment.checks)
+    numbers = (check.at.event or 0 for check in checks if check.kind == "value")
+    usual = 0 if is_bounded(experiment) else events_kept(experiment.trajectories)
+    return max(usual, *numbers, 0)
 
 
 def _fewer(kept: int, trajectories: int) -> int:

@@ -7,7 +7,9 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any, Literal
 
-AtPart = Literal["t", "step", "level", "scheme", "case"]
+AtPart = Literal["t", "step", "event", "level", "scheme", "case"]
+MOST_EVENTS = 512
+"""Events whose times are kept of a scheme and member."""
 
 
 @dataclass(frozen=True)
@@ -48,6 +50,7 @@ class Value:
 
 
 _MARKS: Mapping[str, Mapping[str, Any]] = {
+    "numbered": {"at": ("event", "level", "scheme", "case")},
     "anywhere": {"at": ("t", "step", "level", "scheme", "case")},
     "all_levels": {"at": ("scheme", "case")},
     "exact_motion": {"at": ("case",)},
@@ -96,9 +99,10 @@ relative_energy_error | none | none | best | max |E(t) - E(0)| / |E(0)| over eve
 relative_energy_error_d2t | none | none | | the same with the centred difference of the position as velocity, \
 without the end points
 event_count | none | count | events | number of events, where the motion is not smooth
-first_event_time | none | time | events | time of the first event
-last_event_time | none | time | events | time of the last event
-rest_time | none | time | events | time from which the body was at rest to the end, or of its stop
+event_time | none | time | numbered events best | time of the event with the number `event`, from 1
+first_event_time | none | time | events best | time of the first event
+last_event_time | none | time | events best | time of the last event
+rest_time | none | time | events best | time from which the body was at rest to the end, or of its stop
 accepted_steps | none | count | | number of steps taken
 force_evaluations | none | count | | number of evaluations of the acceleration; of an implicit scheme those of \
 one iteration per step

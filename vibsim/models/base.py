@@ -120,6 +120,8 @@ class FormulaField:
     """The field whose place it takes."""
     positive: bool = False
     """Whether its value must be greater than 0."""
+    paired: bool = False
+    """Whether two coordinates may have one together: ``{x: {y: ...}}``, a symmetric matrix."""
 
 
 @dataclass(frozen=True)

@@ -1,10 +1,10 @@
 r"""A system of equations that a user writes: ``x'' = a(x, y, ..., x', y', ..., t)`` for each of its coordinates.
 
 The velocity of x is named vx; of a system with the one coordinate u it is v. Instead of accelerations there may be
-forces and masses, ``m x'' = F``; a mass is a number, since a mass that depends on the position has further terms, which
-accelerations have. Everything is dimensionless.
+forces and masses, ``m x'' = F``. Masses may depend on positions, and belong to two coordinates together; the terms that
+they then add to the equations are found (`vibsim.models.shared.inertia`). Everything is dimensionless.
 
-Energy: kinetic ``sum m v^2/2`` and a potential V, unless a user writes them. Of each force the terms that name
+Energy: kinetic ``sum M_ij v_i v_j/2`` and a potential V, unless a user writes them. Of each force the terms that name
 positions alone are taken; V is their work from the origin,
 ``-sum_i int_0^(x_i) F_i(x_1, ..., x_(i-1), s, 0, ..., 0) ds``. That is done where it is found by rules and its gradient
 is these forces; else V is 0. The power of everything else follows from the equations, ``P = dE/dt``, and a system is
@@ -38,7 +38,6 @@ from vibsim.formula import (
     Expression,
     Name,
     Negate,
-    Number,
     derivative,
     has_rule,
     integral,
@@ -69,6 +68,7 @@ from vibsim.models.base import (
 )
 from vibsim.models.events import Crossings
 from vibsim.models.shared.crossings import crossings, described
+from vibsim.models.shared.inertia import MASS, Inertia, inertia
 from vibsim.models.shared.manufactured import Manufactured
 from vibsim.models.shared.mechanical import damping_of
 
@@ -149,13 +149,14 @@ def fields(coordinates: tuple[str, ...]) -> tuple[FormulaField, ...]:
             instead_of="acceleration",
         ),
         FormulaField(
-            "mass",
-            (),
+            MASS,
+            coordinates,
             "",
-            "mass of each coordinate, or of all, beside its force; 1 when left out",
+            "mass of each coordinate, or of all, beside its force; 1 when left out; of two together {x: {y: ...}}",
             of="coordinate",
             beside="force",
             positive=True,
+            paired=True,
         ),
         FormulaField(
             "potential",
@@ -168,7 +169,7 @@ def fields(coordinates: tuple[str, ...]) -> tuple[FormulaField, ...]:
             "kinetic",
             states,
             "",
-            "kinetic energy, or its terms, where it is not the sum of m v**2/2",
+            "kinetic energy, or its terms, where it is not that of the masses",
             of="term",
         ),
         FormulaField(
@@ -218,20 +219,20 @@ class Written:
         return [self.read(key) for key in sorted(keys, key=lambda key: int(key.partition(".")[2]))]
 
     @cached_property
-    def masses(self) -> tuple[Expression, ...]:
-        """The mass of every coordinate; 1 of one that has an acceleration."""
-        return tuple(self.read(f"mass.{name}", "1") for name in self.coordinates)
+    def inertia(self) -> Inertia:
+        """The masses; 1 of a coordinate that has an acceleration."""
+        return inertia(self.formulas, self.coordinates, self.velocities, self.declared)
+
+    @cached_property
+    def forces(self) -> tuple[Expression, ...]:
+        """The forces; accelerations, where these are written."""
+        field = "force" if f"force.{self.coordinates[0]}" in self.formulas else "acceleration"
+        return tuple(self.read(f"{field}.{name}", f"-{name}") for name in self.coordinates)
 
     @cached_property
     def own_accelerations(self) -> tuple[Expression, ...]:
         """The accelerations without the forces of a manufactured solution."""
-        found = []
-        for name, mass in zip(self.coordinates, self.masses, strict=True):
-            if f"force.{name}" in self.formulas:
-                found.append(over(self.read(f"force.{name}"), mass))
-            else:
-                found.append(self.read(f"acceleration.{name}", f"-{name}"))
-        return tuple(found)
+        return self.inertia.accelerations(self.forces)
 
     @cached_property
     def crossings(self) -> Crossings | None:
@@ -260,9 +261,7 @@ class Written:
         """The kinetic energy."""
         if terms := self.terms("kinetic"):
             return paired(terms, plus)
-        pairs = zip(self.masses, self.velocities, strict=True)
-        half = [times(times(Number(0.5), m), Binary("**", Name(v), Number(2.0))) for m, v in pairs]
-        return paired(half, partial(Binary, "+"))
+        return self.inertia.kinetic
 
     @cached_property
     def potential(self) -> Expression:
@@ -271,12 +270,12 @@ class Written:
             return paired(terms, plus)
         moving, total = {*self.velocities, "t"}, []
         forces = []
-        for mass, a in zip(self.masses, self.own_accelerations, strict=True):
-            still = (term for term in terms_of(a) if moving.isdisjoint(names_in(term)))
+        for whole in self.forces:
+            still = (term for term in terms_of(whole) if moving.isdisjoint(names_in(term)))
             force: Expression = ZERO
             for term in still:
                 force = plus(force, term)
-            forces.append(times(mass, force))
+            forces.append(force)
         for i, (name, force) in enumerate(zip(self.coordinates, forces, strict=True)):
             for later in self.coordinates[i + 1 :]:
                 if later in names_in(force):
@@ -488,12 +487,19 @@ def _damping(own: Written) -> Damping | None:
 def _equation(own: Written) -> str:
     """Return the equations of motion as a user would write them."""
     speeds = dict(zip(own.velocities, own.coordinates, strict=True))
+    sides = [Name(f"{name}''") for name in own.coordinates]
     lines = []
-    for name, a in zip(own.coordinates, own.own_accelerations, strict=True):
+    for i, a in enumerate(own.own_accelerations):
+        left: Expression = sides[i]
+        if not own.inertia.is_plain:
+            left = own.inertia.rest(i)
+            for j, side in reversed(list(enumerate(sides))):
+                left = plus(times(own.inertia.of(i, j), side), left)
+            a = own.forces[i]
+        both = [left, a]
         for velocity, position in speeds.items():
-            if velocity in names_in(a):
-                a = put(a, velocity, Name(f"{position}'"))
-        lines.append(f"{name}'' = {to_formula(a)}")
+            both = [put(side, velocity, Name(f"{position}'")) for side in both]
+        lines.append(" = ".join(map(to_formula, both)))
     if len(lines) > SHOWN:
         lines = [*lines[: SHOWN // 2], "...", lines[-1]]
     told = ", ".join(lines)

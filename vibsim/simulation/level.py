@@ -17,7 +17,7 @@ from vibsim.engine import EventTimes, Extrema, Gathered, Trajectories
 from vibsim.experiment.storage import (
     RUNNING,
     asks_for_peaks,
-    events_kept,
+    event_times,
     extrema_kept,
     is_bounded,
     stored_series,
@@ -107,7 +107,7 @@ def simulate_record(
         threads=threads,
         with_series=not of_states.issuperset(wanted),
         n_extrema=0 if is_lean and not asks_for_peaks(experiment) else kept,
-        n_events=0 if is_lean or model.events is None else events_kept(experiment.trajectories),
+        n_events=event_times(experiment),
     )
     run = found.gathered
     assert run is not None
@@ -130,7 +130,7 @@ def simulate_record(
         **outcomes,
         **(_extrema(model, found.extrema) if found.extrema else {}),
         **(_table(MEMBER, _events(found.events)) if found.events else {}),
-        **(_event_times(found.events) if found.events and not is_lean else {}),
+        **(_event_times(found.events) if found.events and event_times(experiment) else {}),
         **(_table(MEMBER, _own_steps(run)) if has_adaptive(experiment) else {}),
         **_table(("case",), _constants(model, group, steps)),
     }

@@ -30,7 +30,7 @@ class Scope:
 
         In a row of a printed table some keys stand under ``at``, which checks do not have there.
         """
-        inner = self.path[0] == "published" and keys[0] in ("t", "step", "case")
+        inner = self.path[0] == "published" and keys[0] in ("t", "step", "event", "case")
         return replace(self, path=(*self.path, *(("at",) if inner else ()), *keys))
 
     @property
@@ -153,6 +153,8 @@ def check_place(at: At, row: Value, scope: Scope) -> None:
             scope.at(name).refuse(f"{row.name} takes no {name}", hint, at_key=True)
     if row.needs_time and "t" not in given and "step" not in given:
         scope.refuse(f"{row.name} needs t or step")
+    if "event" in row.at and "event" not in given:
+        scope.refuse(f"{row.name} needs the number of an event", "e.g. event: 1")
     if "t" in given and "step" in given:
         scope.at("step").refuse("must not be given together with t", at_key=True)
     check_scheme_and_case(at, scope)

@@ -1,17 +1,12 @@
-"""The keys `events` and `stop` of the section ``model``: what they may say, and where a motion may begin."""
+"""The keys `events` and `stop` of the section ``model``: what they may say."""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection
 from typing import Any
-
-import numpy as np
 
 from vibsim.core.errors import nearest
 from vibsim.experiment.faults import Report
-from vibsim.experiment.schema.sweep import Axis
-from vibsim.experiment.sweep_columns import columns_of
 from vibsim.formula import (
     MAX_CHARACTERS,
     Call,
@@ -19,18 +14,10 @@ from vibsim.formula import (
     Expression,
     ExpressionError,
     parse,
-    values,
 )
 from vibsim.formula.tree import STEPS, children
-from vibsim.models import Model, tree
-from vibsim.models.base import rate
-from vibsim.models.events import Crossings
+from vibsim.models import Model
 from vibsim.models.shared.crossings import STOP, guard_name, guard_of, is_constant
-
-CHUNK = 2**16
-"""Members that are looked at together."""
-MOST_NAMED = 3
-"""Most swept numbers of a member that a message names."""
 
 
 def read_crossings(
@@ -117,42 +104,3 @@ def _read(
         place = f" at character {error.position + 1}" if error.position < MAX_CHARACTERS else ""
         report.add(path, f"{error.rule}{place}", error.hint, text)
         return None
-
-
-def check_stop(
-    model: Model,
-    parameters: Mapping[str, float],
-    initial: Mapping[str, float],
-    axes: Sequence[Axis],
-    report: Report,
-) -> None:
-    """Refuse a stop that holds at t = 0 already, for some member."""
-    rows = model.events.rows if isinstance(model.events, Crossings) else ()
-    guards = [tree(model, row.guard) for row in rows if row.ends]
-    rates = [rate(model, guard) for guard in guards]
-    count = math.prod(axis.count for axis in axes)
-    for start in range(0, count if guards else 0, CHUNK):
-        stop = min(start + CHUNK, count)
-        found = columns_of(axes, start, stop)
-        numbers: dict[str, Any] = {"t": 0.0}
-        for row in model.parameters:
-            numbers[row.name] = found.get(f"model.{row.key}", parameters[row.key])
-        for state in model.states:
-            given = initial.get(state.name, 0.0)
-            numbers[state.name] = found.get(f"initial.{state.name}", given)
-        # at the border the motion may go in
-        now, ahead = (values(formula, numbers) for formula in (guards[0], rates[0]))
-        holds = np.broadcast_to((now < 0.0) | ((now == 0.0) & (ahead < 0.0)), (stop - start,))
-        if holds.any():
-            i = int(np.argmax(holds))
-            named = [
-                f"{key} = {column[i]:.10g}" for key, column in found.items() if _is_number(column)
-            ]
-            who = f" (where {', '.join(named[:MOST_NAMED])})" if named else ""
-            rule = f"holds at the start already{who}: nothing would move"
-            report.add(("model", STOP), rule, "begin outside of it")
-            return
-
-
-def _is_number(column: Any) -> bool:
-    return bool(np.issubdtype(np.asarray(column).dtype, np.number))

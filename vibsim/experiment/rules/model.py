@@ -313,12 +313,23 @@ def _several(
         keys = (f"{row.name}.{i}" for i in range(len(terms)))
         return {key: text.strip() for key, text, ok in zip(keys, terms, sound, strict=True) if ok}
     if not isinstance(written, Mapping):
-        if model.coordinates > 1 and row.names:
+        if model.coordinates > 1 and not row.beside:
             rule = f"must have a formula for each of {_some(model.positions)}"
             report.add(path, rule, f"e.g. {{{model.position}: ...}}")
             return {}
         is_sound = _is_sound(written, row, path, known, report)
         return {f"{row.name}.{name}": written.strip() for name in model.positions if is_sound}
+    if row.paired:
+        written = {
+            (name, *inner): text
+            for name, value in written.items()
+            for inner, text in (
+                {(other,): text for other, text in value.items()}
+                if isinstance(value, Mapping)
+                else {(): value}
+            ).items()
+        }
+        return _paired(row, written, model, known, report)
     found: dict[str, str] = {}
     taken = [*(state.name for state in model.states), *known]
     for name, text in written.items():
@@ -333,8 +344,31 @@ def _several(
     missing = [name for name in model.positions if name not in written]
     # a name that is misspelt is told already
     is_told = any(name not in model.positions for name in written)
-    if row.of == "coordinate" and row.names and missing and not is_told:
+    if row.of == "coordinate" and missing and not is_told:
         report.add(path, f"must have a formula for each coordinate, has none for {_some(missing)}")
+    return found
+
+
+def _paired(
+    row: FormulaField,
+    written: Mapping[tuple[str, ...], str],
+    model: Model,
+    known: Collection[str],
+    report: Report,
+) -> dict[str, str]:
+    """Return the formulas of a field that two coordinates may have together, by field and names: ``mass.x.y``."""
+    found: dict[str, str] = {}
+    for names, text in written.items():
+        path: Path_ = ("model", row.name, *names)
+        unknown = [name for name in names if name not in model.positions]
+        if unknown:
+            hint = nearest(unknown[0], list(model.positions))
+            report.add(path, "unknown coordinate", hint, at_key=True)
+        elif names[0] != names[-1] and names[::-1] in written and names > names[::-1]:
+            rule = f"is that of {names[1]} and {names[0]}, which stands there already"
+            report.add(path, rule, "leave it out", at_key=True)
+        elif _is_sound(text, row, path, known, report):
+            found[".".join((row.name, *names))] = text.strip()
     return found
 
 
@@ -359,10 +393,14 @@ def _check_place(row: FormulaField, section: Any, report: Report) -> None:
 def _check_positive(
     row: FormulaField, texts: Mapping[str, str], declared: Mapping[str, float], report: Report
 ) -> None:
-    """Refuse formulas in parameters alone whose value is not greater than 0."""
+    """Refuse formulas in parameters alone whose value is not greater than 0; what two have together may be less."""
     for key, text in texts.items():
-        if key.partition(".")[0] == row.name:
-            value = float(values(parse(text, declared), declared))
+        field_, *names = key.split(".")
+        if field_ == row.name and len(set(names)) == 1:
+            formula = parse(text, (*row.names, *declared))
+            if not set(names_in(formula)).issubset(declared):
+                continue
+            value = float(values(formula, declared))
             if not 0.0 < value < np.inf:
                 rule = f"must be greater than 0, is {value:g}"
                 report.add(("model", *key.split(".")), rule, value=text)

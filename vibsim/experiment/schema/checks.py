@@ -30,7 +30,7 @@ from vibsim.experiment.schema.fields import (
     tagged,
     whole,
 )
-from vibsim.experiment.value_names import VALUES
+from vibsim.experiment.value_names import MOST_EVENTS, VALUES
 
 Take = Literal["largest", "smallest", "mean", "where_largest", "where_smallest", "monotone"]
 Drift = Literal["none", "bounded", "linear", "quadratic"]
@@ -261,6 +261,8 @@ class PublishedAt(Members):
     """A stored sample time; where the end differs between members, the fraction 0 to 1 of it."""
     step: Index | None = None
     """A stored step of the level, from 0."""
+    event: Annotated[int, Field(ge=1, le=MOST_EVENTS), BeforeValidator(whole)] | None = None
+    """Number of an event, from 1."""
     case: Index | None = None
     """Index of a member of the sweep, from 0."""
 

@@ -154,6 +154,11 @@ def _few(formulas: Mapping[str, str]) -> Mapping[str, str]:
 Declared = Annotated[dict[str, Number], AfterValidator(_declared)]
 
 
+def _formulas(of_one: Any) -> Any:
+    """Return the type of some formulas by their names."""
+    return Annotated[dict[str, of_one], Field(min_length=1), AfterValidator(_few)]
+
+
 def _formula_type(model: Model, field: FormulaField) -> Any:
     """Return what may stand for a formula: text, and beside it ``{word: coefficient}`` or ``{table: file}``.
 
@@ -164,7 +169,9 @@ def _formula_type(model: Model, field: FormulaField) -> Any:
         if field.of == "term":
             terms = Annotated[tuple[FormulaText, ...], Field(min_length=1), short(MOST_TERMS)]
             return tagged({"one": FormulaText, "several": terms}, Discriminator(_one_or_several))
-        several = Annotated[dict[str, FormulaText], Field(min_length=1), AfterValidator(_few)]
+        several: Any = _formulas(FormulaText)
+        if field.paired:
+            several = _formulas(by_shape(several, FormulaText))
         return several if field.of == "output" else by_shape(several, FormulaText)
     name = f"{_class_name(model.kind)}{_class_name(field.name)}"
     fields: dict[str, Any] = {}
@@ -228,8 +235,9 @@ def model_section(model: Model) -> type[Section]:
     for field in model.formulas:
         names = ", ".join((*field.names, "parameters"))
         if model.named is not None:
-            states = "coordinates, velocities, t and " if len(field.names) > 1 else "t and "
-            names = f"{states if field.names else ''}parameters"
+            kinds = {"coordinates": model.position, "velocities": model.velocity, "t": "t"}
+            known = [word for word, name in kinds.items() if name in field.names]
+            names = " and ".join(filter(None, (", ".join(known), "parameters")))
         words = f"{field.description}; a formula in {names}"
         words += f"; {field.default} when left out" if field.default else ""
         fields[field.name] = (

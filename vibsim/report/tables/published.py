@@ -66,7 +66,7 @@ def tables(experiment: Experiment, record: Record, summary: Mapping[str, Any]) -
 def _columns(record: Record, table: PublishedTable) -> tuple[Column, ...]:
     at = [
         key
-        for key in ("t", "step", "case")
+        for key in ("t", "step", "event", "case")
         if any(getattr(row.at, key) is not None for row in table.rows)
     ]
     at += dict.fromkeys(key for row in table.rows for key in row.at.swept)
@@ -112,7 +112,7 @@ def _row(
     yield str(level)
     # the extrapolated solution has no step
     yield steps.get(level, math.nan)
-    yield from (getattr(row.at, key) for key in ("t", "step", "case") if key in headers)
+    yield from (getattr(row.at, key) for key in ("t", "step", "event", "case") if key in headers)
     yield from (row.at.swept.get(header) for header in headers if "." in header)
     yield row.printed
     yield Written(ours, words.like(ours, row.printed))

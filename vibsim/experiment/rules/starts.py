@@ -1,0 +1,108 @@
+"""Where a motion may begin: outside of its stop, and with masses that are positive there, for every member."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from vibsim.core.array_types import Flags
+from vibsim.experiment.faults import Report
+from vibsim.experiment.schema.sweep import Axis
+from vibsim.experiment.sweep_columns import columns_of
+from vibsim.experiment.yaml.parse import Path_
+from vibsim.formula import values
+from vibsim.models import Model, tree
+from vibsim.models.base import rate
+from vibsim.models.events import Crossings
+from vibsim.models.shared.crossings import STOP
+from vibsim.models.shared.inertia import MASS, inertia
+
+CHUNK = 2**16
+"""Members that are looked at together."""
+MOST_NAMED = 3
+"""Most swept numbers of a member that a message names."""
+
+
+@dataclass(frozen=True)
+class Starts:
+    """All members at t = 0."""
+
+    model: Model
+    parameters: Mapping[str, float]
+    initial: Mapping[str, float]
+    axes: Sequence[Axis]
+
+    def chunks(self) -> Iterator[tuple[int, dict[str, Any], Mapping[str, Any]]]:
+        """Yield the number of some members, what formulas name, and which numbers are swept."""
+        count = math.prod(axis.count for axis in self.axes)
+        for start in range(0, count, CHUNK):
+            stop = min(start + CHUNK, count)
+            swept = columns_of(self.axes, start, stop)
+            given = {key: swept.get(f"model.{key}", x) for key, x in self.parameters.items()}
+            begins = self.model.start(given) if self.model.start else self.initial
+            numbers: dict[str, Any] = {"t": 0.0}
+            numbers |= {row.name: given[row.key] for row in self.model.parameters}
+            for state in self.model.states:
+                value = begins.get(state.name, 0.0)
+                numbers[state.name] = swept.get(f"initial.{state.name}", value)
+            yield stop - start, numbers, swept
+
+    def refuse(
+        self,
+        is_wrong: Callable[[Mapping[str, Any]], Flags],
+        path: Path_,
+        rule: str,
+        hint: str,
+        report: Report,
+    ) -> None:
+        """Refuse the first member of which something is wrong; `rule` has a place for its name."""
+        for count, numbers, swept in self.chunks():
+            wrong = np.broadcast_to(is_wrong(numbers), (count,))
+            if wrong.any():
+                i = int(np.argmax(wrong))
+                named = [f"{key} = {x[i]:.10g}" for key, x in swept.items() if _is_number(x)]
+                who = f" (where {', '.join(named[:MOST_NAMED])})" if named else ""
+                report.add(path, rule.format(who), hint)
+                return
+
+
+def check_starts(starts: Starts, formulas: Mapping[str, str], report: Report) -> None:
+    """Refuse a stop that holds at t = 0 already, and a matrix of masses that is not positive definite there."""
+    model = starts.model
+    rows = model.events.rows if isinstance(model.events, Crossings) else ()
+    for guard in (tree(model, row.guard) for row in rows if row.ends):
+        slope = rate(model, guard)
+
+        def holds(numbers: Mapping[str, Any], guard: Any = guard, slope: Any = slope) -> Flags:
+            # at the border the motion may go in
+            now, ahead = values(guard, numbers), values(slope, numbers)
+            return np.asarray((now < 0.0) | ((now == 0.0) & (ahead < 0.0)))
+
+        rule = "holds at the start already{}: nothing would move"
+        starts.refuse(holds, ("model", STOP), rule, "begin outside of it", report)
+    if any(key.split(".")[0] == MASS for key in formulas) and model.formulas:
+        known = tuple(row.name for row in model.parameters)
+        masses = inertia(formulas, model.positions, model.velocities, known)
+
+        def is_light(numbers: Mapping[str, Any]) -> Flags:
+            found: Flags = np.array(False)
+            for group in masses.groups:
+                rows = [[values(masses.of(i, j), numbers) for j in group] for i in group]
+                entries = np.broadcast_arrays(*(entry for row in rows for entry in row))
+                matrix = np.stack(entries, axis=-1).reshape(*entries[0].shape, len(rows), len(rows))
+                known = np.isfinite(matrix).all(axis=(-2, -1), keepdims=True)
+                least = np.linalg.eigvalsh(np.where(known, matrix, 0.0))[..., 0]
+                found = found | ~(least > 0.0)
+            return found
+
+        rule = "must be positive definite, and is not at the start{}"
+        hint = "every motion must have a positive kinetic energy"
+        starts.refuse(is_light, ("model", MASS), rule, hint, report)
+
+
+def _is_number(column: Any) -> bool:
+    return bool(np.issubdtype(np.asarray(column).dtype, np.number))

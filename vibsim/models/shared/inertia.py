@@ -1,0 +1,172 @@
+r"""Masses of several coordinates: the kinetic energy ``T = sum_ij M_ij(q) q_i' q_j'/2``, and Lagrange's equations.
+
+``d/dt (dT/dq_i') - dT/dq_i = F_i`` is ``sum_j M_ij q_j'' + sum_jk c_ijk q_j' q_k' = F_i`` with
+``c_ijk = (dM_ij/dq_k + dM_ik/dq_j - dM_jk/dq_i)/2``: terms that a mass which depends on the position has beside the
+forces. They are solved for the accelerations by Cramer's rule, in groups of coordinates that have a mass in common.
+
+Source: L. D. Landau and E. M. Lifshitz, Mechanics, sections 5 and 10; H. Goldstein, Classical Mechanics, section 1.4.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property, partial
+
+from vibsim.formula import (
+    ONE,
+    ZERO,
+    Binary,
+    Expression,
+    ExpressionError,
+    Name,
+    Number,
+    derivative,
+    minus,
+    names_in,
+    over,
+    parse,
+    plus,
+    tidied,
+    times,
+)
+from vibsim.formula.tree import paired
+
+MASS = "mass"
+MOST_COUPLED = 3
+"""Coordinates that have masses in common, at most: Cramer's rule for more is longer than what can be compiled."""
+
+
+@dataclass(frozen=True)
+class Inertia:
+    """The masses of a system."""
+
+    positions: tuple[str, ...]
+    velocities: tuple[str, ...]
+    entries: Mapping[tuple[int, int], Expression]
+    """The matrix: its diagonal, and of what stands beside it (i, j) with i < j, where it is not 0."""
+
+    def of(self, i: int, j: int) -> Expression:
+        """Return an entry of the matrix."""
+        return self.entries.get((min(i, j), max(i, j)), ZERO)
+
+    @cached_property
+    def is_plain(self) -> bool:
+        """Whether every coordinate has a mass of its own, which depends on no position."""
+        named = {name for entry in self.entries.values() for name in names_in(entry)}
+        return all(i == j for i, j in self.entries) and named.isdisjoint(self.positions)
+
+    @cached_property
+    def kinetic(self) -> Expression:
+        """The kinetic energy."""
+        v = self.velocities
+        terms = [
+            times(times(Number(0.5), mass), Binary("**", Name(v[i]), Number(2.0)))
+            if i == j
+            else times(mass, times(Name(v[i]), Name(v[j])))
+            for (i, j), mass in self.entries.items()
+        ]
+        return paired(terms, partial(Binary, "+"))
+
+    def rest(self, i: int) -> Expression:
+        """Return ``sum_jk c_ijk q_j' q_k'``; what cancels by symmetry is left out."""
+        found: Expression = ZERO
+        count = len(self.positions) if self._slopes else 0
+        for j in range(count):
+            for k in range(j, count):
+                if j == k:
+                    half = times(Number(0.5), self._slope(j, j, i))
+                    factor = half if i == j else minus(self._slope(i, j, j), half)
+                elif i in (j, k):
+                    factor = self._slope(i, i, k if i == j else j)
+                else:
+                    both = plus(self._slope(i, j, k), self._slope(i, k, j))
+                    factor = minus(both, self._slope(j, k, i))
+                if factor != ZERO:
+                    speeds = (Name(self.velocities[n]) for n in (j, k))
+                    found = plus(found, times(factor, Binary("*", *speeds)))
+        return found
+
+    def accelerations(self, forces: Sequence[Expression]) -> tuple[Expression, ...]:
+        """Return the accelerations by some forces.
+
+        Raises
+        ------
+        ExpressionError
+            Where too many coordinates have masses in common.
+        """
+        right = [minus(force, self.rest(i)) for i, force in enumerate(forces)]
+        found: list[Expression] = [ZERO] * len(right)
+        for group in self.groups:
+            if len(group) > MOST_COUPLED:
+                named = ", ".join(self.positions[i] for i in group[: MOST_COUPLED + 1])
+                rule = f"must not couple more than {MOST_COUPLED} coordinates, couples {named}"
+                rule += ", ..." if len(group) > MOST_COUPLED + 1 else ""
+                raise ExpressionError(MASS, 0, rule, "solve for the accelerations and write these")
+            whole = self._minor(group, group)
+            for i in group:
+                total: Expression = ZERO
+                for j in group:
+                    rows, columns = (tuple(n for n in group if n != out) for out in (j, i))
+                    is_odd = (group.index(i) + group.index(j)) % 2
+                    term = times(self._minor(rows, columns), right[j])
+                    total = minus(total, term) if is_odd else plus(total, term)
+                found[i] = over(total, whole)
+        return tuple(found)
+
+    @cached_property
+    def groups(self) -> list[tuple[int, ...]]:
+        """Coordinates that have masses in common, directly or by others, increasing."""
+        groups = [{i} for i in range(len(self.positions))]
+        for pair in self.entries:
+            met = [group for group in groups if group & set(pair)]
+            groups = [group for group in groups if group not in met] + [set().union(*met)]
+        return [tuple(sorted(group)) for group in groups]
+
+    def _minor(self, rows: tuple[int, ...], columns: tuple[int, ...]) -> Expression:
+        """Return the determinant of some rows and columns, by the first row."""
+        if not rows:
+            return ONE
+        total: Expression = ZERO
+        for place, column in enumerate(columns):
+            rest = columns[:place] + columns[place + 1 :]
+            term = times(self.of(rows[0], column), self._minor(rows[1:], rest))
+            total = minus(total, term) if place % 2 else plus(total, term)
+        return total
+
+    def _slope(self, i: int, j: int, k: int) -> Expression:
+        """Return ``dM_ij/dq_k``."""
+        return self._slopes.get((min(i, j), max(i, j), k), ZERO)
+
+    @cached_property
+    def _slopes(self) -> dict[tuple[int, int, int], Expression]:
+        """Derivatives of the masses, those that are not 0."""
+        found = {
+            (i, j, k): tidied(derivative(mass, name))
+            for (i, j), mass in self.entries.items()
+            for k, name in enumerate(self.positions)
+            if name in names_in(mass)
+        }
+        return {place: slope for place, slope in found.items() if slope != ZERO}
+
+
+def inertia(
+    texts: Mapping[str, str],
+    positions: tuple[str, ...],
+    velocities: tuple[str, ...],
+    parameters: Sequence[str],
+) -> Inertia:
+    """Return the masses of some formulas: ``mass.x`` or ``mass.x.x`` that of x, 1 where none is written, ``mass.x.y``.
+
+    Raises
+    ------
+    ExpressionError
+        Where a formula cannot be read.
+    """
+    entries: dict[tuple[int, int], Expression] = {(i, i): ONE for i in range(len(positions))}
+    for key, text in texts.items():
+        field, *names = key.split(".")
+        if field == MASS:
+            i, j = sorted((positions.index(names[0]), positions.index(names[-1])))
+            entries[i, j] = parse(text, (*positions, *parameters))
+    return Inertia(positions, velocities, {k: v for k, v in entries.items() if v != ZERO})
