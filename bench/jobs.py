@@ -162,10 +162,11 @@ def _kernel(lane: str, cache: str) -> float:
 
 def runs(folder: Path, rounds: int, small: bool) -> Measured:
     """Run the default experiments from nothing, then again with nothing to do, against Snakemake by hand."""
-    from vibsim.plan import checkout, choose
+    from vibsim.core.home import home
+    from vibsim.plan import choose
 
     words = ["theta_convergence"] if small else []
-    choices = choose(words, checkout())
+    choices = choose(words, home())
     results, cache = folder / "results", str(folder / "kernels")
     ours_ = [sys.executable, "-m", "vibsim", "run", *words, "--results", str(results)]
     cold = process(ours_, cwd=folder, environment={"VIBSIM_CACHE_DIR": cache})

@@ -149,7 +149,11 @@ def test_derivative_is_that_of_numeric_differentiation(formula, x):
     assert abs(value(formula, x) - wanted) <= 40 * 2.0**-52 * max(1.0, abs(wanted))
 
 
-@pytest.mark.parametrize("model", MODELS.values(), ids=MODELS)
+@pytest.mark.parametrize(
+    "model",
+    [model for model in MODELS.values() if model.loaded is None],
+    ids=lambda model: model.kind,
+)
 def test_slopes_of_every_model(model):
     names = [*(state.name for state in model.states), "t", *(p.name for p in model.parameters)]
     values = {name: 0.7 + 0.1 * i for i, name in enumerate(names)}

@@ -133,7 +133,7 @@ def test_a_broken_workflow_is_told_in_a_line(
     (root / "workflow/profiles/default").mkdir(parents=True)
     (root / "workflow/profiles/default/config.yaml").write_text(profile)
     (root / "Snakefile").write_text(f"# a workflow\n{snakefile}\n")
-    monkeypatch.setattr(snakemake, "checkout", lambda: root)
+    monkeypatch.setattr(snakemake, "home", lambda: root)
     held = lock.hold(tmp_path / "results")
     try:
         ended = snakemake.run([], tmp_path / "results", held, Executor(["--cores", "1"]))

@@ -12,8 +12,8 @@ import yaml
 from vibsim import Experiment, analyse, simulate, verdicts
 from vibsim.cli import main
 from vibsim.cli.commands.new import SCHEMA
+from vibsim.core.home import home
 from vibsim.models import MODELS
-from vibsim.plan import checkout
 
 Capture = pytest.CaptureFixture[str]
 LINE = "# yaml-language-server: $schema="
@@ -63,7 +63,7 @@ def test_within_the_checkout_the_line_names_the_schema_that_is_there(
 ) -> None:
     (tmp_path / "configs/mine").mkdir(parents=True)
     (tmp_path / "Snakefile").touch()
-    monkeypatch.setattr("vibsim.cli.commands.new.find_checkout", lambda: tmp_path)
+    monkeypatch.setattr("vibsim.cli.commands.new.home", lambda: tmp_path)
     monkeypatch.chdir(tmp_path / "configs/mine")
     assert main(["new", "mine.yaml"]) == 0
     shipped = f"{LINE}../../workflow/schemas/experiment.schema.json"
@@ -74,7 +74,7 @@ def test_within_the_checkout_the_line_names_the_schema_that_is_there(
 def test_a_shipped_experiment_comes_with_its_tables(tmp_path: Path) -> None:
     file = tmp_path / "mine.yaml"
     assert main(["new", str(file), "--like", "bumpy_road"]) == 0
-    shipped = checkout() / "configs/vibration_text"
+    shipped = home() / "configs/vibration_text"
     lines = file.read_text().splitlines()
     assert lines[0] == f"{LINE}{SCHEMA}"
     assert lines[1:] == (shipped / "bumpy_road.yaml").read_text().splitlines()[1:]
@@ -95,7 +95,7 @@ def test_a_shipped_experiment_comes_with_its_tables(tmp_path: Path) -> None:
         (["mine.yaml", "--like", "vehicel"], "did you mean 'vehicle'?"),
         (["mine.yaml", "--like", "pendulum_lab"], "must be one experiment"),
         (["mine.yaml", "--like", "period_against_amplitude@1"], "not one member of it"),
-        (["mine.yaml", "--like", str(checkout() / "examples/heat/heat.yaml")], "copy its folder"),
+        (["mine.yaml", "--like", str(home() / "examples/heat/heat.yaml")], "copy its folder"),
         (["mine.yaml", "--like", "vehicle", "--model", "spring"], "together with --model"),
     ],
 )

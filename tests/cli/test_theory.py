@@ -11,7 +11,7 @@ import pytest
 
 from vibsim import theory
 from vibsim.cli import main
-from vibsim.plan import checkout
+from vibsim.core.home import home
 from vibsim.schemes import FIXED_STEP, SCHEMES
 
 Capture = pytest.CaptureFixture[str]
@@ -88,7 +88,7 @@ def test_the_documents_have_the_series_of_every_scheme(capsys: Capture) -> None:
         row = (series(found["amplitude"]), series(found["frequency"]))
         kinds.setdefault(row, []).append(f"`{kind}`")
     table = [f"| {', '.join(names)} | {' | '.join(row)} |" for row, names in kinds.items()]
-    assert "\n".join(table) in (checkout() / "docs/schemes.md").read_text()
+    assert "\n".join(table) in (home() / "docs/schemes.md").read_text()
 
 
 def test_formulas_are_written_as_latex(capsys: Capture) -> None:

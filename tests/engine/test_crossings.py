@@ -6,11 +6,11 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from event_runs import BALL, TREATMENTS, run
+from same_bits import arrays, assert_same_bits
 
 from vibsim.engine import integrate
-from vibsim.models.base import Model, Parameter, State
-from vibsim.models.events import Crossing, Crossings
 from vibsim.models.oscillator import written
+from vibsim.models.system import written as system
 from vibsim.schemes import FIXED_STEP
 
 BOUNCE = {"spring": "g", "events.1.falling": "u", "events.1.then.v": "-e*v"}
@@ -27,6 +27,27 @@ BETWEEN = written(
 STOPS = {"left": 0.6, "right": 0.4, "e": 0.9}
 KICKED = written({"events.1.when": "sin(pi*t)", "events.1.then.v": "v + kick"}, ("kick",))
 STOPPED = written({"stop": "u < 0"}, ())
+
+
+BEADS = system(
+    ("x", "y"),
+    {
+        "acceleration.x": "-x",
+        "acceleration.y": "-y",
+        "kinetic.0": "m*vx**2/2 + vy**2/2",
+        "potential.0": "m*x**2/2 + y**2/2",
+        "events.1.falling": "y - x - gap",
+        "events.1.then.vx": "(m*vx + vy - e*(vx - vy))/(m + 1)",
+        "events.1.then.vy": "(m*vx + vy + e*m*(vx - vy))/(m + 1)",
+    },
+    ("m", "gap", "e"),
+)
+"""Two beads on springs that strike each other, with the restitution e."""
+HIT = {"m": 3.0, "gap": 0.5, "e": 0.9}
+FLIGHT = ("x", "y"), {"acceleration.x": "0", "acceleration.y": "-g"}, ("g",)
+"""A projectile without drag."""
+FAR = next(r.real for r in np.roots([0.25, -2.0, 5.0, 0.0, -9.0]) if r.real > 0.0 == r.imag)
+"""When it is 3 away: ``t^2 + (2 t - t^2/2)^2 = 9``."""
 
 
 def go(model, kind, given, initial, end, steps, **more):
@@ -189,29 +210,17 @@ def test_a_ball_that_does_not_bounce_stays_on_the_ground():
     np.testing.assert_allclose(way.states[:, 0, -1], 0.0, atol=1e-12)
 
 
-PLANE = Model(
-    kind="plane",
-    title="Two uncoupled bodies",
-    source="test",
-    equation="x'' = -x, y'' = -g",
-    states=(
-        State("x", "m", "x"),
-        State("y", "m", "y"),
-        State("vx", "m", "x"),
-        State("vy", "m", "y"),
-    ),
-    parameters=(Parameter("g", 1.0, "1", "gravity"),),
-    acceleration="-x",
-    further_accelerations=("-g",),
-    kinetic_energy="0.5*vx**2 + 0.5*vy**2",
-    potential_energy="0.5*x**2 + g*y",
-    energy_unit="J",
-    linear=False,
-    conservative=False,
-    natural_frequency=lambda parameters: parameters["g"],
-    events=Crossings(
-        (Crossing("y", -1, (("vy", "-0.8*vy"),)), Crossing("x - 0.5", 1, (("vx", "-vx"),)))
-    ),
+PLANE = system(
+    ("x", "y"),
+    {
+        "acceleration.x": "-x",
+        "acceleration.y": "-g",
+        "events.1.falling": "y",
+        "events.1.then.vy": "-0.8*vy",
+        "events.2.rising": "x - 0.5",
+        "events.2.then.vx": "-vx",
+    },
+    ("g",),
 )
 WALL = {"events.1.rising": "u - 0.5", "events.1.then.v": "-v"}
 
@@ -231,6 +240,97 @@ def test_events_of_several_coordinates_are_those_of_each_alone(kind, lane):
     np.testing.assert_allclose(both.events.event_time[0, :count], times[:count], atol=1e-4)
     np.testing.assert_allclose(both.series.lost[0, -1], ball.series.lost[0, -1], atol=1e-4)
     assert both.gathered.ranges[0, 1].tolist() == pytest.approx([0.0, 1.0], abs=1e-2)
+
+
+def beads(end):
+    """Return impact times and the last positions, from rest at -1 and 1.
+
+    The distance is a sinusoid between impacts, and the centre is one throughout.
+    """
+    m, gap, e = HIT.values()
+    size, t, times = 2.0, 0.0, []
+    while t + math.acos(gap / size) < end:
+        t += math.acos(gap / size)
+        times.append(t)
+        size = math.hypot(gap, e * math.sqrt(size**2 - gap**2))
+        # from the impact to the next turn
+        t += math.acos(gap / size)
+    apart, centre = size * math.cos(end - t), (1.0 - m) / (1.0 + m) * math.cos(end)
+    return times, np.array([centre - apart / (1.0 + m), centre + m * apart / (1.0 + m)])
+
+
+@pytest.mark.parametrize("kind", FIXED_STEP)
+def test_impacts_of_two_bodies_leave_a_scheme_its_order(kind):
+    scheme = FIXED_STEP[kind]
+    order = scheme.formal_order("x", BEADS, scheme.defaults())
+    times, last = beads(7.0)
+    assert len(times) == 3
+    found = []
+    for steps in (3200, 6400, 12800) if order == 1 else (400, 800, 1600):
+        way = go(BEADS, kind, HIT, (-1.0, 1.0, 0.0, 0.0), 7.0, steps, n_events=4)
+        assert way.events.event_count[0] == len(times)
+        error = np.abs(way.events.event_time[0, :-1] - times).max()
+        found.append(error + np.abs(way.states[:2, 0, -1] - last).max())
+    rates = [math.log2(a / b) for a, b in pairwise(found)]
+    assert abs(rates[-1] - order) < 0.3 or found[-1] < 1e-11, (rates, found)
+    assert found[-1] < (0.05 if order == 1 else 1e-3)
+
+
+def test_what_an_impact_of_two_bodies_costs_is_their_energy():
+    way = go(BEADS, "gauss4", HIT, (-1.0, 1.0, 0.0, 0.0), 7.0, 800, with_series=True)
+    m, gap, e = HIT.values()
+    speed, lost = math.sqrt(4.0 - gap**2), 0.0
+    for _ in beads(7.0)[0]:
+        lost += 0.5 * m / (m + 1.0) * (1.0 - e**2) * speed**2
+        speed *= e
+    assert way.series.lost[0, -1] == pytest.approx(lost, rel=1e-7)
+
+
+@pytest.mark.parametrize("kind", ["rk4", "central", "velocity_verlet", "gauss4", "bdf2"])
+@pytest.mark.parametrize(
+    ("stop", "time"),
+    [
+        ("y < 0", 4.0),
+        ("y < x/2", 3.0),
+        ("hypot(x, y) > 3", FAR),
+        ("vy < -vx and y > 0", 3.0),
+    ],
+)
+def test_a_projectile_ends_where_a_formula_of_both_coordinates_says(kind, stop, time):
+    """Every scheme of order 2 has the parabola, and so the time to round-off, except that BDF2 starts by order 1."""
+    names, forces, declared = FLIGHT
+    model = system(names, forces | {"stop": stop}, declared)
+    way = go(model, kind, {"g": 1.0}, (0.0, 0.0, 1.0, 2.0), 5.0, 512, n_events=1)
+    near = 1e-4 if kind == "bdf2" else 1e-12
+    assert way.events.rest_time[0] == pytest.approx(time, abs=near)
+    last = time, 2.0 * time - 0.5 * time**2, 1.0, 2.0 - time
+    np.testing.assert_allclose(way.states[:, 0, -1], last, atol=10 * near)
+
+
+@pytest.mark.parametrize(
+    ("kind", "events"),
+    [*((kind, "located") for kind in FIXED_STEP), ("rk4", "mesh"), ("ab3", "mesh")],
+)
+def test_members_and_lanes_of_a_system_have_the_same_bits(kind, events):
+    scheme, count = FIXED_STEP[kind], 3
+    rng = np.random.default_rng(5)
+    parameters = np.array([*HIT.values()]) * rng.uniform(0.8, 1.05, (count, 3))
+    initial = rng.uniform(0.5, 1.0, (count, 4)) * [-1.0, 1.0, 0.1, 0.1]
+    numbers = parameters, initial, rng.uniform(0.05, 0.06, count)
+    options = {**scheme.defaults(), "events": events}
+    more = {"with_series": True, "n_extrema": 3, "n_events": 6}
+
+    def runs(chosen, lane):
+        own = (np.ascontiguousarray(array[chosen]) for array in numbers)
+        return integrate(BEADS, scheme, options, *own, 100, 1, lane=lane, **more)
+
+    together = runs(slice(None), "scalar")
+    assert together.events.event_count.min() >= 1
+    assert_same_bits(together, runs(slice(None), "plain"))
+    for case in range(count):
+        alone = runs(slice(case, case + 1), "scalar")
+        for (name, a), (_, b) in zip(arrays(together), arrays(alone), strict=True):
+            assert a[case].tobytes() == b[0].tobytes(), name
 
 
 @pytest.mark.parametrize("events", TREATMENTS)

@@ -16,7 +16,7 @@ from experiment_files import GOOD, build, content, only_fault, smallest_section,
 from pydantic import ValidationError
 
 from vibsim.core.errors import InputError
-from vibsim.experiment import Experiment, canonical, collection_of, restore
+from vibsim.experiment import Experiment, canonical, restore
 from vibsim.experiment import collection as collections
 from vibsim.experiment.storage import stride
 from vibsim.models import MODELS
@@ -89,7 +89,9 @@ def test_every_model_and_scheme_of_the_registries_can_be_named(kind: str, scheme
             build(model=smallest_section(kind), initial={}, schemes=schemes)
         return
     experiment = build(model=smallest_section(kind), initial={}, schemes=schemes)
-    defaults = {option.name: option.default for option in method.options_on(model)}
+    # on a structure a scheme has one form, that of the defaults
+    options = method.options_on(model) if model.loaded is None else method.options
+    defaults = {option.name: option.default for option in options}
     assert experiment.schemes[1].options == defaults
     assert tuple(experiment.initial) == tuple(state.name for state in MODELS[kind].states)
 
@@ -332,18 +334,11 @@ def test_collection(
     assert Experiment.from_yaml(file, configs=tmp_path / "configs").collection == collection
     assert Experiment.from_yaml(file, configs=tmp_path / "others").collection == "adhoc"
     assert Experiment.from_yaml(file, collection="mine").collection == "mine"
-    monkeypatch.setattr(collections, "find_checkout", lambda: tmp_path)
+    monkeypatch.setattr(collections, "home", lambda: tmp_path)
     assert (
         Experiment.from_yaml(file).collection == Experiment.from_yaml(file).collection == collection
     )
     assert [choice.collection for choice in choose([str(file)], tmp_path)] == [collection]
-
-
-def test_without_a_checkout_every_file_is_ad_hoc(monkeypatch: pytest.MonkeyPatch) -> None:
-    file = next((ROOT / "configs/pendulum_lab").glob("*.yaml"))
-    assert collection_of(file) == "pendulum_lab"
-    monkeypatch.setattr(collections, "find_checkout", lambda: None)
-    assert collection_of(file) == "adhoc"
 
 
 def test_a_plan_that_is_kept_needs_no_validation() -> None:

@@ -132,6 +132,43 @@ def test_what_is_wrong_with_events_is_said(changes: dict[str, Any], key: str, ru
     assert rule in f"{fault.rule}: {fault.hint}"
 
 
+PLANE: dict[str, Any] = {
+    "kind": "system",
+    "coordinates": ["x", "y"],
+    "acceleration": {"x": "-x", "y": "-y"},
+}
+
+
+def test_events_of_a_system_are_read_and_written_back(tmp_path: Path) -> None:
+    struck = {"when": "y - x", "falling": True, "then": {"vx": "vy", "vy": "vx"}}
+    model = PLANE | {"events": [struck], "stop": "x > 2 and vy > 2"}
+    made = build(model=model, initial={"x": -1.0, "y": 1.0}, schemes=["rk4"])
+    equation = made.model.definition.equation
+    assert "vx -> vy, vy -> vx where y - x falls to 0, end where x > 2 and vy > 2" in equation
+    path = tmp_path / "again.yaml"
+    path.write_text(text(made), encoding="utf-8")
+    assert Experiment.from_yaml(path).model == made.model
+
+
+@pytest.mark.parametrize(
+    ("changes", "key", "rule"),
+    [
+        ({"stop": "z < 0"}, "model.stop", "unknown name 'z'"),
+        ({"stop": "x < 2"}, "model.stop", "holds at the start already"),
+        ({"events": [{"when": "u"}]}, "model.events[0].when", "unknown name 'u'"),
+        ({"events": [{"when": "1"}]}, "model.events[0].when", "names neither t nor a state"),
+        ({"events": [{"when": "x", "then": {"v": 1}}]}, "model.events[0].then.v", "unknown state"),
+        ({"stop": "y < 0", "exact": {"x": "sin(t)", "y": "1"}}, "model.exact", "or a stop"),
+    ],
+)
+def test_what_is_wrong_with_events_of_a_system_is_said(
+    changes: dict[str, Any], key: str, rule: str
+) -> None:
+    fault = only_fault(model=PLANE | changes, initial={}, schemes=["rk4"])
+    assert fault.key == key
+    assert rule in f"{fault.rule}: {fault.hint}"
+
+
 def test_a_stop_that_holds_at_the_start_of_one_member_names_it() -> None:
     sweep = {"initial.u": [-1.0, -0.2, 0.4]}
     fault = only_fault(model=OWN | {"stop": "u + gap > 0"}, initial={}, sweep=sweep)

@@ -37,9 +37,11 @@ T = np.linspace(0.0, 6.0, 61)
 
 
 def test_every_model_of_the_registry_has_a_case():
-    smooth = {kind for kind, model in MODELS.items() if model.events is None}
+    # a structure has no formulas: tests/models/test_structure.py
+    by_formulas = {kind: model for kind, model in MODELS.items() if model.loaded is None}
+    smooth = {kind for kind, model in by_formulas.items() if model.events is None}
     assert {case.kind for case in CASES.values()} == smooth
-    for kind, model in MODELS.items():
+    for kind, model in by_formulas.items():
         seen = set()
         for case in CASES.values():
             seen |= {n for n in model.optional if case.kind == kind and case.numbers.get(n)}

@@ -60,6 +60,9 @@ def beginning_matters(experiment: Experiment) -> bool:
     model = experiment.model.definition
     if model.events is not None or model.lookup is not None or depends_on_velocity(model):
         return False
+    if model.loaded is not None:
+        # no scheme of structures has other orders then
+        return False
     # a swept option is another one in every member
     return options_swept(experiment) or any(
         orders.from_rest is not None or orders.from_balance is not None
@@ -239,11 +242,13 @@ def relative_floors(
 
     `steps` are those of every level, `arithmetic` that of schemes which have several, their own one where None.
     """
+    loaded = experiment.model.definition.loaded
+    least = SPACING_AT_ONE if loaded is None else max(SPACING_AT_ONE, loaded.rounding)
 
     def floor(scheme: Scheme, options: Options) -> list[float]:
         if arithmetic is not None and "arithmetic" in options:
             options = {**options, "arithmetic": arithmetic}
-        return [max(scheme.round_off(options, n), SPACING_AT_ONE) for n in steps]
+        return [max(scheme.round_off(options, n), least) for n in steps]
 
     return _each(experiment, columns, floor)
 

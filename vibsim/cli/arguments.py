@@ -68,7 +68,9 @@ def _flag(name: str, text: str) -> _Row:
 
 def commands() -> Iterator[Command]:
     """Yield all commands."""
-    text = "results folder (default: results/ of the checkout)"
+    text = (
+        "results folder (default: results/ of the checkout, or where vibsim is installed ./results)"
+    )
     results = _row("--results", _path, "DIR", text)
     text = "a value in place of one of the file, such as model.g=1.62; may be repeated"
     settings = _row("--set", _word, "KEY=VALUE", text, dest="settings", action="append", default=[])
@@ -97,6 +99,12 @@ def commands() -> Iterator[Command]:
         *_detail(),
     )
     yield "run", "run.command", "Run experiments and show every verdict.", options
+    text = "experiment, collection or FILE.yaml (default: compare the files of all, recompute none)"
+    named = _row("experiments", _word, "EXPERIMENT", text, nargs="*")
+    text = "compare files with the manifest, and recompute nothing"
+    only = _flag("--files", text)
+    text = "Compare every file with the manifest of its run; recompute, and compare bit for bit."
+    yield "verify", "commands.verify", text, (results, named, settings, only, cores, allow)
     file = _row("file", _path, "FILE", "experiment file")
     text = "Run an experiment file, and again whenever it is saved."
     yield "watch", "commands.watch", text, (results, file, settings, cores, allow, *_detail())
@@ -178,7 +186,11 @@ def commands() -> Iterator[Command]:
     text = "Write the report of an experiment; without one, the index over all results."
     formats = "formats of the figure files: svg, png, pdf; several with commas (default: svg)"
     formats_row = _row("--formats", _word, "LIST", formats)
-    yield "report", "jobs.report", text, (*job, perhaps, folder, formats_row)
+    publish = "copy pages, data, experiment file and metadata (RO-Crate) to a new folder"
+    publish_row = _row("--publish", _path, "DIR", publish)
+    licence = "licence of what is published: its address, or a sentence"
+    publish_rows = (publish_row, _row("--license", _word, "TEXT", licence))
+    yield "report", "commands.report", text, (*job, perhaps, folder, formats_row, *publish_rows)
 
 
 def _detail() -> Iterator[_Row]:

@@ -7,7 +7,8 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from vibsim.core.errors import Fault, InputError
-from vibsim.plan import Plan, checkout, choose, load, load_all
+from vibsim.core.home import home
+from vibsim.plan import Plan, choose, load, load_all
 
 if TYPE_CHECKING:
     from vibsim.experiment import Experiment
@@ -31,7 +32,7 @@ def plans_of(
     With `cached`, plans that were made before will do. InputError with every word that names nothing and the faults of
     all files.
     """
-    return list(load_all(choose(words, checkout(), settings), resolve, cached=cached).values())
+    return list(load_all(choose(words, home(), settings), resolve, cached=cached).values())
 
 
 def tell_notes(plans: Sequence[Plan]) -> None:
@@ -43,7 +44,7 @@ def tell_notes(plans: Sequence[Plan]) -> None:
 
 def one_plan_of(word: str, settings: Sequence[str] = ()) -> Plan:
     """Return the plan of one experiment, perhaps one that was made before; InputError where `word` is a collection."""
-    choices = choose([word], checkout(), settings)
+    choices = choose([word], home(), settings)
     if len(choices) != 1:
         rule = "must be one experiment, not a collection"
         raise InputError([Fault("command line", 0, "EXPERIMENT", word, rule)])

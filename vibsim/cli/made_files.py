@@ -1,7 +1,8 @@
-"""The record of what was made: size, time, inode and digest of every file of an experiment.
+"""The manifest of a results folder: size, time, inode and digest of every file of an experiment, and what made it.
 
-A job adds its files when it has made them; a run compares them with the folder (`vibsim.cli.run.changes`). The record
-is data: a line of another form counts as not there, and the names in it are those that vibsim itself gives.
+A job adds its files when it has made them, and a run that ends writes the whole anew, in order. A run compares it with
+the folder (`vibsim.cli.run.changes`), and so does ``vibsim verify``. The manifest is data: a line begins with its own
+digest, one of another form counts as not there, and the names in it are those that vibsim itself gives.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ import os
 import re
 from collections.abc import Iterable, Mapping
 from contextlib import suppress
+from functools import cache
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -28,6 +30,8 @@ _NAME = re.compile(
     r"|(?:report|index)\.html|(?:figures|tables)/[^/\0.][^/\0]*"
 )
 _DIGEST = re.compile(r"[0-9a-f]{64}")
+_MACHINE = re.compile(r"[\x20-\x7e]{0,200}")
+CHANGED = "its bytes are not those that were written"
 
 
 class Entry(NamedTuple):
@@ -39,53 +43,93 @@ class Entry(NamedTuple):
     inode: int
     digest: str
     """SHA-256 of its content; of a sealed file that of its seal."""
+    job: str
+    """Digest of the job that made it; empty of the index."""
+    machine: str
+    """Where it was made: `machine`."""
 
     def fits(self, status: os.stat_result) -> bool:
         """Tell whether a file has the size, the time and the inode that it had when it was made."""
         return (status.st_size, status.st_mtime_ns, status.st_ino) == self[:3]
 
 
-def add(results: Path, key: str, names: Iterable[str]) -> None:
+@cache
+def machine() -> str:
+    """Name this machine: its architecture, its processor and a digest of all that the processor says it can do."""
+    found: dict[str, str] = {}
+    with suppress(OSError):
+        for line in Path("/proc/cpuinfo").read_text().splitlines():
+            key, _, value = line.partition(":")
+            found.setdefault(key.strip(), value.strip())
+    name = found.get("model name") or found.get("CPU part", "unknown processor")
+    features = found.get("flags") or found.get("Features", "")
+    told = hashlib.sha256(" ".join(sorted(features.split())).encode()).hexdigest()[:8]
+    return f"{os.uname().machine}, {ascii(name)[1:-1][:100]}, features {told}"
+
+
+def add(results: Path, key: str, names: Iterable[str], job: str = "") -> None:
     """Add files that a job has just made; a report comes with all that it consists of.
 
-    `key` is the folder of the experiment in `results`, or `INDEX`; `names` are paths within that folder.
+    `key` is the folder of the experiment in `results`, or `INDEX`; `names` are paths within that folder; `job` is the
+    digest of the job.
     """
     entries = {}
     for name in names:
         file = results / key / name
         digest = seal.stored_digest(file) if file.suffix == ".nc" else content(file)
-        entries[name] = entry(file.lstat(), digest)
+        entries[name] = entry(file.lstat(), digest, job, machine())
     # A line that a kill cut short ends here. What is not on record is compared with its seal, or made again.
     with suppress(OSError):
-        regular_files.append(_path(results, key), f"\n{_text(entries)}\n".encode())
+        regular_files.append(path(results, key), f"\n{_line(entries)}\n".encode())
 
 
 def load(results: Path, key: str) -> dict[str, Entry]:
     """Return what is on record, the newest of each file; of figures and tables those of the newest report."""
+    return read(results, key)[0]
+
+
+def read(results: Path, key: str) -> tuple[dict[str, Entry], bool]:
+    """Return what is on record, and whether every line is as it was written."""
     found: dict[str, Entry] = {}
     try:
-        lines = _path(results, key).read_bytes().splitlines()
+        lines = path(results, key).read_bytes().split(b"\n")
     except OSError:
-        return found
-    for line in lines:
-        try:
-            data = json.loads(line)
-        except (ValueError, RecursionError):
+        return found, False
+    is_whole = True
+    for line in filter(None, lines):
+        data = _data(line)
+        if data is None:
+            is_whole = False
             continue
-        if isinstance(data, dict) and all(map(_is_entry, data, data.values())):
-            if "report.html" in data:
-                found = {name: e for name, e in found.items() if not name.startswith(BESIDE)}
-            found |= {name: Entry(*values) for name, values in data.items()}
-    return found
+        if "report.html" in data:
+            found = {name: e for name, e in found.items() if not name.startswith(BESIDE)}
+        found |= data
+    return found, is_whole
+
+
+def _data(line: bytes) -> dict[str, Entry] | None:
+    """Return the entries of a line; None where it is not as it was written."""
+    digest, _, text = line.partition(b" ")
+    if hashlib.sha256(text).hexdigest().encode() != digest:
+        return None
+    try:
+        data = json.loads(text)
+    except (ValueError, RecursionError):
+        return None
+    if not (isinstance(data, dict) and all(map(_is_entry, data, data.values()))):
+        return None
+    return {name: Entry(*values) for name, values in data.items()}
 
 
 def replace(results: Path, key: str, entries: Mapping[str, Entry]) -> None:
-    """Write the whole record anew."""
+    """Write the whole record anew, in one line and in order, where it is not so already."""
+    file, text = path(results, key), f"{_line(entries)}\n"
     with suppress(OSError):
-        write_text(_path(results, key), f"{_text(entries)}\n")
+        if file.read_bytes() != text.encode() if file.exists() else entries:
+            write_text(file, text)
 
 
-def content(path: Path) -> str:
+def content(file: Path) -> str:
     """Return the digest of a file, worked out from its bytes.
 
     Raises
@@ -93,29 +137,32 @@ def content(path: Path) -> str:
     DamagedFileError
         When it should be sealed and is not as it was sealed.
     """
-    if path.suffix == ".nc":
-        seal.check(path)
-        return seal.stored_digest(path)
-    with path.open("rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()
+    if file.suffix == ".nc":
+        seal.check(file)
+        return seal.stored_digest(file)
+    with file.open("rb") as stream:
+        return hashlib.file_digest(stream, "sha256").hexdigest()
 
 
-def entry(status: os.stat_result, digest: str) -> Entry:
-    """Return the entry of a file with this status."""
-    return Entry(status.st_size, status.st_mtime_ns, status.st_ino, digest)
+def entry(status: os.stat_result, digest: str, job: str = "", machine: str = "") -> Entry:
+    """Return the entry of a file with this status; job and machine are empty where nobody knows them."""
+    return Entry(status.st_size, status.st_mtime_ns, status.st_ino, digest, job, machine)
 
 
-def _path(results: Path, key: str) -> Path:
+def path(results: Path, key: str) -> Path:
+    """Return the file of a manifest."""
     return results / ".vibsim/made" / f"{key.replace('/', '.') or 'index'}.jsonl"
 
 
-def _text(entries: Mapping[str, Entry]) -> str:
-    return json.dumps(entries, separators=(",", ":"))
+def _line(entries: Mapping[str, Entry]) -> str:
+    text = json.dumps(dict(sorted(entries.items())), separators=(",", ":"))
+    return f"{hashlib.sha256(text.encode()).hexdigest()} {text}"
 
 
 def _is_entry(name: str, values: Any) -> bool:
     match values:
-        case [*numbers, str(digest)] if len(numbers) == len(Entry._fields) - 1:
-            known = all(type(number) is int and 0 <= number < 2**63 for number in numbers)
-            return bool(known and _DIGEST.fullmatch(digest) and _NAME.fullmatch(name))
+        case [int(), int(), int(), str(digest), str(job), str(machine)]:
+            known = all(type(number) is int and 0 <= number < 2**63 for number in values[:3])
+            texts = _DIGEST.fullmatch(digest) and (not job or _DIGEST.fullmatch(job))
+            return bool(known and texts and _MACHINE.fullmatch(machine) and _NAME.fullmatch(name))
     return False

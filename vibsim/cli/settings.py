@@ -49,7 +49,9 @@ def _named(content: Mapping[str, Any]) -> dict[str, Any]:
             if isinstance(row, Mapping)
         }
         flat = {**_mapping(model.get("parameters")), **_mapping(model.get("formulas"))}
-        found["model"] = {"kind": model["kind"]} | flat | tables
+        structure = _mapping(model.get("structure"))
+        own = {**structure, **_mapping(structure.get("arrays"))}
+        found["model"] = {"kind": model["kind"]} | flat | tables | _without(own, "arrays")
     for key, name in (("schemes", "name"), ("checks", "id")):
         match found.get(key):
             case [*rows] if all(isinstance(row, Mapping) and name in row for row in rows):

@@ -20,6 +20,16 @@ _WIDEST = 120
 """Columns of a line at most."""
 
 
+STRUCTURE = [
+    ("  mass: [1.0]", "M: its diagonal, rows, or a .mtx, .npy or .csv file"),
+    ("  stiffness: [[1.0]]", "K, of as many rows as M"),
+    ("  # rayleigh: {alpha: 0.01, beta: 0.01}", "damping alpha M + beta K"),
+    ("  # load: {1: cos(0.5*t)}", "formulas in t by degree of freedom, counted from 1"),
+    ("  # observe: {tip: 1}", "names of displacements; all when left out"),
+]
+"""Lines of the section of a linear structure."""
+
+
 def of_model(model: Model, schema: str) -> str:
     """Return a file with a model, its default parameters, four levels and two checks."""
     return "\n".join(_lines(model, schema)) + "\n"
@@ -37,12 +47,16 @@ def _lines(model: Model, schema: str) -> Iterator[str]:
     yield '# `vibsim plan FILE`. Numbers may have units: "50 cm".'
     yield f"title: {model.title} on four levels"
     yield ""
+    scheme = "rk4" if model.assembled is None else "newmark"
     yield from textwrap.wrap(model.equation, 100, initial_indent="# ", subsequent_indent="# ")
     yield "model:"
     yield f"  kind: {model.kind}"
-    yield from _column(
-        [(f"  {row.key}: {row.default!r}", parameter_text(row)) for row in model.parameters]
-    )
+    if model.assembled is not None:
+        yield from _column(STRUCTURE)
+    else:
+        yield from _column(
+            [(f"  {row.key}: {row.default!r}", parameter_text(row)) for row in model.parameters]
+        )
     if model.named is not None:
         yield from _column([(f"  coordinates: [{', '.join(model.positions)}]", COORDINATES)])
     required = needed(model)
@@ -77,7 +91,7 @@ def _lines(model: Model, schema: str) -> Iterator[str]:
                 f"level l has 2^l steps: {2**_FIRST} to {2**_LAST}",
             ),
             ("schemes:", "all of them: vibsim list schemes"),
-            ("  - rk4", "one in full: vibsim list schemes rk4"),
+            (f"  - {scheme}", f"one in full: vibsim list schemes {scheme}"),
         ]
     )
     yield ""

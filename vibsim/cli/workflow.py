@@ -9,6 +9,7 @@ from typing import Any
 from vibsim.cli import results_folder
 from vibsim.cli.chosen_plans import resolve
 from vibsim.cli.jobs.solve import check_allowed
+from vibsim.core.home import default_results
 from vibsim.plan import Names
 
 
@@ -19,10 +20,10 @@ def names_of(config: Mapping[str, Any], root: Path, command_line: Mapping[str, A
     ----------
     config
         The ``experiments`` with the ``settings`` of all of them, and the ``results`` folder, as for
-        `vibsim.plan.Names.of`; without any the default experiments as they are, and the folder of the checkout.
+        `vibsim.plan.Names.of`; without any the default experiments as they are, and `vibsim.core.home.default_results`.
         ``cores`` and ``overhead`` (megabytes) of a job, where it runs elsewhere.
     root
-        The checkout.
+        The folder of the Snakefile.
     command_line
         What ``--config`` says on the command line: ``allow_commands=true`` lets programs of users run.
 
@@ -33,7 +34,7 @@ def names_of(config: Mapping[str, Any], root: Path, command_line: Mapping[str, A
     """
     is_allowed = str(command_line.get("allow_commands")).lower() == "true"
     experiments, settings = config.get("experiments", []), config.get("settings", [])
-    results = str(config.get("results", root / "results"))
+    results = str(config.get("results", default_results()))
     more = {key: int(config[key]) for key in ("cores", "overhead") if key in config}
     names = Names.of(experiments, results, root, resolve, is_allowed, settings, **more)
     results_folder.check(names.results, names.plans)

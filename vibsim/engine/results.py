@@ -108,6 +108,8 @@ class Trajectories:
     extrema: Extrema | None = None
     events: EventTimes | None = None
     """None for a smooth model, and where nothing was to be gathered."""
+    energies: Floats | None = None
+    """Kinetic and potential energy, shape (case, 2, n_samples), where states do not tell them; None where they do."""
 
     @property
     def position(self) -> Floats:

@@ -31,6 +31,8 @@ EVENTFUL = 2.5
 """Steps of a smooth motion that one takes as long as where an event may be."""
 COUPLED = 2.0
 """Steps of one coordinate that one of several takes as long as, and one with a force from a table."""
+STRUCTURE_SECONDS = (35e-6, 12e-9)
+"""Of a step of a linear structure, and beside it for each entry of the stiffness matrix that is not 0."""
 WRITTEN_SECONDS = 4e-9
 """Of one byte that is made, written, sealed and flushed."""
 JOB_SECONDS = 0.5
@@ -59,7 +61,7 @@ PLAIN_MEMORY = 68 * 10**6
 COMPILED_MEMORY = 120 * 10**6
 """Bytes of a simulate job without its arrays, with a compiled kernel."""
 ADAPTIVE_MEMORY = 160 * 10**6
-"""Bytes of a simulate job with an adaptive scheme beside all others: SciPy, and the runs that are kept."""
+"""Bytes of a simulate job with an adaptive scheme or a structure beside all others: SciPy, and what it keeps."""
 TABULATED = 64
 """Bytes that such a job holds of each point of a level."""
 SCRATCH = 520
@@ -137,7 +139,7 @@ class Load:
     d2t: bool = False
     """Whether a scheme has another velocity than the centred difference."""
     own: float = 0.0
-    """Seconds that the schemes which choose their own steps take of a member (`vibsim.schemes.adaptive`)."""
+    """Seconds that SciPy takes of a member: schemes which choose their own steps, and the steps of a structure."""
 
     @property
     def stored(self) -> int:
@@ -254,6 +256,11 @@ def load_of(experiment: ExperimentSpec, level: int) -> Load:
         for scheme in experiment.schemes
         if scheme.adaptive
     )
+    whole = 0.0
+    if model.loaded is not None:
+        each, of_entry = STRUCTURE_SECONDS
+        entries = len(model.loaded.structure.stiffness.entries)
+        whole = steps * len(kinds) * (each + of_entry * entries)
     return Load(
         schemes=len(experiment.schemes),
         steps=steps,
@@ -265,5 +272,5 @@ def load_of(experiment: ExperimentSpec, level: int) -> Load:
         extrema=0 if lean else extrema_kept(steps, experiment.trajectories),
         events=0 if lean or model.events is None else events_kept(experiment.trajectories),
         d2t=experiment.own_velocity or not lean,
-        own=sum(own),
+        own=sum(own) + whole,
     )

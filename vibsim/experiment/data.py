@@ -30,6 +30,7 @@ from vibsim.experiment.schema.figures import FigureOfSource
 from vibsim.experiment.schema.published import PublishedTable
 from vibsim.experiment.schema.sweep import Axis
 from vibsim.models import MODELS, Model, centred, natural_end, quantities, table_end
+from vibsim.models.structure import Structure
 from vibsim.models.table import Table
 from vibsim.schemes import SCHEMES, Scheme
 
@@ -69,6 +70,51 @@ class TableSpec(Section):
         return self._table
 
 
+class ArraySpec(Section):
+    """A matrix or a vector of a structure: of a file, as numbers, by degree of freedom, or the shape of a mode."""
+
+    file: Text | None = None
+    """Path of the file, relative to the folder of the experiment file."""
+    rows: tuple[tuple[float, ...] | float, ...] = ()
+    entries: tuple[tuple[int, float], ...] = ()
+    mode: int | None = None
+    size: float = 1.0
+    """What the first observed displacement has of the shape of a mode."""
+    numbers: str = ""
+    """SHA-256 of the numbers of a file, on which results depend alone."""
+
+
+class StructureSpec(Section):
+    """What a file says of a linear structure beside formulas and parameters."""
+
+    arrays: Annotated[dict[str, ArraySpec], AfterValidator(FrozenDict)]
+    """By key: ``mass``, ``stiffness``, ``damping``, ``load.0``, ``start.displacement``, ``start.velocity``."""
+    ratios: tuple[float, ...] = ()
+    """Damping ratios of the lowest modes."""
+    observe: tuple[tuple[Text, tuple[tuple[int, float], ...]], ...] = ()
+    """By name the factors of degrees of freedom, counted from 1."""
+    is_free: bool = False
+    """Whether the motion begins as the section ``initial`` says."""
+    _structure: Structure | None = PrivateAttr(default=None)
+    _files: tuple[tuple[str, str], ...] = PrivateAttr(default=())
+
+    def hold(self, structure: Structure, files: tuple[tuple[str, str], ...]) -> None:
+        """Take the numbers, and path and SHA-256 of the bytes of each file, no part of an experiment's identity."""
+        self._structure, self._files = structure, files
+
+    @property
+    def files(self) -> tuple[tuple[str, str], ...]:
+        """Path of each file, and SHA-256 of its bytes, as it was read."""
+        return self._files
+
+    @property
+    def structure(self) -> Structure:
+        """The numbers, which `vibsim.experiment.tables.structure.attach` puts there."""
+        if self._structure is None:
+            raise VibsimError("the matrices of the structure were not read")
+        return self._structure
+
+
 class ModelSpec(Section):
     """The model, with every parameter."""
 
@@ -84,11 +130,20 @@ class ModelSpec(Section):
     terms: tuple[Text, ...] = ()
     """Which of `vibsim.models.Model.optional` the equation has: those that are not neutral, or are swept."""
 
+    structure: StructureSpec | None = None
+    """The matrices of a linear structure (`vibsim.models.structure`)."""
+
     _own: Model | None = PrivateAttr(default=None)
 
     def hold(self, model: Model) -> None:
         """Take the model of this kind, where a program hands it over and none is registered."""
         self._own = model
+
+    @property
+    def files(self) -> tuple[tuple[str, str], ...]:
+        """Path of each file that the section names, and SHA-256 of its bytes, as it was read."""
+        tables = tuple((row.file, row.content) for row in self.tables.values())
+        return (*tables, *(self.structure.files if self.structure is not None else ()))
 
     @property
     def base(self) -> Model:
@@ -100,10 +155,12 @@ class ModelSpec(Section):
     def definition(self) -> Model:
         """The equation of motion that this section describes."""
         model = self.base
+        declared = (key.partition(".") for key in self.parameters)
+        names = tuple(name for section, _, name in declared if section == DECLARED)
         if model.written is not None:
-            declared = (key.partition(".") for key in self.parameters)
-            names = (name for section, _, name in declared if section == DECLARED)
-            model = model.written(self.formulas, tuple(names))
+            model = model.written(self.formulas, names)
+        if self.structure is not None and model.assembled is not None:
+            model = model.assembled(self.structure.structure, self.formulas, names)
         for own in self.tables.values():
             if model.with_table is not None:
                 model = model.with_table(own.table, own.is_met)

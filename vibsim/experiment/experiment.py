@@ -131,8 +131,9 @@ def canonical(experiment: Experiment) -> dict[str, Any]:
     for name in ("published", "figures", "units", "scaling"):
         if not getattr(experiment, name):
             del data[name]
-    if not experiment.model.tables:
-        del data["model"]["tables"]
+    for name in ("tables", "structure"):
+        if not getattr(experiment.model, name):
+            del data["model"][name]
     return data
 
 
@@ -164,6 +165,10 @@ def restore(
         from vibsim.experiment.tables.file import attach
 
         attach(experiment)
+    if experiment.model.structure is not None:
+        from vibsim.experiment.tables.structure import attach as attach_structure
+
+        attach_structure(experiment)
     return experiment
 
 

@@ -194,6 +194,7 @@ def build(
             coordinates=model.positions if model.named is not None else (),
             tables=equation.tables,
             terms=equation.terms,
+            structure=equation.structure,
         ),
         initial=dict(numbers.initial),
         time=numbers.time,
@@ -295,9 +296,13 @@ def _check_output(
     if document.output == "best" and len(levels) == 1:
         rule = "the best solution is extrapolated over at least 2 levels, there is 1"
         report.add(("output",), rule)
-    if model is None or model.coordinates == 1:
+    if model is None or model.is_alone:
         return
     rule = f"extrapolates a motion of one coordinate, {model.kind} has {model.coordinates}"
+    if model.loaded is not None:
+        rule = (
+            "extrapolates a motion with the energies of its own states, which a structure has not"
+        )
     if document.tolerance is not None:
         report.add(("tolerance",), rule, "give levels", document.tolerance)
     if document.output == "best":

@@ -31,6 +31,7 @@ from vibsim.models.pendulum import PENDULUM
 from vibsim.models.physical_pendulum import PHYSICAL_PENDULUM
 from vibsim.models.sliding_box import SLIDING_BOX
 from vibsim.models.spring import SPRING
+from vibsim.models.structure import STRUCTURE
 from vibsim.models.system import SYSTEM
 from vibsim.models.vehicle import VEHICLE
 from vibsim.models.washing_machine import WASHING_MACHINE
@@ -49,6 +50,7 @@ _ALL = (
     DUFFING,
     ELASTIC_PENDULUM,
     SYSTEM,
+    STRUCTURE,
 )
 MODELS = Registry[Model]("vibsim.models", _ALL, fault_of)
 

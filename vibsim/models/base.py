@@ -36,6 +36,7 @@ from vibsim.models.table import Lookup, Table
 
 if TYPE_CHECKING:
     from vibsim.models.shared.scales import Scales
+    from vibsim.models.structure import Loaded, Structure
 
 Numbers = Mapping[str, Any]
 """Values by name: floats, or arrays that broadcast against each other."""
@@ -197,6 +198,10 @@ class Model:
     """The highest angular frequency of small oscillations, which a step has to resolve; None: the natural one."""
     further_accelerations: tuple[Formula, ...] = ()
     """Of the coordinates behind the first one."""
+    loaded: Loaded | None = None
+    """The structure that is stepped as a whole, of which the states are what is observed; None of any other model."""
+    assembled: Callable[[Structure, Mapping[str, str], tuple[str, ...]], Model] | None = None
+    """The model of matrices, with formulas of loads and declared parameters; see `vibsim.models.structure`."""
     superposed: bool = False
     """Whether the motion of several coordinates is a sum of linear, conservative ones: the energy has their orders."""
 
@@ -204,6 +209,11 @@ class Model:
     def coordinates(self) -> int:
         """Number of coordinates."""
         return len(self.states) // 2
+
+    @property
+    def is_alone(self) -> bool:
+        """Whether the one coordinate is the whole motion."""
+        return self.coordinates == 1 and self.loaded is None
 
     @property
     def dimensionless(self) -> bool:
@@ -323,9 +333,10 @@ def rate(model: Model, formula: Expression) -> Expression:
 def has_solution(model: Model) -> bool:
     """Tell whether the motion is known: exactly, or to twelve digits by a reference that stops at every corner.
 
-    Of a single motion the reference may not exist (`vibsim.simulation.reference.solve`): its numbers are then NaN.
+    Of a structure it is known by its modes alone. Of a single motion the
+    reference may not exist (`vibsim.simulation.reference.solve`): its numbers are then NaN.
     """
-    return model.exact is not None or model.events is None
+    return model.exact is not None or (model.events is None and model.loaded is None)
 
 
 def parameter_names(model: Model) -> tuple[str, ...]:

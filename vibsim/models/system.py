@@ -14,7 +14,8 @@ function need not look alike.
 Frequencies are those of small oscillations about the origin, ``w^2`` the positive eigenvalues of ``-da/dx`` at t = 0.
 
 Instead of forces a motion may be written for each coordinate: what is missing in the equations is then added, and the
-motion starts on it (a manufactured solution; vibration text (B), section 2.2 and exercises 9 and 23).
+motion starts on it (a manufactured solution; vibration text (B), section 2.2 and exercises 9 and 23). Events and a stop
+may be written as well (`vibsim.models.shared.crossings`).
 """
 
 from __future__ import annotations
@@ -66,6 +67,8 @@ from vibsim.models.base import (
     declared_parameters,
     speeds,
 )
+from vibsim.models.events import Crossings
+from vibsim.models.shared.crossings import crossings, described
 from vibsim.models.shared.manufactured import Manufactured
 from vibsim.models.shared.mechanical import damping_of
 
@@ -231,6 +234,11 @@ class Written:
         return tuple(found)
 
     @cached_property
+    def crossings(self) -> Crossings | None:
+        """The events, where some are written."""
+        return crossings(self.formulas, (*self.states, "t", *self.declared))
+
+    @cached_property
     def manufactured(self) -> Manufactured | None:
         """The motion that is written down, where it is."""
         keys = [f"exact.{name}" for name in self.coordinates]
@@ -264,7 +272,7 @@ class Written:
         moving, total = {*self.velocities, "t"}, []
         forces = []
         for mass, a in zip(self.masses, self.own_accelerations, strict=True):
-            still = (term for term in _terms(a) if moving.isdisjoint(names_in(term)))
+            still = (term for term in terms_of(a) if moving.isdisjoint(names_in(term)))
             force: Expression = ZERO
             for term in still:
                 force = plus(force, term)
@@ -344,22 +352,22 @@ class Written:
         return np.fmax.reduce(self.frequencies(parameters), axis=-1)
 
 
-def _terms(node: Expression) -> Iterator[Expression]:
+def terms_of(node: Expression) -> Iterator[Expression]:
     """Yield the terms of a sum, also of one that is multiplied by what names nothing but parameters."""
     match node:
         case Binary("+", left, right):
-            yield from _terms(left)
-            yield from _terms(right)
+            yield from terms_of(left)
+            yield from terms_of(right)
         case Binary("-", left, right):
-            yield from _terms(left)
-            yield from (Negate(term) for term in _terms(right))
+            yield from terms_of(left)
+            yield from (Negate(term) for term in terms_of(right))
         case Negate(operand):
-            yield from (Negate(term) for term in _terms(operand))
+            yield from (Negate(term) for term in terms_of(operand))
         case Binary("/", left, right):
-            yield from (over(term, right) for term in _terms(left))
-        case Binary("*", left, right) if len(_sum := list(_terms(right))) > 1:
+            yield from (over(term, right) for term in terms_of(left))
+        case Binary("*", left, right) if len(_sum := list(terms_of(right))) > 1:
             yield from (times(left, term) for term in _sum)
-        case Binary("*", left, right) if len(_sum := list(_terms(left))) > 1:
+        case Binary("*", left, right) if len(_sum := list(terms_of(left))) > 1:
             yield from (times(term, right) for term in _sum)
         case _:
             yield node
@@ -418,6 +426,9 @@ def system(
     else:
         more |= {"linear": False, "highest_frequency": own.highest_frequency}
         more["superposed"] = is_conservative and _has_constant_slopes(own)
+    if own.crossings is not None:
+        is_conservative = False
+        more |= {"linear": False, "superposed": False, "events": own.crossings}
     first, *rest = own.accelerations
     return Model(
         kind="system",
@@ -439,6 +450,7 @@ def system(
             if field == "outputs"
         ),
         formulas=fields(coordinates),
+        takes_events=True,
         written=partial(written, coordinates),
         named=named,
         **more,
@@ -464,7 +476,7 @@ def _damping(own: Written) -> Damping | None:
     """Return the damping of the only coordinate, where it is linear or quadratic with a constant rate."""
     (a,), (v,) = own.accelerations, own.velocities
     force: Expression = ZERO
-    for term in _terms(a):
+    for term in terms_of(a):
         if v in names_in(term):
             force = minus(force, term)
     found = damping_of(force, v) if force != ZERO else None
@@ -485,6 +497,8 @@ def _equation(own: Written) -> str:
     if len(lines) > SHOWN:
         lines = [*lines[: SHOWN // 2], "...", lines[-1]]
     told = ", ".join(lines)
+    if own.crossings is not None:
+        told += described(own.crossings, own.formulas)
     if own.manufactured is None:
         return told
     motion = (

@@ -53,7 +53,7 @@ def sensitivity(
     if model.exact is None:
         return np.ones(len(t))
     parameters, initial = in_columns(group.parameters), in_columns(group.initial)
-    if not model.conservative or model.coordinates > 1:
+    if not model.conservative or not model.is_alone:
         return _tried(model, t, initial, parameters)
     found, doubtful = _linear(model, t, initial, parameters, known)
     if doubtful.any():

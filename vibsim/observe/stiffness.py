@@ -27,7 +27,7 @@ from vibsim.simulation.members import Members
 
 def applies(model: Model) -> bool:
     """Tell whether the motion of a model decides on the frequency: one coordinate, a nonlinear force, no events."""
-    return not model.linear and model.coordinates == 1 and model.events is None
+    return not model.linear and model.is_alone and model.events is None
 
 
 def stiffest(

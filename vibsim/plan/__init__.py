@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from vibsim.core.lazy import loader
 from vibsim.plan.cache import load, load_all
-from vibsim.plan.choose import Choice, checkout, choose, experiments
+from vibsim.plan.choose import Choice, choose, experiments
 from vibsim.plan.jobs import Batch, LevelJob, Plan, ShardJob
 from vibsim.plan.workflow_names import Names
 
@@ -23,7 +23,6 @@ __all__ = [
     "Names",
     "Plan",
     "ShardJob",
-    "checkout",
     "choose",
     "columns",
     "experiments",

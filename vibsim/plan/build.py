@@ -78,7 +78,7 @@ def build(experiment: Experiment) -> Plan:
         content=content,
         versions={**versions(NUMERICAL), **_versions_of(packages)},
         notes=experiment.notes,
-        inputs=tuple((t.file, t.content) for t in experiment.model.tables.values()),
+        inputs=experiment.model.files,
         packages=packages,
     )
 

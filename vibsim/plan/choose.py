@@ -7,8 +7,8 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from vibsim.core.errors import MOST_CHOICES, Fault, InputError, VibsimError, listed, nearest
-from vibsim.experiment.collection import ENDINGS, collection_of, find_checkout
+from vibsim.core.errors import MOST_CHOICES, Fault, InputError, listed, nearest
+from vibsim.experiment.collection import ENDINGS, collection_of
 
 DEFAULT = ("pendulum_lab", "showcase")
 MAX_DIGITS = 18
@@ -37,16 +37,8 @@ class Choice:
         return f"{self.collection}/{self.name}"
 
 
-def checkout() -> Path:
-    """Return the folder with the Snakefile and the experiments that come with vibsim; VibsimError without one."""
-    folder = find_checkout()
-    if folder is None:
-        raise VibsimError("no Snakefile beside the package nor here: vibsim runs from its checkout")
-    return folder
-
-
 def experiments(root: Path) -> list[Choice]:
-    """Return every experiment in the collections of the checkout `root`, in order."""
+    """Return every experiment in the collections of the folder `root` (`vibsim.core.home.home`), in order."""
     return [_choice(file, root) for file in sorted((root / "configs").glob("*/*.yaml"))]
 
 
@@ -55,7 +47,7 @@ def choose(words: Sequence[str], root: Path, settings: Sequence[str] = ()) -> li
 
     Words are files, names of experiments (``name`` or ``collection/name``) or collections; none of them means the
     default collections. A file or a name followed by ``@`` and a number means that member of the sweep alone. The
-    experiments of the checkout `root` are known by name. The `settings` hold for each of them.
+    experiments in `root` are known by name. The `settings` hold for each of them.
 
     Raises
     ------

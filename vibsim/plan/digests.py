@@ -59,11 +59,16 @@ def _without(content: Mapping[str, Any], keys: str) -> dict[str, Any]:
 
 def in_numbers(content: Mapping[str, Any]) -> dict[str, Any]:
     """Return a part of an experiment in normal form with the numbers of its tables alone, wherever they stand."""
-    model = content["model"]
-    if "tables" not in model:
-        return dict(content)
-    tables = {name: table["numbers"] for name, table in model["tables"].items()}
-    return {**content, "model": {**model, "tables": tables}}
+    model = dict(content["model"])
+    if "tables" in model:
+        model["tables"] = {name: table["numbers"] for name, table in model["tables"].items()}
+    if "structure" in model:
+        arrays = {
+            name: {key: value for key, value in array.items() if key != "file"}
+            for name, array in model["structure"]["arrays"].items()
+        }
+        model["structure"] = {**model["structure"], "arrays": arrays}
+    return {**content, "model": model}
 
 
 def values_digest(experiment: Experiment, start: int, stop: int) -> str:

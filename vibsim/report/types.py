@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from matplotlib.transforms import Bbox
 
     from vibsim.experiment import Check, Experiment
-    from vibsim.experiment.data import SchemeSpec, TableSpec
+    from vibsim.experiment.data import ArraySpec, SchemeSpec, StructureSpec, TableSpec
     from vibsim.experiment.schema.checks import (
         AccurateCheck,
         ConservesCheck,
@@ -28,10 +28,10 @@ else:
     Environment = Axes = Figure = Bbox = Check = Experiment = SchemeSpec = TableSpec = object
     AccurateCheck = ConservesCheck = ConvergesCheck = EqualCheck = object
     Measurement = StableCheck = ValueCheck = object
-    PublishedRow = PublishedTable = Axis = Plan = object
+    PublishedRow = PublishedTable = Axis = Plan = ArraySpec = StructureSpec = object
 
 __all__ = [
-    "AccurateCheck", "Axes", "Axis", "Bbox", "Check", "ConservesCheck", "ConvergesCheck", "Environment", "EqualCheck",
-    "Experiment", "Figure", "Measurement", "Plan", "PublishedRow", "PublishedTable", "SchemeSpec", "StableCheck",
-    "TableSpec", "ValueCheck",
+    "AccurateCheck", "ArraySpec", "Axes", "Axis", "Bbox", "Check", "ConservesCheck", "ConvergesCheck", "Environment",
+    "EqualCheck", "Experiment", "Figure", "Measurement", "Plan", "PublishedRow", "PublishedTable", "SchemeSpec",
+    "StableCheck", "StructureSpec", "TableSpec", "ValueCheck",
 ]  # fmt: skip

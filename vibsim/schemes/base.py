@@ -167,6 +167,16 @@ def _kind_of(model: Model) -> str:
 
 
 @dataclass(frozen=True)
+class Weights:
+    """The family of Newmark's scheme (`vibsim.schemes.newmark`), in which all steps of structures are."""
+
+    beta: float
+    gamma: float
+    alpha_m: float = 0.0
+    alpha_f: float = 0.0
+
+
+@dataclass(frozen=True)
 class Scheme:
     """A time-stepping method."""
 
@@ -199,6 +209,10 @@ class Scheme:
     """Predicted round-off after a number of steps, relative to the solution (order of magnitude)."""
     adaptive: bool = False
     """Whether it chooses its own steps, outside the ladder (`vibsim.schemes.adaptive`)."""
+    weights: Callable[[Options], Weights] | None = None
+    """Its step on a linear structure, which is stepped as a whole; None of a scheme that cannot do that."""
+    weighed: tuple[str, ...] = ()
+    """Options that count on a structure."""
 
     def defaults(self) -> dict[str, OptionValue]:
         """Return every option with its default."""
@@ -211,11 +225,15 @@ class Scheme:
 
     def options_on(self, model: Model | None) -> tuple[AnyOption, ...]:
         """Return every option that the scheme has on a model."""
+        if model is not None and model.loaded is not None:
+            return tuple(option for option in self.options if option.name in self.weighed)
         has_events = model is not None and model.events is not None and not self.adaptive
         return (*self.options, EVENTS) if has_events else self.options
 
     def treats(self, model: Model) -> bool:
         """Tell whether the scheme can treat the forces of a model, and its events."""
+        if model.loaded is not None:
+            return self.weights is not None
         if (self.adaptive and model.events is not None) or self.unknowns(model) > MOST_UNKNOWNS:
             return False
         return (

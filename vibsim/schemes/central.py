@@ -49,6 +49,7 @@ from vibsim.schemes.base import (
     Options,
     Scheme,
     Stepper,
+    Weights,
 )
 from vibsim.schemes.code_generation import written
 from vibsim.schemes.orders import Orders, depends_on_velocity, same_orders
@@ -326,6 +327,7 @@ CENTRAL = Scheme(
     symmetric=True,
     velocity_forces=False,
     damped=_damped(GEOMETRIC),
+    weights=lambda options: Weights(0.0, 0.5),
 )
 
 
@@ -333,6 +335,7 @@ CENTRAL_QUADRATIC_ROOT = replace(
     CENTRAL,
     kind="central_quadratic_root",
     title="Centred differences, quadratic damping centred as well",
+    weights=None,
     source="vibration text, section 8.2",
     options=_OPTIONS,
     damped=_damped(ROOT),
@@ -341,6 +344,7 @@ CENTRAL_BACKWARD_DAMPING = replace(
     CENTRAL,
     kind="central_backward_damping",
     title="Centred differences, damping of the backward difference",
+    weights=None,
     source="vibration text, exercise 16",
     options=_OPTIONS,
     stepper=partial(stepper, treatment=BACKWARD),

@@ -9,6 +9,14 @@ With ``f^n = a(u^n, v^n, t^n)`` the force per unit mass, all of them are
 with a^0 = f^0. The state carries (u, v, a). Forces are averaged, and external forces with them, rather than taken at an
 averaged point: the two agree on a linear structure but for the time of the load, and both are of order 2.
 
+On a linear structure, ``M u'' + C u' + K u = p(t)``, the force is ``f = M^-1 (p - C v - K u)``, and a step solves
+
+``S a^(n+1) = (1 - alpha_f) (p^(n+1) - C v~ - K u~) + alpha_f (p^n - C v^n - K u^n) - alpha_m M a^n``,
+``S = (1 - alpha_m) M + (1 - alpha_f) (gamma dt C + beta dt^2 K)``,
+
+with u~ and v~ the first two lines without a^(n+1). Centred differences, with the damping centred as well, are beta = 0
+and gamma = 1/2.
+
 - ``newmark``: alpha_m = alpha_f = 0, any beta and gamma. Order 2 for gamma = 1/2 only; above it the amplitude is
   damped, below it grows at every step. beta = 1/4 is the trapezoidal rule (Crank-Nicolson), 1/6 the linear acceleration
   method, 1/12 Fox-Goodwin, 0 velocity Verlet, which is explicit.
@@ -27,9 +35,12 @@ dynamics with improved numerical dissipation: the generalized-alpha method, J. A
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from dataclasses import dataclass
 from functools import cache
 
-from vibsim.schemes.base import NumberOption, Options, Scheme, Stepper
+from vibsim.formula import constant
+from vibsim.schemes.base import NumberOption, Options, Scheme, Stepper, Weights
 from vibsim.schemes.code_generation import self_starting, written
 from vibsim.schemes.newton import solved
 from vibsim.schemes.orders import Orders, same_orders
@@ -76,20 +87,35 @@ def _stepper(beta: str, gamma: str, alpha_m: str = "0", alpha_f: str = "0") -> S
     return self_starting(step, implicit=True, carries_acceleration=True)
 
 
-def _newmark(options: Options) -> Stepper:
-    return _stepper(repr(options["beta"]), repr(options["gamma"]))
+def _newmark(options: Options) -> tuple[str, ...]:
+    return repr(options["beta"]), repr(options["gamma"])
 
 
-def _hht(options: Options) -> Stepper:
+def _hht(options: Options) -> tuple[str, ...]:
     alpha = f"({options['alpha']!r})"
-    return _stepper(f"(1 - {alpha})**2/4", f"(1 - 2*{alpha})/2", alpha_f=f"-{alpha}")
+    return f"(1 - {alpha})**2/4", f"(1 - 2*{alpha})/2", "0", f"-{alpha}"
 
 
-def _generalized_alpha(options: Options) -> Stepper:
+def _generalized_alpha(options: Options) -> tuple[str, ...]:
     rho = repr(options["rho_inf"])
     alpha_m, alpha_f = f"(2*{rho} - 1)/({rho} + 1)", f"{rho}/({rho} + 1)"
     apart = f"({alpha_f} - {alpha_m})"
-    return _stepper(f"(1 + {apart})**2/4", f"1/2 + {apart}", alpha_m, alpha_f)
+    return f"(1 + {apart})**2/4", f"1/2 + {apart}", alpha_m, alpha_f
+
+
+@dataclass(frozen=True)
+class _Family:
+    """The arithmetic of a scheme, from its parameters as formulas."""
+
+    parameters: Callable[[Options], tuple[str, ...]]
+
+    def stepper(self, options: Options) -> Stepper:
+        """Return the step of equations as formulas."""
+        return _stepper(*self.parameters(options))
+
+    def weights(self, options: Options) -> Weights:
+        """Return the step of a linear structure."""
+        return Weights(*map(constant, self.parameters(options)))
 
 
 def _is_centred(options: Options) -> bool:
@@ -133,7 +159,9 @@ NEWMARK_BETA = Scheme(
             "weight of the new acceleration in the velocity; 1/2: order 2, below it the amplitude grows",
         ),
     ),
-    stepper=_newmark,
+    stepper=_Family(_newmark).stepper,
+    weights=_Family(_newmark).weights,
+    weighed=("beta", "gamma"),
     orders=_newmark_orders,
     # symmetric with gamma = 1/2 for any beta
     even_powers=lambda quantity, model, options: _is_centred(options),
@@ -151,7 +179,9 @@ HHT = Scheme(
             "alpha", -0.1, -1.0 / 3.0, 0.0, "damping of high frequencies, the most at -1/3"
         ),
     ),
-    stepper=_hht,
+    stepper=_Family(_hht).stepper,
+    weights=_Family(_hht).weights,
+    weighed=("alpha",),
     orders=_averaged_orders,
     even_powers=lambda quantity, model, options: not _damps(options),
     start="a^0, from the equation of motion",
@@ -167,7 +197,9 @@ GENERALIZED_ALPHA = Scheme(
             "rho_inf", 0.8, 0.0, 1.0, "what is left of the highest frequencies in one step"
         ),
     ),
-    stepper=_generalized_alpha,
+    stepper=_Family(_generalized_alpha).stepper,
+    weights=_Family(_generalized_alpha).weights,
+    weighed=("rho_inf",),
     orders=_averaged_orders,
     even_powers=lambda quantity, model, options: not _damps(options),
     start="a^0, from the equation of motion",

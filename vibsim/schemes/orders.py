@@ -21,12 +21,16 @@ either; with no acceleration; or in any other way."""
 @cache
 def depends_on_velocity(model: Model) -> bool:
     """Tell whether the acceleration of a model depends on the velocity; between events, where there are some."""
+    if model.loaded is not None:
+        return model.loaded.is_damped
     return not _named(model).isdisjoint(model.velocities)
 
 
 @cache
 def is_autonomous(model: Model) -> bool:
     """Tell whether the acceleration of a model does not depend on time."""
+    if model.loaded is not None:
+        return not model.loaded.is_driven
     return "t" not in _named(model)
 
 

@@ -30,9 +30,13 @@ class _Samples:
     states: Floats
     series: Series | None
     lane: str
+    own_energies: Floats | None
+    """Kinetic and potential energy, shape (case, 2, t), where states do not tell them."""
 
     def energies(self, velocities: Floats) -> tuple[Floats, Floats]:
         """Return kinetic and potential energy with those velocities, shape (coordinate, case, t)."""
+        if self.own_energies is not None:
+            return self.own_energies[:, 0], self.own_energies[:, 1]
         states = np.concatenate([self.states[: self.model.coordinates], velocities])
         return energies(self.model, self.parameters, self.dt, self.every, states, lane=self.lane)
 
@@ -80,6 +84,7 @@ def derived(
                 states=solution.states[s, :, part],
                 series=solution.series and _part(solution.series, s, part),
                 lane=lane,
+                own_energies=None if solution.energies is None else solution.energies[s, part],
             )
             for name, values in _series(samples, found.keys()):
                 if name in found:

@@ -11,7 +11,9 @@ import numpy as np
 from vibsim import plan
 from vibsim.core.array_types import Integers
 from vibsim.engine import Trajectories, integrate
-from vibsim.simulation import adaptive
+from vibsim.models import Model
+from vibsim.schemes import Scheme
+from vibsim.simulation import adaptive, structure
 from vibsim.simulation.members import Members
 
 if TYPE_CHECKING:
@@ -40,8 +42,9 @@ def solve(
     for i, scheme in enumerate(experiment.schemes):
         method, runs = scheme.method, []
         for options, members in plan.option_groups(experiment, i, group.columns):
-            for where in adaptive.pieces(members, steps) if method.adaptive else (members,):
-                run = (adaptive.integrate if method.adaptive else integrate)(
+            is_tabulated = method.adaptive or model.loaded is not None
+            for where in adaptive.pieces(members, steps) if is_tabulated else (members,):
+                run = of_kind(model, method)(
                     model,
                     method,
                     options,
@@ -58,6 +61,13 @@ def solve(
         rows, lambda arrays: arrays[0][None] if len(arrays) == 1 else np.stack(arrays)
     )
     return found
+
+
+def of_kind(model: Model, scheme: Scheme) -> Callable[..., Trajectories]:
+    """Return what steps members of a model by a scheme."""
+    if scheme.adaptive:
+        return adaptive.integrate
+    return integrate if model.loaded is None else structure.integrate
 
 
 def has_adaptive(experiment: Experiment) -> bool:

@@ -71,7 +71,7 @@ class Miss:
 
 def applies(model: Model) -> bool:
     """Tell whether the acceleration of a model can be worked out in exact numbers, and never jumps."""
-    if model.events is not None or model.coordinates > 1:
+    if model.events is not None or not model.is_alone:
         return False
     return is_rational(restoring(model))
 

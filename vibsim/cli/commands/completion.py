@@ -125,10 +125,11 @@ def _of(settings: dict[str, object], name: str, given: Sequence[str]) -> Iterabl
 
 def _experiments() -> list[str]:
     """Return the names of collections and experiments, without reading them."""
-    from vibsim.plan.choose import checkout, experiments
+    from vibsim.core.home import home
+    from vibsim.plan.choose import experiments
 
     try:
-        found = experiments(checkout())
+        found = experiments(home())
     except VibsimError:
         return []
     names = [name for choice in found for name in (choice.collection, choice.name, choice.key)]

@@ -132,7 +132,8 @@ def _checks() -> Iterable[tuple[str, str]]:
 
 
 def _experiments() -> Iterable[tuple[str, str]]:
-    from vibsim.plan import checkout, experiments, load_all
+    from vibsim.core.home import home
+    from vibsim.plan import experiments, load_all
 
-    for key, plan in load_all(experiments(checkout())).items():
+    for key, plan in load_all(experiments(home())).items():
         yield key, plan.title

@@ -10,7 +10,8 @@ from pathlib import Path
 
 from vibsim.cli.jobs.common import refusal
 from vibsim.core.errors import nearest
-from vibsim.experiment.collection import ENDINGS, find_checkout
+from vibsim.core.home import home
+from vibsim.experiment.collection import ENDINGS
 from vibsim.store import write_bytes, write_text
 
 SCHEMA = "vibsim.schema.json"
@@ -77,10 +78,9 @@ def _like(word: str, schema: str) -> dict[str, bytes]:
 
 def _schema_of(file: Path) -> str:
     """Return the path of the schema as the file names it: that of the checkout within it, else one beside the file."""
-    root = find_checkout()
-    folder = file.parent.resolve()
-    if root is not None and folder.is_relative_to(root.resolve()):
-        return os.path.relpath(root.resolve() / "workflow/schemas/experiment.schema.json", folder)
+    root, folder = home(), file.parent.resolve()
+    if folder.is_relative_to(root):
+        return os.path.relpath(root / "workflow/schemas/experiment.schema.json", folder)
     return SCHEMA
 
 

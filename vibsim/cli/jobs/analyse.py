@@ -40,5 +40,5 @@ def analyse(options: Namespace) -> int:
     summary = summarise(experiment, verdicts(experiment, record), record)
     store.write_json(folder / "summary.json", summary, digest=plan.analysis)
     if options.out is None:
-        made_files.add(results, plan.key, ["convergence.nc", "summary.json"])
+        made_files.add(results, plan.key, ["convergence.nc", "summary.json"], plan.analysis)
     return 0

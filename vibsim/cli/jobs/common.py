@@ -19,15 +19,16 @@ import vibsim
 from vibsim.cli import results_folder
 from vibsim.cli.chosen_plans import one_plan_of
 from vibsim.core.errors import Fault, FileError, InputError, VibsimError
-from vibsim.plan import Plan, checkout
+from vibsim.core.home import default_results
+from vibsim.plan import Plan
 
 if TYPE_CHECKING:
     from vibsim.core.record import Record
 
 
 def chosen_results(options: Namespace) -> Path:
-    """Return the results folder that was asked for, else that of the checkout."""
-    folder: Path = options.results or checkout() / "results"
+    """Return the results folder that was asked for, else the default one."""
+    folder: Path = options.results or default_results()
     try:
         is_other = folder.exists() and not folder.is_dir()
     except OSError as error:

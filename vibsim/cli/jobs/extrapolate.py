@@ -41,5 +41,5 @@ def extrapolate(options: Namespace) -> int:
             provenance=provenance(plan, extrapolated(plan.content)),
         )
     if options.out is None:
-        made_files.add(results, plan.key, ["best.nc"])
+        made_files.add(results, plan.key, ["best.nc"], plan.extrapolation)
     return 0

@@ -37,5 +37,5 @@ def judge_levels(plan: Plan, options: Namespace, results: Path) -> int:
     summary = analysis.summarise(experiment, checks)
     store.write_json(folder / "summary.json", summary, digest=plan.analysis)
     if options.out is None:
-        made_files.add(results, plan.key, ["convergence.nc", "summary.json"])
+        made_files.add(results, plan.key, ["convergence.nc", "summary.json"], plan.analysis)
     return 0

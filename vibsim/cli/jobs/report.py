@@ -48,7 +48,7 @@ def report(options: Namespace) -> int:
         if options.out is None:
             # No number depends on title and source: after other ones the analysis need not run again.
             store.write_json(results / plan.summary, summary, digest=plan.analysis)
-            made_files.add(results, plan.key, ["summary.json"])
+            made_files.add(results, plan.key, ["summary.json"], plan.analysis)
     write(
         plan,
         found[plan.convergence],
@@ -58,7 +58,7 @@ def report(options: Namespace) -> int:
         provenance=with_settings(plan, plan.content) | {"digest": plan.analysis},
     )
     if options.out is None:
-        made_files.add(results, plan.key, _written(results / plan.key))
+        made_files.add(results, plan.key, _written(results / plan.key), plan.report)
     return 0
 
 

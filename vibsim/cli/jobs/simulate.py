@@ -43,7 +43,9 @@ def simulate(options: Namespace) -> int:
             continue
         try:
             make(plan, level, job, path, options.threads)
-            made_files.add(results, plan.key, [job.path.removeprefix(f"{plan.key}/")])
+            made_files.add(
+                results, plan.key, [Path(job.path).relative_to(plan.key).as_posix()], job.digest
+            )
         except VibsimError as error:
             failed.append(str(error))
         except Exception as error:

@@ -75,7 +75,7 @@ def _problem(folder: Path, name: str, entries: dict[str, Entry], every: bool) ->
     if known is None:
         entries[name] = made_files.entry(status, digest)
     elif digest != known.digest:
-        return "its bytes are not those that were written"
+        return made_files.CHANGED
     else:
         entries[name] = known._replace(inode=status.st_ino)
         if status.st_mtime_ns != known.time:
@@ -86,20 +86,27 @@ def _problem(folder: Path, name: str, entries: dict[str, Entry], every: bool) ->
 
 
 def settle(plans: Sequence[Plan], results: Path, outputs: Iterable[str]) -> None:
-    """Take the times of the files that jobs have just made: Snakemake sets them anew when a job has ended."""
+    """Write the manifests anew: without what was removed, and with the times of what jobs have just made.
+
+    Snakemake sets these when a job has ended.
+    """
     fresh = set(outputs)
+    wanted = {path for plan in plans for path in plan.files}
     for key in (*(plan.key for plan in plans), made_files.INDEX):
         known = made_files.load(results, key)
-        now = dict(known)
-        for name, entry in known.items():
+        now = {
+            name: entry
+            for name, entry in known.items()
+            if not key or name.startswith(BESIDE) or f"{key}/{name}" in wanted
+        }
+        for name, entry in tuple(now.items()):
             path = Path(key, name).as_posix()
             if path in fresh:
                 with suppress(OSError):
                     status = (results / path).lstat()
                     if (status.st_size, status.st_ino) == (entry.size, entry.inode):
                         now[name] = entry._replace(time=status.st_mtime_ns)
-        if now != known:
-            made_files.replace(results, key, now)
+        made_files.replace(results, key, now)
 
 
 def leftovers(plans: Sequence[Plan], results: Path) -> list[Path]:

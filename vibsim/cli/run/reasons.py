@@ -52,12 +52,7 @@ def _told(plan: Plan, made: Mapping[str, Any]) -> str:
     uses = (solved_and_judged if plan.has_solver else analysed)(plan.content)
     found = settings.differences(made["experiment"], uses)
     if not found:
-        # an unknown version says nothing, and no record of it is no change
-        now = provenance(plan, uses)["versions"]
-        match made.get("versions"):
-            case dict() as before:
-                now = {key: now.get(key, value) for key, value in before.items()}
-                found = settings.differences(before, now)
+        found = versions(plan, made)
     if not found:
         before, now = (
             {set_options([text]).strip(): "given" for text in texts}
@@ -73,6 +68,16 @@ def _told(plan: Plan, made: Mapping[str, Any]) -> str:
     more = [f"{len(found) - _SHOWN} more changes"] if len(found) > _SHOWN + 1 else []
     shown = found[:_SHOWN] if more else found
     return "; ".join([*map(str, shown), *more])
+
+
+def versions(plan: Plan, made: Mapping[str, Any]) -> list[settings.Change]:
+    """Return the versions that are others now than those that a result was made with (its provenance)."""
+    # an unknown version says nothing, and no record of it is no change
+    now = provenance(plan, {})["versions"]
+    match made.get("versions"):
+        case dict() as before:
+            return settings.differences(before, {key: now.get(key, before[key]) for key in before})
+    return []
 
 
 def in_words(jobs: Sequence[Job], plans: Sequence[Plan], results: Path) -> Iterator[str]:

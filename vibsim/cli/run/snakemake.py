@@ -22,7 +22,8 @@ from vibsim.cli.run import lock, supervise
 from vibsim.cli.run.executor import Executor
 from vibsim.core import private_cache
 from vibsim.core.errors import VibsimError
-from vibsim.plan import Plan, checkout
+from vibsim.core.home import home
+from vibsim.plan import Plan
 from vibsim.store import write_text
 
 _SEARCH_PATHS = (
@@ -190,8 +191,8 @@ def run(
     command = [sys.executable, "-P", "-m", "vibsim.cli.run.snakemake_process", str(os.getpid())]
     command.append("remote" if where.is_remote else "here")
     command += ["--logger", "vibsim", "--logger-vibsim-pipe", str(writing)]
-    command += ["--snakefile", str(checkout() / "Snakefile")]
-    command += ["--workflow-profile", str(checkout() / "workflow/profiles/default")]
+    command += ["--snakefile", str(home() / "Snakefile")]
+    command += ["--workflow-profile", str(home() / "workflow/profiles/default")]
     command += ["--configfile", str(config), "--directory", str(results), "--nocolor"]
     command += where.arguments
     with os.fdopen(reading, "rb") as events:

@@ -62,7 +62,7 @@ def read_crossings(
             hint = "for kicks with the period T write sin(pi*t/T)"
             report.add((*path, "when"), rule, hint, event.when)
         elif guard is not None and is_constant(guard, states):
-            rule = f"never changes: it names neither t nor {' or '.join(states)}"
+            rule = "never changes: it names neither t nor a state"
             report.add((*path, "when"), rule, value=event.when)
         name = guard_name(i + 1, bool(event.falling), bool(event.rising))
         texts[name] = event.when.strip()
@@ -77,7 +77,7 @@ def read_crossings(
         condition = _read(section.stop, names, ("model", STOP), report)
         try:
             if condition is not None and is_constant(guard_of(condition), states):
-                rule = f"never changes: it names neither t nor {' or '.join(states)}"
+                rule = "never changes: it names neither t nor a state"
                 report.add(("model", STOP), rule, value=section.stop)
         except ExpressionError as error:
             report.add(("model", STOP), error.rule, error.hint, section.stop)

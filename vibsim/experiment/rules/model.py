@@ -12,11 +12,12 @@ from typing import Any
 import numpy as np
 
 from vibsim.core.errors import nearest
-from vibsim.experiment.data import TableSpec
+from vibsim.experiment.data import StructureSpec, TableSpec
 from vibsim.experiment.faults import MISSING, Report
 from vibsim.experiment.kinds import COORDINATES
 from vibsim.experiment.rules.crossings import read_crossings
 from vibsim.experiment.rules.potential import check_potential
+from vibsim.experiment.rules.structure import read_structure, terms_of_damping
 from vibsim.experiment.schema.fields import DECLARED, TABLE, Section
 from vibsim.experiment.tables.file import ENDINGS, TableError, read
 from vibsim.experiment.yaml.parse import Path_
@@ -40,6 +41,7 @@ from vibsim.models.base import rate
 from vibsim.models.events import Crossings
 from vibsim.models.oscillator import COULOMB
 from vibsim.models.shared.crossings import is_crossing
+from vibsim.models.structure import RAYLEIGH
 from vibsim.models.system import coordinate_faults, name_fault
 
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
@@ -62,6 +64,7 @@ class Equation:
     tables: dict[str, TableSpec] = field(default_factory=dict)
     terms: tuple[str, ...] = ()
     """Which of `Model.optional` the equation has."""
+    structure: StructureSpec | None = None
 
 
 def are_known(model: Model, parameters: Mapping[str, float]) -> bool:
@@ -82,7 +85,10 @@ def equation(
                 report.add(("model", COORDINATES, i), fault, "choose another name")
     if section is None or model is None:
         # what follows from formulas is known only with all of them
-        return Equation(model if model is not None and model.written is None else None)
+        is_whole = model is not None and model.written is None and model.assembled is None
+        return Equation(model if is_whole else None)
+    if model.assembled is not None:
+        return _assembled(section, model, swept, folder, report)
     parameters = {row.name: getattr(section, row.name) for row in model.parameters}
     found = Equation(model, parameters)
     if model.written is not None:
@@ -96,6 +102,31 @@ def equation(
         if found.parameters[name] != neutral[name] or f"model.{name}" in swept
     )
     return replace(found, model=found.model.variant(frozenset(terms)), terms=terms)
+
+
+def _assembled(
+    section: Any, model: Model, swept: Collection[str], folder: Path, report: Report
+) -> Equation:
+    """Return the equation of a structure."""
+    assert model.assembled is not None
+    parameters = {
+        row.key: float(getattr(section.rayleigh, row.name, row.default)) for row in RAYLEIGH
+    }
+    declared = _declared(section, model, report)
+    spec, loads = read_structure(section, folder, report)
+    field = FormulaField("load", ("t",), "", "load")
+    known = (*(row.name for row in RAYLEIGH), *declared)
+    for text, path in loads.values():
+        _is_sound(text, field, path, known, report)
+    if spec is None or any(fault.key.split(".")[0] == "model" for fault in report.faults):
+        return Equation(None)
+    texts = {key: text for key, (text, _) in loads.items()}
+    found = model.assembled(spec.structure, texts, tuple(declared))
+    parameters |= {f"{DECLARED}.{name}": value for name, value in declared.items()}
+    terms = terms_of_damping(found, parameters, swept)
+    assert found.variant is not None
+    whole = found.variant(frozenset(terms))
+    return Equation(whole, parameters, texts, terms=terms, structure=spec)
 
 
 def _written(
@@ -134,9 +165,10 @@ def _written(
     for row in model.formulas:
         if row.positive:
             _check_positive(row, texts, declared, report)
+    exact = next((name for name in texts if name.startswith("exact")), "")
     if any(map(is_crossing, texts)):
         for name, is_there, why in (
-            ("exact", "exact" in texts, "the motion leaves the exact solution at an event"),
+            ("exact", bool(exact), "the motion leaves the exact solution at an event"),
             (
                 f"damping.{COULOMB}",
                 f"damping.{COULOMB}" in parameters,
@@ -149,7 +181,6 @@ def _written(
     if any(fault.key.split(".")[0] == "model" for fault in report.faults):
         return Equation(None)
     parameters |= {f"{DECLARED}.{name}": value for name, value in declared.items()}
-    exact = next((name for name in texts if name.startswith("exact")), "exact")
     try:
         found = model.written(texts, tuple(declared))
         for spec in tables.values():
@@ -159,7 +190,7 @@ def _written(
     except ExpressionError as error:
         # an error without a text speaks of the longest formula
         longest = max(texts, key=lambda name: len(texts[name]), default="kind")
-        name = exact if error.text else longest
+        name = exact if error.text and exact else longest
         path = ("model", *name.split("."))
         report.add(path, error.rule, error.hint, texts.get(name, error.text))
         return Equation(None)
@@ -229,6 +260,9 @@ def _declared(section: Any, model: Model, report: Report) -> dict[str, float]:
     taken = {"t": "the time"}
     taken |= {state.name: f"the {state.long_name}" for state in model.states}
     taken |= {row.name: f"the {row.description} of the model" for row in model.parameters}
+    if model.assembled is not None:
+        # these are observed
+        taken = {"t": "the time"} | {row.name: f"the {row.description}" for row in RAYLEIGH}
     if any(row.terms and isinstance(getattr(section, row.name), Section) for row in model.formulas):
         taken["b"] = "the coefficient of the damping"
     found = {}

@@ -47,6 +47,8 @@ def _specs(section: Any, model: Model | None, kinds: Kinds) -> list[SchemeSpec]:
     scheme = kinds.scheme(kind)
     assert scheme is not None
     options: dict[str, Any] = {row.name: row.default for row in scheme.options_on(model)}
+    if model is not None and model.loaded is not None:
+        options = scheme.defaults()
     name = kind
     if not isinstance(section, str):
         name = section.label or kind
@@ -87,6 +89,10 @@ def _check_forces(kind: str, i: int, model: Model, report: Report) -> None:
     hint = "choose from " + ", ".join(able) if able else "no scheme can"
     rule = f"cannot treat {model.kind}, whose acceleration depends on {_velocities(model)}"
     unknowns = method.unknowns(model)
+    if model.loaded is not None:
+        rule = f"cannot treat {model.kind}, whose degrees of freedom are stepped together"
+        report.add(("schemes", i), rule, hint, kind)
+        return
     damped = [other for other, _ in method.damped if not other.startswith(VECTOR)]
     if unknowns > MOST_UNKNOWNS:
         rule = (
@@ -116,6 +122,13 @@ def _velocities(model: Model) -> str:
 def _check_events(section: Any, i: int, model: Model, report: Report) -> None:
     """Refuse a treatment of events where there are none."""
     given = None if isinstance(section, str) else getattr(section, EVENTS.name, None)
+    if model.loaded is not None and not isinstance(section, str):
+        method = report.kinds.scheme(section.kind)
+        assert method is not None
+        for option in method.options:
+            if option.name in section.model_fields_set and option.name not in method.weighed:
+                rule = f"has no meaning for {model.kind}, on which the scheme has one form"
+                report.add(("schemes", i, option.name), rule, "leave it out", at_key=True)
     is_unsure = any(fault.key.split(".")[0] == "model" for fault in report.faults)
     if given is None or is_unsure or model.events is not None:
         return

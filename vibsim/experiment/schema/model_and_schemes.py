@@ -37,6 +37,7 @@ from vibsim.experiment.schema.fields import (
     tag,
     tagged,
 )
+from vibsim.experiment.schema.structure import StructureSection
 from vibsim.experiment.schema.sweep import tolerance_name
 from vibsim.models import FormulaField, Model, Parameter
 from vibsim.models.shared.crossings import MOST_EVENTS, STOP
@@ -208,6 +209,8 @@ class Event(Section):
 @cache
 def model_section(model: Model) -> type[Section]:
     """Return the class of the section of a model."""
+    if model.assembled is not None:
+        return StructureSection
     fields: dict[str, Any] = {"kind": (Literal[model.kind], Field(description=model.title))}
     for row in model.parameters:
         description = f"{row.description} [{row.unit}]"

@@ -33,7 +33,7 @@ class FreeOscillation:
 @cache
 def why_not_free(model: Model) -> str:
     """Return what makes a model another one, as the end of a sentence that it begins; empty where it is such a one."""
-    if model.coordinates > 1:
+    if not model.is_alone:
         return "has several coordinates"
     if model.events is not None or model.lookup is not None:
         return "has a force with corners"

@@ -11,8 +11,11 @@ from vibsim.models.base import Model
 
 
 def has_error_parts(model: Model) -> bool:
-    """Tell whether the motion is smooth: across an impact, or a corner of the force, a shift is not all there is."""
-    return model.events is None and model.lookup is None
+    """Tell whether the motion is smooth and its accelerations are known.
+
+    Across an impact, or a corner of the force, a shift is not all there is; accelerations of a structure are not kept.
+    """
+    return model.events is None and model.lookup is None and model.loaded is None
 
 
 def error_parts(model: Model) -> tuple[str, ...]:

@@ -115,7 +115,7 @@ def pictures(
     if series:
         tabs += tab("energy", [energy.running(record, case) for case in cases[:1]])
         beside: Drawn = [extrema.local(experiment, record, series)]
-        if not data.swept(record) and experiment.model.definition.coordinates == 1:
+        if not data.swept(record) and experiment.model.definition.is_alone:
             beside.append(plane.phase(experiment, record, series))
         tabs += tab("phase and amplitude", beside)
     theories: Drawn = [theory.order_and_stability(experiment, record)]

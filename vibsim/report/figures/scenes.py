@@ -100,7 +100,7 @@ def scene_of(model: Model) -> Callable[[Motion], Scene] | None:
     """Return what draws the motions of a model; None where its system cannot be drawn."""
     if model.kind in SCENES:
         return SCENES[model.kind]
-    is_displacement = model.coordinates == 1 and model.states[0].unit in {"m", "1"}
+    is_displacement = model.is_alone and model.states[0].unit in {"m", "1"}
     return spring_mass if is_displacement else None
 
 

@@ -8,6 +8,7 @@ from typing import Any
 from vibsim.checks.outcome import Result
 from vibsim.checks.value import unit_of
 from vibsim.checks.verdict_text import Wording, expectation
+from vibsim.core.home import called
 from vibsim.core.record import Record
 from vibsim.core.vocabulary import worst
 from vibsim.plan.versions import DRAWING, versions
@@ -200,7 +201,7 @@ def _alone(check: Mapping[str, Any]) -> str:
         if result.get("command"):
             # of the schemes of a member the worst comes first
             found = f"{result['status']} {result['reason']}"
-            lines.setdefault(f".venv/bin/{result['command']}", found)
+            lines.setdefault(called(result["command"]), found)
     width = max(map(len, lines), default=0)
     return "\n".join(f"{command:{width}}  # {found}" for command, found in lines.items())
 

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from vibsim.core.home import called
 from vibsim.core.record import Record
 from vibsim.core.set_option import set_options
 from vibsim.report import data, style, sweep_layout
@@ -47,7 +48,7 @@ def worst(
 def _around(experiment: Experiment) -> tuple[str, str]:
     """Return what stands before and behind the number of a member in its command."""
     start, _, end = quote(f"{experiment.word}@0").rpartition("0")
-    return f".venv/bin/vibsim run {start}", end + set_options(experiment.settings)
+    return called(f"vibsim run {start}"), end + set_options(experiment.settings)
 
 
 def content(experiment: Experiment, record: Record, views: Sequence[View]) -> dict[str, Any] | None:

@@ -12,6 +12,7 @@ from vibsim.checks.outcome import about_members
 from vibsim.checks.value import unit_of
 from vibsim.checks.verdict_text import expectation
 from vibsim.comparison.best_values import WORDS, scalars
+from vibsim.core.home import called
 from vibsim.core.record import Record
 from vibsim.core.vocabulary import decisive_number
 from vibsim.report import choice, data, finest_level, style
@@ -81,7 +82,7 @@ def numbers(experiment: Experiment, record: Record, lead: Lead) -> Iterator[Numb
         text = ", ".join(
             part.replace(" ", "\N{NO-BREAK SPACE}") for part in lead.member.case_words.split(", ")
         )
-        command = f".venv/bin/{lead.result['command']}"
+        command = called(lead.result["command"])
         yield {"label": "Hardest member", "value": text, "note": f"To run it alone: `{command}`"}
     yield from _best(experiment, record, lead)
     level, dt = data.whole(record, "level")[-1], data.steps_of(record, lead.member.case)

@@ -12,6 +12,7 @@ from typing import Any
 
 from vibsim import store
 from vibsim.core.errors import VibsimError, nearest
+from vibsim.core.home import SHIPPED, called
 from vibsim.core.record import Record
 from vibsim.core.set_option import set_options
 from vibsim.core.vocabulary import TYPICAL_NORM
@@ -169,7 +170,7 @@ def write(
             "experiment_file": experiment_file.text(experiment),
             "experiment_shown": experiment_file.shown(experiment),
             "provenance": list(cards.provenance_rows(provenance)),
-            "target": quote(experiment.word) + set_options(experiment.settings),
+            "command": called(f"vibsim run {quote(experiment.word)}") + set_options(experiment.settings),
             "python": _python(experiment),
         }
     )  # fmt: skip
@@ -319,7 +320,8 @@ def _python(experiment: Experiment) -> str:
     file, at, case = word.rpartition("@")
     if not at or word.endswith(ENDINGS):
         file, case = word, ""
-    named = f"configs/{file}.yaml" if is_ours else file
+    shipped = f"{SHIPPED}/configs" if SHIPPED.is_dir() else "configs"
+    named = f"{shipped}/{file}.yaml" if is_ours else file
     settings = experiment.settings
     given = f", settings={json.dumps(settings, ensure_ascii=False)}" if settings else ""
     return PYTHON.format(file=named, given=given, alone=f".alone({case})" if case else "")

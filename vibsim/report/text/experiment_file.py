@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from vibsim.models.shared.crossings import is_crossing, written
+from vibsim.report.text import structure
 from vibsim.report.types import Check, Experiment, SchemeSpec
 
 WIDTH = 100  # characters of a line
@@ -47,7 +48,7 @@ def _head(experiment: Experiment) -> list[str]:
     for key, value in (scaling or model).parameters.items():
         _put(named, key.split("."), value)
     for key, formula in model.formulas.items():
-        if key not in named and not is_crossing(key):
+        if key not in named and not is_crossing(key) and model.structure is None:
             _put(named, key.split("."), formula)
     for key in ("kinetic", "potential"):
         terms = named.get(key)
@@ -55,10 +56,15 @@ def _head(experiment: Experiment) -> list[str]:
             named[key] = [terms[str(i)] for i in range(len(terms))]
     named |= written(model.formulas)
     named |= {name: {"table": spec.file} for name, spec in model.tables.items()}
+    if model.structure is not None:
+        named |= structure.as_written(model.structure, model.formulas)
     lines += [
         f"model: {_value(named)}",
         f"initial: {_value(dict((scaling or experiment).initial))}",
     ]
+    if model.structure is not None and not model.structure.is_free:
+        # the section model says how the motion begins
+        del lines[-1]
     time = experiment.time.model_dump(exclude_none=True)
     if time.get("periods") is not None:
         time = {

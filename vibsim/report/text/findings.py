@@ -161,8 +161,8 @@ def _by_check(experiment: Experiment, record: Record, lead: Lead) -> str:
     if kind == "converges":
         # of a trap, what was found says more than that it was expected
         word = lead.result["reason"] if reason == "match" else reason
-        if word == "exact" and _of_each(record, lead):
-            # one of them is exact, as it promises; the others have an order
+        if word == "exact" and any(result["reason"] != "exact" for result in lead.entry["results"]):
+            # some are exact, as they promise; the others have an order
             word = "asymptotic"
         return ON_ORDER.get(word, ON_ORDER["mismatch"]).format_map(filled)
     if reason == "non_finite":

@@ -11,7 +11,7 @@ from vibsim.core.record import Record
 from vibsim.core.set_option import set_options
 from vibsim.core.vocabulary import HIGHEST
 from vibsim.report import data
-from vibsim.report.text import words
+from vibsim.report.text import structure, words
 from vibsim.report.types import Axis, Experiment, SchemeSpec
 
 LISTED = 8  # most values of a key that are written out
@@ -39,6 +39,8 @@ def setup(experiment: Experiment, record: Record) -> Iterator[tuple[str, str]]:
             else "steps contain its points, where the force has corners"
         )
         yield "Table", f"{name} from {spec.file}, columns {spec.place} and {spec.value}; {steps}"
+    if model.loaded is not None and experiment.model.structure is not None:
+        yield from structure.told(experiment.model.structure, model.loaded)
     if experiment.units:
         parts = [(name, *text.partition(" ")) for name, text in experiment.units.items()]
         told = [f"1 {name} = {number} {data.pretty_unit(base)}" for name, number, _, base in parts]

@@ -1,0 +1,226 @@
+"""``vibsim verify``: whether files are those that their run wrote, and whether the same comes out again, bit for bit.
+
+Files are compared with the manifest that jobs and runs write (`vibsim.cli.made_files`). Results are recomputed by a run
+in a temporary folder, and its manifest is compared with the files that are there.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import sys
+from argparse import Namespace
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from vibsim.cli import made_files, results_folder
+from vibsim.cli.chosen_plans import plans_of
+from vibsim.cli.jobs.common import chosen_results
+from vibsim.cli.jobs.solve import check_allowed
+from vibsim.cli.made_files import BESIDE, Entry
+from vibsim.cli.run import lock, reasons, supervise
+from vibsim.cli.terminal import clean
+from vibsim.core.errors import FileError, VibsimError
+from vibsim.core.home import home
+from vibsim.plan import Plan, choose
+
+NO_RESULTS = ("logs", "benchmarks")
+"""Folders of an experiment with the messages and times of its jobs."""
+TIMESTAMP = ".snakemake_timestamp"
+"""What Snakemake puts into a folder that a job made."""
+LAST = ("convergence.nc", "summary.json", "report.html")
+"""Files that every experiment has when its run ends."""
+_MANIFEST = re.compile(r"\w+\.\w+", re.ASCII)
+"""Name of the manifest of an experiment, whose collection and name have no point in them."""
+SHOWN = 8
+"""Up to so many files are named that differ for the same reason."""
+_OVER_ALL = ("index.html", "summary.csv")
+_README = "README.md"
+"""Stands in the results folder of a checkout."""
+
+
+def verify(options: Namespace) -> int:
+    """Compare files with their manifest; recompute named experiments, unless files alone are asked for.
+
+    Raises
+    ------
+    InputError
+        Where a name or an experiment file is refused, or a program of the user is not allowed.
+    VibsimError
+        Where there are no results.
+    """
+    results, words = chosen_results(options), options.experiments
+    plans: Sequence[Plan] = []
+    if words and not options.files:
+        plans = plans_of(words, options.settings, cached=True)
+        check_allowed(plans, options.allow_commands)
+    if not results.is_dir():
+        raise VibsimError(f"{results}: there are no results yet")
+    if words:
+        keys = [choice.key for choice in choose(words, home(), options.settings)]
+    else:
+        keys = [made_files.INDEX, *experiments(results)]
+    results_folder.check(results, filter(None, keys))
+    with kept(results), TemporaryDirectory(prefix="vibsim-verify-") as folder:
+        faults = sum(_tell_files(results, key) for key in keys)
+        status = _run_again(options, folder) if plans else 0
+        if status not in (0, 1):
+            return status
+        faults += sum(_tell_recomputed(plan, results, Path(folder)) for plan in plans)
+    return 1 if faults else 0
+
+
+@contextmanager
+def kept(results: Path) -> Iterator[None]:
+    """Keep runs out of a results folder: what one is making is neither damaged nor missing."""
+    # where nothing can be written, there is no run
+    held = lock.hold(results) if os.access(results / ".vibsim", os.W_OK) else None
+    try:
+        yield
+    finally:
+        if held is not None:
+            os.close(held)
+
+
+def experiments(results: Path) -> list[str]:
+    """Return the folders of all experiments that have a manifest or files, in order."""
+    manifests = made_files.path(results, made_files.INDEX).parent.glob("*.*.jsonl")
+    folders = (folder for folder in results.glob("[!.]*/[!.]*") if folder.is_dir())
+    found = {file.stem.replace(".", "/") for file in manifests if _MANIFEST.fullmatch(file.stem)}
+    return sorted(found | {folder.relative_to(results).as_posix() for folder in folders})
+
+
+def compare(results: Path, key: str) -> tuple[int, dict[str, str]]:
+    """Compare every file of an experiment, or those over all (`made_files.INDEX`), with the manifest; change nothing.
+
+    Returns
+    -------
+    tuple[int, dict[str, str]]
+        How many files the manifest has; and what is wrong, by the path of the file from `results`.
+    """
+    folder = results / key
+    known, is_whole = made_files.read(results, key)
+    there = set(_files(folder, is_top=key == made_files.INDEX))
+    if not known and not there:
+        return 0, {key or "index.html": "there are no results yet: run it first"}
+    found = {name: _problem(folder / name, entry) for name, entry in known.items()}
+    if is_whole:
+        found |= dict.fromkeys(
+            there - known.keys(), "is not in the manifest: no job that ended made it"
+        )
+        for name in _OVER_ALL if key == made_files.INDEX else LAST:
+            found.setdefault(name, "is not made yet: the last run did not end")
+    if LAST[-1] not in there:
+        # its job begins with figures and tables
+        begun = [name for name in found if name.startswith(BESIDE) and (folder / name).exists()]
+        found |= {name: found[name] and "is of a report that was not finished" for name in begun}
+    problems = {(Path(key) / name).as_posix(): text for name, text in sorted(found.items()) if text}
+    if not is_whole:
+        manifest = made_files.path(results, key)
+        state = "is damaged" if manifest.exists() else "is missing"
+        number = len(there - known.keys())
+        text = f"the manifest {state}, so {number} files cannot be compared; run again"
+        problems[manifest.relative_to(results).as_posix()] = text
+    return len(known), problems
+
+
+def _problem(file: Path, known: Entry) -> str:
+    try:
+        if not file.exists():
+            return "is missing"
+        return "" if made_files.content(file) == known.digest else made_files.CHANGED
+    except OSError as error:
+        return f"cannot be read: {error.strerror}"
+    except FileError as error:
+        return error.reason
+
+
+def _files(folder: Path, *, is_top: bool) -> Iterator[str]:
+    """Yield all results of an experiment, or what is beside the experiments, as paths from `folder`."""
+    for place, folders, names in os.walk(folder):
+        inner = Path(place).relative_to(folder)
+        if is_top:
+            # collections, but no experiments
+            folders[:] = [name for name in folders if not inner.parts and not name.startswith(".")]
+        elif not inner.parts:
+            folders[:] = [name for name in folders if name not in NO_RESULTS]
+        paths = ((inner / name).as_posix() for name in names if name != TIMESTAMP)
+        yield from (path for path in paths if not (is_top and path == _README))
+
+
+def _tell_files(results: Path, key: str) -> int:
+    """Print what is wrong with the files of an experiment; return how many things."""
+    number, problems = compare(results, key)
+    for path, text in problems.items():
+        print(clean(f"{path}: {text}"), flush=True)
+    if not problems:
+        print(clean(f"{key or 'index'}: all {number} files are as they were written"), flush=True)
+    return len(problems)
+
+
+def _run_again(options: Namespace, folder: str) -> int:
+    """Run the same in another folder; return the exit status."""
+    words = [sys.executable, "-P", "-m", "vibsim", "run", *options.experiments]
+    words += ["--results", folder]
+    words += [word for text in options.settings for word in ("--set", text)]
+    words += ["--cores", str(options.cores)] if options.cores else []
+    words += ["--allow-commands"] * options.allow_commands
+    environment = os.environ | supervise.environment()
+    # verdicts are no news here, progress is
+    return subprocess.run(words, env=environment, stdout=subprocess.DEVNULL, check=False).returncode
+
+
+def _tell_recomputed(plan: Plan, results: Path, folder: Path) -> int:
+    """Print which recomputed files differ from those that are there, and why; return how many."""
+    causes = differences(plan, results, folder)
+    for cause, names in causes.items():
+        # data before pages, tables and figures
+        names.sort(key=lambda name: (not name.endswith(".nc"), name))
+        more = f" and {len(names) - SHOWN} more" if len(names) > SHOWN else ""
+        told = ", ".join(names[:SHOWN]) + more
+        print(clean(f"{plan.key}: recomputed, other bytes ({cause}): {told}"))
+    if not causes:
+        number = len(made_files.load(folder, plan.key))
+        print(clean(f"{plan.key}: recomputed, all {number} files have the same bytes"))
+    return sum(map(len, causes.values()))
+
+
+def differences(plan: Plan, results: Path, folder: Path) -> dict[str, list[str]]:
+    """Return the files of `results` that are others than those just made in `folder`, by the cause."""
+    made, known = made_files.load(folder, plan.key), made_files.load(results, plan.key)
+    causes: dict[str, list[str]] = {}
+    for path in plan.files:
+        name = path.removeprefix(f"{plan.key}/")
+        if name not in made:
+            causes.setdefault("its job failed", []).append(name)
+    for name, entry in sorted(made.items()):
+        if _problem(results / plan.key / name, entry):
+            cause = _cause(plan, results, known.get(name), entry, name)
+            causes.setdefault(cause, []).append(name)
+    return causes
+
+
+def _cause(plan: Plan, results: Path, known: Entry | None, again: Entry, name: str) -> str:
+    """Say what differs between the making of a file and of the same file again."""
+    from vibsim.store.provenance import read_provenance
+
+    if known is None:
+        return "the manifest does not have it"
+    if problem := _problem(results / plan.key / name, known):
+        return problem
+    if found := reasons.why(plan, results):
+        return found
+    try:
+        versions = reasons.versions(plan, read_provenance(results / plan.convergence))
+    except FileError:
+        versions = []
+    if versions:
+        return "; ".join(map(str, versions))
+    if known.job and known.job != again.job:
+        return "the title, or the code or the libraries that draw pages changed"
+    if known.machine and known.machine != again.machine:
+        return f"made on another machine ({known.machine}; this is {again.machine})"
+    return "input, versions, code and machine are the same"

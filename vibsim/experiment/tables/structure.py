@@ -1,0 +1,245 @@
+"""From what an experiment says of a structure, and the files that it names, to the numbers of the structure."""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from vibsim.core.array_types import Floats
+from vibsim.core.errors import Fault, InputError
+from vibsim.experiment.data import ArraySpec, ExperimentSpec, StructureSpec
+from vibsim.experiment.tables.matrix import MatrixError, read, square, vector
+from vibsim.models.shared.matrices import RIGID, Matrix, factored
+from vibsim.models.structure import LOAD, MOST_DOFS, MOST_MODES, Structure
+
+MATRICES = ("mass", "stiffness", "damping")
+STARTS = ("start.displacement", "start.velocity")
+SYMMETRIC = 1e-12
+"""A matrix is symmetric whose entries differ by no more, to the largest one: files are rounded."""
+FLAT = 1e-9
+"""An observed displacement below this part of the largest entry of a mode cannot scale it."""
+
+
+@dataclass
+class Assembly:
+    """The numbers of a structure as far as they are sound, and what is wrong with them."""
+
+    spec: StructureSpec
+    folder: Path
+    faults: list[tuple[str, str, str]] = field(default_factory=list)
+    """The dotted key in the section ``model``, the rule that is broken, and how to keep it."""
+    structure: Structure | None = None
+    digests: dict[str, tuple[str, str]] = field(default_factory=dict)
+    """By key the SHA-256 of the numbers of an array, and that of the bytes of its file; empty without one."""
+
+    def add(self, key: str, rule: str, hint: str = "") -> None:
+        """Note a fault."""
+        self.faults.append((key, rule, hint))
+
+    def matrices(self) -> dict[str, Matrix]:
+        """Return the matrices that are sound."""
+        found = {}
+        for key in MATRICES:
+            if key not in self.spec.arrays:
+                continue
+            try:
+                matrix = square(self._array(key))
+                if matrix.size > MOST_DOFS:
+                    raise MatrixError(
+                        f"must not have more than {MOST_DOFS} rows, has {matrix.size}"
+                    )
+                size, i, j = matrix.asymmetry
+                if size > SYMMETRIC:
+                    rule = f"must be symmetric: the entries ({i + 1}, {j + 1}) and ({j + 1}, {i + 1}) differ"
+                    raise MatrixError(f"{rule} by {size:.3g} of the largest one")
+            except MatrixError as error:
+                self.add(key, error.rule, error.hint)
+            else:
+                found[key] = matrix
+        return found
+
+    def _array(self, key: str) -> Any:
+        """Return the numbers of an array as they stand."""
+        row = self.spec.arrays[key]
+        content = ""
+        if row.file is not None:
+            if Path(row.file).is_absolute():
+                raise MatrixError("must be a path relative to the folder of the experiment file")
+            found, content = read(self.folder / row.file)
+        elif row.rows and isinstance(row.rows[0], tuple):
+            lengths = {len(line) for line in row.rows if isinstance(line, tuple)}
+            if len(lengths) > 1:
+                raise MatrixError(
+                    f"must have rows of one length, has {min(lengths)} to {max(lengths)} numbers"
+                )
+            found = np.array(row.rows, dtype=float)
+        else:
+            found = np.array(row.rows, dtype=float)
+        self.digests[key] = _digest(found), content
+        return found
+
+    def vector(self, key: str, size: int) -> Floats:
+        """Return a vector of as many numbers as the structure has degrees of freedom; 0 where it is not sound."""
+        row, found = self.spec.arrays[key], np.zeros(size)
+        if row.entries:
+            for dof, value in row.entries:
+                if dof > size:
+                    self.add(f"{key}.{dof}", f"there are {size} degrees of freedom")
+                else:
+                    found[dof - 1] = value
+            return found
+        try:
+            given = vector(self._array(key))
+            if len(given) != size:
+                raise MatrixError(
+                    f"must have {size} numbers, as many as degrees of freedom, has {len(given)}"
+                )
+        except MatrixError as error:
+            self.add(key, error.rule, error.hint)
+            return found
+        return given
+
+
+def _digest(found: Any) -> str:
+    if not isinstance(found, np.ndarray):
+        return Matrix.of(found).digest if found.shape[0] == found.shape[1] else ""
+    array = np.ascontiguousarray(found, dtype="<f8")
+    return hashlib.sha256(repr(array.shape).encode() + array.tobytes()).hexdigest()
+
+
+def assemble(spec: StructureSpec, folder: Path) -> Assembly:
+    """Read what `spec` names, its paths relative to `folder`, and put the structure together."""
+    own = Assembly(spec, folder)
+    matrices = own.matrices()
+    if "stiffness" not in matrices or len(matrices) < len(spec.arrays.keys() & set(MATRICES)):
+        return own
+    stiffness = matrices["stiffness"]
+    size = stiffness.size
+    mass = matrices.get("mass") or Matrix.of(_identity(size))
+    for key, matrix in matrices.items():
+        if matrix.size != size:
+            rule = f"must have as many rows as the stiffness matrix, {size}, has {matrix.size}"
+            own.add(key, rule)
+    if own.faults:
+        return own
+    if factored(mass.sparse) is None:
+        rule = "must be positive definite: some motion has no mass"
+        own.add("mass", rule, "leave out degrees of freedom without mass (static condensation)")
+        return own
+    structure = Structure(mass, stiffness)
+    _check_stiffness(structure, own)
+    observed = np.zeros((len(spec.observe), size))
+    for i, (name, entries) in enumerate(spec.observe):
+        for dof, factor in entries:
+            if dof > size:
+                own.add(f"observe.{name}", f"there are {size} degrees of freedom, not {dof}")
+            else:
+                observed[i, dof - 1] = factor
+    if len(spec.ratios) > (len(structure.modes.frequencies) if not own.faults else size):
+        rule = f"has ratios of {len(spec.ratios)} modes, the structure has {size}"
+        if size > MOST_MODES:
+            rule = f"modes are found of up to {MOST_MODES} degrees of freedom, there are {size}"
+        own.add("damping_ratios", rule, "or take rayleigh" if size > MOST_MODES else "")
+    loads = [key for key in spec.arrays if key.startswith(f"{LOAD}.")]
+    shapes = np.array([own.vector(key, size) for key in loads]).reshape(len(loads), size)
+    start = [_started(own, key, structure, observed) for key in STARTS]
+    if own.faults:
+        return own
+    own.structure = Structure(
+        mass=mass,
+        stiffness=stiffness,
+        damping=matrices.get("damping"),
+        ratios=spec.ratios,
+        names=tuple(name for name, _ in spec.observe),
+        observed=observed,
+        start=None if spec.is_free else (start[0], start[1]),
+        shapes=shapes,
+    )
+    return own
+
+
+def _identity(size: int) -> Any:
+    from scipy.sparse import eye_array
+
+    return eye_array(size, format="csr")
+
+
+def _check_stiffness(structure: Structure, own: Assembly) -> None:
+    """Refuse a structure that is pushed away from rest, and a large one that is not held."""
+    if structure.has_all_modes:
+        if not np.isfinite(structure.modes.frequencies).all():
+            rule = f"must not have a negative eigenvalue: below -{RIGID:g} of the largest one it pushes away"
+            own.add("stiffness", rule)
+    elif factored(structure.stiffness.sparse) is None:
+        rule = f"must be positive definite above {MOST_MODES} degrees of freedom"
+        own.add("stiffness", rule, "hold the structure, so that it cannot move as a rigid body")
+
+
+def _started(own: Assembly, key: str, structure: Structure, observed: Floats) -> Floats:
+    """Return the displacement or the velocity at t = 0."""
+    if key not in own.spec.arrays:
+        return np.zeros(structure.dofs)
+    row = own.spec.arrays[key]
+    if row.mode is None:
+        return own.vector(key, structure.dofs)
+    if own.faults:
+        return np.zeros(structure.dofs)
+    known = structure.modes.shapes
+    if row.mode > known.shape[1]:
+        own.add(f"{key}.mode", f"{known.shape[1]} modes are found, there is no mode {row.mode}")
+        return np.zeros(structure.dofs)
+    shape = known[:, row.mode - 1]
+    seen = float(observed[0] @ shape)
+    if abs(seen) <= FLAT * float(np.max(np.abs(shape))):
+        name = own.spec.observe[0][0]
+        own.add(f"{key}.mode", f"{name}, which would measure its size, does not move in it")
+        return np.zeros(structure.dofs)
+    return shape * (row.size / seen)
+
+
+def with_digests(spec: StructureSpec, own: Assembly) -> StructureSpec:
+    """Return `spec` with the digests of its numbers, holding its structure."""
+    assert own.structure is not None
+    rows = {
+        key: row.model_copy(update={"numbers": own.digests.get(key, ("", ""))[0]})
+        for key, row in spec.arrays.items()
+    }
+    found = spec.model_copy(update={"arrays": type(spec.arrays)(rows)})
+    files = [(row.file, own.digests[key][1]) for key, row in rows.items() if row.file is not None]
+    found.hold(own.structure, tuple(dict.fromkeys(files)))
+    return found
+
+
+def attach(experiment: ExperimentSpec) -> None:
+    """Read the numbers of a structure that was kept without them.
+
+    Raises
+    ------
+    InputError
+        Where a file cannot be read, or has other numbers than it had.
+    """
+    spec = experiment.model.structure
+    assert spec is not None
+    own = assemble(spec, experiment.file.parent if experiment.file else Path())
+    for key, row in spec.arrays.items():
+        if row.file is not None and own.digests.get(key, ("", ""))[0] != row.numbers:
+            rule = "has other numbers than when the experiment was read"
+            own.add(key, rule, "run the experiment again")
+    if own.faults:
+        file = str(experiment.file or experiment.name)
+        shown = {key: _shown(spec.arrays.get(key)) for key, _, _ in own.faults}
+        faults = [
+            Fault(file, 0, f"model.{key}", shown[key], rule, hint) for key, rule, hint in own.faults
+        ]
+        raise InputError(faults)
+    assert own.structure is not None
+    files = [(row.file, own.digests[key][1]) for key, row in spec.arrays.items() if row.file]
+    spec.hold(own.structure, tuple(dict.fromkeys(files)))
+
+
+def _shown(row: ArraySpec | None) -> str:
+    return row.file if row is not None and row.file is not None else ""

@@ -1,0 +1,80 @@
+"""A linear structure in words, and as its section stands in an experiment file."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from vibsim.models.structure import LOAD, Loaded
+from vibsim.report.text import words
+from vibsim.report.types import ArraySpec, StructureSpec
+
+MOST_SHOWN = 6
+"""Natural frequencies that are listed, and rows of a matrix."""
+WORDS = {"mass": "M", "stiffness": "K", "damping": "C"}
+
+
+def as_written(spec: StructureSpec, formulas: Mapping[str, str]) -> dict[str, Any]:
+    """Return what the section ``model`` has beside its kind, its damping of Rayleigh and its parameters."""
+    found: dict[str, Any] = {key: _array(row) for key, row in spec.arrays.items() if "." not in key}
+    if spec.ratios:
+        is_same = len(set(spec.ratios)) == 1 and len(spec.ratios) > 1
+        found["damping_ratios"] = spec.ratios[0] if is_same else list(spec.ratios)
+    shapes = {key: row for key, row in spec.arrays.items() if key.startswith(f"{LOAD}.")}
+    if shapes:
+        rows = [(row.entries, formulas[key]) for key, row in shapes.items()]
+        if all(len(entries) == 1 and entries[0][1] == 1.0 for entries, _ in rows):
+            found[LOAD] = {str(entries[0][0]): text for entries, text in rows}
+        else:
+            ((key, row),) = shapes.items()
+            found[LOAD] = {"shape": _array(row), "times": formulas[key]}
+    start = {
+        key.partition(".")[2]: _array(row)
+        for key, row in spec.arrays.items()
+        if key.startswith("start.")
+    }
+    if start:
+        found["start"] = start
+    if not spec.is_free:
+        found["observe"] = {name: _entries(entries) for name, entries in spec.observe}
+    return found
+
+
+def _array(row: ArraySpec) -> Any:
+    if row.file is not None:
+        return row.file
+    if row.mode is not None:
+        return {"mode": row.mode, **({"size": row.size} if row.size != 1.0 else {})}
+    if row.entries:
+        return {str(dof): value for dof, value in row.entries}
+    return [list(line) if isinstance(line, tuple) else line for line in row.rows]
+
+
+def _entries(entries: tuple[tuple[int, float], ...]) -> Any:
+    if len(entries) == 1 and entries[0][1] == 1.0:
+        return entries[0][0]
+    return {str(dof): value for dof, value in entries}
+
+
+def told(spec: StructureSpec, loaded: Loaded) -> Iterator[tuple[str, str]]:
+    """Yield what a page says of a structure."""
+    own = loaded.structure
+    files = [
+        f"{word} from {row.file}"
+        for key, word in WORDS.items()
+        if (row := spec.arrays.get(key)) is not None and row.file is not None
+    ]
+    yield "Structure", ", ".join([f"{own.dofs} degrees of freedom", *files])
+    found = own.modes.frequencies
+    listed = ", ".join(words.number(float(w)) for w in found[:MOST_SHOWN])
+    rest = ", ..." if len(found) > MOST_SHOWN or own.dofs > len(found) else ""
+    yield "Natural frequencies", f"{listed}{rest} (radians per unit of time)"
+    parts = []
+    for name, entries in spec.observe:
+        sums = [f"u_{dof}" if x == 1.0 else f"{words.number(x)} u_{dof}" for dof, x in entries]
+        parts.append(f"{name} = {' + '.join(sums)}")
+    yield "Observed", ", ".join(parts)
+    if own.ratios:
+        shown = ", ".join(words.number(x) for x in own.ratios[:MOST_SHOWN])
+        rest = ", ..." if len(own.ratios) > MOST_SHOWN else ""
+        yield "Damping ratios", f"{shown}{rest} of the lowest modes"
