@@ -185,6 +185,15 @@ def test_the_frequency_found_in_a_solution_is_that_of_the_scheme() -> None:
     assert picture.figure.axes[0].get_ylabel() == "angular frequency [rad s⁻¹]"
 
 
+def test_no_exact_amplitude_is_drawn_where_damping_makes_it_fall() -> None:
+    model = {"kind": "oscillator", "spring": "u", "damping": {"linear": 0.2}}
+    exp = spring({"shows": "local_frequency"}, model=model, levels=[6, 7], time={"end": 20.0})
+    ((_, [picture]),), _ = drawn(exp)
+    names = [name for name, *_ in lines(picture)[1]]
+    assert len(names) == 2
+    assert "exact" not in names
+
+
 def test_the_frequency_lies_on_its_formula_and_the_series_touches_it() -> None:
     exp = spring(
         {"shows": "frequency"},

@@ -191,7 +191,9 @@ def _start(experiment: Experiment, record: Record, case: int) -> tuple[float, fl
 
 
 def exact_amplitude(experiment: Experiment, record: Record, case: int) -> float:
-    """Return the exact amplitude where it is known: of a linear model, or of a start at rest."""
+    """Return the exact amplitude where it stays and is known: of a linear model, or of a start at rest."""
+    if not experiment.model.definition.conservative:
+        return math.nan
     u, v = _start(experiment, record, case)
     if v == 0.0:
         return abs(u)

@@ -1,0 +1,80 @@
+"""No shipped claim is empty: with another number its verdict turns."""
+
+from __future__ import annotations
+
+import random
+from pathlib import Path
+
+import pytest
+from claim_mutants import numbers_of, survivors
+
+from vibsim.experiment import Experiment
+
+CONFIGS = Path(__file__).parents[1] / "configs"
+PATHS = {
+    f"{path.parent.name}/{path.stem}": path
+    for path in sorted(CONFIGS.glob("*/*.yaml"))
+    if path.parent.name != "scale"
+}
+SAMPLES, SEED = 6, 22
+
+
+def experiment(name: str) -> Experiment:
+    return Experiment.from_yaml(PATHS[name])
+
+
+def claims_of(found: Experiment) -> list[str]:
+    return [c.id for c in found.checks if c.kind == "claim" and numbers_of(c)]
+
+
+def sampled() -> list[str]:
+    """Return some of the experiments that are claimed about and cost little: by a fixed seed, the same every time."""
+    order = random.Random(SEED).sample(sorted(PATHS), len(PATHS))
+    found = []
+    for name in order:
+        text = PATHS[name].read_text("utf-8")
+        if "claim:" in text and "sweep:" not in text and len(found) < SAMPLES:
+            found.append(name)
+    return found
+
+
+@pytest.mark.parametrize("name", sampled())
+def test_a_sampled_claim_turns_with_its_number(name: str) -> None:
+    assert survivors(experiment(name)) == []
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", [name for name in PATHS if name not in sampled()])
+def test_every_claim_turns_with_its_number(name: str) -> None:
+    found = experiment(name)
+    if claims_of(found):
+        assert survivors(found) == []
+
+
+CONTENT = {
+    "title": "claims",
+    "model": {"kind": "pendulum"},
+    "initial": {"theta": 1.0},
+    "time": {"end": 20.0},
+    "levels": [6, 7, 8, 9],
+    "schemes": ["central"],
+}
+
+
+@pytest.mark.parametrize(
+    ("that", "holds", "empty"),
+    [
+        ({"value": "period", "equals": 6.7, "atol": 0.01}, True, 0),
+        ({"value": "period", "equals": 6.7, "rtol": 0.5}, True, 2),
+        ({"value": "period", "equals": 7.0, "atol": 0.01}, False, 0),
+        ({"value": "period", "below": 7.0}, True, 0),
+        ({"value": "period", "below": 100.0}, True, 1),
+        ({"value": "period", "above": 0.1}, True, 1),
+        ({"value": "period", "above": 7.0}, False, 0),
+        ({"converges": "theta", "order": 2}, True, 0),
+        ({"converges": "theta", "order": 2, "tolerance": 1.5}, True, 2),
+    ],
+)
+def test_an_empty_claim_is_found(that: dict[str, object], holds: bool, empty: int) -> None:
+    claim = {"id": "it", "claim": "so it is", "that": that, "holds": holds, "note": "or is it"}
+    assert len(survivors(Experiment.from_dict({**CONTENT, "checks": [claim]}))) == empty
