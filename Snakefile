@@ -7,9 +7,8 @@ from vibsim.cli.run.lock import hold
 from vibsim.cli.workflow import names_of
 from vibsim.cli.run.supervise import children_end_with_this
 
-root = Path(workflow.basedir)
 # What allows programs of users to run is read from the command line alone, never from a file.
-names = names_of(config, root, workflow.config_settings.config)
+names = names_of(config, workflow.config_settings.config)
 
 
 # Jobs run the vibsim that stands beside this Python, whatever else is installed.
@@ -21,6 +20,9 @@ shell.prefix(f"export PATH={quote(str(Path(sys.executable).parent))}:$PATH; ")
 # Every path below is relative to the results folder, and so are Snakemake's own records. Jobs work elsewhere: what
 # libraries read from the folder that they are in must not come with results.
 workdir: str(names.results)
+
+
+report: "workflow/report/workflow.rst"
 
 
 wildcard_constraints:

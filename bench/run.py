@@ -27,7 +27,8 @@ MEASURED = ROOT / "bench" / "measured.json"
 PAGE = ROOT / "docs" / "benchmarks.md"
 PARTS = (
     *("one_member", "many_members", "same_error", "same_error_many", "pipeline", "jobs"),
-    *("work_precision", "lanes", "formulas", "cost", "scale", "storage"),
+    *("work_precision", "lanes", "formulas", "systems", "cost", "scale", "storage", "plans"),
+    "cluster",
 )
 
 

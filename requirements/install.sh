@@ -1,8 +1,10 @@
 #!/bin/sh
 # Make .venv hold what requirements/<set>.txt pins, and vibsim itself; with nothing to do this costs milliseconds.
 #
-#   sh requirements/install.sh run|dev        (`dev` holds everything that `run` holds)
+#   sh requirements/install.sh run|dev|fuzz   (.venv: `dev` holds everything that `run` holds; `fuzz` adds to either)
+#   sh requirements/install.sh lowest         (.venv-lowest: the oldest versions that pyproject.toml allows)
 #   sh requirements/install.sh peers          (.venv-peers: other solvers, without vibsim, for bench/run.py alone)
+#   sh requirements/install.sh docs           (.venv-docs: Sphinx, which imports vibsim from .venv, for `make docs` alone)
 #
 # .venv/vibsim-<set> is written last and holds what that environment was made of: the place of the checkout (the scripts
 # of an environment carry absolute paths, so a moved checkout needs a new one), pyproject.toml and the pinned versions. Where it
@@ -11,8 +13,10 @@ set -eu
 cd "$(dirname "$0")/.."
 chosen=$1
 [ -f "requirements/$chosen.txt" ] || { echo "no such set of requirements: $chosen" >&2; exit 2; }
-environment=.venv
-[ "$chosen" != peers ] || environment=.venv-peers
+case $chosen in
+    run | dev | fuzz) environment=.venv base_set=run ;;
+    *) environment=.venv-$chosen base_set=$chosen ;;
+esac
 
 wanted() {
     pwd -P
@@ -91,19 +95,28 @@ if [ "$chosen" = peers ]; then
     exit
 fi
 
-if ! is_ready run; then
+if [ "$chosen" = docs ]; then
     make_environment
-    echo "set-up: installing what requirements/run.txt pins (about half a minute; longer on a slow line)"
+    echo "set-up: installing what requirements/docs.txt pins"
+    install --require-hashes --only-binary :all: -r requirements/docs.txt
+    mark_ready docs
+    echo "set-up: done"
+    exit
+fi
+
+if ! is_ready $base_set; then
+    make_environment
+    echo "set-up: installing what requirements/$base_set.txt pins (about half a minute; longer on a slow line)"
     install --require-hashes --only-binary :all: -r requirements/build.txt
-    install_pinned run
+    install_pinned $base_set
     # `compat` is a plain path; the default finder would add 9 ms to the start of every job.
     install --no-build-isolation --config-settings editable_mode=compat --editable .
     # Where the environment keeps Python from writing compiled modules, every job would compile all of vibsim again: 0.15 s.
     $environment/bin/python -m compileall -q vibsim
-    mark_ready run
+    mark_ready $base_set
 fi
 # Adding changes nothing of what is there: interrupted here, the environment still serves a run.
-if [ "$chosen" != run ]; then
+if [ "$chosen" != $base_set ]; then
     echo "set-up: adding what requirements/$chosen.txt pins"
     install_pinned "$chosen"
     mark_ready "$chosen"

@@ -2,13 +2,15 @@
 
 It goes the same way as ``python -m vibsim``, from the command line over its supervisor to its exit status. What the
 test has changed in this process (`monkeypatch`) holds in it too, but nothing that only the start of an interpreter
-reads (``sitecustomize.py``): where that matters, start one. Snakemake is a fork in the same way, and its jobs are
-started as ever; `tests/contract` starts all of them.
+reads (``sitecustomize.py``): where that matters, start one. Snakemake is a fork in the same way, and so are its jobs,
+which else import for half of their time; `tests/contract` and the run that `tests/workflow` looks at start all of them.
 """
 
 from __future__ import annotations
 
 import os
+import re
+import shlex
 import signal
 import subprocess
 import sys
@@ -31,12 +33,15 @@ from vibsim.cli.run import snakemake_process
 
 for name in ("snakemake.cli", "snakemake.report.html_reporter", "yaml", "yte"):
     import_module(name)  # once here, and not in every process of Snakemake
+SHELL: Any = sys.modules["snakemake.shell"]  # a class of Snakemake hides it
 SECONDS = 300
 """A command that takes longer waits for ever."""
 
 
-def vibsim(*arguments: object, cwd: Path | None = None) -> subprocess.CompletedProcess[str]:
-    """Run a command and return its exit status and what it wrote."""
+def vibsim(
+    *arguments: object, cwd: Path | None = None, forked_jobs: bool = True
+) -> subprocess.CompletedProcess[str]:
+    """Run a command and return its exit status and what it wrote; its jobs are forks too, or are started by a shell."""
     command = ["vibsim", *map(str, arguments)]
     with TemporaryFile() as out, TemporaryFile() as err:
         with warnings.catch_warnings():
@@ -44,6 +49,8 @@ def vibsim(*arguments: object, cwd: Path | None = None) -> subprocess.CompletedP
             warnings.simplefilter("ignore", DeprecationWarning)
             child = os.fork()
         if not child:
+            if forked_jobs:
+                SHELL.sp = with_popen(job)
             _perform(command, out.fileno(), err.fileno(), cwd)
         status = _wait(child, command)
         texts = []
@@ -70,8 +77,13 @@ def _perform(command: list[str], out: int, err: int, cwd: Path | None) -> NoRetu
     warnings.resetwarnings()
     for category in (DeprecationWarning, PendingDeprecationWarning, ImportWarning):
         warnings.simplefilter("ignore", category)
-    starting.subprocess = SimpleNamespace(**{**vars(subprocess), "Popen": Snakemake})  # type: ignore[attr-defined]
+    starting.subprocess = with_popen(Snakemake)  # type: ignore[attr-defined]
     _become(main, command, out, err, cwd)
+
+
+def with_popen(start: Callable[..., object]) -> Any:
+    """Return the module `subprocess` with another way to start a process."""
+    return SimpleNamespace(**{**vars(subprocess), "Popen": start})
 
 
 def _become(
@@ -98,8 +110,29 @@ def _become(
         os._exit(status if isinstance(status, int) else int(status is not None))
 
 
-class Snakemake:
-    """What a run asks of the process of Snakemake (`subprocess.Popen`), which is a fork of the run."""
+class Fork:
+    """What is asked of a process that was started (`subprocess.Popen`), where it is a fork of this one."""
+
+    def __init__(self) -> None:
+        self.pid = os.fork()
+        self.returncode: int | None = None
+
+    def wait(self) -> int:
+        if self.returncode is None:
+            self.returncode = os.waitstatus_to_exitcode(os.waitpid(self.pid, 0)[1])
+        return self.returncode
+
+    def kill(self) -> None:
+        if self.returncode is None:
+            with suppress(ProcessLookupError):
+                os.kill(self.pid, signal.SIGKILL)
+
+    def terminate(self) -> None:
+        self.kill()
+
+
+class Snakemake(Fork):
+    """The process of Snakemake, which a run starts."""
 
     def __init__(
         self,
@@ -111,7 +144,7 @@ class Snakemake:
         **_: Any,
     ) -> None:
         reading, writing = os.pipe()
-        self.pid = os.fork()
+        super().__init__()
         if not self.pid:
             for descriptor in pass_fds:
                 os.set_inheritable(descriptor, True)
@@ -124,14 +157,23 @@ class Snakemake:
             _become(snakemake_process.main, command[3:], writing, writing, cwd)
         os.close(writing)
         self.stdout = os.fdopen(reading, "rb")
-        self.returncode: int | None = None
 
-    def wait(self) -> int:
-        if self.returncode is None:
-            self.returncode = os.waitstatus_to_exitcode(os.waitpid(self.pid, 0)[1])
-        return self.returncode
 
-    def kill(self) -> None:
-        if self.returncode is None:
-            with suppress(ProcessLookupError):
-                os.kill(self.pid, signal.SIGKILL)
+JOB = re.compile(r"exec > (?P<log>.*) 2>&1; cd / && exec (?P<words>vibsim .*)")
+"""The end of the line by which a rule starts a job."""
+
+
+def job(line: str, *, env: Mapping[str, str], **options: Any) -> Fork | subprocess.Popen[bytes]:
+    """Start a job of Snakemake, in a fork where the line is that of a job of vibsim."""
+    found = JOB.search(line)
+    if found is None:
+        return subprocess.Popen(line, env=env, **options)
+    (log,) = shlex.split(found["log"])
+    words = shlex.split(found["words"].replace('"$OLDPWD"', shlex.quote(str(Path.cwd()))))
+    with Path(log).open("wb") as file:
+        fork = Fork()
+        if not fork.pid:
+            os.environ.clear()
+            os.environ.update(env)
+            _become(main, words, file.fileno(), file.fileno(), "/")
+    return fork

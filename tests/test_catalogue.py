@@ -5,17 +5,18 @@ from __future__ import annotations
 import copy
 import re
 import runpy
+from functools import cache
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 from vibsim.cli.arguments import commands
-from vibsim.experiment import citation
+from vibsim.experiment import Experiment, citation
 
 ROOT = Path(__file__).parents[1]
 CATALOGUE = runpy.run_path(str(ROOT / "workflow/catalogue.py"))
-LISTED, KNOWN = CATALOGUE["data"](), CATALOGUE["experiments"]()
+LISTED = CATALOGUE["data"]()
 ROWS = [row for kind in ("things", "errata") for row in LISTED[kind].values()]
 PAGE = (ROOT / "docs/catalogue.md").read_text("utf-8")
 THINGS, ERRATA = 202, 58
@@ -28,6 +29,17 @@ SECTIONS = {
     ),
 }
 """The sections of both texts that have a content of their own."""
+
+
+@cache
+def known() -> dict[str, Experiment]:
+    """Return the shipped experiments by ``collection/name``."""
+    found: dict[str, Experiment] = CATALOGUE["experiments"]()
+    return found
+
+
+# the files are read once for all tests
+CATALOGUE["main"].__globals__["experiments"] = known
 
 
 def changed(kind: str, number: int, **content: Any) -> dict[str, Any]:
@@ -71,18 +83,18 @@ def test_no_row_is_missing() -> None:
     ],
 )
 def test_a_faulty_row_is_told(found: dict[str, Any], word: str) -> None:
-    (told, *_) = CATALOGUE["faults"](found, KNOWN)
+    (told, *_) = CATALOGUE["faults"](found, known())
     assert word in told
 
 
 def test_a_statement_of_nobody_is_not_refuted() -> None:
     name = "vibration_text/resonance"
-    (check,) = [c for c in KNOWN[name].checks if c.id == "about_unity"]
-    ours = KNOWN[name].model_copy(
+    (check,) = [c for c in known()[name].checks if c.id == "about_unity"]
+    ours = known()[name].model_copy(
         update={"checks": (check.model_copy(update={"source": "beside the text"}),)}
     )
     found = CATALOGUE["faults"](
-        LISTED, KNOWN | {"own/one": ours.model_copy(update={"name": "one"})}
+        LISTED, known() | {"own/one": ours.model_copy(update={"name": "one"})}
     )
     assert found == ["own/one#about_unity: a statement of no text is refuted: say what is true"]
 
@@ -139,36 +151,40 @@ def test_an_open_row_says_why_and_a_false_statement_what_is_true() -> None:
     for badge, told, line in cells:
         if badge in ("OPEN", "CORRECTED"):
             assert len(told) > 10, line
-    for name, experiment in KNOWN.items():
+    for name, experiment in known().items():
         for check in experiment.checks:
             if check.kind == "claim" and not check.holds:
                 assert check.note, f"{name}#{check.id}: a refuted claim says what is true"
 
 
 def test_every_experiment_on_the_texts_is_in_the_catalogue() -> None:
-    missing = [name for name in KNOWN if f"../configs/{name}.yaml" not in PAGE]
+    missing = [name for name in known() if f"../configs/{name}.yaml" not in PAGE]
     ours = [
         name
         for name in missing
-        if KNOWN[name].source and KNOWN[name].source.startswith(tuple(SECTIONS))
+        if known()[name].source and known()[name].source.startswith(tuple(SECTIONS))
     ]
     assert ours == []
 
 
-BY_NAME = {name.partition("/")[2]: name for name in KNOWN}
+@cache
+def by_name() -> dict[str, str]:
+    return {name.partition("/")[2]: name for name in known()}
+
+
 EXERCISES = (ROOT / "docs/exercises.md").read_text("utf-8").split("\n## ")[1:]
 
 
 def test_every_exercise_has_an_answer_that_runs_and_passes_through_checks_that_exist() -> None:
     notes = [f"Note [hpl {i}]" for i in range(1, 6)]
     assert [part.split(".")[0] for part in EXERCISES] == [*map(str, range(1, 24)), *notes]
-    checks = {f"{name}#{c.id}" for name, experiment in KNOWN.items() for c in experiment.checks}
+    checks = {f"{name}#{c.id}" for name, experiment in known().items() for c in experiment.checks}
     for part in EXERCISES:
         named = re.findall(r"`([a-z_0-9]+)(#[a-z_0-9]+)?`", part)
         assert named or "(python.md#" in part, part
         for name, check in named:
-            full = f"{BY_NAME.get(name)}{check}"
-            assert full in (checks if check else KNOWN), f"{name}{check}"
+            full = f"{by_name().get(name)}{check}"
+            assert full in (checks if check else known()), f"{name}{check}"
 
 
 def test_numbers_of_answers_are_those_that_checks_ask_for() -> None:
@@ -176,7 +192,7 @@ def test_numbers_of_answers_are_those_that_checks_ask_for() -> None:
     checked = 0
     for part in EXERCISES:
         for number, name, id_ in re.findall(r"(\d[\d.e-]*\d)\D{0,40}\(`(\w+)#(\w+)`", part):
-            experiment = KNOWN[BY_NAME[name]]
+            experiment = known()[by_name()[name]]
             (check,) = [c for c in experiment.checks if c.id == id_]
             value = check.measured
             if value.kind == "value" and value.equals is None:

@@ -125,13 +125,9 @@ def test_a_copy_of_a_verdict_is_equal(
         assert copy(a) == a
 
 
-def test_verdicts_come_from_another_process(found: list[vibsim.Verdict]) -> None:
+def test_verdicts_and_errors_come_from_another_process(found: list[vibsim.Verdict]) -> None:
     with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as pool:
         assert pool.submit(judged, 10.0).result() == found
-
-
-def test_errors_come_from_another_process() -> None:
-    with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as pool:
         error = pool.submit(judged, -1.0).exception()
     assert isinstance(error, InputError)
     assert [fault.key for fault in error.faults] == ["time.end"]

@@ -126,12 +126,11 @@ def test_commands_list_what_is_installed(
     schema = json.loads(capsys.readouterr().out)
     content = yaml.safe_load((EXAMPLE / "cart.yaml").read_text())
     jsonschema.validate(content, schema)
+    is_valid = jsonschema.Draft202012Validator(schema).is_valid
     for wrong in ({"model": {"kind": "cart_pendulum", "M": -1.0}}, {"schemes": ["ralstn"]}):
-        with pytest.raises(jsonschema.ValidationError):
-            jsonschema.validate({**content, **wrong}, schema)
+        assert not is_valid({**content, **wrong})
     shipped = json.loads((ROOT / "workflow/schemas/experiment.schema.json").read_text())
-    with pytest.raises(jsonschema.ValidationError):
-        jsonschema.validate(content, shipped)
+    assert not jsonschema.Draft202012Validator(shipped).is_valid(content)
 
 
 def test_without_packages_the_printed_schema_is_that_which_is_shipped(

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import errno
+import fcntl
 import os
 import subprocess
 import sys
@@ -245,6 +247,17 @@ def make():
     return b"content"
 print(private.kept("plans", "ab" * 32, make, bytes, bytes))
 """
+
+
+def test_where_there_are_no_file_locks_an_entry_is_made_and_kept(
+    home: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def flock(descriptor: int, operation: int) -> None:
+        raise OSError(errno.ENOLCK, os.strerror(errno.ENOLCK))
+
+    monkeypatch.setattr(fcntl, "flock", flock)
+    assert ask() == CONTENT
+    assert again(home) == CONTENT
 
 
 def test_processes_that_want_the_same_entry_make_it_once(home: Path, tmp_path: Path) -> None:

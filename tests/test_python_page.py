@@ -1,4 +1,4 @@
-"""The code of the page on Python, and what it says of memory."""
+"""What the page on Python says of memory."""
 
 from __future__ import annotations
 
@@ -12,11 +12,9 @@ import numpy as np
 import pytest
 
 from vibsim import Experiment, simulate
-from vibsim.cli import main
 from vibsim.plan import Choice, load
 
 ROOT = Path(__file__).parents[1]
-PAGE = ROOT / "docs" / "python.md"
 LONG_RUN = ROOT / "configs" / "vibration_text" / "long_run.yaml"
 PROBE = r"""
 import re, sys
@@ -25,27 +23,6 @@ from vibsim.cli import main
 assert main(sys.argv[1:]) == 0
 print("peak", re.search(r"VmHWM:\s*(\d+) kB", Path("/proc/self/status").read_text())[1])
 """
-
-
-def test_the_code_of_the_page_runs(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    blocks = re.findall(r"^```python\n(.*?)^```", PAGE.read_text(), re.DOTALL | re.MULTILINE)
-    assert len(blocks) == 10
-    monkeypatch.chdir(tmp_path)
-    assert main(["simulate", str(LONG_RUN), "--level", "7", "--results", "results"]) == 0
-    capsys.readouterr()
-    names: dict[str, object] = {}
-    for i, block in enumerate(blocks):
-        exec(compile(block, f"{PAGE.name}, block {i + 1}", "exec"), names)
-    out = capsys.readouterr().out
-    assert "PASS u converges" in out or "PASS All 2 results passed" in out
-    drawn = [line for line in out.splitlines() if line.endswith("*")]
-    assert len(drawn) == 50
-    assert drawn[0] == f"{0.0:10.2f} {' ' * 60}*"
-    assert float(re.findall(r"largest error (\S+)", out)[0]) < 1e-7
-    for file in ("forced.svg", "damped.svg"):
-        assert (tmp_path / file).stat().st_size > 10_000
 
 
 def test_a_finer_level_stores_no_more() -> None:

@@ -39,7 +39,7 @@ ROAD = Table(-0.13, 0.2, np.random.default_rng(7).normal(scale=0.01, size=41))
 
 
 def vehicle(table: Table) -> Model:
-    model = MODELS["vehicle"].written({"spring": "30*u"}, ()).with_table(table, False)
+    model = MODELS["vehicle"].with_formulas({"spring": "30*u"}, (), table, False)
     return model.variant(frozenset({"b"}))
 
 

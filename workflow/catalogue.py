@@ -40,9 +40,9 @@ of every statement.
 | PROVIDED | a command or a page does what the text asks for; nothing is measured |
 
 `python workflow/catalogue.py` writes this page from [catalogue.yaml](catalogue.yaml) and the experiment files.
-Numbers 1 to {things} count what the texts describe, E1 to E{errata} the places where they are wrong. Rows without a
-number come from the files of experiments. Figures are also in [a list of their own](figures.md), and
-[the exercises](exercises.md) have a page with their answers.
+Numbers 1 to {things} count what the texts describe, E1 to E{errata} the places where they are wrong or leave a
+condition out. Rows without a number come from the files of experiments. Figures are also in
+[a list of their own](figures.md), and [the exercises](exercises.md) have a page with their answers.
 """
 
 
@@ -117,11 +117,11 @@ def rows(listed: dict[str, Any], known: dict[str, Experiment]) -> Iterator[Row]:
             if not source.startswith(TEXTS):
                 continue
             decides = assertions.measured(check.that)
-            is_corrected = not check.holds or source != check.source
-            told = (
-                decides if check.holds else f"True is: {check.note}. Asked and not found: {decides}"
-            )
-            badge = CORRECTED if is_corrected else CONFIRMED
+            badge, told = CONFIRMED, decides
+            if not check.holds:
+                badge, told = CORRECTED, f"True is: {check.note}. Asked and not found: {decides}"
+            elif source != check.source:
+                badge, told = CORRECTED, f"This is what is true, not what the text says: {decides}"
             yield Row(source, "", check.claim, _link(f"{name}#{check.id}"), badge, told)
 
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from vibsim import Experiment
-from vibsim.analysis import analyse_parts, joined
+from vibsim.analysis import analyse_parts, join_parts
 from vibsim.core.record import Record, Variable
 from vibsim.simulation import simulate_record
 
@@ -90,12 +90,12 @@ def simulated(experiment: Experiment) -> dict[int, Record]:
 
 
 def analysed(
-    experiment: Experiment, records: Mapping[int, Record], size: int, threads: int = 1
+    experiment: Experiment, records: Mapping[int, Record], size: int, processes: int = 1
 ) -> Record:
     readers = {
         level: lambda a, b, record=record: cut(record, a, b) for level, record in records.items()
     }
-    return joined(list(analyse_parts(experiment, readers, size=size, threads=threads)))
+    return join_parts(list(analyse_parts(experiment, readers, size=size, processes=processes)))
 
 
 def assert_same_bytes(found: Record, expected: Record) -> None:

@@ -25,7 +25,7 @@ from vibsim.comparison.order_evidence import CAUSES
 from vibsim.core.record import Record, Variable
 from vibsim.core.vocabulary import DRIFTS, REASON_NAMES, REASONS, STATUSES
 from vibsim.experiment.schema.checks import MEASURED
-from vibsim.report.text.words import interval
+from vibsim.report.words import interval
 from vibsim.simulation import simulate_record
 
 SCHEMA = Path(__file__).parents[2] / "workflow/schemas/experiment.schema.json"
@@ -220,6 +220,7 @@ def story(**changes: Any) -> _Phrases:
         "readable": -1,
         "compensated": -1,
         "orders": (),
+        "apart": 0.01,
         "failures": (),
         "notation": PLAIN,
         "cost": lambda levels: f"{len(levels)} levels",
@@ -267,6 +268,20 @@ def test_a_measured_order_away_from_the_one_that_dominates_is_explained(
     order: float, told: str
 ) -> None:
     assert told in tell(story(reason="asymptotic", order=order))
+
+
+@pytest.mark.parametrize(
+    ("apart", "told"),
+    [
+        (0.01, "The rescaled differences coincide."),
+        (0.2, "The rescaled differences do not coincide yet."),
+        (math.nan, ""),
+    ],
+)
+def test_only_differences_that_coincide_are_told_to(apart: float, told: str) -> None:
+    text = tell(story(reason="asymptotic", order=2.0, apart=apart))
+    assert told in text
+    assert ("coincide" in text) == bool(told)
 
 
 def test_what_is_predicted_is_told_with_its_cost() -> None:
@@ -396,6 +411,25 @@ def test_advice_on_a_number_is_right_when_it_is_followed(value: str) -> None:
     check = {**of, "value": value, "equals": truth, "atol": 1e-6}
     assert judged({**RUN, "levels": [5, 6, 7], "checks": [check]}).advice.startswith("Add finer")
     assert judged({**RUN, "levels": [5, 6, 13, 14], "checks": [check]}).status == "PASS"
+
+
+def test_a_number_of_the_finest_level_by_its_name_asks_for_a_finer_one() -> None:
+    """Levels that are added do not change a check that names its level."""
+    truth = _number({"value": "period", "at": {"level": 14}, "equals": 9.0}, [13, 14])
+    check = {"value": "period", "equals": truth, "atol": 1e-6}
+    named = {**check, "at": {"level": 7}}
+    advice = [judged({**RUN, "levels": [5, 6, 7], "checks": [c]}).advice for c in (check, named)]
+    assert ["ask for one" in a for a in advice] == [False, True]
+
+
+def test_a_motion_that_may_not_be_steady_yet_is_told_to_run_longer() -> None:
+    model = {"kind": "oscillator", "m": 1.0, "spring": "u", "damping": "0.1*v"}
+    model |= {"parameters": {"w": 2.0}, "force": "cos(w*t)"}
+    forced = {"periods": 4, "steps_per_period": 8, "frequency": "model.parameters.w"}
+    content = {"title": "t", "model": model, "initial": {"u": 0.0, "v": 0.0}, "time": forced}
+    content |= {"levels": [2, 3, 4], "schemes": ["rk4"]}
+    content["checks"] = [{"value": "steady_amplitude", "quantity": "u", "equals": 9, "atol": 1}]
+    assert judged(content).advice.endswith("a longer run helps (`time: periods`).")
 
 
 def test_advice_on_a_number_of_several_levels_looks_at_those_that_have_one() -> None:

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import re
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 from ladders import T, evidence_of
 from spring_runs import PERIODS, STEPS, judged, registered, spring
 
+from vibsim.comparison import solution_distance
 from vibsim.convergence.verdict import judge
 from vibsim.core.record import Variable
 from vibsim.core.vocabulary import REASON_NAMES
@@ -203,6 +205,24 @@ def test_a_run_that_overflows_is_compared_without_a_warning() -> None:
     run = spring(["central"], check, time={"end": 2000.0, "base_steps": 4000})
     assert run.record["check_check_1_allowed"].item() == np.inf
     assert run.verdicts[0].status == "FAIL"
+
+
+def test_a_discrete_solution_is_worked_out_for_the_scheme_that_is_compared_alone(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """With a check for each of many schemes, all of them at each check would take the square of their number."""
+    made: list[Any] = []
+    known = solution_distance.theory.discrete
+
+    def counted(stepper: Any, *numbers: Any, **options: Any) -> Any:
+        made.append(stepper)
+        return known(stepper, *numbers, **options)
+
+    monkeypatch.setattr(solution_distance.theory, "discrete", counted)
+    schemes = ["rk4", "central", "heun"]
+    run = spring(schemes, *({"equal": [s, "discrete"], "quantity": "u"} for s in schemes))
+    assert [v.status for v in run.verdicts] == ["PASS"] * 3
+    assert len(made) == 3
 
 
 def test_a_scheme_equals_its_own_discrete_solution_and_not_the_exact_one() -> None:

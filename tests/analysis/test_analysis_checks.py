@@ -10,10 +10,9 @@ import pytest
 from level_records import experiment, level_records, standard_error
 
 from vibsim.analysis import Verdict, analyse_records, summarise, verdicts
-from vibsim.checks.value import sees_several_levels
 from vibsim.comparison import value_numbers as values
+from vibsim.comparison.compare_quantities import comparisons
 from vibsim.comparison.order_evidence import evidence
-from vibsim.comparison.quantity_comparison import comparisons
 from vibsim.experiment import VALUES
 from vibsim.observe.member_block import block_of
 
@@ -171,7 +170,7 @@ def test_what_was_not_gathered_over_every_step_is_not_made_up_from_samples() -> 
 
 
 def test_numbers_that_rest_on_several_levels_are_those_of_the_registry() -> None:
-    found = {name for name in VALUES if sees_several_levels(name)}
+    found = {name for name, row in VALUES.items() if row.sees_several_levels}
     assert found == {
         "error_estimate_defect",
         "error_rate",

@@ -58,7 +58,7 @@ def motions(kind: str) -> tuple[Any, Floats, dict[str, Floats], dict[str, Floats
 def test_the_response_by_formula_is_that_of_trying(kind: str) -> None:
     model, t, initial, parameters = motions(kind)
     found, doubtful = responses._linear(model, t, initial, parameters, None)
-    tried = responses._tried(model, t, initial, parameters)
+    tried = responses._by_trial(model, t, initial, parameters)
     assert not doubtful.any()
     # a disturbance of 1e-12 leaves three digits of a response, fewer where the motion itself is ill-conditioned
     ordinary = tried < 1e3

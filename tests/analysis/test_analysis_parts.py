@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
+import os
+import signal
 import sys
 from functools import cache
 
@@ -12,7 +14,7 @@ from numpy.typing import NDArray
 from sweeps import CHECKS, SWEEPS, analysed, assert_same_bytes, cut, of, simulated
 
 from vibsim import Experiment, analyse
-from vibsim.analysis import analyse_records, kept, summarise, verdicts
+from vibsim.analysis import analyse_records, blockwise, keep_for_verdicts, summarise, verdicts
 from vibsim.comparison.value_numbers import KNOWN
 from vibsim.core.errors import VibsimError
 from vibsim.core.record import Record, Variable
@@ -38,13 +40,33 @@ def made(name: str, storage: str) -> tuple[dict[int, Record], Record]:
     return records, whole
 
 
-@pytest.mark.parametrize("name", SWEEPS)
-def test_parts_and_threads_change_no_bit(name: str, storage: str) -> None:
-    """Parts on threads that do not divide the members evenly, and of one member where there are few."""
+@pytest.mark.parametrize(
+    ("name", "storage"),
+    [("grid", "lean"), ("ends", "series"), ("options", "lean"), ("tolerance", "series")],
+    indirect=["storage"],
+)
+def test_parts_and_processes_change_no_bit(name: str, storage: str) -> None:
+    """Parts of three processes that do not divide the members evenly, and of one member where there are few."""
     experiment = SWEEPS[name]
     records, whole = made(name, storage)
     size = 1 if experiment.members <= 8 else 5
     assert_same_bytes(analysed(experiment, records, size, 3), whole)
+
+
+ME = os.getpid()
+
+
+def analyse_or_die(experiment: Experiment, records: dict[int, Record]) -> Record:
+    if os.getpid() != ME:
+        os.kill(os.getpid(), signal.SIGKILL)
+    return analyse_records(experiment, records)
+
+
+def test_a_process_that_is_killed_ends_the_analysis(monkeypatch: pytest.MonkeyPatch) -> None:
+    experiment = SWEEPS["grid"]
+    monkeypatch.setattr(blockwise, "analyse_records", analyse_or_die)
+    with pytest.raises(VibsimError, match="was killed; there may be too little memory"):
+        analysed(experiment, simulated(experiment), 5, 2)
 
 
 @pytest.mark.parametrize("name", SWEEPS)
@@ -94,8 +116,8 @@ def test_bounded_storage_changes_no_number(name: str, monkeypatch: pytest.Monkey
 
 
 def needs_another_model(row: Value) -> bool:
-    """Tell whether a value is of linear models, of events, or of formulas without functions: none of a pendulum."""
-    return row.needs_linear or row.needs_events or row.needs_rational
+    """Tell whether a value is of linear or driven models, of events, or of formulas without functions: no pendulum."""
+    return row.needs_linear or row.needs_events or row.needs_rational or row.needs_force
 
 
 def every_value() -> Experiment:
@@ -157,7 +179,7 @@ def test_verdicts_need_only_what_is_kept_of_parts() -> None:
     experiment = SWEEPS["ends"]
     _, whole = made("ends", "series")
     thin: list[Record] = []
-    (part,) = kept(experiment, [whole], thin)
+    (part,) = keep_for_verdicts(experiment, [whole], thin)
     assert part is whole
     assert not any("t" in variable.dims for variable in thin[0].variables.values())
     expected = summarise(experiment, verdicts(experiment, whole), whole)
@@ -284,7 +306,7 @@ def test_what_no_level_can_tell_is_said_of_what_is_kept_of_parts() -> None:
         experiment = Experiment.from_dict(data)
         whole = analyse_records(experiment, simulated(experiment))
         thin: list[Record] = []
-        list(kept(experiment, [whole], thin))
+        list(keep_for_verdicts(experiment, [whole], thin))
         (found,) = verdicts(experiment, thin[0])
         assert found.status == "PASS"
         assert ("convergence to a wrong answer would go unnoticed" in found.text) == is_said

@@ -7,7 +7,7 @@ from spring_runs import spring
 from vibsim import theory
 from vibsim.engine import integrate
 from vibsim.models import MODELS
-from vibsim.observe.oscillation import fitted
+from vibsim.observe.oscillation import fit_recurrence
 from vibsim.observe.thresholds import LEAST_STEPS
 from vibsim.schemes import FIXED_STEP
 
@@ -19,7 +19,7 @@ N = np.arange(201)
 @pytest.mark.parametrize("growth", [0.5, 0.99, 1.0, 1.0 + 1e-9, 1.3, 4.0])
 @pytest.mark.parametrize("angle", [0.01, 0.7, 2.0, 3.1])
 def test_a_pair_of_roots_is_found_to_round_off(growth, angle):
-    found = fitted(growth**N * np.cos(angle * N + 0.3))
+    found = fit_recurrence(growth**N * np.cos(angle * N + 0.3))
     tolerance = 1e-13 / np.sin(angle) ** 2
     assert float(found.log_growth) == pytest.approx(np.log(growth), abs=tolerance)
     assert float(found.angle) == pytest.approx(angle, abs=tolerance)
@@ -27,7 +27,7 @@ def test_a_pair_of_roots_is_found_to_round_off(growth, angle):
 
 def test_two_real_roots_give_the_larger_one():
     """Beyond the limit of centred differences the sign changes at every step."""
-    found = fitted((-1.1) ** N + 0.5 * (-1 / 1.1) ** N)
+    found = fit_recurrence((-1.1) ** N + 0.5 * (-1 / 1.1) ** N)
     assert float(found.log_growth) == pytest.approx(np.log(1.1), rel=1e-6)
     assert float(found.angle) == np.pi
 
@@ -43,7 +43,7 @@ def test_two_real_roots_give_the_larger_one():
     ids=["rest", "another motion", "failed", "too short"],
 )
 def test_what_is_no_such_recurrence_gives_nothing(run):
-    found = fitted(run)
+    found = fit_recurrence(run)
     assert np.isnan(found.log_growth)
     assert np.isnan(found.angle)
 
@@ -56,7 +56,7 @@ def test_a_short_run_gives_nothing_or_all_digits(kind, steps):
     stepper = scheme.stepper(scheme.defaults())
     initial, parameters = np.tile([1.0, 0.0], (len(p), 1)), np.ones((len(p), 1))
     run = integrate(SPRING, scheme, scheme.defaults(), parameters, initial, p, steps, 1)
-    found, (growth, angle) = fitted(run.position), theory.dominant(stepper, p)
+    found, (growth, angle) = fit_recurrence(run.position), theory.dominant(stepper, p)
     seen = np.isfinite(found.angle)
     if np.all(theory.roots(stepper, p).parasitic == 0):
         assert np.all(seen)

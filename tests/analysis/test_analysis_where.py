@@ -11,7 +11,7 @@ from sweeps import SWEEPS, of, simulated
 
 from vibsim.analysis import analyse_records, summarise, verdicts
 from vibsim.checks.outcome import Outcome, Results
-from vibsim.checks.sweep_regions import where
+from vibsim.checks.sweep_regions import sweep_regions
 from vibsim.core.record import Record, Variable
 
 
@@ -41,7 +41,7 @@ def sweep_record(**columns: np.ndarray) -> Record:
 def test_the_range_box_and_bins_of_a_corner() -> None:
     a, b = (x.ravel() for x in np.meshgrid(np.linspace(0, 1, 41), np.arange(5.0), indexing="ij"))
     bad = (a > 0.9) & (b >= 3)
-    found = where(sweep_record(x_a=a, x_b=b), outcome(bad.astype(np.int8)[None]))
+    found = sweep_regions(sweep_record(x_a=a, x_b=b), outcome(bad.astype(np.int8)[None]))
     assert set(found) == {"FAIL"}
     row = found["FAIL"]
     assert row["count"] == 8
@@ -63,7 +63,7 @@ def test_the_boxes_hold_what_they_say_together() -> None:
     rng = np.random.default_rng(0)
     x, y = rng.normal(size=(2, 4000))
     hits = rng.random(4000) < 0.5
-    found = where(sweep_record(x_a=x, x_b=y), outcome(hits.astype(np.int8)[None]))["FAIL"]
+    found = sweep_regions(sweep_record(x_a=x, x_b=y), outcome(hits.astype(np.int8)[None]))["FAIL"]
     inside = hits.copy()
     for key, values in (("x.a", x), ("x.b", y)):
         low, high = found["keys"][key]["box"]
@@ -79,17 +79,21 @@ def test_a_few_results_elsewhere_do_not_hide_where_most_are() -> None:
     x = np.linspace(0.0, 1.0, 1001)
     hits = x <= 0.1
     hits[900] = True
-    text = where(sweep_record(x_a=x), outcome(hits.astype(np.int8)[None]))["FAIL"]["text"]
+    text = sweep_regions(sweep_record(x_a=x), outcome(hits.astype(np.int8)[None]))["FAIL"]["text"]
     assert text.startswith("FAIL in 102 of 1001 results, at least 95% of them with x.a")
 
 
 def test_two_ranges_tell_together_what_neither_tells_alone() -> None:
     a, b = (x.ravel() for x in np.meshgrid(np.arange(10.0), np.arange(10.0)))
     hits = (a + b == 13) & (a >= 4)
-    text = where(sweep_record(x_a=a, x_b=b), outcome(hits.astype(np.int8)[None]))["FAIL"]["text"]
+    text = sweep_regions(sweep_record(x_a=a, x_b=b), outcome(hits.astype(np.int8)[None]))["FAIL"][
+        "text"
+    ]
     assert text == "FAIL in 6 of 100 results, all with x.a of 4 or more and x.b of 4 or more"
     one = (a == 4) & (b == 7)
-    text = where(sweep_record(x_a=a, x_b=b), outcome(one.astype(np.int8)[None]))["FAIL"]["text"]
+    text = sweep_regions(sweep_record(x_a=a, x_b=b), outcome(one.astype(np.int8)[None]))["FAIL"][
+        "text"
+    ]
     assert text == "FAIL in 1 of 100 results, with x.a equal to 4 and x.b equal to 7"
 
 
@@ -97,7 +101,7 @@ def test_words_and_schemes_are_told_apart() -> None:
     words = np.array(["kick", "backward"] * 6)
     compared = np.zeros((2, 12), dtype=np.int8)
     compared[1, 1::2] = 2
-    found = where(sweep_record(x_end=words), outcome(compared))["INCONCLUSIVE"]
+    found = sweep_regions(sweep_record(x_end=words), outcome(compared))["INCONCLUSIVE"]
     assert found["schemes"] == {"s0": 0, "s1": 6}
     assert found["keys"]["x.end"]["shares"] == {"backward": 0.5, "kick": 0.0}
     assert found["text"] == "INCONCLUSIVE in 6 of 24 results, all with x.end backward"
@@ -109,7 +113,7 @@ def test_what_is_said_of_a_border_is_true(value: float, side: float) -> None:
     x = value + side * np.linspace(-5.0, 1.0, 61)
     x[50] = value
     compared = (side * x >= side * value).astype(np.int8)[None]
-    text = where(sweep_record(x_a=x), outcome(compared))["FAIL"]["text"]
+    text = sweep_regions(sweep_record(x_a=x), outcome(compared))["FAIL"]["text"]
     start = "FAIL in 11 of 61 results, all with x.a of "
     assert text.startswith(start)
     border, words = text.removeprefix(start).split(" ", 1)
@@ -123,18 +127,22 @@ def test_a_range_that_separates_is_told_however_large_it_is(count: int) -> None:
     x = np.linspace(0.0, 1.0, 101)
     y = np.tile([0.0, 1.0], 51)[:101]
     hits = np.arange(101) >= 101 - count
-    text = where(sweep_record(x_a=x, x_b=y), outcome(hits.astype(np.int8)[None]))["FAIL"]["text"]
+    text = sweep_regions(sweep_record(x_a=x, x_b=y), outcome(hits.astype(np.int8)[None]))["FAIL"][
+        "text"
+    ]
     assert text == f"FAIL in {count} of 101 results, all with x.a of {x[101 - count]:g} or more"
     # but for one within it that passed, a large range says nothing
     hits[98] = False
-    text = where(sweep_record(x_a=x, x_b=y), outcome(hits.astype(np.int8)[None]))["FAIL"]["text"]
+    text = sweep_regions(sweep_record(x_a=x, x_b=y), outcome(hits.astype(np.int8)[None]))["FAIL"][
+        "text"
+    ]
     assert ("spread over the sweep" in text) == (count > 6)
 
 
 def test_words_that_separate_are_told_however_many() -> None:
     words = np.array(["a", "b", "c", "d"] * 4)
     compared = (words != "b").astype(np.int8)[None]
-    text = where(sweep_record(x_a=words), outcome(compared))["FAIL"]["text"]
+    text = sweep_regions(sweep_record(x_a=words), outcome(compared))["FAIL"]["text"]
     assert text == "FAIL in 12 of 16 results, all with x.a a or c or d"
 
 
@@ -144,12 +152,12 @@ def test_a_short_border_keeps_its_digits(border: float, side: float) -> None:
     x = border + side * np.arange(-10.0, 5.0)
     x[10] = border
     compared = (side * x >= side * border).astype(np.int8)[None]
-    text = where(sweep_record(x_a=x), outcome(compared))["FAIL"]["text"]
+    text = sweep_regions(sweep_record(x_a=x), outcome(compared))["FAIL"]["text"]
     assert f"all with x.a of {border:.15g} or" in text
 
 
 def test_without_a_sweep_nothing_is_anywhere() -> None:
-    assert where(Record({}, {}), outcome(np.ones((3, 1), dtype=np.int8))) == {}
+    assert sweep_regions(Record({}, {}), outcome(np.ones((3, 1), dtype=np.int8))) == {}
 
 
 @pytest.mark.parametrize("seed", range(20))

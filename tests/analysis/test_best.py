@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from vibsim.analysis import Verdict, analyse_parts, analyse_records, joined, verdicts
+from vibsim.analysis import Verdict, analyse_parts, analyse_records, join_parts, verdicts
 from vibsim.comparison.best_values import scalars
 from vibsim.convergence.gci import CLASSES
 from vibsim.core.record import Record
 from vibsim.experiment import Experiment
-from vibsim.experiment.value_names import HAVE_LIMITS, VALUES
+from vibsim.experiment.value_names import VALUES
 from vibsim.observe.member_block import block_of
 from vibsim.simulation import simulate_record
 
@@ -116,8 +116,9 @@ def test_what_is_stored_says_how_it_was_found() -> None:
 
 
 def test_every_value_that_exists_at_best_has_a_limit_or_is_of_the_solution() -> None:
-    assert {name for name in HAVE_LIMITS if not VALUES[name].best} == set()
-    rest = {name for name, value in VALUES.items() if value.best} - HAVE_LIMITS
+    have_limits = {name for name, value in VALUES.items() if value.has_limit("best")}
+    assert {name for name in have_limits if not VALUES[name].best} == set()
+    rest = {name for name, value in VALUES.items() if value.best} - have_limits
     assert rest == {"error_l1", "error_l2", "error_linf", "error_linf_interior"}
 
 
@@ -142,7 +143,30 @@ def test_one_level_bounds_nothing() -> None:
         ("INCONCLUSIVE", "too_few_levels"),
         ("PASS", "match"),
     ]
-    assert "unknown error" in found[0].text
+    assert "unknown error, because there is one level only" in found[0].text
+
+
+def test_a_level_too_coarse_for_a_number_does_not_hide_what_finer_ones_say() -> None:
+    """The coarsest level has no turn; the three others approach a period."""
+    run = PENDULUM | {"initial": {"theta": 2.0}, "time": {"end": 20.0}, "levels": [4, 5, 6, 7]}
+    check = {"value": "period", "at": {"level": "best"}, "equals": 8.35, "atol": 0.01}
+    experiment, record = analysed(check, **run, schemes=["euler_cromer"])
+    assert np.isnan(record["period"][0, 0, 0])
+    assert np.isfinite(record["period"][0, 0, 1:]).all()
+    value, bound = best(record, "period")
+    assert abs(value - float(record["exact_period"][0])) <= bound < 0.01
+    assert "with an error of at most" in verdicts(experiment, record)[0].text
+
+
+def test_a_number_of_a_level_that_is_named_is_asked_of_a_finer_one() -> None:
+    """Finer levels alone do not change the number of a level that stays the same."""
+    run = SPRING | {"levels": [6, 7]}
+    asked = {"value": "end", "quantity": "u", "equals": -0.3, "atol": 0.01}
+    of_finest, of_level = judged(asked, asked | {"at": {"level": 7}}, **run)
+    assert of_finest.reason == of_level.reason == "mismatch"
+    assert of_finest.advice.startswith("Add finer `levels:`")
+    assert "ask for one" not in of_finest.advice
+    assert "and ask for one (`at: {level: 9}`)" in of_level.advice
 
 
 def test_a_scheme_that_chooses_its_own_steps_has_no_limits() -> None:
@@ -174,7 +198,7 @@ def test_members_are_the_same_in_parts() -> None:
     experiment, whole = analysed(**data)
 
     readers = {level: partial(simulate_record, experiment, level) for level in experiment.levels}
-    parts = joined(list(analyse_parts(experiment, readers, size=1)))
+    parts = join_parts(list(analyse_parts(experiment, readers, size=1)))
     for name in (
         "period_richardson",
         "theta_end_richardson_error",

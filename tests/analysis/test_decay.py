@@ -10,6 +10,8 @@ import pytest
 
 from vibsim import Experiment, analyse, simulate, verdicts
 
+pytestmark = pytest.mark.usefixtures("without_series")
+
 STRENGTHS = [1e4, 1e6, 1e8, 1e10, 1e12, 1e16]
 
 

@@ -369,8 +369,21 @@ def test_a_decision_is_that_of_the_whole_posterior(expected: float | None) -> No
             )
 
 
+def test_a_quick_decision_asks_as_much_of_three_levels_as_a_whole_one() -> None:
+    """Orders of three levels that are more and more away from the one that theory promises."""
+    levels = [falling(4.5, 2.0 + away) for away in np.linspace(0.0, 0.004, 200)]
+    rows = np.stack([np.diff(np.array(values), axis=0) for values in levels])
+    gram = rows @ np.swapaxes(rows, 1, 2) / rows.shape[2]
+    floor, numbers = np.full((len(gram), 4), EPSILON), np.zeros(len(gram), dtype=bool)
+    given = Ladder(HALVED[:4], gram, floor, numbers, exact_known=False)
+    quick = decide(given, Question(2.0, by_theory=True))
+    whole = assess(given, expected=2.0, by_theory=True)
+    assert len(np.unique(whole.reason)) == 2
+    np.testing.assert_array_equal(quick.reason, whole.reason)
+
+
 def test_a_clear_decision_needs_no_second_posterior(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.delattr(assessment, "_assessed")
+    monkeypatch.delattr(assessment, "_assess_block")
     for exact in (None, np.cos(T)):
         values = series(HALVED, (1.0, 2.0, SHAPE), (0.5, 4.0, OTHER_SHAPE))
         for order, expected in ((2.0, "asymptotic"), (4.0, "order_low")):

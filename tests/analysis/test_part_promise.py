@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from spring_runs import Run, judged
 
-from vibsim.analysis.blockwise import analyse_parts, joined
+from vibsim.analysis.blockwise import analyse_parts, join_parts
 from vibsim.core.record import Record, Variable
 from vibsim.experiment import Experiment
 from vibsim.schemes import FIXED_STEP
@@ -138,7 +138,7 @@ def test_a_sweep_analysed_in_parts_has_the_promises_of_the_whole() -> None:
     sweep = {"initial.v": [0.0, 1.0, 2.0]}
     run = ladder({"kind": "spring"}, FEW[3:4], sweep=sweep)
     readers = {level: partial(some, record) for level, record in run.levels.items()}
-    whole = joined(list(analyse_parts(run.experiment, readers, size=2)))
+    whole = join_parts(list(analyse_parts(run.experiment, readers, size=2)))
     for part in PARTS:
         name = f"{part}_formal_order"
         np.testing.assert_array_equal(whole[name], run.record[name])

@@ -10,7 +10,7 @@ import pytest
 from sweeps import simulated
 
 from vibsim import Experiment, InputError, VibsimError, best, ladder, verdicts
-from vibsim.analysis import analyse_records, kept, summarise
+from vibsim.analysis import analyse_records, keep_for_verdicts, summarise
 from vibsim.comparison.best_solution import best_record
 from vibsim.core.record import Record
 
@@ -96,7 +96,7 @@ def test_the_verdict_needs_only_what_is_kept_of_parts(
     swept: Experiment, convergence: Record
 ) -> None:
     thin: list[Record] = []
-    list(kept(swept, [convergence], thin))
+    list(keep_for_verdicts(swept, [convergence], thin))
     expected = summarise(swept, verdicts(swept, convergence), convergence)
     assert summarise(swept, verdicts(swept, thin[0]), thin[0]) == expected
 

@@ -9,7 +9,7 @@ import pytest
 
 from vibsim.models import MODELS
 from vibsim.observe.thresholds import LEAST_PER_SHIFT
-from vibsim.observe.waveform_fit import shift, strides, template
+from vibsim.observe.waveform_fit import fit_shift, quintic_interpolant, strides
 
 W = 2 * np.pi
 T = np.linspace(0.0, 10.0, 321)
@@ -17,7 +17,7 @@ H = np.full(1, T[1])
 
 
 def cosine(t: Any, w: float = W) -> Any:
-    return template(
+    return quintic_interpolant(
         *(x[None] for x in (np.cos(w * t), -w * np.sin(w * t), -(w**2) * np.cos(w * t))), H
     )
 
@@ -27,7 +27,7 @@ def told(u: Any, v: Any = None, of: Any = None, period: float = 1.0) -> Any:
     of = cosine(T) if of is None else of
     v = np.gradient(u, T) if v is None else v
     p = np.full(1, period)
-    found = shift(u[None], v[None], of, p, strides(p, H, len(T)))
+    found = fit_shift(u[None], v[None], of, p, strides(p, H, len(T)))
     return found[0, 0], found[1, 0]
 
 
@@ -88,11 +88,11 @@ def test_a_pendulum_of_another_amplitude_is_late_by_what_its_period_says() -> No
         return float(model.exact_period({"theta": theta, "omega": 0.0}, parameters))
 
     theta, omega = motion(2.0)
-    of = template(theta, omega, -np.sin(theta), h)
+    of = quintic_interpolant(theta, omega, -np.sin(theta), h)
     p = np.full(1, period(2.0))
     for change in (1e-2, 1e-3):
         other = motion(2.0 * (1 + change))
-        found = shift(*other, of, p, strides(p, h, len(t)))
+        found = fit_shift(*other, of, p, strides(p, h, len(t)))
         late = t * (period(2.0) / period(2.0 * (1 + change)) - 1)
         # peaks are where the shift is known: at whole half-periods
         np.testing.assert_allclose(found[0, 0], late, rtol=0.02, atol=0.3 * change)
@@ -107,7 +107,7 @@ def test_a_shift_of_more_than_a_period_is_followed() -> None:
 
 
 def test_what_does_not_oscillate_has_no_parts() -> None:
-    turning = template(
+    turning = quintic_interpolant(
         *(x[None] for x in (T + 0.1 * np.sin(T), 1 + 0.1 * np.cos(T), -0.1 * np.sin(T))), H
     )
     time, factor = told(T, np.ones_like(T), turning)
@@ -136,15 +136,17 @@ def test_a_row_has_the_same_bits_alone_and_among_others() -> None:
     v = np.gradient(u, T, axis=-1)
     period = np.array([1.0, 1.0, 0.9, 1.1])
     h = np.repeat(H, 4)
-    of = template(
+    of = quintic_interpolant(
         *(np.tile(x, (4, 1)) for x in (np.cos(W * T), -W * np.sin(W * T), -(W**2) * np.cos(W * T))),
         h,
     )
     stride = strides(period, h, len(T))
-    together = shift(u, v, of, period, stride)
+    together = fit_shift(u, v, of, period, stride)
     for i in range(4):
         one = slice(i, i + 1)
-        part = template(of.position[one], of.velocity[one], -(W**2) * of.position[one], h[one])
-        alone = shift(u[one], v[one], part, period[one], stride[one])
+        part = quintic_interpolant(
+            of.position[one], of.velocity[one], -(W**2) * of.position[one], h[one]
+        )
+        alone = fit_shift(u[one], v[one], part, period[one], stride[one])
         np.testing.assert_array_equal(alone[0, 0], together[0, i])
         np.testing.assert_array_equal(alone[1, 0], together[1, i])

@@ -9,6 +9,8 @@ import pytest
 
 from vibsim import Experiment, Verdict, analyse, simulate, verdicts
 
+pytestmark = pytest.mark.usefixtures("without_series")
+
 
 def judged(
     model: dict[str, Any], initial: dict[str, float], end: float, levels: range, *schemes: str

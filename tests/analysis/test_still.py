@@ -8,6 +8,8 @@ import pytest
 
 from vibsim import Experiment, analyse, simulate, verdicts
 
+pytestmark = pytest.mark.usefixtures("without_series")
+
 FALLING = {"kind": "oscillator", "spring": "0", "force": "1"}
 SPRING = {"kind": "spring", "w": 2.0}
 

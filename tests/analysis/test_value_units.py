@@ -6,7 +6,7 @@ import pytest
 
 from vibsim import experiment as spec
 from vibsim.analysis import analyse_records, verdicts
-from vibsim.analysis.blockwise import joined, kept
+from vibsim.analysis.blockwise import join_parts, keep_for_verdicts
 from vibsim.checks.value import unit_of
 from vibsim.experiment.value_names import VALUES
 from vibsim.simulation import simulate_record
@@ -72,7 +72,7 @@ def test_a_counted_number_is_equal_without_a_tolerance():
 def test_every_number_says_what_it_is_measured_in():
     plain = {name for name, row in VALUES.items() if row.measure == "none"}
     words = ("factor", "ratio", "rate", "error", "degree", "order", "limit", "defect", "relative")
-    words += ("coincidence", "fraction", "growth")
+    words += ("coincidence", "fraction", "growth", "phase", "change")
     assert [name for name in plain if not any(word in name for word in words)] == []
 
 
@@ -90,7 +90,7 @@ def test_what_a_run_keeps_of_its_parts_tells_the_same(changes):
     checks = {"converges": "theta", "order": "scheme"}, {"value": "period", "above": 0.0}
     experiment, record = run(*checks, QUANTITIES, **changes)
     thin = []
-    assert list(kept(experiment, [record], thin)) == [record]
-    whole, left = (list(verdicts(experiment, row)) for row in (record, joined(thin)))
+    assert list(keep_for_verdicts(experiment, [record], thin)) == [record]
+    whole, left = (list(verdicts(experiment, row)) for row in (record, join_parts(thin)))
     assert [(v.text, v.advice) for v in left] == [(v.text, v.advice) for v in whole]
     assert "rad s-1" in whole[2].text

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from vibsim import Experiment
-from vibsim.analysis import analyse_records, kept, summarise, verdicts
+from vibsim.analysis import analyse_records, keep_for_verdicts, summarise, verdicts
 from vibsim.core.record import Record
 from vibsim.simulation import simulate_record
 
@@ -75,7 +75,7 @@ def test_what_is_kept_of_parts_is_all_that_verdicts_read(
     records = {level: simulate_record(experiment, level) for level in experiment.levels}
     whole = analyse_records(experiment, records)
     thin: list[Record] = []
-    list(kept(experiment, [whole], thin))
+    list(keep_for_verdicts(experiment, [whole], thin))
 
     asked: set[str] = set()
     variable, contains = Record.variable, Record.__contains__

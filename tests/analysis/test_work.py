@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from vibsim.analysis.compare_levels import analyse_records
-from vibsim.comparison.quantity_comparison import Comparison, comparisons
+from vibsim.comparison.compare_quantities import comparisons
+from vibsim.comparison.quantity_comparison import Comparison
 from vibsim.comparison.work_precision import reference_of, work_precision
 from vibsim.experiment import Experiment
 from vibsim.observe.member_block import block_of

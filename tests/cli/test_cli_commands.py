@@ -3,11 +3,14 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
 
-from vibsim.cli import main, resources, results_folder
+from vibsim.cli import main, results_folder
 from vibsim.cli.jobs import extrapolate
 from vibsim.cli.run import snakemake
 from vibsim.core.errors import FileError, VibsimError
@@ -77,8 +80,15 @@ SWEPT = TEXT + "sweep: {initial.theta: {linspace: [0.1, 3, 300]}}\n"
 
 @pytest.mark.parametrize("command", ["plan", "run"])
 @pytest.mark.parametrize(
-    ("function", "told"),
-    [("free_bytes", "of disk, 1.5 kB are free"), ("_memory", "of memory, the machine has 1.5 kB")],
+    ("function", "found", "told"),
+    [
+        ("free_bytes", lambda _: 1500, "of disk, 1.5 kB are free"),
+        (
+            "psutil.virtual_memory",
+            lambda: SimpleNamespace(total=1500, available=1500),
+            "of memory, the machine has 1.5 kB",
+        ),
+    ],
 )
 def test_what_does_not_fit_is_refused_with_both_numbers(
     file: Path,
@@ -87,9 +97,10 @@ def test_what_does_not_fit_is_refused_with_both_numbers(
     monkeypatch: pytest.MonkeyPatch,
     command: str,
     function: str,
+    found: Callable[..., Any],
     told: str,
 ) -> None:
-    monkeypatch.setattr(resources, function, lambda _: 1500)
+    monkeypatch.setattr(f"vibsim.cli.resources.{function}", found)
     results = tmp_path / "results"
     assert main([command, str(file), "--results", str(results)]) == 2
     assert told in capsys.readouterr().err

@@ -3,14 +3,25 @@
 import math
 import subprocess
 import sys
+from collections.abc import Iterator
 from dataclasses import replace
+from functools import cache
 
 import pytest
 
 from vibsim import theory
 from vibsim.cli import main
+from vibsim.cli.commands import listing
 from vibsim.models import MODELS
 from vibsim.schemes import SCHEMES
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _experiments_are_read_once() -> Iterator[None]:
+    found = cache(lambda read=listing._experiments: list(read()))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(listing, "_experiments", found)
+        yield
 
 
 def listed(capsys: pytest.CaptureFixture[str]) -> list[str]:

@@ -38,7 +38,8 @@ EVENTS: list[tuple[str, LogEvent | None, dict[str, Any]]] = [
         {
             "rule_name": "analyse",
             "output": ["a/x/convergence.nc", "a/x/summary.json"],
-            "log": ["a/x/logs/analyse.log"],
+            "log": ["a/x/logs/analyse.log", "/x/.snakemake/slurm_logs/5.log"],
+            "rule_msg": "SLURM-job '5' failed, SLURM status is: 'OUT_OF_MEMORY'",
         },
     ),
     ("", LogEvent.JOB_INFO, {"rule_name": "all", "output": [], "log": [], "reason": ""}),
@@ -49,6 +50,10 @@ EVENTS: list[tuple[str, LogEvent | None, dict[str, Any]]] = [
     ),
     ("WorkflowError:\nAt least one job", LogEvent.ERROR, {"exception": "WorkflowError"}),
 ]
+
+
+_, _, STARTED = EVENTS[2]
+FAILED = ("Error", LogEvent.JOB_ERROR, STARTED | {"rule_msg": None})
 
 
 def lines_of(events: list[tuple[str, LogEvent | None, dict[str, Any]]]) -> list[bytes]:
@@ -76,7 +81,17 @@ def test_jobs_failures_and_steps_are_read_from_the_events_of_snakemake() -> None
     (failed,) = found.failed
     assert str(failed) == "analyse a/x"
     assert failed.log == "a/x/logs/analyse.log"
+    assert failed.reason == "SLURM-job '5' failed, SLURM status is: 'OUT_OF_MEMORY'"
     assert found.cause == "WorkflowError: At least one job"
+
+
+def test_a_job_that_is_tried_again_is_no_failure_and_counted_once() -> None:
+    found = follow(lines_of([EVENTS[1], EVENTS[2], FAILED, EVENTS[2]]))
+    assert found.failed == []
+    assert len(found.jobs) == 1
+    assert [str(job) for job in follow(lines_of([EVENTS[2], FAILED])).failed] == [
+        "simulate a/x level_07.nc"
+    ]
 
 
 def test_an_event_that_a_kill_cut_short_is_left_out() -> None:

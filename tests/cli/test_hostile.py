@@ -9,10 +9,12 @@ import resource
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import forked
 import pytest
+from torture.harm import disk
 
 from vibsim.cli import main
 
@@ -102,40 +104,33 @@ def test_a_limit_of_the_size_of_files_is_named(file: Path, tmp_path: Path, kilob
     assert not list(tmp_path.glob("*level.nc*"))
 
 
-@pytest.fixture
-def small_disk(tmp_path: Path) -> Iterator[Callable[[int], Path]]:
-    """Return what makes a disk of some kilobytes; that takes the right to mount one."""
-    made = []
-
-    def make(kilobytes: int) -> Path:
-        folder = tmp_path / f"disk_{kilobytes}"
-        folder.mkdir()
-        command = ["mount", "-t", "tmpfs", "-o", f"size={kilobytes}k", "tmpfs", str(folder)]
-        if subprocess.run(command, check=False, capture_output=True).returncode:
-            text = "no disk can be mounted here: full disks are not tried, limits of files are"
-            pytest.skip(text)
-        made.append(folder)
-        return folder
-
-    yield make
-    for folder in made:
-        subprocess.run(["umount", str(folder)], check=True)
+@contextmanager
+def small_disk(tmp_path: Path, kilobytes: int) -> Iterator[Path]:
+    """Have a disk of some kilobytes; that takes the right to mount one."""
+    folder = tmp_path / f"disk_{kilobytes}"
+    with disk(folder, kilobytes) as is_there:
+        if not is_there:
+            pytest.skip(
+                "no disk can be mounted here: full disks are not tried, limits of files are"
+            )
+        yield folder
 
 
-def test_a_full_disk_is_named(file: Path, small_disk: Callable[[int], Path]) -> None:
+def test_a_full_disk_is_named(file: Path, tmp_path: Path) -> None:
     file.write_text(TEXT.replace("7]", "10]"))
     for kilobytes in (4, 24):
-        folder = small_disk(kilobytes)
-        ended = vibsim("simulate", file, "--level", 10, "--out", folder / "level.nc")
-        assert ended.returncode == 1, kilobytes
-        assert ended.stderr.endswith("level.nc: No space left on device\n")
-        assert list(folder.iterdir()) == []
+        with small_disk(tmp_path, kilobytes) as folder:
+            ended = vibsim("simulate", file, "--level", 10, "--out", folder / "level.nc")
+            assert ended.returncode == 1, kilobytes
+            assert ended.stderr.endswith("level.nc: No space left on device\n")
+            assert list(folder.iterdir()) == []
 
 
-def test_an_index_on_a_full_disk(small_disk: Callable[[int], Path]) -> None:
-    ended = vibsim("report", "--results", small_disk(4))
-    assert ended.returncode == 1
-    assert ended.stderr.endswith("No space left on device\n")
+def test_an_index_on_a_full_disk(tmp_path: Path) -> None:
+    with small_disk(tmp_path, 4) as folder:
+        ended = vibsim("report", "--results", folder)
+        assert ended.returncode == 1
+        assert ended.stderr.endswith("No space left on device\n")
 
 
 @pytest.mark.parametrize("number", [errno.ENOLCK, errno.ENOSYS, errno.EOPNOTSUPP])

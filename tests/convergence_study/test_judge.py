@@ -6,7 +6,7 @@ import doctest
 import inspect
 import subprocess
 import sys
-from dataclasses import FrozenInstanceError
+from dataclasses import FrozenInstanceError, replace
 from pathlib import Path
 from typing import Any
 
@@ -273,13 +273,21 @@ def test_a_measured_order_away_from_the_one_that_dominates_is_explained() -> Non
 
 
 def test_every_reason_has_a_sentence() -> None:
-    from vibsim.convergence.study.sentences import SENTENCES, Facts, describe
+    from vibsim.convergence.study.sentences import SENTENCES, Setting, describe
 
-    assert set(SENTENCES) == {*REASONS, "interpolation", "growing"}
+    assert set(SENTENCES) == {*REASONS, "interpolation", "growing", "noisy"}
     for reason, status in REASONS.items():
         for count in (1, 2, 3):
-            facts = Facts("flux", status, reason, (0.4, 0.2, 0.1)[:count], 1.5, not_finite=(0.1,))
-            sentence, advice = describe(facts)
+            levels = judge((0.4, 0.2, 0.1)[:count], [np.nan] * count).levels
+            facts = replace(
+                judge([0.1], [1.0]),
+                quantity="flux",
+                status=status,
+                reason=reason,
+                order=1.5,
+                levels=levels,
+            )
+            sentence, advice = describe(facts, Setting())
             assert "flux" in sentence
             assert sentence.endswith(".")
             assert bool(advice) == (status != "PASS")

@@ -21,22 +21,6 @@ def blocks(text: str, language: str) -> list[str]:
     return re.findall(rf"^```{language}\n(.*?)^```", text, re.DOTALL | re.MULTILINE)
 
 
-def test_the_code_of_the_page_runs(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Capture
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    names: dict[str, object] = {}
-    found = blocks(PAGE.read_text(), "python")
-    assert len(found) == 4
-    for i, block in enumerate(found):
-        exec(compile(block, f"{PAGE.name}, block {i + 1}", "exec"), names)
-    out = capsys.readouterr().out
-    assert out.startswith("PASS  asymptotic  u")
-    assert "T converges with order" in out
-    assert re.findall(r"^(PASS|FAIL|INCONCLUSIVE) \S+$", out, re.MULTILINE) == ["PASS"] * 3
-    assert (tmp_path / "heat.svg").stat().st_size > 10_000
-
-
 def test_the_page_names_every_key_and_every_option() -> None:
     text = PAGE.read_text()
     assert [key for key in KEYS if f"`{key}`" not in text] == []

@@ -37,6 +37,15 @@ def test_stated_noise_does_not_excuse_differences_that_fall(noise: float) -> Non
     assert verdict.status != "PASS"
 
 
+def test_finer_levels_are_not_advised_where_they_would_show_noise() -> None:
+    values = [1 + h**2 for h in H]
+    assert "finer level" in judge(H, [1 + 20 * h**2 + h for h in H], order=2).advice
+    verdict = judge(H, values, order=2, noise=1e-3)
+    assert (verdict.status, verdict.reason) == ("INCONCLUSIVE", "pre_asymptotic")
+    assert "differ by little more than the stated noise" in verdict.sentence
+    assert verdict.advice == "Use coarser levels, or compute u with less noise."
+
+
 def test_what_noise_explains_has_a_bound_and_not_the_error_0() -> None:
     verdict = judge(H, [1.001, 1.002, 0.9995, 1.0], order=2, noise=1e-3)
     assert verdict.reason == "exact"
@@ -52,6 +61,37 @@ def test_levels_that_are_the_same_are_doubted() -> None:
         "All levels are the same to the last digit. Check that the solver used h."
         in verdict.sentence
     )
+
+
+@pytest.mark.parametrize(
+    ("count", "rounding"), [(4, 0.0), (4, 1e-12), (5, 0.0), (5, 1e-12), (6, 0.0)]
+)
+@pytest.mark.parametrize("shape", [1.0, np.sin(np.arange(9.0))])
+def test_a_finest_level_copied_from_the_one_before_does_not_pass(
+    count: int, shape: float | np.ndarray, rounding: float
+) -> None:
+    h = [0.1 * 0.5**k for k in range(count)]
+    values = [2.0 + shape * x**2 for x in h]
+    assert judge(h, values, order=2).status == "PASS"
+    verdict = judge(h, [*values[:-1], values[-2] * (1.0 + rounding)], order=2)
+    assert verdict.status == "INCONCLUSIVE"
+    same = f"The levels h = {h[-2]:g} and {h[-1]:g} are the same to the last digit."
+    assert (same in verdict.sentence) == (rounding == 0.0)
+
+
+def test_an_order_says_behind_which_level_it_is_not_seen() -> None:
+    h = [0.1 * 0.5**k for k in range(6)]
+    values = [np.sin(np.arange(9.0)) * (1.0 + x**2) for x in h]
+    told = "The levels finer than h = 0.00625 do not show this order."
+    assert told not in judge(h, values, order=2).sentence
+    too_long = 0.5 * (h[-2] + h[-1])
+    values[-1] = np.sin(np.arange(9.0)) * (1.0 + too_long**2)
+    assert told in judge(h, values, order=2).sentence
+
+
+def test_three_levels_that_may_fall_by_accident_fit_one_order() -> None:
+    verdict = judge(H[:3], [1 + x ** (1 / 3) for x in H[:3]], order=1 / 3)
+    assert "They fit order 0.33 alone, but may do so by accident." in verdict.sentence
 
 
 @pytest.mark.parametrize("h", [H, H[:3], [0.1, 0.07, 0.03]])

@@ -24,9 +24,8 @@ ROAD = "0.1*sin(2*x + 0.3)"
 
 
 def vehicle(table: Table | None, *, b: float = B, is_met: bool = True, road: str = "0") -> Model:
-    model = MODELS["vehicle"].written({"spring": f"{K}*u", "road": road}, ())
-    if table is not None:
-        model = model.with_table(table, is_met)
+    numbers = () if table is None else (table, is_met)
+    model = MODELS["vehicle"].written({"spring": f"{K}*u", "road": road}, (), *numbers)
     return model.variant(frozenset({"b"} if b else ()))
 
 

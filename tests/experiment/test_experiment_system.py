@@ -249,3 +249,22 @@ def test_linear_and_quadratic_damping_of_one_coordinate_are_recognised():
     for text in ("-u - 2*c*v", "cos(t) - (u + c*abs(v)*v)/2"):
         model = {"acceleration": text, "parameters": {"c": 0.1}}
         assert judged(read(model, schemes=["central"], initial={"u": 1.0}))[0][0] == "PASS"
+
+
+def test_a_formula_that_a_comma_ends_is_told_how_to_be_written(tmp_path):
+    file = tmp_path / "cut.yaml"
+    file.write_text(
+        "title: t\nmodel: {kind: system, coordinates: [x, y], force: {x: -hypot(x, y), y: -y}, mass: {x: 1, y: 1}}\n"
+        "time: {end: 1}\nlevels: [3, 4, 5]\nschemes: [rk4]\n"
+    )
+    with pytest.raises(InputError) as caught:
+        Experiment.from_yaml(file)
+    hints = {fault.hint for fault in caught.value.faults if fault.key == "model.force.y)"}
+    assert hints == {
+        "between braces a comma ends a value: write a formula with commas in quotation marks"
+    }
+
+
+def test_a_swept_parameter_is_found_by_its_own_name():
+    (fault,) = refused(PAIR, sweep={"model.k": [1.0, 2.0]})
+    assert fault.endswith("cannot be swept: did you mean 'model.parameters.k'?")

@@ -15,7 +15,8 @@ from experiment_files import write
 from vibsim.core.errors import Fault, InputError
 from vibsim.experiment import Experiment, canonical, restore
 from vibsim.experiment.tables import file as table_file
-from vibsim.experiment.tables.file import EVEN, TableError, read
+from vibsim.experiment.tables.content import TableError
+from vibsim.experiment.tables.file import EVEN, read
 from vibsim.models.table import Table
 
 HEIGHTS = [0.02 * (i % 7) ** 2 for i in range(101)]
@@ -124,6 +125,7 @@ def test_rows_at_fault(tmp_path: Path, rows: list[str], rule: str, hint: str) ->
         ("{table: noise.csv}", "table", "must be UTF-8 text, but line 1 is none", ""),
         ("{table: noise.nc}", "table", "the netCDF library cannot read it", ""),
         ("{table: header.nc}", "table", "the netCDF library cannot read it", ""),
+        ("{table: counts.nc}", "table", "the netCDF library cannot read it", ""),
         ("{table: empty.csv}", "table", "must not be empty", ""),
         ("{table: large.csv}", "table", "must not be larger than 64 MiB", ""),
         ("{table: /road.csv}", "table", "relative to the folder of the experiment file", ""),
@@ -144,6 +146,8 @@ def test_sections_at_fault(tmp_path: Path, text: str, key: str, rule: str, hint:
     write(tmp_path, b"\xff" + noise, "noise.csv")
     write(tmp_path, noise, "noise.nc")
     write(tmp_path, b"\x89HDF\r\n\x1a\n" + noise, "header.nc")
+    # 2^31 dimensions: the library would take all memory
+    write(tmp_path, b"CDF\x01" + bytes(4) + b"\0\0\0\x0a\x7f\xff\xff\xff" + noise, "counts.nc")
     write(tmp_path, "", "empty.csv")
     write(tmp_path, lines("x,h,h", *(f"{row},0" for row in ROWS)), "twice.csv")
     with (tmp_path / "large.csv").open("wb") as file:

@@ -3,60 +3,20 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
 from typing import Any
 
-import numpy as np
 from experiment_files import content
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from torture.fuzz import attempt
+from torture.fuzz import experiment as read
 
 from vibsim import plan
-from vibsim.core.errors import InputError
-from vibsim.experiment import Experiment, canonical, restore
-from vibsim.experiment.reading import build
-from vibsim.experiment.yaml.parse import parse
+from vibsim.experiment import Experiment
 
 QUIET = settings(
     max_examples=150, deadline=None, suppress_health_check=[HealthCheck.too_slow], derandomize=True
 )
-
-
-def attempt(make: Callable[[], Experiment]) -> None:
-    """Require an experiment that survives its normal form, or faults that say something."""
-    try:
-        experiment = make()
-    except InputError as error:
-        refused: InputError | None = error
-    else:
-        refused = None
-        content = json.loads(json.dumps(canonical(experiment), allow_nan=False))
-        assert restore(content) == experiment
-        members(experiment)
-    assert refused is None or all(fault.rule for fault in refused.faults)
-    assert refused is None or refused.faults
-
-
-def members(experiment: Experiment) -> None:
-    """Require that members are what the plan says, at both ends, and that the last one stands alone."""
-    last = experiment.members - 1
-    for found in (plan.columns(experiment, 0, 1), plan.columns(experiment, last, last + 1)):
-        assert all(len(values) == 1 for values in found.values())
-        assert all(
-            values.dtype.kind == "U" or np.isfinite(values).all() for values in found.values()
-        )
-    alone = experiment.alone(last)
-    assert restore(canonical(alone)) == alone
-    if not experiment.levels:
-        attempt(lambda: experiment.with_levels([6, 7]))
-
-
-def read(data: bytes) -> None:
-    def make() -> Experiment:
-        source = parse(data, "fuzz.yaml")
-        return build(Experiment, source, "adhoc", "fuzz")
-
-    attempt(make)
 
 
 @given(st.binary(max_size=200))

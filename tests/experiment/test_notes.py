@@ -57,6 +57,13 @@ TOLD = {
         {"checks": [{"value": "period", "equals": 6.7}]},
         "checks[0].equals: has no tolerance, and is compared to 1e-9 of it: `atol: 0.05`",
     ),
+    "unused": (
+        {
+            "model": {"kind": "oscillator", "damping": "k2*v", "parameters": {"k2": 1, "k": 2}},
+            "initial": {"u": 1},
+        },
+        "model.parameters.k: no formula names it: leave it out",
+    ),
     "of a claim": (
         {"checks": [{"claim": "it is so", "that": {"value": "period", "equals": 6.71}}]},
         "checks[0].that.equals: has no tolerance, and is compared to 1e-9 of it: `atol: 0.005`",
@@ -134,6 +141,22 @@ REFUSED = {
     "kind of a check": ({"checks": [{"converge": "theta"}]}, "did you mean 'converges'?"),
     "steps as levels": ({"levels": [6, 256]}, "level n has 2^n steps; 256 steps are level 8"),
     "odd level": ({"levels": [6, 100]}, "must be at most 40: level n has 2^n steps (times"),
+    "levels in words": (
+        {"levels": "six"},
+        "must be a list: e.g. [6, 7, 8, 9], or {from: 6, to: 9}",
+    ),
+    "coefficient": (
+        {"model": {"kind": "oscillator", "damping": {"quadratic": "c"}, "parameters": {"c": 1}}},
+        "with a parameter write the formula: `damping: c*abs(v)*v`",
+    ),
+    "friction": (
+        {"model": {"kind": "oscillator", "damping": {"coulomb": "c"}, "parameters": {"c": 1}}},
+        "its values may be swept, as `model.damping.coulomb`",
+    ),
+    "no force": (
+        {"checks": [{"value": "steady_change", "quantity": "theta", "below": 1}]},
+        "checks[0].value: steady_change: is of the last period of a force",
+    ),
     "one scheme": ({"schemes": "rk4"}, "must be a list: write [rk4]"),
     "comma": ({"initial": {"theta": "1,5"}}, "must have a decimal point: write 1.5"),
 }

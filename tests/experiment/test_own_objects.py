@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 import copy
-import linecache
 import pickle
-import re
 from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -225,25 +222,6 @@ def test_a_scheme_whose_text_is_not_known_is_refused_by_name() -> None:
     stepper = Stepper(names["start"], names["step"])
     with pytest.raises(SimulationError, match="is not known: write it in a file"):
         simulate(build(schemes=[replace(RALSTON, stepper=lambda options: stepper)]), 6)
-
-
-@pytest.mark.parametrize("name", ["models", "schemes"])
-def test_the_code_of_the_pages_runs_and_keeps_its_promise(
-    name: str, capsys: pytest.CaptureFixture[str]
-) -> None:
-    page = Path(__file__).parents[2] / "docs" / f"{name}.md"
-    blocks = re.findall(r"^```python\n(.*?)^```", page.read_text(), re.DOTALL | re.MULTILINE)
-    names: dict[str, object] = {"__name__": "page"}
-    for i, block in enumerate(blocks):
-        if "_scheme(" in block:
-            # from a file of vibsim
-            continue
-        file = f"<{page.name}, block {i + 1}>"
-        linecache.cache[file] = (len(block), None, block.splitlines(keepends=True), file)
-        exec(compile(block, file, "exec"), names)
-    statuses = [line.split()[0] for line in capsys.readouterr().out.splitlines()]
-    assert statuses
-    assert set(statuses) == {"PASS"}
 
 
 def test_a_model_with_damping_is_told_how_to_declare_it() -> None:

@@ -9,10 +9,12 @@ from typing import Any
 import pytest
 from experiment_files import build, content, faults_of
 from jsonschema import Draft202012Validator
+from pydantic import TypeAdapter, ValidationError
 from test_experiment import EXAMPLE
 from test_experiment_faults import CASES
 
 from vibsim.experiment.schema.document import schema
+from vibsim.experiment.schema.fields import Section, by_form
 from vibsim.experiment.yaml.parse import parse
 from vibsim.models import MODELS
 from vibsim.schemes import SCHEMES
@@ -116,6 +118,42 @@ def test_choices_follow_the_registries() -> None:
     for kind, scheme in SCHEMES.items():
         defaults = {name: row.get("default") for name, row in sections[kind].items()}
         assert scheme.defaults().items() <= defaults.items()
+
+
+class _Marked(Section):
+    mode: int
+
+
+FORMS = {
+    "rows": tuple[tuple[int, ...], ...],
+    "row": tuple[int, ...],
+    "mapping": dict[str, int],
+    "mode": _Marked,
+    "other": str | int,
+}
+
+
+@pytest.mark.parametrize(
+    ("written", "meant"),
+    [
+        ([[1], [2]], ((1,), (2,))),
+        ([1, 2], (1, 2)),
+        ([], ()),
+        ({"a": 1}, {"a": 1}),
+        ({"mode": 1}, _Marked(mode=1)),
+        ("text", "text"),
+        (3, 3),
+    ],
+)
+def test_the_form_of_what_is_written_chooses_its_type(written: Any, meant: Any) -> None:
+    assert TypeAdapter(by_form(FORMS)).validate_python(written) == meant
+
+
+def test_a_form_without_a_type_is_refused() -> None:
+    rows = {name: kind for name, kind in FORMS.items() if name in ("rows", "mapping")}
+    for written in ([1], "text", 3):
+        with pytest.raises(ValidationError, match="tag"):
+            TypeAdapter(by_form(rows)).validate_python(written)
 
 
 def _of_kinds() -> list[dict[str, Any]]:

@@ -266,6 +266,10 @@ def test_a_value_can_be_asked_for_where_it_exists(name: str) -> None:
             schemes=["rk4"],
         )
         return
+    if row.needs_force:
+        assert "time names no frequency" in fault_of(check).rule
+        spring(check, time={"periods": 3, "steps_per_period": 8, "frequency": "model.w"})
+        return
     spring(check | {"at": at}, samples="all")
     if "step" in row.at:
         spring(check | {"at": {"step": 39}}, samples="all")

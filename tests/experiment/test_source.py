@@ -183,6 +183,13 @@ def test_a_tab_is_named(tmp_path: Path) -> None:
     assert "tabs are not allowed for indentation" in fault.rule
 
 
+@pytest.mark.parametrize("name", ["[q{i}]", "{q{i+1}: 1}", "[a, x{row-2}]"])
+def test_an_index_inside_brackets_is_sent_into_quotation_marks(tmp_path: Path, name: str) -> None:
+    (fault,) = file_faults(tmp_path, f"model:\n  names: {name}\n")
+    assert (fault.line, fault.rule) == (2, "is not valid YAML")
+    assert 'write "q{i}" there' in fault.hint
+
+
 @pytest.mark.parametrize("number", ["010", "00", "-07", "+012", "01.5", "00e1", "0777", "09"])
 @pytest.mark.parametrize(
     "text", ["levels: [6, N]", "levels: {from: 6, to: N}", "initial: {theta: N}"]

@@ -125,7 +125,7 @@ def test_options_are_words() -> None:
     [
         ({"linspace": [1, 2, 10**6]}, True),
         ({"linspace": [2, 2, 10**6]}, False),
-        ({"logspace": [1, 2, 10**6]}, True),
+        ({"logspace": [1, 2, 10**4]}, True),
         ({"logspace": [3, 3, 2]}, False),
         ({"range": [1, 2, 1e-6]}, True),
         ({"range": [1, 2, 3]}, False),
@@ -216,17 +216,17 @@ def test_scattered_points_are_imported_only_where_they_are_drawn() -> None:
         "import sys\n"
         "from vibsim import plan\n"
         "from vibsim.experiment import Experiment\n"
-        "e = Experiment.from_dict({'title': 'x', 'model': {'kind': 'pendulum'}, 'levels': [6],\n"
-        "  'time': {'end': 1}, 'schemes': ['central'], 'sweep': {'sample': {'method': sys.argv[1],\n"
-        "  'n': 4, 'seed': 1, 'over': {'model.g': [1, 2]}}}})\n"
-        "assert 'scipy' not in sys.modules\n"
-        "plan.columns(e, 0, 4)\n"
-        "print('scipy' in sys.modules)"
+        "for method in ('random', 'sobol'):\n"
+        "  e = Experiment.from_dict({'title': 'x', 'model': {'kind': 'pendulum'}, 'levels': [6],\n"
+        "    'time': {'end': 1}, 'schemes': ['central'], 'sweep': {'sample': {'method': method,\n"
+        "    'n': 4, 'seed': 1, 'over': {'model.g': [1, 2]}}}})\n"
+        "  assert 'scipy' not in sys.modules\n"
+        "  plan.columns(e, 0, 4)\n"
+        "  print('scipy' in sys.modules)"
     )
-    for method, expected in (("random", "False"), ("sobol", "True")):
-        command = [sys.executable, "-c", program, method]
-        done = subprocess.run(command, check=True, capture_output=True, text=True)
-        assert done.stdout.strip() == expected
+    command = [sys.executable, "-c", program]
+    done = subprocess.run(command, check=True, capture_output=True, text=True)
+    assert done.stdout.split() == ["False", "True"]
 
 
 def test_equal_sweeps_are_equal() -> None:

@@ -19,7 +19,7 @@ from test_fuzz import QUIET, attempt
 from vibsim import plan
 from vibsim.experiment import Experiment
 from vibsim.experiment.schema.unit_text import MAX_EXPONENT, MAX_UNIT, UnitError, factors, split
-from vibsim.experiment.units import DEFINITIONS, MAX_OWN, finite, known, meaning, registry
+from vibsim.experiment.units import DEFINITIONS, MAX_OWN, finite, meaning, registry, unit_named
 from vibsim.models import MODELS
 
 OSCILLATOR = {"kind": "oscillator", "spring": "k*u", "damping": {"linear": 0.1}}
@@ -371,8 +371,8 @@ def test_any_text_is_a_quantity_or_a_fault(
 
 
 def test_prefixes_and_names() -> None:
-    assert known("km") == known("kilometre") == meaning("km")
-    assert known("nothing") is None
+    assert unit_named("km") == unit_named("kilometre") == meaning("km")
+    assert unit_named("nothing") is None
     assert registry() is registry()
 
 

@@ -172,6 +172,75 @@ def test_what_is_no_structure_is_refused(changed, key, rule):
     assert rule in faults[0].rule
 
 
+def loaded(folder: Path, *, load: str, text: str, end: float = 3.0) -> Experiment:
+    """Return one mass on one spring under a load, beside the table ``push.csv``."""
+    (folder / "push.csv").write_text(text)
+    file = folder / "push.yaml"
+    file.write_text(
+        f"title: Push\nmodel: {{kind: structure, stiffness: [1], load: {load}}}\n"
+        f"time: {{end: {end}, base_steps: 6}}\nlevels: [4, 5]\nschemes: [newmark]\n"
+    )
+    return Experiment.from_yaml(file)
+
+
+@pytest.mark.parametrize(
+    ("load", "names"),
+    [
+        ("{1: {table: push.csv}}", "t,p"),
+        ("{shape: [0.5], times: {table: push.csv, t: time, p: force}}", "time;force"),
+    ],
+)
+def test_a_load_from_a_table_is_straight_between_its_points(tmp_path: Path, load, names):
+    """A ramp that stops at t = 1 has a closed form; the points are not equally spaced."""
+    rows = "0,0\n1,2\n4,2\n" if "," in names else "0;0\n1;4\n4;4\n"
+    own = loaded(tmp_path, load=load, text=f"{names}\n{rows}")
+    errors = []
+    for level in own.levels:
+        data = simulate(own, level)
+        t = data["t"]
+        late = np.maximum(t - 1.0, 0.0)
+        wanted = 2.0 * (t - np.sin(t)) - 2.0 * (late - np.sin(late))
+        errors.append(float(abs(data["u"][0, 0] - wanted).max()))
+    assert errors[1] < 1e-3
+    assert np.log2(errors[0] / errors[1]) == pytest.approx(2.0, abs=0.1)
+
+
+@pytest.mark.parametrize(
+    ("text", "key", "rule"),
+    [
+        ("t,p\n0,0\n2,1\n", "table", "the table ends at 2, but the motion lasts to 3"),
+        ("t,q\n0,0\n4,1\n", "p", "the table has no column 'p'"),
+        ("t,p\n1,0\n4,1\n", "table", "must begin at 0 or below"),
+        ("t,p\n0,0\n4,1\n4,2\n", "table", "'t' must increase"),
+        ("t,p\n0,0\n", "table", "must have at least 2 points"),
+    ],
+)
+@pytest.mark.parametrize(
+    ("load", "place"),
+    [("{1: {table: push.csv}}", "1"), ("{shape: [1], times: {table: push.csv}}", "times")],
+)
+def test_a_table_that_is_no_load_is_refused_with_its_place(tmp_path, load, place, text, key, rule):
+    with pytest.raises(InputError) as error:
+        loaded(tmp_path, load=load, text=text)
+    (fault,) = error.value.faults
+    assert fault.key == f"model.load.{place}.{key}"
+    assert rule in fault.rule
+    assert fault.line == 2
+
+
+def test_results_depend_on_the_numbers_of_a_load_and_not_on_names(tmp_path: Path):
+    """Another name of a column is the same structure, another number is not."""
+    digests = [
+        loaded(tmp_path, load=load, text=text).model.structure.structure.digest
+        for load, text in (
+            ("{1: {table: push.csv}}", "t,p\n0,0\n4,1\n"),
+            ("{1: {table: push.csv, p: q}}", "t,q\n0,0\n4,1\n"),
+            ("{1: {table: push.csv}}", "t,p\n0,0\n4,2\n"),
+        )
+    ]
+    assert digests[0] == digests[1] != digests[2]
+
+
 def test_a_scheme_for_formulas_is_refused():
     with pytest.raises(InputError, match="stepped together"):
         of(TWO, schemes=["rk4"])
@@ -198,6 +267,23 @@ def test_matrices_of_every_kind_of_file_are_the_same(tmp_path: Path, ending: str
     found = Experiment.from_yaml(file).model.definition.loaded.structure
     np.testing.assert_array_equal(found.mass.dense, mass)
     np.testing.assert_array_equal(found.stiffness.dense, stiffness)
+
+
+@pytest.mark.parametrize("ending", ["row.csv", "column.csv", "row.npy"])
+def test_a_file_with_one_row_or_column_is_a_diagonal(tmp_path: Path, ending: str):
+    """As a list in the experiment file is."""
+    name = f"m_{ending}"
+    if ending == "row.npy":
+        np.save(tmp_path / name, [[2.0, 1.0]])
+    else:
+        (tmp_path / name).write_text("2,1\n" if ending == "row.csv" else "2\n1\n")
+    file = tmp_path / "frame.yaml"
+    file.write_text(
+        f"title: Frame\nmodel: {{kind: structure, mass: {name}, stiffness: [[3, -1], [-1, 1]]}}\n"
+        "time: {end: 1.0}\nlevels: [4]\nschemes: [newmark]\n"
+    )
+    found = Experiment.from_yaml(file).model.definition.loaded.structure
+    np.testing.assert_array_equal(found.mass.dense, np.diag([2.0, 1.0]))
 
 
 @pytest.mark.slow

@@ -121,14 +121,14 @@ folder = Path(sys.argv[1])
 choices = [Choice("adhoc", p) for p in sorted(folder.glob("*.yaml"))]
 print(len(load_all(choices, cached=True)))
 heavy = {"numpy", "pydantic", "yaml", "netCDF4", "xarray", "llvmlite"} & set(sys.modules)
-assert len(sys.argv) < 3 or not heavy, heavy
+assert not heavy, heavy
 """
 
 
-def test_a_hundred_cached_plans_load_without_reading_a_file_again(tmp_path: Path) -> None:
-    for number in range(100):
+def test_cached_plans_load_without_reading_a_file_again(tmp_path: Path) -> None:
+    for number in range(20):
         (tmp_path / f"e{number}.yaml").write_text(TEXT + f"# {number}\n")
+    load_all([Choice("adhoc", path) for path in tmp_path.glob("*.yaml")], cached=True)
     command = [sys.executable, "-c", MANY, str(tmp_path)]
-    subprocess.run(command, check=True)
-    ended = subprocess.run([*command, "light"], check=True, capture_output=True, text=True)
-    assert ended.stdout.split() == ["100"]
+    ended = subprocess.run(command, check=True, capture_output=True, text=True)
+    assert ended.stdout.split() == ["20"]

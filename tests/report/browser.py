@@ -15,7 +15,7 @@ from typing import Any
 
 import pytest
 
-from vibsim.report.page.policy import digest_of
+from vibsim.report.page.templates import digest_of
 
 NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
 MISSING = (

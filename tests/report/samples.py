@@ -10,7 +10,7 @@ from vibsim import experiment as spec
 from vibsim.analysis import analyse_records, summarise, verdicts
 from vibsim.core.record import Record
 from vibsim.experiment import canonical, storage
-from vibsim.report import lead, style
+from vibsim.report import choice, style
 from vibsim.report.figures import drawing, gallery
 from vibsim.simulation import simulate_record
 
@@ -57,7 +57,7 @@ def plan(exp: Any) -> Any:
 
 def views(exp: Any, rec: Any, *quantities: str) -> tuple[dict[str, Any], list[str]]:
     """Return the views over members by the names of their files, and what all members share in words."""
-    decisive = lead.find(exp, rec, {"checks": []})
+    decisive = choice.find_lead(exp, rec, {"checks": []})
     with style.applied():
         found, told = gallery.over_members(exp, rec, list(quantities), decisive)
     return {view.picture.name: view for view in found}, told

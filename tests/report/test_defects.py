@@ -10,7 +10,7 @@ import pytest
 import samples
 
 from vibsim import report
-from vibsim.report import choice, data, lead, style
+from vibsim.report import choice, data, style
 from vibsim.report.data import Member
 from vibsim.report.figures import order, solution, time
 from vibsim.report.tables import levels as contents
@@ -32,7 +32,7 @@ def factors(exp):
     record = samples.record(exp)
     summary = samples.summary(exp, record)
     for check in summary["checks"]:
-        found = lead.find(exp, record, {**summary, "checks": [check]})
+        found = choice.find_lead(exp, record, {**summary, "checks": [check]})
         yield check, findings.factor(found)
 
 

@@ -6,7 +6,7 @@ import sympy
 from vibsim.experiment import Experiment
 from vibsim.formula import parse
 from vibsim.report.tables import degrees
-from vibsim.report.tables.degrees import is_polynomial, table, told
+from vibsim.report.tables.degrees import is_polynomial, residual_text, table
 from vibsim.theory import Residual
 
 TEXT = """
@@ -70,7 +70,10 @@ def test_polynomials_are_told_from_other_formulas(text, expected):
 
 def test_long_coefficients_are_left_out_and_long_numbers_rounded():
     x = sympy.Symbol("x")
-    assert told(None) == "exact"
-    assert told(Residual("velocity", 3, -(x**0))) == "velocity: -dt^3"
-    assert told(Residual("position", 4, sympy.Rational(10**9 + 1, 7) * x)) == "1.42857e+8 x dt^4"
-    assert told(Residual("position", 4, sum(sympy.symbols("x_:20")))) == "order dt^4"
+    assert residual_text(None) == "exact"
+    assert residual_text(Residual("velocity", 3, -(x**0))) == "velocity: -dt^3"
+    assert (
+        residual_text(Residual("position", 4, sympy.Rational(10**9 + 1, 7) * x))
+        == "1.42857e+8 x dt^4"
+    )
+    assert residual_text(Residual("position", 4, sum(sympy.symbols("x_:20")))) == "order dt^4"

@@ -16,10 +16,10 @@ from vibsim.core.vocabulary import REASONS
 from vibsim.experiment import Experiment
 from vibsim.experiment.experiment import canonical
 from vibsim.experiment.schema.checks import MEASURED
-from vibsim.report import data, lead, style
+from vibsim.report import choice, data, style, words
 from vibsim.report.figures import hero as drawn
 from vibsim.report.page import cards, hero, index
-from vibsim.report.text import changes, equation, experiment_file, findings, glossary, words
+from vibsim.report.text import equation, experiment_file, findings, glossary
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 WRONG_AS_TRAP = [{"kind": "central", "label": "wrong", "start": "first_order"}]
@@ -29,7 +29,7 @@ WRONG = [{"kind": "central", "start": "first_order"}]
 def found(exp):
     record = samples.record(exp)
     summary = samples.summary(exp, record)
-    return record, summary, lead.find(exp, record, summary)
+    return record, summary, choice.find_lead(exp, record, summary)
 
 
 def first(exp):
@@ -50,7 +50,7 @@ def test_every_reason_and_every_kind_of_check_has_a_title():
         ({"schemes": WRONG, "checks": [{"converges": "theta", "order": 2}]},
          "The angle θ converges at first order, not at second"),
         ({"levels": [6, 7]}, "There are too few levels to judge the angle θ"),
-        ({"sweep": {"initial.theta": [0.5, 1.0]}}, "The angle θ converges at second order in all 2 members"),
+        ({"sweep": {"initial.theta": [0.5, 1.0]}}, "The angle θ converges at second order in both members"),
         ({"schemes": ["central", "rk4"]},
          "The angle θ converges at the order that both schemes promise"),
         ({"checks": [{"value": "period", "below": 1.0}]}, "Period is not as expected"),
@@ -127,7 +127,7 @@ def test_a_change_of_the_file_mends_what_did_not_pass(options, checks, line):
     exp = samples.experiment(checks=checks, **options)
     _, summary, _ = found(exp)
     (entry,) = summary["checks"]
-    told = changes.change(exp, exp.checks[0].measured, entry)
+    told = experiment_file.change(exp, exp.checks[0].measured, entry)
     assert told == line
     if told:
         mended = samples.experiment(**{"checks": checks} | options | yaml.safe_load(told))

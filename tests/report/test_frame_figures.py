@@ -10,22 +10,22 @@ import pytest
 import samples
 from matplotlib.text import Text
 
-from vibsim.report import frame, lead, style
+from vibsim.report import choice, frame, style
 from vibsim.report.data import Member
 from vibsim.report.figures import (
     drawing,
     energy,
     extrema,
     gallery,
-    motion,
     order,
+    solution,
     theory,
     time,
     work,
 )
 from vibsim.report.figures.panels import Curve
+from vibsim.report.figures.work import lines
 from vibsim.report.page import hero
-from vibsim.report.tables.work import lines
 
 TEXT = ["forward_euler", "backward_euler", "crank_nicolson", "euler_cromer", "central"]
 MANY = [
@@ -129,7 +129,7 @@ def test_no_word_leaves_a_figure(case):
     record = samples.record(exp)
     shown, _ = gallery.choose(exp, record)
     with style.applied():
-        decisive = lead.find(exp, record, samples.summary(exp, record))
+        decisive = choice.find_lead(exp, record, samples.summary(exp, record))
         below = gallery.pictures(exp, record, shown, decisive, [])
         behind = [picture for tab in below.belief for picture in tab.pictures]
         behind += [view.picture for view in below.members]
@@ -275,7 +275,7 @@ def test_the_grey_line_of_a_motion_is_named_where_it_is_drawn(levels):
     model = {"kind": "elastic_pendulum", "beta": 0.9, "Theta": 40, "gamma": 0.05}
     exp = samples.experiment(model=model, initial={}, levels=levels)
     with style.applied():
-        picture = motion.motion(samples.record(exp), "x", Member(0, 0, "central", ""))
+        picture = solution.motion(samples.record(exp), "x", Member(0, 0, "central", ""))
     lines = picture.figure.axes[0].lines
-    assert ("grey" in picture.caption) == any(line.get_color() == motion.PALE for line in lines)
+    assert ("grey" in picture.caption) == any(line.get_color() == style.PALE for line in lines)
     assert ("grey" in picture.caption) == (len(levels) > 1)

@@ -14,9 +14,9 @@ from test_page import make, read
 
 from vibsim import report, store
 from vibsim.experiment import citation
+from vibsim.report import words
 from vibsim.report.page import cards, history
 from vibsim.report.page.index import Headline, headline
-from vibsim.report.text import words
 
 
 def put(results, collection, name, exp=None, **changes):
@@ -55,6 +55,15 @@ def test_an_empty_results_folder_has_an_index(tmp_path):
     assert not reader.open
     assert filters(tmp_path) == {}
     assert lines(tmp_path) == []
+
+
+def test_the_index_links_to_the_documentation_where_it_has_been_built(tmp_path):
+    report.write_index(tmp_path)
+    assert "docs/" not in (tmp_path / "index.html").read_text()
+    (tmp_path / "docs").mkdir()
+    (tmp_path / "docs/index.html").write_text("a page")
+    report.write_index(tmp_path)
+    assert 'href="docs/index.html"' in (tmp_path / "index.html").read_text()
 
 
 @pytest.mark.usefixtures("without_pictures")

@@ -8,10 +8,9 @@ import numpy as np
 import pytest
 import samples
 
-from vibsim.report import style
+from vibsim.report import style, words
 from vibsim.report.data import Member
 from vibsim.report.figures import time as figures_time
-from vibsim.report.text import words
 
 TITLE = "Order over time, in windows of half a period"
 

@@ -5,9 +5,8 @@ import pytest
 import samples
 
 from vibsim import simulate
-from vibsim.report import choice, data
+from vibsim.report import choice, data, words
 from vibsim.report.figures import gallery, plane
-from vibsim.report.text import words
 
 CONTENT = {
     "model": {"kind": "elastic_pendulum", "beta": 0.9, "Theta": 40},

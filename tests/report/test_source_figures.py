@@ -13,10 +13,11 @@ import yaml
 from vibsim import report
 from vibsim.experiment import Experiment
 from vibsim.experiment.schema.figures import KINDS
-from vibsim.report import lead, style
+from vibsim.report import choice, style
 from vibsim.report.figures import accuracy, of_source
-from vibsim.report.page import player, source_figures
+from vibsim.report.page import player
 from vibsim.report.page.templates import environment
+from vibsim.report.tables import source_figures
 
 ROOT = Path(__file__).parents[2]
 CONFIGS = ROOT / "configs"
@@ -49,7 +50,7 @@ def test_every_figure_of_the_texts_is_on_a_page(figure: str) -> None:
 
 def drawn(exp: Experiment) -> tuple[list, list[str]]:
     record = samples.record(exp)
-    decisive = lead.find(exp, record, samples.summary(exp, record))
+    decisive = choice.find_lead(exp, record, samples.summary(exp, record))
     with style.applied():
         found = of_source.pictures(exp, record, decisive)
     has_player = bool(player.element(exp, record, environment()))
@@ -83,7 +84,8 @@ def lines(picture) -> list[list[tuple[str, np.ndarray, np.ndarray]]]:
 
 def test_every_kind_draws_or_says_that_it_cannot() -> None:
     kinds = [{"shows": kind} for kind in KINDS]
-    found, undrawn = drawn(spring(*kinds, levels=[6, 7, 8]))
+    time = {"periods": 3, "steps_per_period": 1, "frequency": "model.w"}
+    found, undrawn = drawn(spring(*kinds, levels=[6, 7, 8], time=time))
     cannot = {asked.shows for asked, pictures in found if not pictures} - {"player"}
     assert cannot == {"path", "growth"}
     assert undrawn == ["A text, figure 1"] * 2
@@ -274,3 +276,28 @@ def test_the_page_the_table_and_the_index_name_the_figures(tmp_path) -> None:
     ]
     (folder / source_figures.FILE).write_bytes(b"\xff\x00")
     assert source_figures.listed(tmp_path, [folder]) == []
+
+
+def test_a_spectrum_shows_the_frequency_that_theory_knows() -> None:
+    exp = spring({"shows": "spectrum"}, time={"end": 100.0, "base_dt": 0.25}, levels=[0, 1])
+    ((_, [picture]),), _ = drawn(exp)
+    curves = lines(picture)[0]
+    places = {name: x for name, x, _ in curves if len(x) == 2}
+    assert places["natural"][0] == pytest.approx(2.0)
+    for level, dt in enumerate((0.25, 0.125)):
+        assert places[f"theory, level {level}"][0] == pytest.approx(2.0 / dt * np.arcsin(dt))
+    _, w, amplitudes = curves[0]
+    assert w[np.argmax(amplitudes)] == pytest.approx(2.02, abs=2.0 * np.pi / 100.0)
+
+
+def test_a_poincare_section_has_a_point_a_period() -> None:
+    exp = samples.experiment(
+        model={"kind": "duffing", "delta": 0.3, "gamma": 0.2, "omega": 1.2}, initial={"u": 1.0},
+        time={"periods": 20, "steps_per_period": 16, "frequency": "model.omega"}, levels=[0, 1], schemes=["rk4"],
+        sweep={"model.gamma": [0.2, 0.3]}, checks=[], figures=[{"source": "a", "shows": "poincare"}],
+    )  # fmt: skip
+    ((_, [picture]),), _ = drawn(exp)
+    for panel in lines(picture)[:2]:
+        ((_, u, v),) = panel
+        assert u.size == v.size == 11
+        assert np.ptp(u[-3:]) < 0.1 * np.max(np.abs(u))

@@ -185,3 +185,18 @@ def test_a_page_replaces_the_colour_of_every_line_of_its_figures(documents, tmp_
     used = set(re.findall(r' stroke="(#\w+)"', "".join([*documents, *drawn])))
     assert len(used) > len(style.COLOURS)
     assert {colour for colour in used if f'[stroke="{colour}"]' not in SHEET} == set()
+
+
+def test_axes_make_no_artists_for_ticks_until_somebody_draws_them():
+    with style.applied():
+        figure = style.canvas(2.0)
+        ax = figure.add_axes((0.1, 0.1, 0.8, 0.8))
+        ax.plot([0.0, 1.0], [0.0, 2.0])
+        ax.set_xticks([0.0, 1.0], ["least", "most"])
+        document = drawing.svg(figure, "plain")
+        assert ">least<" in document
+        assert ax.xaxis.majorTicks == ax.yaxis.majorTicks == []
+        assert [label.get_text() for label in ax.get_xticklabels()] == ["least", "most"]
+    lines = [tick.gridline for tick in ax.xaxis.majorTicks]
+    # a frame that is a rectangle clips as a box
+    assert [line.get_clip_box() is None for line in lines] == [False, False]

@@ -510,3 +510,13 @@ def test_curves_of_many_schemes_differ_in_their_dashes_too():
         lines = views[name].picture.figure.axes[0].lines
         named = [line for line in lines if line.get_label() in schemes]
         assert len({str(line._unscaled_dash_pattern) for line in named}) == len(named) == 4, name
+
+
+def test_a_curve_that_goes_up_and_down_is_drawn_in_its_order():
+    """Members that follow each other make one line with both branches; a list out of order is sorted as before."""
+    up_and_down = key([1.0, 2.0, 3.0, 2.0, 1.0], "model.omega")
+    assert sweep_layout.along_of([up_and_down]).lines[0][1].tolist() == [0, 1, 2, 3, 4]
+    assert sweep_layout.along_of([key([2.0, 3.0, 1.0])]).lines[0][1].tolist() == [2, 0, 1]
+    both = [key([0.5] * 5 + [1.0] * 5, "model.gamma"), key([1, 2, 3, 2, 1] * 2, "model.omega")]
+    lines = sweep_layout.along_of(both).lines
+    assert [row[1].tolist() for row in lines] == [[0, 1, 2, 3, 4], [5, 6, 7, 8, 9]]

@@ -10,9 +10,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from vibsim.report import words
 from vibsim.report.tables import table
 from vibsim.report.tables.table import Column, Table
-from vibsim.report.text import words
 
 
 def _table(*rows):

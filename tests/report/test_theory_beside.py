@@ -12,7 +12,7 @@ import samples
 
 from vibsim import report
 from vibsim.models import MODELS
-from vibsim.report import choice, data, style
+from vibsim.report import choice, data, style, words
 from vibsim.report.figures import energy as figures_energy
 from vibsim.report.figures import extrema, gallery
 from vibsim.report.figures import plane as figures_plane
@@ -21,9 +21,7 @@ from vibsim.report.figures import work as figures_work
 from vibsim.report.tables import levels as contents_levels
 from vibsim.report.tables import published
 from vibsim.report.tables import theory as contents_theory
-from vibsim.report.tables import work as contents_work
 from vibsim.report.tables.table import Column, Table, Written, to_csv
-from vibsim.report.text import words
 from vibsim.schemes import FIXED_STEP
 
 W = 2.0 * math.pi
@@ -172,6 +170,17 @@ def test_a_scheme_conserves_with_its_own_velocity_what_the_centred_difference_se
     assert {"own velocity", "[D₂ₜu]"} <= set(texts)
 
 
+def test_an_energy_that_damping_takes_away_is_no_error(tmp_path):
+    model = {"kind": "oscillator", "spring": "39.5*u"}
+    for more, is_error in (({}, True), ({"damping": {"linear": 0.5}}, False)):
+        exp = spring(model=model | more, schemes=["rk4"])
+        rec = samples.record(exp)
+        report.write(samples.plan(exp), rec, samples.summary(exp, rec), tmp_path)
+        page = (tmp_path / "report.html").read_text()
+        assert ("Energy error by velocity" in page) == is_error
+        assert ("How does the energy error grow" in page) == is_error
+
+
 def test_an_energy_that_decays_does_not_grow():
     rec = samples.record(spring(schemes=["forward_euler", "backward_euler"]))
     table = contents_levels.velocities(rec)
@@ -237,7 +246,7 @@ def test_adaptive_schemes_have_their_place_in_work_alone(tmp_path):
     adaptive = {"kind": "dop853", "tolerance": [1e-8, 1e-4]}
     exp = spring(schemes=["central", "rk4", adaptive])
     rec = samples.record(exp)
-    lines = {line.name: line for line in contents_work.lines(exp, rec, 0)}
+    lines = {line.name: line for line in figures_work.lines(exp, rec, 0)}
     assert lines["dop853"].labels == ("tolerance 0.0001", "tolerance 1e-08")
     assert lines["dop853"].error[0] > lines["dop853"].error[1]
     np.testing.assert_array_equal(lines["rk4"].work[1], 4 * lines["rk4"].work[0])

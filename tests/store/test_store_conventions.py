@@ -92,6 +92,27 @@ def test_cf_checker_finds_nothing_in_what_jobs_write(
     check(level, lean_level, part)
 
 
+@pytest.mark.parametrize("name", ["level_05/*.nc", "convergence.nc"])
+def test_every_variable_has_a_unit_and_a_name_that_can_be_read_alone(
+    results: dict[str, Path], name: str
+) -> None:
+    (file,) = results["series"].rglob(name)
+    record = store.read(file)
+    for key, variable in {**record.coords, **record.variables}.items():
+        assert variable.attrs["units"], key
+        told = variable.attrs["long_name"]
+        assert len(told) > 3, key
+        words = told.rpartition(": ")[2]
+        assert not words.startswith(("its ", "that error", "the same")), key
+
+
+def test_an_l1_norm_has_the_unit_of_an_integral_over_time(results: dict[str, Path]) -> None:
+    (file,) = results["series"].rglob("level_05/*.nc")
+    variables = store.read(file).variables
+    assert [variables[f"{q}_l1"].attrs["units"] for q in ("u", "v")] == ["m s", "m"]
+    assert "square root of s" in variables["u_l2"].attrs["long_name"]
+
+
 @pytest.mark.slow
 def test_cf_checker_finds_nothing_in_a_whole_convergence(
     results: dict[str, Path], tmp_path: Path

@@ -101,3 +101,28 @@ def test_a_file_that_has_changed_is_refused(made: Path) -> None:
             vibsim.open(made)
     finally:
         path.write_bytes(whole)
+
+
+def test_with_chunks_nothing_is_read_before_it_is_needed(made: Path) -> None:
+    folder = made / "adhoc" / "four"
+    with vibsim.open(folder) as read, vibsim.open(folder, chunks={}) as tree:
+        theta = tree["level_05/theta"]
+        assert theta.chunks is not None
+        assert theta.chunks[1] == (3, 1)  # a chunk for each of its two files
+        assert type(theta.data).__module__.startswith("dask")
+        error = abs(theta - tree["level_05/theta_exact"]).max("t")
+        wanted = abs(read["level_05/theta"] - read["level_05/theta_exact"]).max("t")
+        assert type(error.data).__module__.startswith("dask")
+        xr.testing.assert_equal(error.compute(), wanted)
+
+
+def test_level_files_are_put_side_by_side(made: Path) -> None:
+    files = sorted((made / "adhoc" / "four").glob("level_*.nc"))
+    options = {"join": "outer", "combine_attrs": "drop_conflicts"}
+    found = xr.open_mfdataset(files, combine="nested", concat_dim="level", **options)
+    with found, xr.open_dataset(files[1]) as finest:
+        assert found.level.values.tolist() == [6, 7]
+        assert found.period.chunks is not None
+        xr.testing.assert_equal(
+            found.period.sel(level=7).compute().drop_vars("level"), finest.period.drop_vars("level")
+        )

@@ -9,7 +9,7 @@ from scheme_variants import VARIANTS
 from vibsim import theory
 from vibsim.engine import integrate
 from vibsim.models import MODELS
-from vibsim.observe.oscillation import fitted
+from vibsim.observe.oscillation import fit_recurrence
 from vibsim.schemes import FIXED_STEP, SCHEMES
 
 SPRING = MODELS["spring"]
@@ -120,7 +120,7 @@ def test_a_long_run_is_left_with_the_dominant_root(p):
     """Of AB3 that is a parasitic one from w dt = 0.68 on."""
     scheme = SCHEMES["ab3"]
     most, angle = theory.dominant(scheme.stepper({}), p)
-    found = fitted(run(scheme, {}, p, 1500).position[0])
+    found = fit_recurrence(run(scheme, {}, p, 1500).position[0])
     assert np.exp(found.log_growth * 2 * np.pi / p) == pytest.approx(most, rel=1e-10)
     assert found.angle == pytest.approx(angle, rel=1e-10)
     assert (most > growth(scheme.stepper({}), p) ** (2 * np.pi / p) * 1.1) == (p > 0.68)

@@ -59,9 +59,12 @@ class Place:
     def tiny(self) -> Path:
         return self.results / "adhoc/tiny"
 
-    def run(self, *options: str, files: Sequence[Path] = ()) -> subprocess.CompletedProcess[str]:
+    def run(
+        self, *options: str, files: Sequence[Path] = (), forked_jobs: bool = True
+    ) -> subprocess.CompletedProcess[str]:
         named = files or [self.file]
-        return vibsim("run", *named, "--results", self.results, "--cores", "2", *options)
+        words = ("run", *named, "--results", self.results, "--cores", "2", *options)
+        return vibsim(*words, forked_jobs=forked_jobs)
 
     def jobs(self, *, files: Sequence[Path] = ()) -> list[str]:
         """Return what a run would do."""
@@ -101,7 +104,7 @@ def finished(tmp_path_factory: pytest.TempPathFactory, worker_id: str) -> Place:
         place = Place(folder)
         place.file.parent.mkdir()
         place.file.write_text(TEXT)
-        ended = place.run()
+        ended = place.run(forked_jobs=False)
         assert ended.returncode == 0, ended.stdout + ended.stderr
 
     return Place(made_once(tmp_path_factory, worker_id, "finished", make))

@@ -11,6 +11,8 @@ from typing import Any
 import pytest
 from forked import vibsim
 
+from vibsim.core.processes import started
+
 from .conftest import TEXT, Place
 from .test_attacks import IN_THE_WAY
 from .test_faults import flip
@@ -69,12 +71,6 @@ def test_every_changed_or_missing_result_comes_back_with_its_bytes(
     assert place.jobs() == []
 
 
-def test_the_index_is_made_again_for_its_table_alone(place: Place, finished: Place) -> None:
-    flip(place.results / "summary.csv")
-    assert place.run().returncode == 0
-    assert place.content() == finished.content()
-
-
 def test_a_missing_table_is_noticed(place: Place) -> None:
     next((place.tiny / "tables").glob("*.csv")).unlink()
     ended = place.run("--dry-run", "--json")
@@ -115,6 +111,21 @@ def test_without_a_record_seals_are_compared_and_the_rest_is_made_again(
     assert place.run().returncode == 0
     assert place.content() == finished.content()
     assert place.changed() == set()
+
+
+@pytest.mark.parametrize("content", [b"\xc0", b"[1]", b"{}", b""])
+def test_what_an_edit_makes_stale_is_made_again_also_without_records_of_the_workflow(
+    place: Place, content: bytes
+) -> None:
+    """Snakemake does not start with such records, or takes them for results that are up to date."""
+    for path in (place.results / ".snakemake/metadata").iterdir():
+        path.write_bytes(content)
+    place.change("A tiny", "Another")
+    assert place.jobs() == ["report", "index"]
+    if content == b"\xc0":
+        ended = place.run()
+        assert ended.returncode == 0, ended.stdout + ended.stderr
+        assert "Another" in (place.tiny / "report.html").read_text()
 
 
 def test_what_is_as_it_was_is_not_read(place: Place, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -166,8 +177,13 @@ def test_what_is_no_longer_asked_for_is_removed_and_nothing_else(place: Place) -
     shards = [touch(place.tiny / f"level_07/shard_000{n}.nc") for n in (0, 1)]
     other = touch(place.tiny / "level_09/mine.txt")
     users = [touch(place.tiny / name) for name in ("level_9.nc", "level_06.txt", "my.nc")]
+    # of a writer that was killed, and of one that is at work
+    half = touch(place.tiny / ".level_21.nc.1-0-ab.part")
+    me = os.getpid()
+    users.append(touch(place.tiny / f".level_21.nc.{me}-{started(me)}-ab.part"))
     ended = place.run("--dry-run")
     assert "would be removed" in ended.stderr
+    assert half.exists()
     assert (place.tiny / "level_09.nc").is_file()
     assert (place.tiny / "best.nc").is_file()
     ended = place.run()
@@ -176,6 +192,7 @@ def test_what_is_no_longer_asked_for_is_removed_and_nothing_else(place: Place) -
     assert not (place.tiny / "level_09.nc").exists()
     assert not (place.tiny / "best.nc").exists()
     assert not shards[0].parent.exists()
+    assert not half.exists()
     assert all(path.is_file() for path in (*users, other))
 
 

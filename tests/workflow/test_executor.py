@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import signal
 import subprocess
 import sys
@@ -11,22 +12,32 @@ from shlex import quote
 
 import pytest
 from made_once import change
+from torture.laboratory import processes, words
 
+from vibsim.cli.arguments import parsed
+from vibsim.cli.run import executor, pending
+from vibsim.core.errors import InputError
 from vibsim.plan import Names
 
 from .conftest import Place, here
-from .interrupts import processes, words
 
 SCRIPTS = {
-    "submit": 'setsid sh "$1" > /dev/null 2>&1 < /dev/null &\necho $!',
-    "status": 'if kill -0 "$1" 2> /dev/null; then echo running; else echo success; fi',
+    "submit": """\
+grep "^# properties" "$1" >> properties
+if [ -e lost ]; then setsid sh "$1" > /dev/null 2>&1 < /dev/null & else true & echo $! > lost; fi
+echo $!""",
+    "status": """\
+if [ "$1" = "$(cat lost)" ]; then echo failed; exit; fi
+if kill -0 "$1" 2> /dev/null; then echo running; else echo success; fi""",
     "cancel": 'for job in "$@"; do kill -9 "-$job"; done; echo "$@" >> cancelled',
 }
 
 
-def scheduler(folder: Path) -> list[str]:
-    """Return the options of a run whose jobs go to a scheduler in `folder`."""
+def scheduler(folder: Path, *, loses: bool = False) -> list[str]:
+    """Return the options of a run whose jobs go to a scheduler in `folder`, which may lose the first one."""
     folder.mkdir()
+    if not loses:
+        (folder / "lost").touch()
     options = ["--executor", "cluster-generic", "--jobs", "4", "--"]
     for name, text in SCRIPTS.items():
         script = folder / name
@@ -39,14 +50,22 @@ def scheduler(folder: Path) -> list[str]:
 def test_jobs_of_a_scheduler_give_the_same_bytes(place: Place, tmp_path: Path) -> None:
     wanted = place.content()
     other = Place(place.folder, elsewhere=tmp_path / "shared results")
-    ended = other.run(*scheduler(tmp_path / "scheduler"))
+    ended = other.run(*scheduler(tmp_path / "scheduler", loses=True))
     assert ended.returncode == 0, ended.stdout + ended.stderr
     found = other.content()
     assert found.keys() == wanted.keys()
     assert [name for name in wanted if found[name] != wanted[name]] == []
-    # simulations, analysis and report; the index is made here
-    assert len((tmp_path / "scheduler/submit.calls").read_text().splitlines()) == 3
     assert other.jobs() == []
+    rows = (tmp_path / "scheduler/properties").read_text().splitlines()
+    jobs = [json.loads(row.removeprefix("# properties = ")) for row in rows]
+    # simulations, analysis and report; the index is made here
+    names = [job.get("groupid") or job["rule"] for job in jobs]
+    assert names == ["simulate", "simulate", "analyse", "report"]
+    needs = [[job["resources"][key] for key in ("mem_mb", "runtime", "disk_mb")] for job in jobs]
+    assert all(memory > 500 and minutes > 2 and disk > 0 for memory, minutes, disk in needs)
+    # what was lost may have needed more
+    lost, again, *_ = needs
+    assert again == [2 * lost[0], 2 * lost[1], lost[2]]
 
 
 def test_an_interrupt_cancels_what_was_submitted(place: Place, tmp_path: Path) -> None:
@@ -85,12 +104,80 @@ def test_memory_holds_what_the_executor_needs_and_grows_with_each_attempt(place:
     assert asked(None, 3) == 3 * asked(None, 1)
 
 
+def test_jobs_are_grouped_to_minutes_and_long_ones_are_not(place: Place) -> None:
+    def made(levels: str) -> list[tuple[str | None, int | None]]:
+        change(place.file, "levels: [6, 7, 8, 9]", f"levels: {levels}")
+        names = Names.of([str(place.file)], str(place.results), Path())
+        change(place.file, f"levels: {levels}", "levels: [6, 7, 8, 9]")
+        return [(one.group, one.minutes) for one in names.simulations]
+
+    assert made("[6, 7]") == [("simulate", 3)]
+    # 52 s at 12 ns a step, and four times as long on a slow machine
+    assert made("[6, 32]") == [("simulate", 3), (None, 6)]
+
+
+def test_a_profile_configures_cores_and_memory_of_the_executor(
+    place: Place, tmp_path: Path
+) -> None:
+    def words(config: str, *options: str) -> list[str]:
+        file = tmp_path / "config.yaml"
+        file.write_text(f"executor: cluster-generic\n{config}")
+        options = ("run", str(place.file), "--profile", str(tmp_path), *options)
+        chosen = executor.chosen(parsed([*options]), [], place.results)
+        return [f"{key}={value}" for key, value in chosen.config.items()]
+
+    assert words("") == ["cores=1", "overhead=500"]
+    assert words("config: {overhead: 700}") == ["cores=1", "overhead=700"]
+    assert words("config: [cores=3]", "--cores", "2") == ["cores=2", "overhead=500"]
+    with pytest.raises(InputError, match="must be whole numbers"):
+        words("config: {overhead: much}")
+
+
+@pytest.mark.parametrize("name", executor.SHIPPED)
+def test_a_shipped_profile_is_found_by_its_name(
+    place: Place, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str
+) -> None:
+    def folder(*options: str) -> str:
+        chosen = executor.chosen(parsed(["run", str(place.file), *options]), [], place.results)
+        return chosen.arguments[chosen.arguments.index("--profile") + 1]
+
+    shipped = Path(__file__).parents[2] / "workflow/profiles" / name
+    assert folder("--profile", name) == str(shipped)
+    # a folder is taken only where it is asked for
+    own = tmp_path / name
+    own.mkdir()
+    (own / "config.yaml").touch()
+    monkeypatch.chdir(tmp_path)
+    assert folder("--profile", name) == str(own)
+    assert folder("--executor", "slurm" if name == "slurm" else "cluster-generic") == str(shipped)
+
+
+def test_jobs_that_wait_are_told_with_the_reason(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    rows = [
+        "/re sults/log Resources",
+        "/re sults/log Priority",
+        "/re sults/log Priority",
+        "/x/log a",
+    ]
+    pairs = [row.rsplit(" ", 1) for row in rows]
+    answer = tmp_path / "answer"
+    answer.write_text("".join(f"{log:4096}{reason:200}\n" for log, reason in pairs))
+    (tmp_path / "squeue").write_text(f"#!/bin/sh\ncat {answer}\n")
+    (tmp_path / "squeue").chmod(0o755)
+    monkeypatch.setenv("PATH", str(tmp_path), prepend=":")
+    found = pending.reasons(Path("/re sults"))
+    assert pending.in_words(found) == "3 jobs are pending: 2 Priority, 1 Resources"
+    assert pending.in_words(pending.reasons(Path("/x"))) == "1 job is pending: 1 a"
+    assert pending.in_words(pending.reasons(Path("/other"))) == ""
+
+
 @pytest.mark.parametrize(
     ("options", "rule"),
     [
         (["--executor", "cluster-generik", "--jobs", "2"], "did you mean 'cluster-generic'?"),
-        (["--executor", "cluster-generic"], "needs --jobs N"),
-        (["--profile", "nowhere"], "must be a folder with the file config.yaml"),
+        (["--profile", "nowhere"], "must be slurm or generic, or a folder with the file"),
         (["--jobs", "2"], "belongs to --executor"),
     ],
 )

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import signal
 import subprocess
 import sys
 import time
@@ -125,40 +124,6 @@ def wait_for_end(group: int) -> None:
             time.sleep(0.01)
 
 
-MADE = {
-    "before any job": "../../.vibsim/run.json",
-    "first job": "logs/level_06_to_09.log",
-    "first level": "level_06.nc",
-    "last level": "level_09.nc",
-    "analysis": "convergence.nc",
-    "report": "report.html",
-}
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    "made",
-    [name if name == "analysis" else pytest.param(name, marks=pytest.mark.slow) for name in MADE],
-)
-@pytest.mark.parametrize("whole", [True, False], ids=["all processes", "the run alone"])
-def test_after_a_kill_the_same_command_works(
-    tmp_path: Path, finished: Place, made: str, whole: bool
-) -> None:
-    place = Place(tmp_path)
-    place.file.parent.mkdir()
-    place.file.write_text(TEXT)
-    with start(place) as process:
-        wait_for(place.tiny / MADE[made], process)
-        (os.killpg if whole else os.kill)(process.pid, signal.SIGKILL)
-    assert process.returncode == -signal.SIGKILL
-    if whole:
-        wait_for_end(process.pid)
-    ended = place.run()
-    assert ended.returncode == 0, ended.stdout + ended.stderr
-    assert place.content() == finished.content()
-    assert not list(place.results.rglob(".*.part"))
-
-
 @pytest.mark.slow
 def test_two_runs_at_once_both_succeed_and_one_waits(tmp_path: Path, finished: Place) -> None:
     place = Place(tmp_path)
@@ -209,10 +174,10 @@ def test_a_failing_job_is_named_with_its_log_and_the_others_go_on(place: Place, 
     other = place.file.with_name("other.yaml")
     other.write_text(TEXT)
     place.change("A tiny", "Another")
-    ended = place.run(files=[place.file, other])
+    ended = place.run(files=[place.file, other], forked_jobs=False)
     assert ended.returncode == 1
     assert "failed: simulate adhoc/other level_06.nc to level_09.nc" in ended.stdout
-    quiet = place.run("-q", files=[place.file, other])
+    quiet = place.run("-q", files=[place.file, other], forked_jobs=False)
     assert (quiet.returncode, quiet.stdout) == (1, "")
     assert "level_07.nc: No space left on device" in quiet.stderr
     assert "level_06_to_09.log" in ended.stdout
@@ -226,7 +191,7 @@ def test_a_failing_job_is_named_with_its_log_and_the_others_go_on(place: Place, 
 def test_a_failing_level_does_not_cost_those_that_share_its_job(place: Place, trap: Path) -> None:
     other = place.file.with_name("other.yaml")
     other.write_text(TEXT)
-    assert place.run(files=[other]).returncode == 1
+    assert place.run(files=[other], forked_jobs=False).returncode == 1
     folder = place.results / "adhoc/other"
     kept = {path: path.stat().st_ino for path in folder.glob("level_*.nc")}
     assert [path.name for path in sorted(kept)] == ["level_06.nc", "level_08.nc", "level_09.nc"]

@@ -83,6 +83,10 @@ def test_a_wheel_runs_a_file_of_the_user_and_a_shipped_experiment_in_an_empty_fo
     shipped = next(folder.parent.glob("environment/lib/*/site-packages/vibsim/shipped"))
     assert f"{shipped}/configs/pendulum_lab/linear_limit.yaml" in page
     assert {path.name for path in folder.iterdir()} == {"own.yaml", "results"}
+    assert (shipped / "workflow/profiles/slurm/config.yaml").is_file()
+    other = ["--executor", "cluster-generic", "--", "--cluster-generic-submit-cmd", "sh"]
+    found = vibsim(folder, "run", "--dry-run", "own.yaml", *other)
+    assert found.stdout == "nothing to do\n", found.stderr
 
 
 @pytest.mark.slow

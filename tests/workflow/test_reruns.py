@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import html
 import json
-import os
 from dataclasses import replace
 
 import pytest
@@ -30,25 +29,6 @@ def test_a_finished_experiment_at_another_place_has_nothing_to_do(place: Place) 
     quiet = place.run("-q", "--junit", str(report))
     assert (quiet.returncode, quiet.stdout, quiet.stderr) == (0, "", "")
     assert '<testsuite name="adhoc/tiny" tests="1" failures="0" errors="0">' in report.read_text()
-
-
-MATRIX = {
-    # what else changes a digest: `tests/plan/test_plan_digests.py`
-    "check": ("order: scheme", "order: 2.1", {"analyse", "report", "index"}),
-    "finer level": ("8, 9]", "8, 9, 10]", {"level_10", "analyse", "report", "index"}),
-    "level left out": ("8, 9]", "8]", {"analyse", "report", "index"}),
-    "parameter": ("g: 1.0", "g: 1.5", EVERYTHING),
-}
-
-
-@pytest.mark.parametrize(("old", "new", "expected"), MATRIX.values(), ids=MATRIX)
-def test_exactly_what_uses_a_change_runs_again(
-    place: Place, old: str, new: str, expected: set[str]
-) -> None:
-    place.change(old, new)
-    found = place.jobs()
-    assert set(found) == expected
-    assert len(found) == len(expected)
 
 
 WORDS = {
@@ -145,25 +125,6 @@ def test_a_setting_is_told_recorded_and_taken_back(place: Place) -> None:
 
 
 @pytest.mark.slow
-def test_one_more_level_leaves_the_files_of_the_others_untouched(place: Place) -> None:
-    # What is written anew is another file, put in the place of the old one.
-    before = {path: path.stat().st_ino for path in place.tiny.glob("level_*.nc")}
-    assert len(before) == 4
-    place.change("8, 9]", "8, 9, 10]")
-    assert place.run().returncode == 0
-    assert {path: path.stat().st_ino for path in before} == before
-    assert (place.tiny / "level_10.nc").is_file()
-    assert place.jobs() == []
-
-
-def test_a_comment_another_spelling_order_or_time_of_the_file_runs_nothing(place: Place) -> None:
-    place.change("title:", "# a comment\ntitle:")
-    place.change("kind: pendulum, g: 1.0, L: 1.0", "L: 1.0, g: 1.00, kind: pendulum")
-    os.utime(place.file)
-    assert place.jobs() == []
-
-
-@pytest.mark.slow
 def test_a_second_experiment_leaves_the_first_alone(place: Place) -> None:
     other = place.file.with_name("other.yaml")
     other.write_text(TEXT)
@@ -175,25 +136,4 @@ def test_a_second_experiment_leaves_the_first_alone(place: Place) -> None:
     assert "other" in index
     assert place.jobs(files=[place.file, other]) == []
     # The index covers all that is there, whichever experiments are chosen.
-    assert place.jobs() == []
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("name", ["convergence.nc", "summary.json", "report.html"])
-def test_a_lost_file_comes_back_with_the_same_bytes(place: Place, name: str) -> None:
-    before = place.content()
-    (place.tiny / name).unlink()
-    assert place.run().returncode == 0
-    assert place.content() == before
-
-
-@pytest.mark.slow
-def test_lost_tables_come_back(place: Place) -> None:
-    folder = place.tiny / "tables"
-    before = {path.name for path in folder.iterdir()}
-    for path in folder.iterdir():
-        path.unlink()
-    folder.rmdir()
-    assert place.run().returncode == 0
-    assert {path.name for path in folder.iterdir()} == before
     assert place.jobs() == []

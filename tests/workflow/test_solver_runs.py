@@ -354,6 +354,17 @@ def test_a_function_that_raises_is_named_with_its_traceback(
     assert "Traceback" in ended.stdout
 
 
+def test_a_function_that_is_not_there_is_named_with_the_nearest(study: Study) -> None:
+    module = study.folder / "my files/has_another.py"
+    module.write_text("def solved(h, rate=1):\n    return None\n")
+    study.write("misspelt", FUNCTION.replace("solver_in_a_module", "has_another"))
+    options = ("--level", 1, "--results", study.results, "--allow-commands")
+    ended = here("simulate", study.file("misspelt"), *options)
+    assert ended.returncode == 1
+    assert ended.stderr.endswith("has_another has no function solve: did you mean 'solved'?\n")
+    assert "Traceback" not in ended.stdout
+
+
 def analysed(study: Study, name: str) -> tuple[int, str]:
     for level in range(3):
         assert study.make(name, level)[0] == 0

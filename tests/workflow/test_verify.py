@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 from forked import vibsim
+from torture.laboratory import problems, vouched_for
 
 from vibsim import store
 from vibsim.cli import made_files
@@ -21,33 +22,11 @@ from .conftest import Place, here
 FLIPS = 1000
 
 
-def problems(place: Place) -> dict[str, str]:
-    """Compare all files, as `vibsim verify` without a name does."""
-    keys = ["", *verify.experiments(place.results)]
-    return {
-        path: text for key in keys for path, text in verify.compare(place.results, key)[1].items()
-    }
-
-
-def results(place: Place) -> list[Path]:
-    """Return every file that a run vouches for, and the manifests themselves."""
-    found = [path for path in place.results.rglob("*") if path.is_file()]
-    aside = {".snakemake", "logs", "benchmarks"}
-    return sorted(
-        path
-        for path in found
-        if (inner := path.relative_to(place.results).parts)
-        and not aside & set(inner)
-        and (inner[0] != ".vibsim" or inner[1] == "made")
-        and path.name != ".snakemake_timestamp"
-    )
-
-
 def flips(place: Place, number: int) -> Iterator[tuple[Path, int]]:
     """Yield files, each kind in turn, with a bit flipped; it is flipped back afterwards."""
     chosen = random.Random(23)
     kinds: dict[str, list[Path]] = {}
-    for path in results(place):
+    for path in vouched_for(place):
         kinds.setdefault(f"{path.parent.name}{path.suffix}", []).append(path)
     for k in range(number):
         path = chosen.choice(list(kinds.values())[k % len(kinds)])
@@ -68,6 +47,22 @@ def test_every_flipped_bit_is_noticed_and_its_file_is_named(place: Place, number
     assert problems(place) == {}
 
 
+def test_the_documentation_is_no_result(place: Place) -> None:
+    """As ``make docs`` leaves it, with folders where a collection has its experiments."""
+    pages = [place.results / "docs" / name for name in ("index.html", "docs/tutorial.html")]
+    try:
+        for path in pages:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_text("a page")
+        assert problems(place) == {}
+        (other := place.results / "doc").mkdir()
+        (other / "index.html").write_text("a page")
+        assert list(problems(place)) == ["doc/index.html"]
+    finally:
+        for name in ("docs", "doc"):
+            shutil.rmtree(place.results / name, ignore_errors=True)
+
+
 def cut(path: Path) -> None:
     path.write_bytes(path.read_bytes()[:-1])
 
@@ -76,7 +71,7 @@ def cut(path: Path) -> None:
 def test_what_is_truncated_missing_or_empty_is_noticed(
     place: Place, harm: Callable[[Path], None]
 ) -> None:
-    files = results(place)
+    files = vouched_for(place)
     # one of each kind; a manifest without its last line end says the same
     named = {f"{path.parent.name}{path.suffix}": path for path in files}.values()
     assert len(named) == 9
@@ -130,6 +125,20 @@ def test_a_damaged_manifest_is_named_and_the_next_run_mends_it(
     assert place.content() == finished.content()
 
 
+def test_manifests_of_two_experiments_that_changed_places_are_damaged(
+    place: Place, finished: Place
+) -> None:
+    manifests = made_files.path(place.results, "adhoc/tiny"), made_files.path(place.results, "")
+    texts = [manifest.read_text() for manifest in manifests]
+    for manifest, text in zip(manifests, reversed(texts), strict=True):
+        manifest.write_text(text)
+    told = problems(place)
+    assert sorted(told) == [".vibsim/made/adhoc.tiny.jsonl", ".vibsim/made/index.jsonl"]
+    assert place.run().returncode == 0
+    assert problems(place) == {}
+    assert place.content() == finished.content()
+
+
 def test_changes_of_runs_are_no_damage(place: Place) -> None:
     """Another title, fewer levels, a second experiment with the index made again, a job by hand, a copy."""
     other = place.file.with_name("other.yaml")
@@ -150,6 +159,26 @@ def test_changes_of_runs_are_no_damage(place: Place) -> None:
         known = made_files.load(place.results, key)
         assert list(known) == sorted(known)
         assert made_files.path(place.results, key).read_text().count("\n") == 1
+
+
+def test_a_job_that_is_killed_before_its_files_are_on_record_damages_nothing(
+    place: Place, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    place.change("A tiny", "Another")
+    place.change("order: scheme", "order: 2")
+
+    def killed(*_: object) -> None:
+        raise SystemExit(137)
+
+    monkeypatch.setattr(made_files, "add", killed)
+    for words in (["analyse", place.file], ["report", place.file], ["report"]):
+        with pytest.raises(SystemExit):
+            here(*words, "--results", place.results)
+        assert made_files.CHANGED not in problems(place).values()
+    assert "adhoc/tiny/report.html" in problems(place)
+    monkeypatch.undo()
+    assert place.run().returncode == 0
+    assert problems(place) == {}
 
 
 def test_an_interrupted_run_is_no_damage_and_not_whole(place: Place) -> None:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from vibsim.core.lazy import loader
 
 if TYPE_CHECKING:
-    from vibsim.analysis.blockwise import analyse_parts, joined, kept
+    from vibsim.analysis.blockwise import analyse_parts, join_parts, keep_for_verdicts
     from vibsim.analysis.check_verdicts import Verdict, verdicts
     from vibsim.analysis.compare_levels import analyse, analyse_records
     from vibsim.analysis.summary import summarise
@@ -22,26 +22,20 @@ __all__ = [
     "analyse",
     "analyse_parts",
     "analyse_records",
-    "joined",
-    "kept",
+    "join_parts",
+    "keep_for_verdicts",
     "summarise",
     "verdicts",
 ]
 
-__getattr__ = loader(
-    __name__,
-    {
-        "Result": "vibsim.checks.outcome",
-        "Verdict": "vibsim.analysis.check_verdicts",
-        "analyse": "vibsim.analysis.compare_levels",
-        "analyse_parts": "vibsim.analysis.blockwise",
-        "analyse_records": "vibsim.analysis.compare_levels",
-        "joined": "vibsim.analysis.blockwise",
-        "kept": "vibsim.analysis.blockwise",
-        "summarise": "vibsim.analysis.summary",
-        "verdicts": "vibsim.analysis.check_verdicts",
-    },
-)
+_HOMES = {
+    "blockwise": ("analyse_parts", "join_parts", "keep_for_verdicts"),
+    "check_verdicts": ("Verdict", "verdicts"),
+    "compare_levels": ("analyse", "analyse_records"),
+    "summary": ("summarise",),
+}
+_HOME = {name: f"vibsim.analysis.{module}" for module, names in _HOMES.items() for name in names}
+__getattr__ = loader(__name__, _HOME | {"Result": "vibsim.checks.outcome"})
 
 
 def __dir__() -> list[str]:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from vibsim.checks import tolerance
 from vibsim.checks.kinds import definition, judge
 from vibsim.checks.outcome import Outcome, Results, compared_reason, truth
-from vibsim.checks.sweep_regions import where
+from vibsim.checks.sweep_regions import sweep_regions
 from vibsim.checks.verdict_text import Wording, expectation
 from vibsim.core.errors import VibsimError
 from vibsim.core.record import Record
@@ -86,7 +86,7 @@ def _verdict(
     id_, measured = (BY_TOLERANCE, None) if check is None else (check.id, check.measured)
     if not outcome.total:
         raise VibsimError(f"check {id_}: it applies to no scheme or no member of the experiment")
-    results, counts, found = Results(outcome), outcome.counts(), where(record, outcome)
+    results, counts, found = Results(outcome), outcome.counts(), sweep_regions(record, outcome)
     decisive = next(results.worst(1))
     status = worst(name for name, count in counts.items() if count)
     reason = compared_reason(measured, status, decisive.status, decisive.reason)

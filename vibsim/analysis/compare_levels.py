@@ -10,18 +10,18 @@ from numpy.typing import NDArray
 
 from vibsim.analysis.motion_variables import motion
 from vibsim.apriori.force_discontinuities import corner_variables, switches_of
-from vibsim.checks.fields import flags
 from vibsim.checks.kinds import check_variables, definition
 from vibsim.checks.order import phase_at_start
 from vibsim.checks.tolerance import bounds
 from vibsim.comparison import best_values
+from vibsim.comparison.compare_quantities import comparisons
 from vibsim.comparison.comparison_variables import Table, in_precision, numbers, over_time
 from vibsim.comparison.order_evidence import judge_orders, judgement, order_in
-from vibsim.comparison.quantity_comparison import Comparison, comparisons
+from vibsim.comparison.quantity_comparison import Comparison
 from vibsim.comparison.work_precision import work_precision
 from vibsim.convergence import differences
 from vibsim.core.errors import VibsimError
-from vibsim.core.record import Record, Variable, attributes
+from vibsim.core.record import Record, Variable, flags
 from vibsim.core.vocabulary import (
     HIGHEST,
     MEMBER,
@@ -32,7 +32,7 @@ from vibsim.core.vocabulary import (
     TYPICAL_NORM,
     is_error_part,
 )
-from vibsim.experiment.storage import RUNNING, asked, lean_series
+from vibsim.experiment.storage import RUNNING, checked_quantities, lean_series
 from vibsim.models import centred
 from vibsim.models.events import TREATMENTS
 from vibsim.observe.common_grid import SAME_AT_EVERY_LEVEL
@@ -91,7 +91,7 @@ def analyse_records(experiment: Experiment, records: Mapping[int, Record]) -> Re
     block = block_of(experiment, records)
     found = comparisons(block, compared(experiment, block.lean) + _centred(block))
     measured = (check.measured for check in experiment.checks)
-    asked_for = asked(experiment)
+    asked_for = checked_quantities(experiment)
     # a sweep too large for its series has verdicts on what checks ask about, and its sentences need
     judged = [name for name in found if not block.lean or name in asked_for or is_error_part(name)]
     judge_orders(found, judged, [check for check in measured if check.kind == "converges"])
@@ -110,8 +110,8 @@ def analyse_records(experiment: Experiment, records: Mapping[int, Record]) -> Re
     if varies_in_time(block.model):
         table |= missed_variables(block.missed)
     if is_damped(block.model):
-        attrs = attributes("largest rate at which damping takes a velocity away", "1/s")
-        table["decay_rate"] = Variable(MEMBER, block.decay, attrs)
+        words = "largest rate at which damping takes a velocity away"
+        table["decay_rate"] = Variable.of(MEMBER, block.decay, words, "1/s")
     table |= best_values.table(block, found)
     if experiment.tolerance is not None:
         table |= bounds(block)
@@ -131,7 +131,7 @@ def compared(experiment: Experiment, lean: bool = False) -> tuple[str, ...]:
     """Name the quantities that are compared between levels: states, energy, and what a check asks for."""
     states = (state.name for state in experiment.model.definition.states)
     own = lean_series(experiment) if lean else (*states, "energy", "energy_deviation")
-    return tuple(dict.fromkeys([*own, *asked(experiment)]))
+    return tuple(dict.fromkeys([*own, *checked_quantities(experiment)]))
 
 
 def _centred(block: MemberBlock) -> tuple[str, ...]:
@@ -148,7 +148,7 @@ def _coords(block: MemberBlock) -> Table:
     levels = np.array(grid.levels, dtype=np.int64)
 
     def add(name: str, values: Any, words: str, dim: str = "") -> None:
-        coords[name] = Variable((dim or name,), np.array(values), attributes(words, "1"))
+        coords[name] = Variable.of((dim or name,), np.array(values), words)
 
     add("level", levels, "level")
     if len(levels) > 1:
@@ -163,7 +163,7 @@ def _coords(block: MemberBlock) -> Table:
     is_of_case = "end" in finest
     dt = grid.dt if is_of_case else grid.dt[:, 0]
     dims = ("level", "case") if is_of_case else ("level",)
-    coords["dt"] = Variable(dims, dt, attributes("time step", "s"))
+    coords["dt"] = Variable.of(dims, dt, "time step", "s")
     return coords
 
 
@@ -187,8 +187,8 @@ def _scaled_deviation(q: Comparison) -> Table:
             for u, level in zip(q.values, levels, strict=True)
         ]
     dims = ("scheme", "case", "level", "t")
-    attrs = attributes(f"{q.long_name}, rescaled", q.units)
-    return {f"{q.name}_scaled": Variable(dims, np.stack(scaled, 2), attrs)}
+    words = f"{q.long_name}, rescaled"
+    return {f"{q.name}_scaled": Variable.of(dims, np.stack(scaled, 2), words, q.units)}
 
 
 def _scalars(block: MemberBlock) -> Table:
@@ -213,7 +213,7 @@ def _scalars(block: MemberBlock) -> Table:
             table[name] = Variable((*dims, "level"), stacked, attrs)
     if motion_decides(block.model):
         words = "angular frequency that a step has to resolve along the motion times the time step"
-        table[HIGHEST] = Variable(("case", "level"), block.fastest, attributes(words, "1"))
+        table[HIGHEST] = Variable.of(("case", "level"), block.fastest, words)
     return table
 
 
@@ -231,8 +231,7 @@ def _verdict(q: Comparison) -> Table:
 
     def add(key: str, values: NDArray[Any], words: str, **more: Any) -> None:
         dims = ("scheme", "case", "norm")[: values.ndim]
-        attrs = attributes(f"{q.name}: {words}", "1", **more)
-        table[f"{q.name}_{key}"] = Variable(dims, values, attrs)
+        table[f"{q.name}_{key}"] = Variable.of(dims, values, f"{q.name}: {words}", **more)
 
     orders = np.stack([order_in(q, norm) for norm in q.block.norms], axis=-1)
     add("order", in_precision(q, orders), "stated order")
@@ -242,7 +241,8 @@ def _verdict(q: Comparison) -> Table:
             np.full(orders.shape[:-1], np.nan) if j is None else getattr(j, end) for j in judged
         ]
         found = np.stack(values, axis=-1)
-        add(f"order_{end}", in_precision(q, found), f"its {text} end, in the norms that are judged")
+        words = f"{text} end of the interval of the order, in the norms that are judged"
+        add(f"order_{end}", in_precision(q, found), words)
     for key, levels in (("first", typical.first), ("last", typical.last)):
         text = f"{key} level that the order rests on, -1 for none"
         add(f"window_{key}", levels.astype(np.int16), text)

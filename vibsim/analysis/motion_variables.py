@@ -7,17 +7,16 @@ differ in w dt.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 
-from vibsim.checks.fields import flags
 from vibsim.comparison import best_values, value_numbers
 from vibsim.comparison.comparison_variables import Table
-from vibsim.comparison.quantity_comparison import Comparison
+from vibsim.comparison.quantity_comparison import Compared
 from vibsim.core.array_types import Floats
-from vibsim.core.record import Variable, attributes
+from vibsim.core.record import Variable, flags
 from vibsim.core.vocabulary import DRIFTS, MEMBER, OF_LEVEL
 from vibsim.experiment.schema.published import row_at, row_id
 from vibsim.experiment.value_names import VALUES
@@ -33,9 +32,11 @@ THEORY_RUNS = 2**12
 PEAKS = "interpolated peaks"
 RECURRENCE = f"recurrence of the steps; {PEAKS} where a run satisfies none to rounding"
 """How growth and frequency were measured (`vibsim.observe.oscillation`): attribute ``method``."""
+GROWTH = "growth factor of the amplitude per period"
+EARLY = "time by which peaks come early, per period"
 
 
-def motion(block: MemberBlock, compared: Mapping[str, Comparison]) -> Table:
+def motion(block: MemberBlock, compared: Compared) -> Table:
     """Return the variables of the convergence Record that belong to the motion of every scheme, member and level."""
     if block.lean:
         return {}
@@ -43,12 +44,12 @@ def motion(block: MemberBlock, compared: Mapping[str, Comparison]) -> Table:
     table |= _beside(block, compared)
     words = "largest stable w dt: infinite for none, 0 where every step grows"
     limits = predicted_oscillation.limits(block)
-    table["stability_limit"] = Variable(MEMBER, limits, attributes(words, "1"))
+    table["stability_limit"] = Variable.of(MEMBER, limits, words)
     words = "largest position over the largest exact one, or over that of the coarsest level"
-    table["size_over_exact"] = Variable(OF_LEVEL, block.growth, attributes(words, "1"))
+    table["size_over_exact"] = Variable.of(OF_LEVEL, block.growth, words)
     words = "evaluations of the acceleration; of an implicit scheme those of one iteration per step"
     counts = _by_level(block, oscillation.force_evaluations)
-    table["force_evaluations_total"] = Variable(OF_LEVEL, counts, attributes(words, "1"))
+    table["force_evaluations_total"] = Variable.of(OF_LEVEL, counts, words)
     return table
 
 
@@ -59,33 +60,22 @@ def _by_level(block: MemberBlock, of: Callable[[MemberBlock, int], Floats]) -> F
 def _theory(block: MemberBlock) -> Table:
     """Return growth, frequency and phase error, predicted and measured."""
     known, seen = predicted_oscillation, oscillation
-    words: dict[str, tuple[str, str, Callable[..., Floats], Callable[..., Floats]]] = {
-        "growth": (
-            "growth factor of the amplitude per period",
-            "1",
-            known.growth_per_period,
-            seen.growth_of_motion,
-        ),
-        "frequency": ("angular frequency", "rad s-1", known.frequency, seen.frequency),
-        "phase_error": (
-            "time by which peaks come early, per period",
-            "s",
-            known.phase_error,
-            seen.phase_error,
-        ),
-    }
+    rows: tuple[tuple[str, str, str, Callable[..., Floats], Callable[..., Floats]], ...] = (
+        ("growth", GROWTH, "1", known.growth_per_period, seen.growth_of_motion),
+        ("frequency", "angular frequency", "rad s-1", known.frequency, seen.frequency),
+        ("phase_error", EARLY, "s", known.phase_error, seen.phase_error),
+    )
     by_recurrence = all(seen.has_recurrence(block, level) for level in block.grid.levels)
-    method = {"method": RECURRENCE if by_recurrence else PEAKS}
+    method = RECURRENCE if by_recurrence else PEAKS
     predicted: Table = {}
     measured: Table = {}
-    for name, (text, unit, theory, measurement) in words.items():
+    for name, text, unit, theory, measurement in rows:
         values = np.full((*block.shape, len(block.grid.levels)), np.nan)
         if _different(block) <= THEORY_RUNS:
             values = _by_level(block, theory)
-        attrs = attributes(f"predicted {text}", unit)
-        predicted[f"theory_{name}"] = Variable(OF_LEVEL, values, attrs)
-        attrs = attributes(f"measured {text}", unit, **method)
-        measured[f"measured_{name}"] = Variable(OF_LEVEL, _by_level(block, measurement), attrs)
+        predicted[f"theory_{name}"] = Variable.of(OF_LEVEL, values, f"predicted {text}", unit)
+        values, words = _by_level(block, measurement), f"measured {text}"
+        measured[f"measured_{name}"] = Variable.of(OF_LEVEL, values, words, unit, method=method)
     return predicted | measured
 
 
@@ -103,15 +93,14 @@ def _drift(block: MemberBlock) -> Table:
     found = [drift_at(block, level) for level in block.grid.levels]
     kinds = np.stack([drift.kind for drift in found], axis=-1)
     rates = by_level([drift.rate for drift in found])
-    of_kind = attributes("how the energy error grows with time", "1", **flags(DRIFTS))
-    of_rate = attributes(
+    of_kind = "how the energy error grows with time"
+    of_rate = (
         "relative energy error per period of a linear drift, per period squared of a quadratic one, change of its "
-        "logarithm per period of an exponential one",
-        "1",
+        "logarithm per period of an exponential one"
     )
     return {
-        "energy_drift_kind": Variable(OF_LEVEL, kinds, of_kind),
-        "energy_drift_rate": Variable(OF_LEVEL, rates, of_rate),
+        "energy_drift_kind": Variable.of(OF_LEVEL, kinds, of_kind, **flags(DRIFTS)),
+        "energy_drift_rate": Variable.of(OF_LEVEL, rates, of_rate),
     }
 
 
@@ -143,7 +132,7 @@ def _running(block: MemberBlock) -> Table:
     return table
 
 
-def _beside(block: MemberBlock, compared: Mapping[str, Comparison]) -> Table:
+def _beside(block: MemberBlock, compared: Compared) -> Table:
     """Return what published tables have beside their rows, shape (check, case, beside); NaN elsewhere."""
     experiment = block.experiment
     width = max((len(table.beside) for table in experiment.published), default=0)
@@ -161,5 +150,5 @@ def _beside(block: MemberBlock, compared: Mapping[str, Comparison]) -> Table:
                 own = place if VALUES[name].of != "none" else replace(place, quantity="")
                 values, _ = best_values.value(name, own)
                 found[ids.index(row_id(i, j)), :, k] = values[names.index(row.scheme)]
-    attrs = attributes("numbers beside each row of a published table", "1")
-    return {"published_beside": Variable(("check", "case", "beside"), found, attrs)}
+    words = "numbers beside each row of a published table"
+    return {"published_beside": Variable.of(("check", "case", "beside"), found, words)}

@@ -76,12 +76,15 @@ def _check(
 
 
 def _member(experiment: Experiment, record: Record, case: int) -> dict[str, Any]:
-    """Return the swept values of a member of a sweep, and what runs it alone."""
+    """Return the swept values of a member of a sweep, and what runs it alone, where that is possible."""
     if experiment.sweep is None:
         return {}
     at = record.place("case", case)
+    found = {"values": {key: values[at] for key, values in columns_of(record).items()}}
+    if case % experiment.chain:
+        return found
     return {
-        "values": {key: values[at] for key, values in columns_of(record).items()},
+        **found,
         "command": f"vibsim run {quote(f'{experiment.word}@{case}')}{set_options(experiment.settings)}",
     }
 
@@ -115,5 +118,4 @@ def _step(record: Record, scheme: int, case: int, level: int) -> int:
     """Return the step at which a member failed."""
     if "last_step" in record:
         return int(record["last_step"][scheme, case, level]) + 1
-    dt = record["dt"][level]
-    return round(float(record["failure_time"][scheme, case, level] / (dt[case] if dt.ndim else dt)))
+    return round(float(record["failure_time"][scheme, case, level]) / record.step(level, case))

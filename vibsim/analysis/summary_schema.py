@@ -11,12 +11,12 @@ from typing import Any
 import numpy as np
 
 from vibsim.checks import reductions
-from vibsim.checks.fields import MEMBERS, Field, stated
+from vibsim.checks.fields import Field, result_fields
 from vibsim.checks.kinds import KINDS
 from vibsim.checks.order import BESIDE
 from vibsim.checks.solver_facts import LEVELS, SOLVER_FACTS
 from vibsim.checks.tolerance import BOUND
-from vibsim.core.vocabulary import BY_TOLERANCE, FORMAT, REASON_NAMES, STATUSES
+from vibsim.core.vocabulary import BY_TOLERANCE, FORMAT, MEMBER, REASON_NAMES, STATUSES
 from vibsim.experiment.citation import FIELDS
 
 TEXT = {"type": "string"}
@@ -57,14 +57,14 @@ def _fact(field: Field) -> dict[str, Any]:
     kind = "integer" if np.issubdtype(field.type, np.integer) else "number"
     several = {"type": ["array", "null"], "items": {"type": kind}}
     one = {"type": [kind, "null"]}
-    return (several if len(field.dims) > len(MEMBERS) else one) | {"description": field.meaning}
+    return (several if len(field.dims) > len(MEMBER) else one) | {"description": field.meaning}
 
 
 def schema() -> dict[str, Any]:
     """Return the JSON Schema (draft 2020-12) of a summary."""
     facts = []
     for kind, row in KINDS.items():
-        of_kind = {name: _fact(field) for name, field in stated(row.fields).items()}
+        of_kind = {name: _fact(field) for name, field in result_fields(row.fields).items()}
         if kind == "converges":
             of_kind |= {name: _fact(field) for name, field in BESIDE.items()}
         facts.append(_object(of_kind, title=f"facts of a check `{kind}`"))

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibsim.core.array_types import Flags, Floats, Integers
-from vibsim.core.record import Record, Variable, attributes
+from vibsim.core.record import Record, Variable
 from vibsim.core.vocabulary import MEMBER
 from vibsim.formula import Name, Switch, names_in, to_formula
 from vibsim.models import Model
@@ -226,6 +226,6 @@ def corner_variables(corners: Corners) -> dict[str, Variable]:
         "switch": (corners.switch.astype(np.int16), "number of its condition, or -1", "1"),
     }
     return {
-        f"corner_{name}": Variable(MEMBER, values, attributes(words, unit))
+        f"corner_{name}": Variable.of(MEMBER, values, words, unit)
         for name, (values, words, unit) in rows.items()
     }

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING, Any, get_args
+from typing import Any, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -17,6 +17,7 @@ from vibsim.apriori.roundoff_floor import SPACING_AT_ONE
 from vibsim.core.array_types import Flags, Floats, Integers
 from vibsim.core.record import Record
 from vibsim.core.vocabulary import PHASE, is_error_part, whole_of
+from vibsim.experiment import Experiment
 from vibsim.formula import values
 from vibsim.models import Model, tree
 from vibsim.models.shared.free import free_oscillation, why_not_free
@@ -24,9 +25,6 @@ from vibsim.schemes import Options, Scheme
 from vibsim.schemes.base import ORDER_AT_CORNERS, is_on_the_mesh
 from vibsim.schemes.orders import Beginning, depends_on_velocity, is_autonomous
 from vibsim.simulation.members import numbers_of
-
-if TYPE_CHECKING:
-    from vibsim.experiment import Experiment
 
 BALANCED = 1e-12
 """A force that makes so little of the velocity within a radian is rounding. [convention]"""
@@ -59,6 +57,9 @@ def beginning_matters(experiment: Experiment) -> bool:
     """Tell whether some scheme promises other orders to motions that begin in a special way."""
     model = experiment.model.definition
     if model.events is not None or model.lookup is not None or depends_on_velocity(model):
+        return False
+    if experiment.chain > 1:
+        # nobody knows beforehand how a member begins that starts from another one
         return False
     if model.loaded is not None:
         # no scheme of structures has other orders then
@@ -269,9 +270,7 @@ def limit_of(scheme: Scheme, options: Options) -> float:
 
 
 def _each(
-    experiment: Experiment,
-    columns: Columns,
-    promise: Callable[[Scheme, Options], ArrayLike],
+    experiment: Experiment, columns: Columns, promise: Callable[[Scheme, Options], ArrayLike]
 ) -> Floats:
     """Return what every scheme promises with the options that each member has of it."""
     rows = []

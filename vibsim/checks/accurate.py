@@ -8,52 +8,46 @@ whose errors fall by no known power bounds nothing.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from functools import partial
+from typing import Any
 
 import numpy as np
 
-from vibsim.checks.fields import LEVEL, Field
+from vibsim.checks.fields import LEVEL, Field, Measured
 from vibsim.checks.notation import PLAIN, Notation, beside
-from vibsim.checks.outcome import (
-    MATCH,
-    MISMATCH,
-    NON_FINITE,
-    NOT_APPLICABLE,
-    PRE_ASYMPTOTIC,
-    ROUND_OFF,
-    UNSTABLE,
-    Judged,
-    as_expected,
-    is_open,
+from vibsim.checks.outcome import Judged, Reason, as_expected, first_reason, is_open
+from vibsim.checks.sentences import (
+    NOT_FINITE,
+    WRONG_LIMIT,
+    Description,
+    Found,
+    add_levels,
+    cost_in_words,
 )
-from vibsim.checks.sentences import NOT_FINITE, Description, Found, cost_in_words
 from vibsim.checks.value import unit_of_quantity
 from vibsim.comparison.finest_error import FinestError, error_of_finest
 from vibsim.comparison.order_evidence import judgement
-from vibsim.comparison.quantity_comparison import Comparison
+from vibsim.comparison.quantity_comparison import Compared, Comparison
 from vibsim.convergence.verdict import Judgement
 from vibsim.core.array_types import Codes
 from vibsim.core.record import Record
 from vibsim.core.vocabulary import ERROR_FACTS, REASON_NAMES, TYPICAL_NORM
+from vibsim.experiment import Experiment
+from vibsim.experiment.schema.checks import AccurateCheck
 from vibsim.observe.member_block import MemberBlock
-
-if TYPE_CHECKING:
-    from vibsim.experiment import Experiment
-    from vibsim.experiment.schema.checks import AccurateCheck
 
 BASES = ("none", "exact", "extrapolated")
 """What an error is measured against; files hold a position here."""
 NONE, EXACT, EXTRAPOLATED = range(len(BASES))
 _TEXTS = (
-    "L2 norm over time of the error of the finest level",
-    "upper bound of that error",
-    "that error over the norm of the solution",
+    "L2 norm over time of the error of the finest level, in the unit of the quantity times the square root of s",
+    "upper bound of the error of the finest level, in the unit of that error",
+    "error of the finest level over the L2 norm of the solution",
 )
 ERROR = dict(zip(ERROR_FACTS, map(Field, _TEXTS), strict=True))
 FIELDS = {
     **ERROR,
-    "size": Field("L2 norm over time of the solution"),
+    "size": Field("L2 norm over time of the solution, in the unit of the error"),
     "accuracy": Field("error that is allowed, relative or absolute as the check asks", dims=()),
     "basis": Field("what the error is measured against", np.int8, BASES),
     "order_reason": Field("reason of the verdict on the promised order", np.int8, REASON_NAMES),
@@ -74,14 +68,12 @@ FINER = 2
 """So many finer levels are advised."""
 
 
-def measure(
-    block: MemberBlock, compared: Mapping[str, Comparison], check: AccurateCheck
-) -> Mapping[str, Any]:
+def measure(block: MemberBlock, compared: Compared, check: AccurateCheck) -> Measured:
     """Return what a check measures."""
     quantity = compared[check.accurate]
     found, judged = error_of_finest(quantity), judgement(quantity, TYPICAL_NORM)
     # a scheme that chooses its own steps has no order, and may have a true error all the same
-    has_none = (judged.reason == NOT_APPLICABLE) & ~(block.adaptive[:, None] & found.is_true)
+    has_none = (judged.reason == Reason.NOT_APPLICABLE) & ~(block.adaptive[:, None] & found.is_true)
     basis = np.select([has_none, found.is_true], [NONE, EXACT], EXTRAPOLATED)
     return {
         **facts_of_error(found),
@@ -104,7 +96,9 @@ def facts_of_error(found: FinestError) -> dict[str, Any]:
 def known_error(q: Comparison) -> dict[str, Any]:
     """Return the values of `ERROR` where the error of a quantity can be believed, NaN elsewhere."""
     found, reason = error_of_finest(q), judgement(q, TYPICAL_NORM).reason
-    decides = found.is_true & ~np.isin(reason, (UNSTABLE, NON_FINITE, NOT_APPLICABLE))
+    decides = found.is_true & ~np.isin(
+        reason, (Reason.UNSTABLE, Reason.NON_FINITE, Reason.NOT_APPLICABLE)
+    )
     decides |= np.isin(reason, ORDER_KNOWN)
     facts = facts_of_error(found)
     return {name: np.where(decides, values, np.nan) for name, values in facts.items()}
@@ -128,8 +122,7 @@ def error_in_words(f: Found, quantity: str) -> str:
 
 def _mean_square(f: Found, error: float) -> float:
     """Return the root of the mean square over time of an error whose L2 norm over time is given."""
-    dt = np.asarray(f.record["dt"])[-1]
-    duration = float(dt[f.case] if dt.ndim else dt) * f.experiment.steps(int(f.record["level"][-1]))
+    duration = f.record.step(-1, f.case) * f.experiment.steps(int(f.record["level"][-1]))
     return error / math.sqrt(duration)
 
 
@@ -144,9 +137,7 @@ def _level_needed(last: int, found: FinestError, judged: Judgement, check: Accur
     return np.where(known, last + np.where(known, steps, 0.0), -1.0).astype(np.int16)
 
 
-def judge(
-    experiment: Experiment, record: Record, check: AccurateCheck, found: Mapping[str, Any]
-) -> Judged:
+def judge(experiment: Experiment, record: Record, check: AccurateCheck, found: Measured) -> Judged:
     """Compare the error of the finest level with what is asked."""
     error, bound, order_reason = found["error"], found["error_bound"], found["order_reason"]
     is_true, size = found["basis"] == EXACT, found["size"]
@@ -155,14 +146,14 @@ def judge(
     least = np.maximum(2.0 * error - bound, 0.0)
     decides = is_true | np.isin(order_reason, ORDER_KNOWN)
     cases = [
-        (np.isin(order_reason, (UNSTABLE, NON_FINITE)), order_reason),
-        ((found["basis"] == NONE) | ~(asked > 0.0), NOT_APPLICABLE),
-        (decides & (bound < asked), MATCH),
-        (decides & (least > asked), MISMATCH),
-        (is_true, ROUND_OFF),
+        (np.isin(order_reason, (Reason.UNSTABLE, Reason.NON_FINITE)), order_reason),
+        ((found["basis"] == NONE) | ~(asked > 0.0), Reason.NOT_APPLICABLE),
+        (decides & (bound < asked), Reason.MATCH),
+        (decides & (least > asked), Reason.MISMATCH),
+        (is_true, Reason.ROUND_OFF),
         (is_open(order_reason), order_reason),
     ]
-    reason = np.select([mask for mask, _ in cases], [code for _, code in cases], PRE_ASYMPTOTIC)
+    reason = first_reason(cases, Reason.PRE_ASYMPTOTIC)
     with np.errstate(all="ignore"):
         away = bound / asked
     return Judged(reason, away, as_expected(check.expect, reason))
@@ -239,6 +230,7 @@ class _Phrases:
         self.subject = f.notation.opening(self.what)
         self.level: int = f.fact("level")
         self.asked = f.notation.number(check.accuracy)
+        self.cost = partial(cost_in_words, f.experiment)
 
     def _counted(self, error: float) -> str:
         """Write an error as the check counts it."""
@@ -253,10 +245,8 @@ class _Phrases:
             return ""
         mean = self.f.notation.number(_mean_square(self.f, self.f.fact("error")), 2)
         unit = unit_of_quantity(self.f.record, self.check.accurate)
-        return (
-            f" These are L2 norms over time. The root-mean-square error is {mean} {unit}".rstrip()
-            + "."
-        )
+        told = f" These are L2 norms over time. The root-mean-square error is {mean} {unit}"
+        return f"{told.rstrip()}."
 
     def error(self) -> str:
         """Say how large the error is."""
@@ -279,26 +269,19 @@ class _Phrases:
     def estimate(self) -> str:
         return f" ({self.error()})" if math.isfinite(self.f.fact("error")) else ""
 
-    def _add(self, last: int) -> str:
-        finer = list(range(self.level + 1, last + 1))
-        names = {1: f"level {last}", 2: f"levels {finer[0]} and {last}"}
-        which = names.get(len(finer), f"levels {finer[0]} to {last}")
-        return f"dd {which} to `levels:` ({cost_in_words(self.f.experiment, finer)})"
-
     def finer(self) -> str:
         """Name the level that is probably as accurate as asked, where one is known."""
         change, needed = f"hange `{self.check.key}:`", self.f.fact("level_needed")
         if self.f.word("order_reason") == "wrong_limit":
-            return "Check `model:` and `initial:` against the intended equation. Finer levels will not help."
+            return WRONG_LIMIT.format(scheme=self.f.scheme_name)
         if needed < 0:
             return f"Take finer `levels:` or a scheme of higher order (`schemes:`), or c{change}."
-        return (
-            f"A{self._add(needed)}, which probably reaches it by the measured order, or c{change}."
-        )
+        add = add_levels(self.level, needed - self.level, self.cost)
+        return f"A{add}, which probably reaches it by the measured order, or c{change}."
 
     def more_levels(self) -> str:
         """Say what shows an order."""
         ask = f"The check `{{converges: {self.check.accurate}}}` says what its order needs"
         if self.f.reason in ("pre_asymptotic", "too_few_levels", "oscillating"):
-            return f"A{self._add(self.level + FINER)}. {ask}."
+            return f"A{add_levels(self.level, FINER, self.cost)}. {ask}."
         return f"{ask}. The bound of the error rests on it."

@@ -3,35 +3,23 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, get_args
+from typing import get_args
 
 import numpy as np
 
 from vibsim.apriori.formal_orders import columns_of, formal_orders
-from vibsim.checks.fields import LEVEL, MOTION, Field
-from vibsim.checks.outcome import (
-    MATCH,
-    MISMATCH,
-    NON_FINITE,
-    NOT_APPLICABLE,
-    PRE_ASYMPTOTIC,
-    ROUND_OFF,
-    Judged,
-)
+from vibsim.checks.fields import LEVEL, MOTION, Field, Measured
+from vibsim.checks.outcome import Judged, Reason, first_reason
 from vibsim.checks.sentences import MOVE, NOT_FINITE, NOTHING_MOVES, Description, Found
+from vibsim.comparison.quantity_comparison import Compared
 from vibsim.convergence.thresholds import ABOVE_ROUND_OFF
 from vibsim.core.array_types import Flags
 from vibsim.core.record import Record
 from vibsim.core.vocabulary import DRIFTS
-from vibsim.experiment.schema.checks import Drift
+from vibsim.experiment import Experiment
+from vibsim.experiment.schema.checks import ConservesCheck, Drift
 from vibsim.observe.energy_drift import drift_at
 from vibsim.observe.member_block import MemberBlock
-
-if TYPE_CHECKING:
-    from vibsim.comparison.quantity_comparison import Comparison
-    from vibsim.experiment import Experiment
-    from vibsim.experiment.schema.checks import ConservesCheck
 
 FIELDS = {
     "drift": Field("how the energy error grows", np.int8, DRIFTS),
@@ -68,9 +56,7 @@ _RATES = {
 }
 
 
-def measure(
-    block: MemberBlock, compared: Mapping[str, Comparison], check: ConservesCheck
-) -> Mapping[str, Any]:
+def measure(block: MemberBlock, compared: Compared, check: ConservesCheck) -> Measured:
     """Return what a check measures."""
     level = block.grid.levels[-1] if check.level is None else check.level
     found = drift_at(block, level, check.about or "")
@@ -99,9 +85,7 @@ def lies_still(block: MemberBlock, level: int) -> Flags:
     return still
 
 
-def judge(
-    experiment: Experiment, record: Record, check: ConservesCheck, found: Mapping[str, Any]
-) -> Judged:
+def judge(experiment: Experiment, record: Record, check: ConservesCheck, found: Measured) -> Judged:
     """Compare how the energy error grows with what a check expects."""
     kind, largest, still = found["drift"], found["energy_error"], found["motion"] != 0
     broken = record["status"][..., record.place("level", int(found["level"]))] != 0
@@ -113,26 +97,23 @@ def judge(
     # an error that theory has, lost in round-off, may grow in any way; one that it has not does not grow
     has_error = np.isfinite(formal_orders(experiment, check.about or "", columns_of(record)))
     cases = [
-        (broken, NON_FINITE),
-        (np.isnan(largest) & unclear, NOT_APPLICABLE),
-        (still & is_none, NOT_APPLICABLE),
+        (broken, Reason.NON_FINITE),
+        (np.isnan(largest) & unclear, Reason.NOT_APPLICABLE),
+        (still & is_none, Reason.NOT_APPLICABLE),
         # an error above round-off is not none, however short the run
-        (unclear & (check.drift != "none"), PRE_ASYMPTOTIC),
-        (wanted, MATCH),
-        (is_none & has_error, ROUND_OFF),
+        (unclear & (check.drift != "none"), Reason.PRE_ASYMPTOTIC),
+        (wanted, Reason.MATCH),
+        (is_none & has_error, Reason.ROUND_OFF),
     ]
-    reason = np.select([mask for mask, _ in cases], [code for _, code in cases], MISMATCH)
+    reason = first_reason(cases, Reason.MISMATCH)
     return Judged(reason, largest)
 
 
 def describe(f: Found, check: ConservesCheck) -> Description:
     """Say how the error of the energy grows with time, and what to change where a check expects otherwise."""
     size, rate, drift = f.fact("energy_error"), f.fact("drift_rate"), f.word("drift")
-    number, name, expects = (
-        f.notation.number,
-        check.conserves,
-        f"The check expects `drift: {check.drift}`.",
-    )
+    number, name = f.notation.number, check.conserves
+    expects = f"The check expects `drift: {check.drift}`."
     match f.reason:
         case "non_finite":
             return Description(NOT_FINITE[0].format(name), NOT_FINITE[1])
@@ -156,14 +137,11 @@ def describe(f: Found, check: ConservesCheck) -> Description:
         told = "shows that the energy decays exponentially"
     if rate and math.isfinite(rate):
         told += _RATES.get(drift, "").format(number(rate, 4))
-    most = (
-        f"The error is at most {number(size, 4)} of the energy"
-        if math.isfinite(size)
-        else "The energy is 0"
-    )
-    return Description(
-        f"The error of {name} {told}. {most}. {expects}", _advice(f.reason, drift, check)
-    )
+    most = "The energy is 0"
+    if math.isfinite(size):
+        most = f"The error is at most {number(size, 4)} of the energy"
+    told = f"The error of {name} {told}. {most}. {expects}"
+    return Description(told, _advice(f.reason, drift, check))
 
 
 def _advice(reason: str, drift: str, check: ConservesCheck) -> str:

@@ -3,32 +3,21 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from decimal import ROUND_CEILING, Context
-from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from vibsim.checks.energy import lies_still
-from vibsim.checks.fields import LEVEL, MOTION, Field
-from vibsim.checks.outcome import (
-    MATCH,
-    MISMATCH,
-    NON_FINITE,
-    NOT_APPLICABLE,
-    Judged,
-)
+from vibsim.checks.fields import LEVEL, MOTION, Field, Measured
+from vibsim.checks.outcome import Judged, Reason, first_reason
 from vibsim.checks.sentences import MOVE, NOT_FINITE, NOTHING_MOVES, Description, Found
-from vibsim.comparison.quantity_comparison import Comparison
-from vibsim.comparison.solution_distance import apart
+from vibsim.comparison.quantity_comparison import Compared
+from vibsim.comparison.solution_distance import solution_distance
 from vibsim.core.array_types import Floats
 from vibsim.core.record import Record
-from vibsim.experiment.schema.checks import SOLUTIONS
+from vibsim.experiment import Experiment
+from vibsim.experiment.schema.checks import SOLUTIONS, EqualCheck
 from vibsim.observe.member_block import MemberBlock
-
-if TYPE_CHECKING:
-    from vibsim.experiment import Experiment
-    from vibsim.experiment.schema.checks import EqualCheck
 
 FIELDS = {
     "distance": Field("largest distance of the two solutions, in the unit of the quantity"),
@@ -46,12 +35,10 @@ PLACES = 241
 """Most places in time of a distance: as many as a figure has pixels."""
 
 
-def measure(
-    block: MemberBlock, compared: Mapping[str, Comparison], check: EqualCheck
-) -> Mapping[str, Any]:
+def measure(block: MemberBlock, compared: Compared, check: EqualCheck) -> Measured:
     """Return what a check measures."""
     level = block.grid.levels[-1] if check.level is None else check.level
-    found = apart(block, compared, check)
+    found = solution_distance(block, compared, check)
     distance, allowed = (np.full(block.shape, np.nan) for _ in range(2))
     still, names = lies_still(block, level), [row.name for row in block.experiment.schemes]
     second = names.index(check.second) if check.second in names else found.scheme
@@ -89,9 +76,7 @@ def by_place(values: Floats, count: int) -> Floats:
     return found
 
 
-def judge(
-    experiment: Experiment, record: Record, check: EqualCheck, found: Mapping[str, Any]
-) -> Judged:
+def judge(experiment: Experiment, record: Record, check: EqualCheck, found: Measured) -> Judged:
     """Compare the largest distance between two solutions with what it may be."""
     distance, allowed, still = found["distance"], found["allowed"], found["motion"] != 0
     place = record.place("level", int(found["level"]))
@@ -99,12 +84,12 @@ def judge(
     involved = [names.index(name) for name in check.equal if name in names]
     broken = np.any(record["status"][involved, :, place] != 0, axis=0)
     cases = [
-        (np.broadcast_to(broken, distance.shape), NON_FINITE),
-        (np.isnan(distance) | np.isnan(allowed), NOT_APPLICABLE),
-        ((distance <= allowed) & still, NOT_APPLICABLE),
-        (distance <= allowed, MATCH),
+        (np.broadcast_to(broken, distance.shape), Reason.NON_FINITE),
+        (np.isnan(distance) | np.isnan(allowed), Reason.NOT_APPLICABLE),
+        ((distance <= allowed) & still, Reason.NOT_APPLICABLE),
+        (distance <= allowed, Reason.MATCH),
     ]
-    reason = np.select([mask for mask, _ in cases], [code for _, code in cases], MISMATCH)
+    reason = first_reason(cases, Reason.MISMATCH)
     # as a part of what is allowed, which differs from member to member
     with np.errstate(divide="ignore", invalid="ignore"):
         away = np.where(distance > 0, distance / allowed, distance)
@@ -125,32 +110,29 @@ def describe(f: Found, check: EqualCheck) -> Description:
     apart = f"at most {number(distance, 4)} apart"
     brief = f"{apart}; {number(allowed, 4)} is allowed"
     enough = f"above {_rounded_up(distance)} if that is close enough"
-    sentence = f"{what} of scheme {check.first} {{}} {other}. They are {brief}."
     match f.reason:
         case "match":
-            return Description(sentence.format("equals"), "", brief)
+            told, advice = f"{what} of scheme {check.first} equals {other}. They are {brief}.", ""
         case "non_finite":
-            return Description(NOT_FINITE[0].format(what), NOT_FINITE[1], brief)
+            told, advice = NOT_FINITE[0].format(what), NOT_FINITE[1]
         case "not_applicable" if distance <= allowed:
             told = f"{NOTHING_MOVES.format(what)}. A comparison with {other} shows nothing."
-            return Description(told, MOVE, brief)
+            advice = MOVE
         case "not_applicable" if math.isfinite(distance):
             told = f"{both} are {apart}, but the round-off to compare with is not known here."
-            return Description(told, f"Give `atol:`, {enough}.", brief)
+            advice = f"Give `atol:`, {enough}."
         case "not_applicable":
-            return Description(
-                f"{what} and {other} cannot be compared here, or were not stored.",
-                "Name a scheme or a solution that exists here (`equal:`), or another `quantity:`.",
-                brief,
+            told = f"{what} and {other} cannot be compared here, or were not stored."
+            advice = (
+                "Name a scheme or a solution that exists here (`equal:`), or another `quantity:`."
             )
-    ways = " or the options of one of the `schemes:`,"
-    if check.second in SOLUTIONS:
-        ways = ", take a finer `level:`,"
-    return Description(
-        sentence.format("differs from"),
-        f"Correct `equal:`{ways} or give `atol:` {enough}.",
-        brief,
-    )
+        case _:
+            told = f"{what} of scheme {check.first} differs from {other}. They are {brief}."
+            ways = " or the options of one of the `schemes:`,"
+            if check.second in SOLUTIONS:
+                ways = ", take a finer `level:`,"
+            advice = f"Correct `equal:`{ways} or give `atol:` {enough}."
+    return Description(told, advice, brief)
 
 
 def _rounded_up(distance: float) -> str:

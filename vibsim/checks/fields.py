@@ -12,12 +12,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from vibsim.core.record import Record, Variable, attributes
-from vibsim.core.vocabulary import REASON_NAMES, STATUSES
+from vibsim.core.record import Record, Variable, attributes, flags
+from vibsim.core.vocabulary import MEMBER, REASON_NAMES, STATUSES
 
 GROUP = "checks"
 """Group of ``convergence.nc`` that holds what the checks measured."""
-MEMBERS = ("scheme", "case")
 
 
 @dataclass(frozen=True)
@@ -30,7 +29,7 @@ class Field:
     """Of a position in a list of words, the list."""
     none: int | None = None
     """The number that stands for none."""
-    dims: tuple[str, ...] = MEMBERS
+    dims: tuple[str, ...] = MEMBER
     of_figure: bool = False
     """Whether only its figure needs it: it is left out where no series are stored."""
 
@@ -39,11 +38,6 @@ STATUS = Field("status", np.int8, STATUSES)
 REASON = Field("reason", np.int8, REASON_NAMES)
 MOTION = Field("whether anything moves", np.int8, ("moves", "rests"))
 LEVEL = Field("level", np.int16, dims=())
-
-
-def flags(words: tuple[str, ...]) -> dict[str, Any]:
-    """Return the attributes of a variable that holds positions in a list of words."""
-    return {"flag_values": np.arange(len(words), dtype=np.int8), "flag_meanings": " ".join(words)}
 
 
 def name_of(check: str, field: str) -> str:
@@ -68,16 +62,18 @@ def variables(
     return table
 
 
-def measured(record: Record, check: str, field: str) -> NDArray[Any]:
+def field_values(record: Record, check: str, field: str) -> NDArray[Any]:
     """Return the values of a field of a check."""
     return record[name_of(check, field)]
 
 
+Measured = Mapping[str, Any]
+"""Values of the fields of a check, by their names."""
 Facts = Mapping[str, tuple[Field, NDArray[Any]]]
 """Name of a fact to what it is, and its values: of every scheme and member, or one for all."""
 
 
-def stated(fields: Mapping[str, Field]) -> dict[str, Field]:
+def result_fields(fields: Mapping[str, Field]) -> dict[str, Field]:
     """Return the fields that a result states: not what its figure alone needs, nor what every result has."""
     return {
         name: field
@@ -89,7 +85,7 @@ def stated(fields: Mapping[str, Field]) -> dict[str, Field]:
 def facts_of(table: Facts, scheme: int, case: int) -> dict[str, Any]:
     """Return the facts of one scheme and member as plain data; None where there is none, or it is not finite."""
     return {
-        name: _plain(field, values[scheme, case] if field.dims[:2] == MEMBERS else values)
+        name: _plain(field, values[scheme, case] if field.dims[:2] == MEMBER else values)
         for name, (field, values) in table.items()
     }
 

@@ -4,19 +4,17 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import NamedTuple
 
 from vibsim.checks import accurate, energy, equal, order, order_text, reductions, stable, value
-from vibsim.checks.fields import Field, measured, stated, variables
+from vibsim.checks.fields import Field, Measured, field_values, result_fields, variables
 from vibsim.checks.outcome import Judged, Outcome, outcome_of
 from vibsim.checks.sentences import Description
+from vibsim.comparison.quantity_comparison import Compared
 from vibsim.core.record import Record, Variable
+from vibsim.experiment import Experiment
+from vibsim.experiment.schema.checks import Measurement
 from vibsim.observe.member_block import MemberBlock
-
-if TYPE_CHECKING:
-    from vibsim.comparison.quantity_comparison import Comparison
-    from vibsim.experiment import Experiment
-    from vibsim.experiment.schema.checks import Measurement
 
 
 class Kind(NamedTuple):
@@ -24,7 +22,7 @@ class Kind(NamedTuple):
 
     fields: Mapping[str, Field]
     """What is stored of it."""
-    measure: Callable[..., Mapping[str, Any]]
+    measure: Callable[..., Measured]
     """Takes a block of members, the compared quantities and the check; returns the values of the fields."""
     judge: Callable[..., Judged]
     """Takes the experiment, the convergence Record, the check and the values of its fields."""
@@ -42,7 +40,7 @@ KINDS: Mapping[str, Kind] = {
 }
 
 
-def check_variables(block: MemberBlock, compared: Mapping[str, Comparison]) -> dict[str, Variable]:
+def check_variables(block: MemberBlock, compared: Compared) -> dict[str, Variable]:
     """Return what every check of an experiment measured, and what its figure needs beside that."""
     table: dict[str, Variable] = {}
     for check in block.experiment.checks:
@@ -56,11 +54,11 @@ def judge(experiment: Experiment, record: Record, check: Measurement, id_: str) 
     """Compare what a check measured with what it expects."""
     kind = KINDS[check.kind]
     found = {
-        name: measured(record, id_, name)
+        name: field_values(record, id_, name)
         for name, field in kind.fields.items()
         if not field.of_figure
     }
-    facts = {name: (field, found[name]) for name, field in stated(kind.fields).items()}
+    facts = {name: (field, found[name]) for name, field in result_fields(kind.fields).items()}
     judged = kind.judge(experiment, record, check, found)
     return outcome_of(experiment, record, check, judged, facts)
 

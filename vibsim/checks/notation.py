@@ -9,7 +9,7 @@ NEAR_ONE, ROUND_OFF = 1e-2, 1e-13
 class Notation:
     """The notation of terminals and files: names as an experiment file has them, numbers as Python writes them.
 
-    A page has another one (`vibsim.report.text.words.PAGE`).
+    A page has another one (`vibsim.report.words.PAGE`).
     """
 
     def quantity(self, name: str) -> str:

@@ -14,20 +14,14 @@ with the number of steps. An order can be read from three levels as long as the 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable
 
 import numpy as np
 
 from vibsim.apriori.formal_orders import even_powers, orders_in, relative_floors
 from vibsim.checks.accurate import ERROR, known_error
-from vibsim.checks.fields import REASON, STATUS, Field
-from vibsim.checks.outcome import (
-    PRE_ASYMPTOTIC,
-    ROUND_OFF,
-    Judged,
-    as_expected,
-)
+from vibsim.checks.fields import REASON, STATUS, Field, Measured
+from vibsim.checks.outcome import Judged, Reason, as_expected
 from vibsim.comparison.order_evidence import (
     CAUSES,
     causes,
@@ -36,7 +30,7 @@ from vibsim.comparison.order_evidence import (
     judgement,
     order_of,
 )
-from vibsim.comparison.quantity_comparison import Comparison
+from vibsim.comparison.quantity_comparison import Compared, Comparison
 from vibsim.convergence.differences import largest, safe_ratio
 from vibsim.convergence.thresholds import (
     HALF_SPACING,
@@ -47,13 +41,11 @@ from vibsim.convergence.thresholds import (
 )
 from vibsim.convergence.verdict import Judgement
 from vibsim.core.array_types import Codes, Floats
-from vibsim.core.record import Record, Variable, attributes
-from vibsim.core.vocabulary import AMPLITUDE, PHASE, TYPICAL_NORM
+from vibsim.core.record import Record, Variable
+from vibsim.core.vocabulary import AMPLITUDE, MEMBER, PHASE, TYPICAL_NORM
+from vibsim.experiment import Experiment
+from vibsim.experiment.schema.checks import ConvergesCheck
 from vibsim.observe.member_block import MemberBlock
-
-if TYPE_CHECKING:
-    from vibsim.experiment import Experiment
-    from vibsim.experiment.schema.checks import ConvergesCheck
 
 FIELDS = {
     "status": STATUS,
@@ -72,7 +64,11 @@ FIELDS = {
     "readable_level": Field(
         "finest level at which the order can be read, -1 unknown", np.int8, none=-1
     ),
-    "readable_level_compensated": Field("the same in compensated arithmetic", np.int8, none=-1),
+    "readable_level_compensated": Field(
+        "finest level at which the order can be read in compensated arithmetic, -1 unknown",
+        np.int8,
+        none=-1,
+    ),
     "cause": Field("why the order is another one, as far as it is known", np.int8, CAUSES),
     **ERROR,
 }
@@ -92,12 +88,10 @@ FINEST = 40
 """No finer level is looked at."""
 
 
-def measure(
-    block: MemberBlock, compared: Mapping[str, Comparison], check: ConvergesCheck
-) -> Mapping[str, Any]:
+def measure(block: MemberBlock, compared: Compared, check: ConvergesCheck) -> Measured:
     """Return what a check measures, with what would settle a verdict that is open, or explain it."""
     quantity, norm = compared[check.converges], check.norm
-    judged, order = judge_check(quantity, check), order_of(quantity, check)
+    judged, order = judge_check(quantity, check), order_of(quantity, check.order)
     return {
         "status": judged.status,
         "reason": judged.reason,
@@ -116,9 +110,7 @@ def measure(
     }
 
 
-def judge(
-    experiment: Experiment, record: Record, check: ConvergesCheck, found: Mapping[str, Any]
-) -> Judged:
+def judge(experiment: Experiment, record: Record, check: ConvergesCheck, found: Measured) -> Judged:
     """Compare the verdict on a quantity, of every scheme and member, with the expected one."""
     reason, order = found["reason"], expected_order(experiment, record, check)
     none = np.full((1, 1), np.nan)
@@ -151,8 +143,8 @@ def phase_at_start(q: Comparison) -> dict[str, Variable]:
     pair = np.where(first < 0, len(levels) - 1, np.searchsorted(levels, first))
     share = np.stack([safe_ratio(np.abs(d[..., 0]), largest(d)) for d in q.differences], axis=-1)
     chosen = np.take_along_axis(share, pair[..., None], axis=-1)[..., 0]
-    attrs = attributes(f"{q.long_name}: what is there from the start over the largest", "1")
-    return {f"{q.name}_at_start": Variable(("scheme", "case"), chosen, attrs)}
+    words = f"{q.long_name}: what is there from the start over the largest"
+    return {f"{q.name}_at_start": Variable.of(MEMBER, chosen, words)}
 
 
 def is_of_parts(name: str) -> bool:
@@ -168,7 +160,7 @@ def _more_levels(q: Comparison, judged: Judgement, order: Floats, tolerance: flo
     """
     shape, orders = judged.reason.shape, judged.orders
     needed = np.full(shape, UNKNOWN, dtype=np.int8)
-    early = judged.reason == PRE_ASYMPTOTIC
+    early = judged.reason == Reason.PRE_ASYMPTOTIC
     if not np.any(early) or not orders.shape[-1]:
         return needed
     last, has = orders[..., -1], np.broadcast_to(q.order, shape)
@@ -199,7 +191,7 @@ def _finest_readable(
     found = np.full(judged.reason.shape, UNKNOWN, dtype=np.int8)
     with np.errstate(invalid="ignore"):
         p = np.where(judged.order >= LEAST_CANDIDATE, judged.order, order)
-    lost = (judged.reason == ROUND_OFF) & np.isfinite(p)
+    lost = (judged.reason == Reason.ROUND_OFF) & np.isfinite(p)
     if not np.any(lost):
         return found
     size, at = _clean_difference(q, norm, p)

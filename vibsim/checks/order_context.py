@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from functools import partial
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -23,13 +23,14 @@ from vibsim.checks.accurate import error_in_words
 from vibsim.checks.phase_amplitude_text import parts_in_words
 from vibsim.checks.sentences import Found, cost_in_words, growth_in_words
 from vibsim.checks.stable import ALIKE
-from vibsim.comparison.exact_availability import has_exact
+from vibsim.comparison.comparison_variables import has_exact
 from vibsim.core.record import Record
 from vibsim.core.vocabulary import is_error_part, whole_of
+from vibsim.experiment.schema.checks import ConvergesCheck
 from vibsim.observe.member_block import fastest
 
-if TYPE_CHECKING:
-    from vibsim.experiment.schema.checks import ConvergesCheck
+COINCIDE = 0.1
+"""Rescaled differences that are further apart, over the finer one, do not coincide."""
 
 
 class Corner(NamedTuple):
@@ -66,6 +67,8 @@ class OrderContext:
         self.levels = tuple(int(level) for level in record["level"])
         self.orders = _orders(record, check, scheme, case)
         """Of successive levels in the norm of the check, the coarsest first."""
+        self.apart = _apart(record, quantity, scheme, case, self.levels, self.last)
+        """How far the finest two rescaled differences of the levels that decide are apart, over the finer one."""
         self.more: int = f.fact("levels_needed")
         """Finer levels that are probably needed."""
         self.readable: int = f.fact("readable_level")
@@ -118,8 +121,7 @@ class OrderContext:
         rate = "decay_rate"
         self.decay = float(record[rate][scheme, case]) if rate in record else math.nan
         """The largest rate at which damping takes a velocity away."""
-        dt = np.asarray(record["dt"])[-1]
-        self.shortest = float(dt[case] if dt.ndim else dt)
+        self.shortest = record.step(-1, case)
 
     @property
     def what(self) -> str:
@@ -194,6 +196,16 @@ def _orders(record: Record, check: ConvergesCheck, scheme: int, case: int) -> tu
     return tuple(record[name][scheme, case, :, norms.index(check.norm)].astype(float).tolist())
 
 
+def _apart(
+    record: Record, quantity: str, scheme: int, case: int, levels: tuple[int, ...], last: int
+) -> float:
+    """Return how far the two finest rescaled differences up to a level are apart; NaN where that is not known."""
+    name = f"{quantity}_coincidence"
+    if name not in record or last not in levels[2:]:
+        return math.nan
+    return float(record[name][scheme, case, levels.index(last) - 2])
+
+
 def _failures(record: Record, scheme: int, case: int) -> tuple[float, ...]:
     """Return when each level met a number that is not finite, in its first step at 0; NaN where it did not.
 
@@ -212,10 +224,10 @@ def _corner(f: Found) -> Corner | None:
     record, place = f.record, (f.scheme, f.case)
     if "corner_switch" not in record or record["corner_switch"][place] < 0:
         return None
-    time, dt = np.asarray(record["corner_time"])[place], np.asarray(record["dt"])[0]
+    time = np.asarray(record["corner_time"])[place]
     return Corner(
         words_of(f.model, int(record["corner_switch"][place])),
         float(time),
         float(record["corner_power"][place]),
-        on_a_point=bool(is_on_a_point(time, dt[f.case] if dt.ndim else dt)),
+        on_a_point=bool(is_on_a_point(time, np.asarray(record.step(0, f.case)))),
     )

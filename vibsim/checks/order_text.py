@@ -9,17 +9,14 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from itertools import pairwise
-from typing import TYPE_CHECKING
 
-from vibsim.checks.order_context import OrderContext
-from vibsim.checks.sentences import Description, Found, Template
+from vibsim.checks.order_context import COINCIDE, OrderContext
+from vibsim.checks.sentences import WRONG_LIMIT, Description, Found, Template, add_levels
 from vibsim.convergence.study.sentences import higher_part
 from vibsim.convergence.thresholds import HALF_SPACING
 from vibsim.core.vocabulary import order_interval
+from vibsim.experiment.schema.checks import ConvergesCheck
 from vibsim.schemes.base import is_on_the_mesh
-
-if TYPE_CHECKING:
-    from vibsim.experiment.schema.checks import ConvergesCheck
 
 HIGHEST = 12.0
 """An estimate above is the order of no scheme."""
@@ -65,7 +62,7 @@ DIAGNOSES: Words = {
     "wrong_limit": (
         "The levels of {what} approach each other, but not the exact solution. The remaining error is too large."
         "{error}",
-        "Check `model:` and `initial:` against the intended equation. Finer levels will not help.",
+        WRONG_LIMIT,
     ),
     "unstable, beyond the limit": (
         "The run is unstable at level {culprit}, where w dt = {omega_dt:4} is beyond the limit {limit} of scheme "
@@ -264,10 +261,7 @@ def _diagnosis(s: OrderContext) -> str:
     has_promise, less = s.shows_promise, s.promises_less
     finer = {
         "unstable": {"beyond the limit": s.is_beyond_limit},
-        "non_finite": {
-            "from the start": s.singular == 0.0,
-            "always": not math.isnan(s.singular),
-        },
+        "non_finite": {"from the start": s.singular == 0.0, "always": not math.isnan(s.singular)},
         "not_applicable": {"adaptive": "tolerance" in s.options},
         "non_smooth": {
             "pulse": s.cause == "pulse",
@@ -329,8 +323,13 @@ class _Phrases(OrderContext):
 
     def coincidence(self) -> str:
         """Say whether the levels agree, or why the measured order is not yet the one that dominates."""
-        moved = higher_part(self.order, self.expected, self.tolerance)
-        return f" {moved or 'The rescaled differences coincide.'}"
+        if moved := higher_part(self.order, self.expected, self.tolerance):
+            return f" {moved}"
+        if self.apart <= COINCIDE:
+            return " The rescaled differences coincide."
+        if self.apart > COINCIDE:
+            return " The rescaled differences do not coincide yet."
+        return ""
 
     def doubt(self) -> str:
         """Say of an order that passes why its interval reaches far down; empty where it does not."""
@@ -402,10 +401,7 @@ class _Phrases(OrderContext):
 
     def add(self, count: int = 2) -> str:
         """Ask for so many finer levels, with what they cost."""
-        levels = [self.levels[-1] + 1 + i for i in range(count)]
-        names = {1: f"level {levels[0]}", 2: f"levels {levels[0]} and {levels[-1]}"}
-        which = names.get(count, f"levels {levels[0]} to {levels[-1]}")
-        return f"Add {which} to `levels:` ({self.cost(levels)})"
+        return f"A{add_levels(self.levels[-1], count, self.cost)}"
 
     def add_missing(self) -> str:
         return self.add(min(max(4 - len(self.levels), 1), 2))

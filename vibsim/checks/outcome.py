@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from enum import IntEnum
 from functools import cached_property
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, NamedTuple, overload
+from typing import Any, NamedTuple, overload
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,24 +17,33 @@ from vibsim.checks.fields import Facts, facts_of
 from vibsim.core.array_types import Codes, Flags, Floats, Integers
 from vibsim.core.record import Record
 from vibsim.core.vocabulary import REASON_NAMES, REASONS, SEVERITY, STATUSES, decisive_number
+from vibsim.experiment import Experiment
 from vibsim.experiment.data import schemes_of
+from vibsim.experiment.schema.checks import ClaimCheck, Expect, Measurement, MeasuringCheck
 from vibsim.experiment.sweep_columns import members_with
-
-if TYPE_CHECKING:
-    from vibsim.experiment import Experiment
-    from vibsim.experiment.schema.checks import ClaimCheck, Expect, Measurement, MeasuringCheck
 
 PASS, FAIL, INCONCLUSIVE = map(STATUSES.index, ("PASS", "FAIL", "INCONCLUSIVE"))
 """Index into `STATUSES`."""
-MATCH, MISMATCH, UNSTABLE, NON_FINITE = map(
-    REASON_NAMES.index, ("match", "mismatch", "unstable", "non_finite")
-)
-PRE_ASYMPTOTIC, ROUND_OFF, TOO_FEW_LEVELS, NOT_APPLICABLE = map(
-    REASON_NAMES.index, ("pre_asymptotic", "round_off", "too_few_levels", "not_applicable")
-)
-"""Index into `REASON_NAMES`."""
 STATUS_OF = np.array([STATUSES.index(status) for status in REASONS.values()], dtype=np.int8)
 """The status that each of `REASON_NAMES` belongs to."""
+
+
+class Reason(IntEnum):
+    """Index into `REASON_NAMES` of what checks decide themselves."""
+
+    MATCH = REASON_NAMES.index("match")
+    MISMATCH = REASON_NAMES.index("mismatch")
+    UNSTABLE = REASON_NAMES.index("unstable")
+    NON_FINITE = REASON_NAMES.index("non_finite")
+    PRE_ASYMPTOTIC = REASON_NAMES.index("pre_asymptotic")
+    ROUND_OFF = REASON_NAMES.index("round_off")
+    TOO_FEW_LEVELS = REASON_NAMES.index("too_few_levels")
+    NOT_APPLICABLE = REASON_NAMES.index("not_applicable")
+
+
+def first_reason(cases: Sequence[tuple[Flags, Codes | int]], otherwise: Reason) -> Codes:
+    """Return the reason of the first case that applies to each result, by flags of the shape of the results."""
+    return np.select([where for where, _ in cases], [reason for _, reason in cases], otherwise)
 
 
 @dataclass(frozen=True)

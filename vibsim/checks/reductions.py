@@ -12,31 +12,19 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from vibsim.apriori.formal_orders import columns_of
 from vibsim.checks import value
-from vibsim.checks.fields import Field, measured
-from vibsim.checks.outcome import (
-    MATCH,
-    MISMATCH,
-    NON_FINITE,
-    NOT_APPLICABLE,
-    PRE_ASYMPTOTIC,
-    TOO_FEW_LEVELS,
-    Judged,
-    about_members,
-)
+from vibsim.checks.fields import Field, Measured, field_values
+from vibsim.checks.outcome import Judged, Reason, about_members
 from vibsim.checks.sentences import Description, Found
-from vibsim.comparison.best_values import has_limit
 from vibsim.core.array_types import Flags, Floats
 from vibsim.core.record import Record
-
-if TYPE_CHECKING:
-    from vibsim.experiment import Experiment
-    from vibsim.experiment.schema.checks import ValueCheck
+from vibsim.experiment import Experiment
+from vibsim.experiment.schema.checks import ValueCheck
 
 FACTS: Mapping[str, Field] = {
     "low": Field("least value that the reduced number can have"),
@@ -131,12 +119,7 @@ def monotone(x: Floats, e: Floats, key: Floats) -> Reduced:
 
 
 REDUCTIONS: Mapping[str, Callable[[Floats, Floats, Floats], Reduced]] = {
-    "largest": largest,
-    "smallest": smallest,
-    "mean": mean,
-    "where_largest": where_largest,
-    "where_smallest": where_smallest,
-    "monotone": monotone,
+    row.__name__: row for row in (largest, smallest, mean, where_largest, where_smallest, monotone)
 }
 
 
@@ -153,32 +136,32 @@ def is_as_asked(check: ValueCheck, low: float, high: float) -> bool | None:
     return True if every else None if some else False
 
 
-def judge(
-    experiment: Experiment, record: Record, check: ValueCheck, found: Mapping[str, Any]
-) -> Judged:
+def judge(experiment: Experiment, record: Record, check: ValueCheck, found: Measured) -> Judged:
     """Compare a number with what the check asks of it: that of every member, or one of all of them."""
     if check.take is None:
         return value.judge(experiment, record, check, found)
     own = value.judge(experiment, record, check, found)
     about = np.flatnonzero(about_members(record, check))
     schemes = len(record["scheme"])
-    places, reasons = np.full(schemes, about[0]), np.full(schemes, MATCH)
+    places, reasons = np.full(schemes, about[0]), np.full(schemes, Reason.MATCH)
     table = {name: np.full(schemes, np.nan) for name in ("value", "error_bound", *FACTS)}
     enough = len(record["level"]) >= value.FEWEST
     for s in range(schemes):
-        broken = np.isin(own.reason[s, about], (NON_FINITE, NOT_APPLICABLE))
-        broken |= (own.reason[s, about] == TOO_FEW_LEVELS) & np.isnan(found["value"][s, about])
+        broken = np.isin(own.reason[s, about], (Reason.NON_FINITE, Reason.NOT_APPLICABLE))
+        broken |= (own.reason[s, about] == Reason.TOO_FEW_LEVELS) & np.isnan(
+            found["value"][s, about]
+        )
         table["members"][s], table["undecided"][s] = len(about), np.count_nonzero(broken)
         if broken.any():
             # a number that does not exist leaves none of all members
             places[s] = about[np.argmax(broken)]
             reasons[s] = own.reason[s, places[s]]
             continue
-        one = _reduced(record, check, found, s, about)
+        one = _reduced(experiment, record, check, found, s, about)
         places[s] = about[one.member]
         holds = is_as_asked(check, one.low, one.high)
-        unclear = PRE_ASYMPTOTIC if enough else TOO_FEW_LEVELS
-        reasons[s] = unclear if holds is None else MATCH if holds else MISMATCH
+        unclear = Reason.PRE_ASYMPTOTIC if enough else Reason.TOO_FEW_LEVELS
+        reasons[s] = unclear if holds is None else Reason.MATCH if holds else Reason.MISMATCH
         table["value"][s], table["low"][s], table["high"][s] = one.value, one.low, one.high
         table["error_bound"][s] = max(one.high - one.value, one.value - one.low)
         table["at"][s] = _key(record, check)[places[s]]
@@ -195,16 +178,26 @@ def judge(
 
 
 def _reduced(
-    record: Record, check: ValueCheck, found: Mapping[str, Any], scheme: int, about: Any
+    experiment: Experiment,
+    record: Record,
+    check: ValueCheck,
+    found: Measured,
+    scheme: int,
+    about: Any,
 ) -> Reduced:
     """Return the number of the members `about`, by their positions, of a scheme."""
     assert check.take is not None
     numbers = np.asarray(found["value"], dtype=np.float64)[scheme, about]
     error = np.zeros(len(about))
-    if has_limit(check.value, check.at.level):
+    if check.number.has_limit(check.at.level):
         error = np.asarray(found["error_bound"], dtype=np.float64)[scheme, about]
         error = np.where(np.isnan(error), np.inf, error)
-    return REDUCTIONS[check.take](numbers, error, _key(record, check)[about])
+    key = _key(record, check)
+    sweep = experiment.sweep
+    if check.take == "monotone" and sweep is not None and sweep.follow == check.over:
+        # along the curve, which may go up and down
+        key = np.arange(len(key), dtype=np.float64)
+    return REDUCTIONS[check.take](numbers, error, key[about])
 
 
 def _key(record: Record, check: ValueCheck) -> Floats:
@@ -226,8 +219,8 @@ def describe(f: Found, check: ValueCheck) -> Description:
         here = _at(f, check, f.case)
         rule = f"{f.notation.opening(of)} cannot be taken together: at {here}, {told}."
         return Description(rule, own.advice, f"not known at {here}")
-    found = {name: measured(f.record, f.id, name) for name in ("value", "error_bound")}
-    one = _reduced(f.record, check, found, f.scheme, about)
+    found = {name: field_values(f.record, f.id, name) for name in ("value", "error_bound")}
+    one = _reduced(f.experiment, f.record, check, found, f.scheme, about)
     told = _told(f, check, one, about)
     holds, doubted, not_so = _asked(f, check)
     if f.reason == "match":
@@ -246,8 +239,20 @@ def describe(f: Found, check: ValueCheck) -> Description:
 
 
 def _at(f: Found, check: ValueCheck, case: int) -> str:
-    """Name a member, by its position, by its swept value."""
-    return f"{check.over} = {f.notation.number(float(_key(f.record, check)[case]), 8)}"
+    """Name a member, by its position, by its swept value, and by its branch of a curve that goes up and down."""
+    key = _key(f.record, check)
+    here = f"{check.over} = {f.notation.number(float(key[case]), 8)}"
+    sweep = f.experiment.sweep
+    if sweep is None or sweep.follow != check.over:
+        return here
+    first = case - case % f.experiment.chain
+    curve = key[first : first + f.experiment.chain]
+    if np.all(np.diff(curve) >= 0.0) or np.all(np.diff(curve) <= 0.0):
+        return here
+    # a curve begins in the direction in which it goes on
+    after = max(case - first, 1)
+    way = "up" if curve[after] > curve[after - 1] else "down"
+    return f"{here} on the way {way}"
 
 
 def _asked(f: Found, check: ValueCheck) -> tuple[str, str, str]:
@@ -269,16 +274,13 @@ def _told(f: Found, check: ValueCheck, one: Reduced, about: Any) -> str:
         return f"{f.notation.opening(what)} {DIRECTIONS[one.value]} with {check.over} over {count} members{turn}"
     if take.startswith("where_"):
         which = take.removeprefix("where_")
-        span = (
-            ""
-            if one.low == one.high
-            else f", or elsewhere from {number(one.low, 8)} to {number(one.high, 8)}"
-        )
-        return f"The {which} {what} over {count} members is at {check.over} = {number(one.value, 10)}{span}"
+        span = f", or elsewhere from {number(one.low, 8)} to {number(one.high, 8)}"
+        span = "" if one.low == one.high else span
+        return f"The {which} {what} over {count} members is at {here}{span}"
     error = max(one.high - one.value, one.value - one.low)
     told = f"The {take} {what} over {count} members is {number(one.value, 10)} {unit}".rstrip()
     told += "" if take == "mean" else f", at {here}"
-    if not has_limit(check.value, check.at.level):
+    if not check.number.has_limit(check.at.level):
         return told
     if math.isinf(error):
         return f"{told}, with an unknown error"

@@ -4,23 +4,21 @@ from __future__ import annotations
 
 import math
 import string
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from vibsim.checks.fields import measured, name_of
+from vibsim.checks.fields import field_values, name_of
 from vibsim.checks.notation import PLAIN, Notation
 from vibsim.core.array_types import Floats
 from vibsim.core.record import Record
+from vibsim.experiment import Experiment
 from vibsim.experiment.cost import load_of
-
-if TYPE_CHECKING:
-    from vibsim.experiment import Experiment
-    from vibsim.experiment.schema.checks import Measurement
-    from vibsim.models.base import Model
+from vibsim.experiment.schema.checks import Measurement
+from vibsim.models.base import Model
 
 LONG = 120.0
 """Seconds above which times are told in minutes, and sixty times that in hours."""
@@ -33,6 +31,11 @@ NOT_FINITE = (
 NOTHING_MOVES = "Nothing moves here, so {} keeps its initial value with any scheme"
 MOVE = "Choose `initial:` values or a force that cause motion."
 """Advice where nothing moves."""
+WRONG_LIMIT = (
+    "Check `model:` and `initial:` against the intended equation, and the code of scheme {scheme} if it is your own. "
+    "Finer levels will not help."
+)
+"""Advice where levels approach another limit than the exact solution."""
 
 
 class Template(string.Formatter):
@@ -83,7 +86,7 @@ class Found:
 
     def fact(self, name: str) -> Any:
         """Return a field of the check: that of the scheme and the member, or the one for all."""
-        values = np.asarray(measured(self.record, self.id, name))
+        values = np.asarray(field_values(self.record, self.id, name))
         return (values[self.scheme, self.case] if values.ndim else values).tolist()
 
     def word(self, name: str) -> str:
@@ -141,6 +144,15 @@ def cost_in_words(experiment: Experiment, levels: Sequence[int]) -> str:
     size = f"{memory / 1e6:.0f} MB" if memory < 1e9 else f"{memory / 1e9:.1f} GB"
     time = _time(sum(load.seconds(members) for load in loads))
     return f"{count} steps, {time} on one core, {size} of memory"
+
+
+def add_levels(finest: int, count: int, cost: Callable[[Sequence[int]], str]) -> str:
+    """Ask for so many levels finer than one, with what they cost in words; from the second letter on."""
+    last = finest + count
+    finer = list(range(finest + 1, last + 1))
+    names = {1: f"level {last}", 2: f"levels {finer[0]} and {last}"}
+    which = names.get(count, f"levels {finer[0]} to {last}")
+    return f"dd {which} to `levels:` ({cost(finer)})"
 
 
 def _time(seconds: float) -> str:

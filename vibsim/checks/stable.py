@@ -15,36 +15,23 @@ be.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from vibsim.apriori.formal_orders import columns_of, stability_limits
-from vibsim.checks.fields import LEVEL, STATUS, Field
+from vibsim.checks.fields import LEVEL, STATUS, Field, Measured
 from vibsim.checks.notation import ROUND_OFF
-from vibsim.checks.outcome import (
-    FAIL,
-    MATCH,
-    MISMATCH,
-    NON_FINITE,
-    PASS,
-    STATUS_OF,
-    UNSTABLE,
-    Judged,
-)
+from vibsim.checks.outcome import FAIL, PASS, STATUS_OF, Judged, Reason
 from vibsim.checks.sentences import Description, Found, growth_in_words
+from vibsim.comparison.quantity_comparison import Compared
 from vibsim.convergence.thresholds import BLOWN_UP
 from vibsim.core.array_types import Flags, Floats
 from vibsim.core.record import Record
 from vibsim.core.vocabulary import REASON_NAMES
+from vibsim.experiment import Experiment
+from vibsim.experiment.schema.checks import StableCheck
 from vibsim.observe import oscillation, predicted_oscillation
 from vibsim.observe.member_block import MemberBlock
-
-if TYPE_CHECKING:
-    from vibsim.comparison.quantity_comparison import Comparison
-    from vibsim.experiment import Experiment
-    from vibsim.experiment.schema.checks import StableCheck
 
 FIELDS = {
     "status": STATUS,
@@ -54,7 +41,7 @@ FIELDS = {
         REASON_NAMES,
     ),
     "growth": Field("growth factor of the amplitude per period"),
-    "predicted_growth": Field("the same by theory"),
+    "predicted_growth": Field("growth factor of the amplitude per period by theory"),
     "omega_dt": Field("highest w dt"),
     "level": LEVEL,
 }
@@ -67,9 +54,7 @@ NEAR = 0.1
 """How far the logarithm of a growth may be from the predicted one, as a part of it."""
 
 
-def measure(
-    block: MemberBlock, compared: Mapping[str, Comparison], check: StableCheck
-) -> Mapping[str, Any]:
+def measure(block: MemberBlock, compared: Compared, check: StableCheck) -> Measured:
     """Return what a check measures."""
     level = block.grid.levels[-1] if check.level is None else check.level
     index = block.grid.levels.index(level)
@@ -85,7 +70,9 @@ def measure(
     contradicted &= _differs(block, index, found, expected)
     unstable = (broken & ~escaped) | beyond | grown
     reason = np.select(
-        [contradicted, unstable, escaped], [MISMATCH, UNSTABLE, NON_FINITE], default=MATCH
+        [contradicted, unstable, escaped],
+        [Reason.MISMATCH, Reason.UNSTABLE, Reason.NON_FINITE],
+        default=Reason.MATCH,
     )
     return {
         "status": STATUS_OF[reason],
@@ -136,13 +123,11 @@ def _differs(block: MemberBlock, index: int, measured: Floats, expected: Floats)
     return np.asarray(apart > NEAR * np.abs(whole) + late)
 
 
-def judge(
-    experiment: Experiment, record: Record, check: StableCheck, found: Mapping[str, Any]
-) -> Judged:
+def judge(experiment: Experiment, record: Record, check: StableCheck, found: Measured) -> Judged:
     """Compare whether schemes are stable with what a check expects."""
     with np.errstate(divide="ignore", invalid="ignore"):
         size = np.abs(np.log(found["growth"]))
-    as_expected = found["reason"] == (MATCH if check.stable else UNSTABLE)
+    as_expected = found["reason"] == (Reason.MATCH if check.stable else Reason.UNSTABLE)
     away = np.where(np.isnan(size), np.inf, size)
     return Judged(found["reason"], away, np.where(as_expected, PASS, FAIL))
 

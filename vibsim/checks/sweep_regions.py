@@ -29,7 +29,7 @@ TOLD = 2
 """A sentence names so many keys."""
 
 
-def where(record: Record, outcome: Outcome) -> dict[str, Any]:
+def sweep_regions(record: Record, outcome: Outcome) -> dict[str, Any]:
     """Tell where in a sweep, whose values the convergence Record has, the results lie that did not pass.
 
     Returns

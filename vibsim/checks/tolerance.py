@@ -7,22 +7,20 @@ The levels were chosen by a pilot of a few members. What holds of all the others
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from vibsim.checks.fields import Field
 from vibsim.checks.notation import Notation
-from vibsim.checks.outcome import MATCH, MISMATCH, Judged, Outcome, outcome_of
+from vibsim.checks.outcome import Judged, Outcome, Reason, outcome_of
 from vibsim.checks.sentences import Description, Found
 from vibsim.comparison.best_solution import extrapolated
 from vibsim.core.array_types import Floats, Integers
 from vibsim.core.errors import VibsimError
-from vibsim.core.record import Record, Variable, attributes
+from vibsim.core.record import Record, Variable
+from vibsim.core.vocabulary import MEMBER
+from vibsim.experiment import Experiment
 from vibsim.observe.member_block import MemberBlock
-
-if TYPE_CHECKING:
-    from vibsim.experiment import Experiment
 
 _BOUND = "_best_error"
 """What follows the name of a state in the name of its largest bound."""
@@ -46,8 +44,8 @@ def bounds(block: MemberBlock) -> dict[str, Variable]:
     largest[:, list(block.experiment.ladder)] = bounds
     words = "largest bound of the error of the extrapolated solution"
     return {
-        f"{state.name}{_BOUND}": Variable(
-            ("scheme", "case"), values, attributes(f"{state.long_name}: {words}", state.unit)
+        f"{state.name}{_BOUND}": Variable.of(
+            MEMBER, values, f"{state.long_name}: {words}", state.unit
         )
         for state, values in zip(block.model.states, largest, strict=True)
     }
@@ -63,16 +61,13 @@ def _largest_bound(experiment: Experiment, record: Record) -> tuple[Floats, Inte
 def judge(experiment: Experiment, record: Record) -> Outcome:
     """Compare the largest bound of every scheme and member with the tolerance of the experiment.
 
-    Raises
-    ------
-    VibsimError
-        Where `record`, the convergence Record, was made without the tolerance.
+    VibsimError where `record`, the convergence Record, was made without the tolerance.
     """
     states = tuple(state.name for state in experiment.model.definition.states)
     if experiment.tolerance is None or any(f"{name}{_BOUND}" not in record for name in states):
         raise VibsimError("the analysis knows of no tolerance: analyse the levels again")
     largest, which = _largest_bound(experiment, record)
-    reason = np.where(largest <= experiment.tolerance, MATCH, MISMATCH)
+    reason = np.where(largest <= experiment.tolerance, Reason.MATCH, Reason.MISMATCH)
     facts = {
         "error_bound": (BOUND, largest),
         "state": (Field("state with the largest bound", np.int8, states), which),

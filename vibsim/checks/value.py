@@ -8,42 +8,31 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from vibsim.apriori.formal_orders import columns_of, options_of
-from vibsim.checks.fields import Field
+from vibsim.checks.fields import Field, Measured
 from vibsim.checks.notation import PLAIN, ROUND_OFF, Notation
-from vibsim.checks.outcome import (
-    MATCH,
-    MISMATCH,
-    NON_FINITE,
-    NOT_APPLICABLE,
-    PRE_ASYMPTOTIC,
-    TOO_FEW_LEVELS,
-    Judged,
-)
+from vibsim.checks.outcome import Judged, Reason, first_reason
 from vibsim.checks.sentences import NOT_FINITE, Description, Found, cost_in_words
 from vibsim.comparison import best_values, value_numbers
-from vibsim.comparison.best_values import has_limit
-from vibsim.comparison.quantity_comparison import Comparison
+from vibsim.comparison.quantity_comparison import Compared
 from vibsim.core.array_types import Flags, Floats
 from vibsim.core.record import Record
+from vibsim.experiment import Experiment
+from vibsim.experiment.schema.checks import ValueCheck
 from vibsim.experiment.value_names import VALUES
 from vibsim.observe.member_block import MemberBlock
 from vibsim.schemes.base import is_on_the_mesh
 from vibsim.simulation.scaled import has_time_unit
 
-if TYPE_CHECKING:
-    from vibsim.experiment import Experiment
-    from vibsim.experiment.schema.checks import ValueCheck
-
 FIELDS = {
     "value": Field("the number, in its own unit"),
-    "error_bound": Field("bound of its error where it is extrapolated"),
+    "error_bound": Field("bound of the error of the number where it is extrapolated"),
     "levels_needed": Field(
         "finer levels that are probably needed, 0 where none mends it, -1 unknown", np.int8, none=-1
     ),
@@ -65,34 +54,6 @@ FEWEST = 3
 FINER = 2
 """So many finer levels are advised."""
 
-SAMPLED = ("at", "end")
-"""Numbers that are a sample of a series, and are told by its name."""
-COUNTED = frozenset({"accepted_steps", "force_evaluations"})
-"""Numbers that finer levels make larger, and no more accurate."""
-SURVIVES_FAILURE = frozenset(
-    {
-        *("at", "exact_period", "growth_per_period", "stability_limit", "exact_degree"),
-        *("predicted_growth_per_period", "predicted_frequency", "predicted_phase_error"),
-    }
-)
-"""Numbers that may be sound although the member broke down later; those from theory no run enters."""
-
-
-def sees_several_levels(name: str) -> bool:
-    """Say whether a number rests on more than one level: on finer ones, or on the whole ladder."""
-    row = VALUES[name]
-    return row.finer_levels > 0 or (row.of == "convergent" and "level" not in row.at)
-
-
-def depends_on_level(name: str) -> bool:
-    """Say whether a number is another at another level, or rests on the whole ladder."""
-    return "level" in VALUES[name].at or sees_several_levels(name)
-
-
-def own_levels(name: str, levels: Sequence[int]) -> tuple[int, ...]:
-    """Return the levels that have such a number: one that is made of several has the coarsest of them as its own."""
-    return tuple(levels)[: len(levels) - VALUES[name].finer_levels]
-
 
 def compare(check: ValueCheck, number: Floats) -> tuple[Flags, Floats]:
     """Return where numbers are as they should be, and how far beyond the border they are; of any shape."""
@@ -105,23 +66,21 @@ def compare(check: ValueCheck, number: Floats) -> tuple[Flags, Floats]:
     return away <= check.allowed, away - check.allowed
 
 
-def measure(
-    block: MemberBlock, compared: Mapping[str, Comparison], check: ValueCheck
-) -> Mapping[str, Any]:
+def measure(block: MemberBlock, compared: Compared, check: ValueCheck) -> Measured:
     """Return the number, the bound of its error, and what finer levels do to it."""
-    at, name, levels = check.at, check.value, block.grid.levels
+    at, name, levels, row = check.at, check.value, block.grid.levels, check.number
     place = value_numbers.Place(
         block, compared, check.quantity or "", at.level, at.t, at.step, at.event
     )
     value, bound = (np.broadcast_to(one, block.shape) for one in best_values.value(name, place))
     fulfilled, _ = compare(check, value)
     numbers = np.full((*block.shape, len(levels)), np.nan)
-    if "level" in VALUES[name].at and not (block.lean and np.all(fulfilled) and not check.take):
+    if "level" in row.at and not (block.lean and np.all(fulfilled) and not check.take):
         numbers = _by_level(name, place)
-    if check.take is not None and has_limit(name, at.level):
+    if check.take is not None and row.has_limit(at.level):
         # every member has a part in the number of all
         bound = np.where(np.isnan(bound), REACH * _last_change(numbers), bound)
-    own = own_levels(name, levels) or tuple(levels)
+    own = row.own_levels(levels) or tuple(levels)
     level = place.level if place.level in own else own[-1]
     needed, first = _prospects(check, numbers[..., : len(own)], own, int(level), fulfilled)
     return {
@@ -138,7 +97,7 @@ def _by_level(name: str, place: value_numbers.Place) -> Floats:
 
     A step of a level is the same time on every other one; of the extrapolated solution it is that of a common time.
     """
-    if place.level == "best" and name in SAMPLED:
+    if place.level == "best" and VALUES[name].is_sample:
         return np.stack(value_numbers.samples(place), axis=-1)
     time, data = place.t, place.data()
     if place.step is not None and data is not None:
@@ -181,43 +140,48 @@ def _prospects(
     return np.where(fulfilled, UNKNOWN, code), np.where(fulfilled, -1, first)
 
 
-def judge(
-    experiment: Experiment, record: Record, check: ValueCheck, found: Mapping[str, Any]
-) -> Judged:
+def judge(experiment: Experiment, record: Record, check: ValueCheck, found: Measured) -> Judged:
     """Compare a measured number with what the check asks of it.
 
     A limit of several levels that misses what is asked by less than its bound may be right: nothing is decided then.
     Nor is it where the time of an event meets what is asked, but may be further away.
     """
     name, number, bound = check.value, found["value"], found["error_bound"]
+    row, is_limit = check.number, check.number.has_limit(check.at.level)
     holds, away = compare(check, number)
-    survives = np.isfinite(number) & (name in SURVIVES_FAILURE)
+    survives = np.isfinite(number) & row.survives_failure
     # of a stability limit infinity is a value; on the separatrix there is no period, and nothing went wrong
     does_not_exist = np.isnan(number) | (np.isinf(number) & (name == "exact_period"))
     infinite = np.isinf(number) & (name != "stability_limit") & ~does_not_exist
-    may_be_right = ~(away > bound) & has_limit(name, check.at.level)
-    if has_limit(name, check.at.level) and VALUES[name].needs_events:
+    may_be_right = ~(away > bound) & is_limit
+    if is_limit and row.needs_events:
         # a time that the levels leave open agrees by chance, perhaps of another event
         holds &= bound <= np.maximum(-away, 0.0 if check.equals is None else check.allowed)
     cases = [
-        ((_failed(record, check) & ~survives) | infinite, NON_FINITE),
-        (does_not_exist, TOO_FEW_LEVELS if _lacks_levels(experiment, check) else NOT_APPLICABLE),
-        (holds, MATCH),
-        (may_be_right, TOO_FEW_LEVELS if len(record["level"]) < FEWEST else PRE_ASYMPTOTIC),
+        ((_failed(record, check) & ~survives) | infinite, Reason.NON_FINITE),
+        (
+            does_not_exist,
+            Reason.TOO_FEW_LEVELS if _lacks_levels(experiment, check) else Reason.NOT_APPLICABLE,
+        ),
+        (holds, Reason.MATCH),
+        (
+            may_be_right,
+            Reason.TOO_FEW_LEVELS if len(record["level"]) < FEWEST else Reason.PRE_ASYMPTOTIC,
+        ),
     ]
-    reason = np.select([mask for mask, _ in cases], [code for _, code in cases], MISMATCH)
+    reason = first_reason(cases, Reason.MISMATCH)
     return Judged(reason, away)
 
 
 def _lacks_levels(experiment: Experiment, check: ValueCheck) -> bool:
     """Say whether a number rests on more levels than the experiment has."""
-    return VALUES[check.value].finer_levels >= len(experiment.levels)
+    return check.number.finer_levels >= len(experiment.levels)
 
 
 def _failed(record: Record, check: ValueCheck) -> Flags:
     """Say which members broke down at a level that the value depends on, shape (scheme, case)."""
     broken, level = record["status"] != 0, check.at.level
-    if sees_several_levels(check.value) or level == "best":
+    if check.number.sees_several_levels or level == "best":
         return np.asarray(np.any(broken, axis=-1))
     levels = np.asarray(record["level"]).tolist()
     return np.asarray(broken[..., levels.index(level) if level in levels else -1])
@@ -232,7 +196,7 @@ def unit_of(experiment: Experiment, record: Record, check: ValueCheck) -> str:
 
     A scaled run, and a model without units, have none: the convergence Record says so.
     """
-    time, measure = ("s" if has_time_unit(record) else ""), VALUES[check.value].measure
+    time, measure = ("s" if has_time_unit(record) else ""), check.number.measure
     if check.take is not None and check.take not in ("largest", "smallest", "mean"):
         # a swept value has its own unit, a direction none
         return ""
@@ -275,7 +239,7 @@ def units_in(record: Record) -> dict[str, str]:
 def what(check: ValueCheck, notation: Notation = PLAIN) -> str:
     """Say which number is meant."""
     quantity = notation.quantity(check.quantity) if check.quantity else ""
-    if check.value in SAMPLED:
+    if check.number.is_sample:
         if check.at.t is not None:
             return f"{quantity} at t = {check.at.t:g}"
         when = "at the end" if check.at.step is None else f"at step {check.at.step}"
@@ -300,55 +264,46 @@ def rule(check: ValueCheck, notation: Notation = PLAIN) -> str:
     if key != "equals":
         return f"{key} {notation.number(wanted)}"
     # counted numbers are equal, or apart by more
-    is_counted = VALUES[check.value].measure == "count" and check.allowed < 0.5
+    is_counted = check.number.measure == "count" and check.allowed < 0.5
     within = "" if is_counted else f" within {notation.number(check.allowed)}"
     return f"equal to {notation.number(wanted, 15)}{within}"
 
 
 def describe(f: Found, check: ValueCheck) -> Description:
     """Say what a number is, whether it is what a check asks for, and what to change."""
-    told, brief, asked = (
-        f.notation.opening(what(check, f.notation)),
-        _measured(f, check),
-        rule(check, f.notation),
-    )
+    told = f.notation.opening(what(check, f.notation))
+    brief, asked = _measured(f, check), rule(check, f.notation)
     match f.reason:
         case "match":
-            return Description(f"{told} is {brief}; it is {asked}.", "", brief)
+            sentence, advice = f"{told} is {brief}; it is {asked}.", ""
         case "mismatch":
-            advice = _on_mismatch(f, check)
-            return Description(f"{told} is {brief}; it is not {asked}.", advice, brief)
+            sentence, advice = f"{told} is {brief}; it is not {asked}.", _on_mismatch(f, check)
+            if check.number.needs_force and not _is_unsteady(f, check):
+                advice += " If the motion is not steady yet, a longer run helps (`time: periods`)."
         case "non_finite":
-            return Description(NOT_FINITE[0].format(told), NOT_FINITE[1], brief)
+            sentence, advice = NOT_FINITE[0].format(told), NOT_FINITE[1]
         case "not_applicable" if check.at.event is not None:
-            return Description(
-                f"{told} does not exist: fewer events happen until the end.",
-                "Ask for an earlier `event:`, or make `time: end` later.",
-                brief,
-            )
+            sentence = f"{told} does not exist: fewer events happen until the end."
+            advice = "Ask for an earlier `event:`, or make `time: end` later."
         case "not_applicable":
-            return Description(
-                f"{told} does not exist here, or was not stored.",
+            sentence = f"{told} does not exist here, or was not stored."
+            advice = (
                 "Ask for a level, a step and a time that are stored (`at:`, `samples: all`), and choose `time: end` so "
-                "that the number exists.",
-                brief,
+                "that the number exists."
             )
         case "too_few_levels" if _lacks_levels(f.experiment, check):
-            return Description(
-                f"{told} does not exist here, because it needs more levels than there are.",
-                f"Add finer `levels:` until there are {VALUES[check.value].finer_levels + 1}.",
-                brief,
-            )
-    may_be = f"{told} is {brief}; it may or may not be {asked}."
-    if _is_on_the_mesh(f, check):
-        return Description(may_be, f"Set `events: located` for scheme {f.scheme_name}.", brief)
-    finer, cost = finer_levels(f)
-    return Description(
-        may_be,
-        f"Add levels {finer[0]} and {finer[-1]} to `levels:` ({cost}) to shrink the error bound, or ask for the "
-        "number of one level (`at: {level: ...}`).",
-        brief,
-    )
+            sentence = f"{told} does not exist here, because it needs more levels than there are."
+            advice = f"Add finer `levels:` until there are {check.number.finer_levels + 1}."
+        case _:
+            sentence = f"{told} is {brief}; it may or may not be {asked}."
+            advice = f"Set `events: located` for scheme {f.scheme_name}."
+            if not _is_on_the_mesh(f, check):
+                finer, cost = finer_levels(f)
+                advice = (
+                    f"Add levels {finer[0]} and {finer[-1]} to `levels:` ({cost}) to shrink the error bound, or ask "
+                    "for the number of one level (`at: {level: ...}`)."
+                )
+    return Description(sentence, advice, brief)
 
 
 def _measured(f: Found, check: ValueCheck) -> str:
@@ -359,19 +314,24 @@ def _measured(f: Found, check: ValueCheck) -> str:
     told = f"{f.notation.number(found, digits)} {unit_of(f.experiment, f.record, check)}".rstrip()
     if check.value == "stability_limit" and found == 0.0:
         told += " (it grows at every step)"
-    if not has_limit(check.value, check.at.level):
+    if not check.number.has_limit(check.at.level):
         return told
     if math.isnan(bound):
-        is_late = _is_on_the_mesh(f, check)
-        why = "events are left to the mesh" if is_late else "the levels do not approach each other"
-        return f"{told}, with an unknown error, because {why}"
+        return f"{told}, with an unknown error{_why_unknown(f, check)}"
     return f"{told}, with an error of at most {f.notation.number(bound, 2)}"
+
+
+def _why_unknown(f: Found, check: ValueCheck) -> str:
+    """Say why nothing bounds the error of a number, where one cause is sure."""
+    if _is_on_the_mesh(f, check):
+        return ", because events are left to the mesh"
+    return ", because there is one level only" if len(f.experiment.levels) == 1 else ""
 
 
 def _is_on_the_mesh(f: Found, check: ValueCheck) -> bool:
     """Say whether a number is of events that are left to the mesh."""
     options = options_of(f.experiment, columns_of(f.record), f.scheme, f.case)
-    return VALUES[check.value].needs_events and is_on_the_mesh(options)
+    return check.number.needs_events and is_on_the_mesh(options)
 
 
 def finer_levels(f: Found) -> tuple[list[int], str]:
@@ -383,19 +343,28 @@ def finer_levels(f: Found) -> tuple[list[int], str]:
 def _on_mismatch(f: Found, check: ValueCheck) -> str:
     """Say what to change where a number is another one; finer levels only where they change it enough."""
     change = f"hange `{_border(check)[0]}:`"
-    if check.value in COUNTED or not depends_on_level(check.value):
+    if check.number.is_count_of_work or not check.number.depends_on_level:
         return f"C{change}."
     if _is_on_the_mesh(f, check):
         return f"Set `events: located` for scheme {f.scheme_name}, or c{change}."
+    if _is_unsteady(f, check):
+        return f"Give more `periods:`, if the motion is not steady yet, or c{change}."
     if (first := f.fact("level_as_asked")) > 0:
         return f"Ask for a finer level (`at: {_at(check, first)}`), where the number is as asked, or c{change}."
     if f.fact("levels_needed") == SETTLED:
         return f"C{change}, `model:` or `initial:`. Finer levels will not help."
     finer, cost = finer_levels(f)
     ask = f" and ask for one (`at: {_at(check, finer[-1])}`)"
-    if check.at.level in (None, f.experiment.levels[-1], "best"):
+    if check.at.level in (None, "best"):
         ask = ""
     return f"Add finer `levels:` ({finer[0]} and {finer[-1]} cost {cost}){ask}, or c{change}."
+
+
+def _is_unsteady(f: Found, check: ValueCheck) -> bool:
+    """Tell whether a number itself says that the motion is not steady."""
+    if check.value == "section_period":
+        return bool(f.fact("value") == 0)
+    return check.value == "steady_change"
 
 
 def _at(check: ValueCheck, level: int) -> str:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from vibsim.apriori.formal_orders import columns_of
 from vibsim.checks import accurate, equal, tolerance, value
@@ -18,10 +18,8 @@ from vibsim.checks.outcome import Result, compared_reason, truth
 from vibsim.checks.sentences import Description, Found
 from vibsim.core.record import Record
 from vibsim.core.vocabulary import BY_TOLERANCE, worst
-
-if TYPE_CHECKING:
-    from vibsim.experiment import Check, Experiment
-    from vibsim.experiment.schema.checks import Expect, Measurement
+from vibsim.experiment import Experiment
+from vibsim.experiment.schema.checks import Check, Expect, Measurement
 
 CORRECT = "Correct `expect:`, or find out why the outcome differs."
 
@@ -116,7 +114,7 @@ class Wording:
                 told += f" The check detected {expected}, as intended."
             elif reason == "mismatch":
                 told += f" The check expects {expected}."
-        asked = self._asked()
+        asked = self._swept_values()
         if total == 1 and asked:
             told = f"With {asked}: {told}"
         if total > 1:
@@ -134,7 +132,7 @@ class Wording:
         decided = "cannot be decided" if holds is None else f"is {'true' if holds else 'false'}"
         return f"The statement {decided}. {told}"
 
-    def _asked(self) -> str:
+    def _swept_values(self) -> str:
         """Name the swept values of the members that the check is about; empty where it is about every one."""
         swept = {} if self._measured is None else self._measured.swept
         return ", ".join(

@@ -90,7 +90,7 @@ def commands() -> Iterator[Command]:
         cores,
         _row("--executor", _word, "NAME", "where jobs run: an executor plug-in of Snakemake"),
         _row("--jobs", _positive, "N", "jobs that an executor has at once"),
-        _row("--profile", _path, "DIR", "a profile of Snakemake, such as that of a cluster"),
+        _row("--profile", _path, "DIR", "a profile of Snakemake: slurm, generic, or a folder"),
         _flag("--dry-run", "show what would run and why"),
         _flag("--verify", verify),
         allow,

@@ -33,10 +33,10 @@ def in_full(what: str, name: str) -> list[str]:
     from vibsim.models import MODELS
 
     if what == "schemes":
-        return laid_out(_scheme(scheme_named(name)))
+        return laid_out(scheme_rows(scheme_named(name)))
     if name not in MODELS:
         raise refusal("NAME", name, "is no model", nearest(name, sorted(MODELS)))
-    return laid_out(_model(MODELS[name]))
+    return laid_out(model_rows(MODELS[name]))
 
 
 def scheme_named(name: str) -> Scheme:
@@ -70,7 +70,8 @@ def laid_out(found: Iterable[Row]) -> list[str]:
     return lines
 
 
-def _scheme(scheme: Scheme) -> Iterator[Row]:
+def scheme_rows(scheme: Scheme) -> Iterator[Row]:
+    """Yield what there is to know of a scheme."""
     order, step, symplectic, forces, stable = facts(scheme)
     yield "scheme", f"{scheme.kind}: {scheme.title}"
     yield "source", scheme.source
@@ -139,7 +140,8 @@ def choices(option: AnyOption) -> str:
     return f"{option.least:g} to {option.most:g} (default {option.default:g})"
 
 
-def _model(model: Model) -> Iterator[Row]:
+def model_rows(model: Model) -> Iterator[Row]:
+    """Yield what there is to know of a model."""
     yield "model", f"{model.kind}: {model.title}"
     yield "equation", model.equation
     yield "source", model.source

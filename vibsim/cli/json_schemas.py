@@ -72,7 +72,16 @@ def plan() -> dict[str, Any]:
         member_steps=COUNT,
         bytes=COUNT | {"description": "of all files"},
         memory=COUNT | {"description": "bytes of the largest job"},
-        seconds={"type": "number", "description": "of one core"},
+        seconds={
+            "type": "number",
+            "description": "of one core, of the steps and files of all levels",
+        },
+        cpu_seconds={"type": "number", "description": "CPU time of a whole run"},
+        wall_seconds={
+            "type": "object",
+            "description": "time of a whole run, by the number of cores: 1, and those at hand",
+            "additionalProperties": {"type": "number"},
+        },
     )
     found["properties"]["total"] = total
     # every field is printed, also one with a default

@@ -1,8 +1,9 @@
 """The manifest of a results folder: size, time, inode and digest of every file of an experiment, and what made it.
 
 A job adds its files when it has made them, and a run that ends writes the whole anew, in order. A run compares it with
-the folder (`vibsim.cli.run.changes`), and so does ``vibsim verify``. The manifest is data: a line begins with its own
-digest, one of another form counts as not there, and the names in it are those that vibsim itself gives.
+the folder (`vibsim.cli.run.changes`), and so does ``vibsim verify``. The manifest is data: a line begins with a digest
+of itself and of the experiment's key, one of another form or of another experiment counts as not there, and the names
+in it are those that vibsim itself gives.
 """
 
 from __future__ import annotations
@@ -23,6 +24,8 @@ from vibsim.store.atomic import write_text
 
 INDEX = ""
 """Key of the files over all experiments."""
+OVER_ALL = ("index.html", "summary.csv")
+"""These files."""
 BESIDE = ("figures", "tables")
 """Folders of a report, whose files only the report knows."""
 _NAME = re.compile(
@@ -78,9 +81,21 @@ def add(results: Path, key: str, names: Iterable[str], job: str = "") -> None:
         file = results / key / name
         digest = seal.stored_digest(file) if file.suffix == ".nc" else content(file)
         entries[name] = entry(file.lstat(), digest, job, machine())
+    _append(results, key, entries)
+
+
+def withdraw(results: Path, key: str, names: Iterable[str]) -> None:
+    """Take files off the record that a job is about to write; a job that is killed then leaves none that seems changed.
+
+    With a report goes all that it consists of.
+    """
+    _append(results, key, dict.fromkeys(names))
+
+
+def _append(results: Path, key: str, entries: Mapping[str, Entry | None]) -> None:
     # A line that a kill cut short ends here. What is not on record is compared with its seal, or made again.
     with suppress(OSError):
-        regular_files.append(path(results, key), f"\n{_line(entries)}\n".encode())
+        regular_files.append(path(results, key), f"\n{_line(key, entries)}\n".encode())
 
 
 def load(results: Path, key: str) -> dict[str, Entry]:
@@ -97,20 +112,24 @@ def read(results: Path, key: str) -> tuple[dict[str, Entry], bool]:
         return found, False
     is_whole = True
     for line in filter(None, lines):
-        data = _data(line)
+        data = _data(key, line)
         if data is None:
             is_whole = False
             continue
         if "report.html" in data:
             found = {name: e for name, e in found.items() if not name.startswith(BESIDE)}
-        found |= data
+        for name, entry in data.items():
+            if entry is None:
+                found.pop(name, None)
+            else:
+                found[name] = entry
     return found, is_whole
 
 
-def _data(line: bytes) -> dict[str, Entry] | None:
-    """Return the entries of a line; None where it is not as it was written."""
+def _data(key: str, line: bytes) -> dict[str, Entry | None] | None:
+    """Return the entries of a line, None of what is withdrawn; None where it is not as it was written for this key."""
     digest, _, text = line.partition(b" ")
-    if hashlib.sha256(text).hexdigest().encode() != digest:
+    if _digest(key, text) != digest:
         return None
     try:
         data = json.loads(text)
@@ -118,12 +137,12 @@ def _data(line: bytes) -> dict[str, Entry] | None:
         return None
     if not (isinstance(data, dict) and all(map(_is_entry, data, data.values()))):
         return None
-    return {name: Entry(*values) for name, values in data.items()}
+    return {name: Entry(*values) if values else None for name, values in data.items()}
 
 
 def replace(results: Path, key: str, entries: Mapping[str, Entry]) -> None:
     """Write the whole record anew, in one line and in order, where it is not so already."""
-    file, text = path(results, key), f"{_line(entries)}\n"
+    file, text = path(results, key), f"{_line(key, entries)}\n"
     with suppress(OSError):
         if file.read_bytes() != text.encode() if file.exists() else entries:
             write_text(file, text)
@@ -154,13 +173,19 @@ def path(results: Path, key: str) -> Path:
     return results / ".vibsim/made" / f"{key.replace('/', '.') or 'index'}.jsonl"
 
 
-def _line(entries: Mapping[str, Entry]) -> str:
+def _line(key: str, entries: Mapping[str, Entry | None]) -> str:
     text = json.dumps(dict(sorted(entries.items())), separators=(",", ":"))
-    return f"{hashlib.sha256(text.encode()).hexdigest()} {text}"
+    return f"{_digest(key, text.encode()).decode()} {text}"
+
+
+def _digest(key: str, text: bytes) -> bytes:
+    return hashlib.sha256(b"%b %b" % (key.encode(), text)).hexdigest().encode()
 
 
 def _is_entry(name: str, values: Any) -> bool:
     match values:
+        case None:
+            return _NAME.fullmatch(name) is not None
         case [int(), int(), int(), str(digest), str(job), str(machine)]:
             known = all(type(number) is int and 0 <= number < 2**63 for number in values[:3])
             texts = _DIGEST.fullmatch(digest) and (not job or _DIGEST.fullmatch(job))

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-import os
 import shutil
 from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
+
+import psutil
 
 from vibsim.core.errors import Fault, InputError
 from vibsim.plan import Plan
@@ -21,7 +22,11 @@ def check(plans: Sequence[Plan], results: Path) -> None:
     InputError
         With what is needed and what is there.
     """
-    needed, free, total = _missing_bytes(plans, results), free_bytes(results), _memory("MemTotal")
+    needed, free, total = (
+        _missing_bytes(plans, results),
+        free_bytes(results),
+        psutil.virtual_memory().total,
+    )
     problems = [
         f"{plan.key}: a job needs {size(plan.memory)} of memory, the machine has {size(total)}"
         for plan in plans
@@ -67,16 +72,8 @@ def obstacle(results: Path) -> tuple[str, ...]:
 def megabytes(plans: Sequence[Plan]) -> int:
     """Return how much memory all jobs at once may take: what is free, but at least what the largest one needs."""
     largest = max((plan.memory for plan in plans), default=0)
-    return max(_memory("MemAvailable"), largest) // 10**6 + 1
-
-
-def _memory(name: str) -> int:
-    """Return a number of ``/proc/meminfo`` in bytes."""
-    for line in Path("/proc/meminfo").read_text().splitlines():
-        key, _, value = line.partition(":")
-        if key == name:
-            return int(value.split()[0]) * 1024
-    return os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
+    available: int = psutil.virtual_memory().available
+    return max(available, largest) // 10**6 + 1
 
 
 def size(number: float) -> str:

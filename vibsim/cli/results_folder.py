@@ -7,6 +7,7 @@ for the run that started it.
 
 from __future__ import annotations
 
+import json
 import os
 import stat
 from collections.abc import Iterable, Iterator
@@ -68,6 +69,26 @@ def clean(results: Path, keys: Iterable[str]) -> None:
             for entry in _entries(folder, deep=True):
                 if not entry.is_dir() and entry.stat().st_nlink > 1:
                     store.write_bytes(Path(entry), Path(entry).read_bytes())
+
+
+def forget(results: Path) -> bool:
+    """Remove the records of Snakemake that cannot be read, which end its work; tell whether there were any."""
+    found = [
+        Path(entry)
+        for name in ("metadata", "incomplete")
+        for entry in _entries(results / ".snakemake" / name, deep=True)
+        if entry.is_file() and not _is_record(Path(entry).read_bytes())
+    ]
+    for path in found:
+        path.unlink()
+    return bool(found)
+
+
+def _is_record(content: bytes) -> bool:
+    try:
+        return isinstance(json.loads(content), dict)
+    except ValueError:
+        return False
 
 
 _KINDS = {

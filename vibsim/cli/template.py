@@ -47,11 +47,11 @@ def _lines(model: Model, schema: str) -> Iterator[str]:
     yield '# `vibsim plan FILE`. Numbers may have units: "50 cm".'
     yield f"title: {model.title} on four levels"
     yield ""
-    scheme = "rk4" if model.assembled is None else "newmark"
+    scheme = "rk4" if model.loaded is None else "newmark"
     yield from textwrap.wrap(model.equation, 100, initial_indent="# ", subsequent_indent="# ")
     yield "model:"
     yield f"  kind: {model.kind}"
-    if model.assembled is not None:
+    if model.loaded is not None:
         yield from _column(STRUCTURE)
     else:
         yield from _column(

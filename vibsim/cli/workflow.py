@@ -3,27 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
 
 from vibsim.cli import results_folder
 from vibsim.cli.chosen_plans import resolve
 from vibsim.cli.jobs.solve import check_allowed
-from vibsim.core.home import default_results
+from vibsim.core.home import default_results, home
 from vibsim.plan import Names
 
 
-def names_of(config: Mapping[str, Any], root: Path, command_line: Mapping[str, Any]) -> Names:
+def names_of(config: Mapping[str, Any], command_line: Mapping[str, Any]) -> Names:
     """Return the names for the workflow of some experiments.
 
     Parameters
     ----------
     config
-        The ``experiments`` with the ``settings`` of all of them, and the ``results`` folder, as for
+        The ``experiments`` with the ``settings`` of all of them, one as text or several in a list, and the ``results``
+        folder, as for
         `vibsim.plan.Names.of`; without any the default experiments as they are, and `vibsim.core.home.default_results`.
         ``cores`` and ``overhead`` (megabytes) of a job, where it runs elsewhere.
-    root
-        The folder of the Snakefile.
     command_line
         What ``--config`` says on the command line: ``allow_commands=true`` lets programs of users run.
 
@@ -33,10 +31,13 @@ def names_of(config: Mapping[str, Any], root: Path, command_line: Mapping[str, A
         Where a file is refused, the results folder is, or a program that is not allowed to run.
     """
     is_allowed = str(command_line.get("allow_commands")).lower() == "true"
-    experiments, settings = config.get("experiments", []), config.get("settings", [])
+    experiments, settings = (
+        [words] if isinstance(words := config.get(key, []), str) else words
+        for key in ("experiments", "settings")
+    )
     results = str(config.get("results", default_results()))
     more = {key: int(config[key]) for key in ("cores", "overhead") if key in config}
-    names = Names.of(experiments, results, root, resolve, is_allowed, settings, **more)
+    names = Names.of(experiments, results, home(), resolve, is_allowed, settings, **more)
     results_folder.check(names.results, names.plans)
     check_allowed(names.plans.values(), is_allowed)
     return names

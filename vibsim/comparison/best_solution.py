@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,19 +14,17 @@ from vibsim.comparison.extrapolate_members import (
     Method,
     Start,
     extrapolate_members,
-    joined,
+    join_members,
     noise_of,
 )
 from vibsim.convergence.state_extrapolation import Pair
 from vibsim.core.array_types import Floats, Integers
-from vibsim.core.record import Attribute, Record, Variable, attributes
+from vibsim.core.record import Attribute, Record, Variable, flags
 from vibsim.core.vocabulary import MEMBER, SERIES
+from vibsim.experiment import Experiment
 from vibsim.observe.common_grid import Grid, check_belonging, common_grid, take
 from vibsim.simulation.members import Members, members
 from vibsim.simulation.scaled import in_scales
-
-if TYPE_CHECKING:
-    from vibsim.experiment import Experiment
 
 REACHED = ("no", "yes")
 """Meaning of the variable ``reached``."""
@@ -125,7 +123,7 @@ def in_order(parts: Sequence[tuple[Extrapolated, Integers]]) -> Extrapolated:
     if len(parts) == 1:
         return parts[0][0]
     order = np.argsort(np.concatenate([where for _, where in parts]))
-    return joined([part for part, _ in parts], order)
+    return join_members([part for part, _ in parts], order)
 
 
 def record_of(
@@ -143,7 +141,7 @@ def record_of(
 
     def add(name: str, fields: Iterable[NDArray[Any]], words: str, units: str) -> None:
         stacked = np.stack([np.ascontiguousarray(values.T) for values in fields])
-        variables[name] = Variable(SERIES, stacked, attributes(words, units))
+        variables[name] = Variable.of(SERIES, stacked, words, units)
 
     states = list(zip(model.states, ("position", "velocity"), strict=True))
     for state, field in states:
@@ -160,12 +158,10 @@ def record_of(
     if experiment.tolerance is not None:
         tolerance = experiment.tolerance
         reached = np.stack([np.maximum(*row.largest_bounds()) <= tolerance for row in rows])
-        words = (
+        text = (
             f"whether every bound of the member is at most {tolerance:g} in the unit of its state"
         )
-        codes = np.arange(len(REACHED), dtype=np.int8)
-        attrs = attributes(words, "1", flag_values=codes, flag_meanings=" ".join(REACHED))
-        variables["reached"] = Variable(MEMBER, reached.astype(np.int8), attrs)
+        variables["reached"] = Variable.of(MEMBER, reached.astype(np.int8), text, **flags(REACHED))
     about: dict[str, Attribute] = {
         "title": experiment.title,
         "model": model.kind,

@@ -9,7 +9,7 @@ extrapolated solution has no peaks of its own. Beside the bound stands the grid 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -19,27 +19,19 @@ from numpy.typing import NDArray
 from vibsim.apriori.formal_orders import even_powers, formal_orders
 from vibsim.comparison import value_numbers
 from vibsim.comparison.comparison_variables import Table
-from vibsim.comparison.quantity_comparison import Comparison
+from vibsim.comparison.quantity_comparison import Compared
 from vibsim.comparison.thresholds import IRREGULAR, MISSED_EXTREMUM, OF_GRID, OF_PARABOLA
 from vibsim.convergence import gci
 from vibsim.convergence.batches import batches
 from vibsim.convergence.number_extrapolation import Limit, limit, observed_order
 from vibsim.convergence.thresholds import ORDER_ABOVE_ROUND_OFF
 from vibsim.core.array_types import Flags, Floats
-from vibsim.core.record import Variable, attributes
+from vibsim.core.record import Variable, flags
 from vibsim.core.vocabulary import MEMBER
-from vibsim.experiment.value_names import HAVE_LIMITS, VALUES
+from vibsim.experiment.value_names import VALUES
 from vibsim.models import Model
 from vibsim.observe import oscillation
 from vibsim.observe.member_block import MemberBlock
-
-_INTERPOLATED = {"period", "period_error", "amplitude", "amplitude_error", "growth_factor"}
-_AT_POINTS = {"min", "max", "max_abs"}
-_OF_SERIES = {"end", "at"}
-_OF_ROOTS = {"frequency", "error_of_frequency", "phase_error_per_period", "growth_per_period"}
-"""Made of the recurrence of the steps, whose round-off is eps/(w dt)^2; by peaks where there is none."""
-_OF_EVENTS = {name for name in HAVE_LIMITS if VALUES[name].needs_events}
-_OWN_SIZE = {"period", "frequency", "amplitude", "growth_per_period", "growth_factor"} | _OF_EVENTS
 
 
 @dataclass(frozen=True)
@@ -53,17 +45,12 @@ class Scalar:
     words: str
 
 
-def has_limit(name: str, level: int | str | None) -> bool:
-    """Tell whether a value is asked for as the limit of the numbers of the levels."""
-    return level == "best" and name in HAVE_LIMITS
-
-
 def value(name: str, place: value_numbers.Place) -> tuple[Floats, Floats]:
     """Return the number `name` at `place`, and the bound of its error, shape (scheme, case).
 
     The bound is NaN where the number is not a limit, or nothing is known of its error.
     """
-    if not has_limit(name, place.level):
+    if not VALUES[name].has_limit(place.level):
         return value_numbers.value(name, place), place.missing
     found = _ladder(name, place).limit()
     return found.value, found.bound
@@ -89,30 +76,32 @@ class _Ladder:
 
 
 def _ladder(name: str, place: value_numbers.Place) -> _Ladder:
-    block, comparison = place.block, place.comparison()
-    if name in _OF_SERIES:
+    block, comparison, row = place.block, place.comparison(), VALUES[name]
+    if row.is_sample:
         rows = value_numbers.samples(place)
     else:
         rows = [value_numbers.value(name, replace(place, level=lv)) for lv in place.levels]
     values = np.stack(rows, axis=-1)
     values[block.adaptive] = np.nan
     size = _size(name, place, values)
-    if comparison is not None and name in _OF_SERIES:
+    if comparison is not None and row.is_sample:
         floor = comparison.floor
     else:
         relative = block.relative_floor * block.magnified[:, None]
-        if name in _OF_ROOTS and oscillation.has_recurrence(block, place.levels[-1]):
+        if row.measured_by == "roots" and oscillation.has_recurrence(block, place.levels[-1]):
             relative = relative / np.minimum(block.omega_dt, 1.0) ** 2
         floor = np.broadcast_to(relative * size[..., None], values.shape)
-    missed = _missed(block, values, floor, size) if name in _AT_POINTS else np.zeros(size.shape)
+    missed = np.zeros(size.shape)
+    if row.measured_by == "points":
+        missed = _missed(block, values, floor, size)
     safety = np.full(size.shape, 1.0 if block.model.events is None else IRREGULAR)
-    if name in _OF_EVENTS:
+    if row.needs_events:
         # an event on the mesh is late by an accident
         safety = np.where(np.isnan(block.left_to_the_mesh), safety, np.nan)
     return _Ladder(place.levels, values, *_promised(name, place), floor, size, missed, safety)
 
 
-def _beside_each_other(rows: Sequence[_Ladder]) -> _Ladder:
+def _stacked(rows: Sequence[_Ladder]) -> _Ladder:
     """Return ladders of the same levels as one, along a new first axis."""
     names = ("values", "order", "even", "floor", "size", "missed", "safety")
     return _Ladder(rows[0].levels, *(np.stack([getattr(r, name) for r in rows]) for name in names))
@@ -139,23 +128,23 @@ def _promised(name: str, place: value_numbers.Place) -> tuple[Floats, Flags]:
         quantity = "energy_deviation"
     order = formal_orders(experiment, quantity, block.columns, block.eventless)
     even = even_powers(experiment, quantity, block.columns)
-    if name in _INTERPOLATED:
+    if VALUES[name].measured_by == "parabola":
         order, even = np.minimum(order, OF_PARABOLA), np.zeros_like(even)
-    elif name in _AT_POINTS or name == "relative_energy_error":
+    elif VALUES[name].measured_by == "points" or name == "relative_energy_error":
         order, even = np.minimum(order, OF_GRID), np.zeros_like(even)
     return np.broadcast_to(order, block.shape), np.broadcast_to(even, block.shape)
 
 
 def _size(name: str, place: value_numbers.Place, values: Floats) -> Floats:
     """Return the size that such a number has: of the solution, or of the number itself."""
-    finest = replace(place, level=place.levels[-1])
-    if name in _OF_SERIES | _AT_POINTS:
+    finest, row = replace(place, level=place.levels[-1]), VALUES[name]
+    if row.is_sample or row.measured_by == "points":
         q = place.comparison()
         if q is not None:
             return q.scale
         rows = [np.abs(value_numbers.value(which, finest)) for which in ("min", "max")]
         return np.asarray(np.maximum(*rows))
-    if name in _OWN_SIZE:
+    if row.has_own_size:
         return np.abs(values[..., -1])
     if name == "phase_error_per_period":
         return value_numbers.value("period", finest)
@@ -194,7 +183,7 @@ COLUMNS = {
 """What is kept along the numbers where series are kept."""
 
 
-def table(block: MemberBlock, compared: Mapping[str, Comparison]) -> Table:
+def table(block: MemberBlock, compared: Compared) -> Table:
     """Return the limits of all numbers with their bounds, as variables of the convergence Record."""
     found: Table = {}
     kept: dict[str, list[NDArray[Any]]] = {name: [] for name in COLUMNS}
@@ -203,7 +192,7 @@ def table(block: MemberBlock, compared: Mapping[str, Comparison]) -> Table:
         places = [
             value_numbers.Place(block, compared, r.quantity, "best", None, None) for r in rows
         ]
-        one = _beside_each_other([_ladder(r.value, p) for r, p in zip(rows, places, strict=True)])
+        one = _stacked([_ladder(r.value, p) for r, p in zip(rows, places, strict=True)])
         best = one.limit()
         numbers = {
             "richardson": (best.value, "extrapolated over the levels"),
@@ -215,8 +204,8 @@ def table(block: MemberBlock, compared: Mapping[str, Comparison]) -> Table:
             numbers["gci"] = index, "grid convergence index of the finest level"
         for i, row in enumerate(rows):
             for key, (values, words) in numbers.items():
-                attrs = attributes(f"{row.words}: {words}", row.units)
-                found[f"{row.variable}_{key}"] = Variable(MEMBER, values[i].copy(), attrs)
+                text, own = f"{row.words}: {words}", values[i].copy()
+                found[f"{row.variable}_{key}"] = Variable.of(MEMBER, own, text, row.units)
         if block.lean:
             continue
         columns: tuple[NDArray[Any], ...] = (
@@ -229,13 +218,11 @@ def table(block: MemberBlock, compared: Mapping[str, Comparison]) -> Table:
         )
         for column, values in zip(kept.values(), columns, strict=True):
             column.extend(values)
-    codes = np.arange(len(gci.CLASSES), dtype=np.int8)
-    of_kinds = {"flag_values": codes, "flag_meanings": " ".join(gci.CLASSES)}
     for name, of_rows in kept.items():
         if of_rows:
-            more = of_kinds if name == "convergence" else {}
-            attrs = attributes(COLUMNS[name], "1", **more)
-            found[f"scalar_{name}"] = Variable(("scalar", *MEMBER), np.stack(of_rows), attrs)
+            more = flags(gci.CLASSES) if name == "convergence" else {}
+            dims, values = ("scalar", *MEMBER), np.stack(of_rows)
+            found[f"scalar_{name}"] = Variable.of(dims, values, COLUMNS[name], **more)
     return found
 
 
@@ -244,5 +231,4 @@ def coordinate(block: MemberBlock) -> Table:
     if block.lean:
         return {}
     names = np.array([row.variable for row in scalars(block.model)])
-    words = "numbers of which the limit was sought"
-    return {"scalar": Variable(("scalar",), names, attributes(words, "1"))}
+    return {"scalar": Variable.of(("scalar",), names, "numbers of which the limit was sought")}

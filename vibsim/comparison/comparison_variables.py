@@ -17,7 +17,7 @@ from vibsim.convergence.gci import of_order
 from vibsim.convergence.local_order import local_order, window_points
 from vibsim.convergence.thresholds import ORDINARY_ORDER
 from vibsim.core.array_types import Floats
-from vibsim.core.record import Variable, attributes
+from vibsim.core.record import Record, Variable
 from vibsim.core.vocabulary import MEMBER, OF_LEVEL, SERIES, TYPICAL_NORM, is_error_part
 from vibsim.models import ENERGIES
 from vibsim.observe.member_block import CENTRED, by_level, plain_name
@@ -31,6 +31,8 @@ LEAST_ORDER = (
     "order that the scheme promises for the position, at least that of a part of its error"
 )
 """What is said of the order of a part of an error of which theory says nothing."""
+NORM, KNOWN = "_error_norm", "_error_known"
+"""What follows the name of a quantity in the names of the norms of its true error, and of whether one is known."""
 _IN_NORM = "{} in a norm over time (times s for l1, times the square root of s for l2)"
 
 
@@ -40,11 +42,11 @@ def _adder(table: Table, q: Comparison) -> Add:
     def add(
         name: str, dims: tuple[str, ...], values: NDArray[Any], words: str, units: str = q.units
     ) -> None:
-        attrs = attributes(f"{q.long_name}: {words}", units)
         if dims[-1] == "t" and q.name.endswith(CENTRED):
             values = np.array(values)
             values[..., q.block.ends()] = np.nan
-        table[f"{q.name}_{name}"] = Variable(dims, np.ascontiguousarray(values), attrs)
+        words = f"{q.long_name}: {words}"
+        table[f"{q.name}_{name}"] = Variable.of(dims, np.ascontiguousarray(values), words, units)
 
     return add
 
@@ -72,12 +74,12 @@ def numbers(q: Comparison) -> Table:
         add("richardson_error_max", MEMBER, q.largest_bound, words)
     add("floor", of_level, q.floor, "predicted round-off")
     is_due = not is_error_part(q.name) or is_promised(block.experiment, q.name)
-    words = PROMISED_ORDER if is_due else LEAST_ORDER
-    attrs = attributes(f"{q.long_name}: {words}", "1", promised=int(is_due))
-    formal = Variable(("scheme",), q.order[:, 0], attrs)
+    words = f"{q.long_name}: {PROMISED_ORDER if is_due else LEAST_ORDER}"
+    dims: tuple[str, ...] = MEMBER[:1]
+    orders = q.order[:, 0]
     if orders_vary(block.experiment, q.name):
-        formal = Variable(MEMBER, np.broadcast_to(q.order, block.shape), attrs)
-    table[f"{q.name}_formal_order"] = formal
+        dims, orders = MEMBER, np.broadcast_to(q.order, block.shape)
+    table[f"{q.name}_formal_order"] = Variable.of(dims, orders, words, promised=int(is_due))
     if levels > 1:
         found = stacked(lambda n: q.in_norm(n).difference)
         add("difference_norm", (*MEMBER, "pair", "norm"), found, _IN_NORM.format("difference"))
@@ -175,7 +177,29 @@ def _triples(q: Comparison, add: Add) -> None:
     add("ratio", dims, np.stack(ratios, 2), "ratio of successive differences", "1")
     words = "least-squares factor between successive differences"
     add("proportionality", dims[:-1], by_level(factors), words, "1")
-    ends = {"": "order over time", "_low": "its lower end", "_high": "its upper end"}
+    of = "end of the interval of the order over time"
+    ends = {"": "order over time", "_low": f"lower {of}", "_high": f"upper {of}"}
     for k, (end, words) in enumerate(ends.items()):
         found = np.stack([row[k] for row in orders], 2).astype(np.float32)
         add(f"local_order{end}", dims, found, words, "1")
+
+
+def known_errors(record: Record) -> dict[str, Variable]:
+    """Return of each quantity of a convergence Record whether a true error is known at some level.
+
+    It is `<q>_error_known` over ``scheme, case``, of every q with `<q>_error_norm`: all that verdicts need of norms.
+    """
+    found, words = {}, "whether a true error is known"
+    for name, norms in record.variables.items():
+        if norms.dims[:2] == MEMBER and name.endswith(NORM):
+            known = np.isfinite(norms.values).any(axis=tuple(range(2, norms.values.ndim)))
+            found[name.removesuffix(NORM) + KNOWN] = Variable.of(MEMBER, known, words)
+    return found
+
+
+def has_exact(record: Record, quantity: str, scheme: int, case: int) -> bool:
+    """Tell whether a true error of a quantity is known at some level."""
+    name = quantity + KNOWN
+    known = record.variables if name in record else known_errors(record)
+    # parts of an error are measured against the motion itself
+    return name not in known or bool(known[name].values[scheme, case])

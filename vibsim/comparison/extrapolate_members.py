@@ -206,7 +206,7 @@ def noise_of(
     turned = rate_of(start) * start.end
     if np.all(turned <= RESOLVED_STEP * steps[0]):
         sampling = steps[0], every[0], levels[0]
-        found = _apart(method, start, *sampling, threads=threads, lane=lane)
+        found = _distance_of_twin(method, start, *sampling, threads=threads, lane=lane)
         return found[:: (len(found) - 1) // (len(levels[-1][0]) - 1)]
     noise = np.full(levels[-1][0].shape, np.nan)
     left = np.arange(len(turned))
@@ -215,14 +215,14 @@ def noise_of(
         now, left = left[is_resolved], left[~is_resolved]
         if len(now):
             sampling = n, stride, (u[:, now], v[:, now])
-            found = _apart(method, start.of(now), *sampling, threads=threads, lane=lane)
+            found = _distance_of_twin(method, start.of(now), *sampling, threads=threads, lane=lane)
             noise[:, now] = found[:: (len(u) - 1) // (len(noise) - 1)]
         if not len(left):
             break
     return noise
 
 
-def _apart(
+def _distance_of_twin(
     method: Method,
     start: Start,
     steps: int,
@@ -268,10 +268,10 @@ def extrapolate_members(
         some = [(np.ascontiguousarray(u[:, part]), v[:, part] + 0.0) for u, v in levels]
         of_part = None if noise is None else noise[:, part]
         parts.append(_extrapolate(method, start.of(part), steps, t, some, of_part))
-    return joined(parts)
+    return join_members(parts)
 
 
-def joined(
+def join_members(
     parts: Sequence[Extrapolated], order: NDArray[np.intp] | slice = slice(None)
 ) -> Extrapolated:
     """Return the members of all parts, in their order, or in the order that is given."""
@@ -297,7 +297,9 @@ def _extrapolate(
             both = best_entry(method.tableau(steps, powers[0]), levels, known)
             found = [both, both]
         else:
-            found = [_alone(method, steps, x, levels, i, known) for i, x in enumerate(powers)]
+            found = [
+                _one_quantity(method, steps, x, levels, i, known) for i, x in enumerate(powers)
+            ]
         values = [found[0].position, found[1].velocity]
         errors = [found[0].error, found[1].error + 0.0]
         if method.end_powers != powers[1] and t[-1, 0] == 1.0:
@@ -305,7 +307,7 @@ def _extrapolate(
             known = replace(known, **recent)
             levels = [(u[-RECENT:], v[-RECENT:]) for u, v in levels]
             for i, x in enumerate((powers[0], method.end_powers)):
-                end = _alone(method, steps, x, levels, i, known)
+                end = _one_quantity(method, steps, x, levels, i, known)
                 values[i][-1], errors[i][-1] = end[i][-1], end.error[-1]
                 if i == 0:
                     found[0].entry[-1] = end.entry[-1]
@@ -321,7 +323,7 @@ def _extrapolate(
         )
 
 
-def _alone(
+def _one_quantity(
     method: Method,
     steps: tuple[int, ...],
     powers: tuple[int, int],

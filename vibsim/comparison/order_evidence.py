@@ -11,14 +11,13 @@ times that all lie at turning points (Dt = pi/w after a release from rest) there
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from functools import partial
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from vibsim.apriori.roundoff_floor import SPACING_AT_ONE, norm_of_floor
-from vibsim.comparison.quantity_comparison import Comparison
+from vibsim.comparison.quantity_comparison import Compared, Comparison
 from vibsim.comparison.thresholds import STRAIGHT, THEORY_ROUNDING, VANISHING_RATE
 from vibsim.convergence.batches import batches
 from vibsim.convergence.circumstances import Evidence, at_rest, floor_of_pairs, unresolved
@@ -27,12 +26,10 @@ from vibsim.convergence.thresholds import ABOVE_ROUND_OFF, HALF_SPACING
 from vibsim.convergence.verdict import Judgement, judge, judge_together
 from vibsim.core.array_types import Codes, Flags, Floats
 from vibsim.core.vocabulary import NORMS, ORDER_TOLERANCE, REASON_NAMES, TYPICAL_NORM, is_error_part
+from vibsim.experiment.schema.checks import ConvergesCheck
 from vibsim.models import ENERGIES
 from vibsim.observe import predicted_oscillation
-from vibsim.observe.member_block import plain_name, stored
-
-if TYPE_CHECKING:
-    from vibsim.experiment.schema.checks import ConvergesCheck
+from vibsim.observe.member_block import plain_name, stored_or_nan
 
 CAUSES = (
     *("none", "last_point", "one_quantity", "everything", "special_times", "one_norm", "theory"),
@@ -49,7 +46,7 @@ ROUGH = ("pre_asymptotic", "non_smooth")
 
 
 def judge_orders(
-    quantities: Mapping[str, Comparison], names: Iterable[str], checks: Iterable[ConvergesCheck]
+    quantities: Compared, names: Iterable[str], checks: Iterable[ConvergesCheck]
 ) -> None:
     """Judge the named quantities by the orders that their schemes promise, and all by those that checks expect.
 
@@ -65,7 +62,7 @@ def judge_orders(
     ladders = math.prod(quantities[due[0][0]].block.shape) if due else 0
     for part in batches(due, ladders):
         rows = [
-            evidence(quantities[name], norm, _order(quantities[name], order), ORDER_TOLERANCE)
+            evidence(quantities[name], norm, order_of(quantities[name], order), ORDER_TOLERANCE)
             for name, order, norm in part
         ]
         for (name, order, norm), judged in zip(part, judge_together(rows), strict=True):
@@ -75,7 +72,7 @@ def judge_orders(
 def judgement(q: Comparison, norm: str, order: float | str = "scheme") -> Judgement:
     """Judge a quantity by the order that its scheme promises, or by another one."""
     if (norm, order) not in q.judged:
-        found = judge(evidence(q, norm, _order(q, order), ORDER_TOLERANCE))
+        found = judge(evidence(q, norm, order_of(q, order), ORDER_TOLERANCE))
         q.judged[norm, order] = found
     return q.judged[norm, order]
 
@@ -83,7 +80,7 @@ def judgement(q: Comparison, norm: str, order: float | str = "scheme") -> Judgem
 def judge_check(q: Comparison, check: ConvergesCheck) -> Judgement:
     """Judge a quantity as a check asks for it."""
     if not _is_usual(check):
-        return judge(evidence(q, check.norm, order_of(q, check), check.tolerance))
+        return judge(evidence(q, check.norm, order_of(q, check.order), check.tolerance))
     return judgement(q, check.norm, _expected(q, check))
 
 
@@ -109,16 +106,12 @@ def _is_usual(check: ConvergesCheck) -> bool:
 
 def _expected(q: Comparison, check: ConvergesCheck) -> float | str:
     """Return the order that a check expects: "scheme" where it is the promised one of every scheme and member."""
-    promised = check.order == "scheme" or bool(np.all(order_of(q, check) == q.order))
+    promised = check.order == "scheme" or bool(np.all(order_of(q, check.order) == q.order))
     return "scheme" if promised else check.order
 
 
-def order_of(q: Comparison, check: ConvergesCheck) -> Floats:
+def order_of(q: Comparison, order: float | str) -> Floats:
     """Return the order that a check expects of a quantity, which broadcasts against (scheme, case)."""
-    return _order(q, check.order)
-
-
-def _order(q: Comparison, order: float | str) -> Floats:
     return q.order if order == "scheme" else np.full((1, 1), float(order))
 
 
@@ -206,12 +199,7 @@ def _motion(q: Comparison, order: Floats, size: Floats) -> tuple[Floats, Flags]:
 
 
 def causes(
-    q: Comparison,
-    others: Mapping[str, Comparison],
-    judged: Judgement,
-    norm: str,
-    order: Floats,
-    tolerance: float,
+    q: Comparison, others: Compared, judged: Judgement, norm: str, order: Floats, tolerance: float
 ) -> Codes:
     """Return why orders are too low, too high, or not seen, as positions in `CAUSES`, shape (scheme, case).
 
@@ -285,7 +273,7 @@ def _first(kinds: list[tuple[Flags, int]], shape: tuple[int, ...]) -> Codes:
     return np.asarray(np.select(masks, [code for _, code in kinds], NONE), dtype=np.int8)
 
 
-def _at_rest(q: Comparison, others: Mapping[str, Comparison]) -> Flags:
+def _at_rest(q: Comparison, others: Compared) -> Flags:
     """Say where the rate of change of a state vanishes at every common time, but not between them."""
     block, model = q.block, q.block.model
     name = ""
@@ -300,7 +288,9 @@ def _at_rest(q: Comparison, others: Mapping[str, Comparison]) -> Flags:
     if rate is None:
         rate = others[name].extrapolation[0]
     # over every step; data of other programs do not tell
-    low, high = (stored(block.finest, f"{name}_{end}", block.shape) for end in ("min", "max"))
+    low, high = (
+        stored_or_nan(block.finest, f"{name}_{end}", block.shape) for end in ("min", "max")
+    )
     most = np.maximum(np.abs(low), np.abs(high))
     with np.errstate(invalid="ignore"):
         return np.asarray((most > 0) & (largest(rate) <= VANISHING_RATE * most))

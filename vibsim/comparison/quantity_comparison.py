@@ -9,16 +9,14 @@ from itertools import pairwise
 
 import numpy as np
 
-from vibsim.apriori.formal_orders import even_powers, formal_orders, special_orders
-from vibsim.apriori.roundoff_floor import solution_size
+from vibsim.apriori.formal_orders import even_powers, special_orders
 from vibsim.comparison import thresholds as th
 from vibsim.convergence import differences
 from vibsim.convergence.extrapolation import extrapolate_series
 from vibsim.convergence.thresholds import ROUND_OFF_SAFETY
 from vibsim.convergence.verdict import Judgement, local_orders
 from vibsim.core.array_types import Flags, Floats
-from vibsim.observe.member_block import MemberBlock, by_level, energy_at_start
-from vibsim.observe.phase_amplitude_error import parts_of_errors, wanted
+from vibsim.observe.member_block import MemberBlock, by_level
 
 
 @dataclass(frozen=True)
@@ -169,33 +167,5 @@ class Comparison:
         return local_orders(self.in_norm(kind).difference, self.block.grid.levels)
 
 
-def comparisons(block: MemberBlock, names: tuple[str, ...]) -> Mapping[str, Comparison]:
-    """Compare quantities between the levels of a part."""
-    positions = block.model.positions
-    apart = wanted(block, names)
-    names = tuple(name for name in names if name not in apart)
-    values = {name: block.series(name) for name in dict.fromkeys((*positions, *names))}
-    # of the energy what it was plus what became of it
-    became = solution_size(block.series("energy_deviation"))
-    sizes = {"energy": np.abs(energy_at_start(block.finest)) + became}
-    # what is rounded in one coordinate is felt by the others
-    whole = [block.size(name, values[name], sizes) for name in positions]
-    sizes |= {name: np.asarray(np.maximum.reduce(whole)) for name in positions}
-    found: dict[str, Comparison] = {}
-    for name in names:
-        scale = block.size(name, values[name], sizes)
-        floor = block.floor_of(name, scale)
-        attrs = block.finest.variables[name].attrs if name in block.finest else {}
-        found[name] = Comparison(
-            block=block,
-            name=name,
-            long_name=str(attrs.get("long_name", name)),
-            units=str(attrs.get("units", "1")),
-            values=values[name],
-            exact=block.exact_of(name),
-            order=formal_orders(block.experiment, name, block.columns, block.eventless),
-            floor=floor,
-            scale=scale,
-            blur=np.zeros_like(floor),
-        )
-    return found | parts_of_errors(block, found, apart, Comparison)
+Compared = Mapping[str, Comparison]
+"""Quantities by name, compared between the levels of a block."""

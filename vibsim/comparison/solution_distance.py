@@ -7,30 +7,32 @@ it is `ABOVE_ROUND_OFF` times the predicted floor, an order of magnitude.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from vibsim import theory
 from vibsim.apriori.exact_values import known_values
 from vibsim.apriori.roundoff_floor import SPACING_AT_ONE
-from vibsim.comparison.quantity_comparison import Comparison
+from vibsim.comparison.quantity_comparison import Compared
 from vibsim.convergence.thresholds import ABOVE_ROUND_OFF
 from vibsim.core.array_types import Floats
+from vibsim.experiment.schema.checks import EqualCheck
 from vibsim.models import ENERGIES
 from vibsim.observe.common_grid import whole
-from vibsim.observe.member_block import CENTRED, MemberBlock, energy_at_start, plain_name, stored
+from vibsim.observe.member_block import (
+    CENTRED,
+    MemberBlock,
+    energy_at_start,
+    plain_name,
+    stored_or_nan,
+)
 from vibsim.observe.predicted_oscillation import is_simple, natural_frequency, steppers
 from vibsim.observe.sensitivity import in_columns
 
-if TYPE_CHECKING:
-    from vibsim.experiment.schema.checks import EqualCheck
-
 
 @dataclass(frozen=True)
-class Apart:
+class SolutionDistance:
     """How far two solutions are from each other, in the unit of the quantity; NaN where one of them does not exist."""
 
     scheme: int  # number of the scheme that is compared
@@ -39,13 +41,15 @@ class Apart:
     allowed: Floats  # what that may be, shape (case,)
 
 
-def apart(block: MemberBlock, compared: Mapping[str, Comparison], check: EqualCheck) -> Apart:
+def solution_distance(
+    block: MemberBlock, compared: Compared, check: EqualCheck
+) -> SolutionDistance:
     """Return how far the two solutions that a check compares are from each other."""
     names = [scheme.name for scheme in block.experiment.schemes]
     level = block.grid.levels[-1] if check.level is None else check.level
     first, name = names.index(check.first), check.quantity
     record = block.records[level]
-    values = stored(record, name, (*block.shape, len(record["t"])))
+    values = stored_or_nan(record, name, (*block.shape, len(record["t"])))
     floor = ABOVE_ROUND_OFF * compared[name].floor[..., block.grid.levels.index(level)]
     bound = rounding(block, level, name, first, floor[first])
     if check.second in names:
@@ -55,14 +59,14 @@ def apart(block: MemberBlock, compared: Mapping[str, Comparison], check: EqualCh
         other = exact_series(block, level, name)[first]
         more = _of_exact(block, level, name, values[first])
     else:
-        other, more = discrete(block, level, name)[first], np.zeros_like(bound)
+        other, more = discrete(block, level, name, first), np.zeros_like(bound)
     inside = slice(1, -1) if name.endswith(CENTRED) else slice(None)
     distance = np.full(block.shape[1:] + values.shape[-1:], np.nan)
     with np.errstate(invalid="ignore", over="ignore"):
         distance[:, inside] = np.abs(values[first] - other)[..., inside]
     largest = np.max(distance[:, inside], axis=-1)
     allowed = np.full(largest.shape, check.atol) if check.atol is not None else bound + more
-    return Apart(first, distance, largest, np.asarray(allowed))
+    return SolutionDistance(first, distance, largest, np.asarray(allowed))
 
 
 def rounding(block: MemberBlock, level: int, name: str, scheme: int, floor: Floats) -> Floats:
@@ -82,23 +86,22 @@ def rounding(block: MemberBlock, level: int, name: str, scheme: int, floor: Floa
     return found
 
 
-def discrete(block: MemberBlock, level: int, name: str) -> Floats:
-    """Return the exact solution of every scheme's own steps at the stored times, shape (scheme, case, t).
+def discrete(block: MemberBlock, level: int, name: str, scheme: int) -> Floats:
+    """Return the exact solution of one scheme's own steps at the stored times, shape (case, t).
 
     Of a linear model without damping; NaN elsewhere, and for what is no state.
     """
     record, model = block.records[level], block.model
-    found = np.full((*block.shape, len(record["t"])), np.nan)
+    found = np.full((*block.shape[1:], len(record["t"])), np.nan)
     if not is_simple(block) or name not in (model.position, model.velocity):
         return found
     steps, numbers = _numbers(block, level)
     n = np.arange(len(record["t"])) * whole(record, "every")
-    for i, scheme in enumerate(block.experiment.schemes):
-        for options, where in steppers(block, i):
-            w, dt, u, v = (x[where] for x in numbers)
-            stepper = scheme.method.stepper(options)
-            states = theory.discrete(stepper, w, dt, u, v, n, steps=steps)
-            found[i, where] = states[int(name == model.velocity)]
+    for options, where in steppers(block, scheme):
+        w, dt, u, v = (x[where] for x in numbers)
+        stepper = block.experiment.schemes[scheme].method.stepper(options)
+        states = theory.discrete(stepper, w, dt, u, v, n, steps=steps)
+        found[where] = states[int(name == model.velocity)]
     return found
 
 
@@ -107,8 +110,9 @@ def discrete_error(block: MemberBlock, level: int, name: str) -> Floats:
     record = block.records[level]
     if name not in record:
         return np.full(block.shape, np.nan)
+    own = np.stack([discrete(block, level, name, i) for i in range(block.shape[0])])
     with np.errstate(invalid="ignore", over="ignore"):
-        return np.asarray(np.max(np.abs(record[name] - discrete(block, level, name)), axis=-1))
+        return np.asarray(np.max(np.abs(record[name] - own), axis=-1))
 
 
 def _numbers(block: MemberBlock, level: int) -> tuple[int, tuple[Floats, ...]]:

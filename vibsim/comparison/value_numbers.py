@@ -12,14 +12,14 @@ from typing import Any
 import numpy as np
 
 from vibsim.comparison.comparison_variables import estimates
-from vibsim.comparison.quantity_comparison import Comparison
+from vibsim.comparison.quantity_comparison import Compared, Comparison
 from vibsim.comparison.solution_distance import discrete_error, exact_series
 from vibsim.convergence.differences import largest, safe_ratio
 from vibsim.core.array_types import Floats
 from vibsim.core.record import Record
-from vibsim.observe import oscillation, predicted_oscillation
+from vibsim.observe import oscillation, predicted_oscillation, spectrum, steady_state
 from vibsim.observe.common_grid import whole
-from vibsim.observe.member_block import MemberBlock, energy_at_start, stored
+from vibsim.observe.member_block import MemberBlock, energy_at_start, stored_or_nan
 
 
 @dataclass(frozen=True)
@@ -27,7 +27,7 @@ class Place:
     """Where a value is taken, and what it may be taken from."""
 
     block: MemberBlock
-    compared: Mapping[str, Comparison]  # quantities that were compared between levels
+    compared: Compared  # quantities that were compared between levels
     quantity: str  # empty where the value is of none
     level: int | str | None
     t: float | None
@@ -57,7 +57,7 @@ class Place:
     def gathered(self, name: str) -> Floats:
         """Return what the level that is asked for holds of every member; NaN where it does not hold it."""
         data = self.data()
-        return self.missing if data is None else stored(data, name, self.block.shape)
+        return self.missing if data is None else stored_or_nan(data, name, self.block.shape)
 
     def of_quantity(self, which: str) -> Floats:
         """Return what was gathered of the quantity over every step."""
@@ -147,6 +147,11 @@ def _event_time(p: Place, data: Record) -> Floats:
     times = np.asarray(data["event_time"]) if "event_time" in data else p.missing[..., :0]
     index = (p.event or 0) - 1
     return times[..., index] if 0 <= index < times.shape[-1] else p.missing
+
+
+def _of_quantity(of: Callable[[MemberBlock, int, str], Floats]) -> Number:
+    """Return what belongs to a quantity of the members at a level."""
+    return lambda p: p.missing if p.at_level is None else of(p.block, p.at_level, p.quantity)
 
 
 def _max_abs_interior(p: Place) -> Floats:
@@ -276,6 +281,11 @@ KNOWN: Mapping[str, Number] = {
     "predicted_phase_error": _at_level(predicted_oscillation.phase_error),
     "phase_error_slope": _needs_data(lambda p, data: oscillation.phase_error_slope(data)),
     "amplitude_error": _needs_data(lambda p, data: oscillation.amplitude_error(data)),
+    "steady_amplitude": _of_quantity(steady_state.amplitude),
+    "steady_phase": _of_quantity(steady_state.phase),
+    "steady_change": _of_quantity(steady_state.change),
+    "section_period": _at_level(steady_state.section_period),
+    "peak_frequency": _of_quantity(spectrum.peak_frequency),
     "growth_factor": _needs_data(lambda p, data: oscillation.growth_factor(data)),
     "growth_per_period": _at_level(oscillation.growth_per_period),
     "predicted_growth_per_period": _at_level(predicted_oscillation.growth_per_period),

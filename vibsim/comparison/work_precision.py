@@ -12,20 +12,18 @@ error against work); vibration text (B), section 5 and exercise 4.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 import numpy as np
 
 from vibsim.comparison.comparison_variables import Table
-from vibsim.comparison.quantity_comparison import Comparison
+from vibsim.comparison.quantity_comparison import Compared, Comparison
 from vibsim.core.array_types import Floats
-from vibsim.core.record import Variable, attributes
+from vibsim.core.record import Variable
 from vibsim.core.vocabulary import OF_LEVEL
 from vibsim.observe import oscillation
 from vibsim.observe.member_block import MemberBlock, by_level
 
 
-def work_precision(block: MemberBlock, found: Mapping[str, Comparison]) -> Table:
+def work_precision(block: MemberBlock, found: Compared) -> Table:
     """Return the data of a work-precision diagram.
 
     Parameters
@@ -56,12 +54,10 @@ def work_precision(block: MemberBlock, found: Mapping[str, Comparison]) -> Table
         ("work_error", errors, of_error, position.units, reference_name),
     ):
         values[block.adaptive, :, :-1] = np.nan
-        attrs = attributes(
-            f"{text}; of an adaptive scheme once, at the finest level", units, **more
-        )
-        table[name] = Variable(OF_LEVEL, values, attrs)
-    attrs = attributes(f"largest error bound of {words}", position.units)
-    return table | {"work_reference_error": Variable(("case",), bound, attrs)}
+        told = f"{text}; of an adaptive scheme once, at the finest level"
+        table[name] = Variable.of(OF_LEVEL, values, told, units, **more)
+    of_bound = Variable.of(("case",), bound, f"largest error bound of {words}", position.units)
+    return table | {"work_reference_error": of_bound}
 
 
 def reference_of(position: Comparison) -> tuple[Floats, Floats]:

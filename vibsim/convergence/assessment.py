@@ -26,14 +26,15 @@ one of the two, while it has at least the probability `RISK` with the other.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
+from functools import partial
 
 import numpy as np
 
 from vibsim.convergence.best_value import best_value, is_missed, norm
 from vibsim.convergence.error_model.hypotheses import Promise
 from vibsim.convergence.error_model.posterior import LEFT_OUT, Ladder, Posterior, posterior
+from vibsim.convergence.ladder_blocks import in_blocks
 from vibsim.convergence.likely_powers import (
     OUTSIDE,
     finest_order,
@@ -44,29 +45,22 @@ from vibsim.convergence.likely_powers import (
     sides,
     tails,
 )
+from vibsim.convergence.predicted_noise import is_away, is_only_noise, least_noise
+from vibsim.convergence.thresholds import (
+    DEFINITE,
+    NOISE_FACTOR,
+    RISK,
+    RISK_OF_THREE,
+)
 from vibsim.core.array_types import Codes, Flags, Floats, Integers
-from vibsim.core.vocabulary import ORDER_TOLERANCE, REASON_NAMES, REASONS, STATUSES
+from vibsim.core.vocabulary import ORDER_TOLERANCE, REASON_NAMES
 
-RISK = 0.01
-"""Accepted probability that a verdict is wrong."""
-RISK_OF_THREE = 0.1 * RISK
-"""The same where three levels decide behind others that do not fit (seeds 1, 3, 11, 101-103)."""
-DEFINITE = 0.9
-"""An order fails only where one power has so much of the probability, alone or as one of two of a size."""
-BLOCK = 512
-"""So many ladders are judged together at most."""
 DECIDED = tuple(REASON_NAMES.index(name) for name in ("asymptotic", "order_low", "order_high"))
 """Reasons of verdicts on an order."""
 ROUGHLY = 1e-3
 """Part of all evidence that may be left out where only the verdict is asked, if that part cannot change it."""
 NEAR = 0.1
 """Distance of an extrapolation from the exact solution, over the error of the finest level, that surely is no miss."""
-LARGEST_RATIO = 1e60
-"""Of a difference to the largest finer one, and of noise to the largest difference: more says no more."""
-STATED_NOISE_FACTOR = 2.0
-"""The same as `NOISE_FACTOR` of noise that a user states: differences of normal noise exceed it in one of 200."""
-NOISE_FACTOR = 10.0
-"""Noise may be so many times its prediction where levels are said to differ by nothing else."""
 
 
 @dataclass(frozen=True)
@@ -135,7 +129,7 @@ def assess(
         Whether theory promises the order that is expected.
     """
     question = Question(expected, at_least, tolerance, noise_factor, by_theory)
-    found = _in_blocks(ladder, question, _assessed)
+    found = in_blocks(ladder, partial(_assess_block, question=question))
     return Assessment(**{field.name: found[field.name] for field in fields(Assessment)})
 
 
@@ -144,17 +138,17 @@ def decide(ladder: Ladder, question: Question) -> Decision:
 
     Most ladders are so clear that a rough posterior has the same verdict (see `_is_sure`).
     """
-    found = _in_blocks(ladder, question, _decided)
+    found = in_blocks(ladder, partial(_decide_block, question=question))
     rest = np.flatnonzero(~found["sure"])
     if len(rest):
-        assessed = _in_blocks(_some(ladder, rest), question, _assessed)
+        assessed = in_blocks(ladder.some(rest), partial(_assess_block, question=question))
         for field in fields(Decision):
             found[field.name][rest] = assessed[field.name]
     return Decision(**{field.name: found[field.name] for field in fields(Decision)})
 
 
 @dataclass(frozen=True)
-class _Found:
+class _Evaluation:
     """What the posterior of ladders leads to, but for an exact solution that is missed."""
 
     posterior: Posterior
@@ -167,10 +161,10 @@ class _Found:
     )
     cut_short: Flags  # whether noise that may be far less than predicted ends the window: nothing is decided
 
-    def some(self, rows: Integers, *, cut_short: bool) -> _Found:
+    def some(self, rows: Integers, *, cut_short: bool) -> _Evaluation:
         """Return what was found of some of the ladders."""
         lower, right, higher = (side[rows] for side in self.sides)
-        return _Found(
+        return _Evaluation(
             self.posterior.some(rows),
             (lower, right, higher),
             self.exact[rows],
@@ -180,7 +174,7 @@ class _Found:
             np.full(len(rows), cut_short),
         )
 
-    def replace(self, ladders: Integers, other: _Found, rows: Flags) -> None:
+    def replace(self, ladders: Integers, other: _Evaluation, rows: Flags) -> None:
         """Take what was found of some ladders from some rows of another one."""
         self.posterior.replace(ladders, other.posterior, rows)
         for one, of_other in zip(self.sides, other.sides, strict=True):
@@ -188,72 +182,40 @@ class _Found:
         self.by_three[ladders] = other.by_three[rows]
 
 
-def _in_blocks(
-    ladder: Ladder,
-    question: Question,
-    work: Callable[[Ladder, Floats, Question], dict[str, np.ndarray]],
-) -> dict[str, np.ndarray]:
-    """Return status, reason and the numbers of ladders."""
-    n, count = len(ladder.h), len(ladder.gram)
-    finite = np.all(np.isfinite(ladder.gram), axis=(-2, -1)) & np.all(
-        np.isfinite(ladder.floor), axis=-1
-    )
-    found = _nothing(count, n)
-    reason = found["reason"] = np.full(count, REASON_NAMES.index("non_finite"))
-    if n < 3:
-        reason[finite] = REASON_NAMES.index("too_few_levels")
-    else:
-        every = np.flatnonzero(finite)
-        for start in range(0, len(every), BLOCK):
-            rows = every[start : start + BLOCK]
-            part, size, factors = _scaled(ladder, rows)
-            for name, value in work(part, factors, question).items():
-                in_units = name in ("error", "error_bound", "best_bound")
-                found[name][rows] = value * size if in_units else value
-    status = np.array([STATUSES.index(REASONS[REASON_NAMES[code]]) for code in reason])
-    return {**found, "status": status.astype(np.int8), "reason": reason.astype(np.int8)}
-
-
-def _assessed(ladder: Ladder, factors: Floats, question: Question) -> dict[str, np.ndarray]:
+def _assess_block(ladder: Ladder, factors: Floats, question: Question) -> dict[str, np.ndarray]:
     """Return what an `Assessment` holds, of ladders of three levels and more."""
-    found = _with_less_noise(ladder, _found(ladder, question, LEFT_OUT), question)
+    found = _with_less_noise(ladder, _evaluate(ladder, question, LEFT_OUT), question)
     of_limit, missed = found.posterior, found.away
     if ladder.exact_known:
         # what the levels say of the limit without the exact solution
-        of_limit = posterior(_without_exact(ladder), question.promise)
+        of_limit = posterior(ladder.without_exact(), question.promise)
         risk = np.where(rests_on_three(of_limit), RISK_OF_THREE, RISK)
         missed = missed | ((of_limit.expansion > 1.0 - risk) & is_missed(ladder, of_limit))
     numbers = _numbers(ladder, found, of_limit, missed)
     return numbers | best_value(ladder, of_limit, found.exact, factors)
 
 
-def _decided(ladder: Ladder, factors: Floats, question: Question) -> dict[str, np.ndarray]:
+def _decide_block(ladder: Ladder, factors: Floats, question: Question) -> dict[str, np.ndarray]:
     """Return what a `Decision` holds, of ladders of three levels and more, and whether it is sure."""
     del factors
-    found = _found(ladder, question, ROUGHLY)
+    found = _evaluate(ladder, question, ROUGHLY)
     numbers = _numbers(ladder, found, found.posterior, found.away)
     return numbers | {"sure": _is_sure(ladder, found, question)}
 
 
-def _some(ladder: Ladder, rows: Integers) -> Ladder:
-    return replace(
-        ladder, gram=ladder.gram[rows], floor=ladder.floor[rows], numbers=ladder.numbers[rows]
-    )
-
-
-def _found(ladder: Ladder, question: Question, left_out: float) -> _Found:
+def _evaluate(ladder: Ladder, question: Question, left_out: float) -> _Evaluation:
     believed = posterior(ladder, question.promise, left_out=left_out)
     of_sides = sides(believed, question.expected, question.at_least, question.tolerance)
-    exact = _is_only_noise(ladder, question.noise_factor)
+    exact = is_only_noise(ladder, question.noise_factor)
     away = np.zeros_like(exact)
     if ladder.exact_known:
-        away = exact & _is_away(ladder, question.noise_factor)
+        away = exact & is_away(ladder, question.noise_factor)
     by_three, cut_short = rests_on_three(believed), _is_cut_short(ladder, believed)
     by_theory = question.by_theory and not ladder.exact_known
-    return _Found(believed, of_sides, exact, away, by_three, by_theory, cut_short)
+    return _Evaluation(believed, of_sides, exact, away, by_three, by_theory, cut_short)
 
 
-def _is_sure(ladder: Ladder, found: _Found, question: Question) -> Flags:
+def _is_sure(ladder: Ladder, found: _Evaluation, question: Question) -> Flags:
     """Say where the same is decided whatever the hypotheses are like that were left out.
 
     Then no probability is nearer than `ROUGHLY` to what it is compared with. And either the extrapolation by the order
@@ -278,13 +240,13 @@ def _is_sure(ladder: Ladder, found: _Found, question: Question) -> Flags:
         margins.append(window[:, -1] - window[:, -2])
     sure = (
         np.asarray(np.all(np.abs(margins) > ROUGHLY, axis=0))
-        & ~(fails & found.by_three)
+        & ~((fails | found.by_theory) & found.by_three)
         & ~found.cut_short
     )
     if ladder.exact_known:
         open_still = np.flatnonzero(sure & ~_meets(ladder, p))
         if len(open_still):
-            levels = _without_exact(_some(ladder, open_still))
+            levels = ladder.some(open_still).without_exact()
             of_limit = posterior(levels, question.promise, left_out=ROUGHLY)
             sure[open_still] = of_limit.expansion < 1.0 - RISK - ROUGHLY
     return sure
@@ -301,66 +263,14 @@ def _meets(ladder: Ladder, p: Posterior) -> Flags:
     return np.asarray((order > 0.0) & near & (ends == len(ladder.h) - 1))
 
 
-def _nothing(count: int, levels: int) -> dict[str, np.ndarray]:
-    """Return the numbers of ladders of which nothing is known."""
-    names = ("order", "low", "high", "error", "error_bound", "best_bound")
-    unknown = {name: np.full(count, np.nan) for name in names}
-    window = {"first": np.zeros(count, dtype=np.int64), "last": np.full(count, levels - 1)}
-    flags = {"sure": np.ones(count, dtype=bool)}
-    return {**unknown, **window, **flags, "weights": np.full((count, levels), np.nan)}
-
-
-def _scaled(ladder: Ladder, rows: Integers) -> tuple[Ladder, Floats, Floats]:
-    """Return some of the ladders over the norm of their largest row, that norm, and a factor on every difference.
-
-    Squares of differences that are too large or small for each other would overflow or vanish: coarse levels that have
-    blown up so far are brought nearer.
-    """
-    gram, count = ladder.gram[rows], len(ladder.h) - 1
-    norms = np.sqrt(np.diagonal(gram, axis1=1, axis2=2))
-    factors = np.ones_like(norms)
-    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        for k in range(count - 2, -1, -1):
-            ratio = norms[:, k] / np.max((norms * factors)[:, k + 1 : count], axis=-1)
-            factors[:, k] = np.where(ratio > LARGEST_RATIO, LARGEST_RATIO / ratio, 1.0)
-    # beside differences of 0 any size will do
-    factors = np.where(factors > 0.0, factors, 1.0)
-    size = np.max(norms * factors, axis=-1)
-    size = np.where(size > 0.0, size, 1.0)
-    over = factors / size[:, None]
-    gram = gram * over[:, :, None] * over[:, None, :]
-    # squares of what is larger would overflow
-    floor = np.minimum(ladder.floor[rows] / size[:, None], LARGEST_RATIO)
-    part = Ladder(ladder.h, gram, floor, ladder.numbers[rows], ladder.exact_known)
-    return part, size, factors[:, :count]
-
-
-def _is_only_noise(ladder: Ladder, factor: float) -> Flags:
-    """Say where all levels differ by no more than the noise that is expected of them."""
-    n = len(ladder.h)
-    d = np.sqrt(np.diagonal(ladder.gram, axis1=1, axis2=2))[:, : n - 1]
-    allowed = factor * (ladder.floor[:, :-1] + ladder.floor[:, 1:])
-    return np.asarray(np.all(d <= allowed, axis=-1))
-
-
-def _least_noise(ladder: Ladder) -> Floats:
-    """Return the noise of every level if it grows no more than the finest differences show, shape (ladder, n).
-
-    At the coarsest level it is as predicted, since storing numbers makes noise even where differences are 0.
-    """
-    finest = np.sqrt(np.max(np.diagonal(ladder.gram, axis1=1, axis2=2)[:, -2:], axis=-1))
-    least = np.maximum(ladder.floor[:, :1], NOISE_FACTOR * finest[:, None])
-    return np.asarray(np.minimum(ladder.floor, least))
-
-
 def _is_cut_short(ladder: Ladder, believed: Posterior) -> Flags:
     """Say where noise that may be far less than predicted ends the most probable window."""
     every, last = np.arange(len(ladder.gram)), likely_window(believed)[1]
-    least = _least_noise(ladder)[every, last]
+    least = least_noise(ladder)[every, last]
     return np.asarray(NOISE_FACTOR * least < ladder.floor[every, last])
 
 
-def _with_less_noise(ladder: Ladder, found: _Found, question: Question) -> _Found:
+def _with_less_noise(ladder: Ladder, found: _Evaluation, question: Question) -> _Evaluation:
     """Return what is found of ladders whose window is cut short by noise, with that noise and with less.
 
     What is sure with one of the two counts, where it has at least the probability `RISK` with the other; else nothing.
@@ -369,8 +279,8 @@ def _with_less_noise(ladder: Ladder, found: _Found, question: Question) -> _Foun
     if not len(rows):
         return found
     first = found.some(rows, cut_short=False)
-    less = replace(_some(ladder, rows), floor=_least_noise(ladder)[rows])
-    other = _found(less, question, LEFT_OUT).some(np.arange(len(rows)), cut_short=False)
+    less = replace(ladder.some(rows), floor=least_noise(ladder)[rows])
+    other = _evaluate(less, question, LEFT_OUT).some(np.arange(len(rows)), cut_short=False)
     none = np.zeros(len(rows), dtype=bool)
     code, code_of_other = (_reasons(one, none) for one in (first, other))
     excluded = _probability(code, other) < RISK
@@ -382,19 +292,14 @@ def _with_less_noise(ladder: Ladder, found: _Found, question: Question) -> _Foun
     return found
 
 
-def _probability(codes: Integers, found: _Found) -> Floats:
+def _probability(codes: Integers, found: _Evaluation) -> Floats:
     """Return the probability of what is decided, 1 where nothing is."""
     lower, right, higher = found.sides
     right = np.where(codes == DECIDED[0], right, lower + higher)
     return np.where(np.isin(codes, DECIDED), right, 1.0)
 
 
-def _is_away(ladder: Ladder, factor: float) -> Flags:
-    """Say where the finest level is further from the exact solution than noise explains."""
-    return np.asarray(np.sqrt(ladder.gram[:, -1, -1]) > factor * ladder.floor[:, -1])
-
-
-def _reasons(found: _Found, missed: Flags) -> Integers:
+def _reasons(found: _Evaluation, missed: Flags) -> Integers:
     """Return the reasons of the verdicts, as positions in `REASON_NAMES`; see the head of this module."""
     p, (lower, right, higher) = found.posterior, found.sides
     risk = np.where(found.by_three, RISK_OF_THREE, RISK)
@@ -415,7 +320,7 @@ def _reasons(found: _Found, missed: Flags) -> Integers:
 
 
 def _numbers(
-    ladder: Ladder, found: _Found, of_limit: Posterior, missed: Flags
+    ladder: Ladder, found: _Evaluation, of_limit: Posterior, missed: Flags
 ) -> dict[str, np.ndarray]:
     """Return what a `Decision` holds beside the status, for ladders of three levels and more."""
     n, believed, exact = len(ladder.h), found.posterior, found.exact
@@ -434,8 +339,3 @@ def _numbers(
         "first": np.where(exact, 0, first),
         "last": np.where(exact, n - 1, last),
     }
-
-
-def _without_exact(ladder: Ladder) -> Ladder:
-    m = len(ladder.h) - 1
-    return Ladder(ladder.h, ladder.gram[:, :m, :m], ladder.floor, ladder.numbers, exact_known=False)

@@ -6,14 +6,8 @@ import numpy as np
 
 from vibsim.convergence.error_model.hypotheses import times
 from vibsim.convergence.error_model.posterior import Ladder, Posterior
+from vibsim.convergence.thresholds import BEST_BOUND, MISSED, MISSED_SHARE
 from vibsim.core.array_types import Flags, Floats
-
-BOUND = 3.0
-"""Standard deviations in the bound of an error: of the tails that the posterior has, these are 95 % (seeds 1 and 3)."""
-MISSED = 3.0
-"""A limit is missed that is so many bounds of the best value away from it,"""
-MISSED_SHARE = 0.5
-"""and at least so large a part of the estimated error of the finest level."""
 
 
 def best_value(
@@ -42,7 +36,7 @@ def best_value(
     weights[:, -1] = 1.0
     weights[:, :-1] += path * factors
     weights[:, 1:] -= path * factors
-    bound = BOUND * np.sqrt(spread + floor**2)
+    bound = BEST_BOUND * np.sqrt(spread + floor**2)
     if ladder.exact_known:
         error = np.sqrt(ladder.gram[:, -1, -1])
         largest = error + floor
@@ -57,7 +51,7 @@ def is_missed(ladder: Ladder, of_limit: Posterior) -> Flags:
     # the best value less the exact one, in the rows
     path = np.concatenate([of_limit.path, np.ones((len(of_limit.path), 1))], axis=-1)
     distance = norm(path, ladder.gram)
-    bound = BOUND * np.sqrt(_variance(ladder, of_limit) + ladder.floor[:, -1] ** 2)
+    bound = BEST_BOUND * np.sqrt(_variance(ladder, of_limit) + ladder.floor[:, -1] ** 2)
     error = norm(of_limit.path, ladder.gram[:, :-1, :-1])
     return np.asarray((distance > MISSED * bound) & (distance > MISSED_SHARE * error))
 

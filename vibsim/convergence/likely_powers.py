@@ -5,13 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from vibsim.convergence.error_model.posterior import Posterior
+from vibsim.convergence.thresholds import ORDER_INTERVAL
 from vibsim.core.array_types import Flags, Floats, Integers
 from vibsim.core.vocabulary import ORDER_TOLERANCE
 
-INTERVAL = 0.95
-"""Probability of the interval of an order."""
-OUTSIDE = 0.5 * (1.0 - INTERVAL)
-"""The same of what is below it, and above."""
+OUTSIDE = 0.5 * (1.0 - ORDER_INTERVAL)
+"""Probability of what is below the interval of an order, and of what is above."""
 
 
 def sides(
@@ -87,7 +86,7 @@ def finest_order(orders: Floats, last: Integers) -> Floats:
 
 
 def interval(believed: Posterior, order: Floats) -> tuple[Floats, Floats]:
-    """Return the range of powers that holds `INTERVAL` of what is believed, and the measured order."""
+    """Return the range of powers that holds `ORDER_INTERVAL` of what is believed, and the measured order."""
     below, above = tails(believed)
     low = believed.powers[np.argmax(below > OUTSIDE, axis=-1)]
     high = believed.powers[::-1][np.argmax(above > OUTSIDE, axis=-1)]

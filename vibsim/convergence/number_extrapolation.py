@@ -49,6 +49,8 @@ def limit(
 ) -> Limit:
     """Find the limits of numbers.
 
+    Levels up to the finest one that has no such number are left out: of a motion that is too coarse there is no period.
+
     Parameters
     ----------
     values, floor
@@ -57,6 +59,22 @@ def limit(
         Promised order p, and whether the next power is p + 2 rather than p + 1, shape (...); where the levels show
         another order, that is taken.
     """
+    n, unknown = len(levels), np.full(values.shape[:-1], np.nan)
+    finest = np.full(values.shape[:-1], n - 1)
+    found = Limit(values[..., -1].copy(), unknown, finest, finest.copy())
+    start = np.max(np.where(np.isfinite(values), 0, np.arange(1, n + 1)), axis=-1)
+    for k in np.unique(start[start < n]).tolist():
+        own = start == k
+        of = _limit(values[own][:, k:], levels[k:], order[own], even[own], floor[own][:, k:])
+        found.value[own], found.bound[own] = of.value, of.bound
+        found.first[own], found.last[own] = of.first + k, of.last + k
+    return found
+
+
+def _limit(
+    values: Floats, levels: Sequence[int], order: Floats, even: Flags, floor: Floats
+) -> Limit:
+    """Find the limits of numbers that exist at every level."""
     n = len(levels)
     finest = np.full(values.shape[:-1], n - 1)
     with np.errstate(all="ignore"):
@@ -64,7 +82,12 @@ def limit(
         unsure = np.where(np.isnan(bound), np.inf, bound)
         best = Limit(values[..., -1].copy(), unsure, finest, finest.copy())
         if n > 2:
-            p = _leading(observed_order(values, levels, floor), order)
+            seen = observed_order(values, levels, floor)
+            # a number whose error changes its sign falls fast by accident, and not at two triples alike
+            earlier = observed_order(values[..., :-1], levels[:-1], floor[..., :-1])
+            p = _leading(
+                np.where(earlier < seen - th.OTHER_ORDER, np.fmin(seen, order), seen), order
+            )
             best = _extrapolated(values, levels, p, np.where(even, 2, 1), floor, best)
     known = np.isfinite(best.bound) & np.isfinite(best.value)
     return Limit(best.value, np.where(known, best.bound, np.nan), best.first, best.last)

@@ -8,7 +8,7 @@ The origin stands in brackets at the end:
 - *pendulums*: set on random ladders of pendulums and springs (``tests/analysis/test_extrapolation.py``);
 - *convention*: a usual value of the field, or a size that was chosen.
 
-Those of the error model, which decides on orders, are in ``error_model/priors.py`` and ``assessment.py``.
+The priors of the error model are in ``error_model/priors.py``.
 """
 
 from __future__ import annotations
@@ -35,6 +35,23 @@ EXACT_ACCURACY = 1e-12  # an exact solution is trusted to this part of its size 
 # An ordinary error, (w dt)^p at the coarsest level, that exceeds `ABOVE_ROUND_OFF` by this factor is seen. [calibrated]
 VISIBLE_ERROR = 1e4
 STAYS = 0.5  # a floor does not fall below this part of itself [calibrated]
+
+# ---- Decisions by the error model
+
+RISK = 0.01  # accepted probability that a verdict is wrong [convention]
+# The same where three levels decide behind others that do not fit. [calibrated]
+RISK_OF_THREE = 0.1 * RISK
+# An order fails only where one power has so much of the probability, alone or as one of two of a size. [calibrated]
+DEFINITE = 0.9
+ORDER_INTERVAL = 0.95  # probability of the interval of an order [convention]
+# Standard deviations in the bound of a best value: of the tails that the posterior has, these are 95 %. [calibrated]
+BEST_BOUND = 3.0
+# A limit is missed that is so many bounds of the best value away from it, and at least so large a part of the estimated
+# error of the finest level. [calibrated]
+MISSED, MISSED_SHARE = 3.0, 0.5
+# Noise may be so many times its prediction where levels are said to differ by nothing else; the same of noise that a
+# user states, which differences of normal noise exceed in one of 200. [convention]
+NOISE_FACTOR, STATED_NOISE_FACTOR = 10.0, 2.0
 
 # ---- Facts from outside a ladder
 

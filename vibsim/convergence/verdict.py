@@ -37,12 +37,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import NamedTuple
 
 import numpy as np
 
 from vibsim.convergence import thresholds as th
-from vibsim.convergence.assessment import Question, decide
+from vibsim.convergence.assessment import Decision, Question, decide
 from vibsim.convergence.circumstances import (
     Evidence,
     at_rest,
@@ -76,17 +75,6 @@ class Judgement:
     last: Integers  # finest level that the order rests on; -1 where there is no order
     culprit: Integers  # the coarsest level that failed, or is beyond the limit; -1 for none
     orders: Floats = field(repr=False)  # local order of every triple, shape (..., n-2)
-
-
-class Believed(NamedTuple):
-    """What the error model believes of every ladder; see `vibsim.convergence.assessment.Assessment`."""
-
-    reason: Codes
-    order: Floats
-    low: Floats
-    high: Floats
-    first: Integers
-    last: Integers
 
 
 def judge(e: Evidence) -> Judgement:
@@ -137,10 +125,11 @@ def judge(e: Evidence) -> Judgement:
     )
 
 
-def _believed(e: Evidence, asked: Flags) -> Believed:
+def _believed(e: Evidence, asked: Flags) -> Decision:
     """Return what the error model says of the ladders that it is asked about, and of all others that they are noise."""
     shape, n = asked.shape, len(e.levels)
-    found = Believed(
+    found = Decision(
+        status=np.full(shape, STATUSES.index("INCONCLUSIVE"), dtype=np.int8),
         reason=np.full(shape, REASON_NAMES.index("round_off"), dtype=np.int8),
         order=np.full(shape, np.nan),
         low=np.full(shape, np.nan),
@@ -174,7 +163,7 @@ def _believed(e: Evidence, asked: Flags) -> Believed:
             by_theory=bool(by_theory),
         )
         a = decide(ladder, question)
-        for name, values in found._asdict().items():
+        for name, values in vars(found).items():
             values[chosen] = getattr(a, name)
     return found
 
@@ -191,7 +180,7 @@ def _is_theory(e: Evidence) -> Flags:
 
 
 def _cases(
-    e: Evidence, b: Believed, orders: Floats
+    e: Evidence, b: Decision, orders: Floats
 ) -> tuple[list[tuple[Flags, str]], Floats, Flags]:
     """Return the cases of ladders of three levels and more, first to last.
 

@@ -10,6 +10,8 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+from vibsim.core import guarded
+
 
 def create(path: Path) -> Any:
     """Return a new dataset in the file `path`, to be closed by who asked for it."""
@@ -39,8 +41,21 @@ def variables(dataset: Any) -> Iterator[tuple[str, Any, str]]:
             yield name, variable, group
 
 
-def in_memory(content: bytes) -> Any:
-    """Return the dataset that the bytes of a file are; OSError where the library cannot read it."""
+def foreign(source: Path | bytes) -> Any:
+    """Return the dataset of a user's file, or of its bytes; OSError where the library cannot read it."""
     from netCDF4 import Dataset
 
-    return Dataset("table.nc", memory=content)
+    def opened() -> Any:
+        if isinstance(source, bytes):
+            return Dataset("table.nc", memory=source)
+        return Dataset(source, "r")
+
+    def look() -> None:
+        with opened() as dataset:
+            for _, variable, _ in variables(dataset):
+                variable.ncattrs()
+
+    size = len(source) if isinstance(source, bytes) else source.stat().st_size
+    if problem := guarded.problem(look, size):
+        raise OSError(problem)
+    return opened()

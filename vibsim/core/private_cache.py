@@ -126,7 +126,7 @@ def provided() -> Iterator[str]:
     Yields why the user has none, empty where there is one. OSError where there is no folder for temporary files either.
     """
     # every job imports this module, and only a run has use for it
-    from tempfile import TemporaryDirectory
+    from vibsim.core.temporary import temporary_folder
 
     before = os.environ.get(VARIABLE)
     reason = ""
@@ -142,8 +142,8 @@ def provided() -> Iterator[str]:
             os.environ[VARIABLE] = str(place())
             yield ""
         else:
-            with TemporaryDirectory(prefix="vibsim-", ignore_cleanup_errors=True) as folder:
-                os.environ[VARIABLE] = folder
+            with temporary_folder() as folder:
+                os.environ[VARIABLE] = str(folder)
                 yield reason
     finally:
         os.environ.pop(VARIABLE)

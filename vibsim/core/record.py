@@ -6,7 +6,7 @@ Jobs work on plain arrays: importing xarray costs more than a short simulation. 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -35,10 +35,22 @@ class Variable:
                 f"{len(self.dims)} names {self.dims} for {np.ndim(self.values)} dimensions"
             )
 
+    @classmethod
+    def of(
+        cls, dims: tuple[str, ...], values: NDArray[Any], words: str, units: str = "1", **more: Any
+    ) -> Variable:
+        """Return an array that `words` describe, in its `units`; `more` are further attributes."""
+        return cls(dims, values, attributes(words, units, **more))
+
 
 def attributes(long_name: str, units: str, **more: Any) -> dict[str, Any]:
     """Return the attributes of a variable."""
     return {"long_name": long_name, "units": units, **more}
+
+
+def flags(words: Sequence[str]) -> dict[str, Any]:
+    """Return the attributes of a variable that holds positions in a list of words, beside `attributes`."""
+    return {"flag_values": np.arange(len(words), dtype=np.int8), "flag_meanings": " ".join(words)}
 
 
 @dataclass(frozen=True)
@@ -71,6 +83,11 @@ class Record:
     def place(self, dim: str, value: int) -> int:
         """Return the position of a value of a coordinate of whole numbers."""
         return int(np.flatnonzero(np.asarray(self[dim]) == value)[0])
+
+    def step(self, level: int, case: int) -> float:
+        """Return dt of a member at a level, both by their positions, from a convergence Record."""
+        dt = np.asarray(self["dt"])[level]
+        return float(dt[case] if dt.ndim else dt)
 
     def __contains__(self, name: str) -> bool:
         return name in self.variables or name in self.coords

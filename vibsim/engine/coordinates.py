@@ -101,11 +101,13 @@ def put_moves(module: Module, count: int) -> None:
         module.define(head, *lines)
     module.define("first_of(q)", f"return {components('q')[0]}")
     pairs = zip(components("q"), components("w"), strict=True)
-    first, *rest = (f"abs({part})" for pair in pairs for part in pair)
-    # a sum of many terms in one line would be nested too deeply
-    module.define(
-        "size_of(q, w)", f"size = {first}", *(f"size = size + {x}" for x in rest), "return size"
-    )
+    terms = [f"abs({part})" for pair in pairs for part in pair]
+    # by halves: no addition waits for all others, and nothing is nested deeply
+    while len(terms) > 1:
+        terms = [f"({a} + {b})" for a, b in zip(terms[::2], terms[1::2], strict=False)] + terms[
+            len(terms) - len(terms) % 2 :
+        ]
+    module.define("size_of(q, w)", f"return {terms[0]}")
 
 
 def put_further(module: Module, count: int) -> None:

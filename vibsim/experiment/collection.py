@@ -9,6 +9,8 @@ from vibsim.core.home import home
 
 ADHOC = "adhoc"
 """Collection of a file outside the shipped ``configs/``."""
+SITE = "docs"
+"""Folder of the results where a collection would be, with the documentation that ``make docs`` makes."""
 ENDINGS = (".yaml", ".yml")
 """Of the name of an experiment file."""
 

@@ -52,6 +52,8 @@ FILE = 33_000
 """Bytes of a file beside its data."""
 SERIES_FILE = 11_000
 """Bytes of a file beside these where every series is kept, and extrema."""
+COORDINATE_FILE = 14_000
+"""Bytes of a file beside these for each coordinate behind the first: the heads of its variables."""
 
 PACKED_UP_TO = 2**25
 """Bytes of a file with every series up to which it is compressed, in a second, and until then kept in memory."""
@@ -76,14 +78,14 @@ SHARD_BYTES = 320 * 10**6
 LARGEST_SHARD = 2**20
 """Members of a shard at most."""
 
-ANALYSIS_MEMORY = 92 * 10**6
-"""Bytes of an analysis without its arrays."""
+ANALYSIS_MEMORY = 125 * 10**6
+"""Bytes of an analysis without its arrays, with the process that watches over it."""
 ANALYSED = 3.8
 """Bytes that an analysis holds at its peak for each byte that it reads of the members at hand."""
-PART_SAMPLES = 2**17
-"""Samples of one variable that an analysis takes at a time (`vibsim.analysis`)."""
-RANGES_HELD = 3
-"""Ranges of members that an analysis holds at a time: one for each of two threads, and one that is written."""
+PART_SAMPLES = 2**16
+"""Samples of one variable that an analysis takes at a time: a few arrays of them fit into the cache of a core."""
+PROCESS_MEMORY = 30 * 10**6
+"""Bytes that each of several processes of an analysis holds without its part of the members."""
 RESULT = 124
 """Bytes that an analysis keeps of each scheme and member until its end."""
 
@@ -140,6 +142,11 @@ class Load:
     """Whether a scheme has another velocity than the centred difference."""
     own: float = 0.0
     """Seconds that SciPy takes of a member: schemes which choose their own steps, and the steps of a structure."""
+    shared: float = 0.0
+    """Those of them that all levels of a job take together: such schemes run once."""
+    coordinates: int = 1
+    chain: int = 1
+    """Members that start one from the other, and so are stepped one after the other, in one job."""
 
     @property
     def stored(self) -> int:
@@ -163,10 +170,10 @@ class Load:
 
     @property
     def shard(self) -> int:
-        """Members of a shard: a power of two, so that another measured constant seldom changes it."""
+        """Members of a shard: a power of two of chains, so that another measured constant seldom changes it."""
         by_time = SHARD_SECONDS / (self.steps * self._step(MANY_SECONDS, ONE_SECONDS) + self.own)
-        most = max(1, min(int(by_time), SHARD_BYTES // self.held, LARGEST_SHARD))
-        return 1 << (most.bit_length() - 1)
+        most = min(int(by_time), SHARD_BYTES // self.held, LARGEST_SHARD) // self.chain
+        return self.chain << (max(most, 1).bit_length() - 1)
 
     def shards(self, members: int) -> int:
         """Return the number of shards that `members` fill."""
@@ -175,6 +182,7 @@ class Load:
     def disk(self, members: int) -> int:
         """Return the bytes of the files of `members`, before any of them is compressed."""
         each = FILE + (SERIES_FILE if self.extrema else 0)
+        each += COORDINATE_FILE * (self.coordinates - 1)
         return members * self.stored + self.shards(members) * each
 
     def memory(self, members: int) -> int:
@@ -185,7 +193,7 @@ class Load:
 
     def seconds(self, members: int) -> float:
         """Return the seconds of one core that the steps and the files of `members` take."""
-        compiled = MANY_SECONDS + (ONE_SECONDS - MANY_SECONDS) / members
+        compiled = MANY_SECONDS + (ONE_SECONDS - MANY_SECONDS) * self.chain / members
         step = self._step(compiled, ONE_SECONDS)
         if self._is_plain(members):
             step = self._step(PLAIN_SECONDS, PLAIN_SECONDS)
@@ -197,7 +205,7 @@ class Load:
         return units * explicit + self.iterated * iterated
 
     def _is_plain(self, members: int) -> bool:
-        return members * self.steps <= PLAIN_MEMBER_STEPS
+        return members * self.steps <= PLAIN_MEMBER_STEPS * self.chain
 
 
 def _packed(size: int, extrema: int) -> int:
@@ -206,12 +214,20 @@ def _packed(size: int, extrema: int) -> int:
 
 
 def analysis_memory(loads: Sequence[Load], members: int) -> int:
-    """Return the bytes that an analysis of `members` holds at its peak; `loads` are those of every level."""
-    part = max(1, PART_SAMPLES // (loads[0].samples * loads[0].schemes))
-    at_hand = min(members, RANGES_HELD * part)
-    read = at_hand * sum(load.stored for load in loads)
+    """Return the bytes that an analysis in one process holds at its peak; `loads` are those of every level."""
     written = _packed(analysis_disk(loads, members, is_lean=False), loads[0].extrema)
-    return ANALYSIS_MEMORY + round(ANALYSED * read) + RESULT * loads[0].schemes * members + written
+    result = RESULT * loads[0].schemes * members
+    return ANALYSIS_MEMORY + _part_memory(loads, members) + result + written
+
+
+def process_memory(loads: Sequence[Load], members: int) -> int:
+    """Return the bytes that each process holds where several share an analysis."""
+    return PROCESS_MEMORY + _part_memory(loads, members)
+
+
+def _part_memory(loads: Sequence[Load], members: int) -> int:
+    part = max(1, PART_SAMPLES // (loads[0].samples * loads[0].schemes))
+    return round(ANALYSED * min(members, part) * sum(load.stored for load in loads))
 
 
 def analysis_disk(loads: Sequence[Load], members: int, is_lean: bool) -> int:
@@ -227,6 +243,8 @@ def analysis_disk(loads: Sequence[Load], members: int, is_lean: bool) -> int:
         size += EXTREMUM * len(loads) * max(load.extrema for load in loads) + COMPARED_NUMBERS
         size += EVENT * len(loads) * max(load.events for load in loads)
         file += COMPARED_SERIES_FILE
+        # those of one coordinate
+        size, file = loads[0].coordinates * size, loads[0].coordinates * file
     return loads[0].schemes * members * size + file
 
 
@@ -251,11 +269,12 @@ def load_of(experiment: ExperimentSpec, level: int) -> Load:
     works = [work(kind.force_evaluations, kind.explicit, alone) for kind in kinds]
     # of a member that is not swept
     turns = experiment.time.end * float(model.natural_frequency(experiment.model.parameters))
-    own = (
+    shared = sum(
         seconds(scheme.kind, float(scheme.options["tolerance"]), turns / (2.0 * math.pi))
         for scheme in experiment.schemes
         if scheme.adaptive
     )
+    has_exact = model.exact is not None or (has_solution(model) and experiment.chain == 1)
     whole = 0.0
     if model.loaded is not None:
         each, of_entry = STRUCTURE_SECONDS
@@ -266,11 +285,14 @@ def load_of(experiment: ExperimentSpec, level: int) -> Load:
         steps=steps,
         samples=steps // sampling(experiment, level) + 1,
         series=len(stored_series(experiment)),
-        exact=len(model.states) if has_solution(model) and not lean else 0,
+        exact=len(model.states) if has_exact and not lean else 0,
         work=sum(explicit for explicit, _ in works),
         iterated=sum(iterated for _, iterated in works),
         extrema=0 if lean else extrema_kept(steps, experiment.trajectories),
         events=event_times(experiment),
         d2t=experiment.own_velocity or not lean,
-        own=sum(own) + whole,
+        own=shared + whole,
+        shared=shared,
+        coordinates=model.coordinates,
+        chain=experiment.chain,
     )

@@ -75,6 +75,8 @@ class ArraySpec(Section):
 
     file: Text | None = None
     """Path of the file, relative to the folder of the experiment file."""
+    columns: tuple[Text, Text] | None = None
+    """Names of the columns of times and loads, where the file is the table of a load."""
     rows: tuple[tuple[float, ...] | float, ...] = ()
     entries: tuple[tuple[int, float], ...] = ()
     mode: int | None = None
@@ -88,7 +90,7 @@ class StructureSpec(Section):
     """What a file says of a linear structure beside formulas and parameters."""
 
     arrays: Annotated[dict[str, ArraySpec], AfterValidator(FrozenDict)]
-    """By key: ``mass``, ``stiffness``, ``damping``, ``load.0``, ``start.displacement``, ``start.velocity``."""
+    """By key: ``mass``, ``stiffness``, ``damping``, ``load.0``, ``history.0`` (its table), ``start.displacement``."""
     ratios: tuple[float, ...] = ()
     """Damping ratios of the lowest modes."""
     observe: tuple[tuple[Text, tuple[tuple[int, float], ...]], ...] = ()
@@ -154,17 +156,11 @@ class ModelSpec(Section):
     @property
     def definition(self) -> Model:
         """The equation of motion that this section describes."""
-        model = self.base
-        declared = (key.partition(".") for key in self.parameters)
-        names = tuple(name for section, _, name in declared if section == DECLARED)
-        if model.written is not None:
-            model = model.written(self.formulas, names)
-        if self.structure is not None and model.assembled is not None:
-            model = model.assembled(self.structure.structure, self.formulas, names)
-        for own in self.tables.values():
-            if model.with_table is not None:
-                model = model.with_table(own.table, own.is_met)
-        return model.variant(frozenset(self.terms)) if model.variant is not None else model
+        keys = (key.partition(".") for key in self.parameters)
+        declared = tuple(name for section, _, name in keys if section == DECLARED)
+        numbers: list[Any] = [x for row in self.tables.values() for x in (row.table, row.is_met)]
+        numbers += [self.structure.structure] if self.structure is not None else []
+        return self.base.with_formulas(self.formulas, declared, *numbers).with_terms(self.terms)
 
 
 class TimeSpec(Section):
@@ -175,7 +171,9 @@ class TimeSpec(Section):
     base_steps: Count
     """Steps at level 0."""
     periods: float | None = None
-    """The end in natural periods, where the file gives it so: each member then has its own end."""
+    """The end in periods, where the file gives it so: each member then has its own end."""
+    frequency: str | None = None
+    """The parameter of the model whose periods these are, an angular frequency; natural periods where None."""
     steps_per_point: int | None = None
     """Steps at level 0 from a point of the model's table to the next, where the file gives these instead of an end."""
 
@@ -186,6 +184,8 @@ class TimeSpec(Section):
 
     def end_of(self, model: Model, parameters: Mapping[str, Any]) -> Any:
         """Return the end time of members with these `parameters` (numbers or arrays), unless swept."""
+        if self.periods is not None and self.frequency is not None:
+            return self.periods * (2.0 * math.pi / parameters[self.frequency])
         if self.periods is not None:
             return natural_end(model, self.periods, parameters)
         return self.end if self.steps_per_point is None else table_end(model, parameters)
@@ -236,6 +236,8 @@ class Sweep(Section):
 
     axes: tuple[Axis, ...]
     """In the order written."""
+    follow: str | None = None
+    """A key of the last axis, where each member along that starts from the last state of the one before."""
 
     @property
     def keys(self) -> tuple[str, ...]:
@@ -246,6 +248,11 @@ class Sweep(Section):
     def count(self) -> int:
         """Number of members."""
         return math.prod(axis.count for axis in self.axes)
+
+    @property
+    def chain(self) -> int:
+        """Number of members that start one from the other; 1 where all start as the file says."""
+        return self.axes[-1].count if self.follow else 1
 
     @property
     def _spans(self) -> Iterator[tuple[str, Any, Any]]:
@@ -267,7 +274,29 @@ class Sweep(Section):
         return None if by_model or "time.end" in differ else self.least_end(time)
 
 
-class ExperimentSpec(Section):
+class ReadSection(Section):
+    """What is read from a file."""
+
+    _file: Path | None = PrivateAttr(default=None)
+    _settings: tuple[str, ...] = PrivateAttr(default=())
+
+    @property
+    def file(self) -> Path | None:
+        """Where it was read; not part of its identity."""
+        return self._file
+
+    @property
+    def folder(self) -> Path:
+        """Folder of that file, from which paths start, and where a command runs."""
+        return self._file.parent if self._file else Path()
+
+    @property
+    def settings(self) -> tuple[str, ...]:
+        """What a command line gave in place of values of the file, as ``KEY=VALUE``; not part of its identity."""
+        return self._settings
+
+
+class ExperimentSpec(ReadSection):
     """The fields of an experiment, and what follows from them alone."""
 
     collection: Identifier
@@ -298,8 +327,6 @@ class ExperimentSpec(Section):
     """Units that the file defines, in SI base units; every number is converted already."""
     scaling: Scaling | None = None
     """Present where the run is made in the characteristic units of the model."""
-    _file: Path | None = PrivateAttr(default=None)
-    _settings: tuple[str, ...] = PrivateAttr(default=())
     _notes: tuple[tuple[int, str], ...] = PrivateAttr(default=())
 
     @classmethod
@@ -308,16 +335,6 @@ class ExperimentSpec(Section):
         found: Any = cls.model_construct(**spec.__dict__)
         made: Self = found
         return made
-
-    @property
-    def file(self) -> Path | None:
-        """Where the experiment was read; not part of its identity."""
-        return self._file
-
-    @property
-    def settings(self) -> tuple[str, ...]:
-        """What a command line gave in place of values of the file, as ``KEY=VALUE``; not part of its identity."""
-        return self._settings
 
     @property
     def notes(self) -> tuple[tuple[int, str], ...]:
@@ -340,6 +357,11 @@ class ExperimentSpec(Section):
     def members(self) -> int:
         """Number of members of the sweep, 1 without one."""
         return self.sweep.count if self.sweep else 1
+
+    @property
+    def chain(self) -> int:
+        """Number of members that start one from the other (`Sweep.chain`)."""
+        return self.sweep.chain if self.sweep else 1
 
     @property
     def trajectories(self) -> int:

@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any, TypeVar
 
+from vibsim.core.errors import Fault, InputError
 from vibsim.experiment.data import AnyExperiment, ExperimentSpec, SchemeSpec, Sweep, check_member
 from vibsim.experiment.faults import Report
 from vibsim.experiment.rules import size_limits
 from vibsim.experiment.rules.checks import check_published, finish_checks
-from vibsim.experiment.rules.levels import rising_levels
 from vibsim.experiment.rules.members import update_tables
+from vibsim.experiment.rules.timing import rising_levels
 from vibsim.experiment.schema.checks import (
     AccurateCheck,
     Check,
@@ -21,7 +22,7 @@ from vibsim.experiment.schema.checks import (
 )
 from vibsim.experiment.schema.document import Levels
 from vibsim.experiment.schema.fields import FrozenDict
-from vibsim.experiment.schema.figures import LEVEL, FigureOfSource
+from vibsim.experiment.schema.figures import LEVEL
 from vibsim.experiment.schema.published import PublishedTable, claims
 from vibsim.experiment.schema.sweep import as_option
 from vibsim.experiment.sweep_columns import columns, members_with
@@ -37,12 +38,13 @@ def alone(experiment: AnyExperiment, case: int) -> AnyExperiment:
     Its checks are those that speak of this member or of every one; without any of them the position must converge, as
     in a file without checks.
 
-    Raises
-    ------
-    InputError
-        Where there is no such member.
+    InputError where there is no such member, or it starts from the last state of another one.
     """
     check_member(case, experiment.members, str(experiment.file or experiment.name))
+    if case % experiment.chain:
+        name, rule = str(experiment.file or experiment.name), "starts where the member before ends"
+        hint = f"run the sweep, or @{case - case % experiment.chain}, which starts as the file says"
+        raise InputError([Fault(name, 0, "sweep.follow", str(case), rule, hint)])
     swept = {key: column[0].item() for key, column in columns(experiment, case, case + 1).items()}
     parameters = _filled(swept, "model", experiment.model.parameters)
     # a term that is 0 for this member alone stays, and with it every bit
@@ -68,6 +70,13 @@ def alone(experiment: AnyExperiment, case: int) -> AnyExperiment:
     checks += claims(published)
     positions = model.definition.positions if not checks else ()
     checks += [ConvergesCheck(id=f"check_{i}", converges=u) for i, u in enumerate(positions, 1)]
+    # nothing is divided by members any more
+    figures = tuple(
+        figure.model_copy(
+            update={"panels": LEVEL if figure.panels == LEVEL else None, "each": None}
+        )
+        for figure in experiment.figures
+    )
     found = experiment.model_copy(
         update={
             "name": f"{experiment.name}_case_{case}",
@@ -78,7 +87,7 @@ def alone(experiment: AnyExperiment, case: int) -> AnyExperiment:
             "sweep": None,
             "checks": tuple(checks),
             "published": published,
-            "figures": tuple(_figure_of_member(figure) for figure in experiment.figures),
+            "figures": figures,
         }
     )
     return update_tables(found)
@@ -109,12 +118,6 @@ def _published_of(experiment: ExperimentSpec, case: int, unit: float) -> tuple[P
     return tuple(found)
 
 
-def _figure_of_member(figure: FigureOfSource) -> FigureOfSource:
-    """Leave out what a figure divides by members."""
-    divided = None if figure.panels != LEVEL else LEVEL
-    return figure.model_copy(update={"panels": divided, "each": None})
-
-
 def _of_member(check: Check, unit: float) -> Check:
     if isinstance(check, ClaimCheck):
         return check.model_copy(update={"that": _of_member(check.that, unit)})
@@ -132,11 +135,8 @@ def _at_of_member(at: AnyAt, unit: float) -> AnyAt:
 def with_levels(experiment: AnyExperiment, levels: Sequence[int]) -> AnyExperiment:
     """Return `experiment` with `levels`, held to every rule that levels of a file are held to.
 
-    Raises
-    ------
-    InputError
-        Where they are no levels (none at all, not increasing, or out of range), what they ask for cannot be run, or a
-        check names a time that they do not store.
+    InputError where they are no levels (none at all, not increasing, or out of range), what they ask for cannot be run,
+    or a check names a time that they do not store.
     """
     report = Report(Source(str(experiment.file or experiment.name), {}))
     rising = rising_levels(read_value(("levels",), list(levels), Levels, report), report)

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Self
 
 from vibsim.experiment.collection import ADHOC
 from vibsim.experiment.data import ExperimentSpec
-from vibsim.experiment.schema.checks import Check
+from vibsim.experiment.schema.checks import as_data, without_kind
 
 if TYPE_CHECKING:
     from vibsim.models import Model
@@ -123,24 +123,20 @@ def canonical(experiment: Experiment) -> dict[str, Any]:
 
     The sections stand apart, so that a digest can take those that a job uses: ``collection``, ``name``, ``title``,
     ``source``, ``model``, ``initial``, ``time``, ``levels``, ``schemes``, ``sweep``, ``samples``, ``output``,
-    ``tolerance``, ``checks``, and ``published``, ``figures``, ``units`` and ``scaling`` where there is any.
+    ``tolerance``, ``checks``, and ``follow``, ``published``, ``figures``, ``units`` and ``scaling`` where there is any.
     """
     data = experiment.model_dump(mode="json", exclude={"checks"})
-    data["sweep"] = data["sweep"] and data["sweep"]["axes"]
-    data["checks"] = [_with_kind(check) for check in experiment.checks]
+    sweep = data["sweep"]
+    data["sweep"] = sweep and sweep["axes"]
+    if sweep and sweep["follow"]:
+        data["follow"] = sweep["follow"]
+    data["checks"] = [as_data(check) for check in experiment.checks]
     for name in ("published", "figures", "units", "scaling"):
         if not getattr(experiment, name):
             del data[name]
     for name in ("tables", "structure"):
         if not getattr(experiment.model, name):
             del data["model"][name]
-    return data
-
-
-def _with_kind(check: Check) -> dict[str, Any]:
-    data: dict[str, Any] = {"kind": check.kind, **check.model_dump(mode="json")}
-    if check.kind == "claim":
-        data["that"] = _with_kind(check.that)
     return data
 
 
@@ -157,8 +153,9 @@ def restore(
         Where a table of it cannot be read, or has other numbers than it had.
     """
     data = dict(content)
-    data["sweep"] = data["sweep"] and {"axes": data["sweep"]}
-    data["checks"] = [_without_kind(check) for check in data["checks"]]
+    follow = data.pop("follow", None)
+    data["sweep"] = data["sweep"] and {"axes": data["sweep"], "follow": follow}
+    data["checks"] = [without_kind(check) for check in data["checks"]]
     experiment = Experiment.made_of(ExperimentSpec.model_validate(data))
     experiment._file, experiment._settings = file, settings
     if experiment.model.tables:
@@ -170,8 +167,3 @@ def restore(
 
         attach_structure(experiment)
     return experiment
-
-
-def _without_kind(check: Mapping[str, Any]) -> dict[str, Any]:
-    data = {key: value for key, value in check.items() if key != "kind"}
-    return data | ({"that": _without_kind(data["that"])} if "that" in data else {})

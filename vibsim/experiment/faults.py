@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
 from pydantic import ValidationError
 
 from vibsim.core.errors import Fault, InputError, nearest
+from vibsim.core.home import home
 from vibsim.core.set_option import set_in
 from vibsim.experiment.kinds import Kinds
 from vibsim.experiment.yaml.parse import MAX_FAULTS, Path_, Source, dotted
+from vibsim.formula import MAX_CHARACTERS, Expression, ExpressionError, parse
 
 MAX_VALUE = 60
 MISSING = "required key is missing"
@@ -40,6 +43,17 @@ _FORMS = {
 }
 """How each rule for the values of a sweep is written."""
 
+_EXAMPLES: Mapping[Path_, str] = {
+    ("levels",): "e.g. [6, 7, 8, 9], or {from: 6, to: 9}",
+    ("time",): "e.g. {end: 10.0}",
+    ("model", "rayleigh"): "e.g. {alpha: 0.1, beta: 0.001}",
+    ("model", "observe"): "e.g. {tip: 10, stretch: {1: -1, 2: 1}}",
+}
+"""How a list or a mapping is written, where the rule alone would help nobody."""
+
+_MEANT = {"tolerance": "atol", "tol": "atol"}
+"""A key that other programs have, and the one that has its meaning here."""
+
 
 class Report:
     """The faults of one input, and the kinds that it may name."""
@@ -58,10 +72,7 @@ class Report:
     ) -> None:
         """Note a fault of the value at `path`, or with `at_key` of the key itself.
 
-        Raises
-        ------
-        InputError
-            Where there are `MAX_FAULTS` already: nobody reads more of them.
+        InputError where there are `MAX_FAULTS` already: nobody reads more of them.
         """
         if path in self.faulty:
             return
@@ -75,6 +86,9 @@ class Report:
         self.notes.add(self._fault(path, rule, hint, None, False))
 
     def _fault(self, path: Path_, rule: str, hint: str, value: object, at_key: bool) -> Fault:
+        if path and str(path[-1]).count(")") > str(path[-1]).count("("):
+            # half of a formula
+            hint = "between braces a comma ends a value: write a formula with commas in quotation marks"
         place = self.source.place(path)
         nested = place is not None and not place.text
         file, line = self._above(path)
@@ -106,7 +120,9 @@ class Report:
             rule, hint = "a key of the sweep has one rule for its values", ""
         else:
             is_rule = any(name in _FORMS for name in known)
-            rule, hint = "unknown key", nearest(path[-1], list(_FORMS) if is_rule else known)
+            meant = _MEANT.get(str(path[-1]), "")
+            written = meant if meant in known else path[-1]
+            rule, hint = "unknown key", nearest(written, list(_FORMS) if is_rule else known)
         self.add_malformed(path, rule, hint, value, at_key=True)
 
     def add_invalid(self, error: ValidationError, path: Path_) -> list[Path_]:
@@ -139,6 +155,8 @@ class Report:
             hint = f"write [{value}]"
         if kind == "literal_error":
             hint = nearest(value, re.findall(r"'([^']*)'", context["expected"]))
+        if kind in ("tuple_type", "dict_type", "model_type", "model_attributes_type"):
+            hint = _EXAMPLES.get(path, hint)
         if kind in ("missing", "too_long", "tuple_type"):
             path, rule = _whole_list(path, rule)
         # a list with wrong items is too short only for pydantic, which counts the right ones
@@ -155,10 +173,13 @@ class Report:
             return
         rule = f"unknown {path[0]}".rstrip("s") if "kind" in value else MISSING
         kind = value.get("kind")
-        self.add((*path, "kind"), rule, nearest(kind if "kind" in value else "", kinds), kind)
+        hint = nearest(kind if "kind" in value else "", kinds)
+        if path == ("model",) and (experiment := _shipped(str(kind))):
+            hint = f"`vibsim new FILE --like {experiment}` begins with a shipped experiment of this name"
+        self.add((*path, "kind"), rule, hint, kind)
 
     @property
-    def told(self) -> tuple[tuple[int, str], ...]:
+    def note_lines(self) -> tuple[tuple[int, str], ...]:
         """The notes as lines of the file, 0 where there is none, and texts."""
         found = []
         for row in sorted(self.notes):
@@ -166,10 +187,38 @@ class Report:
             found.append((row.line, str(replace(row, file=setting, line=0))))
         return tuple(found)
 
+    @property
+    def doubts_model(self) -> bool:
+        """Whether the section ``model`` has a fault."""
+        return any(fault.key.split(".")[0] == "model" for fault in self.faults)
+
+    def formula(
+        self, path: Path_, text: str, names: Sequence[str], more: str = "", hint: str = ""
+    ) -> Expression | None:
+        """Return a formula that may hold some names; None where it cannot be read, which is noted.
+
+        Where a name is unknown, `more` stands behind the rule; a `hint` takes the place of that of the parser.
+        """
+        try:
+            return parse(text, names)
+        except ExpressionError as error:
+            place = f" at character {error.position + 1}" if error.position < MAX_CHARACTERS else ""
+            rest = more if error.rule.startswith("unknown name") else ""
+            self.add(path, f"{error.rule}{place}{rest}", hint or error.hint, text)
+            return None
+
     def raise_any(self) -> None:
         """Raise `InputError` with every fault, if there is one."""
         if self.faults:
             raise InputError(self.faults)
+
+
+def _shipped(name: str) -> str:
+    """Return the shipped experiment of a name, with its collection; empty where there is none."""
+    if not re.fullmatch(r"\w+", name):
+        return ""
+    files = sorted((home() / "configs").glob(f"*/{name}.yaml"))
+    return f"{files[0].parent.name}/{name}" if files else ""
 
 
 def _nearest_key(value: dict[Any, Any], rule: str) -> str:

@@ -24,9 +24,7 @@ class Kinds:
 
     def model(self, kind: Any) -> Model | None:
         """Return the model of a kind; None where there is none."""
-        if not isinstance(kind, str):
-            return None
-        return self.own_models.get(kind) or MODELS.get(kind)
+        return self.own_models.get(kind) or MODELS.get(kind) if isinstance(kind, str) else None
 
     def model_of(self, section: Any) -> Model | None:
         """Return the model that a section ``model`` describes, with the coordinates that it names, but no formulas.
@@ -45,9 +43,7 @@ class Kinds:
 
     def scheme(self, kind: Any) -> Scheme | None:
         """Return the scheme of a kind; None where there is none."""
-        if not isinstance(kind, str):
-            return None
-        return self.own_schemes.get(kind) or SCHEMES.get(kind)
+        return self.own_schemes.get(kind) or SCHEMES.get(kind) if isinstance(kind, str) else None
 
     def names(self, section: str | int) -> tuple[str, ...]:
         """Name every kind of the section ``model`` or ``schemes``; nothing is imported for that."""

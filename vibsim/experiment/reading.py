@@ -11,20 +11,21 @@ from typing import Any
 
 from vibsim.core.errors import Fault, InputError, nearest
 from vibsim.experiment.collection import collection_of
-from vibsim.experiment.data import AnyExperiment, ExperimentSpec, ModelSpec
+from vibsim.experiment.data import AnyExperiment, ExperimentSpec, ModelSpec, Sweep, TimeSpec
 from vibsim.experiment.faults import MISSING, Report, shorten
 from vibsim.experiment.kinds import Kinds
 from vibsim.experiment.repeat import with_repeats
-from vibsim.experiment.rules import members, size_limits, timing, unlikely
+from vibsim.experiment.rules import continuation, members, size_limits, timing, unlikely
 from vibsim.experiment.rules import schemes as scheme_rules
 from vibsim.experiment.rules.checks import check_published, finish_checks
 from vibsim.experiment.rules.figures import check_figures
-from vibsim.experiment.rules.levels import rising_levels
-from vibsim.experiment.rules.model import are_known
+from vibsim.experiment.rules.model import Equation, are_known
 from vibsim.experiment.rules.model import equation as read_equation
 from vibsim.experiment.rules.scaling import Numbers, characteristic
 from vibsim.experiment.rules.starts import Starts, check_starts
+from vibsim.experiment.rules.structure import check_histories
 from vibsim.experiment.rules.sweep import read_sweep
+from vibsim.experiment.rules.timing import rising_levels
 from vibsim.experiment.schema.checks import Check, ConvergesCheck
 from vibsim.experiment.schema.document import Document, Every
 from vibsim.experiment.schema.fields import IDENTIFIER
@@ -34,6 +35,7 @@ from vibsim.experiment.settings import with_settings
 from vibsim.experiment.validation import read_document
 from vibsim.experiment.yaml.parse import MAX_DEPTH, Source, read
 from vibsim.models import MODELS, Model
+from vibsim.models.structure import STRUCTURE
 from vibsim.schemes import SCHEMES, Scheme
 
 SOLVER = "solver"
@@ -43,6 +45,8 @@ KEYS = (*Document.model_fields, SOLVER, "refine", "quantities")
 MAX_NAME = 100
 MAX_REPEATS = 20
 """Snakemake takes a name that ends in so many repetitions for a rule that feeds itself."""
+AS_WRITTEN = ("title", "source", "output", "tolerance", "published", "figures", "units")
+"""Sections that an experiment has as they are written."""
 SAME_START = 1e-12
 """A state that is given and follows from the parameters agrees to this part of the largest one."""
 
@@ -129,10 +133,7 @@ def build(
 
     `kinds` says which models and schemes it may name, by default those that are registered.
 
-    Raises
-    ------
-    InputError
-        With every fault of the file.
+    InputError with every fault of the file.
     """
     report = Report(source, kinds)
     for what, text in (("experiment", name), ("collection", collection)):
@@ -150,17 +151,13 @@ def build(
     schemes = tuple(scheme_rules.finish_schemes(document.schemes, model, report))
     knows_schemes = scheme_rules.are_known(document.schemes, report.kinds)
     time = timing.time_spec(document.time, model, parameters, report)
-    initial = _initial(document.initial, model or of_kind, parameters, report)
+    # the states of a structure are known with its matrices alone
+    known = None if of_kind is STRUCTURE else of_kind
+    initial = _initial(document.initial, model or known, parameters, report)
     order = source.data.get("sweep")
     sweep, is_whole = read_sweep(document, order, model, schemes, not knows_schemes, report)
-    if time is not None and is_whole and model is not None and are_known(model, parameters):
-        of_members = members.MemberNumbers(model, parameters, time, sweep.axes)
-        members.check_ends(of_members, report)
-        for table in equation.tables:
-            members.check_length(of_members, table, report)
-        members.check_jumps(of_members, equation.formulas, report)
-        starts = Starts(model, parameters, initial, sweep.axes)
-        check_starts(starts, equation.formulas, report)
+    if is_whole:
+        _check_members(equation, initial, time, sweep, report)
     numbers = Numbers(parameters, initial, time)
     if document.scaled:
         numbers = characteristic(numbers, model, swept, report)
@@ -178,6 +175,10 @@ def build(
     )
     size_limits.check(setting, report)
     _check_output(document, model, levels, report)
+    if sweep.follow is not None and (document.tolerance is not None or document.output == "best"):
+        key = "tolerance" if document.tolerance is not None else "output"
+        rule = "extrapolates members that start as the file says, not those of `follow`"
+        report.add((key,), rule, "leave it out, and give levels")
     checks = _checks(document, setting, report)
     check_figures(document.figures, setting, report)
     report.raise_any()
@@ -186,8 +187,7 @@ def build(
     spec = ExperimentSpec(
         collection=collection,
         name=name,
-        title=document.title,
-        source=document.source,
+        **{key: getattr(document, key) for key in AS_WRITTEN},
         model=ModelSpec(
             kind=model.kind,
             parameters=dict(numbers.parameters),
@@ -203,12 +203,7 @@ def build(
         schemes=schemes,
         sweep=sweep if sweep.axes else None,
         samples=setting.samples,
-        output=document.output,
-        tolerance=document.tolerance,
         checks=checks,
-        published=document.published,
-        figures=document.figures,
-        units=document.units,
         scaling=numbers.scaling,
     )
     if model.kind in report.kinds.own_models:
@@ -218,8 +213,33 @@ def build(
     size_limits.check_files(experiment, report)
     report.raise_any()
     unlikely.note_unlikely(document.checks, setting, report)
-    experiment._notes = report.told
+    experiment._notes = report.note_lines
     return members.update_tables(experiment)
+
+
+def _check_members(
+    equation: Equation,
+    initial: Mapping[str, float],
+    time: TimeSpec | None,
+    sweep: Sweep,
+    report: Report,
+) -> None:
+    """Check what every member of a sweep must keep, where all of its numbers are known."""
+    model, parameters = equation.model, equation.parameters
+    if time is None or model is None or not are_known(model, parameters):
+        return
+    numbers = members.MemberNumbers(model, parameters, time, sweep.axes)
+    members.check_ends(numbers, report)
+    for table in equation.tables:
+        members.check_length(numbers, table, report)
+    if equation.structure is not None and equation.structure.structure.histories:
+        last = max(float(max(end)) for _, end in numbers.members())
+        check_histories(equation.structure, last, report)
+    members.check_jumps(numbers, equation.formulas, report)
+    if sweep.follow is not None:
+        continuation.check_equation(model, numbers, report)
+    starts = Starts(model, parameters, initial, sweep.axes)
+    check_starts(starts, equation.formulas, report)
 
 
 def check_name(what: str, text: str, report: Report) -> None:
@@ -250,10 +270,7 @@ def _levels(document: Any, source: Source, report: Report) -> tuple[int, ...]:
 
 
 def _initial(
-    given: Mapping[str, float],
-    model: Model | None,
-    parameters: Mapping[str, float],
-    report: Report,
+    given: Mapping[str, float], model: Model | None, parameters: Mapping[str, float], report: Report
 ) -> dict[str, float]:
     """Return the initial value of every state, 0 for those that are not given."""
     if model is None:

@@ -26,10 +26,7 @@ _OF_MEMBERS = (("sweep",), ("at",))
 def with_settings(source: Source, settings: Sequence[str]) -> Source:
     """Return the content of a file with values replaced or added, one setting after the other.
 
-    Raises
-    ------
-    InputError
-        With every setting that cannot be read, or that names no place.
+    InputError with every setting that cannot be read, or that names no place.
     """
     faults: list[Fault] = []
     for text in settings:

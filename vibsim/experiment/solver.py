@@ -13,10 +13,11 @@ from pathlib import Path
 from string import Formatter
 from typing import Annotated, Any
 
-from pydantic import AfterValidator, PrivateAttr
+from pydantic import AfterValidator
 
 from vibsim.experiment.collection import ADHOC
-from vibsim.experiment.data import Sweep, check_member
+from vibsim.experiment.data import ReadSection, Sweep, check_member
+from vibsim.experiment.schema.checks import as_data, without_kind
 from vibsim.experiment.schema.fields import FrozenDict, Identifier, Section, Text
 from vibsim.experiment.schema.solver import (
     PLACE,
@@ -42,7 +43,7 @@ class SolverSpec(Section):
     """Paths of files that it depends on, from the folder of the experiment file."""
 
 
-class SolverExperiment(Section):
+class SolverExperiment(ReadSection):
     """One experiment with a solver of the user."""
 
     collection: Identifier
@@ -62,23 +63,6 @@ class SolverExperiment(Section):
     """Parameters of one member alone."""
     resources: ResourcesSection
     checks: tuple[SolverCheck, ...]
-    _file: Path | None = PrivateAttr(default=None)
-    _settings: tuple[str, ...] = PrivateAttr(default=())
-
-    @property
-    def file(self) -> Path | None:
-        """Where the experiment was read; not part of its identity."""
-        return self._file
-
-    @property
-    def settings(self) -> tuple[str, ...]:
-        """What a command line gave in place of values of the file, as ``KEY=VALUE``; not part of its identity."""
-        return self._settings
-
-    @property
-    def folder(self) -> Path:
-        """Folder of the experiment file, where a command runs and from which paths start."""
-        return self._file.parent if self._file else Path()
 
     @property
     def word(self) -> str:
@@ -142,10 +126,7 @@ class SolverExperiment(Section):
     def alone(self, member: int) -> SolverExperiment:
         """Return the experiment of one member, without a sweep, named ``<name>_case_<member>``.
 
-        Raises
-        ------
-        InputError
-            Where there is no such member.
+        InputError where there is no such member.
         """
         check_member(member, self.members, str(self.file or self.name))
         update = {
@@ -162,17 +143,14 @@ class SolverExperiment(Section):
     def content(self) -> dict[str, Any]:
         """The experiment as JSON-able data, which `restore` reads."""
         data = self.model_dump(mode="json", exclude={"checks"})
-        data["checks"] = [
-            {"kind": check.kind, **check.model_dump(mode="json")} for check in self.checks
-        ]
-        return data
+        return data | {"checks": [as_data(check) for check in self.checks]}
 
 
 def restore(
     content: Mapping[str, Any], file: Path | None, settings: tuple[str, ...] = ()
 ) -> SolverExperiment:
     """Return the experiment with this `content`; `file` is where it was read, with which `settings`."""
-    checks = [{k: v for k, v in check.items() if k != "kind"} for check in content["checks"]]
+    checks = [without_kind(check) for check in content["checks"]]
     found = SolverExperiment.model_validate({**content, "checks": checks})
     found._file, found._settings = file, settings
     return found

@@ -14,9 +14,9 @@ from vibsim.experiment.data import Sweep
 from vibsim.experiment.faults import Report
 from vibsim.experiment.reading import KEYS, SOLVER, check_name
 from vibsim.experiment.rules.checks import check_expect, check_ids, given_one
-from vibsim.experiment.rules.levels import rising_levels
 from vibsim.experiment.rules.size_limits import MAX_FILES
 from vibsim.experiment.rules.sweep import SweepReader
+from vibsim.experiment.rules.timing import rising_levels
 from vibsim.experiment.schema.fields import Number, Text
 from vibsim.experiment.schema.solver import (
     KINDS,
@@ -28,12 +28,7 @@ from vibsim.experiment.schema.solver import (
     SolverConvergesCheck,
     SolverDocument,
 )
-from vibsim.experiment.solver import (
-    OUTPUTS,
-    SolverExperiment,
-    SolverSpec,
-    placeholders,
-)
+from vibsim.experiment.solver import OUTPUTS, SolverExperiment, SolverSpec, placeholders
 from vibsim.experiment.tables.file import ENDINGS
 from vibsim.experiment.validation import read_document
 from vibsim.experiment.yaml.parse import Path_, Source, read
@@ -48,13 +43,7 @@ def from_file(path: Path) -> SolverExperiment:
 
 
 def read_solver(source: Source, collection: str, file: Path) -> SolverExperiment:
-    """Validate what `source` holds and fill in every default.
-
-    Raises
-    ------
-    InputError
-        With every fault of the file.
-    """
+    """Validate what `source` holds and fill in every default; InputError with every fault of the file."""
     report, name = Report(source), file.stem
     for what, text in (("experiment", name), ("collection", collection)):
         check_name(f"the name of the {what}, '{text}',", text, report)

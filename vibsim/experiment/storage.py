@@ -109,7 +109,7 @@ def is_bounded(experiment: ExperimentSpec) -> bool:
     return is_lean(experiment.samples, coarsest, experiment.trajectories)
 
 
-def asked(experiment: ExperimentSpec) -> tuple[str, ...]:
+def checked_quantities(experiment: ExperimentSpec) -> tuple[str, ...]:
     """Name the quantities that the checks are about."""
     named = (check.measured.about for check in experiment.checks)
     return tuple(dict.fromkeys(name for name in named if name is not None))
@@ -123,7 +123,7 @@ def lean_series(experiment: ExperimentSpec) -> tuple[str, ...]:
     """
     states = (state.name for state in experiment.model.definition.states)
     # parts of an error are made of the states
-    more = (name for name in asked(experiment) if not is_error_part(name))
+    more = (name for name in checked_quantities(experiment) if not is_error_part(name))
     return tuple(dict.fromkeys([*states, "energy_deviation", *more]))
 
 

@@ -150,7 +150,7 @@ def _check_name(name: str) -> None:
         what = "constant" if name in CONSTANTS else "function"
         raise UnitError(f"'{name}' is a {what} of formulas", "choose another name")
     try:
-        is_taken = known(name) is not None
+        is_taken = unit_named(name) is not None
     except UnitError:
         is_taken = True
     if is_taken:
@@ -308,7 +308,7 @@ def registry() -> Any:
 
 
 @cache
-def known(name: str) -> Unit | None:
+def unit_named(name: str) -> Unit | None:
     """Return the unit of one name, with or without a prefix; None where there is none.
 
     One whose zero is not that of the base unit, so that it cannot be a factor, raises UnitError.
@@ -331,7 +331,7 @@ def meaning(text: str, own: Mapping[str, Unit] = MappingProxyType({})) -> Unit:
     """Return what a unit is; `own` holds the names that a file defines. UnitError where there is no such unit."""
     unit = Unit()
     for factor in factors(text) if text != "1" else ():
-        named = own.get(factor.name) or known(factor.name)
+        named = own.get(factor.name) or unit_named(factor.name)
         if named is None:
             choices = [*own, *_OFFERED.split()]
             alike = [choice for choice in choices if choice.lower() == factor.name.lower()]

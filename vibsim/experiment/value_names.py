@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any, Literal
@@ -47,6 +47,37 @@ class Value:
     """Whether the acceleration must be worked out in exact numbers (`vibsim.theory.degrees`)."""
     needs_events: bool = False
     """Whether it exists only where the motion of the model is not smooth."""
+    needs_force: bool = False
+    """Whether it is of whole periods of a force, whose frequency ``time:`` names."""
+    is_sample: bool = False
+    """Whether it is a sample of a series, and is told by the name of that."""
+    is_count_of_work: bool = False
+    """Whether finer levels make it larger, and no more accurate."""
+    survives_failure: bool = False
+    """Whether it may be sound although the member broke down later; what theory gives no run enters."""
+    measured_by: Literal["", "parabola", "points", "roots"] = ""
+    """What its error comes from beside that of the steps: a peak interpolated by a parabola, extrema over the points of
+    the grid, or the recurrence of the steps, whose round-off is eps/(w dt)^2 (peaks where there is none)."""
+    has_own_size: bool = False
+    """Whether its round-off is relative to itself."""
+
+    def has_limit(self, level: int | str | None) -> bool:
+        """Tell whether it is asked for as the limit of the numbers of the levels, not of the extrapolated solution."""
+        return level == "best" and self.best and self.of != "convergent"
+
+    @property
+    def sees_several_levels(self) -> bool:
+        """Whether it rests on more than one level: on finer ones, or on the whole ladder."""
+        return self.finer_levels > 0 or (self.of == "convergent" and "level" not in self.at)
+
+    @property
+    def depends_on_level(self) -> bool:
+        """Whether it is another one at another level, or rests on the whole ladder."""
+        return "level" in self.at or self.sees_several_levels
+
+    def own_levels(self, levels: Sequence[int]) -> tuple[int, ...]:
+        """Return the levels that have such a number; one that is made of several belongs to the coarsest of them."""
+        return tuple(levels)[: len(levels) - self.finer_levels]
 
 
 _MARKS: Mapping[str, Mapping[str, Any]] = {
@@ -65,50 +96,67 @@ _MARKS: Mapping[str, Mapping[str, Any]] = {
     "fixed_step": {"fixed_step": True},
     "rational": {"needs_rational": True},
     "events": {"needs_events": True},
+    "sample": {"is_sample": True},
+    "work": {"is_count_of_work": True},
+    "survives": {"survives_failure": True},
+    "parabola": {"measured_by": "parabola"},
+    "points": {"measured_by": "points"},
+    "roots": {"measured_by": "roots"},
+    "own_size": {"has_own_size": True},
+    "force": {"needs_force": True},
 }
 """Further fields of `Value`, by the words of the fourth column of the table."""
 _TABLE = """\
-end | series | quantity | anywhere best | value at the last time, or at `t` or `step`
-at | series | quantity | anywhere best time | value at the time `t` or after `step` steps
-min | stored | quantity | best | smallest value over every step; of an output, over the stored times
-max | stored | quantity | best | largest value over every step; of an output, over the stored times
-max_abs | extremal | quantity | best | largest absolute value over every step
+end | series | quantity | anywhere best sample | value at the last time, or at `t` or `step`
+at | series | quantity | anywhere best time sample survives | value at the time `t` or after `step` steps
+min | stored | quantity | best points | smallest value over every step; of an output, over the stored times
+max | stored | quantity | best points | largest value over every step; of an output, over the stored times
+max_abs | extremal | quantity | best points | largest absolute value over every step
 max_abs_interior | deviation | quantity | | the same without the last point
 max_abs_ratio | extremal | none | pair fixed_step | largest absolute value over every step, over that of the \
 next finer level
 max_abs_interior_ratio | deviation | none | pair fixed_step | the same without the last point
 running_max | running | quantity | anywhere | largest absolute value over every step up to `t` or `step`, or the end
 relative_running_max | running | none | anywhere | the same, over |E(0)|
-period | none | time | best | period, from interpolated peaks
+period | none | time | best parabola own_size | period, from interpolated peaks
 period_grid | none | time | | period, from peaks at grid points
-exact_period | none | time | exact_motion period | period of the exact solution
-period_error | none | none | best period | period over the exact period, less one
-frequency | none | frequency | best | angular frequency of the computed motion
-error_of_frequency | none | none | best period | angular frequency over that of the exact solution, less one
-predicted_frequency | none | frequency | linear fixed_step | angular frequency by the theory of the scheme
-phase_error_per_period | none | time | best period | time by which the peaks come early, per period; negative \
+exact_period | none | time | exact_motion period survives | period of the exact solution
+period_error | none | none | best period parabola | period over the exact period, less one
+frequency | none | frequency | best roots own_size | angular frequency of the computed motion
+error_of_frequency | none | none | best period roots | angular frequency over that of the exact solution, less one
+predicted_frequency | none | frequency | linear fixed_step survives | angular frequency by the theory of the scheme
+phase_error_per_period | none | time | best period roots | time by which the peaks come early, per period; negative \
 where they come late
-predicted_phase_error | none | time | linear fixed_step | the same by the theory of the scheme
+predicted_phase_error | none | time | linear fixed_step survives | the same by the theory of the scheme
 phase_error_slope | none | time | period | slope of the time by which a peak comes early over the number of its period
-amplitude | none | position | best | half the height from the last trough to the last peak
-amplitude_error | none | none | best | last amplitude over the first one, less one
-growth_factor | none | none | best | last peak over the first peak
-growth_per_period | none | none | best | factor by which the amplitude grows in a period
-predicted_growth_per_period | none | none | linear fixed_step | the same by the theory of the scheme
+amplitude | none | position | best parabola own_size | half the height from the last trough to the last peak
+amplitude_error | none | none | best parabola | last amplitude over the first one, less one
+steady_amplitude | series | quantity | force best own_size | A of the harmonic A cos(w t - phase) with the frequency w \
+of the force, over its last period
+steady_phase | series | none | force best | phase of that harmonic [rad], from -pi to pi: the lag behind cos(w t)
+steady_change | series | none | force | how far that harmonic is from that of the period before, over its amplitude
+section_period | none | count | force | after how many periods of the force the state is the same again, to 1e-3, \
+in the second half of the run; 0 where it never is
+peak_frequency | series | frequency | best own_size | angular frequency of the highest line in the spectrum of the \
+stored series
+growth_factor | none | none | best parabola own_size | last peak over the first peak
+growth_per_period | none | none | best roots own_size survives | factor by which the amplitude grows in a period
+predicted_growth_per_period | none | none | linear fixed_step survives | the same by the theory of the scheme
 relative_energy_error | none | none | best | max |E(t) - E(0)| / |E(0)| over every step
 relative_energy_error_d2t | none | none | | the same with the centred difference of the position as velocity, \
 without the end points
 event_count | none | count | events | number of events, where the motion is not smooth
-event_time | none | time | numbered events best | time of the event with the number `event`, from 1
-first_event_time | none | time | events best | time of the first event
-last_event_time | none | time | events best | time of the last event
-rest_time | none | time | events best | time from which the body was at rest to the end, or of its stop
-accepted_steps | none | count | | number of steps taken
-force_evaluations | none | count | | number of evaluations of the acceleration; of an implicit scheme those of \
+event_time | none | time | numbered events best own_size | time of the event with the number `event`, from 1
+first_event_time | none | time | events best own_size | time of the first event
+last_event_time | none | time | events best own_size | time of the last event
+rest_time | none | time | events best own_size | time from which the body was at rest to the end, or of its stop
+accepted_steps | none | count | work | number of steps taken
+force_evaluations | none | count | work | number of evaluations of the acceleration; of an implicit scheme those of \
 one iteration per step
-stability_limit | none | none | all_levels fixed_step | largest stable w dt of the scheme, infinite where there is none
-exact_degree | none | count | all_levels fixed_step rational | highest degree up to which the scheme reproduces \
-polynomials in t as solutions of the model, 8 at most
+stability_limit | none | none | all_levels fixed_step survives | largest stable w dt of the scheme, \
+infinite where there is none
+exact_degree | none | count | all_levels fixed_step rational survives | highest degree up to which the scheme \
+reproduces polynomials in t as solutions of the model, 8 at most
 error_l1 | convergent | l1 | best solution | L1 norm of the true error
 error_l2 | convergent | l2 | best solution | L2 norm of the true error
 error_linf | convergent | quantity | best solution | largest true error
@@ -141,6 +189,3 @@ VALUES: Mapping[str, Value] = MappingProxyType(
     {row.name: row for row in map(_value, _TABLE.splitlines())}
 )
 """Every value name with its meaning, as `vibsim list checks` prints it."""
-
-HAVE_LIMITS = frozenset(row.name for row in VALUES.values() if row.best and row.of != "convergent")
-"""What ``level: best`` takes as the limit of the numbers of all levels; else it is of the extrapolated solution."""

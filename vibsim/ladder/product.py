@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from vibsim import plan
 from vibsim.comparison.best_solution import in_order, methods, record_of, start_of
-from vibsim.comparison.extrapolate_members import Extrapolated, joined
+from vibsim.comparison.extrapolate_members import Extrapolated, join_members
 from vibsim.ladder.choosing import resolve
 from vibsim.ladder.solving import climb
 from vibsim.simulation.level import coordinates
@@ -68,7 +68,7 @@ def best(
         members(experiment, first, min(first + size, experiment.members))
         for first in range(0, experiment.members, size)
     ]
-    rows = [joined([climbed(i, group) for group in groups]) for i in schemes]
+    rows = [join_members([climbed(i, group) for group in groups]) for i in schemes]
     group = members(experiment, 0, experiment.members)
     names = [experiment.schemes[i].name for i in schemes]
     same_end = not experiment.end_varies

@@ -18,6 +18,7 @@ import numpy as np
 
 from vibsim.core.array_types import Floats
 from vibsim.core.registry import hash_fault
+from vibsim.core.vocabulary import AMPLITUDE, PHASE
 from vibsim.formula import (
     CONSTANTS,
     FUNCTIONS,
@@ -32,11 +33,11 @@ from vibsim.formula import (
     values,
 )
 from vibsim.models.events import Events
-from vibsim.models.table import Lookup, Table
+from vibsim.models.table import Lookup
 
 if TYPE_CHECKING:
     from vibsim.models.shared.scales import Scales
-    from vibsim.models.structure import Loaded, Structure
+    from vibsim.models.structure import Loaded
 
 Numbers = Mapping[str, Any]
 """Values by name: floats, or arrays that broadcast against each other."""
@@ -185,13 +186,12 @@ class Model:
     """What a user writes as formulas."""
     takes_events: bool = False
     """Whether a user may write events and a stop as formulas beside them (`vibsim.models.shared.crossings`)."""
-    written: Callable[[Mapping[str, str], tuple[str, ...]], Model] | None = None
+    written: Callable[..., Model] | None = None
     """The model of such formulas, by name, with declared parameters; see `vibsim.models.oscillator`. Formulas of single
-    coordinates and outputs have the name of the field before their own: ``acceleration.x``."""
+    coordinates and outputs have the name of the field before their own: ``acceleration.x``. Behind them stand numbers
+    of files: a `Table` in place of a formula, with `Lookup.is_met`, or a `Structure`."""
     named: Callable[[tuple[str, ...]], Model] | None = None
     """The model whose coordinates have such names; None where a user does not name them."""
-    with_table: Callable[[Table, bool], Model] | None = None
-    """The model with a table instead of a formula, and whether all steps meet its points (`Lookup.is_met`)."""
     lookup: Lookup | None = None
     """The table that the formulas look up; None where there is none."""
     scales: Scales | None = None
@@ -202,10 +202,18 @@ class Model:
     """Of the coordinates behind the first one."""
     loaded: Loaded | None = None
     """The structure that is stepped as a whole, of which the states are what is observed; None of any other model."""
-    assembled: Callable[[Structure, Mapping[str, str], tuple[str, ...]], Model] | None = None
-    """The model of matrices, with formulas of loads and declared parameters; see `vibsim.models.structure`."""
     superposed: bool = False
     """Whether the motion of several coordinates is a sum of linear, conservative ones: the energy has their orders."""
+
+    def with_formulas(
+        self, formulas: Mapping[str, str], declared: tuple[str, ...], *numbers: Any
+    ) -> Model:
+        """Return the model of formulas by their names, with declared parameters and numbers of files: see `written`."""
+        return self if self.written is None else self.written(formulas, declared, *numbers)
+
+    def with_terms(self, names: Iterable[str]) -> Model:
+        """Return the model with the terms of some of `optional`."""
+        return self if self.variant is None else self.variant(frozenset(names))
 
     @property
     def coordinates(self) -> int:
@@ -377,6 +385,20 @@ def quantities(model: Model, own_velocity: bool = False) -> tuple[str, ...]:
         *(output.name for output in model.outputs),
         *(centred(model) if own_velocity else ()),
     )
+
+
+def has_error_parts(model: Model) -> bool:
+    """Tell whether a position's error is a shift in time and a factor of the amplitude: the motion is smooth.
+
+    Across an impact, or a corner of the force, a shift is not all there is; accelerations of a structure are not kept.
+    """
+    return model.events is None and model.lookup is None and model.loaded is None
+
+
+def error_parts(model: Model) -> tuple[str, ...]:
+    """Name these parts of every position's error, made when levels are compared; empty where there are none."""
+    positions = model.positions if has_error_parts(model) else ()
+    return tuple(name + end for name in positions for end in (PHASE, AMPLITUDE))
 
 
 def centred(model: Model) -> tuple[str, ...]:

@@ -23,14 +23,7 @@ from vibsim.formula import (
     times,
     to_formula,
 )
-from vibsim.models.base import (
-    FormulaField,
-    Model,
-    Output,
-    Parameter,
-    State,
-    declared_parameters,
-)
+from vibsim.models.base import FormulaField, Model, Output, Parameter, State, declared_parameters
 from vibsim.models.shared.linear_scales import linear_scales
 from vibsim.models.shared.mechanical import Forces, mechanical
 from vibsim.models.shared.scales import Scales
@@ -47,10 +40,7 @@ FORMULAS = (FormulaField("voltage", ("t",), "0", "voltage V(t) of the source [V]
 def written(formulas: Mapping[str, str], declared: tuple[str, ...]) -> Model:
     """Return the circuit with the voltage of a user, without its resistor.
 
-    Raises
-    ------
-    ExpressionError
-        Where the voltage names something else than t and parameters.
+    ExpressionError where the voltage names something else than t and parameters.
     """
     return circuit(formulas.get("voltage", "0"), declared, frozenset())
 

@@ -88,7 +88,6 @@ def duffing(terms: frozenset[str]) -> Model:
 
 
 DUFFING = replace(
-    duffing(frozenset()),
-    equation="u'' + delta u' + alpha u + beta u^3 = gamma cos(omega t)",
+    duffing(frozenset()), equation="u'' + delta u' + alpha u + beta u^3 = gamma cos(omega t)"
 )
 """The oscillator without damping and force, under the equation that has them."""

@@ -41,10 +41,7 @@ WIRE = Output("wire_force", "N", "force in the wire", "m*g*cos(theta) + m*L*omeg
 AIR = Output("drag_force", "N", "drag force on the bob", "-m*L*drag*abs(omega)*omega")
 
 SCALES = Scales(
-    time="sqrt(L/g)",
-    position="1",
-    energy="m*g*L",
-    parameters=(("g", "1"), ("L", "1"), ("m", "1")),
+    time="sqrt(L/g)", position="1", energy="m*g*L", parameters=(("g", "1"), ("L", "1"), ("m", "1"))
 )
 """Those in which g = L = m = 1 (A, section 1.2); the drag number is the same in all."""
 
@@ -58,27 +55,14 @@ def natural_frequency(parameters: Numbers) -> Any:
 def pendulum(terms: frozenset[str]) -> Model:
     """Return the pendulum, with air resistance where `terms` has ``drag``."""
     is_dragged = "drag" in terms
-    form: dict[str, Any] = {
-        "equation": "theta'' = -(g/L) sin(theta)",
-        "acceleration": WEIGHT,
-        "exact": pendulum_motion,
-        "exact_period": pendulum_period,
-        "outputs": (WIRE,),
-    }
-    if is_dragged:
-        form = {
-            "equation": DRAGGED,
-            "acceleration": f"-drag*abs(omega)*omega + ({WEIGHT})",
-            "damping": Damping("quadratic", "drag"),
-            "dissipation": "m*L**2*drag*abs(omega)*omega**2",
-            "outputs": (WIRE, AIR),
-        }
     return Model(
         kind="pendulum",
         title="Nonlinear pendulum",
         source="pendulum lecture, sections 1-2; vibration text, section 10.5",
+        equation=DRAGGED if is_dragged else "theta'' = -(g/L) sin(theta)",
         states=STATES,
         parameters=(*PARAMETERS, DRAG),
+        acceleration=f"-drag*abs(omega)*omega + ({WEIGHT})" if is_dragged else WEIGHT,
         kinetic_energy="0.5*m*(L*omega)**2",
         # 1 - cos(theta) = 2 sin^2(theta/2), without the cancellation at small angles
         potential_energy="2.0*m*g*L*sin(0.5*theta)**2",
@@ -95,7 +79,11 @@ def pendulum(terms: frozenset[str]) -> Model:
         ),
         optional=("drag",),
         variant=pendulum,
-        **form,
+        exact=None if is_dragged else pendulum_motion,
+        exact_period=None if is_dragged else pendulum_period,
+        damping=Damping("quadratic", "drag") if is_dragged else None,
+        dissipation="m*L**2*drag*abs(omega)*omega**2" if is_dragged else None,
+        outputs=(WIRE, AIR) if is_dragged else (WIRE,),
     )
 
 

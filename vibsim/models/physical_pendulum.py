@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from vibsim.core.array_types import Floats
 from vibsim.models.base import Damping, Model, Numbers, Output, Parameter
 from vibsim.models.pendulum import STATES
 from vibsim.models.shared.elliptic import pendulum_motion, pendulum_period
@@ -33,38 +34,34 @@ PIVOT = Output("pivot_force", "N", "force along the rod in the pivot", FORCE)
 AIR = Output("drag_moment", "N m", "moment of the air resistance", "-drag*abs(omega)*omega")
 
 
-def _as_simple(parameters: Numbers) -> dict[str, Any]:
+def _as_simple(p: Numbers) -> dict[str, Any]:
     """Return the parameters of the simple pendulum that moves in the same way without drag."""
-    p = parameters
     return {"g": p["m"] * p["g"] * p["L"], "L": p["inertia"]}
+
+
+def exact(t: Floats, initial: Numbers, parameters: Numbers) -> dict[str, Floats]:
+    """Return the exact theta and omega without drag."""
+    return pendulum_motion(t, initial, _as_simple(parameters))
+
+
+def exact_period(initial: Numbers, parameters: Numbers) -> Any:
+    """Return the exact period without drag."""
+    return pendulum_period(initial, _as_simple(parameters))
 
 
 @cache
 def physical_pendulum(terms: frozenset[str]) -> Model:
     """Return the physical pendulum, with air resistance where `terms` has ``drag``."""
     is_dragged = "drag" in terms
-    form: dict[str, Any] = {
-        "equation": "inertia theta'' + m g L sin(theta) = 0",
-        "acceleration": WEIGHT,
-        "exact": lambda t, initial, p: pendulum_motion(t, initial, _as_simple(p)),
-        "exact_period": lambda initial, p: pendulum_period(initial, _as_simple(p)),
-        "outputs": (PIVOT,),
-    }
-    if is_dragged:
-        form = {
-            "equation": DRAGGED,
-            "acceleration": f"-(drag/inertia)*abs(omega)*omega + ({WEIGHT})",
-            "damping": Damping("quadratic", "drag/inertia"),
-            "dissipation": "drag*abs(omega)*omega**2",
-            "outputs": (PIVOT, AIR),
-        }
     kappa, alpha = ("kappa", "m*L**2/inertia"), ("alpha", "drag/inertia")
     return Model(
         kind="physical_pendulum",
         title="Physical pendulum",
         source="vibration text, section 10.5, equation (90)",
+        equation=DRAGGED if is_dragged else "inertia theta'' + m g L sin(theta) = 0",
         states=STATES,
         parameters=PARAMETERS,
+        acceleration=f"-(drag/inertia)*abs(omega)*omega + ({WEIGHT})" if is_dragged else WEIGHT,
         kinetic_energy="0.5*inertia*omega**2",
         potential_energy="2.0*m*g*L*sin(0.5*theta)**2",
         energy_unit="J",
@@ -89,7 +86,11 @@ def physical_pendulum(terms: frozenset[str]) -> Model:
         ),
         optional=("drag",),
         variant=physical_pendulum,
-        **form,
+        exact=None if is_dragged else exact,
+        exact_period=None if is_dragged else exact_period,
+        damping=Damping("quadratic", "drag/inertia") if is_dragged else None,
+        dissipation="drag*abs(omega)*omega**2" if is_dragged else None,
+        outputs=(PIVOT, AIR) if is_dragged else (PIVOT,),
     )
 
 

@@ -76,6 +76,10 @@ BETA = Parameter(
 RAYLEIGH = (ALPHA, BETA)
 LOAD = "load"
 """Before the number of a load: the key of its formula in `Model.written`."""
+HISTORY = "history"
+"""Before the number of a load that a table gives over time."""
+_TABULATED = Name("_history")
+"""The formula of such a load; no user can write it."""
 
 
 @dataclass(frozen=True)
@@ -95,14 +99,17 @@ class Structure:
     """Displacement and velocity at t = 0, shape (dof,); None where they are the initial values of a file."""
     shapes: Floats = field(default_factory=lambda: np.empty((0, 1)), compare=False, repr=False)
     """The vector of each load, shape (load, dof)."""
+    histories: tuple[tuple[int, Floats], ...] = field(default=(), compare=False, repr=False)
+    """Numbers of loads that are tables, and their times and factors, shape (2, point), straight between points."""
     digest: str = field(init=False)
     """SHA-256 of all numbers."""
 
     def __post_init__(self) -> None:
         matrices = (self.mass, self.stiffness, self.damping)
         own = [row.digest if row else "" for row in matrices]
-        digest = hashlib.sha256(repr((own, self.ratios, self.names)).encode())
-        for array in (self.observed, *(self.start or ()), self.shapes):
+        numbers, tables = zip(*self.histories, strict=True) if self.histories else ((), ())
+        digest = hashlib.sha256(repr((own, self.ratios, self.names, numbers)).encode())
+        for array in (self.observed, *(self.start or ()), self.shapes, *tables):
             digest.update(repr(array.shape).encode())
             digest.update(np.ascontiguousarray(array, dtype="<f8").tobytes())
         object.__setattr__(self, "digest", f"{digest.hexdigest()}{self.start is None}")
@@ -238,7 +245,7 @@ class Loaded:
     @property
     def is_driven(self) -> bool:
         """Whether a load varies in time."""
-        return any("t" in names_in(load) for load in self.loads)
+        return any(load == _TABULATED or "t" in names_in(load) for load in self.loads)
 
     @property
     def rounding(self) -> float:
@@ -257,14 +264,19 @@ class Loaded:
 
     def forces(self, t: Floats, named: Mapping[str, float]) -> Floats:
         """Return the value of every load at times t, shape (load, time)."""
-        numbers = {**named, "t": t}
-        rows = [np.broadcast_to(values(load, numbers), t.shape) for load in self.loads]
+        numbers, tables = {**named, "t": t}, dict(self.structure.histories)
+        rows = [
+            np.interp(t, *tables[i])
+            if i in tables
+            else np.broadcast_to(values(load, numbers), t.shape)
+            for i, load in enumerate(self.loads)
+        ]
         return np.stack(rows) if rows else np.empty((0, *t.shape))
 
     @cached_property
     def harmonics(self) -> tuple[tuple[Harmonic, ...], ...] | None:
         """Every load as a sum of harmonic ones; None where one is no such sum."""
-        rows = [harmonics(load) for load in self.loads]
+        rows = [None if load == _TABULATED else harmonics(load) for load in self.loads]
         known = [row for row in rows if row is not None]
         return tuple(known) if len(known) == len(rows) else None
 
@@ -330,30 +342,28 @@ class Loaded:
         return found[found > 0.0][0] if np.any(found > 0.0) else np.nan
 
 
-def assembled(
-    structure: Structure, formulas: Mapping[str, str], declared: tuple[str, ...]
+def written(
+    formulas: Mapping[str, str], declared: tuple[str, ...], structure: Structure | None = None
 ) -> Model:
     """Return the model of a structure under loads, ``load.0`` the formula of the first one, with declared parameters.
 
-    Raises
-    ------
-    ExpressionError
-        Where a formula names something else than t and parameters.
+    A load that is a table of the structure has no formula.
+
+    ExpressionError where a formula names something else than t and parameters.
     """
-    texts = tuple(formulas[f"{LOAD}.{i}"] for i in range(len(structure.shapes)))
-    return _structure(structure, texts, declared, frozenset())
+    own = unit_structure() if structure is None else structure
+    texts = tuple(formulas.get(f"{LOAD}.{i}", "") for i in range(len(own.shapes)))
+    return _structure(own, texts, declared, frozenset())
 
 
 @cache
 def _structure(
-    structure: Structure,
-    texts: tuple[str, ...],
-    declared: tuple[str, ...],
-    terms: frozenset[str],
+    structure: Structure, texts: tuple[str, ...], declared: tuple[str, ...], terms: frozenset[str]
 ) -> Model:
     parameters = (*RAYLEIGH, *declared_parameters(declared))
     known = ("t", *(row.name for row in parameters))
-    own = Loaded(structure, tuple(parse(text, known) for text in texts), parameters, terms)
+    loads = tuple(parse(text, known) if text else _TABULATED for text in texts)
+    own = Loaded(structure, loads, parameters, terms)
     is_conservative = not own.is_damped and not own.loads
     states = [
         State(name, "1", word)
@@ -387,7 +397,7 @@ def _structure(
         exact=own.exact if own.has_exact else None,
         start=own.start if structure.start is not None else None,
         loaded=own,
-        assembled=assembled,
+        written=written,
         optional=tuple(row.name for row in RAYLEIGH),
         variant=partial(_structure, structure, texts, declared),
     )
@@ -399,7 +409,5 @@ def unit_structure() -> Structure:
     return Structure(one, one, names=("u",))
 
 
-STRUCTURE = replace(
-    assembled(unit_structure(), {}, ()), equation="M u'' + C u' + K u = p(t), with matrices M, C, K"
-)
+STRUCTURE = replace(written({}, ()), equation="M u'' + C u' + K u = p(t), with matrices M, C, K")
 """The structure of one degree of freedom, under the equation of all."""

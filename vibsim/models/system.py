@@ -131,58 +131,30 @@ def coordinate_faults(coordinates: Sequence[str]) -> Iterator[str]:
         before += [name, velocity]
 
 
+ACCELERATION = "acceleration of each coordinate"
+FORCE = "force on each coordinate, instead of its acceleration"
+MASSES = "mass of each coordinate, or of all, beside its force; 1 when left out; of two together {x: {y: ...}}"
+POTENTIAL = "potential energy, or its terms, where it cannot be found"
+KINETIC = "kinetic energy, or its terms, where it is not that of the masses"
+OUTPUTS = "further series, each with a name of your own"
+EXACT = "exact solution of each coordinate, for which forces are then added"
+
+
 def fields(coordinates: tuple[str, ...]) -> tuple[FormulaField, ...]:
     """Return what a user may write about a system with these coordinates."""
     velocities = velocities_of(coordinates)
     states, known = (*coordinates, *velocities), (*coordinates, *velocities, "t")
-    first = coordinates[0]
+    of_each: dict[str, Any] = {"of": "coordinate"}
     return (
+        FormulaField("acceleration", known, f"-{coordinates[0]}", ACCELERATION, **of_each),
+        FormulaField("force", known, "", FORCE, instead_of="acceleration", **of_each),
         FormulaField(
-            "acceleration", known, f"-{first}", "acceleration of each coordinate", of="coordinate"
+            MASS, coordinates, "", MASSES, beside="force", positive=True, paired=True, **of_each
         ),
-        FormulaField(
-            "force",
-            known,
-            "",
-            "force on each coordinate, instead of its acceleration",
-            of="coordinate",
-            instead_of="acceleration",
-        ),
-        FormulaField(
-            MASS,
-            coordinates,
-            "",
-            "mass of each coordinate, or of all, beside its force; 1 when left out; of two together {x: {y: ...}}",
-            of="coordinate",
-            beside="force",
-            positive=True,
-            paired=True,
-        ),
-        FormulaField(
-            "potential",
-            states,
-            "",
-            "potential energy, or its terms, where it cannot be found",
-            of="term",
-        ),
-        FormulaField(
-            "kinetic",
-            states,
-            "",
-            "kinetic energy, or its terms, where it is not that of the masses",
-            of="term",
-        ),
-        FormulaField(
-            "outputs", known, "", "further series, each with a name of your own", of="output"
-        ),
-        FormulaField(
-            "exact",
-            ("t",),
-            "",
-            "exact solution of each coordinate, for which forces are then added",
-            of="coordinate",
-            derivatives=2,
-        ),
+        FormulaField("potential", states, "", POTENTIAL, of="term"),
+        FormulaField("kinetic", states, "", KINETIC, of="term"),
+        FormulaField("outputs", known, "", OUTPUTS, of="output"),
+        FormulaField("exact", ("t",), "", EXACT, derivatives=2, **of_each),
     )
 
 
@@ -382,25 +354,20 @@ def written(
 ) -> Model:
     """Return the system of formulas, with declared parameters.
 
+    ExpressionError where a formula names something else than its field allows, or an exact solution has derivatives
+    that are too long.
+
     Parameters
     ----------
     formulas
         By the names of `fields`; those of coordinates and outputs as ``acceleration.x``.
-
-    Raises
-    ------
-    ExpressionError
-        Where a formula names something else than its field allows, or an exact solution has derivatives that are too
-        long.
     """
     return system(coordinates, tuple(sorted(formulas.items())), declared)
 
 
 @cache
 def system(
-    coordinates: tuple[str, ...],
-    formulas: tuple[tuple[str, str], ...],
-    declared: tuple[str, ...],
+    coordinates: tuple[str, ...], formulas: tuple[tuple[str, str], ...], declared: tuple[str, ...]
 ) -> Model:
     """Return the system of formulas; see `written`."""
     own = Written(coordinates, dict(formulas), declared)

@@ -19,12 +19,9 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
-from vibsim.formula import Expression
-
-Floats = NDArray[np.float64]
-Formula = str | Expression
+from vibsim.core.array_types import Floats
+from vibsim.models.events import Formula
 
 FEWEST_POINTS = 3
 """Points of a table, at least: a second difference takes three."""

@@ -30,7 +30,7 @@ from vibsim.formula import (
 from vibsim.models.base import FormulaField, Model, Output, Parameter, declared_parameters
 from vibsim.models.shared.linear_scales import linear_scales
 from vibsim.models.shared.mechanical import Forces, mechanical
-from vibsim.models.table import BEND, HEIGHT, Lookup
+from vibsim.models.table import BEND, HEIGHT, Lookup, Table
 
 PARAMETERS = (
     Parameter("m", 1.0, "kg", "mass of the body", minimum=0.0, exclusive=True),
@@ -55,16 +55,19 @@ PLACE = Binary("*", Name("speed"), Name("t"))
 """Where the vehicle is."""
 
 
-def written(formulas: Mapping[str, str], declared: tuple[str, ...]) -> Model:
-    """Return the vehicle with the spring and the road of a user, without its damper.
+def written(
+    formulas: Mapping[str, str],
+    declared: tuple[str, ...],
+    table: Table | None = None,
+    is_met: bool = False,
+) -> Model:
+    """Return the vehicle with the spring and the road of a user, a formula or a table, without its damper.
 
-    Raises
-    ------
-    ExpressionError
-        Where a formula names something else than its field allows.
+    ExpressionError where a formula names something else than its field allows.
     """
     texts = tuple(formulas.get(field.name, field.default) for field in FORMULAS)
-    return vehicle(texts, declared, frozenset())
+    lookup = None if table is None else Lookup(table, PLACE, is_met)
+    return vehicle(texts, declared, frozenset(), lookup)
 
 
 @cache
@@ -108,9 +111,6 @@ def vehicle(
         powers={"speed": (0, 1, -1)},
         optional=("b",),
         variant=lambda names: vehicle(texts, declared, names, lookup),
-        with_table=lambda table, is_met: vehicle(
-            texts, declared, terms, Lookup(table, PLACE, is_met)
-        ),
         **more,
     )
 

@@ -11,19 +11,17 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vibsim.convergence.differences import laid_out
-from vibsim.core.array_types import Floats
+from vibsim.core.array_types import Flags, Floats
 from vibsim.core.errors import VibsimError
 from vibsim.core.record import Record
+from vibsim.experiment import Experiment
 from vibsim.observe.thresholds import SAME_START
-
-if TYPE_CHECKING:
-    from vibsim.experiment import Experiment
 
 SAME_AT_EVERY_LEVEL = frozenset({"natural_frequency", "exact_period"})
 """What the levels hold of every member and does not depend on the step."""
@@ -58,10 +56,7 @@ class Grid:
 def common_grid(records: Mapping[int, Record]) -> Grid:
     """Find the common grid of the records of a ladder, which have the attributes ``steps`` and ``every``.
 
-    Raises
-    ------
-    VibsimError
-        Where there is no level, or the levels have fewer than two sample times in common.
+    VibsimError where there is no level, or the levels have fewer than two sample times in common.
     """
     if not records:
         raise VibsimError("analysis needs the data of at least one level")
@@ -108,12 +103,9 @@ def _step(record: Record) -> Floats:
 def check_belonging(experiment: Experiment, records: Mapping[int, Record]) -> None:
     """Refuse level Records that are not those of `experiment`, or not of one and the same problem.
 
-    Raises
-    ------
-    VibsimError
-        With every fault: a level that the experiment does not have, another model, other schemes, members, numbers of
-        steps, end times or parameters than the other levels or the experiment, other values at t = 0, a variable that
-        is missing.
+    VibsimError with every fault: a level that the experiment does not have, another model, other schemes, members,
+    numbers of steps, end times or parameters than the other levels or the experiment, other values at t = 0, a variable
+    that is missing.
     """
     faults = [
         f"level {level}: {fault}"
@@ -155,21 +147,23 @@ def _faults(experiment: Experiment, level: int, record: Record, other: Record) -
             yield f"{name} differs from the finest level's"
     if not np.isclose(record["t"][-1], other["t"][-1], rtol=1e-12, atol=0.0):
         yield f"it ends at {record['t'][-1]:g}, the finest level at {other['t'][-1]:g}"
+    # members that start from others start at every level from what that level has
+    starts = np.asarray(record["case"]) % experiment.chain == 0
     for state in model.states:
-        yield from _start(record, other, state.name)
+        yield from _start(record, other, state.name, starts)
 
 
 def _equal(a: NDArray[Any], b: NDArray[Any]) -> bool:
     return bool(np.array_equal(a, b, equal_nan=a.dtype.kind == b.dtype.kind == "f"))
 
 
-def _start(record: Record, other: Record, name: str) -> Iterator[str]:
+def _start(record: Record, other: Record, name: str, starts: Flags) -> Iterator[str]:
     compared = [(name, other, "the finest level's")]
     if f"{name}_exact" in record:
         compared.append((f"{name}_exact", record, "the exact solution's"))
-    own = np.asarray(record[name], dtype=np.float64)
+    own = np.asarray(record[name], dtype=np.float64)[:, starts]
     for other_name, source, words in compared:
-        known = np.asarray(source[other_name], dtype=np.float64)
+        known = np.asarray(source[other_name], dtype=np.float64)[..., starts, :]
         # a level that blows up is larger than the motion
         largest = [np.fmax.reduce(np.abs(values), axis=-1) for values in (own, known)]
         size = np.maximum(np.abs(known[..., 0]), np.fmin(*largest))

@@ -33,7 +33,7 @@ from vibsim.core.vocabulary import DRIFTS
 from vibsim.formula import derivative, plus, values
 from vibsim.models.base import tree
 from vibsim.observe import thresholds as th
-from vibsim.observe.member_block import CENTRED, MemberBlock, energy_at_start, stored
+from vibsim.observe.member_block import CENTRED, MemberBlock, energy_at_start, stored_or_nan
 from vibsim.schemes.base import UNIT_ROUND_OFF, round_off
 
 NONE, BOUNDED, LINEAR, QUADRATIC, EXPONENTIAL, UNCLEAR = range(len(DRIFTS))
@@ -61,7 +61,7 @@ def drift_at(block: MemberBlock, level: int, name: str = "energy_deviation") -> 
     """
     record, index = block.records[level], block.grid.levels.index(level)
     initial = energy_at_start(record)
-    deviation = stored(record, name, (*block.shape, len(record["t"])))
+    deviation = stored_or_nan(record, name, (*block.shape, len(record["t"])))
     # over every step so far; where storage is bounded, over the samples so far
     if f"{name}_running_max" in record:
         running = np.asarray(record[f"{name}_running_max"], dtype=float)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -22,17 +21,14 @@ from vibsim.convergence.differences import laid_out, largest
 from vibsim.core.array_types import Flags, Floats
 from vibsim.core.record import Record
 from vibsim.core.vocabulary import HIGHEST, NORMS, TYPICAL_NORM
+from vibsim.experiment import Experiment
 from vibsim.models import BUDGET, ENERGIES, Model
 from vibsim.observe.common_grid import Grid, check_belonging, common_grid, take
 from vibsim.observe.missed_pulses import Missed, missed_pulses
 from vibsim.observe.sensitivity import in_columns, sensitivity
-from vibsim.observe.stiffness import decay_rate, stiffest
+from vibsim.observe.stiffness import Motion, decay_rate, stiffest
 from vibsim.observe.thresholds import FEW_RADIANS
 from vibsim.simulation.members import Members, members
-
-if TYPE_CHECKING:
-    from vibsim.experiment import Experiment
-
 
 CENTRED = "_d2t"
 """What follows the name of a velocity or an energy that is made with ``[D_2t u]``."""
@@ -173,17 +169,14 @@ class MemberBlock:
 def block_of(experiment: Experiment, records: Mapping[int, Record]) -> MemberBlock:
     """Bring the level Records of some members together.
 
-    Raises
-    ------
-    VibsimError
-        Where there is no level, the levels have no times in common, or they do not belong together.
+    VibsimError where there is no level, the levels have no times in common, or they do not belong together.
     """
     grid = common_grid(records)
     check_belonging(experiment, records)
     rows = [records[level] for level in grid.levels]
     model, finest = experiment.model.definition, rows[-1]
     failed = by_level([row["status"] for row in rows]) != 0
-    eventless = stored(finest, "event_count", failed.shape[:2]) == 0.0
+    eventless = stored_or_nan(finest, "event_count", failed.shape[:2]) == 0.0
     lean = any(record.attrs.get("storage") == "lean" for record in rows)
     columns, states = columns_of(finest), [state.name for state in model.states]
     case = np.asarray(finest["case"], dtype=np.int64)
@@ -196,6 +189,7 @@ def block_of(experiment: Experiment, records: Mapping[int, Record]) -> MemberBlo
     else:
         found = model.exact(t, in_columns(group.initial), in_columns(group.parameters))
         exact = {name: laid_out(values) for name, values in found.items()}
+    motion = Motion(model, grid, finest, group, exact)
     return MemberBlock(
         experiment=experiment,
         records=records,
@@ -208,8 +202,8 @@ def block_of(experiment: Experiment, records: Mapping[int, Record]) -> MemberBlo
         relative_floor=relative_floors(experiment, grid.steps, columns),
         stored_floor=stored_floor(records, grid.levels, states),
         omega_dt=by_level([row["omega_dt"] for row in rows]),
-        fastest=_fastest(model, rows, grid, group, exact),
-        decay=decay_rate(model, grid, finest, group, exact),
+        fastest=_fastest(motion, rows),
+        decay=decay_rate(motion),
         group=group,
         failed=failed,
         stability_limit=stability_limits(experiment, columns),
@@ -227,7 +221,7 @@ def by_level(values: list[Floats]) -> Floats:
     return np.moveaxis(np.stack([np.asarray(row, dtype=np.float64) for row in values]), 0, -1)
 
 
-def stored(record: Record, name: str, shape: tuple[int, ...]) -> Floats:
+def stored_or_nan(record: Record, name: str, shape: tuple[int, ...]) -> Floats:
     """Return what a level holds, broadcast to a shape; NaN where it does not hold it."""
     values = np.asarray(record[name], dtype=np.float64) if name in record else np.float64(np.nan)
     return np.broadcast_to(values, shape)
@@ -243,15 +237,12 @@ def energy_at_start(record: Record) -> Floats:
     return np.asarray(record["energy_initial"], dtype=np.float64)
 
 
-def _fastest(
-    model: Model, rows: list[Record], grid: Grid, group: Members, exact: Mapping[str, Floats]
-) -> Floats:
+def _fastest(motion: Motion, rows: list[Record]) -> Floats:
     """Return the angular frequency that a step has to resolve times the step of every level, shape (case, level)."""
-    natural = by_level([fastest(row) for row in rows])
-    w = stiffest(model, grid, rows[-1], group, exact)
-    own = np.asarray(rows[-1]["natural_frequency"], dtype=float)
-    steps = np.array(grid.steps, dtype=np.float64)
-    return np.where((w == own)[:, None], natural, (w * group.end)[:, None] / steps)
+    natural, w, end = by_level([fastest(row) for row in rows]), stiffest(motion), motion.group.end
+    own = np.asarray(motion.finest["natural_frequency"], dtype=float)
+    steps = np.array(motion.grid.steps, dtype=np.float64)
+    return np.where((w == own)[:, None], natural, (w * end)[:, None] / steps)
 
 
 def _norms(experiment: Experiment) -> tuple[str, ...]:

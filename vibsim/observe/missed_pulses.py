@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from vibsim.core.array_types import Flags, Floats
-from vibsim.core.record import Record, Variable, attributes
+from vibsim.core.record import Record, Variable
 from vibsim.formula import Pulses
 from vibsim.models import Model
 from vibsim.observe.thresholds import MOST_GAPS
@@ -68,8 +68,6 @@ def missed_variables(missed: Missed) -> dict[str, Variable]:
     """Return the pulses as variables of the convergence Record."""
     words = "time of a pulse of the force between the points of every level"
     return {
-        "pulse_time": Variable(("case",), missed.time, attributes(words, "s")),
-        "pulse_width": Variable(
-            ("case",), missed.width, attributes("how long that pulse lasts", "s")
-        ),
+        "pulse_time": Variable.of(("case",), missed.time, words, "s"),
+        "pulse_width": Variable.of(("case",), missed.width, "how long that pulse lasts", "s"),
     }

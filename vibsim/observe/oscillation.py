@@ -27,7 +27,7 @@ from vibsim.core.array_types import Flags, Floats
 from vibsim.core.record import Record
 from vibsim.experiment.storage import FEWEST_EXTREMA
 from vibsim.observe import thresholds as th
-from vibsim.observe.member_block import MemberBlock, stored
+from vibsim.observe.member_block import MemberBlock, stored_or_nan
 from vibsim.observe.predicted_oscillation import is_simple, natural_frequency
 
 
@@ -90,7 +90,7 @@ def has_recurrence(block: MemberBlock, level: int) -> bool:
 def _recurrence(block: MemberBlock, level: int) -> Motion | None:
     if not has_recurrence(block, level):
         return None
-    return fitted(np.asarray(block.records[level][block.model.position], dtype=float))
+    return fit_recurrence(np.asarray(block.records[level][block.model.position], dtype=float))
 
 
 def _step(block: MemberBlock, level: int) -> Floats:
@@ -125,7 +125,7 @@ def phase_error(block: MemberBlock, level: int) -> Floats:
 
 def _exact_period(block: MemberBlock, level: int) -> Floats:
     """Return the exact period, shape (case,); NaN where it is not known or infinite."""
-    found = stored(block.records[level], "exact_period", block.shape[1:])
+    found = stored_or_nan(block.records[level], "exact_period", block.shape[1:])
     return np.where(np.isfinite(found), found, np.nan)
 
 
@@ -155,7 +155,7 @@ def energy_error_d2t(block: MemberBlock, record: Record) -> Floats:
 
     A scheme whose own velocity that is has its own, without the last point.
     """
-    found = np.array(stored(record, "energy_deviation_d2t_max_abs", block.shape))
+    found = np.array(stored_or_nan(record, "energy_deviation_d2t_max_abs", block.shape))
     own = record["energy_deviation_max_abs_interior"]
     for i, scheme in enumerate(block.experiment.schemes):
         if not scheme.adaptive and not scheme.own_velocity:
@@ -177,7 +177,7 @@ def steps_taken(block: MemberBlock, level: int) -> Floats:
 def _own_or(block: MemberBlock, level: int, name: str, per_step: Floats) -> Floats:
     """Return what an adaptive scheme counted, or the number of steps times a number per step."""
     steps = block.grid.steps[block.grid.levels.index(level)]
-    own = stored(block.records[level], name, block.shape)
+    own = stored_or_nan(block.records[level], name, block.shape)
     return np.where(block.adaptive[:, None], own, (per_step * steps)[:, None])
 
 
@@ -188,8 +188,8 @@ def period_scale(block: MemberBlock) -> Floats:
     of the time.
     """
     cases = block.shape[1:]
-    exact = stored(block.finest, "exact_period", cases)
-    w = np.abs(stored(block.finest, "natural_frequency", cases))
+    exact = stored_or_nan(block.finest, "exact_period", cases)
+    w = np.abs(stored_or_nan(block.finest, "natural_frequency", cases))
     with np.errstate(divide="ignore"):
         small = np.where(w > 0, 2.0 * math.pi / w, np.nan)
     found = np.where(np.isfinite(exact) & (exact > 0), exact, small)
@@ -204,7 +204,7 @@ class Motion:
     angle: Floats  # numerical frequency times dt, from 0 to pi
 
 
-def fitted(position: Floats) -> Motion:
+def fit_recurrence(position: Floats) -> Motion:
     """Fit the recurrence to positions at every step, shape (..., N+1)."""
     steps = position.shape[-1] - 1
     if steps < th.LEAST_STEPS:

@@ -17,18 +17,15 @@ tells, gives the response at every time to every disturbance at every other:
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from vibsim.convergence.differences import laid_out, largest
 from vibsim.core.array_types import Flags, Floats
+from vibsim.experiment import Experiment
 from vibsim.models import Model
 from vibsim.observe.thresholds import DISTURBANCE, INSTANT, NEAR_REST, PLACES
 from vibsim.simulation.members import Members
-
-if TYPE_CHECKING:
-    from vibsim.experiment import Experiment
 
 States = dict[str, Floats]
 
@@ -54,11 +51,11 @@ def sensitivity(
         return np.ones(len(t))
     parameters, initial = in_columns(group.parameters), in_columns(group.initial)
     if not model.conservative or not model.is_alone:
-        return _tried(model, t, initial, parameters)
+        return _by_trial(model, t, initial, parameters)
     found, doubtful = _linear(model, t, initial, parameters, known)
     if doubtful.any():
         rows = ({k: v[doubtful] for k, v in table.items()} for table in (initial, parameters))
-        found[doubtful] = _tried(model, t[doubtful], *rows)
+        found[doubtful] = _by_trial(model, t[doubtful], *rows)
     return found
 
 
@@ -133,7 +130,7 @@ def _largest_response(
     return found
 
 
-def _tried(model: Model, t: Floats, initial: States, parameters: States) -> Floats:
+def _by_trial(model: Model, t: Floats, initial: States, parameters: States) -> Floats:
     """Return the largest response to disturbances that are tried one by one, shape (case,)."""
     assert model.exact is not None
     exact = model.exact(t, initial, parameters)

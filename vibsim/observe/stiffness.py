@@ -13,6 +13,7 @@ The motion is that of the finest level at the common times; exact states, of sha
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -30,20 +31,41 @@ def applies(model: Model) -> bool:
     return not model.linear and model.is_alone and model.events is None
 
 
-def stiffest(
-    model: Model, grid: Grid, finest: Record, group: Members, exact: Mapping[str, Floats]
-) -> Floats:
+@dataclass(frozen=True)
+class Motion:
+    """The motion of some members, with what its formulas need."""
+
+    model: Model
+    grid: Grid
+    finest: Record
+    group: Members
+    exact: Mapping[str, Floats]
+
+    def fall(self, acceleration: Formula, state: str, states: Mapping[str, Floats]) -> Floats:
+        """Return minus the derivative of an acceleration by a state along a motion, of the shape of its states."""
+        numbers = {
+            row.name: self.group.parameters[row.key][:, None] for row in self.model.parameters
+        }
+        slope = derivative(tree(self.model, acceleration), state)
+        times = self.grid.times(self.group.end)
+        return np.broadcast_to(
+            -values(slope, {**numbers, **states, "t": times}), np.shape(states[state])
+        )
+
+
+def stiffest(motion: Motion) -> Floats:
     """Return the angular frequency that a step has to resolve, shape (case,); by the first scheme that is sound."""
+    model, finest = motion.model, motion.finest
     natural = np.asarray(finest["natural_frequency"], dtype=np.float64)
     if not applies(model):
         return natural
     sound = np.argmin(np.asarray(finest["status"]) != 0, axis=0)
     states = {}
     for state in model.states:
-        own = take(grid, finest, state.name)[sound, np.arange(len(sound))]
-        known = np.asarray(exact.get(state.name, own))
+        own = take(motion.grid, finest, state.name)[sound, np.arange(len(sound))]
+        known = np.asarray(motion.exact.get(state.name, own))
         states[state.name] = np.where(np.isfinite(known).all(axis=-1, keepdims=True), known, own)
-    stiffness = _fall(model, model.acceleration, model.position, states, grid, group)
+    stiffness = motion.fall(model.acceleration, model.position, states)
     known = np.isfinite(stiffness)
     count = np.maximum(np.count_nonzero(known, axis=-1), 1)
     with np.errstate(all="ignore"):
@@ -59,36 +81,19 @@ def is_damped(model: Model) -> bool:
     return any(not velocities.isdisjoint(names_in(tree(model, row))) for row in model.accelerations)
 
 
-def decay_rate(
-    model: Model, grid: Grid, finest: Record, group: Members, exact: Mapping[str, Floats]
-) -> Floats:
+def decay_rate(motion: Motion) -> Floats:
     """Return the largest rate at which the force takes a velocity away, 0 for none, shape (scheme, case)."""
-    fastest = np.zeros(np.shape(finest["status"]))
+    model, fastest = motion.model, np.zeros(np.shape(motion.finest["status"]))
     if not is_damped(model):
         return fastest
     states = {}
     for state in model.states:
-        own = take(grid, finest, state.name)
-        known = np.asarray(exact.get(state.name, own))
+        own = take(motion.grid, motion.finest, state.name)
+        known = np.asarray(motion.exact.get(state.name, own))
         states[state.name] = np.where(np.isfinite(known), known, own)
     with np.errstate(all="ignore"):
         for row, velocity in zip(model.accelerations, model.velocities, strict=True):
-            rate = _fall(model, row, velocity, states, grid, group)
+            rate = motion.fall(row, velocity, states)
             largest = np.max(np.where(np.isfinite(rate), rate, 0.0), axis=-1)
             fastest = np.maximum(fastest, largest)
     return fastest
-
-
-def _fall(
-    model: Model,
-    acceleration: Formula,
-    state: str,
-    states: Mapping[str, Floats],
-    grid: Grid,
-    group: Members,
-) -> Floats:
-    """Return minus the derivative of an acceleration by a state along a motion, of the shape of its states."""
-    numbers = {row.name: group.parameters[row.key][:, None] for row in model.parameters}
-    slope = derivative(tree(model, acceleration), state)
-    found = -values(slope, {**numbers, **states, "t": grid.times(group.end)})
-    return np.broadcast_to(found, np.shape(states[state]))

@@ -39,7 +39,7 @@ SAMPLES_AT_A_TIME = NUMBERS_AT_A_TIME // th.WINDOW_POINTS  # each has a window o
 
 
 @dataclass(frozen=True)
-class Template:
+class QuinticInterpolant:
     """Motions that others are compared with."""
 
     position: Floats  # shape (r, t)
@@ -58,14 +58,16 @@ class Template:
         slope = c[1] + y * (2 * c[2] + y * (3 * c[3] + y * (4 * c[4] + y * (5 * c[5]))))
         return position, slope / self.spacing[:, None]
 
-    def repeated(self, count: int) -> Template:
+    def repeated(self, count: int) -> QuinticInterpolant:
         """Return the same motions so many times one after the other, shape (count r, t)."""
         position, velocity = (np.tile(x, (count, 1)) for x in (self.position, self.velocity))
         coefficients = np.tile(self.coefficients, (1, count, 1))
-        return Template(position, velocity, np.tile(self.spacing, count), coefficients)
+        return QuinticInterpolant(position, velocity, np.tile(self.spacing, count), coefficients)
 
 
-def template(position: Floats, velocity: Floats, acceleration: Floats, spacing: Floats) -> Template:
+def quintic_interpolant(
+    position: Floats, velocity: Floats, acceleration: Floats, spacing: Floats
+) -> QuinticInterpolant:
     """Return the motion with these samples, shape (r, t), at a distance of shape (r,)."""
     h = spacing[:, None]
     v, a = h * velocity, h * h * acceleration
@@ -80,7 +82,7 @@ def template(position: Floats, velocity: Floats, acceleration: Floats, spacing: 
         -15 * rise + 8 * v0 + 7 * v1 + 1.5 * a0 - a1,
         6 * rise - 3 * v0 - 3 * v1 - 0.5 * a0 + 0.5 * a1,
     ]
-    return Template(position, velocity, spacing, np.stack(coefficients))
+    return QuinticInterpolant(position, velocity, spacing, np.stack(coefficients))
 
 
 def strides(period: Floats, spacing: Floats, points: int) -> Integers:
@@ -96,8 +98,8 @@ def strides(period: Floats, spacing: Floats, points: int) -> Integers:
     return np.where(usable, found, 0).astype(np.int64)
 
 
-def shift(
-    position: Floats, velocity: Floats, of: Template, period: Floats, stride: Integers
+def fit_shift(
+    position: Floats, velocity: Floats, of: QuinticInterpolant, period: Floats, stride: Integers
 ) -> Floats:
     """Tell shift and factor of computed motions apart.
 
@@ -126,11 +128,11 @@ def shift(
             rows = np.flatnonzero(kept & (largest >= least) & (largest < most))
             least = most
             for r, at in _pieces(rows, position.shape[-1]):
-                part = Template(
+                part = QuinticInterpolant(
                     of.position[r], of.velocity[r], of.spacing[r], of.coefficients[:, r]
                 )
                 mine = position[r], guess[r], part, period[r], stride[r]
-                found[:, r[:, None], at] = _fitted(*mine, at, rounds)
+                found[:, r[:, None], at] = _fit_windows(*mine, at, rounds)
         found[:, ~np.isfinite(found).all(axis=(0, 2))] = np.nan
     return found
 
@@ -144,10 +146,10 @@ def _pieces(rows: Integers, points: int) -> Iterator[tuple[Integers, Integers]]:
             yield rows[first : first + step], np.arange(start, stop)
 
 
-def _fitted(
+def _fit_windows(
     position: Floats,
     guess: Floats,
-    of: Template,
+    of: QuinticInterpolant,
     period: Floats,
     stride: Integers,
     at: Integers,
@@ -180,7 +182,7 @@ def _fitted(
         weight = np.clip((th.BEYOND_THE_ENDS - beyond) / (0.5 * th.BEYOND_THE_ENDS), 0.0, 1.0)
         left = (u - offset) * np.exp(-alpha - rise * s) - there
         speed = speed * radian
-        by = _solved([np.ones(u.shape), there, s * there, speed, s * speed], left, weight)
+        by = _least_squares([np.ones(u.shape), there, s * there, speed, s * speed], left, weight)
         # of a factor the whole of the change is taken, however large it is
         gain = np.maximum(by[1], -0.9)
         offset = offset + by[0] * np.exp(alpha)
@@ -203,7 +205,7 @@ def _sum(values: Floats) -> Floats:
     return total(np.moveaxis(values, 0, -1))
 
 
-def _solved(basis: list[Floats], left: Floats, weight: Floats) -> list[Floats]:
+def _least_squares(basis: list[Floats], left: Floats, weight: Floats) -> list[Floats]:
     """Return the least-squares coefficients of `left` in the basis, each of shape (r, t).
 
     Gaussian elimination of the normal equations, written out so that the bits do not depend on a library.
@@ -229,7 +231,7 @@ def _solved(basis: list[Floats], left: Floats, weight: Floats) -> list[Floats]:
 
 
 def _guess(
-    position: Floats, velocity: Floats, of: Template, period: Floats
+    position: Floats, velocity: Floats, of: QuinticInterpolant, period: Floats
 ) -> tuple[Floats, Floats]:
     """Return a first guess of the shift from the phase plane, shape (r, t), and the largest one in radians, shape (r,).
 

@@ -14,10 +14,16 @@ from typing import Any
 
 from vibsim.core.registry import Registry, offers
 from vibsim.experiment import Experiment, canonical
-from vibsim.experiment.cost import JOB_SECONDS, analysis_disk, analysis_memory, load_of
+from vibsim.experiment.cost import (
+    JOB_SECONDS,
+    analysis_disk,
+    analysis_memory,
+    load_of,
+    process_memory,
+)
 from vibsim.experiment.storage import is_bounded, sampling, stored_series
 from vibsim.models import MODELS
-from vibsim.plan import code_digest
+from vibsim.plan import code_digest, forecast
 from vibsim.plan.digests import (
     analysed,
     batch_digest,
@@ -54,6 +60,7 @@ def build(experiment: Experiment) -> Plan:
     }
     told = told_settings(experiment.settings)
     analysis = job_digest("analyse", in_numbers(analysed(content)), made | told)
+    reference = round(forecast.reference_seconds(experiment), 3)
     extrapolation = ""
     if experiment.output == "best":
         extrapolation = job_digest("extrapolate", in_numbers(extrapolated(content)), made)
@@ -71,15 +78,19 @@ def build(experiment: Experiment) -> Plan:
             for shard in range(len(group[0].shards))
         ),
         analysis=analysis,
-        analysis_memory=analysis_memory(loads, experiment.members),
+        analysis_memory=analysis_memory(loads, experiment.members)
+        + forecast.other_memory(experiment, loads),
+        process_memory=process_memory(loads, experiment.members),
         analysis_bytes=analysis_disk(loads, experiment.members, is_bounded(experiment)),
         extrapolation=extrapolation,
         report=job_digest("report", content, {"analysis": analysis}, DRAWING),
         content=content,
         versions={**versions(NUMERICAL), **_versions_of(packages)},
-        notes=experiment.notes,
+        notes=experiment.notes + forecast.notes(reference, experiment.model.kind),
         inputs=experiment.model.files,
         packages=packages,
+        reference_seconds=reference,
+        other_seconds=round(forecast.other_seconds(experiment, loads), 3),
     )
 
 
@@ -186,7 +197,7 @@ def _level(
         member_steps=load.schemes * members * load.steps,
         bytes=load.disk(members),
         seconds=round(load.seconds(members), 3),
-        shared=round(members * load.own, 3),
+        shared=round(members * load.shared, 3),
         memory=load.memory(min(members, load.shard)),
         shards=tuple(map(shard, range(load.shards(members)))),
     )

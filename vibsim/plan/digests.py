@@ -64,7 +64,7 @@ def in_numbers(content: Mapping[str, Any]) -> dict[str, Any]:
         model["tables"] = {name: table["numbers"] for name, table in model["tables"].items()}
     if "structure" in model:
         arrays = {
-            name: {key: value for key, value in array.items() if key != "file"}
+            name: {key: value for key, value in array.items() if key not in ("file", "columns")}
             for name, array in model["structure"]["arrays"].items()
         }
         model["structure"] = {**model["structure"], "arrays": arrays}

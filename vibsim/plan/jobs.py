@@ -75,6 +75,10 @@ class Batch:
     """Minutes that the user expects; None where nobody says."""
 
 
+SHARED_BYTES = 32 * 10**6
+"""Bytes of all files from which an analysis has work for more processes than one."""
+
+
 @dataclass(frozen=True)
 class Plan:
     """What there is to do for one experiment."""
@@ -91,7 +95,9 @@ class Plan:
     analysis: str
     """Digest of the analysis."""
     analysis_memory: int
-    """Bytes that the analysis holds at its peak, estimated."""
+    """Bytes that the analysis holds at its peak where one process makes it, estimated."""
+    process_memory: int
+    """Bytes beside these for each process, where several share it."""
     analysis_bytes: int
     """Size of what the analysis writes, estimated."""
     extrapolation: str
@@ -108,6 +114,10 @@ class Plan:
     """Group, kind and digest of the code of every model and scheme that an installed package offers."""
     settings: tuple[str, ...] = ()
     """What a command line gave in place of values of the file, as ``KEY=VALUE``; no level depends on it."""
+    reference_seconds: float = 0.0
+    """Seconds of one core that reference solutions take, estimated; those of the first level that needs one."""
+    other_seconds: float = 0.0
+    """Seconds of one core that series, the analysis and the page take, estimated."""
     notes: tuple[tuple[int, str], ...] = ()
     """What the file says and probably does not mean, each with its line, 0 without one."""
     file: str = ""
@@ -197,13 +207,31 @@ class Plan:
         return sum(batch.seconds for batch in self.batches)
 
     @property
+    def cpu_seconds(self) -> float:
+        """Seconds of one core that everything takes but the start of the run, estimated."""
+        return self.seconds + self.reference_seconds + self.other_seconds
+
+    def wall_seconds(self, cores: int) -> float:
+        """Return how long all of that takes on so many cores, estimated; one analysis and page follow the levels."""
+        longest = max((b.seconds for b in self.batches if not b.is_divisible), default=0.0)
+        return max(longest, self.seconds / cores) + self.reference_seconds + self.other_seconds
+
+    @property
     def bytes(self) -> int:
         """Size of all files, estimated."""
         return sum(level.bytes for level in self.levels) + self.analysis_bytes
 
+    def analysis_processes(self, cores: int) -> int:
+        """Return how many processes share the analysis on so many cores: one where there is little to do."""
+        return cores if self.bytes > SHARED_BYTES else 1
+
+    def shared_memory(self, processes: int) -> int:
+        """Return the bytes that the analysis holds at its peak where so many processes share it, estimated."""
+        return self.analysis_memory + (self.process_memory * processes if processes > 1 else 0)
+
     @property
     def memory(self) -> int:
-        """Bytes that the largest job holds at its peak, estimated."""
+        """Bytes that the largest job holds at its peak on one core, estimated."""
         return max(self.analysis_memory, *(batch.memory for batch in self.batches))
 
 

@@ -73,6 +73,7 @@ def build(experiment: SolverExperiment) -> Plan:
         ),
         analysis=analysis,
         analysis_memory=ANALYSIS_MEMORY,
+        process_memory=0,
         analysis_bytes=0,
         extrapolation="",
         report=job_digest(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import os
+import math
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -10,6 +10,7 @@ from itertools import chain, count
 from pathlib import Path
 from typing import Any
 
+from vibsim.core.processes import usable_cores
 from vibsim.core.set_option import OPTION
 from vibsim.plan import code_digest
 from vibsim.plan.cache import Resolver, load_all
@@ -19,8 +20,22 @@ from vibsim.plan.jobs import Batch, Plan
 
 PAGE_MEMORY = 300
 """Megabytes of a job that makes a page: twice of what those of the default run take."""
-_LARGE = 32 * 10**6
-"""Bytes of level files from which an analysis has work for more threads than one."""
+PAGE_DISK = 100
+"""Megabytes that such a job writes at most: ten times of what those of the default run write."""
+UNKNOWN_DISK = 1000
+"""Megabytes of a job whose files have no estimate, a solver of the user: as Snakemake assumes."""
+PAGE_SECONDS = 30.0
+"""Seconds of such a job: several times of what those of the default run take."""
+ANALYSED_SECONDS = 20e-9
+"""Seconds of one core that an analysis takes for each byte of level files."""
+START_MINUTES = 2
+"""Minutes that a job of an executor may take to start and to end."""
+SLOWNESS = 4.0
+"""How many times longer a job may take than is estimated, on a slower machine or one that others use as well."""
+GROUP = "simulate"
+"""The group of short jobs, several of which an executor may be given as one (``--group-components``)."""
+GROUPED_SECONDS = 10.0
+"""Seconds of one core that such a job takes at most: more than a shard holds."""
 
 
 @dataclass(frozen=True)
@@ -38,8 +53,12 @@ class Simulation:
     threads: int
     megabytes: int
     """Memory of a job, without the overhead of an executor."""
-    runtime: int | None
-    """Minutes of a job; None where nobody says."""
+    minutes: int | None
+    """Minutes of a job at most; None where nobody says."""
+    disk: int
+    """Megabytes that a job writes."""
+    group: str | None
+    """The group of Snakemake that a job may share with others; None where it is long enough alone."""
     digests: list[str]
     """Of every job."""
     source: str
@@ -61,6 +80,8 @@ class Simulation:
 def _simulation(plan: Plan, batches: Sequence[Batch], rule: str, cores: int) -> Simulation:
     first = batches[0]
     paths, levels = [shard.path for shard in plan.made_by(first)], list(first.levels)
+    seconds = max(batch.seconds for batch in batches)
+    share = plan.level(levels[0]).shards[0].stop / plan.cases
     stem = f"level_{levels[0]:02d}" + (f"_to_{levels[-1]:02d}" if len(levels) > 1 else "")
     if len(batches) > 1:
         paths = [f"{Path(path).parent.as_posix()}/shard_{{shard}}.nc" for path in paths]
@@ -72,11 +93,23 @@ def _simulation(plan: Plan, batches: Sequence[Batch], rule: str, cores: int) -> 
         log=f"{plan.key}/logs/{stem}.log",
         benchmark=f"{plan.key}/benchmarks/{stem}.tsv",
         threads=first.threads or (cores if first.is_divisible else 1),
-        megabytes=-(-max(batch.memory for batch in batches) // 10**6),
-        runtime=first.runtime,
+        megabytes=math.ceil(max(batch.memory for batch in batches) / 10**6),
+        minutes=first.runtime or _minutes(seconds),
+        disk=_disk(share * sum(plan.level(level).bytes for level in levels)),
+        group=GROUP if 0.0 < seconds <= GROUPED_SECONDS else None,
         digests=[batch.digest for batch in batches],
         source=plan.file,
     )
+
+
+def _disk(size: float) -> int:
+    """Return the megabytes of files of so many bytes, 0 where there is no estimate."""
+    return math.ceil(size / 10**6) or UNKNOWN_DISK
+
+
+def _minutes(seconds: float) -> int | None:
+    """Return the minutes that a job may take whose work is estimated; None where it is not."""
+    return START_MINUTES + math.ceil(SLOWNESS * seconds / 60.0) if seconds else None
 
 
 def _of_plan(field: str) -> Callable[[Names, Any], str]:
@@ -98,7 +131,7 @@ class Names:
     """Whether programs of the user may run."""
     settings: tuple[str, ...] = ()
     """What stands in place of values of the files."""
-    cores: int = field(default_factory=lambda: len(os.sched_getaffinity(0)))
+    cores: int = field(default_factory=usable_cores)
     """Cores that a job may use at most."""
     overhead: int = 0
     """Megabytes that a job needs for the processes of its executor, beside its own."""
@@ -168,24 +201,44 @@ class Names:
     report_digest = _of_plan("report")
 
     def analysis_threads(self, wildcards: Any) -> int:
-        """Return the threads of an analysis."""
-        return self.cores if self.plans[wildcards.experiment].bytes > _LARGE else 1
+        """Return the threads of an analysis, which are processes."""
+        return self.plans[wildcards.experiment].analysis_processes(self.cores)
 
     def analysis_memory(self, wildcards: Any, attempt: int) -> int:
         """Return the megabytes of an analysis; see `memory`."""
-        own = -(-self.plans[wildcards.experiment].analysis_memory // 10**6)
-        return self.memory(own)(wildcards, attempt)
+        own = self.plans[wildcards.experiment].shared_memory(self.analysis_threads(wildcards))
+        return self.memory(math.ceil(own / 10**6))(wildcards, attempt)
 
-    @property
-    def page_memory(self) -> int:
-        """Megabytes of a job that makes a page, without the overhead of an executor."""
-        return PAGE_MEMORY
+    def analysis_minutes(self, wildcards: Any, attempt: int) -> int | None:
+        """Return the minutes of an analysis, or of an extrapolation; see `runtime`."""
+        seconds = 1.0 + ANALYSED_SECONDS * self.plans[wildcards.experiment].bytes
+        return self.runtime(_minutes(seconds))(wildcards, attempt)
+
+    def analysis_disk(self, wildcards: Any) -> int:
+        """Return the megabytes that an analysis writes."""
+        return _disk(self.plans[wildcards.experiment].analysis_bytes)
+
+    def best_disk(self, wildcards: Any) -> int:
+        """Return the megabytes that an extrapolation writes: it has the size of a level."""
+        return _disk(self.plans[wildcards.experiment].levels[-1].bytes)
+
+    page_memory = PAGE_MEMORY
+    page_minutes = _minutes(PAGE_SECONDS)
+    page_disk = PAGE_DISK
 
     def memory(self, megabytes: int) -> Callable[[Any, int], int]:
         """Return what gives the memory of a job: with that of its executor, and more where it was not enough before."""
 
         def asked(wildcards: Any, attempt: int) -> int:
             return (megabytes + self.overhead) * attempt
+
+        return asked
+
+    def runtime(self, minutes: int | None) -> Callable[[Any, int], int | None]:
+        """Return what gives the minutes of a job: more where they were not enough before."""
+
+        def asked(wildcards: Any, attempt: int) -> int | None:
+            return minutes and minutes * attempt
 
         return asked
 

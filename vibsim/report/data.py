@@ -16,14 +16,12 @@ from numpy.typing import NDArray
 from vibsim.apriori.roundoff_floor import norm_of_floor
 from vibsim.core.array_types import Floats
 from vibsim.core.record import Record
-from vibsim.core.vocabulary import TYPICAL_NORM
-from vibsim.report.names import swept as in_words
+from vibsim.core.vocabulary import OF_LEVEL, TYPICAL_NORM
+from vibsim.report import words
 from vibsim.report.style import finite, label
-from vibsim.report.superscripts import RAISE
 from vibsim.simulation.scaled import has_time_unit
 
 ABOVE = 3.0  # a difference counts as more than round-off when it exceeds this many times the floor
-COINCIDE = 0.1  # rescaled differences that are further apart do not coincide
 _LONGEST = 40  # characters of the name of a scheme in the name of a file
 
 
@@ -47,7 +45,7 @@ class Member:
     @property
     def case_words(self) -> str:
         """Name of the member in the words of a page; empty without a sweep."""
-        return in_words(self.case_name)
+        return words.swept(self.case_name)
 
     @property
     def stem(self) -> str:
@@ -104,6 +102,15 @@ def omega_dt(record: Record) -> Floats:
     return np.broadcast_to(values if "case" in variable.dims else values[None, :], shape)
 
 
+def phase_error(record: Record, who: str) -> Floats:
+    """Return the phase error over a period by ``theory`` or as ``measured``, shape (scheme, case, level)."""
+    variable = record.variable("dt")
+    dt = np.asarray(variable.values, dtype=np.float64)
+    by_level = dt.T if variable.dims == ("level", "case") else dt[None, :]
+    periods = omega_dt(record) / (2.0 * np.pi) / by_level
+    return known(record, f"{who}_phase_error", OF_LEVEL) * periods
+
+
 def unit(record: Record, name: str) -> str:
     """Return the unit of a variable, with Unicode exponents; empty where it has none."""
     return pretty_unit(str(record.variable(name).attrs.get("units", "")) if name in record else "")
@@ -122,8 +129,8 @@ def time_label(record: Record) -> str:
 def pretty_unit(text: str) -> str:
     """Write a unit such as ``rad s-1`` with Unicode exponents."""
     parts = [(part, part.rstrip("-0123456789")) for part in text.split()]
-    words = [base + part[len(base) :].translate(RAISE) for part, base in parts]
-    return "" if text in {"", "1"} else " ".join(words).replace("sqrt(s)", "√s")
+    raised = [base + part[len(base) :].translate(words.RAISE) for part, base in parts]
+    return "" if text in {"", "1"} else " ".join(raised).replace("sqrt(s)", "√s")
 
 
 def norm_unit(record: Record, quantity: str, norm: str = TYPICAL_NORM) -> str:
@@ -161,8 +168,8 @@ def flags(record: Record, name: str) -> NDArray[Any]:
     """Return a flag variable as words, same shape."""
     table, values = record.meanings(name), record[name]
     found, place = np.unique(values, return_inverse=True)
-    words = np.array([table[int(value)] for value in found], dtype=object)
-    return np.asarray(words[place].reshape(values.shape))
+    texts = np.array([table[int(value)] for value in found], dtype=object)
+    return np.asarray(texts[place].reshape(values.shape))
 
 
 def whole(record: Record, dim: str) -> list[int]:
@@ -237,7 +244,7 @@ def formal_orders(record: Record, quantity: str) -> Floats:
     return np.broadcast_to(by_case, (len(record["scheme"]), len(record["case"])))
 
 
-def due(record: Record, quantity: str) -> str:
+def basis_of_order(record: Record, quantity: str) -> str:
     """Say whose an order is: promised by theory, or expected by a check of a part of an error that has no promise."""
     is_promised = record.variable(f"{quantity}_formal_order").attrs["promised"]
     return "promised" if is_promised else "expected"
@@ -246,7 +253,9 @@ def due(record: Record, quantity: str) -> str:
 def promised_text(record: Record, quantity: str, scheme: int) -> str:
     """Write the order that is due to a quantity: a number, or whose it is where it depends on the member."""
     found = np.unique(formal_orders(record, quantity)[scheme])
-    return f"{found[0]:g}".replace("inf", "∞") if found.size == 1 else due(record, quantity)
+    return (
+        f"{found[0]:g}".replace("inf", "∞") if found.size == 1 else basis_of_order(record, quantity)
+    )
 
 
 def stated_order(

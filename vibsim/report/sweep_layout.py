@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 
 from vibsim.core.array_types import Floats
 from vibsim.core.record import Record
+from vibsim.report import words
 from vibsim.report.data import swept, swept_label
 from vibsim.report.style import label
-from vibsim.report.text import words
 
 LARGEST_TO_SCALE = 1e100  # swept values from here on are not drawn to scale
 LOG_RATIO = 30.0
@@ -176,7 +176,8 @@ class Along:
 
     key: Key
     lines: tuple[tuple[str, NDArray[np.intp]], ...]
-    """Members that belong to one line, in ascending order of the key, with a name; without where there is one line."""
+    """Members that belong to one line, with a name; without where there is one line. They are in ascending order of the
+    key, or in their own where values repeat, as up and down a response curve."""
     follows: bool = False  # whether other keys change with this one
 
 
@@ -186,10 +187,11 @@ def along_of(found: list[Key]) -> Along | None:
         return None
     longest = max(found, key=lambda key: key.distinct.size)
     others = [key for key in found if key is not longest]
-    order = np.argsort(longest.values, kind="stable")
+    order = np.arange(longest.values.size)
     if not others or longest.distinct.size == longest.values.size:
         # of keys that move together one says it all
-        return Along(longest, (("", order),), bool(others)) if _moves_together(found) else None
+        line = _in_order(longest, order)
+        return Along(longest, (("", line),), bool(others)) if _moves_together(found) else None
     if int(np.prod([key.distinct.size for key in others])) > (FEW if len(others) == 1 else LINES):
         return None
     number = np.zeros(longest.values.size, dtype=np.intp)
@@ -197,12 +199,18 @@ def along_of(found: list[Key]) -> Along | None:
         number = number * key.distinct.size + np.searchsorted(key.distinct, key.values)
     lines = []
     for code in np.unique(number):
-        members = order[number[order] == code]
+        members = _in_order(longest, order[number == code])
         name = ", ".join(
             f"{key.name} = {key.text(float(key.values[members[0]]))}" for key in others
         )
         lines.append((name, members))
     return Along(longest, tuple(lines))
+
+
+def _in_order(key: Key, members: NDArray[np.intp]) -> NDArray[np.intp]:
+    """Return the members of a line in the order in which it is drawn."""
+    rising = members[np.argsort(key.values[members], kind="stable")]
+    return rising if np.all(np.diff(key.values[rising]) > 0.0) else members
 
 
 def _moves_together(found: list[Key]) -> bool:

@@ -243,6 +243,8 @@ def _exact(
     model = experiment.model.definition
     if model.exact is None:
         few = has_solution(model) and experiment.members <= MOST_REFERENCES
+        # members that start from others have starts of every level's own
+        few = few and experiment.chain == 1
         return _computed(model, group, number / steps) if few else {}
     exact = model.exact(
         number * (group.end / steps)[:, None],
@@ -291,14 +293,23 @@ def _ranges(model: Model, run: Gathered) -> Iterable[Row]:
         for i, (end, words) in enumerate((("min", "least"), ("max", "largest"))):
             told = f"{words} {state.long_name} over every step"
             yield f"{state.name}_{end}", run.ranges[..., k, i], told, state.unit
-        # units of half a second are none that udunits knows
-        for i, (norm, time) in enumerate((("l1", "s"), ("l2", "the square root of s"))):
-            told = f"{norm} norm of the {state.long_name} over every step (times {time})"
-            yield f"{state.name}_{norm}", run.norms[..., k, i], told, state.unit
+        told = f"norm of the {state.long_name} over every step"
+        yield f"{state.name}_l1", run.norms[..., k, 0], f"l1 {told}", _times_second(state.unit)
+        # udunits knows no root of a unit
+        words = f"l2 {told} (times the square root of s)"
+        yield f"{state.name}_l2", run.norms[..., k, 1], words, state.unit
     words, unit = "largest absolute energy deviation over every step", model.energy_unit
     yield "energy_deviation_max_abs", run.deviation, words, unit
     name = "energy_deviation_max_abs_interior"
     yield name, run.deviation_interior, f"{words} but the last point", unit
+
+
+def _times_second(unit: str) -> str:
+    """Return the unit of an integral over time."""
+    of_rate, _, last = f" {unit}".rpartition(" ")
+    if last == "s-1":
+        return of_rate.strip() or "1"
+    return "s" if unit == "1" else f"{unit} s"
 
 
 def _peaks(model: Model, run: Gathered) -> Iterable[Row]:

@@ -26,6 +26,7 @@ class Members:
     """Swept values by dotted key: numbers, or words for options of schemes."""
     parameters: Mapping[str, Floats]
     initial: Mapping[str, Floats]
+    """NaN for a member that starts from the last state of the one before, which no file tells."""
     end: Floats
 
     def numbers(self, model: Model) -> Floats:
@@ -38,6 +39,9 @@ def members(experiment: Experiment, start: int, stop: int) -> Members:
     """Work out the numbers of members start..stop-1."""
     columns = plan.columns(experiment, start, stop)
     parameters, initial = numbers_of(experiment, columns, stop - start)
+    if experiment.chain > 1:
+        starts = np.arange(start, stop) % experiment.chain == 0
+        initial = {name: np.where(starts, values, np.nan) for name, values in initial.items()}
     end = _filled("time", {"end": experiment.time.end}, columns, stop - start)["end"]
     if experiment.end_varies and "time.end" not in columns:
         # the end follows from the parameters of each member

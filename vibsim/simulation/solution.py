@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import fields, is_dataclass, replace
+from itertools import product
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -23,7 +24,10 @@ if TYPE_CHECKING:
 def solve(
     experiment: Experiment, group: Members, steps: int, every: int, **more: Any
 ) -> Trajectories:
-    """Step every scheme of `experiment` for the members of `group`.
+    """Step every scheme of `experiment` for the members of `group`, which are whole chains (`Sweep.chain`).
+
+    The members of a chain are stepped one after the other: each starts at t = 0 from the last state that the scheme
+    itself has of the one before, at the same level.
 
     Parameters
     ----------
@@ -36,12 +40,16 @@ def solve(
         Its arrays have the shapes that it says, behind a first axis of schemes.
     """
     model = experiment.model.definition
-    initial = np.stack([group.initial[state.name] for state in model.states], axis=-1)
-    parameters = group.numbers(model)
+    given = np.stack([group.initial[state.name] for state in model.states], axis=-1)
+    parameters, place = group.numbers(model), group.index % experiment.chain
     rows = []
     for i, scheme in enumerate(experiment.schemes):
-        method, runs = scheme.method, []
-        for options, members in plan.option_groups(experiment, i, group.columns):
+        method, runs, initial = scheme.method, [], given.copy()
+        options_of = plan.option_groups(experiment, i, group.columns)
+        for link, (options, alike) in product(range(experiment.chain), options_of):
+            members = alike[place[alike] == link]
+            if not members.size:
+                continue
             is_tabulated = method.adaptive or model.loaded is not None
             for where in adaptive.pieces(members, steps) if is_tabulated else (members,):
                 run = of_kind(model, method)(
@@ -56,6 +64,8 @@ def solve(
                     **more,
                 )
                 runs.append((run, where))
+                if link < experiment.chain - 1:
+                    initial[where + 1] = run.states[:, :, -1].T
         rows.append(_in_order(runs))
     found: Trajectories = _joined(
         rows, lambda arrays: arrays[0][None] if len(arrays) == 1 else np.stack(arrays)

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from vibsim.analysis.summary import WORST
-from vibsim.checks.fields import GROUP, flags, name_of
+from vibsim.checks.fields import GROUP, name_of
 from vibsim.checks.outcome import compared_reason
 from vibsim.checks.solver_facts import SOLVER_FACTS
 from vibsim.convergence import LadderVerdict
@@ -19,7 +19,7 @@ from vibsim.convergence.study.labelled import COLUMNS, dataset
 from vibsim.convergence.study.verdict_data import Level
 from vibsim.core.array_types import Floats
 from vibsim.core.errors import VibsimError
-from vibsim.core.record import Record, Variable, attributes
+from vibsim.core.record import Record, Variable, attributes, flags
 from vibsim.core.set_option import set_options
 from vibsim.core.vocabulary import FORMAT, REASON_NAMES, SEVERITY, STATUSES, jsonable, worst
 from vibsim.experiment import citation

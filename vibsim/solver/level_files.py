@@ -83,7 +83,7 @@ def _listed(size: str) -> list[float] | None:
 def opened(path: Path) -> Any:
     """Return the dataset of a netCDF file; InputError where the library cannot read it."""
     try:
-        return netcdf.opened(path)
+        return netcdf.foreign(path)
     except (OSError, RuntimeError) as error:
         _refuse(str(path), "", "", f"the netCDF library cannot read it ({error})")
 

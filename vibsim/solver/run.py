@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from vibsim.convergence.study.grid_values import GridValues
-from vibsim.core.errors import VibsimError
+from vibsim.core.errors import VibsimError, nearest
 from vibsim.core.processes import end_with
 from vibsim.experiment.solver import OUTPUTS, SolverExperiment
 from vibsim.solver import level_output
@@ -96,7 +96,12 @@ def _called(experiment: SolverExperiment, level: int, member: int) -> Any:
         sys.path.append(folder)
     with chdir(folder):
         try:
-            return getattr(importlib.import_module(module), name)(**arguments)
+            found = importlib.import_module(module)
+            if not callable(getattr(found, name, None)):
+                raise VibsimError(f"{module} has no function {name}: {nearest(name, dir(found))}")
+            return getattr(found, name)(**arguments)
+        except VibsimError:
+            raise
         except (Exception, SystemExit) as error:
             traceback.print_exc(file=sys.stdout)
             raise VibsimError(f"{text} raised {type(error).__name__}: {error}") from None

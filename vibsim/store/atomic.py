@@ -1,18 +1,23 @@
 """Files that appear whole: a hidden temporary file beside the target, flushed, then renamed.
 
 A reader sees the old file or the new one and nothing between, also after a crash or a power cut.
-What a killed writer leaves behind is removed by the next one with the same target.
+What a killed writer leaves behind is removed by the next one with the same target, or by a run that has no such target
+any more.
 """
 
 from __future__ import annotations
 
 import os
+import re
 import secrets
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+from vibsim.core.processes import started
+
 _SUFFIX = ".part"
+_TEMPORARY = re.compile(rf"\.(?P<target>.+)\.(?P<pid>\d+)-(?P<started>[^-]*)-[^-]+\{_SUFFIX}")
 _BLOCK, _MARGIN = 2**16, 2**22
 """Bytes that are written at a time, and in all, to find out whether a disk is full."""
 
@@ -24,9 +29,9 @@ def replacing(path: Path) -> Iterator[Path]:
     It is a name of its own in the same folder, so that writers of one target do not meet.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
-    _remove_stale(path)
+    _remove_abandoned(path)
     pid = os.getpid()
-    owner = f"{pid}-{_started(pid)}-{secrets.token_hex(4)}"
+    owner = f"{pid}-{started(pid)}-{secrets.token_hex(4)}"
     temporary = path.with_name(f".{path.name}.{owner}{_SUFFIX}")
     try:
         yield temporary
@@ -78,22 +83,15 @@ def _flush(path: Path) -> None:
         os.close(descriptor)
 
 
-def _remove_stale(path: Path) -> None:
-    prefix = f".{path.name}."
-    for entry in os.scandir(path.parent):
-        if entry.name.startswith(prefix) and entry.name.endswith(_SUFFIX):
-            owner = entry.name[len(prefix) : -len(_SUFFIX)].split("-")
-            if len(owner) == 3 and owner[0].isdigit() and _started(int(owner[0])) != owner[1]:
-                Path(entry.path).unlink(missing_ok=True)
+def abandoned(folder: Path) -> Iterator[tuple[Path, Path]]:
+    """Give each temporary file in `folder` whose writer has ended, and its target."""
+    for entry in os.scandir(folder):
+        found = _TEMPORARY.fullmatch(entry.name)
+        if found and started(int(found["pid"])) != found["started"]:
+            yield Path(entry.path), folder / found["target"]
 
 
-def _started(pid: int) -> str:
-    """Return when process `pid` started, in ticks since boot; empty when it is dead, even if nobody took notice.
-
-    The number tells a living writer from a later process that was given the same id.
-    """
-    try:
-        fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
-    except OSError:
-        return ""
-    return "" if fields[0] in {"X", "Z"} else fields[19]
+def _remove_abandoned(path: Path) -> None:
+    for temporary, target in abandoned(path.parent):
+        if target == path:
+            temporary.unlink(missing_ok=True)

@@ -12,6 +12,8 @@ rule analyse:
     threads: names.analysis_threads
     resources:
         mem_mb=names.analysis_memory,
+        runtime=names.analysis_minutes,
+        disk_mb=names.analysis_disk,
     params:
         digest=names.analysis_digest,
         file=names.file,

@@ -12,6 +12,8 @@ rule extrapolate:
         experiment=names.best_pattern,
     resources:
         mem_mb=names.analysis_memory,
+        runtime=names.analysis_minutes,
+        disk_mb=names.best_disk,
     params:
         digest=names.extrapolation_digest,
         file=names.file,

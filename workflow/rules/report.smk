@@ -9,7 +9,12 @@ rule index:
         names.indexed,
     output:
         "index.html",
-        "summary.csv",
+        report(
+            "summary.csv",
+            caption="../report/summary.rst",
+            category="All experiments",
+            labels={"shows": "verdicts"},
+        ),
     log:
         ".vibsim/logs/index.log",
     benchmark:
@@ -26,15 +31,34 @@ rule report:
         "{experiment}/convergence.nc",
         "{experiment}/summary.json",
     output:
-        "{experiment}/report.html",
-        directory("{experiment}/figures"),
-        directory("{experiment}/tables"),
+        report(
+            "{experiment}/report.html",
+            caption="../report/page.rst",
+            category="{experiment}",
+            labels={"shows": "page"},
+        ),
+        report(
+            directory("{experiment}/figures"),
+            patterns=["{figure}.svg"],
+            caption="../report/figure.rst",
+            category="{experiment}",
+            labels={"shows": "figure: {figure}"},
+        ),
+        report(
+            directory("{experiment}/tables"),
+            patterns=["{table}.csv"],
+            caption="../report/table.rst",
+            category="{experiment}",
+            labels={"shows": "table: {table}"},
+        ),
     log:
         "{experiment}/logs/report.log",
     benchmark:
         "{experiment}/benchmarks/report.tsv"
     resources:
         mem_mb=names.memory(names.page_memory),
+        runtime=names.runtime(names.page_minutes),
+        disk_mb=names.page_disk,
     params:
         digest=names.report_digest,
         file=names.file,

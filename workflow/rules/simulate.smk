@@ -10,10 +10,13 @@ for simulation in names.simulations:
             simulation.log,
         benchmark:
             simulation.benchmark
+        group:
+            simulation.group
         threads: simulation.threads
         resources:
             mem_mb=names.memory(simulation.megabytes),
-            runtime=simulation.runtime,
+            runtime=names.runtime(simulation.minutes),
+            disk_mb=simulation.disk,
         params:
             digest=simulation.digest,
             levels=simulation.levels,

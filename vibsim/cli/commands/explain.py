@@ -8,11 +8,15 @@ from __future__ import annotations
 import textwrap
 from argparse import Namespace
 from collections.abc import Iterator
+from typing import TYPE_CHECKING
 
 from vibsim.cli import terminal
 from vibsim.cli.jobs.common import refusal
 from vibsim.core.errors import nearest
 from vibsim.core.vocabulary import DECISIVE, REASONS, STATUSES
+
+if TYPE_CHECKING:
+    from vibsim.report.text.reasons import Reason
 
 _WIDEST = 100
 
@@ -33,24 +37,30 @@ def explain(options: Namespace) -> int:
 
 
 def _lines(word: str) -> Iterator[str]:
-    from vibsim.report.text.reasons import REASONS as EXPLAINED
-    from vibsim.report.text.reasons import Reason, reason
-
     status = REASONS[word]
     yield f"{terminal.painted(word, 'bold')}: {terminal.painted(status, status)}"
+    for head, told in meanings(word):
+        yield from _paragraphs(told, head)
+    yield "\nMore: docs/verdicts.md, section Reasons"
+
+
+def meanings(word: str) -> Iterator[tuple[str, Reason]]:
+    """Yield what a reason means, and behind "For" what else it means for some kinds of checks."""
+    from vibsim.report.text.reasons import REASONS as EXPLAINED
+    from vibsim.report.text.reasons import reason
+
     own = EXPLAINED[word]
-    yield from _paragraphs(own, "")
+    yield "", own
     # what a kind of check means by the same word
     told: dict[Reason, list[str]] = {}
     for kind in DECISIVE:
         told.setdefault(reason(word, kind), []).append(f"`{kind}`")
     for other, kinds in told.items():
         if other != own:
-            yield from _paragraphs(other, f"For {', '.join(kinds)}: ")
+            yield f"For {', '.join(kinds)}: ", other
     promised = reason(word, "converges", is_promised=True)
     if promised != own:
-        yield from _paragraphs(promised, "Where the scheme promises that order: ")
-    yield "\nMore: docs/verdicts.md, section Reasons"
+        yield "Where the scheme promises that order: ", promised
 
 
 def _paragraphs(found: tuple[str, str], head: str) -> Iterator[str]:

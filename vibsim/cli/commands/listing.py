@@ -31,7 +31,7 @@ def list_(options: Namespace) -> int:
     if options.what in ("models", "schemes"):
         rows, faults = _models() if options.what == "models" else _schemes()
     else:
-        rows = _checks() if options.what == "checks" else _experiments()
+        rows = checks() if options.what == "checks" else _experiments()
     table = [tuple(map(str, row)) for row in rows]
     width = max((len(name) for name, _ in table), default=0)
     for name, text in table:
@@ -48,9 +48,7 @@ def _one(what: str, name: str) -> int:
         return 0
     if what == "schema":
         raise refusal("NAME", name, "the JSON Schema has no entries")
-    rows = [
-        (key.strip(), text) for key, text in (_checks() if what == "checks" else _experiments())
-    ]
+    rows = [(key.strip(), text) for key, text in (checks() if what == "checks" else _experiments())]
     found = [row for row in rows if name in (row[0], row[0].rpartition("/")[2])]
     if not found:
         known = [key for key, _ in rows]
@@ -112,7 +110,8 @@ def _of_schemes(schemes: Collection[Scheme]) -> Iterable[tuple[str, str]]:
             yield f"  {option.name}", f"{choices(option)}: {option.description}"
 
 
-def _checks() -> Iterable[tuple[str, str]]:
+def checks() -> Iterable[tuple[str, str]]:
+    """Yield the kinds of checks, and behind `value` every number that it takes."""
     from vibsim.experiment.value_names import VALUES
 
     drifts = "{conserves: energy | energy_d2t, drift: none | bounded | linear | quadratic}"

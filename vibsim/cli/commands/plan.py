@@ -17,9 +17,15 @@ from vibsim.cli import resources
 from vibsim.cli.chosen_plans import plans_of, tell_notes
 from vibsim.cli.jobs.common import chosen_results
 from vibsim.cli.resources import amount, duration, size
+from vibsim.core.processes import usable_cores
 from vibsim.plan import Plan
+from vibsim.plan.forecast import RUN_SECONDS
 
 _WIDTHS = (7, 12, 12, 7, 14, 10, 10, 10)
+CORES = usable_cores()
+"""Cores at hand, as `vibsim run` uses them."""
+SHORT = 1.0
+"""Seconds of a reference that is not worth a line."""
 _HEAD = ("level", "steps", "kept every", "files", "member-steps", "disk", "memory", "time")
 
 
@@ -56,6 +62,10 @@ def _entry(item: Plan) -> dict[str, Any]:
         "bytes": item.bytes,
         "memory": item.memory,
         "seconds": item.seconds,
+        "cpu_seconds": RUN_SECONDS + item.cpu_seconds,
+        "wall_seconds": {
+            str(cores): RUN_SECONDS + item.wall_seconds(cores) for cores in sorted({1, CORES})
+        },
     }
     return {**asdict(item), "total": totals}
 
@@ -98,6 +108,9 @@ def _lines(item: Plan) -> Iterator[str]:
         f"    all: {simulate}, {amount(_steps(item))} member-steps, at most {size(item.bytes)} of disk, "
         f"{size(item.memory)} of memory in a job, {duration(item.seconds)} of one core"
     )
+    if item.reference_seconds >= SHORT:
+        yield f"    reference: about {duration(item.reference_seconds)}, as no exact solution is known"
+    yield f"    with analysis and page: {_times([item])}"
 
 
 def _row(cells: Sequence[str]) -> str:
@@ -107,8 +120,18 @@ def _row(cells: Sequence[str]) -> str:
 
 def _sum(plans: Sequence[Plan], results: Path) -> str:
     steps, files = sum(map(_steps, plans)), sum(item.bytes for item in plans)
-    seconds = sum(item.seconds for item in plans)
     return (
         f"{len(plans)} experiments: {amount(steps)} member-steps, at most {size(files)} of disk "
-        f"({size(resources.free_bytes(results))} free), {duration(seconds)} of one core"
+        f"({size(resources.free_bytes(results))} free), {_times(plans)}"
     )
+
+
+def _times(plans: Sequence[Plan]) -> str:
+    """Write the CPU time of a run of some plans, and how long it takes on the cores at hand, the start included."""
+    cpu = RUN_SECONDS + sum(item.cpu_seconds for item in plans)
+    # experiments run beside each other
+    wall = RUN_SECONDS + max(
+        *(item.wall_seconds(CORES) for item in plans), (cpu - RUN_SECONDS) / CORES
+    )
+    cores = "1 core" if CORES == 1 else f"{CORES} cores"
+    return f"about {duration(cpu)} of CPU time, {duration(wall)} on {cores}"

@@ -37,11 +37,12 @@ def theory(options: Namespace) -> int:
         rule = "chooses its own steps: there is no theory in w dt"
         raise refusal("SCHEME", scheme.kind, rule)
     given = _options(scheme, options.options)
-    print(*laid_out(_rows(scheme, given, options.terms, latex=options.latex)), sep="\n")
+    print(*laid_out(theory_rows(scheme, given, options.terms, latex=options.latex)), sep="\n")
     return 0
 
 
-def _rows(scheme: Scheme, options: Options, terms: int, *, latex: bool) -> Iterator[Row]:
+def theory_rows(scheme: Scheme, options: Options, terms: int, *, latex: bool) -> Iterator[Row]:
+    """Yield the theory of a scheme with equal steps; each series has `terms` terms."""
     from vibsim.theory import symbolic
 
     stepper = scheme.stepper(options)

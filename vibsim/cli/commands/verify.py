@@ -14,7 +14,6 @@ from argparse import Namespace
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from tempfile import TemporaryDirectory
 
 from vibsim.cli import made_files, results_folder
 from vibsim.cli.chosen_plans import plans_of
@@ -25,6 +24,8 @@ from vibsim.cli.run import lock, reasons, supervise
 from vibsim.cli.terminal import clean
 from vibsim.core.errors import FileError, VibsimError
 from vibsim.core.home import home
+from vibsim.core.temporary import temporary_folder
+from vibsim.experiment.collection import SITE
 from vibsim.plan import Plan, choose
 
 NO_RESULTS = ("logs", "benchmarks")
@@ -37,7 +38,6 @@ _MANIFEST = re.compile(r"\w+\.\w+", re.ASCII)
 """Name of the manifest of an experiment, whose collection and name have no point in them."""
 SHOWN = 8
 """Up to so many files are named that differ for the same reason."""
-_OVER_ALL = ("index.html", "summary.csv")
 _README = "README.md"
 """Stands in the results folder of a checkout."""
 
@@ -64,12 +64,12 @@ def verify(options: Namespace) -> int:
     else:
         keys = [made_files.INDEX, *experiments(results)]
     results_folder.check(results, filter(None, keys))
-    with kept(results), TemporaryDirectory(prefix="vibsim-verify-") as folder:
+    with kept(results), temporary_folder() as folder:
         faults = sum(_tell_files(results, key) for key in keys)
         status = _run_again(options, folder) if plans else 0
         if status not in (0, 1):
             return status
-        faults += sum(_tell_recomputed(plan, results, Path(folder)) for plan in plans)
+        faults += sum(_tell_recomputed(plan, results, folder) for plan in plans)
     return 1 if faults else 0
 
 
@@ -88,7 +88,8 @@ def kept(results: Path) -> Iterator[None]:
 def experiments(results: Path) -> list[str]:
     """Return the folders of all experiments that have a manifest or files, in order."""
     manifests = made_files.path(results, made_files.INDEX).parent.glob("*.*.jsonl")
-    folders = (folder for folder in results.glob("[!.]*/[!.]*") if folder.is_dir())
+    inner = (folder for folder in results.glob("[!.]*/[!.]*") if folder.parent.name != SITE)
+    folders = (folder for folder in inner if folder.is_dir())
     found = {file.stem.replace(".", "/") for file in manifests if _MANIFEST.fullmatch(file.stem)}
     return sorted(found | {folder.relative_to(results).as_posix() for folder in folders})
 
@@ -111,7 +112,7 @@ def compare(results: Path, key: str) -> tuple[int, dict[str, str]]:
         found |= dict.fromkeys(
             there - known.keys(), "is not in the manifest: no job that ended made it"
         )
-        for name in _OVER_ALL if key == made_files.INDEX else LAST:
+        for name in made_files.OVER_ALL if key == made_files.INDEX else LAST:
             found.setdefault(name, "is not made yet: the last run did not end")
     if LAST[-1] not in there:
         # its job begins with figures and tables
@@ -144,7 +145,8 @@ def _files(folder: Path, *, is_top: bool) -> Iterator[str]:
         inner = Path(place).relative_to(folder)
         if is_top:
             # collections, but no experiments
-            folders[:] = [name for name in folders if not inner.parts and not name.startswith(".")]
+            outer = [] if inner.parts else folders
+            folders[:] = [name for name in outer if not name.startswith(".") and name != SITE]
         elif not inner.parts:
             folders[:] = [name for name in folders if name not in NO_RESULTS]
         paths = ((inner / name).as_posix() for name in names if name != TIMESTAMP)
@@ -161,10 +163,10 @@ def _tell_files(results: Path, key: str) -> int:
     return len(problems)
 
 
-def _run_again(options: Namespace, folder: str) -> int:
+def _run_again(options: Namespace, folder: Path) -> int:
     """Run the same in another folder; return the exit status."""
     words = [sys.executable, "-P", "-m", "vibsim", "run", *options.experiments]
-    words += ["--results", folder]
+    words += ["--results", str(folder)]
     words += [word for text in options.settings for word in ("--set", text)]
     words += ["--cores", str(options.cores)] if options.cores else []
     words += ["--allow-commands"] * options.allow_commands

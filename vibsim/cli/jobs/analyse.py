@@ -22,13 +22,17 @@ def analyse(options: Namespace) -> int:
 
         return judge_levels(plan, options, results)
     from vibsim import store
-    from vibsim.analysis import analyse_parts, joined, kept, summarise, verdicts
+    from vibsim.analysis import analyse_parts, join_parts, keep_for_verdicts, summarise, verdicts
 
     experiment = plan.experiment
     folder = options.out or results / plan.key
     thin: list[Record] = []
+    if options.out is None:
+        made_files.withdraw(results, plan.key, ["convergence.nc", "summary.json"])
     with open_levels(plan, options, results) as levels:
-        parts = kept(experiment, analyse_parts(experiment, levels, threads=options.threads), thin)
+        parts = keep_for_verdicts(
+            experiment, analyse_parts(experiment, levels, processes=options.threads), thin
+        )
         store.write_parts(
             folder / "convergence.nc",
             (titled(part, f"{plan.key}: comparison of levels") for part in parts),
@@ -36,7 +40,7 @@ def analyse(options: Namespace) -> int:
             digest=plan.analysis,
             provenance=with_settings(plan, analysed(plan.content)),
         )
-    record = joined(thin)
+    record = join_parts(thin)
     summary = summarise(experiment, verdicts(experiment, record), record)
     store.write_json(folder / "summary.json", summary, digest=plan.analysis)
     if options.out is None:

@@ -21,6 +21,8 @@ def extrapolate(options: Namespace) -> int:
     from vibsim import store
     from vibsim.comparison.best_solution import best_record
 
+    if options.out is None:
+        made_files.withdraw(results, plan.key, ["best.nc"])
     size = max(1, PART_BYTES * plan.cases // plan.bytes)
     with open_levels(plan, options, results) as levels:
         parts = (

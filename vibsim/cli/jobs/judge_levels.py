@@ -28,6 +28,8 @@ def judge_levels(plan: Plan, options: Namespace, results: Path) -> int:
     folder = options.out or results / plan.key
     record = titled(analysis.record(experiment, checks), f"{plan.key}: comparison of levels")
     uses = solved_and_judged(plan.content)
+    if options.out is None:
+        made_files.withdraw(results, plan.key, ["convergence.nc", "summary.json"])
     store.write(
         folder / "convergence.nc",
         record,

@@ -47,8 +47,11 @@ def report(options: Namespace) -> int:
         summary |= named
         if options.out is None:
             # No number depends on title and source: after other ones the analysis need not run again.
+            made_files.withdraw(results, plan.key, ["summary.json"])
             store.write_json(results / plan.summary, summary, digest=plan.analysis)
             made_files.add(results, plan.key, ["summary.json"], plan.analysis)
+    if options.out is None:
+        made_files.withdraw(results, plan.key, ["report.html"])
     write(
         plan,
         found[plan.convergence],
@@ -78,9 +81,11 @@ def _index(options: Namespace) -> int:
     from vibsim.report import write_index
 
     results = chosen_results(options)
+    if options.out is None:
+        made_files.withdraw(results, made_files.INDEX, made_files.OVER_ALL)
     write_index(options.out or results)
     if options.out is None:
-        made_files.add(results, made_files.INDEX, ["index.html", "summary.csv"])
+        made_files.add(results, made_files.INDEX, made_files.OVER_ALL)
     return 0
 
 

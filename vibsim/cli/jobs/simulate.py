@@ -41,11 +41,11 @@ def simulate(options: Namespace) -> int:
         if is_made(path, job):
             print(f"{job.path}: is up to date", flush=True)
             continue
+        name = Path(job.path).relative_to(plan.key).as_posix()
         try:
+            made_files.withdraw(results, plan.key, [name])
             make(plan, level, job, path, options.threads)
-            made_files.add(
-                results, plan.key, [Path(job.path).relative_to(plan.key).as_posix()], job.digest
-            )
+            made_files.add(results, plan.key, [name], job.digest)
         except VibsimError as error:
             failed.append(str(error))
         except Exception as error:

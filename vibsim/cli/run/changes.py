@@ -14,10 +14,10 @@ from pathlib import Path
 
 from vibsim.cli import made_files
 from vibsim.cli.made_files import BESIDE, Entry
-from vibsim.core.errors import DamagedFileError, FileError
+from vibsim.core.errors import DamagedFileError, FileError, StaleFileError
 from vibsim.plan import Plan
+from vibsim.store.atomic import abandoned
 
-_OVER_ALL = ("index.html", "summary.csv")
 _SEALED = (".nc", ".json")
 """Files that say themselves whether they are whole."""
 _LEVEL = re.compile(r"level_\d{2,}")
@@ -34,7 +34,7 @@ def changed(plans: Sequence[Plan], results: Path, *, every: bool) -> list[FileEr
     for plan in plans:
         own = [path.removeprefix(f"{plan.key}/") for path in plan.files]
         found.extend(_changed(results, plan.key, own, every))
-    found.extend(_changed(results, made_files.INDEX, _OVER_ALL, every))
+    found.extend(_changed(results, made_files.INDEX, made_files.OVER_ALL, every))
     return found
 
 
@@ -85,6 +85,22 @@ def _problem(folder: Path, name: str, entries: dict[str, Entry], every: bool) ->
     return ""
 
 
+def stale(plans: Sequence[Plan], results: Path) -> list[FileError]:
+    """Return the files that another job is on record for; Snakemake misses them where its own record is lost."""
+    found: list[FileError] = []
+    for plan in plans:
+        jobs = {shard.path: shard.digest for shard in plan.shards}
+        jobs |= {plan.convergence: plan.analysis, plan.summary: plan.analysis}
+        jobs[plan.page] = plan.report
+        if plan.best and plan.extrapolation:
+            jobs[plan.best] = plan.extrapolation
+        for name, entry in made_files.load(results, plan.key).items():
+            path = f"{plan.key}/{name}"
+            if entry.job and jobs.get(path, entry.job) != entry.job and (results / path).exists():
+                found.append(StaleFileError(results / path, "is of another input, title or code"))
+    return found
+
+
 def settle(plans: Sequence[Plan], results: Path, outputs: Iterable[str]) -> None:
     """Write the manifests anew: without what was removed, and with the times of what jobs have just made.
 
@@ -110,15 +126,21 @@ def settle(plans: Sequence[Plan], results: Path, outputs: Iterable[str]) -> None
 
 
 def leftovers(plans: Sequence[Plan], results: Path) -> list[Path]:
-    """Return the files under names that vibsim gives, and that these experiments have not; links are nobody's."""
+    """Return the files under names that vibsim gives, and that these experiments have not; links are nobody's.
+
+    A temporary file that a killed job left counts as the file that it was to become.
+    """
     wanted = {results / path for plan in plans for path in plan.files}
     found = []
     for folder in (results / plan.key for plan in plans):
-        for path in sorted([*folder.glob("*.nc"), *folder.glob("level_*/*.nc")]):
-            is_own = path.is_file() and not path.is_symlink() and not path.parent.is_symlink()
-            name = path.relative_to(folder).as_posix()
-            if is_own and path not in wanted and _NAMED.fullmatch(name):
-                found.append(path)
+        of_levels = [place for place in sorted(folder.glob("level_*/")) if not place.is_symlink()]
+        for place in filter(Path.is_dir, (folder, *of_levels)):
+            targets = [(path, path) for path in sorted(place.glob("*.nc"))]
+            for path, target in [*targets, *abandoned(place)]:
+                name = target.relative_to(folder).as_posix()
+                is_own = path.is_file() and not path.is_symlink() and _NAMED.fullmatch(name)
+                if is_own and target not in wanted:
+                    found.append(path)
     return found
 
 

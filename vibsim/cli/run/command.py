@@ -11,7 +11,6 @@ from collections.abc import Iterator, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
-from tempfile import TemporaryDirectory
 
 from vibsim.cli import failure, outcome_text, results_folder, terminal
 from vibsim.cli.chosen_plans import plans_of, tell_notes
@@ -22,7 +21,8 @@ from vibsim.cli.run import changes, executor, junit, lock, outcome, reasons, sna
 from vibsim.cli.run.executor import Executor
 from vibsim.cli.run.snakemake import Job, Progress
 from vibsim.core import private_cache
-from vibsim.core.errors import VibsimError
+from vibsim.core.errors import FileError, VibsimError
+from vibsim.core.temporary import temporary_folder
 from vibsim.plan import Plan
 
 _STAGES = 4
@@ -49,9 +49,11 @@ def _run(options: Namespace) -> int:
     check_allowed(plans, options.allow_commands)
     results_folder.check(results, [plan.key for plan in plans])
     where = executor.chosen(options, plans, results)
-    if options.allow_commands:
-        # on the command line alone: what a file says is not heard
-        where = replace(where, arguments=["--config", "allow_commands=true", *where.arguments])
+    # on the command line: a profile has its own, and that programs may run is not heard from a file
+    config = [f"{key}={value}" for key, value in where.config.items()]
+    config += ["allow_commands=true"] * options.allow_commands
+    if config:
+        where = replace(where, arguments=["--config", *config, *where.arguments])
     if options.detail != "quiet":
         tell_notes(plans)
     if options.dry_run and options.junit:
@@ -70,7 +72,7 @@ def _run(options: Namespace) -> int:
     progress = None if is_quiet else Progress()
     jobs: list[Job] = []
     for _ in range(_STAGES):
-        ended = snakemake.run(plans, results, held, where, progress)
+        ended = _workflow(plans, results, held, where, progress)
         if ended.jobs:
             _refuse_edited(plans, options)
         summaries = [outcome.collect(plan, results) for plan in plans]
@@ -78,9 +80,25 @@ def _run(options: Namespace) -> int:
             progress.clear()
         jobs.extend(ended.jobs)
         changes.settle(plans, results, (path for job in ended.jobs for path in job.outputs))
+        for error in () if ended.status else changes.stale(plans, results):
+            results_folder.delete(error, results)
         if not _tell_deleted(results):
             break
     return _show(options, plans, summaries, ended, results, bool(jobs))
+
+
+def _workflow(
+    plans: Sequence[Plan],
+    results: Path,
+    held: int,
+    where: Executor,
+    progress: Progress | None = None,
+) -> snakemake.Outcome:
+    """Run Snakemake, once more where its own records end it: what they say, the manifest says as well."""
+    ended = snakemake.run(plans, results, held, where, progress)
+    if ended.broke and results_folder.forget(results):
+        return snakemake.run(plans, results, held, where, progress)
+    return ended
 
 
 def _clear(plans: Sequence[Plan], results: Path, options: Namespace) -> None:
@@ -127,7 +145,7 @@ def _dry_run(plans: Sequence[Plan], results: Path, where: Executor, options: Nam
     """Show the jobs; a results folder that does not exist yet is not made for that."""
     with ExitStack() as stack:
         if not results.exists():
-            results = Path(stack.enter_context(TemporaryDirectory(prefix="vibsim-")))
+            results = stack.enter_context(temporary_folder())
         held = lock.hold(results)
         lock.claim(plans, results, dry_run=True)
         bad = changes.changed(plans, results, every=options.verify)
@@ -135,12 +153,10 @@ def _dry_run(plans: Sequence[Plan], results: Path, where: Executor, options: Nam
             print(f"vibsim: would be deleted and made again: {error}", file=sys.stderr)
         for path in changes.leftovers(plans, results):
             print(f"vibsim: would be removed, no longer asked for: {path}", file=sys.stderr)
-        arguments = [*where.arguments, "--dry-run"]
-        if bad:
-            paths = dict.fromkeys(error.path.relative_to(results).as_posix() for error in bad)
-            arguments += ["--forcerun", *paths]
-        ended = snakemake.run(plans, results, held, replace(where, arguments=arguments))
-        _check(ended)
+        ended = _shown(plans, results, held, where, bad)
+        known = {results / path for job in ended.jobs for path in job.outputs}
+        if missed := [e for e in changes.stale(plans, results) if e.path not in known]:
+            ended = _shown(plans, results, held, where, [*bad, *missed])
         jobs = list(_one_by_one(ended.jobs, plans, results))
         words = list(reasons.in_words(jobs, plans, results))
     if options.json:
@@ -151,6 +167,19 @@ def _dry_run(plans: Sequence[Plan], results: Path, where: Executor, options: Nam
     elif options.detail != "quiet":
         print(*words or ["nothing to do"], sep="\n")
     return 0
+
+
+def _shown(
+    plans: Sequence[Plan], results: Path, held: int, where: Executor, bad: Sequence[FileError]
+) -> snakemake.Outcome:
+    """Ask Snakemake what it would do, if these files were not there."""
+    arguments = [*where.arguments, "--dry-run"]
+    if bad:
+        paths = dict.fromkeys(error.path.relative_to(results).as_posix() for error in bad)
+        arguments += ["--forcerun", *paths]
+    ended = _workflow(plans, results, held, replace(where, arguments=arguments))
+    _check(ended)
+    return ended
 
 
 def _one_by_one(jobs: Sequence[Job], plans: Sequence[Plan], results: Path) -> Iterator[Job]:
@@ -167,7 +196,7 @@ def _one_by_one(jobs: Sequence[Job], plans: Sequence[Plan], results: Path) -> It
 
 def _check(ended: snakemake.Outcome) -> None:
     """Refuse to go on where Snakemake itself failed, rather than one of its jobs."""
-    if ended.status and not ended.failed:
+    if ended.broke:
         raise VibsimError(f"the workflow failed: {ended.cause} {failure.save_text(ended.text)}")
 
 
@@ -180,7 +209,9 @@ def _show(
     worked: bool,
 ) -> int:
     _check(ended)
-    failures = [outcome.failed_job(str(job), results / job.log, results) for job in ended.failed]
+    failures = [
+        outcome.failed_job(str(job), results / job.log, results, job.reason) for job in ended.failed
+    ]
     has_index = not failures or _write_index(results)
     status = outcome.status(summaries, failures)
     if options.junit:

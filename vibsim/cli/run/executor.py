@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from argparse import Namespace
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -13,15 +12,17 @@ from pkgutil import iter_modules
 from vibsim.cli import resources
 from vibsim.cli.jobs.common import refusal
 from vibsim.core.errors import nearest
+from vibsim.core.home import home
+from vibsim.core.processes import usable_cores
 from vibsim.plan import Plan
 
 PLUG_IN = "snakemake_executor_plugin_"
 PROFILES = ("config.yaml", "config.v8+.yaml", "config.v9+.yaml")
 """Names that the file of a profile may have."""
-OVERHEAD = 500
-"""Megabytes for the executor's own processes beside a job: 140 in a batch step of SLURM, 350 in a job step."""
-RETRIES = 2
-"""How often a job is tried again, with more memory each time, where a scheduler may have killed it."""
+SHIPPED = ("slurm", "generic")
+"""The profiles in ``workflow/profiles``: one for the executor of its name, and one for any other."""
+CONFIGURED = ("cores", "overhead")
+"""What a profile configures of vibsim: the cores of a job, and the megabytes of the executor's processes beside it."""
 
 
 @dataclass(frozen=True)
@@ -48,25 +49,49 @@ def chosen(options: Namespace, plans: Sequence[Plan], results: Path) -> Executor
         if options.jobs:
             raise refusal("--jobs", options.jobs, "belongs to --executor", "give --cores")
         resources.check(plans, results)
-        cores = str(options.cores or len(os.sched_getaffinity(0)))
+        allowed = str(options.cores or usable_cores())
         memory = f"mem_mb={resources.megabytes(plans)}"
-        return Executor(["--cores", cores, "--resources", memory, *options.handed])
+        return Executor(["--cores", allowed, "--resources", memory, *options.handed])
     arguments: list[str] = []
     if name:
         _check_name(name)
-        if not options.jobs and not profile:
-            raise refusal("--executor", name, "needs --jobs N", "the jobs that it has at once")
         arguments += ["--executor", name]
+    shipped = home() / "workflow/profiles"
+    folder = shipped / (name if name in SHIPPED else "generic")
     if profile:
-        if not any((profile / file).is_file() for file in PROFILES):
-            rule = f"must be a folder with the file {PROFILES[0]}"
-            raise refusal("--profile", profile, rule)
-        arguments += ["--profile", str(profile.absolute())]
+        folder = _folder(profile, shipped)
+    arguments += ["--profile", str(folder)]
     if options.jobs:
         arguments += ["--jobs", str(options.jobs)]
-    arguments += ["--retries", str(RETRIES), *options.handed]
-    config = {"cores": options.cores or 1, "overhead": OVERHEAD}
-    return Executor(arguments, config, is_remote=True)
+    config = _configured(shipped / "generic") | _configured(folder)
+    if options.cores:
+        arguments += ["--cores", str(options.cores)]
+        config["cores"] = options.cores
+    return Executor([*arguments, *options.handed], config, is_remote=True)
+
+
+def _folder(profile: Path, shipped: Path) -> Path:
+    """Return the folder of a profile that is named: a folder, else the shipped one of that name."""
+    found = [profile.absolute(), *([shipped / profile] if str(profile) in SHIPPED else [])]
+    for folder in found:
+        if any((folder / file).is_file() for file in PROFILES):
+            return folder
+    rule = f"must be {' or '.join(SHIPPED)}, or a folder with the file {PROFILES[0]}"
+    raise refusal("--profile", profile, rule)
+
+
+def _configured(folder: Path) -> dict[str, int]:
+    """Return what the profile in a folder configures of vibsim, as a mapping or as ``KEY=VALUE``."""
+    import yaml
+
+    file = next(folder / name for name in PROFILES if (folder / name).is_file())
+    try:
+        found = (yaml.safe_load(file.read_text()) or {}).get("config") or {}
+        pairs = found.items() if isinstance(found, dict) else (row.split("=", 1) for row in found)
+        return {key: int(value) for key, value in pairs if key in CONFIGURED}
+    except (OSError, ValueError, AttributeError, TypeError, yaml.YAMLError) as error:
+        rule = f"cannot be read: {' and '.join(CONFIGURED)} in `config` must be whole numbers"
+        raise refusal("--profile", file, rule, str(error).splitlines()[0]) from None
 
 
 def _check_name(name: str) -> None:

@@ -11,13 +11,13 @@ from __future__ import annotations
 
 import errno
 import fcntl
+import hashlib
 import json
 import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
-from typing import Any
 
 from vibsim.cli.run import supervise
 from vibsim.core import regular_files
@@ -113,7 +113,7 @@ def claim(plans: Sequence[Plan], results: Path, *, dry_run: bool = False) -> Non
     if now != known and not dry_run:
         # Results on a read-only medium keep what they have.
         with suppress(OSError):
-            write_text(record, json.dumps(now, indent=1) + "\n")
+            write_text(record, _text(now))
 
 
 def _source(plan: Plan, results: Path) -> Source:
@@ -129,13 +129,17 @@ def _file(word: str) -> str:
 
 
 def _load(record: Path) -> dict[str, Source]:
+    """Return what is on record; nothing where it is damaged, rather than a file that has nothing to do with it."""
     try:
-        data: Any = json.loads(record.read_bytes())
-    except (OSError, ValueError, RecursionError):
+        text = record.read_text(encoding="utf-8")
+        known = {
+            key: (str(file), str(same)) for key, (file, same) in json.loads(text)["sources"].items()
+        }
+    except (OSError, ValueError, RecursionError, KeyError, TypeError, AttributeError):
         return {}
-    known = {}
-    for key, found in data.items() if isinstance(data, dict) else ():
-        match found:
-            case [str(file), str(relative)] if file and relative:
-                known[key] = file, relative
-    return known
+    return known if text == _text(known) else {}
+
+
+def _text(sources: Mapping[str, Source]) -> str:
+    digest = hashlib.sha256(json.dumps(sources).encode()).hexdigest()
+    return json.dumps({"digest": digest, "sources": sources}, indent=1) + "\n"

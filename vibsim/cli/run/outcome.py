@@ -39,13 +39,14 @@ def collect(plan: Plan, results: Path) -> Entry:
     }
 
 
-def failed_job(job: str, log: Path, results: Path) -> Entry:
-    """Return a job that failed, with the end of its log."""
+def failed_job(job: str, log: Path, results: Path, reason: str = "") -> Entry:
+    """Return a job that failed, with the end of its log and the `reason` of its executor."""
     try:
         lines = log.read_text(errors="replace").splitlines()
     except OSError:
         lines = []
     tail = [line for line in lines if line.strip()][-_LOG_LINES:]
+    tail += [reason] * bool(reason)
     # a job on a full disk cannot say so in its log
     return {"job": job, "log": str(log), "tail": tail or resources.obstacle(results)}
 

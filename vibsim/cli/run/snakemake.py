@@ -11,14 +11,14 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterable, Sequence
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from threading import Thread
 from typing import Any, BinaryIO
 
 from vibsim.cli import resources, results_folder
-from vibsim.cli.run import lock, supervise
+from vibsim.cli.run import lock, pending, supervise
 from vibsim.cli.run.executor import Executor
 from vibsim.core import private_cache
 from vibsim.core.errors import VibsimError
@@ -46,7 +46,7 @@ class Job:
     """The files that it makes, from the results folder."""
     log: str
     reason: str
-    """Why it is to run."""
+    """Why it is to run; of one that failed, what its executor says of that, if anything."""
 
     @property
     def simulates(self) -> bool:
@@ -138,6 +138,11 @@ class Outcome:
     """What Snakemake wrote for people."""
 
     @property
+    def broke(self) -> bool:
+        """Whether Snakemake itself failed, rather than one of its jobs."""
+        return bool(self.status and not self.failed)
+
+    @property
     def cause(self) -> str:
         """The exception with what it says in a line; where none was logged, the last line that was written."""
         lines = [line.strip() for line in (self.message or self.text).splitlines() if line.strip()]
@@ -213,7 +218,10 @@ def run(
         reader = Thread(target=_read, args=(process.stdout, text), daemon=True)
         reader.start()
         try:
-            ended = follow(events, progress)
+            with ExitStack() as stack:
+                if progress and where.is_remote:
+                    stack.enter_context(pending.told(results, progress.clear))
+                ended = follow(events, progress)
             ended.status = _status(process)
         except supervise.Interrupted:
             if where.is_remote:
@@ -262,9 +270,16 @@ def _take(event: dict[str, Any], found: Outcome, progress: Progress | None) -> N
         # the target of all is no job
         case {"rule_name": rule} if rule != "all":
             outputs = tuple(path.removesuffix(" (update)") for path in event["output"])
-            job = Job(rule, outputs, ", ".join(event["log"]), event.get("reason", ""))
+            # behind its own log stands that of its executor
+            log = "".join(event["log"][:1])
+            job = Job(rule, outputs, log, event.get("reason") or event.get("rule_msg") or "")
+            failed = [one for one in found.failed if one.outputs == job.outputs]
             if event["event"] == "job_error":
                 found.failed.append(job)
+                return
+            if failed:
+                # it is tried again
+                found.failed = [one for one in found.failed if one not in failed]
                 return
             found.jobs.append(job)
             if progress:

@@ -1,8 +1,8 @@
 """A command in two processes: one works, and the other ends it when it is told to, however busy it is.
 
 The first process takes signals only where it waits for them, so that none arrives at a wrong moment. It asks the
-worker to end, and kills it when it does not. Each process of a run ends with the one that started it, by a signal
-that the kernel sends (``PR_SET_PDEATHSIG``): whoever is killed, nothing works on, and the lock of the results
+worker to end, and kills it when it does not. Each process of a run ends with the one that started it, as
+`vibsim.core.processes` says: whoever is killed, nothing works on, and the lock of the results
 folder is free.
 """
 
@@ -19,10 +19,15 @@ from collections.abc import Callable
 from contextlib import suppress
 from typing import NoReturn
 
-from vibsim.core.processes import adopt_orphans, end_with
+from vibsim.core.processes import (
+    ENDS,
+    adopt_orphans,
+    as_worker_of,
+    end_with,
+    heeded,
+    wait_for_signal,
+)
 
-ENDS = (signal.SIGHUP, signal.SIGINT, signal.SIGTERM)
-"""Signals that ask a command to end."""
 _GRACE = 3.0
 """Seconds that a worker has to end by itself, and then its children."""
 _PARENT = "VIBSIM_PARENT"
@@ -45,7 +50,7 @@ def supervised(work: Work) -> int:
     """
     if parent := os.environ.pop(_PARENT, ""):
         return _as_child(int(parent), work)
-    ends = _heeded()
+    ends = heeded()
     signal.signal(signal.SIGCHLD, signal.SIG_DFL)
     before = signal.pthread_sigmask(signal.SIG_BLOCK, ends | {signal.SIGCHLD})
     adopt_orphans()
@@ -76,7 +81,7 @@ def end_at_once() -> None:
     The signals are blocked in every thread but one, which does nothing else than wait for them: a handler would
     run in the middle of whatever the main thread does, locks held.
     """
-    ends = _heeded()
+    ends = heeded()
     signal.pthread_sigmask(signal.SIG_BLOCK, ends)
 
     def wait() -> None:
@@ -90,7 +95,7 @@ def end_in_order() -> None:
 
     Snakemake then cancels what it has submitted. Further requests must not disturb that.
     """
-    ends = _heeded()
+    ends = heeded()
     signal.pthread_sigmask(signal.SIG_BLOCK, ends)
     signal.signal(signal.SIGUSR1, signal.default_int_handler)
 
@@ -130,18 +135,9 @@ _supervisor = 0
 _request = 0
 
 
-def _heeded() -> set[signal.Signals]:
-    """Return the signals that end this process: those that it was started to ignore (``nohup``) stay ignored."""
-    return {number for number in ENDS if signal.getsignal(number) is not signal.SIG_IGN}
-
-
 def _as_child(parent: int, work: Work) -> int:
     """Work as a job of a run, which a signal ends on the spot: its files appear whole or not at all."""
-    ends = _heeded()
-    for number in ends:
-        signal.signal(number, signal.SIG_DFL)
-    signal.pthread_sigmask(signal.SIG_UNBLOCK, ends)
-    end_with(parent)
+    as_worker_of(parent)
     return work()
 
 
@@ -183,15 +179,15 @@ def _watch(worker: int, ends: set[signal.Signals]) -> tuple[int, int]:
     asked, deadline = 0, 0.0
     while True:
         left = max(deadline - time.monotonic(), 0) if asked else 3600.0
-        found = signal.sigtimedwait(ends | {signal.SIGCHLD}, left)
+        found = wait_for_signal(ends | {signal.SIGCHLD}, left)
         if (status := _ended(worker)) is not None:
             return status, asked
-        if found and found.si_signo == signal.SIGCHLD:
+        if found == signal.SIGCHLD:
             continue
         if found and not asked:
-            asked, deadline = found.si_signo, time.monotonic() + max(_GRACE, _asked_for())
+            asked, deadline = found, time.monotonic() + max(_GRACE, _asked_for())
             os.kill(worker, signal.SIGTERM)
-        elif asked:
+        elif asked and (found or time.monotonic() >= deadline):
             # out of time, or asked again
             os.kill(worker, signal.SIGKILL)
 

@@ -23,7 +23,8 @@ rows share, this is a power of one ratio (see `hypotheses.Table`). Three kinds o
 - *no expansion*: every row has a size of its own, all of them or up to one behind which all rows are noise.
 
 Rows before a window are coarse levels that the expansion does not reach: each has a size of its own, for the price
-`PRICE`. Rows behind it are noise that grows as the steps shrink; noise as large as its prediction costs least.
+`PRICE`. Rows behind it are noise that grows as the steps shrink; noise as large as its prediction costs least, and
+noise that is smaller than what the expansion leaves there is improbable (`posterior._Fit.hidden`).
 
 Hypotheses whose evidence is known to be next to nothing are not weighed: whole tables by the size of the last row, and
 groups of hypotheses by one quadratic form: where a covariance C exceeds all theirs, ``tr(K^-1 G) >= tr(C^-1 G)``.

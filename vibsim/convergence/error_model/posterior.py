@@ -13,6 +13,7 @@ from vibsim.convergence.error_model import priors
 from vibsim.convergence.error_model.hypotheses import (
     Promise,
     Table,
+    between,
     hypotheses_of,
     noise_of_rows,
     two_powers,
@@ -56,6 +57,16 @@ class Ladder:
     def points(self) -> Floats:
         """Independent points, shape (ladder,)."""
         return np.where(self.numbers, 1.0, priors.POINTS)
+
+    def some(self, rows: Integers) -> Ladder:
+        """Return some of the ladders."""
+        parts = {name: getattr(self, name)[rows] for name in ("gram", "floor", "numbers")}
+        return replace(self, **parts)
+
+    def without_exact(self) -> Ladder:
+        """Return what the levels alone say, where the exact solution is known."""
+        m = len(self.h) - 1
+        return replace(self, gram=self.gram[:, :m, :m], exact_known=False)
 
 
 @dataclass
@@ -183,6 +194,7 @@ class _Fit:
         rest += noise(
             ladder.h[end:], self.differences[:, end:, end:], self.points, ladder.floor[:, end:]
         )
+        rest += self.hidden(end)
         smallest = self.differences[:, end - 1, end - 1]
         sizes = ladder.h[start : end + 1] / ladder.h[end]
         inside, behind = self.rows(start, end), np.empty((len(rest), 0))
@@ -269,6 +281,21 @@ class _Fit:
             found[:, count - 1, count] -= self.rounding[:, end]
             found[:, count, count - 1] -= self.rounding[:, end]
         return found
+
+    def hidden(self, end: int) -> Floats:
+        """Return the log of how likely noise hides what an expansion leaves behind the window that ends at a level.
+
+        A difference of which D is expected is as small as noise of the size s < D with the probability ``(s/D)^N``. D
+        falls by the order of the finest levels of the window; where they have none, nothing is expected.
+        """
+        sizes = self.ladder.h[end - 1 :] / self.ladder.h[end]
+        order = np.clip(self.orders[:, end - 2, None], priors.POWERS[0], priors.HIGHEST)
+        falls = between(sizes**order)
+        own = np.sqrt(np.diagonal(self.differences, axis1=1, axis2=2)[:, end - 1 :])
+        expected = np.maximum(own[:, :1] * falls[:, 1:] / falls[:, :1], TINY)
+        seen = np.max(own[:, 1:], axis=-1, initial=0.0)
+        size = np.maximum(seen, self.ladder.floor[:, end])[:, None]
+        return np.asarray(self.points * np.sum(np.fmin(np.log(size / expected), 0.0), axis=-1))
 
     def behind(self, start: int, end: int) -> Floats:
         """Return what `kernel` reads of the differences behind a window."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 
@@ -10,14 +11,12 @@ from vibsim.convergence.differences import order_of_differences
 from vibsim.convergence.study.common_points import CommonValues
 from vibsim.convergence.study.outcomes import FEWEST, Outcome, Question
 from vibsim.convergence.study.refinement import Refinement
-from vibsim.convergence.study.sentences import Facts, describe
+from vibsim.convergence.study.sentences import Setting, describe
 from vibsim.convergence.study.verdict import LadderVerdict
 from vibsim.convergence.study.verdict_data import Level
+from vibsim.convergence.thresholds import GCI_TRUSTED
 from vibsim.core.array_types import Floats
 from vibsim.core.vocabulary import ORDER_TOLERANCE, REASONS
-
-GCI_FACTOR = 1.25
-"""Safety factor of the grid convergence index of three levels and more."""
 
 
 def verdict(
@@ -34,56 +33,24 @@ def verdict(
     h, (values, dims) = steps.h, shown
     hidden = _hidden(question, common, one)
     reason = "not_applicable" if hidden else one.reason
-    status = REASONS[reason]
     best = _known(float(one.best[0])) if one.best is not None and not dims else None
-    best_bound = _best_bound(one, best)
     size = one.size if one.size > 0.0 else np.nan
-    relative = abs(one.error) / size
-    used = tuple(h[list(one.used)].tolist())
-    broken = tuple(h[np.isnan(one.values)].tolist())
-    facts = Facts(
+    found = LadderVerdict(
         quantity=question.quantity,
-        status=status,
+        status=REASONS[reason],
         reason=reason,
-        h=tuple(h.tolist()),
         order=_known(one.order),
-        low=_known(one.low),
-        high=_known(one.high),
-        expected=question.order,
-        at_least=question.at_least,
+        order_low=_known(one.low),
+        order_high=_known(one.high),
+        h_used=tuple(h[list(one.used)].tolist()),
         error=_known(one.error),
         error_bound=_known(one.error_bound),
-        relative_error=_known(relative),
+        relative_error=_known(abs(one.error) / size),
         best=best,
-        best_bound=best_bound,
-        is_exact_known=one.exact_known,
-        is_number=one.is_number,
-        has_noise=bool(question.noise),
-        not_finite=broken,
-        sizes=steps.names,
-        is_proportional=steps.is_proportional,
-        interpolation=(common.kind, common.interpolation_order or 0) if hidden else None,
-        notes=common.notes,
-        parts=common.parts,
-        is_constant=len(one.finite) > 1 and not np.any(one.differences),
-    )
-    sentence, advice = describe(facts)
-    return LadderVerdict(
-        quantity=question.quantity,
-        status=status,
-        reason=reason,
-        order=facts.order,
-        order_low=facts.low,
-        order_high=facts.high,
-        h_used=used,
-        error=facts.error,
-        error_bound=facts.error_bound,
-        relative_error=facts.relative_error,
-        best=best,
-        best_bound=best_bound,
+        best_bound=_best_bound(one, best),
         gci=_known(_gci(one, h)),
-        sentence=sentence,
-        advice=advice,
+        sentence="",
+        advice="",
         levels=tuple(_table(one, h)),
         expected=question.order,
         at_least=question.at_least,
@@ -94,6 +61,16 @@ def verdict(
         values=values,
         best_values=None if one.best is None else one.best.reshape(values.shape[1:]),
     )
+    setting = Setting(
+        noise=question.noise or 0.0,
+        sizes=steps.names,
+        is_proportional=steps.is_proportional,
+        interpolation=(common.kind, common.interpolation_order or 0) if hidden else None,
+        notes=common.notes,
+        parts=common.parts,
+    )
+    sentence, advice = describe(found, setting)
+    return replace(found, sentence=sentence, advice=advice)
 
 
 def _known(value: float) -> float | None:
@@ -134,7 +111,7 @@ def _gci(one: Outcome, h: Floats) -> float:
     ratio = h[one.finite[-2]] / h[one.finite[-1]]
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         relative = np.abs(one.differences[-1]) / np.float64(one.size)
-        return float(GCI_FACTOR * relative / np.expm1(one.order * np.log(ratio)))
+        return float(GCI_TRUSTED * relative / np.expm1(one.order * np.log(ratio)))
 
 
 def _table(one: Outcome, h: Floats) -> Iterator[Level]:

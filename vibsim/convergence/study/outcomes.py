@@ -6,9 +6,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from vibsim.convergence.assessment import NOISE_FACTOR, STATED_NOISE_FACTOR, Assessment, assess
+from vibsim.convergence.assessment import Assessment, assess
 from vibsim.convergence.differences import order_of_differences
 from vibsim.convergence.study.measurement import Measurement, finite_levels, measurement
+from vibsim.convergence.thresholds import NOISE_FACTOR, STATED_NOISE_FACTOR
 from vibsim.core.array_types import Flags, Floats, Integers
 from vibsim.core.vocabulary import ORDER_TOLERANCE, REASON_NAMES
 
@@ -188,12 +189,12 @@ def _decided(
 ) -> Outcome:
     """Add what was decided of member `k`."""
     scale = float(measured.scale[k])
-    estimate = _estimate(one, measured.ladder.h, decided, k)
+    one = replace(one, reason=REASON_NAMES[int(decided.reason[k])])
+    order, used, weights = _estimate(one, measured.ladder.h, decided, k)
     # added up one by one, so that a member has the same digits alone and among others
     best: Floats | None = None
-    if np.isfinite(estimate.weights).all():
-        best = sum((w * row for w, row in zip(estimate.weights, part, strict=True)), 0.0 * part[0])
-    used = one.finite[estimate.first : estimate.last + 1] if estimate.first >= 0 else ()
+    if np.isfinite(weights).all():
+        best = sum((w * row for w, row in zip(weights, part, strict=True)), 0.0 * part[0])
     error, bound, errors = one.error, one.error_bound, one.errors
     if not one.exact_known:
         error, bound = float(decided.error[k]) * scale, float(decided.error_bound[k]) * scale
@@ -204,11 +205,10 @@ def _decided(
                 error = -error
     return replace(
         one,
-        reason=REASON_NAMES[int(decided.reason[k])],
-        order=estimate.order,
+        order=order,
         low=float(decided.low[k]),
         high=float(decided.high[k]),
-        used=tuple(map(int, used)),
+        used=tuple(one.finite[used].tolist()),
         error=error,
         error_bound=bound,
         errors=errors,
@@ -217,25 +217,16 @@ def _decided(
     )
 
 
-@dataclass(frozen=True)
-class _Estimate:
-    """An order, the first and last position of its levels (-1 for none), and the weights of the extrapolation."""
+def _estimate(one: Outcome, h: Floats, decided: Assessment, k: int) -> tuple[float, slice, Floats]:
+    """Return the order of member `k`, the places of its levels, and the weights of the extrapolation.
 
-    order: float
-    first: int
-    last: int
-    weights: Floats
-
-
-def _estimate(one: Outcome, h: Floats, decided: Assessment, k: int) -> _Estimate:
-    """Return what was decided of member `k`; where no order may be believed, that of the finest three levels with one.
-
-    The verdict says that such an estimate is not to be trusted.
+    Where no order may be believed, they are those of the finest three levels that have one. The verdict says that such
+    an estimate is not to be trusted.
     """
     order, weights = float(decided.order[k]), decided.weights[k]
     first, last = int(decided.first[k]), int(decided.last[k])
-    if REASON_NAMES[int(decided.reason[k])] == "exact":
-        return _Estimate(order, first, last, weights)
+    if one.reason == "exact":
+        return order, slice(first, last + 1), weights
     if not np.isfinite(order):
         for i in range(len(one.ratios) - 1, -1, -1):
             order = float(order_of_differences(one.ratios[i], h[i : i + 3]))
@@ -247,4 +238,4 @@ def _estimate(one: Outcome, h: Floats, decided: Assessment, k: int) -> _Estimate
         part = 1.0 / np.expm1(order * np.log(h[fine - 1] / h[fine]))
         weights = np.zeros(len(h))
         weights[[fine - 1, fine]] = -part, 1.0 + part
-    return _Estimate(order, first, last, weights)
+    return order, slice(first, last + 1), weights

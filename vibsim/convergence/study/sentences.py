@@ -9,54 +9,41 @@ from itertools import pairwise
 from types import MappingProxyType
 from typing import Any
 
+from vibsim.convergence.study.verdict_data import VerdictData
 from vibsim.core.vocabulary import ORDER_TOLERANCE
 
 
 @dataclass(frozen=True)
-class Facts:
-    """What the words on a ladder are made from; numbers are None where there are none."""
+class Setting:
+    """What the words on a ladder are made from beside the facts of its verdict."""
 
-    quantity: str
-    status: str
-    reason: str
-    h: tuple[float, ...]
-    """Of all levels, the coarsest first."""
-    order: float | None = None
-    low: float | None = None
-    high: float | None = None
-    expected: float | None = None
-    at_least: float | None = None
-    error: float | None = None
-    error_bound: float | None = None
-    relative_error: float | None = None
-    best: float | None = None
-    best_bound: float | None = None
-    is_exact_known: bool = False
-    is_number: bool = True
-    has_noise: bool = False
-    """Whether the user stated the noise of the levels."""
-    not_finite: tuple[float, ...] = ()
-    """Step sizes of the levels that are not finite."""
+    noise: float = 0.0
+    """Noise of the levels, as the user states it."""
     sizes: tuple[str, ...] = ("h",)
+    """Names of the sizes that are refined together."""
     is_proportional: bool = True
+    """Whether all of them are proportional to the first."""
     interpolation: tuple[str, int] | None = None
     """Kind and order of an interpolation that hides the order."""
     notes: tuple[str, ...] = ()
     """What else may be wrong, where it does not pass."""
     parts: tuple[str, ...] = ()
     """Which part of the points is compared."""
-    is_constant: bool = False
-    """Whether all levels are the same, to the last digit."""
 
 
 PLAIN_DIGITS = 5
 """Whole numbers of so many digits are written without a power of ten."""
 MOST_DIGITS = 12
 """Of an extrapolated number in a sentence."""
+NOISE_SEEN = 4.0
+"""A difference of two levels that is larger than so many times their noise is hardly noise."""
+BEYOND_ROUND_OFF = 1e-10
+"""A difference that is a larger part of the values is no round-off."""
 LOOK_FOR = (
     "Look for a part of lower order, such as the first step, a formula at a boundary, a limiter, or an iteration that "
     "stops too early"
 )
+NOT_FINER = "Use coarser levels, or compute {quantity} with less noise."
 SENTENCES: Mapping[str, tuple[str, str]] = MappingProxyType(
     {
         "asymptotic": ("{quantity} converges with order {order}{as_expected}.", ""),
@@ -76,7 +63,8 @@ SENTENCES: Mapping[str, tuple[str, str]] = MappingProxyType(
         "mismatch": ("{quantity} is not as expected.", "Compare the expectation with the levels."),
         "wrong_limit": (
             "The levels of {quantity} approach each other, but not the exact {value}.",
-            "Check the equation, its parameters and conditions, and the exact {value}. Finer levels will not help.",
+            "Check the solver's code, the equation, its parameters and conditions, and the exact {value}. Finer levels "
+            "will not help.",
         ),
         "unstable": (
             "{quantity} grows from level to level instead of approaching a limit.",
@@ -90,6 +78,11 @@ SENTENCES: Mapping[str, tuple[str, str]] = MappingProxyType(
             "The levels of {quantity} do not show a settled order yet{estimate}.",
             "Add a finer level, such as {size} = {finer}.",
         ),
+        "noisy": (
+            "The finest levels of {quantity} differ by little more than {noise}, so they do not show a settled order"
+            "{estimate}.",
+            NOT_FINER,
+        ),
         "growing": (
             "The differences of {quantity} grow towards the finer levels{estimate}.",
             "Check that {size} is a step size, not a number of cells or steps. If it is a step size, add a finer "
@@ -97,7 +90,7 @@ SENTENCES: Mapping[str, tuple[str, str]] = MappingProxyType(
         ),
         "round_off": (
             "The differences of {quantity} have reached {floor}, so they do not show its order{estimate}.",
-            "Use coarser levels, or compute {quantity} with less noise.",
+            NOT_FINER,
         ),
         "oscillating": (
             "The differences of {quantity} change sign from level to level, so no order can be read from them.",
@@ -122,39 +115,49 @@ SENTENCES: Mapping[str, tuple[str, str]] = MappingProxyType(
         ),
     }
 )
-"""Reason to the templates of sentence and advice; ``interpolation`` is a case of ``not_applicable``, ``growing`` one of
-``pre_asymptotic``."""
+"""Reason to the templates of sentence and advice; ``interpolation`` is a case of ``not_applicable``, ``growing`` and
+``noisy`` are cases of ``pre_asymptotic``."""
 
 
-def describe(facts: Facts) -> tuple[str, str]:
+def describe(facts: VerdictData, setting: Setting) -> tuple[str, str]:
     """Return the sentence on a ladder, and the advice; the advice on one that passed is empty."""
-    key = "interpolation" if facts.interpolation else facts.reason
-    if key == "pre_asymptotic" and facts.order is not None and facts.order < 0.0:
+    key = "interpolation" if setting.interpolation else facts.reason
+    if key == "pre_asymptotic" and _is_noise_seen(facts, setting):
+        key = "noisy"
+    elif key == "pre_asymptotic" and facts.order is not None and facts.order < 0.0:
         key = "growing"
-    phrases = _phrases(facts)
+    phrases = _phrases(facts, setting)
     sentence, advice = (template.format_map(phrases) for template in SENTENCES[key])
     more = [
         _higher_part(facts),
         _interval(facts),
         _error(facts),
         _best(facts),
-        _together(facts),
-        *facts.parts,
-        _constant(facts),
+        _together(setting),
+        *setting.parts,
+        _finer(facts),
+        _copies(facts),
     ]
     if facts.status == "PASS":
         return _joined([sentence, *more]), ""
-    return _joined([sentence, *more]), _joined([advice, *facts.notes])
+    return _joined([sentence, *more]), _joined([advice, *setting.notes])
+
+
+def _is_noise_seen(facts: VerdictData, setting: Setting) -> bool:
+    """Say whether the finest difference may be the stated noise: a finer level would show no more."""
+    finest = facts.levels[-2:][0].difference
+    return finest is not None and abs(finest) <= NOISE_SEEN * setting.noise
 
 
 def _joined(parts: Sequence[str]) -> str:
     return " ".join(part for part in parts if part)
 
 
-def _phrases(facts: Facts) -> dict[str, Any]:
-    kind, own = facts.interpolation or ("", 0)
-    count = len(facts.h)
-    finer = facts.h[-1] * (facts.h[-1] / facts.h[-2] if count > 1 else 0.5)
+def _phrases(facts: VerdictData, setting: Setting) -> dict[str, Any]:
+    kind, own = setting.interpolation or ("", 0)
+    h, count = [level.h for level in facts.levels], len(facts.levels)
+    finer = h[-1] * (h[-1] / h[-2] if count > 1 else 0.5)
+    not_finite = [level.h for level in facts.levels if level.value is None]
     points = "Take levels that have the coarsest points in common (restrict: subset)"
     return {
         "quantity": facts.quantity,
@@ -162,14 +165,14 @@ def _phrases(facts: Facts) -> dict[str, Any]:
         "as_expected": _as_expected(facts),
         "wanted": _wanted(facts),
         "value": "value" if facts.is_number else "values",
-        "noise": "the stated noise" if facts.has_noise else "round-off",
-        "floor": "the stated noise" if facts.has_noise else "round-off or other noise",
-        "not_finite": f"{facts.sizes[0]} = {listed(facts.not_finite)}",
-        "these": "this level" if len(facts.not_finite) == 1 else "these levels",
+        "noise": "the stated noise" if setting.noise else "round-off",
+        "floor": "the stated noise" if setting.noise else "round-off or other noise",
+        "not_finite": f"{facts.size_name} = {listed(not_finite)}",
+        "these": "this level" if len(not_finite) == 1 else "these levels",
         "estimate": f" (the last estimate is {number(facts.order, 3)})"
         if facts.order is not None
         else "",
-        "size": facts.sizes[0],
+        "size": facts.size_name,
         "finer": number(finer, 3),
         "count": "One level is" if count == 1 else f"{count} levels are",
         "kind": kind,
@@ -178,17 +181,19 @@ def _phrases(facts: Facts) -> dict[str, Any]:
     }
 
 
-def order_with_interval(facts: Facts) -> str:
+def order_with_interval(facts: VerdictData) -> str:
     """Write an order with its interval, ``2.00 (1.97 to 2.03)``."""
     if facts.order is None:
         return "unknown"
-    if facts.low is None or facts.high is None:
+    if facts.order_low is None or facts.order_high is None:
         return f"{facts.order:.2f}"
-    places = 3 if facts.high - facts.low < 0.02 else 2
-    return f"{facts.order:.{places}f} ({facts.low:.{places}f} to {facts.high:.{places}f})"
+    places = 3 if facts.order_high - facts.order_low < 0.02 else 2
+    return (
+        f"{facts.order:.{places}f} ({facts.order_low:.{places}f} to {facts.order_high:.{places}f})"
+    )
 
 
-def _as_expected(facts: Facts) -> str:
+def _as_expected(facts: VerdictData) -> str:
     if facts.expected is not None:
         return ", as expected"
     return f", at least {facts.at_least:g} as expected" if facts.at_least is not None else ""
@@ -202,35 +207,54 @@ def higher_part(order: float, expected: float, tolerance: float) -> str:
     return f"A part of the error of higher order is still seen. It {moves} the measured order."
 
 
-def _higher_part(facts: Facts) -> str:
+def _higher_part(facts: VerdictData) -> str:
     if facts.reason != "asymptotic" or facts.expected is None or facts.order is None:
         return ""
     return higher_part(facts.order, facts.expected, ORDER_TOLERANCE)
 
 
-def _wanted(facts: Facts) -> str:
+def _wanted(facts: VerdictData) -> str:
     if facts.expected is not None:
         return f"{facts.expected:g}"
     return f"at least {facts.at_least:g}" if facts.at_least is not None else "another one"
 
 
-def _interval(facts: Facts) -> str:
+def _interval(facts: VerdictData) -> str:
     """Say between which orders the levels leave it open."""
-    if facts.reason != "pre_asymptotic" or facts.low is None or facts.high is None:
+    if facts.reason != "pre_asymptotic" or facts.order_low is None or facts.order_high is None:
         return ""
-    return f"They are consistent with orders from {facts.low:.2f} to {facts.high:.2f}."
+    if facts.order_high - facts.order_low < ORDER_TOLERANCE:
+        return f"They fit order {facts.order_low:.2f} alone, but may do so by accident."
+    return f"They are consistent with orders from {facts.order_low:.2f} to {facts.order_high:.2f}."
 
 
-def _constant(facts: Facts) -> str:
-    """Doubt levels that do not differ at all."""
-    if facts.reason != "exact" or not facts.is_constant:
+def _finer(facts: VerdictData) -> str:
+    """Say behind which level an order that was decided on is not seen."""
+    decided = facts.reason in ("asymptotic", "order_low", "order_high")
+    if not decided or not facts.h_used or facts.h_used[-1] == facts.levels[-1].h:
         return ""
-    return (
-        f"All levels are the same to the last digit. Check that the solver used {facts.sizes[0]}."
-    )
+    last = number(facts.h_used[-1], 6)
+    return f"The levels finer than {facts.size_name} = {last} do not show this order."
 
 
-def _error(facts: Facts) -> str:
+def _copies(facts: VerdictData) -> str:
+    """Doubt neighbouring levels that do not differ at all, where those beside them differ by more than round-off."""
+    levels, size = facts.levels, facts.size_name
+    sizes = [abs(level.difference or 0.0) for level in levels[:-1]]
+    if facts.reason == "exact" and sizes and not any(sizes):
+        return f"All levels are the same to the last digit. Check that the solver used {size}."
+    for i, level in enumerate(levels[:-1]):
+        beside = max([*sizes[max(i - 1, 0) : i], *sizes[i + 1 : i + 2]], default=0.0)
+        if level.difference == 0.0 and beside > BEYOND_ROUND_OFF * abs(level.value or 0.0):
+            same = listed([level.h, levels[i + 1].h])
+            return (
+                f"The levels {size} = {same} are the same to the last digit. Check that the solver used {size}, and "
+                "that no digits were cut off."
+            )
+    return ""
+
+
+def _error(facts: VerdictData) -> str:
     """Say the error of the finest level with its bound."""
     if facts.error is None:
         return ""
@@ -244,7 +268,7 @@ def _error(facts: Facts) -> str:
     return f"The error of the finest level is {size}{share}{limit}."
 
 
-def _best(facts: Facts) -> str:
+def _best(facts: VerdictData) -> str:
     """Say the extrapolated number with its bound."""
     if (
         facts.best is None
@@ -258,11 +282,11 @@ def _best(facts: Facts) -> str:
     return f"The extrapolated value is {with_bound(facts.best, facts.best_bound)}."
 
 
-def _together(facts: Facts) -> str:
+def _together(setting: Setting) -> str:
     """Say what an order counts where sizes are refined together, but not in proportion."""
-    if facts.is_proportional:
+    if setting.is_proportional:
         return ""
-    first, *others = facts.sizes
+    first, *others = setting.sizes
     verb = "is" if len(others) == 1 else "are"
     return f"The order counts powers of {first}; {listed_words(others)} {verb} refined with it, not in proportion."
 

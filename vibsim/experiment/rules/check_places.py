@@ -16,6 +16,9 @@ from vibsim.experiment.sweep_columns import Column, columns_of, matching, member
 from vibsim.experiment.value_names import Value
 from vibsim.experiment.yaml.parse import Path_
 
+FEWEST_IN_A_PERIOD = 8
+"""Stored samples in a period of a force, from which its harmonic is told."""
+
 
 @dataclass(frozen=True)
 class Scope:
@@ -44,63 +47,183 @@ class Scope:
         """Note a fault here; see `vibsim.experiment.faults.Report.add`."""
         self.report.add(self.path, rule, hint, value, at_key)
 
+    def check_scheme(self, name: str, more: tuple[str, ...] = ()) -> None:
+        """Check that a scheme of the experiment is named; `more`: other words that were right there."""
+        known = self.setting.names
+        if not known or name in known:
+            return
+        # where a scheme of the list is itself unknown, its right name may be meant
+        kinds = self.report.kinds.names("schemes")
+        if name not in kinds or all(other in kinds for other in known):
+            self.refuse("not a scheme of this experiment", nearest(name, (*known, *more)), name)
 
-def known_scheme(name: str, scope: Scope, more: tuple[str, ...] = ()) -> None:
-    """Check that a scheme of the experiment is named; `more`: other words that were right there."""
-    known = scope.setting.names
-    if not known or name in known:
-        return
-    # where a scheme of the list is itself unknown, its right name may be meant
-    kinds = scope.report.kinds.names("schemes")
-    if name not in kinds or all(other in kinds for other in known):
-        scope.refuse("not a scheme of this experiment", nearest(name, (*known, *more)), name)
+    def check_schemes(self, names: Sequence[str] | None) -> None:
+        """Check a list of schemes, each of the experiment and named once."""
+        for i, name in enumerate(names or ()):
+            self.at(i).check_scheme(name)
+            if name in (names or ())[:i]:
+                self.at(i).refuse("a scheme must not be repeated", value=name)
+
+    def check_scheme_and_case(self, at: At) -> None:
+        """Check what is the same for every value."""
+        if at.scheme is not None:
+            self.at("scheme").check_scheme(at.scheme)
+        self.at("case").check_case(at.case)
+        self.check_members(at, at.case)
+
+    def check_members(self, at: Members, case: int | None) -> None:
+        """Check that there are members with the given values, here under `at`, or in a row of a printed table."""
+        setting, here = self.setting, self.at("at") if self.path[0] == "published" else self
+        if not at.swept or not setting.knows_sweep:
+            return
+        known = [*type(at).model_fields, *setting.sweep.keys]
+        unknown = [key for key in at.swept if key not in setting.sweep.keys]
+        for key in unknown:
+            hint = nearest(key, known)
+            here.at(key).refuse("unknown key", hint, _written(at.swept[key]), at_key=True)
+        if case is not None and not unknown:
+            here.at(next(iter(at.swept))).refuse(
+                "must not be given together with case", at_key=True
+            )
+        for axis in setting.sweep.axes:
+            wanted = {key: at.swept[key] for key in axis.keys if key in at.swept}
+            columns = columns_of([axis], 0, axis.count) if wanted else {}
+            for key, value in wanted.items():
+                if not matching(columns[key], value).any():
+                    hint = _nearest_values(columns[key], value)
+                    here.at(key).refuse("not a value of the sweep", hint, _written(value))
+                    break
+            else:
+                if wanted and not members_with(columns, wanted, axis.count).any():
+                    last = list(wanted)[-1]
+                    here.at(last).refuse(f"no member has this together with {next(iter(wanted))}")
+
+    def check_case(self, case: int | None) -> None:
+        """Check that there is a member."""
+        members = self.setting.members
+        if case is not None and members is not None and case >= members:
+            there = "there is 1 case" if members == 1 else f"there are {members} cases"
+            self.refuse(f"must be at most {members - 1}", there)
+
+    def check_level(self, level: int | None, instead: str = "leave it out") -> bool:
+        """Tell whether a level, if one is given, is one of the experiment; `instead`: what helps with a tolerance."""
+        levels = self.setting.levels
+        if level is None or (not self.setting.by_tolerance and (not levels or level in levels)):
+            return True
+        if self.setting.by_tolerance:
+            self.refuse(f"a level {_NOT_YET}", instead, level)
+            return False
+        closest = min(levels, key=lambda known: abs(known - level))
+        hint = f"nearest is {closest}; levels are {', '.join(map(str, levels))}"
+        self.refuse("not a level of this experiment", hint, level)
+        return False
+
+    def check_place(self, at: At, row: Value) -> None:
+        """Check that `row` is taken where it exists."""
+        setting = self.setting
+        given = [
+            name
+            for name in At.model_fields
+            if getattr(at, name) is not None or self.at(name).is_faulty
+        ]
+        for name in given:
+            if name not in row.at:
+                hint = "it takes " + ", ".join(row.at)
+                self.at(name).refuse(f"{row.name} takes no {name}", hint, at_key=True)
+        if row.needs_time and "t" not in given and "step" not in given:
+            self.refuse(f"{row.name} needs t or step")
+        if row.needs_force:
+            self._check_force(row)
+        if "event" in row.at and "event" not in given:
+            self.refuse(f"{row.name} needs the number of an event", "e.g. event: 1")
+        if "t" in given and "step" in given:
+            self.at("step").refuse("must not be given together with t", at_key=True)
+        self.check_scheme_and_case(at)
+        if at.scheme in setting.adaptive and (row.fixed_step or at.level == "best"):
+            rule = f"{row.name} does not exist of a scheme that chooses its own steps"
+            self.at("scheme").refuse(rule, value=at.scheme)
+        level = self._level(at, row)
+        if setting.by_tolerance and at.step is not None and "step" in row.at:
+            self.at("step").refuse(f"a step {_NOT_YET}", "t can")
+        if setting.time is None or not setting.knows_sweep:
+            return
+        level = level if "t" in row.at else None
+        if at.step is not None and level is not None:
+            self.at("step")._check_step(at.step, level)
+        if at.t is not None and (level is not None or setting.by_tolerance):
+            self.at("t")._check_time(at.t, setting.time, level)
+
+    def _check_force(self, row: Value) -> None:
+        """Check that periods of a force are known, and stored with samples enough."""
+        setting, time = self.setting, self.setting.time
+        if time is None:
+            return
+        if time.frequency is None or time.periods is None:
+            rule = "is of the last period of a force, and time names no frequency"
+            hint = "give time as periods, steps_per_period and frequency, e.g. model.omega"
+            # `at` need not be written: the fault is that of the number
+            above = self.path[:2] if self.path[0] == "published" else self.path[:-1]
+            self.report.add((*above, "value"), rule, hint, row.name)
+        elif setting.levels and setting.knows_sweep:
+            coarsest = setting.levels[0]
+            kept = setting.steps(coarsest) // setting.stride(coarsest) / time.periods
+            if kept < FEWEST_IN_A_PERIOD or kept % 1.0:
+                rule = (
+                    f"{row.name} needs at least {FEWEST_IN_A_PERIOD} stored samples in every period"
+                )
+                hint = "give `samples: common`, and steps_per_period enough for the coarsest level"
+                self.refuse(rule, f"there are {kept:.4g}: {hint}")
+
+    def _level(self, at: At, row: Value) -> int | None:
+        """Check the level; return that at which times are stored, the finest by default, None where it is not known."""
+        by_tolerance, place = self.setting.by_tolerance, self.at("level")
+        levels = () if by_tolerance else self.setting.levels
+        if place.is_faulty or self.is_faulty:
+            return None
+        if at.level is None or "level" not in row.at:
+            return levels[-1] if levels else None
+        if at.level == "best":
+            if not row.best and (levels or by_tolerance):
+                place.refuse(f"{row.name} does not exist of the extrapolated solution")
+            # that solution has the times of the coarsest level
+            return levels[0] if levels else None
+        if not place.check_level(at.level, "level: best can") or not levels:
+            return None
+        finer = len(levels) - 1 - levels.index(at.level)
+        if finer < row.finer_levels:
+            word = "level" if row.finer_levels == 1 else "levels"
+            there = "there is 1" if finer == 1 else f"there are {finer or 'none'}"
+            rule = f"{row.name} needs {row.finer_levels} finer {word} beside it, {there}"
+            place.refuse(rule, value=at.level)
+        return at.level
+
+    def _check_step(self, step: int, level: int) -> None:
+        steps, every = self.setting.steps(level), self.setting.stride(level)
+        if step > steps:
+            self.refuse(f"must be at most {steps}, the steps of level {level}")
+        elif step % every:
+            low = step - step % every
+            rule = f"not a stored step of level {level}, where every {every}th is stored"
+            self.refuse(rule, f"nearest are {low} and {low + every}")
+
+    def _check_time(self, t: float, time: TimeSpec, level: int | None) -> None:
+        """Check that a time is in the interval, and where its level is known one of the equal parts that are stored."""
+        setting = self.setting
+        fixed = setting.sweep.fixed_end(time)
+        end = 1.0 if fixed is None else fixed
+        if not 0.0 <= t <= end:
+            word = "the fraction 1 of the end" if fixed is None else f"the end {end:g}"
+            self.refuse(f"must be between 0 and {word}", value=t)
+        elif level is not None:
+            samples = setting.steps(level) // setting.stride(level)
+            dt = end / samples
+            if abs(t - min(round(t / dt), samples) * dt) > 1e-9 * dt:
+                low = min(int(t / dt), samples - 1)
+                hint = f"nearest are {low * dt:.12g} and {(low + 1) * dt:.12g}"
+                self.refuse("not a stored sample time", hint, t)
 
 
-def known_schemes(names: Sequence[str] | None, scope: Scope) -> None:
-    """Check a list of schemes, each of the experiment and named once."""
-    for i, name in enumerate(names or ()):
-        known_scheme(name, scope.at(i))
-        if name in (names or ())[:i]:
-            scope.at(i).refuse("a scheme must not be repeated", value=name)
-
-
-def check_scheme_and_case(at: At, scope: Scope) -> None:
-    """Check what is the same for every value."""
-    if at.scheme is not None:
-        known_scheme(at.scheme, scope.at("scheme"))
-    check_case(at.case, scope.at("case"))
-    check_members(at, at.case, scope)
-
-
-def check_members(at: Members, case: int | None, scope: Scope) -> None:
-    """Check that there are members with the given values; the scope is that of `at`, or of a row of a printed table."""
-    setting = scope.setting
-    if scope.path[0] == "published":
-        scope = scope.at("at")
-    if not at.swept or not setting.knows_sweep:
-        return
-    known = [*type(at).model_fields, *setting.sweep.keys]
-    unknown = [key for key in at.swept if key not in setting.sweep.keys]
-    for key in unknown:
-        hint = nearest(key, known)
-        scope.at(key).refuse("unknown key", hint, _told(at.swept[key]), at_key=True)
-    if case is not None and not unknown:
-        scope.at(next(iter(at.swept))).refuse("must not be given together with case", at_key=True)
-    for axis in setting.sweep.axes:
-        wanted = {key: at.swept[key] for key in axis.keys if key in at.swept}
-        columns = columns_of([axis], 0, axis.count) if wanted else {}
-        for key, value in wanted.items():
-            if not matching(columns[key], value).any():
-                hint = _nearest_values(columns[key], value)
-                scope.at(key).refuse("not a value of the sweep", hint, _told(value))
-                break
-        else:
-            if wanted and not members_with(columns, wanted, axis.count).any():
-                last = list(wanted)[-1]
-                scope.at(last).refuse(f"no member has this together with {next(iter(wanted))}")
-
-
-def _told(value: float | str) -> str:
+def _written(value: float | str) -> str:
     return value if isinstance(value, str) else f"{value:.12g}"
 
 
@@ -114,111 +237,4 @@ def _nearest_values(column: Column, value: float | str) -> str:
     return f"nearest {'is' if len(near) == 1 else 'are'} {' and '.join(near)}"
 
 
-def check_case(case: int | None, scope: Scope) -> None:
-    """Check that there is a member."""
-    members = scope.setting.members
-    if case is not None and members is not None and case >= members:
-        there = "there is 1 case" if members == 1 else f"there are {members} cases"
-        scope.refuse(f"must be at most {members - 1}", there)
-
-
 _NOT_YET = "cannot be named where tolerance chooses the levels"
-
-
-def check_level(level: int | None, scope: Scope, instead: str = "leave it out") -> bool:
-    """Tell whether a level, where one is given, is one of the experiment; `instead`: what helps with a tolerance."""
-    levels = scope.setting.levels
-    if level is None or (not scope.setting.by_tolerance and (not levels or level in levels)):
-        return True
-    if scope.setting.by_tolerance:
-        scope.refuse(f"a level {_NOT_YET}", instead, level)
-        return False
-    closest = min(levels, key=lambda known: abs(known - level))
-    hint = f"nearest is {closest}; levels are {', '.join(map(str, levels))}"
-    scope.refuse("not a level of this experiment", hint, level)
-    return False
-
-
-def check_place(at: At, row: Value, scope: Scope) -> None:
-    """Check that `row` is taken where it exists."""
-    setting = scope.setting
-    given = [
-        name
-        for name in At.model_fields
-        if getattr(at, name) is not None or scope.at(name).is_faulty
-    ]
-    for name in given:
-        if name not in row.at:
-            hint = "it takes " + ", ".join(row.at)
-            scope.at(name).refuse(f"{row.name} takes no {name}", hint, at_key=True)
-    if row.needs_time and "t" not in given and "step" not in given:
-        scope.refuse(f"{row.name} needs t or step")
-    if "event" in row.at and "event" not in given:
-        scope.refuse(f"{row.name} needs the number of an event", "e.g. event: 1")
-    if "t" in given and "step" in given:
-        scope.at("step").refuse("must not be given together with t", at_key=True)
-    check_scheme_and_case(at, scope)
-    if at.scheme in setting.adaptive and (row.fixed_step or at.level == "best"):
-        rule = f"{row.name} does not exist of a scheme that chooses its own steps"
-        scope.at("scheme").refuse(rule, value=at.scheme)
-    level = _level(at, row, scope)
-    if setting.by_tolerance and at.step is not None and "step" in row.at:
-        scope.at("step").refuse(f"a step {_NOT_YET}", "t can")
-    if setting.time is None or not setting.knows_sweep:
-        return
-    level = level if "t" in row.at else None
-    if at.step is not None and level is not None:
-        _check_step(at.step, level, scope.at("step"))
-    if at.t is not None and (level is not None or setting.by_tolerance):
-        _check_time(at.t, setting.time, level, scope.at("t"))
-
-
-def _level(at: At, row: Value, scope: Scope) -> int | None:
-    """Check the level; return that at which times are stored, the finest by default, and None where it is not known."""
-    by_tolerance, place = scope.setting.by_tolerance, scope.at("level")
-    levels = () if by_tolerance else scope.setting.levels
-    if place.is_faulty or scope.is_faulty:
-        return None
-    if at.level is None or "level" not in row.at:
-        return levels[-1] if levels else None
-    if at.level == "best":
-        if not row.best and (levels or by_tolerance):
-            place.refuse(f"{row.name} does not exist of the extrapolated solution")
-        # that solution has the times of the coarsest level
-        return levels[0] if levels else None
-    if not check_level(at.level, place, "level: best can") or not levels:
-        return None
-    finer = len(levels) - 1 - levels.index(at.level)
-    if finer < row.finer_levels:
-        word = "level" if row.finer_levels == 1 else "levels"
-        there = "there is 1" if finer == 1 else f"there are {finer or 'none'}"
-        rule = f"{row.name} needs {row.finer_levels} finer {word} beside it, {there}"
-        place.refuse(rule, value=at.level)
-    return at.level
-
-
-def _check_step(step: int, level: int, scope: Scope) -> None:
-    steps, every = scope.setting.steps(level), scope.setting.stride(level)
-    if step > steps:
-        scope.refuse(f"must be at most {steps}, the steps of level {level}")
-    elif step % every:
-        low = step - step % every
-        rule = f"not a stored step of level {level}, where every {every}th is stored"
-        scope.refuse(rule, f"nearest are {low} and {low + every}")
-
-
-def _check_time(t: float, time: TimeSpec, level: int | None, scope: Scope) -> None:
-    """Check that a time is in the interval, and where its level is known one of the equal parts that are stored."""
-    setting = scope.setting
-    fixed = setting.sweep.fixed_end(time)
-    end = 1.0 if fixed is None else fixed
-    if not 0.0 <= t <= end:
-        word = "the fraction 1 of the end" if fixed is None else f"the end {end:g}"
-        scope.refuse(f"must be between 0 and {word}", value=t)
-    elif level is not None:
-        samples = setting.steps(level) // setting.stride(level)
-        dt = end / samples
-        if abs(t - min(round(t / dt), samples) * dt) > 1e-9 * dt:
-            low = min(int(t / dt), samples - 1)
-            hint = f"nearest are {low * dt:.12g} and {(low + 1) * dt:.12g}"
-            scope.refuse("not a stored sample time", hint, t)

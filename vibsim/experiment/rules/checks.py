@@ -9,16 +9,7 @@ from typing import Any
 from vibsim.core.errors import nearest
 from vibsim.core.vocabulary import BY_TOLERANCE, REASONS, is_error_part
 from vibsim.experiment.faults import Report
-from vibsim.experiment.rules.check_places import (
-    Scope,
-    check_case,
-    check_level,
-    check_members,
-    check_place,
-    check_scheme_and_case,
-    known_scheme,
-    known_schemes,
-)
+from vibsim.experiment.rules.check_places import Scope
 from vibsim.experiment.rules.size_limits import Setting
 from vibsim.experiment.schema.checks import (
     SOLUTIONS,
@@ -36,8 +27,8 @@ from vibsim.experiment.schema.published import row_at, row_id
 from vibsim.experiment.value_names import VALUES, Value
 from vibsim.experiment.yaml.parse import Path_
 from vibsim.models import BUDGET, centred, has_budget, has_solution
+from vibsim.models.base import error_parts, has_error_parts
 from vibsim.models.shared.free import why_not_free
-from vibsim.models.shared.phase_amplitude_names import error_parts, has_error_parts
 
 ENERGIES = ("energy", "energy_deviation")
 """The energies that are known exactly where they are conserved."""
@@ -80,9 +71,9 @@ def _published_table(table: Any, scope: Scope) -> None:
             _is_comparable(other, table.quantity, place)
     for printed, place in rows:
         if row is not None:
-            check_place(row_at(printed), row, place)
+            place.check_place(row_at(printed), row)
         else:
-            check_scheme_and_case(row_at(printed), place)
+            place.check_scheme_and_case(row_at(printed))
         if table.quantity is not None:
             _has_quantity(table.quantity, [(printed.scheme, place.at("scheme"))])
 
@@ -125,13 +116,13 @@ def _check(check: Check, scope: Scope) -> None:
             scope.at("id").refuse("the id belongs to the claim", at_key=True)
     inner = check.measured
     if isinstance(inner, StableCheck | ConservesCheck | EqualCheck):
-        check_level(inner.level, scope.at("level"))
-        check_case(inner.case, scope.at("case"))
-        check_members(inner.at, inner.case, scope.at("at"))
+        scope.at("level").check_level(inner.level)
+        scope.at("case").check_case(inner.case)
+        scope.at("at").check_members(inner.at, inner.case)
     if isinstance(inner, ConvergesCheck | AccurateCheck):
-        check_members(inner.at, None, scope.at("at"))
+        scope.at("at").check_members(inner.at, None)
     if not isinstance(inner, ValueCheck | EqualCheck):
-        known_schemes(inner.schemes, scope.at("schemes"))
+        scope.at("schemes").check_schemes(inner.schemes)
     match inner:
         case ConvergesCheck():
             _converges(inner, scope)
@@ -230,12 +221,12 @@ def _value(check: ValueCheck, scope: Scope) -> None:
     _reduction(check, scope)
     row = _known_value(check.value, scope.at("value"))
     if row is None:
-        check_scheme_and_case(check.at, place)
+        place.check_scheme_and_case(check.at)
         return
     _check_value(row, check.quantity, check.at.level == "best", scope)
     if check.quantity is not None and check.at.scheme is not None:
         _has_quantity(check.quantity, [(check.at.scheme, place.at("scheme"))])
-    check_place(check.at, row, place)
+    place.check_place(check.at, row)
 
 
 def _reduction(check: ValueCheck, scope: Scope) -> None:
@@ -281,10 +272,10 @@ def _equal(check: EqualCheck, scope: Scope) -> None:
     if check.first in SOLUTIONS:
         first.refuse("must be a scheme: what it equals stands behind it", value=check.first)
     else:
-        known_scheme(check.first, first)
+        first.check_scheme(check.first)
     named = [(check.first, first)]
     if check.second not in SOLUTIONS:
-        known_scheme(check.second, second, SOLUTIONS)
+        second.check_scheme(check.second, SOLUTIONS)
         named.append((check.second, second))
         if check.first == check.second:
             second.refuse("must be another one than the first", value=check.second)
@@ -297,7 +288,9 @@ def _equal(check: EqualCheck, scope: Scope) -> None:
                 choices += (check.quantity,)
     if _is_quantity(check.quantity, choices, scope.at("quantity"), what):
         _has_quantity(check.quantity, named)
-        if check.second == "exact":
+        if check.second == "exact" and setting.sweep.follow:
+            _known_of_followers(check.second, second)
+        elif check.second == "exact":
             _known_exactly(check.quantity, check.second, second)
         elif check.second == "discrete":
             _known_by_theory(check.second, second)
@@ -367,6 +360,9 @@ def _is_comparable(row: Value, quantity: str | None, scope: Scope) -> None:
     model = scope.setting.model
     if model is None:
         return
+    if row.needs_exact and scope.setting.sweep.follow:
+        _known_of_followers(row.name, scope)
+        return
     if row.needs_exact == "period" and model.exact_period is None:
         scope.refuse(f"the exact period of {model.kind} is not known", value=row.name)
     if row.needs_exact == "solution":
@@ -400,6 +396,11 @@ def _known_exactly(quantity: str | None, value: str, scope: Scope) -> None:
         hint = f"{' and '.join(of)} {'is' if len(of) == 1 else 'are'}" if of else ""
         rule = f"the exact {quantity or 'solution'} of {model.kind} is not known"
         scope.refuse(rule, hint, value)
+
+
+def _known_of_followers(value: str, scope: Scope) -> None:
+    rule = "the exact solution is not known of members that start from the last state of others"
+    scope.refuse(rule, "leave out `follow`", value)
 
 
 def _known_by_theory(value: str, scope: Scope) -> None:

@@ -7,14 +7,7 @@ from typing import Any
 
 from vibsim.core.errors import nearest
 from vibsim.experiment.faults import Report
-from vibsim.formula import (
-    MAX_CHARACTERS,
-    Call,
-    Compare,
-    Expression,
-    ExpressionError,
-    parse,
-)
+from vibsim.formula import Call, Compare, Expression, ExpressionError
 from vibsim.formula.tree import STEPS, children
 from vibsim.models import Model
 from vibsim.models.shared.crossings import STOP, guard_name, guard_of, is_constant
@@ -39,7 +32,7 @@ def read_crossings(
         path = "model", "events", i
         if event is None or _is_without_way(event, path, report):
             continue
-        guard = _read(event.when, names, (*path, "when"), report)
+        guard = report.formula((*path, "when"), event.when, names)
         if isinstance(guard, Compare):
             rule = "must be a formula that crosses 0, and no comparison"
             hint = "write u - gap and rising: true for u > gap"
@@ -57,11 +50,11 @@ def read_crossings(
             if state not in states:
                 rule = "unknown state"
                 report.add((*path, "then", state), rule, nearest(state, states), at_key=True)
-            elif _read(text, names, (*path, "then", state), report) is not None:
+            elif report.formula((*path, "then", state), text, names) is not None:
                 texts[f"{name.rpartition('.')[0]}.then.{state}"] = text.strip()
     if section.stop is not None:
         texts[STOP] = section.stop.strip()
-        condition = _read(section.stop, names, ("model", STOP), report)
+        condition = report.formula(("model", STOP), section.stop, names)
         try:
             if condition is not None and is_constant(guard_of(condition), states):
                 rule = "never changes: it names neither t nor a state"
@@ -92,15 +85,3 @@ def _is_without_way(event: Any, path: tuple[str, str, int], report: Report) -> b
     rule = "must be true for falling or for rising: the event would never happen"
     report.add((*path, given[0]), rule, "leave both out for both ways", False, at_key=True)
     return True
-
-
-def _read(
-    text: str, names: tuple[str, ...], path: tuple[str | int, ...], report: Report
-) -> Expression | None:
-    """Return a formula; None where it cannot be read, which is noted."""
-    try:
-        return parse(text, names)
-    except ExpressionError as error:
-        place = f" at character {error.position + 1}" if error.position < MAX_CHARACTERS else ""
-        report.add(path, f"{error.rule}{place}", error.hint, text)
-        return None

@@ -21,6 +21,7 @@ from vibsim.experiment.schema.sweep import Axis
 from vibsim.experiment.sweep_columns import columns_of
 from vibsim.formula import Expression, derivative, first_jump, parse, put, size, values
 from vibsim.models import FormulaField, Model, tree
+from vibsim.models.table import Lookup
 
 CHUNK = 2**16
 """Members that are looked at together."""
@@ -52,13 +53,13 @@ class MemberNumbers:
 
     def members(self) -> Iterator[tuple[dict[str, Any], Floats]]:
         """Yield parts of the members that differ in what matters: their swept numbers, and their ends."""
-        count = self._count()
+        count = self.count
         for start in range(0, count, CHUNK):
             yield self._part(start, min(start + CHUNK, count))
 
     def some(self, most: int) -> Iterator[tuple[dict[str, float], float]]:
         """Yield the parameters by name and the ends of at most so many of these members, evenly spread over them."""
-        count = self._count()
+        count = self.count
         for i in sorted({k * (count - 1) // max(most - 1, 1) for k in range(most)}):
             found, end = self._part(i, i + 1)
             numbers = self._by_name(found)
@@ -67,21 +68,29 @@ class MemberNumbers:
     def _axes(self) -> list[Axis]:
         return [axis for axis in self.axes if any(map(_matters, axis.keys))]
 
-    def _count(self) -> int:
+    @property
+    def count(self) -> int:
+        """Number of members that differ in what matters."""
         return math.prod(axis.count for axis in self._axes())
 
     def _part(self, start: int, stop: int) -> tuple[dict[str, Any], Floats]:
         found = {k: v for k, v in columns_of(self._axes(), start, stop).items() if _matters(k)}
         end = found.get("time.end", np.full(stop - start, self.time.end))
         if self.time.is_of_model:
-            own = self.time.end_of(self.model, self._parameters(found))
+            with np.errstate(divide="ignore"):
+                own = self.time.end_of(self.model, self._parameters(found))
             end = np.broadcast_to(own, end.shape)
         return found, end
 
+    @property
+    def lookup(self) -> Lookup:
+        """The table of the model."""
+        assert self.model.lookup is not None
+        return self.model.lookup
+
     def place(self, found: Mapping[str, Any], t: Floats) -> Floats:
         """Return the places at times t, of members with some numbers swept."""
-        assert self.model.lookup is not None
-        formula = tree(self.model, self.model.lookup.place)
+        formula = tree(self.model, self.lookup.place)
         return np.broadcast_to(values(formula, {**self._by_name(found), "t": t}), t.shape)
 
     def _parameters(self, found: Mapping[str, Any]) -> dict[str, Any]:
@@ -103,8 +112,10 @@ def check_ends(numbers: MemberNumbers, report: Report) -> None:
     for found, end in numbers.members():
         has_none = ~(np.isfinite(end) & (end > 0.0))
         if has_none.any():
-            who = _named(found, int(np.argmax(has_none)))
-            if numbers.time.periods is not None:
+            who = named(found, int(np.argmax(has_none)))
+            if numbers.time.frequency is not None:
+                key, rule = "frequency", "must be an angular frequency greater than 0"
+            elif numbers.time.periods is not None:
                 key, rule = "periods", "the model has no natural period"
             else:
                 key, rule = "steps_per_point", "the vehicle never comes to the end of the table"
@@ -112,22 +123,30 @@ def check_ends(numbers: MemberNumbers, report: Report) -> None:
             return
 
 
-def _named(found: Mapping[str, Any], i: int) -> str:
+def parts(axes: Sequence[Axis]) -> Iterator[tuple[int, dict[str, Any]]]:
+    """Yield the number of some members, and their swept values by key, until all were there."""
+    count = math.prod(axis.count for axis in axes)
+    for start in range(0, count, CHUNK):
+        stop = min(start + CHUNK, count)
+        yield stop - start, columns_of(axes, start, stop)
+
+
+def named(swept: Mapping[str, Any], i: int) -> str:
     """Name a member by its swept numbers."""
-    return ", ".join([f"{key} = {column[i]:.10g}" for key, column in found.items()][:MOST_NAMED])
+    numbers = (f"{key} = {x[i]:.10g}" for key, x in swept.items() if x.dtype.kind != "U")
+    return ", ".join(list(numbers)[:MOST_NAMED])
 
 
 def check_length(numbers: MemberNumbers, name: str, report: Report) -> None:
     """Refuse a table that ends before a member does."""
-    assert numbers.model.lookup is not None
-    table = numbers.model.lookup.table
+    table = numbers.lookup.table
     most, who = -np.inf, ""
     for found, end in numbers.members():
         places = numbers.place(found, end)
         i = int(np.argmax(places))
         if places[i] > most:
             most = float(places[i])
-            who = _named(found, i)
+            who = named(found, i)
     if most > table.last + SLACK * table.spacing:
         count = int(np.ceil((most - table.first) / table.spacing - SLACK)) + 1
         rule = f"the table ends at {table.last:.10g} m, but the motion comes to {most:.10g} m"
@@ -141,8 +160,7 @@ def _is_met(numbers: MemberNumbers, level: int) -> bool:
     It does where the way of a step at the coarsest level is a whole part of the spacing, and the table has a point at
     the start.
     """
-    assert numbers.model.lookup is not None
-    table, steps = numbers.model.lookup.table, numbers.time.base_steps << level
+    table, steps = numbers.lookup.table, numbers.time.base_steps << level
     for found, end in numbers.members():
         way = numbers.place(found, end / steps)
         with np.errstate(divide="ignore", invalid="ignore"):

@@ -19,11 +19,11 @@ from vibsim.experiment.rules.crossings import read_crossings
 from vibsim.experiment.rules.potential import check_potential
 from vibsim.experiment.rules.structure import read_structure, terms_of_damping
 from vibsim.experiment.schema.fields import DECLARED, TABLE, Section
-from vibsim.experiment.tables.file import ENDINGS, TableError, read
+from vibsim.experiment.tables.content import TableError
+from vibsim.experiment.tables.file import ENDINGS, read
 from vibsim.experiment.yaml.parse import Path_
 from vibsim.formula import (
     FUNCTIONS,
-    MAX_CHARACTERS,
     ONE,
     Binary,
     ExpressionError,
@@ -45,6 +45,8 @@ from vibsim.models.structure import RAYLEIGH
 from vibsim.models.system import coordinate_faults, name_fault
 
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
+EVENTS = "events or a stop"
+HOLDS = "coulomb friction, which may hold the body elsewhere"
 NONE = "none"
 """Stands for a term that is left out, where others have words as well."""
 MOST_NAMED = 8
@@ -85,15 +87,17 @@ def equation(
                 report.add(("model", COORDINATES, i), fault, "choose another name")
     if section is None or model is None:
         # what follows from formulas is known only with all of them
-        is_whole = model is not None and model.written is None and model.assembled is None
-        return Equation(model if is_whole else None)
-    if model.assembled is not None:
-        return _assembled(section, model, swept, folder, report)
+        return Equation(model if model is not None and model.written is None else None)
+    if model.loaded is not None:
+        found = _structure(section, model, swept, folder, report)
+        _note_unused(section, found, report)
+        return found
     parameters = {row.name: getattr(section, row.name) for row in model.parameters}
     found = Equation(model, parameters)
     if model.written is not None:
         found = _written(section, model, parameters, folder, report)
-    if found.model is None or found.model.variant is None:
+        _note_unused(section, found, report)
+    if found.model is None:
         return found
     neutral = {row.name: row.neutral for row in found.model.parameters}
     terms = tuple(
@@ -101,14 +105,23 @@ def equation(
         for name in found.model.optional
         if found.parameters[name] != neutral[name] or f"model.{name}" in swept
     )
-    return replace(found, model=found.model.variant(frozenset(terms)), terms=terms)
+    return replace(found, model=found.model.with_terms(terms), terms=terms)
 
 
-def _assembled(
+def _note_unused(section: Any, found: Equation, report: Report) -> None:
+    """Note declared parameters that no formula names."""
+    if found.model is None:
+        return
+    used = {name for text in found.formulas.values() for name in _NAME.findall(text)}
+    for name in section.parameters:
+        if name not in used:
+            report.note(("model", DECLARED, name), "no formula names it", "leave it out")
+
+
+def _structure(
     section: Any, model: Model, swept: Collection[str], folder: Path, report: Report
 ) -> Equation:
     """Return the equation of a structure."""
-    assert model.assembled is not None
     parameters = {
         row.key: float(getattr(section.rayleigh, row.name, row.default)) for row in RAYLEIGH
     }
@@ -118,21 +131,18 @@ def _assembled(
     known = (*(row.name for row in RAYLEIGH), *declared)
     for text, path in loads.values():
         _is_sound(text, field, path, known, report)
-    if spec is None or any(fault.key.split(".")[0] == "model" for fault in report.faults):
+    if spec is None or report.doubts_model:
         return Equation(None)
     texts = {key: text for key, (text, _) in loads.items()}
-    found = model.assembled(spec.structure, texts, tuple(declared))
+    found = model.with_formulas(texts, tuple(declared), spec.structure)
     parameters |= {f"{DECLARED}.{name}": value for name, value in declared.items()}
     terms = terms_of_damping(found, parameters, swept)
-    assert found.variant is not None
-    whole = found.variant(frozenset(terms))
-    return Equation(whole, parameters, texts, terms=terms, structure=spec)
+    return Equation(found.with_terms(terms), parameters, texts, terms=terms, structure=spec)
 
 
 def _written(
     section: Any, model: Model, parameters: dict[str, float], folder: Path, report: Report
 ) -> Equation:
-    assert model.written is not None
     declared = _declared(section, model, report)
     known = (*(own.name for own in model.parameters), *declared)
     texts: dict[str, str] = {}
@@ -156,36 +166,17 @@ def _written(
         _check_place(row, section, report)
     if model.takes_events:
         texts |= read_crossings(section, model, known, report)
-    if "exact" in texts and section.force is not None:
-        rule = "must not be given together with exact, from which it follows"
-        report.add(("model", "force"), rule, at_key=True)
-    if "exact" in texts and f"damping.{COULOMB}" in parameters:
-        rule = "must not be given together with coulomb friction, which may hold the body elsewhere"
-        report.add(("model", "exact"), rule, at_key=True)
     for row in model.formulas:
         if row.positive:
             _check_positive(row, texts, declared, report)
     exact = next((name for name in texts if name.startswith("exact")), "")
-    if any(map(is_crossing, texts)):
-        for name, is_there, why in (
-            ("exact", bool(exact), "the motion leaves the exact solution at an event"),
-            (
-                f"damping.{COULOMB}",
-                f"damping.{COULOMB}" in parameters,
-                "friction has events of its own",
-            ),
-        ):
-            if is_there:
-                rule = "must not be given together with events or a stop"
-                report.add(("model", *name.split(".")), rule, why, at_key=True)
-    if any(fault.key.split(".")[0] == "model" for fault in report.faults):
+    _check_together(section, texts, exact, f"damping.{COULOMB}" in parameters, report)
+    if report.doubts_model:
         return Equation(None)
     parameters |= {f"{DECLARED}.{name}": value for name, value in declared.items()}
     try:
-        found = model.written(texts, tuple(declared))
-        for spec in tables.values():
-            assert found.with_table is not None
-            found = found.with_table(spec.table, False)
+        numbers = (spec.table for spec in tables.values())
+        found = model.with_formulas(texts, tuple(declared), *numbers)
         _check_length(found)
     except ExpressionError as error:
         # an error without a text speaks of the longest formula
@@ -207,6 +198,26 @@ def _written(
     if any(row.name == "spring" for row in model.formulas):
         check_potential(found, parameters, texts, report)
     return Equation(found, parameters, texts, tables)
+
+
+def _check_together(
+    section: Any, texts: Mapping[str, str], exact: str, has_friction: bool, report: Report
+) -> None:
+    """Refuse what cannot stand side by side: an exact solution, a force, friction, and events."""
+    friction, is_followed = f"damping.{COULOMB}", "exact" in texts
+    has_events = any(map(is_crossing, texts))
+    has_force = is_followed and section.force is not None
+    leaves = "the motion leaves the exact solution at an event"
+    pairs = (
+        ("force", has_force, "exact, from which it follows", ""),
+        ("exact", is_followed and has_friction, HOLDS, ""),
+        ("exact", has_events and exact, EVENTS, leaves),
+        (friction, has_events and has_friction, EVENTS, "friction has events of its own"),
+    )
+    for key, are_together, other, why in pairs:
+        if are_together:
+            rule = f"must not be given together with {other}"
+            report.add(("model", *key.split(".")), rule, why, at_key=True)
 
 
 def _table(
@@ -260,7 +271,7 @@ def _declared(section: Any, model: Model, report: Report) -> dict[str, float]:
     taken = {"t": "the time"}
     taken |= {state.name: f"the {state.long_name}" for state in model.states}
     taken |= {row.name: f"the {row.description} of the model" for row in model.parameters}
-    if model.assembled is not None:
+    if model.loaded is not None:
         # these are observed
         taken = {"t": "the time"} | {row.name: f"the {row.description}" for row in RAYLEIGH}
     if any(row.terms and isinstance(getattr(section, row.name), Section) for row in model.formulas):
@@ -410,17 +421,11 @@ def _is_sound(
     text: str, row: FormulaField, path: Path_, known: Collection[str], report: Report
 ) -> bool:
     """Tell whether a formula of variables and some `known` parameters can be read; note its fault otherwise."""
-    try:
-        read_tree = parse(text, (*row.names, *known))
-    except ExpressionError as error:
-        place = f" at character {error.position + 1}" if error.position < MAX_CHARACTERS else ""
-        rule = f"{error.rule}{place}"
-        if error.rule.startswith("unknown name"):
-            named = f"{_some(row.names)} and " if row.names else ""
-            rule += f"; it may name {named}parameters"
-        is_file = row.table is not None and text.lower().endswith(ENDINGS)
-        hint = f"for a table write {{{TABLE}: {text}}}" if is_file else error.hint
-        report.add(path, rule, hint, text)
+    more = f"; it may name {f'{_some(row.names)} and ' if row.names else ''}parameters"
+    is_file = row.table is not None and text.lower().endswith(ENDINGS)
+    hint = f"for a table write {{{TABLE}: {text}}}" if is_file else ""
+    read_tree = report.formula(path, text, (*row.names, *known), more, hint)
+    if read_tree is None:
         return False
     if row.terms and not is_zero(read_tree) and set(row.names).isdisjoint(names_in(read_tree)):
         rule = f"does not depend on {row.names[0]}: it is a constant force, and no {row.name}"

@@ -15,7 +15,7 @@ from vibsim.experiment.schema.model_and_schemes import TOLERANCE
 from vibsim.experiment.schema.sweep import tolerance_name
 from vibsim.formula import names_in
 from vibsim.models import MODELS, Model, tree
-from vibsim.schemes import FIXED_STEP
+from vibsim.schemes import FIXED_STEP, Scheme
 from vibsim.schemes.base import EVENTS, MOST_UNKNOWNS, VECTOR
 
 
@@ -26,27 +26,29 @@ def finish_schemes(
     found: list[SchemeSpec] = []
     first: dict[str, int] = {}
     for i, section in enumerate(sections):
-        if isinstance(section, str) and report.kinds.scheme(section) is None:
-            hint = nearest(section, sorted(report.kinds.names("schemes")))
-            report.add(("schemes", i), "unknown scheme", hint, section)
-        elif section is not None:
-            several = _specs(section, model, report.kinds)
-            found.extend(several)
-            if model is not None:
-                _check_options(section, i, model, report)
-                _check_events(section, i, model, report)
-                _check_forces(several[0].kind, i, model, report)
-            _check_names(several, i, first, report)
+        if section is None:
+            continue
+        kind = section if isinstance(section, str) else section.kind
+        scheme = report.kinds.scheme(kind)
+        if scheme is None:
+            hint = nearest(kind, sorted(report.kinds.names("schemes")))
+            report.add(("schemes", i), "unknown scheme", hint, kind)
+            continue
+        several = _specs(section, scheme, model, report.kinds)
+        found.extend(several)
+        if model is not None:
+            _check_options(section, i, scheme, model, report)
+            _check_events(section, i, model, report)
+            _check_forces(scheme, i, model, report)
+        _check_names(several, i, first, report)
     if are_known(sections, report.kinds) and all(spec.adaptive for spec in found):
         rule = "at least one scheme must take equal steps, on the levels that are compared"
         report.add(("schemes",), rule, "choose from " + ", ".join(FIXED_STEP), at_key=True)
     return found
 
 
-def _specs(section: Any, model: Model | None, kinds: Kinds) -> list[SchemeSpec]:
-    kind = section if isinstance(section, str) else section.kind
-    scheme = kinds.scheme(kind)
-    assert scheme is not None
+def _specs(section: Any, scheme: Scheme, model: Model | None, kinds: Kinds) -> list[SchemeSpec]:
+    kind = scheme.kind
     options: dict[str, Any] = {
         **scheme.defaults(),
         **{row.name: row.default for row in scheme.options_on(model)},
@@ -81,10 +83,8 @@ def _check_names(several: list[SchemeSpec], i: int, first: dict[str, int], repor
             report.add(("schemes", i), rule, "give one of them a label")
 
 
-def _check_forces(kind: str, i: int, model: Model, report: Report) -> None:
+def _check_forces(method: Scheme, i: int, model: Model, report: Report) -> None:
     """Refuse a scheme that cannot treat the forces of the model."""
-    method = report.kinds.scheme(kind)
-    assert method is not None
     if method.treats(model):
         return
     able = [other for other, row in report.kinds.all_schemes().items() if row.treats(model)]
@@ -93,7 +93,7 @@ def _check_forces(kind: str, i: int, model: Model, report: Report) -> None:
     unknowns = method.unknowns(model)
     if model.loaded is not None:
         rule = f"cannot treat {model.kind}, whose degrees of freedom are stepped together"
-        report.add(("schemes", i), rule, hint, kind)
+        report.add(("schemes", i), rule, hint, method.kind)
         return
     damped = [other for other, _ in method.damped if not other.startswith(VECTOR)]
     if unknowns > MOST_UNKNOWNS:
@@ -111,7 +111,7 @@ def _check_forces(kind: str, i: int, model: Model, report: Report) -> None:
         kinds = " or ".join(damped)
         rule += f" and which declares no {kinds} damping"
         hint += f"; if it is {kinds} damping, write damping=Damping(kind, rate) in the model"
-    report.add(("schemes", i), rule, hint, kind)
+    report.add(("schemes", i), rule, hint, method.kind)
 
 
 def _velocities(model: Model) -> str:
@@ -121,12 +121,10 @@ def _velocities(model: Model) -> str:
     return ", ".join(found if len(found) < MOST_NAMED else [*found[: MOST_NAMED - 1], "..."])
 
 
-def _check_options(section: Any, i: int, model: Model, report: Report) -> None:
+def _check_options(section: Any, i: int, scheme: Scheme, model: Model, report: Report) -> None:
     """Refuse options without a meaning on this model."""
     if isinstance(section, str):
         return
-    scheme = report.kinds.scheme(section.kind)
-    assert scheme is not None
     known = scheme.options_on(model)
     for option in scheme.options:
         if option not in known and option.name in section.model_fields_set:
@@ -137,7 +135,7 @@ def _check_options(section: Any, i: int, model: Model, report: Report) -> None:
 def _check_events(section: Any, i: int, model: Model, report: Report) -> None:
     """Refuse a treatment of events where there are none."""
     given = None if isinstance(section, str) else getattr(section, EVENTS.name, None)
-    is_unsure = any(fault.key.split(".")[0] == "model" for fault in report.faults)
+    is_unsure = report.doubts_model
     if given is None or is_unsure or model.events is not None:
         return
     able = [kind for kind, other in report.kinds.all_models().items() if other.events is not None]

@@ -104,7 +104,7 @@ class Setting:
             d2t = False
         samples = steps // self.stride(level) + 1
         if is_lean(self.samples, self.steps(self.levels[0]), self.trajectories):
-            return Load(self.scheme_count, steps, samples, _LEAN, d2t=d2t)
+            return Load(self.scheme_count, steps, samples, _LEAN, d2t=d2t, chain=self.sweep.chain)
         known = len(quantities(self.model)) if self.model else 0
         # with the running maximum of the energy deviation
         series = max(known, _SMALLEST_MODEL) + 1 + (_D2T if d2t else 0)
@@ -119,6 +119,7 @@ class Setting:
             extrema=extrema,
             events=events,
             d2t=True,
+            chain=self.sweep.chain,
         )
 
 
@@ -146,10 +147,15 @@ def check(setting: Setting, report: Report) -> None:
         return
     loads = [setting.load(level) for level in setting.levels]
     hint = "store fewer samples, or begin at a lower level"
-    # one member is the least that a job can make
-    memory, disk = max(load.memory(1) for load in loads), sum(load.disk(members) for load in loads)
+    # one member, or one chain of them, is the least that a job can make
+    least = setting.sweep.chain
+    memory, disk = (
+        max(load.memory(least) for load in loads),
+        sum(load.disk(members) for load in loads),
+    )
     if memory > MAX_MEMORY:
-        rule = f"one member at one level must not take more than {MAX_MEMORY} bytes of memory, it takes {memory}"
+        what = "one member" if least == 1 else f"the {least} members that follow each other"
+        rule = f"{what} at one level must not take more than {MAX_MEMORY} bytes of memory, it takes {memory}"
         report.add(("levels",), rule, hint, at_key=True)
     if disk > MAX_DISK:
         rule = f"the files must not take more than {MAX_DISK} bytes, they take {disk}"

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -11,8 +10,8 @@ import numpy as np
 
 from vibsim.core.array_types import Flags
 from vibsim.experiment.faults import Report
+from vibsim.experiment.rules.members import named, parts
 from vibsim.experiment.schema.sweep import Axis
-from vibsim.experiment.sweep_columns import columns_of
 from vibsim.experiment.yaml.parse import Path_
 from vibsim.formula import values
 from vibsim.models import Model, tree
@@ -20,11 +19,6 @@ from vibsim.models.base import rate
 from vibsim.models.events import Crossings
 from vibsim.models.shared.crossings import STOP
 from vibsim.models.shared.inertia import MASS, inertia
-
-CHUNK = 2**16
-"""Members that are looked at together."""
-MOST_NAMED = 3
-"""Most swept numbers of a member that a message names."""
 
 
 @dataclass(frozen=True)
@@ -38,10 +32,7 @@ class Starts:
 
     def chunks(self) -> Iterator[tuple[int, dict[str, Any], Mapping[str, Any]]]:
         """Yield the number of some members, what formulas name, and which numbers are swept."""
-        count = math.prod(axis.count for axis in self.axes)
-        for start in range(0, count, CHUNK):
-            stop = min(start + CHUNK, count)
-            swept = columns_of(self.axes, start, stop)
+        for count, swept in parts(self.axes):
             given = {key: swept.get(f"model.{key}", x) for key, x in self.parameters.items()}
             begins = self.model.start(given) if self.model.start else self.initial
             numbers: dict[str, Any] = {"t": 0.0}
@@ -49,7 +40,7 @@ class Starts:
             for state in self.model.states:
                 value = begins.get(state.name, 0.0)
                 numbers[state.name] = swept.get(f"initial.{state.name}", value)
-            yield stop - start, numbers, swept
+            yield count, numbers, swept
 
     def refuse(
         self,
@@ -63,10 +54,8 @@ class Starts:
         for count, numbers, swept in self.chunks():
             wrong = np.broadcast_to(is_wrong(numbers), (count,))
             if wrong.any():
-                i = int(np.argmax(wrong))
-                named = [f"{key} = {x[i]:.10g}" for key, x in swept.items() if _is_number(x)]
-                who = f" (where {', '.join(named[:MOST_NAMED])})" if named else ""
-                report.add(path, rule.format(who), hint)
+                who = named(swept, int(np.argmax(wrong)))
+                report.add(path, rule.format(f" (where {who})" if who else ""), hint)
                 return
 
 
@@ -102,7 +91,3 @@ def check_starts(starts: Starts, formulas: Mapping[str, str], report: Report) ->
         rule = "must be positive definite, and is not at the start{}"
         hint = "every motion must have a positive kinetic energy"
         starts.refuse(is_light, ("model", MASS), rule, hint, report)
-
-
-def _is_number(column: Any) -> bool:
-    return bool(np.issubdtype(np.asarray(column).dtype, np.number))

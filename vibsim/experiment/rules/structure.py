@@ -8,13 +8,15 @@ from typing import Any
 
 from vibsim.experiment.data import ArraySpec, StructureSpec
 from vibsim.experiment.faults import MISSING, Report
-from vibsim.experiment.schema.fields import DECLARED
-from vibsim.experiment.schema.structure import Mode, ShapedLoad
+from vibsim.experiment.schema.fields import DECLARED, TABLE
+from vibsim.experiment.schema.structure import LoadTable, Mode, ShapedLoad
 from vibsim.experiment.tables.structure import MATRICES, Assembly, assemble, with_digests
 from vibsim.models import Model
-from vibsim.models.structure import LOAD, MOST_OBSERVED, RAYLEIGH
+from vibsim.models.structure import HISTORY, LOAD, MOST_OBSERVED, RAYLEIGH
 from vibsim.models.system import name_fault, velocities_of
 
+ROUNDED_END = 1e-9
+"""By which a table may end early, relative to its end: a file may have rounded it."""
 Formulas = dict[str, tuple[str, tuple[str | int, ...]]]
 """By key the text of a formula, and where it stands."""
 
@@ -43,15 +45,15 @@ def read_structure(
         observe=_observed(section, report),
         is_free=section.observe is None and section.start is None,
     )
-    if report.faults and any(fault.key.split(".")[0] == "model" for fault in report.faults):
+    if report.doubts_model:
         return None, formulas
-    if section.observe is None or isinstance(section.damping_ratios, float):
-        spec = _completed(section, spec, folder, report)
-    elif section.damping_ratios is not None:
-        spec = spec.model_copy(update={"ratios": tuple(section.damping_ratios)})
-    own = assemble(spec, folder)
-    _tell(own, report)
-    return (with_digests(spec, own) if own.structure is not None else None), formulas
+    ratios = section.damping_ratios
+    every = ratios if isinstance(ratios, float) else None
+    if isinstance(ratios, tuple):
+        spec = spec.model_copy(update={"ratios": ratios})
+    own = assemble(spec, folder, every)
+    _note_faults(own, report)
+    return (with_digests(own) if own.structure is not None else None), formulas
 
 
 def _array(value: Any) -> ArraySpec:
@@ -75,22 +77,31 @@ def _check_numbers(arrays: Mapping[str, ArraySpec], report: Report) -> None:
 
 
 def _loads(section: Any, arrays: dict[str, ArraySpec], report: Report) -> Formulas:
-    """Return the formulas of the loads, and put their shapes among the arrays."""
+    """Return the formulas of the loads, and put their shapes and their tables among the arrays."""
     load = section.load
     if load is None:
         return {}
+    found: Formulas = {}
+
+    def take(number: int, factor: Any, path: tuple[str | int, ...]) -> None:
+        if isinstance(factor, LoadTable):
+            spec = ArraySpec(file=factor.table, columns=(factor.t, factor.p))
+            arrays[f"{HISTORY}.{number}"] = spec
+        else:
+            found[f"{LOAD}.{number}"] = factor.strip(), path
+
     if isinstance(load, ShapedLoad):
         arrays[f"{LOAD}.0"] = _array(load.shape)
-        return {f"{LOAD}.0": (load.times.strip(), ("model", LOAD, "times"))}
-    found: Formulas = {}
-    for i, (dof, text) in enumerate(load.items()):
+        take(0, load.times, ("model", LOAD, "times"))
+        return found
+    for i, (dof, factor) in enumerate(load.items()):
         path = ("model", LOAD, dof)
         if not dof.isdigit() or int(dof) < 1:
             rule = "must be the number of a degree of freedom, counted from 1"
             report.add(path, rule, "or write {shape: ..., times: ...}", at_key=True)
             continue
         arrays[f"{LOAD}.{i}"] = ArraySpec(entries=((int(dof), 1.0),))
-        found[f"{LOAD}.{i}"] = text.strip(), path
+        take(i, factor, path)
     return found
 
 
@@ -118,46 +129,51 @@ def _observed(
     return tuple(found)
 
 
-def _completed(section: Any, spec: StructureSpec, folder: Path, report: Report) -> StructureSpec:
-    """Name every degree of freedom where nothing is observed by name, and give every mode its damping ratio."""
-    only = spec.model_copy(
-        update={
-            "arrays": type(spec.arrays)(
-                {key: row for key, row in spec.arrays.items() if key == "stiffness"}
-            ),
-        }
-    )
-    matrices = Assembly(only, folder).matrices()
-    size = matrices["stiffness"].size if matrices else 0
-    update: dict[str, Any] = {}
-    if section.observe is None:
-        if size > MOST_OBSERVED:
-            rule = f"must be given above {MOST_OBSERVED} degrees of freedom, there are {size}"
-            report.add(("model", "observe"), rule, f"e.g. {{tip: {size}}}")
-        names = ("u",) if size == 1 else tuple(f"u{i}" for i in range(1, size + 1))
-        each = (((i, 1.0),) for i in range(1, size + 1))
-        update["observe"] = tuple(zip(names, each, strict=True))[:MOST_OBSERVED]
-    ratios = section.damping_ratios
-    if ratios is not None:
-        update["ratios"] = (ratios,) * size if isinstance(ratios, float) else tuple(ratios)
-    return spec.model_copy(update=update)
-
-
 def _path(key: str) -> tuple[str | int, ...]:
     """Return where an array stands in the section ``model``."""
     head, *rest = key.split(".")
     return (LOAD, "shape", *rest[1:]) if head == LOAD else (head, *rest)
 
 
-def _tell(own: Assembly, report: Report) -> None:
+def _note_faults(own: Assembly, report: Report) -> None:
     """Put the faults of a structure where they belong."""
+    if own.unnamed:
+        rule = f"must be given above {MOST_OBSERVED} degrees of freedom, there are {own.unnamed}"
+        report.add(("model", "observe"), rule, f"e.g. {{tip: {own.unnamed}}}")
+    is_shaped = _has_shape(report)
     for key, rule, hint in own.faults:
         path: tuple[str | int, ...] = ("model", *_path(key))
-        if key.startswith(f"{LOAD}.") and report.source.place(("model", LOAD, "shape")) is None:
+        row = own.spec.arrays.get(key)
+        shown = row.file if row is not None else None
+        if key.startswith(f"{HISTORY}."):
+            _, number, column = key.split(".")
+            path = (*_table_path(own.spec, number, report), column)
+            shown = None
+        elif key.startswith(f"{LOAD}.") and not is_shaped:
             # a load of one degree of freedom, under its number
             path = ("model", LOAD, key.rpartition(".")[2])
-        row = own.spec.arrays.get(key)
-        report.add(path, rule, hint, row.file if row is not None else None)
+        report.add(path, rule, hint, shown)
+
+
+def _has_shape(report: Report) -> bool:
+    """Tell whether the load is written as a shape and its factor, and not by degree of freedom."""
+    return report.source.place(("model", LOAD, "shape")) is not None
+
+
+def _table_path(spec: StructureSpec, number: str, report: Report) -> tuple[str | int, ...]:
+    """Return where the table of a load stands in a file."""
+    if _has_shape(report):
+        return "model", LOAD, "times"
+    return "model", LOAD, str(spec.arrays[f"{LOAD}.{number}"].entries[0][0])
+
+
+def check_histories(spec: StructureSpec, end: float, report: Report) -> None:
+    """Refuse a table of a load that ends before the motion does."""
+    for number, (times, _) in spec.structure.histories:
+        if end > times[-1] * (1.0 + ROUNDED_END):
+            rule = f"the table ends at {times[-1]:.10g}, but the motion lasts to {end:.10g}"
+            path = (*_table_path(spec, str(number), report), TABLE)
+            report.add(path, rule, "add the load at the end, 0 if there is none")
 
 
 def terms_of_damping(

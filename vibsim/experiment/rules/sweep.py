@@ -12,6 +12,7 @@ from pydantic import StrictBool, TypeAdapter, ValidationError
 from vibsim.core.errors import nearest
 from vibsim.experiment.data import SchemeSpec, Sweep
 from vibsim.experiment.faults import Report
+from vibsim.experiment.rules.continuation import check_follow
 from vibsim.experiment.schema.fields import TABLE
 from vibsim.experiment.schema.model_and_schemes import sweep_types
 from vibsim.experiment.schema.sweep import (
@@ -69,7 +70,10 @@ def read_sweep(
     is_whole = _is_wellformed(report) and len(sound) == len(found)
     if is_whole and not sound:
         report.add(("sweep",), "must not be empty")
-    return Sweep.model_construct(axes=sound), is_whole
+    follow = section.follow if is_whole and sound else None
+    if follow is not None:
+        check_follow(follow, sound, report)
+    return Sweep.model_construct(axes=sound, follow=follow), is_whole
 
 
 def _is_wellformed(report: Report) -> bool:
@@ -193,8 +197,12 @@ class SweepReader:
             example = next(key for key in self.types if key.startswith("model."))
             hint = f"sweep a parameter, such as {example}"
         elif model is not None and not (self.lacks_scheme and key.startswith("schemes.")):
+            last = key.lower().split(".")[-1]
             alike = [name for name in self.types if name.lower() == key.lower()]
+            alike = alike or [name for name in self.types if name.lower().split(".")[-1] == last]
             rule, hint = "cannot be swept", nearest(key, alike or list(self.types))
+            if len(alike) == 1:
+                hint = f"did you mean '{alike[0]}'?"
         if rule:
             self.report.add(path, rule, hint, at_key=True)
         return None

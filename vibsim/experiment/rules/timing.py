@@ -1,15 +1,18 @@
-"""The time section: from the five ways of writing it to an end and a number of steps."""
+"""Time and levels: from the ways of writing them to an end and a number of steps, and to levels that rise."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from itertools import pairwise
 
+from vibsim.core.errors import nearest
 from vibsim.experiment.data import TimeSpec
 from vibsim.experiment.faults import MISSING, Report
 from vibsim.experiment.rules.members import SLACK
 from vibsim.experiment.rules.model import are_known
-from vibsim.experiment.schema.document import TimeSection
+from vibsim.experiment.schema.document import LevelRange, TimeSection
+from vibsim.experiment.yaml.parse import Path_
 from vibsim.models import Model, natural_end, table_end
 
 WHOLE_NUMBER = 1e-12
@@ -27,6 +30,10 @@ def time_spec(
         return None
     given = {name for name in TimeSection.model_fields if getattr(section, name) is not None}
     by_periods = ("periods", "steps_per_period")
+    if section.frequency is not None and not set(by_periods) <= given:
+        rule = "says whose periods are counted, and belongs to periods and steps_per_period"
+        report.add(("time", "frequency"), rule, at_key=True)
+        return None
     if section.steps_per_point is not None:
         rule = "must not be given together with steps_per_point"
         _refuse(given - {"steps_per_point"}, rule, report)
@@ -60,11 +67,40 @@ def time_spec(
         report.add(("time", "steps_per_period"), rule, f"it is {product:.15g}")
     if steps is None or model is None or not are_known(model, parameters):
         return None
+    if section.frequency is not None:
+        return _by_force(section, steps, parameters, report)
     end = float(natural_end(model, section.periods, parameters))
     if not (math.isfinite(end) and end > 0.0):
         report.add(("time", "periods"), "the model has no natural period with these parameters")
         return None
     return TimeSpec(end=end, base_steps=steps, periods=section.periods)
+
+
+def _by_force(
+    section: TimeSection, steps: int, parameters: Mapping[str, float], report: Report
+) -> TimeSpec | None:
+    """Return the time of whole periods of a parameter of the model, with whole steps in each."""
+    assert section.periods is not None
+    assert section.steps_per_period is not None
+    for name in ("periods", "steps_per_period"):
+        value = getattr(section, name)
+        if value % 1.0:
+            report.add(
+                ("time", name), "must be a whole number where frequency is given", value=value
+            )
+            return None
+    key = str(section.frequency).removeprefix("model.")
+    if f"model.{key}" != section.frequency or key not in parameters:
+        known = [f"model.{name}" for name in parameters]
+        rule = "must be a parameter of the model"
+        report.add(("time", "frequency"), rule, nearest(str(section.frequency), known))
+        return None
+    if not (math.isfinite(parameters[key]) and parameters[key] > 0.0):
+        rule = "must be an angular frequency greater than 0"
+        report.add(("time", "frequency"), rule, f"it is {parameters[key]:g}")
+        return None
+    end = section.periods * (2.0 * math.pi / parameters[key])
+    return TimeSpec(end=end, base_steps=steps, periods=section.periods, frequency=key)
 
 
 def _by_table(
@@ -103,3 +139,20 @@ def _whole(value: float) -> int | None:
         return None
     nearest = round(value)
     return nearest if nearest >= 1 and abs(value - nearest) <= WHOLE_NUMBER * nearest else None
+
+
+def rising_levels(
+    section: LevelRange | tuple[int, ...] | None, report: Report, path: Path_ = ("levels",)
+) -> tuple[int, ...]:
+    """Return the levels of a section, which stands at `path`; none where it is missing or faulty."""
+    if isinstance(section, LevelRange):
+        if section.from_ > section.to:
+            report.add((*path, "to"), f"must be at least 'from', which is {section.from_}")
+        return tuple(range(section.from_, section.to + 1))
+    levels = section or ()
+    falling = [i for i, (low, high) in enumerate(pairwise(levels), 1) if low >= high]
+    for i in falling:
+        is_same = levels[i] == levels[i - 1]
+        word = "must not be repeated" if is_same else "must be in increasing order"
+        report.add((*path, i), f"levels {word}", value=levels[i])
+    return () if falling else levels

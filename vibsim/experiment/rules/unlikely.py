@@ -14,6 +14,8 @@ from vibsim.experiment.value_names import VALUES
 from vibsim.experiment.yaml.parse import Path_
 
 TURN = 2.0 * math.pi
+DIGITS = (None, "largest", "smallest", "mean")
+"""Numbers that have digits of their own, by what is taken of all members."""
 EXACT_DIGITS = 9
 """Numbers that are written with so many digits are meant to be compared to 1e-9 of them."""
 
@@ -30,20 +32,11 @@ def note_unlikely(checks: Sequence[Check | None], setting: Setting, report: Repo
             case AccurateCheck(relative=float(part)) if part >= 1.0:
                 rule = f"is {part:g} times the size of {inner.accurate}, which nearly everything is below"
                 report.note((*path, "relative"), rule, f"{part:g} percent are {part / 100:g}")
-            case ConvergesCheck() if _is_wide(inner):
-                rule = f"lets every order up to {float(inner.order) + inner.tolerance:g} pass"
+            case ConvergesCheck(order=float(order)) if inner.tolerance >= order:
+                rule = f"lets every order up to {order + inner.tolerance:g} pass"
                 report.note((*path, "tolerance"), rule, "it is a distance of orders, such as 0.1")
-            case ValueCheck(equals=float(number), rtol=None, atol=None) if _is_measured(inner):
+            case ValueCheck(equals=float(number), rtol=None, atol=None) if inner.take in DIGITS:
                 _digits((*path, "equals"), inner.value, number, report)
-
-
-def _is_wide(check: ConvergesCheck) -> bool:
-    return check.order != "scheme" and check.tolerance >= float(check.order)
-
-
-def _is_measured(check: ValueCheck) -> bool:
-    """Tell whether a number has digits of its own: no direction, and no value of the sweep."""
-    return check.take in (None, "largest", "smallest", "mean")
 
 
 def _angles(setting: Setting, report: Report) -> None:

@@ -30,7 +30,7 @@ from vibsim.experiment.schema.fields import (
     tagged,
     whole,
 )
-from vibsim.experiment.value_names import MOST_EVENTS, VALUES
+from vibsim.experiment.value_names import MOST_EVENTS, VALUES, Value
 
 Take = Literal["largest", "smallest", "mean", "where_largest", "where_smallest", "monotone"]
 Drift = Literal["none", "bounded", "linear", "quadratic"]
@@ -106,6 +106,10 @@ _At = Annotated[
 ]
 
 
+OF_A_QUANTITY = ("converges", "accurate")
+"""Kinds of checks that have their quantity under their leading key."""
+
+
 class MeasuringCheck(Section):
     """What every check that measures something has."""
 
@@ -121,13 +125,15 @@ class MeasuringCheck(Section):
     @property
     def about(self) -> str | None:
         """The quantity that must be known over time."""
-        found: str | None = getattr(self, "quantity", None)
+        key = self.kind if self.kind in OF_A_QUANTITY else "quantity"
+        found: str | None = getattr(self, key, None)
         return found
 
     @property
     def member(self) -> int | None:
         """The member of the sweep that the check speaks of; None for every one."""
-        found: int | None = getattr(self, "case", None)
+        has_own = "case" in type(self).model_fields
+        found: int | None = getattr(self if has_own else getattr(self, "at", None), "case", None)
         return found
 
     @property
@@ -310,11 +316,6 @@ class ConvergesCheck(MeasuringCheck):
     expect: Expect = Expect()
     """The verdict that passes; PASS when left out."""
 
-    @property
-    def about(self) -> str | None:
-        """The quantity that must be known over time."""
-        return self.converges
-
 
 class Accuracy(MeasuringCheck):
     """The error of the finest level is small enough."""
@@ -329,11 +330,6 @@ class Accuracy(MeasuringCheck):
     """The error must be below this, in the unit of its norm."""
     expect: Expect = Expect()
     """The verdict that passes; PASS when left out."""
-
-    @property
-    def about(self) -> str | None:
-        """The quantity that must be known over time."""
-        return self.accurate
 
     @property
     def key(self) -> str:
@@ -402,6 +398,11 @@ class ValueCheck(MeasuringCheck):
         return {**written, "at": {**at, "level": "best"}}, ""
 
     @property
+    def number(self) -> Value:
+        """What is said of the number that is asked for, whose name is a known one."""
+        return VALUES[self.value]
+
+    @property
     def allowed(self) -> float:
         """How far the number may be from `equals`; NaN where the check has a border."""
         if self.equals is None:
@@ -409,14 +410,21 @@ class ValueCheck(MeasuringCheck):
         plain = self.rtol is None and self.atol is None
         rtol = DEFAULT_RTOL if plain else self.rtol or 0.0
         # what has a unit may be as small as it likes
-        sized = self.equals != 0.0 and VALUES[self.value].measure not in PLAIN
+        sized = self.equals != 0.0 and self.number.measure not in PLAIN
         atol = (0.0 if sized else DEFAULT_ATOL) if plain else self.atol or 0.0
         return atol + rtol * abs(self.equals)
 
-    @property
-    def member(self) -> int | None:
-        """The member of the sweep that the check speaks of; None for every one."""
-        return self.at.case
+
+def as_data(check: Any) -> dict[str, Any]:
+    """Return a check as JSON-able data, with its kind, and a claim with that of what decides it."""
+    data: dict[str, Any] = {"kind": check.kind, **check.model_dump(mode="json")}
+    return data | ({"that": as_data(check.that)} if check.kind == "claim" else {})
+
+
+def without_kind(data: Mapping[str, Any]) -> dict[str, Any]:
+    """Return what `as_data` returned as it is validated."""
+    found = {key: value for key, value in data.items() if key != "kind"}
+    return found | ({"that": without_kind(found["that"])} if "that" in found else {})
 
 
 def by_key(kinds: Iterable[str]) -> Callable[[Any], str | None]:

@@ -29,7 +29,7 @@ from vibsim.experiment.schema.fields import (
     Positive,
     Section,
     Text,
-    by_shape,
+    by_form,
     short,
     tag,
     tagged,
@@ -93,11 +93,16 @@ class TimeSection(Section):
         json_schema_extra={
             "oneOf": [
                 {"required": ["end"]}
-                | _without("periods", "steps_per_period", "steps_per_point", "base_steps base_dt"),
+                | _without(
+                    *("periods", "steps_per_period", "frequency", "steps_per_point"),
+                    "base_steps base_dt",
+                ),
                 {"required": ["periods", "steps_per_period"]}
                 | _without("end", "base_steps", "base_dt", "steps_per_point"),
                 {"required": ["steps_per_point"]}
-                | _without("end", "base_steps", "base_dt", "periods", "steps_per_period"),
+                | _without(
+                    *("end", "base_steps", "base_dt", "periods", "steps_per_period", "frequency")
+                ),
             ]
         }
     )
@@ -112,6 +117,9 @@ class TimeSection(Section):
     """Length in natural periods of the model (small oscillations), instead of `end`."""
     steps_per_period: Positive | None = None
     """Steps per natural period at level 0, with `periods`."""
+    frequency: Text | None = None
+    """A parameter of the model, such as `model.omega`: `periods` are those of this angular frequency, that of a force,
+    in place of natural ones; both numbers must be whole then."""
     steps_per_point: Count | None = None
     """Steps at level 0 from each point of the model's table to the next; the end is where the table ends."""
 
@@ -133,8 +141,8 @@ class Every(Section):
 
 
 _LevelList = Annotated[tuple[Level, ...], Field(min_length=1), short(MAX_LEVEL + 1)]
-Levels: Any = by_shape(LevelRange, _LevelList)
-Samples: Any = by_shape(Every, Literal["auto", "common", "all"])
+Levels: Any = by_form({"mapping": LevelRange, "other": _LevelList})
+Samples: Any = by_form({"mapping": Every, "other": Literal["auto", "common", "all"]})
 
 
 def _initial_schema(models: Iterable[Model]) -> dict[str, Any]:

@@ -50,12 +50,7 @@ FORMULA_NOTE = "a number, or a constant formula such as 2*pi/30"
 class Section(BaseModel):
     """A part of an experiment: frozen, and without unknown keys."""
 
-    model_config = ConfigDict(
-        extra="forbid",
-        frozen=True,
-        allow_inf_nan=False,
-        defer_build=True,
-    )
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, defer_build=True)
 
     stand_ins: ClassVar[Mapping[str, Any] | None] = None
     """What takes the place of required values that are faulty, where what else is there is looked at nevertheless; None
@@ -107,13 +102,27 @@ def tagged(members: Mapping[str, Any], which: Discriminator) -> Any:
     return Annotated[reduce(or_, kinds), which]
 
 
-def by_shape(mapping: Any, other: Any) -> Any:
-    """Return the union of a type that is written as a mapping, and another one that is not."""
+_FORMS = ("mapping", "text", "number", "list", "rows", "row", "other")
 
-    def shape(value: Any) -> str:
-        return tag("mapping") if isinstance(value, Mapping | Section) else tag("other")
 
-    return tagged({"mapping": mapping, "other": other}, Discriminator(shape))
+def by_form(members: Mapping[str, Any], **error: Any) -> Any:
+    """Return the union of types of which the form of what is written chooses one; `error` is that of any other form.
+
+    Members are named after a key of a mapping, or are ``mapping``, ``text``, ``number``, ``list``, ``rows`` (a list of
+    lists), ``row`` (any other list), and ``other`` for what no other member is for.
+    """
+
+    def form(value: Any) -> str:
+        if isinstance(value, Mapping | Section):
+            keys = value if isinstance(value, Mapping) else type(value).model_fields
+            forms = [*(name for name in members if name in keys and name not in _FORMS), "mapping"]
+        elif isinstance(value, list | tuple):
+            forms = ["list", "rows" if value and isinstance(value[0], list | tuple) else "row"]
+        else:
+            forms = ["text" if isinstance(value, str) else "number"]
+        return tag(next((name for name in (*forms, "other") if name in members), forms[0]))
+
+    return tagged(members, Discriminator(form, **error))
 
 
 def number(value: Any) -> float:

@@ -12,7 +12,7 @@ from vibsim.experiment.schema.fields import MAX_ENTRIES, FrozenDict, Positive, S
 
 Shows = Literal[
     "over_time", "phase_plane", "path", "peaks", "local_frequency", "growth", "frequency", "second_difference",
-    "differences", "energy_error", "grids", "spring", "player",
+    "differences", "energy_error", "grids", "spring", "spectrum", "poincare", "player",
 ]  # fmt: skip
 KINDS: tuple[str, ...] = get_args(Shows)
 OVER_TIME = ("quantities", "panels", "each", "until", "beside")

@@ -7,22 +7,18 @@ tolerance.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping
+import re
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from functools import cache
 from typing import Annotated, Any, Literal
 
-from pydantic import (
-    AfterValidator,
-    Discriminator,
-    Field,
-    StrictBool,
-    create_model,
-)
+from pydantic import AfterValidator, BeforeValidator, Field, StrictBool, create_model
 from pydantic_core import PydanticCustomError
 
 from vibsim.experiment.kinds import COORDINATES
 from vibsim.experiment.schema.fields import (
     FORMULA,
+    FORMULA_NOTE,
     TABLE,
     FormulaText,
     Line,
@@ -30,16 +26,16 @@ from vibsim.experiment.schema.fields import (
     Positive,
     Section,
     Text,
-    by_shape,
+    by_form,
     number,
     refused,
     short,
-    tag,
-    tagged,
 )
 from vibsim.experiment.schema.structure import StructureSection
 from vibsim.experiment.schema.sweep import tolerance_name
+from vibsim.formula import CONSTANTS
 from vibsim.models import FormulaField, Model, Parameter
+from vibsim.models.oscillator import COULOMB
 from vibsim.models.shared.crossings import MOST_EVENTS, STOP
 from vibsim.models.system import MOST
 from vibsim.schemes import AnyOption, Flag, NumberOption, Option, Scheme
@@ -98,7 +94,7 @@ def _type(option: AnyOption, scheme: Scheme) -> Any:
     if not scheme.adaptive or option.name != TOLERANCE or not isinstance(option, NumberOption):
         return value
     several = Annotated[tuple[value, ...], Field(min_length=1), short(MAX_TOLERANCES)]
-    return tagged({"one": value, "several": several}, Discriminator(_one_or_several))
+    return by_form({"other": value, "list": several})
 
 
 def sweep_types(model: Model | None, schemes: Iterable[tuple[str, Scheme]]) -> dict[str, Any]:
@@ -113,10 +109,6 @@ def sweep_types(model: Model | None, schemes: Iterable[tuple[str, Scheme]]) -> d
         for option in scheme.options_on(model):
             found[f"schemes.{name}.{option.name}"] = _option_type(option)
     return found
-
-
-def _one_or_several(value: Any) -> str:
-    return tag("several") if isinstance(value, list | tuple) else tag("one")
 
 
 def scheme_names(data: Any) -> Iterator[str]:
@@ -168,11 +160,13 @@ def _formula_type(model: Model, field: FormulaField) -> Any:
     if field.of:
         if field.of == "term":
             terms = Annotated[tuple[FormulaText, ...], Field(min_length=1), short(MOST_TERMS)]
-            return tagged({"one": FormulaText, "several": terms}, Discriminator(_one_or_several))
+            return by_form({"other": FormulaText, "list": terms})
         several: Any = _formulas(FormulaText)
         if field.paired:
-            several = _formulas(by_shape(several, FormulaText))
-        return several if field.of == "output" else by_shape(several, FormulaText)
+            several = _formulas(by_form({"mapping": several, "other": FormulaText}))
+        return (
+            several if field.of == "output" else by_form({"mapping": several, "other": FormulaText})
+        )
     name = f"{_class_name(model.kind)}{_class_name(field.name)}"
     fields: dict[str, Any] = {}
     if field.table is not None:
@@ -184,39 +178,47 @@ def _formula_type(model: Model, field: FormulaField) -> Any:
             words = f"name of the column of {what} in the table, or of the variable"
             fields[key] = (Text, Field(default=key, description=words))
     for word, text in () if field.table else field.terms.items():
-        value = Annotated[float, FORMULA] | None
+        value = Annotated[float, FORMULA, BeforeValidator(_coefficient(field, word))] | None
         fields[word] = (value, Field(default=None, description=f"b of {text}"))
     if not fields:
         return FormulaText
-    return by_shape(create_model(name, __base__=Section, **fields), FormulaText)
+    own = create_model(name, __base__=Section, **fields)
+    return by_form({"mapping": own, "other": FormulaText})
+
+
+def _coefficient(field: FormulaField, word: str) -> Callable[[Any], Any]:
+    """Return what refuses the name of a parameter as the coefficient b of a term, and says what to write."""
+
+    def check(value: Any) -> Any:
+        if isinstance(value, str) and value.isidentifier() and value not in CONSTANTS:
+            whole = re.sub(r"\bb\b", value, field.terms[word])
+            hint = f"with a parameter write the formula: `{field.name}: {whole}`"
+            if word == COULOMB:
+                # its formula would hold nothing
+                hint = f"its values may be swept, as `model.{field.name}.{word}`"
+            raise refused(f"must be {FORMULA_NOTE}", hint)
+        return value
+
+    return check
 
 
 class Event(Section):
     """An event that a user writes as formulas."""
 
-    when: Annotated[
-        FormulaText,
-        Field(
-            description="a formula in the states, t and parameters: the event is where it crosses 0"
-        ),
-    ]
-    falling: Annotated[
-        StrictBool | None, Field(description="only where it falls; both ways when left out")
-    ] = None
-    rising: Annotated[StrictBool | None, Field(description="only where it rises")] = None
-    then: Annotated[
-        dict[str, FormulaText],
-        Field(
-            default_factory=dict,
-            description="new values of states, as formulas in the values before the event",
-        ),
-    ]
+    when: FormulaText
+    """a formula in the states, t and parameters: the event is where it crosses 0"""
+    falling: StrictBool | None = None
+    """only where it falls; both ways when left out"""
+    rising: StrictBool | None = None
+    """only where it rises"""
+    then: dict[str, FormulaText] = Field(default_factory=dict)
+    """new values of states, as formulas in the values before the event"""
 
 
 @cache
 def model_section(model: Model) -> type[Section]:
     """Return the class of the section of a model."""
-    if model.assembled is not None:
+    if model.loaded is not None:
         return StructureSection
     fields: dict[str, Any] = {"kind": (Literal[model.kind], Field(description=model.title))}
     for row in model.parameters:

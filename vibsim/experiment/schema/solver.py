@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, get_args
 
-from pydantic import BeforeValidator, ConfigDict, Discriminator, Field
+from pydantic import BeforeValidator, ConfigDict, Field
 
 from vibsim.core.vocabulary import Restriction
 from vibsim.experiment.schema.checks import Accuracy, Expect, MeasuringCheck, by_key, one_of
@@ -23,10 +23,9 @@ from vibsim.experiment.schema.fields import (
     Positive,
     Section,
     Text,
+    by_form,
     refused,
     short,
-    tag,
-    tagged,
 )
 from vibsim.experiment.schema.sweep import ParameterSweep
 
@@ -54,9 +53,7 @@ Function = Annotated[str, BeforeValidator(_function)]
 class SolverSection(Section):
     """How a level is made: by a command, by a function in Python, or by nobody, because its file is there."""
 
-    model_config = ConfigDict(
-        json_schema_extra={"oneOf": [{"required": [kind]} for kind in KINDS]},
-    )
+    model_config = ConfigDict(json_schema_extra={"oneOf": [{"required": [kind]} for kind in KINDS]})
     stand_ins = MappingProxyType({})
 
     command: Line | None = None
@@ -71,15 +68,11 @@ class SolverSection(Section):
     """Files that the solver reads or consists of; when one changes, all levels are made again."""
 
 
-def _is_formula(value: Any) -> str:
-    return tag("formula" if isinstance(value, str) else "list")
-
-
 _List = Annotated[tuple[Number, ...], Field(min_length=1), short(MOST_LEVELS)]
 if TYPE_CHECKING:
     Sizes = tuple[float, ...] | str
 else:
-    Sizes = tagged({"formula": Line, "list": _List}, Discriminator(_is_formula))
+    Sizes = by_form({"text": Line, "other": _List})
 
 
 class RefineSection(Section):
@@ -129,11 +122,6 @@ class SolverConvergesCheck(MeasuringCheck):
     """The lowest order that is expected; without this and `order`, any order will do that can be believed."""
     expect: Expect = Expect()
     """The verdict that passes; PASS when left out."""
-
-    @property
-    def about(self) -> str:
-        """The quantity."""
-        return self.converges
 
 
 class SolverAccurateCheck(Accuracy):

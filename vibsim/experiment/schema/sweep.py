@@ -11,17 +11,17 @@ from collections.abc import Iterable, Mapping
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from pydantic import BeforeValidator, ConfigDict, Discriminator, Field, StrictBool, WithJsonSchema
+from pydantic import BeforeValidator, ConfigDict, Field, StrictBool, WithJsonSchema
 
 from vibsim.experiment.schema.fields import (
     Count,
     Number,
     Section,
     Text,
+    by_form,
     number,
     plain,
-    tag,
-    tagged,
+    refused,
     whole,
 )
 from vibsim.schemes import SCHEMES, NumberOption, Option, Scheme
@@ -105,11 +105,7 @@ class Range(_Spaced):
         return (first, first + (self.count - 1) * step)
 
 
-RULES: Mapping[str, type[Section]] = {
-    "linspace": Linspace,
-    "logspace": Logspace,
-    "range": Range,
-}
+RULES: Mapping[str, type[Section]] = {"linspace": Linspace, "logspace": Logspace, "range": Range}
 """Every rule by the key that it is written with."""
 Rule = Linspace | Logspace | Range
 Entry = float | str
@@ -170,14 +166,6 @@ def _as_entry(value: Any) -> Any:
     return value if isinstance(value, str | bool) else number(value)
 
 
-def _which(value: Any) -> str | None:
-    """Tell a list from a mapping with a rule, and which rule it is."""
-    if isinstance(value, list | tuple):
-        return tag("list")
-    names = RULES if isinstance(value, Mapping) else ()
-    return next((tag(name) for name in names if name in value), None)
-
-
 _Entry = Annotated[
     StrictBool | float | str,
     BeforeValidator(_as_entry),
@@ -189,9 +177,8 @@ Written = tuple[bool | float | str, ...] | Linspace | Logspace | Range
 if TYPE_CHECKING:
     Spread = Written
 else:
-    Spread = tagged(
-        {**RULES, "list": _List},
-        Discriminator(_which, custom_error_type="values", custom_error_message=LIST_RULE),
+    Spread = by_form(
+        {**RULES, "list": _List}, custom_error_type="values", custom_error_message=LIST_RULE
     )
 
 
@@ -241,6 +228,13 @@ class ParameterSweep(Section):
         return self.__pydantic_extra__ or {}
 
 
+def _key(value: Any) -> Any:
+    """Return a key of the sweep as written; what is no text can name none."""
+    if not isinstance(value, str):
+        raise refused("must name a swept key, such as model.omega")
+    return value
+
+
 class SweepSection(ParameterSweep):
     """Parameters that vary, by dotted path; several make a grid in the order written, the last one fastest."""
 
@@ -251,3 +245,6 @@ class SweepSection(ParameterSweep):
             "patternProperties": swept_options(SCHEMES.built_in.values()),
         },
     )
+
+    follow: Annotated[Text, BeforeValidator(_key)] | None = None
+    """A swept key along which each member starts from the last state of the member before; it must vary fastest."""

@@ -102,6 +102,8 @@ def read(
 ) -> tuple[list[Floats], Integers]:
     """Return columns of the bytes of a file, of equal length, and the line of every row, from 1.
 
+    CsvError where it is no table of numbers in these columns.
+
     Parameters
     ----------
     choose
@@ -110,11 +112,6 @@ def read(
         is not shown.
     most
         Number of rows that are read at most.
-
-    Raises
-    ------
-    CsvError
-        Where it is no table of numbers in these columns.
     """
     source = _Rows(content)
     rows = iter(source)

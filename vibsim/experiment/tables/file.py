@@ -18,7 +18,7 @@ from vibsim.core.errors import Fault, InputError, nearest
 from vibsim.experiment.data import ExperimentSpec
 from vibsim.experiment.schema.fields import TABLE
 from vibsim.experiment.tables import csv_text
-from vibsim.experiment.yaml.file_content import MOST_BYTES, content_of
+from vibsim.experiment.tables.content import MOST_LISTED, TableError, bytes_of, reason
 from vibsim.models.table import FEWEST_POINTS, Table
 
 ENDINGS = (".csv", ".nc")
@@ -26,18 +26,10 @@ MOST_POINTS = 2**20
 EVEN = 1e-3
 """How far a place may be from where equal spacing has it, in spacings: a file may have rounded it."""
 UNIT = "m"
-MOST_LISTED = 8
-"""Files that a message lists, at most."""
+WORDS = {"x": "places", "t": "times"}
+"""What the first column holds, by its key."""
 MOST_SHOWN = 40
 """Characters of a name that a message shows, at most."""
-
-
-class TableError(ValueError):
-    """A table that is refused: the key at fault (``table`` or that of a column), the rule, and the nearest choice."""
-
-    def __init__(self, key: str, rule: str, hint: str = "") -> None:
-        self.key, self.rule, self.hint = key, rule, hint
-        super().__init__(rule)
 
 
 _Columns = tuple[Floats, Floats, Callable[[Any], str]]
@@ -49,42 +41,37 @@ def read(path: Path, keys: tuple[str, str], names: tuple[str, str]) -> tuple[Tab
 
     Under `keys` an experiment gives the `names` of the columns of places and values.
     """
-    content = _content(path)
+    columns, content = _read(path, keys, names, UNIT)
+    return _table(columns, names), content
+
+
+def read_history(path: Path, names: tuple[str, str]) -> tuple[Floats, str]:
+    """Return times and loads in the file at `path`, shape (2, point), and the SHA-256 of its bytes.
+
+    Times rise and begin at 0 or below, in steps of any length. TableError where the file is no such table.
+    """
+    columns, content = _read(path, ("t", "p"), names, "")
+    t, p, _ = columns
+    if len(t) < 2:
+        raise TableError(f"must have at least 2 points, has {len(t)}")
+    _check_rising(columns, names)
+    if t[0] > 0.0:
+        raise TableError(_late(names[0], t[0]))
+    return np.stack([t, p]), content
+
+
+def _read(
+    path: Path, keys: tuple[str, str], names: tuple[str, str], unit: str
+) -> tuple[_Columns, str]:
+    content = bytes_of(path, ENDINGS, "table")
     if names[0] == names[1]:
-        rule = f"must be another column than '{names[0]}', which holds the places"
-        raise TableError(keys[1], rule)
-    of_kind = _from_text if path.suffix.lower() == ".csv" else _from_netcdf
-    columns = of_kind(content, keys, names)
-    return _table(columns, names), hashlib.sha256(content).hexdigest()
-
-
-def _content(path: Path) -> bytes:
-    if path.suffix.lower() not in ENDINGS:
-        raise TableError(TABLE, f"the name of a table must end with {' or '.join(ENDINGS)}")
-    if path.is_dir():
-        raise TableError(TABLE, "is a folder, and must be a file")
-    try:
-        content = content_of(path, MOST_BYTES)
-    except FileNotFoundError:
-        raise TableError(TABLE, "there is no such file", _alike(path)) from None
-    except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or str(error)
-        raise TableError(TABLE, f"cannot be read ({reason})") from None
-    if len(content) > MOST_BYTES:
-        raise TableError(TABLE, f"must not be larger than {MOST_BYTES >> 20} MiB")
-    return content
-
-
-def _alike(path: Path) -> str:
-    try:
-        beside = [p.name for p in path.parent.iterdir() if p.suffix.lower() in ENDINGS]
-    except (OSError, ValueError):
-        return "there is no such folder"
-    if not beside:
-        return "there is no table in that folder"
-    hint = nearest(path.name, sorted(beside))
-    is_close = hint.startswith("did") or len(beside) <= MOST_LISTED
-    return hint if is_close else f"there are {len(beside)} tables in that folder"
+        rule = f"must be another column than '{names[0]}', which holds the {WORDS[keys[0]]}"
+        raise TableError(rule, key=keys[1])
+    if path.suffix.lower() == ".csv":
+        columns = _from_text(content, keys, names)
+    else:
+        columns = _from_netcdf(content, keys, names, unit)
+    return columns, hashlib.sha256(content).hexdigest()
 
 
 def _from_text(content: bytes, keys: tuple[str, str], names: tuple[str, str]) -> _Columns:
@@ -102,8 +89,7 @@ def _from_text(content: bytes, keys: tuple[str, str], names: tuple[str, str]) ->
             column = f", in column '{error.column}'" if error.column else ""
             what = "" if cell or not error.column else "the cell "
             rule = f"line {error.line}: {cell}{what}{error.rule}{column}"
-        raise TableError(TABLE, rule, error.hint) from None
-    _check_count(len(lines))
+        raise TableError(rule, error.hint) from None
     return place, value, lambda i: f"line {lines[i]}"
 
 
@@ -113,65 +99,72 @@ def _found(names: list[str], name: str, key: str, word: str, *, is_told: bool = 
         hint = nearest(name, [known[:MOST_SHOWN] for known in names]) if is_told else ""
         if len(names) > MOST_LISTED and not hint.startswith("did"):
             hint = f"it has {len(names)}"
-        raise TableError(key, f"the table has no {word} '{name}'", hint)
+        raise TableError(f"the table has no {word} '{name}'", hint, key)
     if names.count(name) > 1:
-        raise TableError(key, f"the table has more than one {word} '{name}'")
+        raise TableError(f"the table has more than one {word} '{name}'", key=key)
     return names.index(name)
 
 
-def _from_netcdf(content: bytes, keys: tuple[str, str], names: tuple[str, str]) -> _Columns:
+def _from_netcdf(
+    content: bytes, keys: tuple[str, str], names: tuple[str, str], unit: str
+) -> _Columns:
     try:
-        with netcdf.in_memory(content) as dataset:
-            found = [_variable(dataset, *pair) for pair in zip(keys, names, strict=True)]
+        with netcdf.foreign(content) as dataset:
+            found = [_variable(dataset, *pair, unit) for pair in zip(keys, names, strict=True)]
     except (OSError, RuntimeError) as error:
-        reason = getattr(error, "strerror", None) or str(error)
-        raise TableError(TABLE, f"the netCDF library cannot read it ({reason})") from None
+        raise TableError(f"the netCDF library cannot read it ({reason(error)})") from None
     place, value = found
     if len(place) != len(value):
         rule = f"'{names[0]}' has {len(place)} points, '{names[1]}' has {len(value)}"
-        raise TableError(TABLE, f"both variables must be of one dimension: {rule}")
+        raise TableError(f"both variables must be of one dimension: {rule}")
     return place, value, lambda i: f"index {i}"
 
 
-def _variable(dataset: Any, key: str, name: str) -> Floats:
-    """Return a variable of one dimension as numbers; what is missing in it is NaN."""
+def _variable(dataset: Any, key: str, name: str, unit: str) -> Floats:
+    """Return a variable of one dimension, in `unit` if any, as numbers; what is missing in it is NaN."""
     known = list(dataset.variables)
     variable = dataset.variables[known[_found(known, name, key, "variable")]]
     if len(variable.dimensions) != 1:
         dims = len(variable.dimensions)
-        raise TableError(key, f"variable '{name}' must have one dimension, and has {dims}")
-    unit = str(getattr(variable, "units", UNIT)).strip()
-    if unit not in (UNIT, "metre", "meter", "metres", "meters"):
-        raise TableError(key, f"variable '{name}' is in '{unit}', and must be in {UNIT}")
-    _check_count(variable.size)
+        raise TableError(f"variable '{name}' must have one dimension, and has {dims}", key=key)
+    own = str(getattr(variable, "units", unit)).strip()
+    if unit and own not in (unit, "metre", "meter", "metres", "meters"):
+        raise TableError(f"variable '{name}' is in '{own}', and must be in {unit}", key=key)
+    if variable.size > MOST_POINTS:
+        raise TableError(f"must not have more than {MOST_POINTS} points, has {variable.size}")
     if variable.dtype is str or variable.dtype.kind not in "fiu":
-        raise TableError(key, f"variable '{name}' must hold numbers")
+        raise TableError(f"variable '{name}' must hold numbers", key=key)
     values = np.ma.asarray(variable[:])
     return np.ma.filled(values.astype(np.float64), np.nan)
 
 
-def _check_count(points: int) -> None:
-    if points < FEWEST_POINTS:
-        raise TableError(TABLE, f"must have at least {FEWEST_POINTS} points, has {points}")
-    if points > MOST_POINTS:
-        raise TableError(TABLE, f"must not have more than {MOST_POINTS} points, has {points}")
+def _late(name: str, first: float) -> str:
+    return f"'{name}' must begin at 0 or below, where the motion starts; it begins at {first:.10g}"
 
 
-def _table(columns: _Columns, names: tuple[str, str]) -> Table:
+def _check_rising(columns: _Columns, names: tuple[str, str]) -> None:
+    """Refuse numbers that are not finite, and places that do not increase."""
     x, h, place_of = columns
     for name, values in zip(names, (x, h), strict=True):
         wrong = np.flatnonzero(~np.isfinite(values))
         if len(wrong):
             rule = f"{place_of(wrong[0])}: '{name}' is {values[wrong[0]]:g}, and must be finite"
-            raise TableError(TABLE, rule)
+            raise TableError(rule)
     falling = np.flatnonzero(np.diff(x) <= 0.0)
     if len(falling):
         i = int(falling[0])
         rule = f"'{names[0]}' must increase, but is {x[i]:.10g} and then {x[i + 1]:.10g}"
-        raise TableError(TABLE, f"{place_of(i + 1)}: {rule}")
+        raise TableError(f"{place_of(i + 1)}: {rule}")
+
+
+def _table(columns: _Columns, names: tuple[str, str]) -> Table:
+    x, h, place_of = columns
+    if len(x) < FEWEST_POINTS:
+        raise TableError(f"must have at least {FEWEST_POINTS} points, has {len(x)}")
+    _check_rising(columns, names)
     spacing = float(x[-1] - x[0]) / (len(x) - 1)
     if not 0.0 < spacing < np.inf:
-        raise TableError(TABLE, f"'{names[0]}' must span a finite length")
+        raise TableError(f"'{names[0]}' must span a finite length")
     gaps, even = np.diff(x), x[0] + np.arange(len(x)) * spacing
     usual = float(np.median(gaps))
     if np.any(np.abs(x - even) > EVEN * usual):
@@ -180,33 +173,30 @@ def _table(columns: _Columns, names: tuple[str, str]) -> Table:
         i = min(int(odd[0] if len(odd) else np.argmax(np.abs(x - even))), len(gaps) - 1)
         rule = f"'{names[0]}' must be equally spaced, but is {gaps[i]:.10g} further than the point before"
         hint = f"the others are {usual:.10g} apart"
-        raise TableError(TABLE, f"{place_of(i + 1)}: {rule}", hint)
+        raise TableError(f"{place_of(i + 1)}: {rule}", hint)
     if x[0] > EVEN * spacing:
-        rule = f"'{names[0]}' must begin at 0 or below, where the motion starts; it begins at {x[0]:.10g}"
-        raise TableError(TABLE, rule)
+        raise TableError(_late(names[0], x[0]))
     table = Table(float(x[0]), spacing, h)
     with np.errstate(all="ignore"):
         if not np.isfinite(table.rows).all():
-            raise TableError(TABLE, "its second differences are too large to be numbers")
+            raise TableError("its second differences are too large to be numbers")
     return table
 
 
 def attach(experiment: ExperimentSpec) -> None:
     """Read the tables of an experiment that was kept without their numbers.
 
-    Raises
-    ------
-    InputError
-        Where one cannot be read, or has other numbers than it had.
+    InputError where one cannot be read, or has other numbers than it had.
     """
-    folder = experiment.file.parent if experiment.file else Path()
     keys = {row.name: row.table or ("", "") for row in experiment.model.base.formulas}
     for name, spec in experiment.model.tables.items():
         try:
-            table, content = read(folder / spec.file, keys[name], (spec.place, spec.value))
+            table, content = read(
+                experiment.folder / spec.file, keys[name], (spec.place, spec.value)
+            )
             if table.digest != spec.numbers:
                 rule = "has other numbers than when the experiment was read"
-                raise TableError(TABLE, rule, "run the experiment again")
+                raise TableError(rule, "run the experiment again")
         except TableError as error:
             file, key = str(experiment.file or experiment.name), f"model.{name}.{TABLE}"
             raise InputError([Fault(file, 0, key, spec.file, error.rule, error.hint)]) from None

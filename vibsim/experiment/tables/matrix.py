@@ -9,14 +9,15 @@ from __future__ import annotations
 import hashlib
 import io
 from pathlib import Path
+from tokenize import TokenError
 from typing import Any
 
 import numpy as np
 
+from vibsim.core import guarded
 from vibsim.core.array_types import Floats
-from vibsim.core.errors import nearest
 from vibsim.experiment.tables import csv_text
-from vibsim.experiment.yaml.file_content import MOST_BYTES, content_of
+from vibsim.experiment.tables.content import TableError, bytes_of
 from vibsim.models.shared.matrices import Matrix
 from vibsim.models.structure import MOST_DOFS
 
@@ -26,59 +27,28 @@ MOST_DENSE = 2048
 """Rows of a matrix that is written out with its zeros, at most."""
 
 
-class MatrixError(ValueError):
-    """A matrix that is refused: the rule that it breaks, and how to keep it."""
-
-    def __init__(self, rule: str, hint: str = "") -> None:
-        self.rule, self.hint = rule, hint
-        super().__init__(rule)
-
-
 def read(path: Path) -> tuple[Any, str]:
     """Return what the file at `path` holds, and the SHA-256 of its bytes.
 
     It is an array of numbers of one or two dimensions, or a sparse array of SciPy.
 
-    Raises
-    ------
-    MatrixError
-        Where the file cannot be read as numbers.
+    TableError where the file cannot be read as numbers.
     """
-    if path.suffix.lower() not in ENDINGS:
-        raise MatrixError(f"the name of a matrix must end with {', '.join(ENDINGS)}")
-    if path.is_dir():
-        raise MatrixError("is a folder, and must be a file")
-    try:
-        content = content_of(path, MOST_BYTES)
-    except FileNotFoundError:
-        raise MatrixError("there is no such file", _alike(path)) from None
-    except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or str(error)
-        raise MatrixError(f"cannot be read ({reason})") from None
-    if len(content) > MOST_BYTES:
-        raise MatrixError(f"must not be larger than {MOST_BYTES >> 20} MiB")
+    content = bytes_of(path, ENDINGS, "matrix")
     of_kind = {".mtx": _from_matrix_market, ".npy": _from_numpy, ".csv": _from_text}
     found = of_kind[path.suffix.lower()](content)
     if np.iscomplexobj(found):
-        raise MatrixError("must hold real numbers, holds complex ones")
+        raise TableError("must hold real numbers, holds complex ones")
     numbers = found if isinstance(found, np.ndarray) else found.data
     if not np.isfinite(numbers).all():
-        raise MatrixError("must hold finite numbers")
+        raise TableError("must hold finite numbers")
     return found, hashlib.sha256(content).hexdigest()
-
-
-def _alike(path: Path) -> str:
-    try:
-        beside = sorted(p.name for p in path.parent.iterdir() if p.suffix.lower() in ENDINGS)
-    except (OSError, ValueError):
-        return "there is no such folder"
-    return nearest(path.name, beside) if beside else "there is no matrix in that folder"
 
 
 def _check_counts(*counts: int) -> None:
     if max(counts) > MOST_DOFS:
         rule = f"must not have more than {MOST_DOFS} rows and columns, has {max(counts)}"
-        raise MatrixError(rule)
+        raise TableError(rule)
 
 
 def _from_matrix_market(content: bytes) -> Any:
@@ -89,26 +59,28 @@ def _from_matrix_market(content: bytes) -> Any:
         # before anything of that size is allocated
         _check_counts(rows, columns)
         if form == "array" and rows * columns > MOST_DENSE**2:
-            raise MatrixError(f"of more than {MOST_DENSE} rows only a coordinate matrix is read")
+            raise TableError(f"of more than {MOST_DENSE} rows only a coordinate matrix is read")
+        if problem := guarded.problem(lambda: mmread(io.BytesIO(content)), len(content)):
+            raise ValueError(problem)
         found = mmread(io.BytesIO(content), spmatrix=False)
-    except MatrixError:
+    except TableError:
         raise
     except (ValueError, TypeError, OverflowError, RuntimeError, EOFError) as error:
-        raise MatrixError(f"is no Matrix Market file ({_first_line(error)})") from None
+        raise TableError(f"is no Matrix Market file ({_first_line(error)})") from None
     return np.asarray(found, dtype=float) if isinstance(found, np.ndarray) else found
 
 
 def _from_numpy(content: bytes) -> Any:
     try:
         found = np.load(io.BytesIO(content), allow_pickle=False)
-    except (ValueError, OSError, EOFError, MemoryError, SyntaxError) as error:
-        raise MatrixError(f"is no array of NumPy ({_first_line(error)})") from None
+    except (ValueError, OSError, EOFError, MemoryError, SyntaxError, TokenError) as error:
+        raise TableError(f"is no array of NumPy ({_first_line(error)})") from None
     if (
         not isinstance(found, np.ndarray)
         or found.dtype.kind not in "fiuc"
         or found.ndim not in (1, 2)
     ):
-        raise MatrixError("must hold one array of numbers, of one or two dimensions")
+        raise TableError("must hold one array of numbers, of one or two dimensions")
     _check_counts(*found.shape, 1)
     return found if found.dtype.kind == "c" else found.astype(float)
 
@@ -117,11 +89,11 @@ def _from_text(content: bytes) -> Any:
     try:
         text = content.decode("utf-8-sig")
     except UnicodeDecodeError:
-        raise MatrixError("must be UTF-8 text") from None
+        raise TableError("must be UTF-8 text") from None
     lines = [(i, line.strip()) for i, line in enumerate(text.splitlines(), 1)]
     lines = [(i, line) for i, line in lines if line and not line.startswith("#")]
     if not lines:
-        raise MatrixError("holds no numbers")
+        raise TableError("holds no numbers")
     is_sparse = lines[0][1].replace(" ", "").lower() == SPARSE_HEADER
     rows, width = [], 0
     for i, line in lines[is_sparse:]:
@@ -131,10 +103,10 @@ def _from_text(content: bytes) -> Any:
             shown = f"'{line[:40]}'" if csv_text.is_shown(line[:40]) else "the line"
             hint = f"or begin with the line {SPARSE_HEADER}"
             rule = f"line {i}: {shown} must hold numbers between commas"
-            raise MatrixError(rule, hint) from None
+            raise TableError(rule, hint) from None
         width = width or len(row)
         if len(row) != width:
-            raise MatrixError(f"line {i}: has {len(row)} numbers, the lines before have {width}")
+            raise TableError(f"line {i}: has {len(row)} numbers, the lines before have {width}")
         rows.append(row)
     _check_counts(0 if is_sparse else len(rows), width)
     if is_sparse:
@@ -148,13 +120,13 @@ def _from_entries(entries: Floats | None) -> Any:
     from scipy.sparse import coo_array
 
     if entries is None or not len(entries):
-        raise MatrixError(f"must have three numbers on each line below {SPARSE_HEADER}")
+        raise TableError(f"must have three numbers on each line below {SPARSE_HEADER}")
     places = entries[:, :2]
     if not np.all((places >= 1.0) & (places <= MOST_DOFS) & (places == np.floor(places))):
-        raise MatrixError(f"rows and columns must be whole numbers from 1 to {MOST_DOFS}")
+        raise TableError(f"rows and columns must be whole numbers from 1 to {MOST_DOFS}")
     rows, columns = (places - 1.0).astype(np.int64).T
     if len(np.unique(rows * MOST_DOFS + columns)) < len(rows):
-        raise MatrixError("an entry must not be given twice")
+        raise TableError("an entry must not be given twice")
     size = int(max(rows.max(), columns.max())) + 1
     return coo_array((entries[:, 2], (rows, columns)), shape=(size, size))
 
@@ -166,22 +138,19 @@ def _first_line(error: Exception) -> str:
 def square(found: Any) -> Matrix:
     """Return a square matrix; of one row or column of numbers the diagonal matrix.
 
-    Raises
-    ------
-    MatrixError
-        Where it is not square.
+    TableError where it is not square.
     """
-    if isinstance(found, np.ndarray) and found.ndim == 1:
-        found = np.diag(found)
+    if isinstance(found, np.ndarray) and (found.ndim == 1 or 1 in found.shape):
+        found = np.diag(np.ravel(found))
     rows, columns = found.shape
     if rows != columns:
-        raise MatrixError(f"must be square, has {rows} rows and {columns} columns")
+        raise TableError(f"must be square, has {rows} rows and {columns} columns")
     return Matrix.of(found)
 
 
 def vector(found: Any) -> Floats:
-    """Return one row or column of numbers as a vector; MatrixError where there are several."""
+    """Return one row or column of numbers as a vector; TableError where there are several."""
     dense = found if isinstance(found, np.ndarray) else found.toarray()
     if dense.ndim == 2 and 1 not in dense.shape:
-        raise MatrixError(f"must be one column, has the shape {dense.shape[0]} x {dense.shape[1]}")
+        raise TableError(f"must be one column, has the shape {dense.shape[0]} x {dense.shape[1]}")
     return np.ravel(dense)

@@ -12,9 +12,11 @@ import numpy as np
 from vibsim.core.array_types import Floats
 from vibsim.core.errors import Fault, InputError
 from vibsim.experiment.data import ArraySpec, ExperimentSpec, StructureSpec
-from vibsim.experiment.tables.matrix import MatrixError, read, square, vector
+from vibsim.experiment.tables.content import TableError
+from vibsim.experiment.tables.file import read_history
+from vibsim.experiment.tables.matrix import read, square, vector
 from vibsim.models.shared.matrices import RIGID, Matrix, factored
-from vibsim.models.structure import LOAD, MOST_DOFS, MOST_MODES, Structure
+from vibsim.models.structure import HISTORY, LOAD, MOST_DOFS, MOST_MODES, MOST_OBSERVED, Structure
 
 MATRICES = ("mass", "stiffness", "damping")
 STARTS = ("start.displacement", "start.velocity")
@@ -33,12 +35,24 @@ class Assembly:
     faults: list[tuple[str, str, str]] = field(default_factory=list)
     """The dotted key in the section ``model``, the rule that is broken, and how to keep it."""
     structure: Structure | None = None
+    unnamed: int = 0
+    """Degrees of freedom, where they are too many to be observed without names."""
     digests: dict[str, tuple[str, str]] = field(default_factory=dict)
     """By key the SHA-256 of the numbers of an array, and that of the bytes of its file; empty without one."""
 
     def add(self, key: str, rule: str, hint: str = "") -> None:
         """Note a fault."""
         self.faults.append((key, rule, hint))
+
+    def complete(self, size: int, ratio: float | None) -> None:
+        """Name every degree of freedom where nothing is observed by name, and give every mode one damping ratio."""
+        update: dict[str, Any] = {} if ratio is None else {"ratios": (ratio,) * size}
+        if not self.spec.observe:
+            self.unnamed = size if size > MOST_OBSERVED else 0
+            names = ("u",) if size == 1 else tuple(f"u{i}" for i in range(1, size + 1))
+            each = (((i, 1.0),) for i in range(1, size + 1))
+            update["observe"] = tuple(zip(names, each, strict=True))[:MOST_OBSERVED]
+        self.spec = self.spec.model_copy(update=update)
 
     def matrices(self) -> dict[str, Matrix]:
         """Return the matrices that are sound."""
@@ -49,14 +63,12 @@ class Assembly:
             try:
                 matrix = square(self._array(key))
                 if matrix.size > MOST_DOFS:
-                    raise MatrixError(
-                        f"must not have more than {MOST_DOFS} rows, has {matrix.size}"
-                    )
+                    raise TableError(f"must not have more than {MOST_DOFS} rows, has {matrix.size}")
                 size, i, j = matrix.asymmetry
                 if size > SYMMETRIC:
                     rule = f"must be symmetric: the entries ({i + 1}, {j + 1}) and ({j + 1}, {i + 1}) differ"
-                    raise MatrixError(f"{rule} by {size:.3g} of the largest one")
-            except MatrixError as error:
+                    raise TableError(f"{rule} by {size:.3g} of the largest one")
+            except TableError as error:
                 self.add(key, error.rule, error.hint)
             else:
                 found[key] = matrix
@@ -68,12 +80,13 @@ class Assembly:
         content = ""
         if row.file is not None:
             if Path(row.file).is_absolute():
-                raise MatrixError("must be a path relative to the folder of the experiment file")
-            found, content = read(self.folder / row.file)
+                raise TableError("must be a path relative to the folder of the experiment file")
+            path = self.folder / row.file
+            found, content = read_history(path, row.columns) if row.columns else read(path)
         elif row.rows and isinstance(row.rows[0], tuple):
             lengths = {len(line) for line in row.rows if isinstance(line, tuple)}
             if len(lengths) > 1:
-                raise MatrixError(
+                raise TableError(
                     f"must have rows of one length, has {min(lengths)} to {max(lengths)} numbers"
                 )
             found = np.array(row.rows, dtype=float)
@@ -81,6 +94,17 @@ class Assembly:
             found = np.array(row.rows, dtype=float)
         self.digests[key] = _digest(found), content
         return found
+
+    def histories(self) -> tuple[tuple[int, Floats], ...]:
+        """Return the tables of loads that are sound, each behind the number of its load."""
+        found = []
+        for key in self.spec.arrays:
+            if key.startswith(f"{HISTORY}."):
+                try:
+                    found.append((int(key.partition(".")[2]), self._array(key)))
+                except TableError as error:
+                    self.add(f"{key}.{error.key}", error.rule, error.hint)
+        return tuple(found)
 
     def vector(self, key: str, size: int) -> Floats:
         """Return a vector of as many numbers as the structure has degrees of freedom; 0 where it is not sound."""
@@ -95,10 +119,10 @@ class Assembly:
         try:
             given = vector(self._array(key))
             if len(given) != size:
-                raise MatrixError(
+                raise TableError(
                     f"must have {size} numbers, as many as degrees of freedom, has {len(given)}"
                 )
-        except MatrixError as error:
+        except TableError as error:
             self.add(key, error.rule, error.hint)
             return found
         return given
@@ -111,10 +135,16 @@ def _digest(found: Any) -> str:
     return hashlib.sha256(repr(array.shape).encode() + array.tobytes()).hexdigest()
 
 
-def assemble(spec: StructureSpec, folder: Path) -> Assembly:
-    """Read what `spec` names, its paths relative to `folder`, and put the structure together."""
+def assemble(spec: StructureSpec, folder: Path, ratio: float | None = None) -> Assembly:
+    """Read what `spec` names, its paths relative to `folder`, and put the structure together.
+
+    `ratio` is the damping ratio of every mode, where there is one. What `spec` leaves out is filled in.
+    """
     own = Assembly(spec, folder)
     matrices = own.matrices()
+    if "stiffness" in matrices:
+        own.complete(matrices["stiffness"].size, ratio)
+        spec = own.spec
     if "stiffness" not in matrices or len(matrices) < len(spec.arrays.keys() & set(MATRICES)):
         return own
     stiffness = matrices["stiffness"]
@@ -146,6 +176,7 @@ def assemble(spec: StructureSpec, folder: Path) -> Assembly:
         own.add("damping_ratios", rule, "or take rayleigh" if size > MOST_MODES else "")
     loads = [key for key in spec.arrays if key.startswith(f"{LOAD}.")]
     shapes = np.array([own.vector(key, size) for key in loads]).reshape(len(loads), size)
+    histories = own.histories()
     start = [_started(own, key, structure, observed) for key in STARTS]
     if own.faults:
         return own
@@ -158,6 +189,7 @@ def assemble(spec: StructureSpec, folder: Path) -> Assembly:
         observed=observed,
         start=None if spec.is_free else (start[0], start[1]),
         shapes=shapes,
+        histories=histories,
     )
     return own
 
@@ -201,8 +233,9 @@ def _started(own: Assembly, key: str, structure: Structure, observed: Floats) ->
     return shape * (row.size / seen)
 
 
-def with_digests(spec: StructureSpec, own: Assembly) -> StructureSpec:
-    """Return `spec` with the digests of its numbers, holding its structure."""
+def with_digests(own: Assembly) -> StructureSpec:
+    """Return what was assembled with the digests of its numbers, holding its structure."""
+    spec = own.spec
     assert own.structure is not None
     rows = {
         key: row.model_copy(update={"numbers": own.digests.get(key, ("", ""))[0]})
@@ -217,14 +250,11 @@ def with_digests(spec: StructureSpec, own: Assembly) -> StructureSpec:
 def attach(experiment: ExperimentSpec) -> None:
     """Read the numbers of a structure that was kept without them.
 
-    Raises
-    ------
-    InputError
-        Where a file cannot be read, or has other numbers than it had.
+    InputError where a file cannot be read, or has other numbers than it had.
     """
     spec = experiment.model.structure
     assert spec is not None
-    own = assemble(spec, experiment.file.parent if experiment.file else Path())
+    own = assemble(spec, experiment.folder)
     for key, row in spec.arrays.items():
         if row.file is not None and own.digests.get(key, ("", ""))[0] != row.numbers:
             rule = "has other numbers than when the experiment was read"

@@ -16,10 +16,7 @@ MOST_BYTES = 2**26
 def read_bytes(path: Path) -> bytes:
     """Return the content of the experiment file at `path`.
 
-    Raises
-    ------
-    InputError
-        When it cannot be read, is no regular file (a pipe, a device, a folder) or is too large.
+    InputError when it cannot be read, is no regular file (a pipe, a device, a folder) or is too large.
     """
     rule = f"must not be larger than {MAX_BYTES} bytes"
     try:

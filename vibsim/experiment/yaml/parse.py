@@ -47,6 +47,8 @@ _INFINITY = re.compile(r"[-+]?\.(inf|Inf|INF)")
 _NAN = frozenset({".nan", ".NaN", ".NAN"})
 _INVALID = "is not valid YAML"
 _TAB = re.compile(" *\t")
+_INDEX = re.compile(r"\w\{\w+([+-]\d+)?\}")
+"""A name with an index of `repeat`, as it stands in an experiment file."""
 _Loader: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 
 
@@ -113,6 +115,8 @@ def read(path: Path, keys: Collection[str] = ()) -> Source:
 def parse(content: bytes, file: str, keys: Collection[str] = ()) -> Source:
     """Build the data of one YAML document.
 
+    InputError at the first fault of syntax, with the duplicate keys and the tags before it.
+
     Parameters
     ----------
     file
@@ -120,11 +124,6 @@ def parse(content: bytes, file: str, keys: Collection[str] = ()) -> Source:
     keys
         Keys of which a file has one at least: else it is no file for vibsim, and no message shows what is in it. None
         means that any file will do.
-
-    Raises
-    ------
-    InputError
-        At the first fault of syntax, with the duplicate keys and the tags before it.
     """
     try:
         text = content.decode("utf-8-sig")
@@ -162,6 +161,8 @@ def _syntax(error: yaml.MarkedYAMLError, text: str, file: str) -> Fault:
     if _TAB.match("".join(text.splitlines()[line - 1 : line])):
         rule = f"{_INVALID}: tabs are not allowed for indentation"
         return Fault(file, line, "", "", rule, "use spaces")
+    if _INDEX.search("".join(text.splitlines()[line - 1 : line])):
+        problem += '; YAML reads braces inside [...] and {...} itself: write "q{i}" there, in quotation marks'
     return Fault(file, line, "", "", _INVALID, problem)
 
 

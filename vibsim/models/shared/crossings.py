@@ -44,10 +44,7 @@ def guard_name(number: int, falling: bool, rising: bool) -> str:
 def guard_of(condition: Expression) -> Expression:
     """Return what falls below 0 where a condition begins to hold: a comparison, or some joined by and, or.
 
-    Raises
-    ------
-    ExpressionError
-        Where it is another formula, or asks for a single value.
+    ExpressionError where it is another formula, or asks for a single value.
     """
     match condition:
         case Compare("<" | "<=", left, right):
@@ -67,10 +64,7 @@ def guard_of(condition: Expression) -> Expression:
 def crossings(texts: Mapping[str, str], names: tuple[str, ...]) -> Crossings | None:
     """Return the events of some formulas, which may hold `names`; the stop is the last one. None where there are none.
 
-    Raises
-    ------
-    ExpressionError
-        Where a formula cannot be read.
+    ExpressionError where a formula cannot be read.
     """
     rows = []
     for number in range(1, MOST_EVENTS + 1):

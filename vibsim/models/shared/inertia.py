@@ -90,10 +90,7 @@ class Inertia:
     def accelerations(self, forces: Sequence[Expression]) -> tuple[Expression, ...]:
         """Return the accelerations by some forces.
 
-        Raises
-        ------
-        ExpressionError
-            Where too many coordinates have masses in common.
+        ExpressionError where too many coordinates have masses in common.
         """
         right = [minus(force, self.rest(i)) for i, force in enumerate(forces)]
         found: list[Expression] = [ZERO] * len(right)
@@ -158,10 +155,7 @@ def inertia(
 ) -> Inertia:
     """Return the masses of some formulas: ``mass.x`` or ``mass.x.x`` that of x, 1 where none is written, ``mass.x.y``.
 
-    Raises
-    ------
-    ExpressionError
-        Where a formula cannot be read.
+    ExpressionError where a formula cannot be read.
     """
     entries: dict[tuple[int, int], Expression] = {(i, i): ONE for i in range(len(positions))}
     for key, text in texts.items():

@@ -94,10 +94,7 @@ def damped_motion(
 def exponentials(node: Expression, numbers: Mapping[str, Any]) -> list[Term]:
     """Return the pairs of C and s of a formula in the time that is a sum of exponentials, from values of other names.
 
-    Raises
-    ------
-    ValueError
-        Where the formula is no such sum (see `is_sum_of_exponentials`).
+    ValueError where the formula is no such sum (see `is_sum_of_exponentials`).
     """
     if "t" not in names_in(node):
         return [(values(node, numbers) + 0j, 0j)]

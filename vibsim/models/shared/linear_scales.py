@@ -93,10 +93,7 @@ def stiffness_at_rest(forces: Forces) -> Expression | None:
 
 
 def with_scaled_run(
-    scales: Scales,
-    forces: Forces,
-    parameters: tuple[Parameter, ...],
-    given: Mapping[str, Powers],
+    scales: Scales, forces: Forces, parameters: tuple[Parameter, ...], given: Mapping[str, Powers]
 ) -> Scales:
     """Return the scales with the parameters of the scaled equation, or why there are none.
 
@@ -206,13 +203,7 @@ class Equations:
         return found
 
     def equal(self, left: Dimension, right: Dimension, node: Expression) -> None:
-        """Demand that two dimensions are one.
-
-        Raises
-        ------
-        DimensionError
-            Where they cannot be.
-        """
+        """Demand that two dimensions are one; DimensionError where they cannot be."""
         rest = dict(self.reduced(_product(left, right, Fraction(-1))))
         name = next((name for name in rest if name not in BASES), None)
         if name is not None:
@@ -281,6 +272,8 @@ def powers(
 ) -> dict[str, tuple[Fraction, ...]]:
     """Return the powers of the scales of mass, position and time that parameters have, from forces.
 
+    DimensionError with the part of the formulas where terms of one sum cannot have the same dimension.
+
     Parameters
     ----------
     known
@@ -288,11 +281,6 @@ def powers(
     names
         The parameters that are asked for. Where the formulas leave a choice, as between the factors of a product, the
         first ones get the dimension and the others none.
-
-    Raises
-    ------
-    DimensionError
-        With the part of the formulas where terms of one sum cannot have the same dimension.
     """
     equations = Equations({name: _known(value) for name, value in known.items()})
     for formula in formulas:

@@ -34,13 +34,7 @@ class Manufactured:
 
     @cached_property
     def velocities(self) -> tuple[Expression, ...]:
-        """Derivatives of the positions.
-
-        Raises
-        ------
-        ExpressionError
-            Where they are too long to be worked with.
-        """
+        """Derivatives of the positions; ExpressionError where they are too long to be worked with."""
         return tuple(self._short(derivative(u, "t"), MAX_NODES // 10) for u in self.positions)
 
     @cached_property

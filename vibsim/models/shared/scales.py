@@ -111,10 +111,7 @@ def dimensionless(
 def scaled_parameters(model: Model, parameters: Numbers, initial: Numbers) -> dict[str, Any]:
     """Return the parameters of the scaled equation by their keys.
 
-    Raises
-    ------
-    ValueError
-        Where the model has no scaled equation.
+    ValueError where the model has no scaled equation.
     """
     own = model.scales
     if own is None or own.parameters is None:

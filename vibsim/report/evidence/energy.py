@@ -17,11 +17,11 @@ from vibsim.core.record import Record
 from vibsim.core.vocabulary import DRIFTS
 from vibsim.observe.thresholds import LEAST_PERIODS, LEAST_SAMPLES, STILL
 from vibsim.report import style
-from vibsim.report.data import Member, at, pick, time_label, times, unit, whole
+from vibsim.report.data import Member, at, time_label, times, unit, whole
 from vibsim.report.evidence import frame
 from vibsim.report.evidence.frame import brief, evidence, measured, short
 from vibsim.report.style import Picture
-from vibsim.report.types import Axes, ConservesCheck
+from vibsim.report.types import Axes, ConservesCheck, Experiment
 
 WINDOWS = ((0.125, 0.25), (0.25, 0.5), (0.5, 1.0))  # in parts of the end, those of m3, m2 and m1
 NAMES = ("m₃", "m₂", "m₁")
@@ -53,14 +53,15 @@ class EnergyError:
         return not np.isfinite(self.means).all()
 
 
-def picture(record: Record, check: ConservesCheck, name: str, member: Member) -> Picture | None:
+def picture(
+    _: Experiment, record: Record, check: ConservesCheck, name: str, member: Member
+) -> Picture | None:
     """Draw how the largest energy error so far grows, beside the drift that a check asks for."""
     series = f"{check.about}_running_max"
     if series not in record:
         return evidence(f"{member.title}: the largest energy error so far is not stored.")
-    place = {"scheme": member.scheme, "case": member.case}
     level, kind, rate, power = (
-        measured(record, name, field, **place)
+        measured(record, name, field, member)
         for field in ("level", "drift", "drift_rate", "drift_power")
     )
     first = abs(float(at(record, "energy_initial", member)))
@@ -71,9 +72,8 @@ def picture(record: Record, check: ConservesCheck, name: str, member: Member) ->
         t=times(record, member.case),
         # the last velocity may be a one-sided one, which the verdict does not look at
         running=np.append(running[:-1], np.nan) / (first or 1.0),
-        means=np.asarray(pick(record, name_of(name, "window_means"), **place), np.float64)
-        / (first or 1.0),
-        round_off=measured(record, name, "round_off", **place) / (first or 1.0),
+        means=at(record, name_of(name, "window_means"), member) / (first or 1.0),
+        round_off=measured(record, name, "round_off", member) / (first or 1.0),
         power=power,
         rate=rate,
     )
@@ -87,7 +87,7 @@ def picture(record: Record, check: ConservesCheck, name: str, member: Member) ->
     title = style.label(label, "" if first else unit(record, "energy_deviation_max_abs"))
     figure = style.canvas(1.0)
     _draw(frame.panel(figure, title, time_label(record), frame.WIDE), found)
-    caption = f"{member.title}, level {level:.0f}: {_told(found)} {_dashed(found)}".strip()
+    caption = f"{member.title}, level {level:.0f}: {_naming(found)} {_dashed_line(found)}".strip()
     return evidence(caption, title, figure)
 
 
@@ -140,7 +140,7 @@ def _expected(found: EnergyError, t: Floats) -> Floats:
     return np.asarray(second + (first - second) * (part - earlier) / (later - earlier))
 
 
-def _told(found: EnergyError) -> str:
+def _naming(found: EnergyError) -> str:
     """Say by which number the drift was named."""
     most = float(np.nanmax(found.running))
     third, second, first = found.means.tolist()
@@ -172,7 +172,7 @@ def _told(found: EnergyError) -> str:
     return f"{bars} {law}, which matches no named drift."
 
 
-def _dashed(found: EnergyError) -> str:
+def _dashed_line(found: EnergyError) -> str:
     """Say what the dashed line is."""
     if found.is_broken:
         return ""

@@ -9,25 +9,25 @@ import numpy as np
 
 from vibsim.checks.fields import name_of
 from vibsim.core.record import Record
-from vibsim.report import data, style
+from vibsim.report import data, style, words
 from vibsim.report.data import Member
 from vibsim.report.evidence import frame
 from vibsim.report.evidence.frame import brief, evidence, measured, short
 from vibsim.report.style import Picture
-from vibsim.report.text import words
 from vibsim.report.text.assertions import SOLUTIONS
-from vibsim.report.types import EqualCheck
+from vibsim.report.types import EqualCheck, Experiment
 
 DIPS = 10.0
 """Percentage of the places whose difference is so small, near a zero, that the scale need not show it."""
 
 
-def picture(record: Record, check: EqualCheck, name: str, member: Member) -> Picture | None:
+def picture(
+    _: Experiment, record: Record, check: EqualCheck, name: str, member: Member
+) -> Picture | None:
     """Draw the size of the difference of two solutions over time, on a logarithmic scale."""
     distance = data.at(record, name_of(name, "distance_over_time"), member)
     bound, level, most = (
-        measured(record, name, field, member.scheme, member.case)
-        for field in ("allowed", "level", "distance")
+        measured(record, name, field, member) for field in ("allowed", "level", "distance")
     )
     second = SOLUTIONS.get(check.second, check.second)
     who = f"{member.title}, level {level:.0f}: its {words.symbol(check.quantity)}"

@@ -6,7 +6,7 @@ stability show the number that decides of all members instead.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -16,12 +16,11 @@ from vibsim.checks.fields import name_of
 from vibsim.core.array_types import Floats
 from vibsim.core.record import Record
 from vibsim.core.vocabulary import DECISIVE
-from vibsim.report import style, sweep_layout
+from vibsim.report import style, sweep_layout, words
 from vibsim.report.data import Member, case_name, is_lean, pick, place_of, unit
-from vibsim.report.evidence import accurate, energy, equal, frame, order, stable, value
+from vibsim.report.evidence import energy, equal, frame, order, stable, value
 from vibsim.report.evidence.frame import GrowthScale, evidence, usable
 from vibsim.report.style import Picture
-from vibsim.report.text import words
 from vibsim.report.types import Check, ConservesCheck, EqualCheck, Experiment, StableCheck
 
 MANY = 60  # up to so many members each has a dot; of more the range is drawn
@@ -43,28 +42,13 @@ def picture(
     member = _member(record, results[0]) if results else None
     if asserted is None or member is None:
         return None
+    check_of, name = asserted.measured, asserted.id
+    draw = DRAWN[check_of.kind]
+    if is_lean(record) and draw in (energy.picture, equal.picture, stable.picture):
+        draw = _of_members
     with style.applied():
-        found = _draw(experiment, record, asserted, member)
-    return found and replace(found, name=f"evidence_{asserted.id}")
-
-
-def _draw(
-    experiment: Experiment, record: Record, asserted: Check, member: Member
-) -> Picture | None:
-    measured, name = asserted.measured, asserted.id
-    if measured.kind == "converges":
-        return order.picture(record, measured, member)
-    if measured.kind == "accurate":
-        return accurate.picture(record, measured, name, member)
-    if measured.kind == "value":
-        return value.picture(experiment, record, measured, name, member)
-    if is_lean(record):
-        return _of_members(record, measured, name, member)
-    if measured.kind == "conserves":
-        return energy.picture(record, measured, name, member)
-    if measured.kind == "equal":
-        return equal.picture(record, measured, name, member)
-    return stable.picture(experiment, record, name, member)
+        found = draw(experiment, record, check_of, name, member)
+    return found and replace(found, name=f"evidence_{name}")
 
 
 def _member(record: Record, result: Mapping[str, Any]) -> Member | None:
@@ -76,8 +60,8 @@ def _member(record: Record, result: Mapping[str, Any]) -> Member | None:
 
 
 def _of_members(
-    record: Record, check: StableCheck | ConservesCheck | EqualCheck, name: str, member: Member
-) -> Picture:
+    _: Experiment, record: Record, check: StableCheck | ConservesCheck | EqualCheck, name: str, member: Member
+) -> Picture:  # fmt: skip
     """Draw the number that decides a check against the swept value, or the number of the member."""
     count = len(record["case"])
     if count == 1:
@@ -126,3 +110,14 @@ def _of_members(
         f"that decides, {member.case_words}, is filled{more if usable(beside).size else ''}."
     )
     return evidence(caption, up.title, figure)
+
+
+DRAWN: Mapping[str, Callable[..., Picture | None]] = {
+    "accurate": value.of_error,
+    "conserves": energy.picture,
+    "converges": order.picture,
+    "equal": equal.picture,
+    "stable": stable.picture,
+    "value": value.picture,
+}
+"""What draws each kind of check: of an experiment, its record, the check with its id, and a member."""

@@ -10,10 +10,9 @@ import numpy as np
 from vibsim.checks.fields import name_of
 from vibsim.core.array_types import Floats
 from vibsim.core.record import Record
-from vibsim.report import frame, style
-from vibsim.report.data import pick
+from vibsim.report import frame, style, words
+from vibsim.report.data import Member, at
 from vibsim.report.style import Picture
-from vibsim.report.text import words
 from vibsim.report.types import Axes, Figure
 
 INK, SOFT, BAND = "#1b1b1b", "#555555", "#e4e4e4"
@@ -127,9 +126,9 @@ def usable(values: Floats) -> Floats:
     return style.finite(values[values > 0.0])
 
 
-def measured(record: Record, check: str, name: str, scheme: int, case: int) -> float:
-    """Return a number that a check measured of a scheme and a member, such as its ``growth``."""
-    return float(pick(record, name_of(check, name), scheme=scheme, case=case))
+def measured(record: Record, check: str, name: str, member: Member) -> float:
+    """Return a number that a check measured of a member, such as its ``growth``."""
+    return float(at(record, name_of(check, name), member))
 
 
 def short(value: float) -> str:

@@ -8,23 +8,24 @@ from typing import Any
 import numpy as np
 
 from vibsim.core.record import Record
-from vibsim.report import data, style
+from vibsim.report import data, style, words
 from vibsim.report.data import Member, at
 from vibsim.report.evidence import frame
 from vibsim.report.evidence.frame import evidence
 from vibsim.report.figures.order import draw_stated
 from vibsim.report.figures.time import differences as curves_of_differences
 from vibsim.report.style import Picture
-from vibsim.report.text import words
-from vibsim.report.types import ConvergesCheck, Figure
+from vibsim.report.types import ConvergesCheck, Experiment, Figure
 
 
-def picture(record: Record, check: ConvergesCheck, member: Member) -> Picture | None:
+def picture(
+    _: Experiment, record: Record, check: ConvergesCheck, name: str, member: Member
+) -> Picture | None:
     """Draw the rescaled differences over time, where series are kept, and the order by level."""
     quantity = check.converges
     norm = data.norm_index(record, check.norm)
-    name = f"{quantity}_observed_order"
-    if name not in record or not np.isfinite(at(record, name, member, norm=norm)).any():
+    orders = f"{quantity}_observed_order"
+    if orders not in record or not np.isfinite(at(record, orders, member, norm=norm)).any():
         return None
     alt = f"Evidence on the order of {words.name(quantity)}"
     told = (

@@ -16,14 +16,13 @@ from vibsim.convergence.thresholds import BLOWN_UP
 from vibsim.core.array_types import Floats
 from vibsim.core.record import Record
 from vibsim.core.vocabulary import HIGHEST
-from vibsim.report import style
+from vibsim.report import style, words
 from vibsim.report.choice import position
 from vibsim.report.data import Member, at, known, whole
 from vibsim.report.evidence import frame
 from vibsim.report.evidence.frame import brief, evidence, measured, short, usable
 from vibsim.report.style import Picture
-from vibsim.report.text import words
-from vibsim.report.types import Axes, Experiment, Figure
+from vibsim.report.types import Axes, Experiment, Figure, StableCheck
 
 WIDTH = 1.56  # of a panel [inch]
 MOST_LEVELS = 8
@@ -54,9 +53,11 @@ class _Run:
         frame.points(ax, self.levels, values, [i == self.index for i in range(len(self.levels))])
 
 
-def picture(experiment: Experiment, record: Record, name: str, member: Member) -> Picture | None:
+def picture(
+    experiment: Experiment, record: Record, _: StableCheck, name: str, member: Member
+) -> Picture | None:
     """Draw what decides whether a run is stable, on every level."""
-    level = int(measured(record, name, "level", member.scheme, member.case))
+    level = int(measured(record, name, "level", member))
     levels = whole(record, "level")
     p = at(record, HIGHEST if HIGHEST in record else "omega_dt", member)
     limit = float(at(record, "stability_limit", member))
@@ -124,7 +125,7 @@ def _growths(run: _Run, record: Record, member: Member, name: str) -> str:
     is_near = not math.isfinite(told[run.index])
     for values, field in ((seen, "growth"), (told, "predicted_growth")):
         if not math.isfinite(values[run.index]):
-            values[run.index] = measured(record, name, field, member.scheme, member.case)
+            values[run.index] = measured(record, name, field, member)
     both = usable(np.concatenate([seen, told]))
     if not both.size:
         return ""

@@ -11,17 +11,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from vibsim.checks.fields import name_of
-from vibsim.checks.value import SAMPLED, own_levels, unit_of, what
+from vibsim.checks.value import unit_of, unit_of_norm, what
 from vibsim.core.array_types import Floats
 from vibsim.core.record import Record
-from vibsim.core.vocabulary import OF_LEVEL
-from vibsim.report import style
+from vibsim.core.vocabulary import OF_LEVEL, TYPICAL_NORM
+from vibsim.report import style, words
 from vibsim.report.data import Member, at, norm_index, norm_unit, pretty_unit, unit, whole
 from vibsim.report.evidence import frame
 from vibsim.report.evidence.frame import evidence, measured
 from vibsim.report.style import Picture
-from vibsim.report.text import words
-from vibsim.report.types import Axes, Experiment, ValueCheck
+from vibsim.report.types import AccurateCheck, Axes, Experiment, ValueCheck
 
 WIDE = 30.0
 """Positive numbers of which the largest is more than so many times the least have a logarithmic scale."""
@@ -76,7 +75,7 @@ def _beside_border(row: ByLevel, check: ValueCheck, title: str, bar: Floats) -> 
 def _spoken(check: ValueCheck) -> str:
     """Return the name of a number as a title has it."""
     told = what(check, words.PAGE)
-    if check.value in SAMPLED or (check.at.t is None and check.at.step is None):
+    if check.number.is_sample or (check.at.t is None and check.at.step is None):
         return told
     return f"{told} up to {f't = {check.at.t:g}' if check.at.t is not None else f'step {check.at.step}'}"
 
@@ -140,10 +139,45 @@ def _row(record: Record, check: ValueCheck, name: str, member: Member, values: F
     """Return the numbers of the levels, and behind them the extrapolated one where that is asked for."""
     levels = whole(record, "level")
     if check.at.level != "best":
-        own = own_levels(check.value, levels) or levels
+        own = check.number.own_levels(levels) or levels
         level = own[-1] if check.at.level is None else check.at.level
         return ByLevel(levels, values, [one == level for one in levels], member.title)
-    place = member.scheme, member.case
-    best, bound = (measured(record, name, field, *place) for field in ("value", "error_bound"))
+    best, bound = (measured(record, name, field, member) for field in ("value", "error_bound"))
     counts = [False] * len(levels) + [True]
     return ByLevel(levels, np.append(values, best), counts, member.title, bound)
+
+
+def of_error(
+    _: Experiment, record: Record, check: AccurateCheck, name: str, member: Member
+) -> Picture | None:
+    """Draw the errors of the levels; None where that of the finest is not known."""
+    error, bound, size = (
+        measured(record, name, field, member) for field in ("error", "error_bound", "size")
+    )
+    levels = whole(record, "level")
+    over = size if check.is_relative else 1.0
+    errors = np.full(len(levels), np.nan)
+    norms = f"{check.accurate}_error_norm"
+    if norms in record:
+        errors = np.array(at(record, norms, member, norm=norm_index(record, TYPICAL_NORM)))
+    errors[-1] = error
+    if not (np.isfinite(bound) and error > 0.0 and over > 0.0):
+        return None
+    shown, most = errors / over, bound / over
+    what = words.symbol(check.accurate)
+    title = f"relative error of {what}"
+    if not check.is_relative:
+        unit = pretty_unit(unit_of_norm(record, check.accurate))
+        title = style.label(f"error of {what}", unit)
+    figure = style.canvas(1.0)
+    ax = frame.panel(figure, title, "level")
+    frame.level_axis(ax, levels)
+    frame.scale(ax, shown, np.array([most, check.accuracy]), is_log=True)
+    frame.below(ax, check.accuracy)
+    ax.plot([levels[-1]] * 2, [shown[-1], most], color=frame.COLOUR, linewidth=1.5)
+    frame.points(ax, levels, shown, [i == len(levels) - 1 for i in range(len(levels))])
+    caption = (
+        f"{member.title}: the error in the L2 norm over time; filled at the finest level, with a bar up to its bound. "
+        "Grey: what the check asks for."
+    )
+    return evidence(caption, f"Evidence on the error of {words.name(check.accurate)}", figure)

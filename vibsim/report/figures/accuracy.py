@@ -13,12 +13,10 @@ import numpy as np
 
 from vibsim.core.array_types import Floats
 from vibsim.core.record import Record
-from vibsim.core.vocabulary import OF_LEVEL
-from vibsim.report import data, style
+from vibsim.report import data, style, words
 from vibsim.report.data import Member, known, omega_dt
 from vibsim.report.figures import panels
 from vibsim.report.style import Picture
-from vibsim.report.text import words
 from vibsim.report.types import Experiment
 
 POINTS = 240  # of a curve
@@ -37,7 +35,7 @@ def frequency(experiment: Experiment, record: Record) -> Picture | None:
         return None
     limits = known(record, "stability_limit", ("scheme", "case"))
     grid = np.linspace(1e-3, float(sound.max()), POINTS)
-    measured = 1.0 / (1.0 - _phase(record, p))
+    measured = 1.0 / (1.0 - data.phase_error(record, "measured"))
     (ax,) = panels.stacked([3.0])
     ax.axhline(1.0, **style.REFERENCE)
     drawn = [np.ones(1)]
@@ -76,14 +74,6 @@ def frequency(experiment: Experiment, record: Record) -> Picture | None:
         "Numerical over exact frequency of every scheme against w dt, predicted, as a series and measured",
         ax.get_figure(root=True),
     )
-
-
-def _phase(record: Record, p: Floats) -> Floats:
-    """Return the measured phase error over a period, shape (scheme, case, level)."""
-    variable = record.variable("dt")
-    dt = np.asarray(variable.values, dtype=np.float64)
-    by_level = dt.T if variable.dims == ("level", "case") else dt[None, :]
-    return known(record, "measured_phase_error", OF_LEVEL) * (p / (2.0 * np.pi) / by_level)
 
 
 def _leading(start: Floats) -> tuple[int, str, float] | None:

@@ -13,7 +13,7 @@ import numpy as np
 
 from vibsim.core.array_types import Floats
 from vibsim.core.record import Record
-from vibsim.report import data, frame, style
+from vibsim.report import choice, data, frame, style, words
 from vibsim.report.choice import position
 from vibsim.report.data import Member, at, whole
 from vibsim.report.figures.panels import note, stacked
@@ -22,6 +22,7 @@ from vibsim.report.types import Axes, Experiment
 
 MOST_CURVES = 6  # most curves; more lie on one another
 MOST_MARKERS = 40  # most numbers of one curve that get a marker each
+MARKED = 60  # most local frequencies of one curve that get a marker each
 MOSTLY = 0.5
 """Where fewer than this part of the curves stay so small for two peaks or more, the scale is logarithmic."""
 CUT_OFF = 10.0
@@ -237,3 +238,57 @@ def _grow(ax: Axes, lines: tuple[Any, ...], size: float) -> None:
     shown = values[(values <= frame.UNBOUNDED * size) & (values >= size / frame.UNBOUNDED)]
     style.log_axis(ax, "y", float(shown.min()) / 2.0, 2.0 * float(shown.max()))
     note(ax, "size, logarithmic")
+
+
+def frequency(experiment: Experiment, record: Record) -> Picture | None:
+    """Draw local angular frequency and amplitude against the number of the peak; None with fewer than two peaks."""
+    if "peak_time" not in record:
+        return None
+    everyone = choice.with_levels(experiment, data.everyone(record))
+    case = everyone[0].case
+    runs = runs_of(record, [member for member in everyone if member.case == case])
+    if not runs:
+        return None
+    axes = stacked([2.3, 2.3])
+    several = len({member.scheme for _, member, _ in runs}) > 1
+    time, step = data.time_unit(record), data.steps_of(record, case)
+    period = float(data.exact_periods(record)[case])
+    size = exact_amplitude(experiment, record, case)
+    exact = (2.0 * math.pi / period, size)
+    drawn: list[list[np.ndarray]] = [[], []]
+    for (_, member, level), look in zip(runs, looks_of(runs), strict=True):
+        found = (
+            at(record, name, member, level=level)
+            for name in ("peak_time", "peak", "trough_time", "trough")
+        )
+        t, peak, trough_time, trough = found
+        keep = np.isfinite(t)
+        t, peak = t[keep], peak[keep]
+        dt = f"dt = {words.number(float(step[level]), 'step')} {data.time_unit(record, 'dt')}".rstrip()
+        text = style.entry(f"{member.scheme_name}, {dt}" if several else dt)
+        line = look | {"linewidth": 1.1, "markersize": 4, "label": text}
+        line["marker"] = look["marker"] if t.size <= MARKED else ""
+        series = 2.0 * np.pi / np.diff(t), heights(t, peak, trough_time, trough)
+        for ax, values, kept in zip(axes, series, drawn, strict=True):
+            ax.plot(np.arange(1, values.size + 1), values, **line)
+            kept.append(values)
+    radians = f"rad {data.pretty_unit(f'{time}-1')}" if time else ""
+    measure = data.unit(record, f"{position(experiment)}_finest")
+    rows = (("angular frequency", radians), ("amplitude", measure))
+    for ax, (text, unit), value, kept in zip(axes, rows, exact, drawn, strict=True):
+        known = np.array([value] if math.isfinite(value) else [])
+        if known.size:
+            ax.axhline(value, label="exact", **style.REFERENCE)
+        ax.set_ylim(*style.limits(*kept, known))
+        ax.yaxis.set_label_coords(-0.115, 0.5)
+        ax.set(ylabel=style.label(text, unit), title=f"Local {text}")
+        style.beside(ax)
+    axes[1].set_xlabel("number of the peak")
+    return Picture(
+        "local_frequency",
+        "Angular frequency and amplitude found in the solutions",
+        "The frequency is 2π over the time from a peak to the next one, the amplitude half the height from a peak to "
+        "the trough behind it; peaks are interpolated by a parabola. Dashed: exact.",
+        "Local angular frequency and amplitude against the number of the peak, with the exact ones",
+        axes[0].get_figure(root=True),
+    )

@@ -8,14 +8,14 @@ from functools import cache
 
 from vibsim.core.record import Record
 from vibsim.core.vocabulary import SEVERITY
-from vibsim.experiment.storage import asked
-from vibsim.report import choice, data, sweep_layout
+from vibsim.experiment.storage import checked_quantities
+from vibsim.report import choice, data, sweep_layout, words
+from vibsim.report.choice import Lead
 from vibsim.report.data import Member
 from vibsim.report.figures import (
     energy,
     extrema,
     long_series,
-    motion,
     order,
     plane,
     solution,
@@ -26,9 +26,7 @@ from vibsim.report.figures import (
 from vibsim.report.figures.sweeps import maps, members, sweep
 from vibsim.report.figures.sweeps.separatrix import with_separatrix
 from vibsim.report.figures.sweeps.view import View
-from vibsim.report.lead import Lead
 from vibsim.report.style import Picture
-from vibsim.report.text import words
 from vibsim.report.types import Experiment
 
 FEW_SCHEMES = 3
@@ -75,11 +73,11 @@ def pictures(
     has_series, has_pairs = not data.is_lean(record), bool(data.whole(record, "pair"))
     series = shown if has_series else []
     position = choice.position(experiment)
-    moving: Drawn = [motion.motion(record, position, lead.member)] if has_series else []
+    moving: Drawn = [solution.motion(record, position, lead.member)] if has_series else []
     if has_series:
         # beside the worst member a typical one
         typical = [member for member in series if member.role == "typical"]
-        moving += [motion.motion(record, position, member) for member in typical[:1]]
+        moving += [solution.motion(record, position, member) for member in typical[:1]]
         moving += [long_series.long_series(record, position, lead.member)]
         moving += [plane.path(experiment, record, series)]
     own = [member for member in series if member.role != "typical"]
@@ -101,7 +99,8 @@ def pictures(
         several = is_lead and len(own) > 1
         for member in own[:FEW_SCHEMES] if is_lead else own[:1]:
             each: Drawn = [time.energy(record, member)] if is_energy else []
-            if has_pairs and (not is_energy or quantity in asked(experiment)):
+            is_wanted = not is_energy or quantity in checked_quantities(experiment)
+            if has_pairs and is_wanted and time.name_of_differences(quantity, member) not in first:
                 each.append(time.overlay(record, quantity, member))
             if several:
                 tabs += tab(f"{letter}, {member.scheme_name}", each)
@@ -113,7 +112,8 @@ def pictures(
     if has_pairs:
         tabs += tab("estimated error", [solution.solution(record, position, m) for m in own[:1]])
     if series:
-        tabs += tab("energy", [energy.running(record, case) for case in cases[:1]])
+        if experiment.model.definition.conservative:
+            tabs += tab("energy", [energy.running(record, case) for case in cases[:1]])
         beside: Drawn = [extrema.local(experiment, record, series)]
         if not data.swept(record) and experiment.model.definition.is_alone:
             beside.append(plane.phase(experiment, record, series))

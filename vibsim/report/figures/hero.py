@@ -11,19 +11,20 @@ from typing import Any
 
 import numpy as np
 
+from vibsim.checks.order_context import COINCIDE
 from vibsim.core.array_types import Floats
 from vibsim.core.record import Record
-from vibsim.report import choice, data, finest_level, style, sweep_layout
+from vibsim.report import choice, data, finest_level, style, sweep_layout, words
+from vibsim.report.choice import Lead
 from vibsim.report.data import Member
 from vibsim.report.figures import panels, time
 from vibsim.report.figures.sweeps.view import ring
-from vibsim.report.lead import Lead
 from vibsim.report.style import Picture
-from vibsim.report.text import findings, words
+from vibsim.report.text import findings
 from vibsim.report.types import Axes, Experiment, Figure
 
-LEFT, RIGHT, WHOLE, HEIGHT = 5.4, 3.9, 9.6, 2.75
-"""Widths of the left picture, of the right one and of one that stands alone, and their height [inch]."""
+LEFT, RIGHT, HEIGHT = 5.4, 3.9, 2.75
+"""Widths of the left picture and of the right one, and their height [inch]."""
 FEW = 300  # of more members a histogram of the orders says more than dots
 FEWEST = 2  # errors that a picture over the step needs
 MOST_SCHEMES = 6  # schemes that the right picture can tell apart
@@ -38,9 +39,7 @@ LONG = 24  # letters of a label above which it is set smaller
 
 def _panel(width: float, title: str, left: float = 0.72, right: float = 0.14) -> Axes:
     """Return the axes of a picture, whose label of the vertical axis stands above them."""
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(width, HEIGHT))
+    figure = style.canvas(HEIGHT, width)
     box = (left / width, 0.46 / HEIGHT, (width - left - right) / width, (HEIGHT - 0.78) / HEIGHT)
     ax = figure.add_axes(box)
     _name(ax, title)
@@ -119,7 +118,7 @@ def _title_of_differences(record: Record, lead: Lead, count: int) -> str:
         return f"What is left is round-off{of}"
     if count < 2 or not math.isfinite(last):
         return f"What is left between the levels{of}"
-    if last > data.COINCIDE:
+    if last > COINCIDE:
         return f"The rescaled curves do not coincide{of}"
     return f"The finest curves agree to {words.number(100.0 * last, 'brief')} %{of}"
 
@@ -161,14 +160,13 @@ def against_step(experiment: Experiment, record: Record, lead: Lead) -> Picture 
             data.stated_order(record, quantity, member, data.norm_index(record, lead.norm))[0]
         )
         if is_lead and (has_order or lead.is_on_order) and lead.result.get("reason") != "exact":
+            order = data.formal_order(record, member, quantity)
             _slope(
                 ax,
                 dt,
-                estimate,
-                true,
-                data.formal_order(record, member, quantity),
-                record,
-                quantity,
+                np.where(np.isfinite(true), true, estimate),
+                order,
+                data.basis_of_order(record, quantity),
             )
     if sum(style.finite(part).size for part in drawn) < FEWEST:
         return None
@@ -205,17 +203,12 @@ def solution(record: Record, quantity: str, member: Member, *, is_left: bool) ->
     ax.set_gid(style.TIME)
     has_exact = bool(np.isfinite(exact).any())
     if has_exact:
-        ax.plot(*style.thin(t, exact, 200), color="#b0b0b0", linewidth=4.5, label="exact")
+        ax.plot(*style.thin(t, exact, 200), color=style.PALE, linewidth=4.5, label="exact")
     steps = words.number(int(record["steps"][-1]), "integer")
     ax.plot(
         *style.thin(t, values, 200), color=style.COLOURS[0], linewidth=1.4, label=f"{steps} steps"
     )
-    if panels.explosive([values]):
-        for line in ax.lines:
-            line.set_ydata(style.no_zeros(np.asarray(line.get_ydata(), dtype=np.float64)))
-        style.log_axis(ax, "y", *panels.decades([values]))
-    else:
-        ax.set_ylim(*style.limits(values, exact))
+    panels.fit_values(ax, [values], exact)
     panels.stop_at_breakdown(ax, t, [values])
     ax.set_xlabel(data.time_label(record))
     ax.legend(loc="best", fontsize=8, handlelength=1.8)
@@ -253,18 +246,14 @@ def _errors(record: Record, quantity: str, member: Member, name: str) -> tuple[F
     return style.positive(estimate), style.positive(true)
 
 
-def _slope(
-    ax: Axes, dt: Floats, estimate: Floats, true: Floats, order: float, record: Record, quantity: str
-) -> None:  # fmt: skip
-    """Draw the promised slope through the finest error that is known."""
-    known = np.where(np.isfinite(true), true, estimate)
-    places = np.flatnonzero(np.isfinite(known))
-    if not places.size or not math.isfinite(order):
+def _slope(ax: Axes, dt: Floats, error: Floats, order: float, due: str) -> None:
+    """Draw the slope of an order through the finest error that is known."""
+    if not math.isfinite(order):
         return
-    last = places[-1]
-    line = known[last] * (dt / dt[last]) ** order
-    text = f"order {order:g}, {data.due(record, quantity)}"
-    ax.plot(dt, line, **style.REFERENCE | {"color": style.GREY}, label=text)
+    for last in np.flatnonzero(np.isfinite(error))[-1:]:
+        line = error[last] * (dt / dt[last]) ** order
+        look = style.REFERENCE | {"color": style.GREY}
+        ax.plot(dt, line, **look, label=f"order {order:g}, {due}")
 
 
 def response(experiment: Experiment, record: Record, lead: Lead) -> Picture | None:
@@ -436,7 +425,7 @@ def orders(experiment: Experiment, record: Record, lead: Lead) -> Picture | None
     title = (
         "All members keep their order"
         if inside.all()
-        else f"{kept} of {every} members have an order within the band"
+        else f"{kept} of all {every} members have an order within the band"
     )
     more = (
         f" {words.number(missing, 'integer')} members have no order and are left out."

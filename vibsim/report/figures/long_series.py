@@ -14,12 +14,11 @@ import numpy as np
 
 from vibsim.core.array_types import Floats
 from vibsim.core.record import Record
-from vibsim.report import data, style
+from vibsim.report import data, style, words
 from vibsim.report.data import Member
 from vibsim.report.figures import moments, panels
 from vibsim.report.figures.moments import UNBOUNDED
 from vibsim.report.style import Picture
-from vibsim.report.text import words
 from vibsim.report.types import Axes
 
 MANY_PERIODS = 10.0
@@ -31,7 +30,6 @@ FEWEST, MOST = 2, 5  # panels
 TALL, STRIP = 0.95, 0.4  # height of a panel and of the strip below [inch]
 SPARSE = 12.0  # samples a period below which they have dots, and what they are compared with is smooth between them
 BEYOND = 1.25  # how much of a panel lies above the largest value that is compared with
-PALE = "#b0b0b0"
 
 
 class Row(NamedTuple):
@@ -67,7 +65,7 @@ def long_series(record: Record, quantity: str, member: Member) -> Picture | None
     against = "exact" if is_known else f"level {finest}"
     gid = f"{style.LONG} {PERIODS * period:.6g}"
     axes = panels.stacked([*[TALL] * len(rows), STRIP], gid)
-    look: dict[str, Any] = {"color": PALE, "linewidth": 3.5, "zorder": 1, "gid": "compared"}
+    look: dict[str, Any] = {"color": style.PALE, "linewidth": 3.5, "zorder": 1, "gid": "compared"}
     is_sparse = t.size * period < SPARSE * span
     dots: dict[str, Any] = {"marker": "o", "markersize": 2.5} if is_sparse else {}
     pale = _smooth(t, compared) if is_sparse else style.thin(t, compared, width)

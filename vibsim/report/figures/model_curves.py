@@ -14,10 +14,9 @@ from vibsim.core.array_types import Floats
 from vibsim.core.record import Record
 from vibsim.formula import values
 from vibsim.models.base import tree
-from vibsim.report import data, series, style
+from vibsim.report import data, series, style, words
 from vibsim.report.figures import panels
 from vibsim.report.style import Picture
-from vibsim.report.text import words
 from vibsim.report.types import Experiment
 
 MESHES = 4  # most levels whose meshes are drawn

@@ -8,17 +8,17 @@ from dataclasses import replace
 from vibsim.core.record import Record
 from vibsim.experiment.schema.figures import FigureOfSource
 from vibsim.report import choice, data
+from vibsim.report.choice import Lead
 from vibsim.report.figures import (
     accuracy,
     extrema,
-    local_frequency,
     model_curves,
     over_time,
     plane,
+    spectra,
     theory,
     time,
 )
-from vibsim.report.lead import Lead
 from vibsim.report.style import Picture
 from vibsim.report.tables.source_figures import PLAYER
 from vibsim.report.types import Experiment
@@ -26,27 +26,22 @@ from vibsim.report.types import Experiment
 Draw = Callable[[Experiment, Record, Lead], Picture | None]
 
 
-def _differences(experiment: Experiment, record: Record, lead: Lead) -> Picture | None:
-    return time.overlay(record, choice.position(experiment), lead.member)
-
-
-def _energy(experiment: Experiment, record: Record, lead: Lead) -> Picture | None:
-    known = "energy_deviation_scaled" in record
-    return time.energy(record, lead.member) if known else None
-
-
 DRAWN: Mapping[str, Draw] = {
     "phase_plane": lambda e, r, _: plane.phase(e, r, data.everyone(r)),
     "path": lambda e, r, _: plane.path(e, r, data.everyone(r)),
     "peaks": lambda e, r, _: extrema.local(e, r, data.everyone(r)),
-    "local_frequency": lambda e, r, _: local_frequency.local_frequency(e, r),
+    "local_frequency": lambda e, r, _: extrema.frequency(e, r),
     "growth": lambda e, r, _: theory.growing(e, r),
     "frequency": lambda e, r, _: accuracy.frequency(e, r),
     "second_difference": lambda e, r, _: accuracy.second_difference(r),
-    "differences": _differences,
-    "energy_error": _energy,
+    "differences": lambda e, r, lead: time.overlay(r, choice.position(e), lead.member),
+    "energy_error": lambda _, r, lead: (
+        time.energy(r, lead.member) if "energy_deviation_scaled" in r else None
+    ),
     "grids": lambda e, r, _: model_curves.grids(r),
     "spring": lambda e, r, _: model_curves.spring(e, r),
+    "spectrum": lambda e, r, lead: spectra.spectrum(e, r, lead.member),
+    "poincare": lambda e, r, _: spectra.poincare(e, r, data.everyone(r)),
 }
 """What draws each kind, but those over time, which have options, and the player."""
 OF_SERIES = {
@@ -58,6 +53,8 @@ OF_SERIES = {
     "differences",
     "energy_error",
     "spring",
+    "spectrum",
+    "poincare",
 }
 """Kinds that need series over time, which a large sweep does not keep."""
 

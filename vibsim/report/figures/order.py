@@ -12,12 +12,11 @@ import numpy as np
 from vibsim.core.array_types import Floats
 from vibsim.core.record import Record
 from vibsim.core.vocabulary import TYPICAL_NORM
-from vibsim.report import data, style
+from vibsim.report import data, style, words
 from vibsim.report.choice import promises
 from vibsim.report.data import Member
 from vibsim.report.figures.panels import legend_above, rows_of
 from vibsim.report.style import Picture
-from vibsim.report.text import words
 from vibsim.report.types import Axes, Experiment
 
 SLOPES: tuple[Any, ...] = ((0, (4, 3)), (0, (1.2, 1.6)), (0, (7, 2, 1.2, 2)), (0, (10, 2)))
@@ -48,7 +47,7 @@ def against_step(experiment: Experiment, record: Record, quantity: str, case: in
     return Picture(
         name=f"order_{quantity}_{case}",
         title=f"How fast does the error shrink? {letter}{f', {name}' if name else ''}",
-        caption=_caption(kinds, is_settled, many, data.due(record, quantity)),
+        caption=_caption(kinds, is_settled, many, data.basis_of_order(record, quantity)),
         alt=f"Norm of the level differences of {words.name(quantity)} against the step, and local order against level",
         figure=figure,
     )
@@ -109,7 +108,7 @@ def _draw_norms(
         style.remark(ax, "every difference and error is zero,\nor not finite: nothing to draw")
         return set()
     orders = list(dict.fromkeys(order for order, _ in promises(experiment, record, quantity)))
-    due = data.due(record, quantity)
+    due = data.basis_of_order(record, quantity)
     slopes = [
         _reference(ax, dt, seen, order, due, SLOPES[k % len(SLOPES)] if len(orders) > 1 else None)
         for k, order in enumerate(orders)

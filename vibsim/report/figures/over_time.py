@@ -18,11 +18,10 @@ from vibsim.core.record import Record
 from vibsim.experiment.schema.figures import LEVEL, MEMBER, FigureOfSource
 from vibsim.formula import parse, values
 from vibsim.models.events import Crossings, Impact
-from vibsim.report import choice, data, series, style
+from vibsim.report import choice, data, series, style, words
 from vibsim.report.data import Member
 from vibsim.report.figures import panels
 from vibsim.report.style import Picture
-from vibsim.report.text import words
 from vibsim.report.types import Axes, Experiment
 
 MOST = 6  # most panels of a figure, and most figures
@@ -32,7 +31,6 @@ LEAVES_FRAME = 8.0
 """What is beyond so many times the exact solution leaves the frame."""
 SEEN = 0.2
 """Only runs that stay within the frame for so much of the time leave it at all."""
-PALE = "#b0b0b0"  # colour of the exact solution
 SUBTLE: dict[str, Any] = {"linestyle": (0, (5, 2)), "linewidth": 1.2, "zorder": 1.5}
 """The look of further curves."""
 
@@ -183,7 +181,9 @@ def _draw(
     if len({member.case for _, member in panel.runs}) == 1:
         fine, best = _exact(experiment, record, panel.quantity, first, end)
         if np.isfinite(best).any():
-            ax.plot(*style.thin(fine, best), color=PALE, linewidth=4.5, label="exact", zorder=1)
+            ax.plot(
+                *style.thin(fine, best), color=style.PALE, linewidth=4.5, label="exact", zorder=1
+            )
             exact.append(best)
     size = max(map(data.largest, exact), default=0.0)
     drawn, jumps = [], isinstance(model.events, Impact | Crossings)

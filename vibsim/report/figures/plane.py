@@ -14,11 +14,10 @@ import numpy as np
 from vibsim.core.array_types import Flags, Floats
 from vibsim.core.record import Record
 from vibsim.models import Model
-from vibsim.report import data, style
+from vibsim.report import data, style, words
 from vibsim.report.data import Member, of_level, unit, whole
 from vibsim.report.figures.panels import legend_above, rows_of
 from vibsim.report.style import Picture
-from vibsim.report.text import words
 from vibsim.report.types import Axes, Experiment
 
 PANELS_A_ROW = 3  # panels in a row of the phase plane, and most panels of the path

@@ -14,13 +14,12 @@ import numpy as np
 from vibsim.core.array_types import Floats
 from vibsim.core.record import Record
 from vibsim.core.vocabulary import MEMBER, OF_LEVEL
-from vibsim.report import data, frame, style
+from vibsim.report import data, frame, style, words
 from vibsim.report.choice import position
 from vibsim.report.data import Member, known, omega_dt
 from vibsim.report.figures.panels import stacked
 from vibsim.report.style import Picture
 from vibsim.report.tables.theory import predicted
-from vibsim.report.text import words
 from vibsim.report.types import Axes, Experiment
 
 CURVE_POINTS = 240  # points of a curve
@@ -47,12 +46,7 @@ def order_and_stability(experiment: Experiment, record: Record) -> Picture | Non
     if not predicted(record) or np.unique(p[np.isfinite(p) & (p > 0.0)]).size < 2:
         return None
     growth = [known(record, f"{who}_growth", OF_LEVEL) - 1.0 for who in ("theory", "measured")]
-    variable = record.variable("dt")
-    dt = np.asarray(variable.values, dtype=np.float64)
-    turns = p / (2.0 * np.pi) / (dt.T if variable.dims == ("level", "case") else dt[None, :])
-    phase = [
-        known(record, f"{who}_phase_error", OF_LEVEL) * turns for who in ("theory", "measured")
-    ]
+    phase = [data.phase_error(record, who) for who in ("theory", "measured")]
     # what has no theory, such as an adaptive scheme, has no place over w dt
     growth, phase = (
         [told, np.where(np.isnan(told), np.nan, seen)] for told, seen in (growth, phase)

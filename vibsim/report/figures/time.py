@@ -13,11 +13,10 @@ import numpy as np
 from vibsim.convergence.differences import gap_ratio, rescaling, target_ratio
 from vibsim.core.array_types import Floats
 from vibsim.core.record import Record
-from vibsim.report import data, frame, style
+from vibsim.report import data, frame, style, words
 from vibsim.report.data import Member
 from vibsim.report.figures import panels
 from vibsim.report.style import Picture
-from vibsim.report.text import words
 from vibsim.report.types import Axes
 
 MOST_CURVES = 6  # most curves in one panel; more cannot be told apart
@@ -26,6 +25,11 @@ UNSURE = 1.0
 """An interval of an order that is wider, or unbounded, leaves a place marked as uncertain."""
 ROOM, BEYOND = 0.35, 3.0  # least and most distance from the promised order to the frame
 SPREAD = "the spread: how far each curve is from the finest one above round-off."
+
+
+def name_of_differences(quantity: str, member: Member) -> str:
+    """Return the name of the picture that `overlay` draws."""
+    return f"differences_{quantity}_{member.stem}"
 
 
 def overlay(record: Record, quantity: str, member: Member) -> Picture:
@@ -53,7 +57,7 @@ def overlay(record: Record, quantity: str, member: Member) -> Picture:
         else f", {_multiplied(order, levels)}; if the error shrinks as {law}, the curves fall on one another."
     )
     return Picture(
-        name=f"differences_{quantity}_{member.stem}",
+        name=name_of_differences(quantity, member),
         title=f"Do the levels agree? {words.title(quantity)}, {member.title}",
         caption=style.sentences(
             f"{letter}{words.lowered(levels[0])} is {letter} on level {levels[0]}, and so on. Top: the differences "
@@ -170,7 +174,7 @@ def _draw_ratios(
         values = data.at(record, f"{quantity}_ratio", member, triple=i)
         if not np.isfinite(values).any():
             continue
-        look: dict[str, Any] = {"color": "#b0b0b0", "linewidth": 0.6, "zorder": 1.5}
+        look: dict[str, Any] = {"color": style.PALE, "linewidth": 0.6, "zorder": 1.5}
         if good[i] or not any(good):
             look = {"color": style.COLOURS[k], "linestyle": style.DASHES[k], "linewidth": 1.3}
             drawn.append(values)
@@ -180,7 +184,9 @@ def _draw_ratios(
         style.remark(ax, _why_no_ratio(good, lost))
     targets = sorted({float(target_ratio(order, levels[i : i + 3])) for i in _few(good)})
     for k, target in enumerate(targets):
-        ax.axhline(target, **style.REFERENCE, label="" if k else data.due(record, quantity))
+        ax.axhline(
+            target, **style.REFERENCE, label="" if k else data.basis_of_order(record, quantity)
+        )
     # the target and the middle nine tenths of the ratios, but no wild outlier
     every = style.finite(*drawn)
     every = every if every.size else np.array(targets)
@@ -256,7 +262,7 @@ def _draw_orders(
     found = style.finite(*drawn)
     ends = np.array([found.min(), found.max()] if found.size else [])
     if math.isfinite(promised):
-        ax.axhline(promised, **style.REFERENCE, label=data.due(record, quantity))
+        ax.axhline(promised, **style.REFERENCE, label=data.basis_of_order(record, quantity))
         low_end = max(float(min([promised - ROOM, *(ends - 0.1)])), promised - BEYOND)
         ax.set_ylim(low_end, min(float(max([promised + ROOM, *(ends + 0.1)])), promised + BEYOND))
     else:

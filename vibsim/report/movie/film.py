@@ -15,10 +15,9 @@ import numpy as np
 
 from vibsim.core.array_types import Floats
 from vibsim.core.record import Record
-from vibsim.report import data, style
+from vibsim.report import data, style, words
 from vibsim.report.figures import moments, scenes
 from vibsim.report.figures.scenes import Scene
-from vibsim.report.text import words
 from vibsim.report.types import Experiment
 
 MOST_FRAMES = 1500

@@ -12,13 +12,13 @@ from vibsim.core.home import called
 from vibsim.core.record import Record
 from vibsim.core.vocabulary import worst
 from vibsim.plan.versions import DRAWING, versions
-from vibsim.report import data
+from vibsim.report import data, words
+from vibsim.report.choice import is_trap
 from vibsim.report.evidence import figure
-from vibsim.report.lead import is_trap
 from vibsim.report.tables import checks as check_tables
 from vibsim.report.tables import published
 from vibsim.report.tables.table import Column, Table
-from vibsim.report.text import assertions, changes, reasons, words
+from vibsim.report.text import assertions, experiment_file, reasons
 from vibsim.report.types import Check, Experiment, Measurement
 
 SAID_BY_THE_LINE = ("value", "equal", "converges")
@@ -118,7 +118,7 @@ def card(experiment: Experiment, record: Record, check: Mapping[str, Any]) -> di
         "picture": figure.picture(experiment, record, asserted, check),
         "text": told,
         "advice": wording.advice(status, result, counts),
-        "change": changes.change(experiment, measured, check),
+        "change": experiment_file.change(experiment, measured, check),
     }
 
 
@@ -189,7 +189,7 @@ def _keeps_promise(record: Record, measured: Measurement | None, check: Mapping[
         return False
     promised = data.formal_orders(record, measured.converges)
     own = promised[record.words("scheme").index(decisive["scheme"]), place]
-    is_due = data.due(record, measured.converges) == "promised"
+    is_due = data.basis_of_order(record, measured.converges) == "promised"
     return bool(is_due and abs(own - order) <= measured.tolerance)
 
 

@@ -16,10 +16,9 @@ from numpy.typing import NDArray
 from vibsim.core.home import called
 from vibsim.core.record import Record
 from vibsim.core.set_option import set_options
-from vibsim.report import data, style, sweep_layout
+from vibsim.report import data, style, sweep_layout, words
 from vibsim.report.figures.sweeps.view import View
 from vibsim.report.sweep_layout import Key
-from vibsim.report.text import words
 from vibsim.report.types import Experiment
 
 POINTS = 2000
@@ -29,7 +28,7 @@ POINTS = 2000
 def worst(
     experiment: Experiment, record: Record, views: Sequence[View]
 ) -> list[tuple[str, str, str]]:
-    """Return the members that are marked: the letters of the quantities, its name, and the command that runs it."""
+    """Return the members that are marked: the letters of the quantities, its name, and the command for it."""
     found: dict[int, dict[str, None]] = {}
     for view in views:
         if view.worst is not None:
@@ -47,6 +46,9 @@ def worst(
 
 def _around(experiment: Experiment) -> tuple[str, str]:
     """Return what stands before and behind the number of a member in its command."""
+    if experiment.chain > 1:
+        # none of those that start from others runs alone
+        return called(f"vibsim show {quote(experiment.word)} --case "), ""
     start, _, end = quote(f"{experiment.word}@0").rpartition("0")
     return called(f"vibsim run {start}"), end + set_options(experiment.settings)
 

@@ -15,15 +15,15 @@ from vibsim.comparison.best_values import WORDS, scalars
 from vibsim.core.home import called
 from vibsim.core.record import Record
 from vibsim.core.vocabulary import decisive_number
-from vibsim.report import choice, data, finest_level, style
+from vibsim.report import choice, data, finest_level, style, words
+from vibsim.report.choice import Lead, is_trap
 from vibsim.report.evidence import figure
 from vibsim.report.figures import hero as drawn
-from vibsim.report.figures import motion
-from vibsim.report.lead import Lead, is_trap
+from vibsim.report.figures import solution
 from vibsim.report.style import Picture
 from vibsim.report.tables import published
 from vibsim.report.tables.best import error_size, rounded
-from vibsim.report.text import assertions, findings, words
+from vibsim.report.text import assertions, findings
 from vibsim.report.types import Experiment
 
 NUMBERS = 3  # large numbers on the first screen
@@ -143,7 +143,7 @@ def _order(record: Record, lead: Lead) -> Iterator[Number]:
         return
     label = f"Observed order of {words.symbol(quantity)}{data.of_several(record, member.scheme)}"
     promised = data.promised_text(record, quantity, member.scheme)
-    of = data.due(record, quantity)
+    of = data.basis_of_order(record, quantity)
     due = f"the scheme promises {promised}" if of == "promised" else f"{promised} is expected"
     due = f"what is {of} depends on the member" if promised == of else due
     facts = lead.result.get("facts") or {}
@@ -199,7 +199,7 @@ def _error(record: Record, lead: Lead) -> Iterator[Number]:
     yield {
         "label": f"Error of {words.symbol(quantity)} at {steps} steps{data.of_several(record, member.scheme)}",
         "value": f"{words.number(mean, 'brief')} {unit}".rstrip(),
-        "note": f"{size}{word}, root mean square",
+        "note": f"{size}{word}, root mean square{_of_member(record, lead)}",
     }
 
 
@@ -231,9 +231,14 @@ def _best(experiment: Experiment, record: Record, lead: Lead) -> Iterator[Number
         yield {
             "label": f"Best value: {text}{data.of_several(record, lead.member.scheme)}",
             "value": f"{told} {unit}".rstrip(),
-            "note": f"{note}, extrapolated over {levels} levels",
+            "note": f"{note}, extrapolated over {levels} levels{_of_member(record, lead)}",
         }
         return
+
+
+def _of_member(record: Record, lead: Lead) -> str:
+    """Name the member that a number is of, where there are several."""
+    return f", of {lead.member.case_words}" if data.swept(record) else ""
 
 
 def pictures(experiment: Experiment, record: Record, lead: Lead) -> list[Picture]:
@@ -255,7 +260,7 @@ def pictures(experiment: Experiment, record: Record, lead: Lead) -> list[Picture
     if data.is_lean(record) or len(found) == 2:
         return found
     if not found:
-        return [motion.motion(record, choice.position(experiment), lead.member)]
+        return [solution.motion(record, choice.position(experiment), lead.member)]
     moving = drawn.solution(record, choice.position(experiment), lead.member, is_left=left is None)
     return [moving, *found] if left is None else [*found, moving]
 

@@ -13,12 +13,13 @@ from vibsim import store
 from vibsim.core.errors import FileError
 from vibsim.core.vocabulary import SEVERITY, worst
 from vibsim.experiment import citation
-from vibsim.experiment.collection import ADHOC
-from vibsim.report.page import history, policy, source_figures, source_statements
-from vibsim.report.page.templates import environment, markup
+from vibsim.experiment.collection import ADHOC, SITE
+from vibsim.report import words
+from vibsim.report.page import history, source_statements
+from vibsim.report.page.templates import digest_of, environment, markup
+from vibsim.report.tables import source_figures
 from vibsim.report.tables.results import error_of, measured_order, number_of
 from vibsim.report.tables.table import Column, Table, to_csv
-from vibsim.report.text import words
 
 UNREADABLE = ("DAMAGED", "MISSING")
 """Words for an experiment whose verdict cannot be read: it counts as failed."""
@@ -128,9 +129,10 @@ def write_index(results: Path) -> None:
         "shipped": [(key, list(group)) for key, group in groupby(shipped, lambda r: r.collection)],
         "figures": source_figures.listed(results, sorted(folders)),
         "statements": source_statements.listed((row.name, row.link, row.checks) for row in rows),
+        "site": f"{SITE}/index.html" if (results / SITE / "index.html").is_file() else "",
         "history": history.FILE,
         "script": markup(_script()),
-        "script_digest": policy.digest_of(_script()),
+        "script_digest": digest_of(_script()),
     }
     store.write_text(results / "index.html", template.render(context))
     cells = tuple(line for row in rows for line in _lines(row))
@@ -234,40 +236,17 @@ def _decides(check: Mapping[str, Any]) -> Mapping[str, Any]:
 
 def _lines(row: Row) -> Iterator[tuple[Any, ...]]:
     """Yield one line per check, with the worst of its results; one line for an experiment that cannot be read."""
-    head = (row.collection, row.name, row.title)
-    if not row.checks:
-        yield (
-            *head,
-            *_source(row),
-            row.status,
-            *[None] * 5,
-            row.status,
-            row.why,
-            *[None] * 11,
-            row.broken,
-        )
     of_check = ("id", "kind", "text", "quantity", "expected", "status", "reason")
-    for check in row.checks:
+    for check in row.checks or [{"status": row.status, "reason": row.why}]:
         decides = _decides(check)
-        measured = (
-            decides.get("scheme"),
-            decides.get("case"),
-            *measured_order(decides),
-            number_of(decides),
-            *error_of(decides),
-        )
+        measured = (*measured_order(decides), number_of(decides), *error_of(decides))
         yield (
-            *head,
-            *_source(row, check),
-            row.status,
-            *map(check.get, of_check),
-            *measured,
-            check.get("advice"),
-            row.broken,
-        )
+            row.collection, row.name, row.title, *_source(row, check), row.status, *map(check.get, of_check),
+            decides.get("scheme"), decides.get("case"), *measured, check.get("advice"), row.broken,
+        )  # fmt: skip
 
 
-def _source(row: Row, check: Mapping[str, Any] | None = None) -> tuple[str | None, ...]:
+def _source(row: Row, check: Mapping[str, Any]) -> tuple[str | None, ...]:
     """Return where a check stands, by `citation.FIELDS`: its own source, else that of its experiment."""
-    source = (check or {}).get("source") or row.source or {}
+    source = check.get("source") or row.source or {}
     return tuple(source.get(name) for name in citation.FIELDS)

@@ -17,11 +17,11 @@ from vibsim.core.record import Record
 from vibsim.core.set_option import set_options
 from vibsim.core.vocabulary import TYPICAL_NORM
 from vibsim.experiment.collection import ADHOC, ENDINGS
-from vibsim.report import choice, data, lead, style
-from vibsim.report.figures import drawing, gallery, of_source, thumbnail
+from vibsim.report import choice, data, style, words
+from vibsim.report.figures import drawing, gallery, of_source, thumbnail, work
 from vibsim.report.figures.sweeps.view import View
-from vibsim.report.page import cards, explorer, hero, player, policy
-from vibsim.report.page.templates import environment, markup
+from vibsim.report.page import cards, explorer, hero, player
+from vibsim.report.page.templates import environment, markup, sealed
 from vibsim.report.style import Picture
 from vibsim.report.tables import (
     best,
@@ -32,12 +32,11 @@ from vibsim.report.tables import (
     published,
     source_figures,
     theory,
-    work,
 )
 from vibsim.report.tables.latex import to_latex
 from vibsim.report.tables.scales import table as scales_table
 from vibsim.report.tables.table import Table, to_csv
-from vibsim.report.text import equation, experiment_file, setting, words
+from vibsim.report.text import equation, experiment_file, setting
 from vibsim.report.types import Experiment, Plan
 
 NOTHING: Mapping[str, Any] = {}
@@ -58,6 +57,7 @@ for verdict in verdicts(experiment, convergence):
     print(verdict.id, verdict.status, verdict.reason)"""
 
 
+@style.applied()
 def write(
     plan: Plan,
     convergence: Record,
@@ -93,22 +93,18 @@ def write(
         raise VibsimError(f"figure format '{unknown[0]}': {nearest(unknown[0], drawing.FORMATS)}")
     experiment, position = plan.experiment, choice.position(plan.experiment)
     shown, left_out = gallery.choose(experiment, convergence)
-    decisive = lead.find(experiment, convergence, summary)
+    decisive = choice.find_lead(experiment, convergence, summary)
     drawn = _Drawn(formats)
-    with style.applied():
-        first = [drawn.add(one) for one in hero.pictures(experiment, convergence, decisive)]
-        sources = of_source.pictures(experiment, convergence, decisive)
-        sourced = [drawn.add(picture) for _, found in sources for picture in found]
-        names = [picture.name for picture, _ in (*first, *sourced)]
-        below = gallery.pictures(experiment, convergence, shown, decisive, names)
-        drawings = {
-            "hero": first,
-            "source": sourced,
-            "motion": [drawn.add(picture) for picture in below.motion],
-        }
-        tabs = {"belief": drawn.tabs(below.belief, FIGURES)}
-        views = drawn.views(below.members)
-        small = thumbnail.thumbnail(experiment, convergence, shown[0])
+    first = [drawn.add(one) for one in hero.pictures(experiment, convergence, decisive)]
+    sources = of_source.pictures(experiment, convergence, decisive)
+    sourced = [drawn.add(picture) for _, found in sources for picture in found]
+    names = [picture.name for picture, _ in (*first, *sourced)]
+    below = gallery.pictures(experiment, convergence, shown, decisive, names)
+    moving = [drawn.add(picture) for picture in below.motion]
+    drawings = {"hero": first, "source": sourced, "motion": moving}
+    tabs = {"belief": drawn.tabs(below.belief, FIGURES)}
+    views = drawn.views(below.members)
+    small = thumbnail.thumbnail(experiment, convergence, shown[0])
     replace_files(directory / "figures", {**drawn.files, "thumbnail.svg": small.encode()})
     listed, others = _tables(experiment, convergence)
     scales = scales_table(experiment, convergence)
@@ -116,17 +112,14 @@ def write(
     broken = checks.failures(summary, convergence)
     every = [*printed, *listed, *others, scales, checks.checks(summary), broken]
     every += [source_figures.table(sources), members.table(convergence, position)]
-    files = {}
-    for table in every:
-        if table is not None:
-            files[f"{table.name}.csv"] = to_csv(table).encode()
-            files[f"{table.name}.tex"] = to_latex(table).encode()
+    written = {table.name: texts_of(table) for table in every if table is not None}
+    files = files_of(written)
     kept = ("members.csv",) if data.swept(convergence) else ()
     if kept:
         members.write_csv(directory / "tables/members.csv", convergence, position)
         files.pop("members.csv", None)
     replace_files(directory / "tables", files, kept)
-    moving = player.element(experiment, convergence, environment())
+    played = player.element(experiment, convergence, environment())
     made = cards.cards(experiment, convergence, summary)
     if "hero_evidence" in names and decisive.entry is not None:
         made = [c | {"picture": None} if c["id"] == decisive.entry["id"] else c for c in made]
@@ -155,11 +148,11 @@ def write(
             if failures > more
             else "",
             "numbers_shown": [cut(table) for table in listed],
-            "tables": {table.name: copied(table) for table in (*printed, *listed)},
+            "tables": {table.name: copied(written[table.name]) for table in (*printed, *listed)},
             "scales": scales,
-            "undrawn": of_source.undrawn(sources, has_player=bool(moving)),
+            "undrawn": of_source.undrawn(sources, has_player=bool(played)),
             "player_source": of_source.of_player(experiment),
-            "player": markup(moving),
+            "player": markup(played),
             "printed": printed,
             "printed_sentence": published.sentence(printed),
             "shown": left_out,
@@ -174,7 +167,7 @@ def write(
             "python": _python(experiment),
         }
     )  # fmt: skip
-    store.write_text(directory / "report.html", policy.sealed(page))
+    store.write_text(directory / "report.html", sealed(page))
 
 
 class _Drawn:
@@ -266,10 +259,24 @@ def cut(table: Table) -> tuple[str, Table, str]:
     return _heading(table.caption), replace(table, rows=shown).without_empty(), told
 
 
-def copied(table: Table) -> dict[str, str]:
-    """Return what buttons copy of a table: all of it, by the name of the format; nothing of a very long one."""
-    found = {"CSV": to_csv(table), "LaTeX": to_latex(table)}
-    return found if max(map(len, found.values())) <= COPIED else {}
+def texts_of(table: Table) -> dict[str, str]:
+    """Return a table as text by the name of the format."""
+    return {"CSV": to_csv(table), "LaTeX": to_latex(table)}
+
+
+def files_of(written: Mapping[str, Mapping[str, str]]) -> dict[str, bytes]:
+    """Return the files of tables by their names, from the `texts_of` each table."""
+    ends = {"CSV": "csv", "LaTeX": "tex"}
+    return {
+        f"{name}.{ends[form]}": text.encode()
+        for name, texts in written.items()
+        for form, text in texts.items()
+    }
+
+
+def copied(texts: Mapping[str, str]) -> Mapping[str, str]:
+    """Return what buttons copy of a table, its texts; nothing of a very long one."""
+    return texts if max(map(len, texts.values())) <= COPIED else {}
 
 
 def replace_files(directory: Path, files: Mapping[str, bytes], others: Sequence[str] = ()) -> None:
@@ -290,9 +297,8 @@ def _tables(experiment: Experiment, record: Record) -> tuple[list[Table], list[T
     wanted = [
         *orders[:1], best.table(model, record, shown), theory.schemes(experiment, record), *orders[1:],
         degrees.table(experiment), levels.scalars(record, shown), levels.events(record), *theory.predictions(record),
-        levels.velocities(record),
         # what damping or a force changes says nothing of a scheme
-        levels.maxima(record, shown) if model.conservative else None,
+        *((levels.velocities(record), levels.maxima(record, shown)) if model.conservative else ()),
         None if data.is_lean(record) else work.table(experiment, record),
     ]  # fmt: skip
     everyone = members.table(record, choice.position(experiment))

@@ -20,12 +20,11 @@ import numpy as np
 
 from vibsim.core.array_types import Floats
 from vibsim.core.record import Record
-from vibsim.report import choice, data, frame, style
+from vibsim.report import choice, data, frame, style, words
 from vibsim.report.data import Member
 from vibsim.report.figures import moments, scenes
 from vibsim.report.figures.moments import SECONDS_A_PERIOD, UNBOUNDED, VISIBLE
 from vibsim.report.figures.scenes import Motion, Part, Scene
-from vibsim.report.text import words
 from vibsim.report.types import Environment, Experiment
 
 FRAMES_A_PERIOD = 48  # where there is room

@@ -13,21 +13,20 @@ from vibsim import store
 from vibsim.convergence import LadderVerdict
 from vibsim.core.record import Record
 from vibsim.experiment.solver import SolverExperiment, restore
-from vibsim.report import style
+from vibsim.report import style, words
 from vibsim.report.figures import drawing, thumbnail
-from vibsim.report.page import policy, study
+from vibsim.report.page import study
 from vibsim.report.page.cards import provenance_rows
-from vibsim.report.page.page import replace_files
-from vibsim.report.page.templates import environment
+from vibsim.report.page.page import files_of, replace_files, texts_of
+from vibsim.report.page.templates import environment, sealed
 from vibsim.report.tables import checks as check_tables
-from vibsim.report.tables.latex import to_latex
-from vibsim.report.tables.table import Cell, Column, Table, to_csv
-from vibsim.report.text import words
+from vibsim.report.tables.table import Cell, Column, Table
 from vibsim.report.text.setting import not_in_file
 from vibsim.report.types import Plan
 from vibsim.solver import analysis
 
 
+@style.applied()
 def write(
     plan: Plan,
     convergence: Record,
@@ -48,11 +47,7 @@ def write(
         figures |= dict(_thumbnail(verdict)) if not figures else {}
         figures |= dict(_files(card["picture"], formats))
     replace_files(directory / "figures", figures)
-    files: dict[str, bytes] = {}
-    for table in tables:
-        files[f"{table.name}.csv"] = to_csv(table).encode()
-        files[f"{table.name}.tex"] = to_latex(table).encode()
-    replace_files(directory / "tables", files)
+    replace_files(directory / "tables", files_of({table.name: texts_of(table) for table in tables}))
     context = {
         "status": summary["status"],
         "counts": words.passed([entry["status"] for entry in summary["checks"]]),
@@ -67,7 +62,7 @@ def write(
         "facts": "summary.json",
     }
     page = environment().get_template("study.html").render(context)
-    store.write_text(directory / "report.html", policy.sealed(page))
+    store.write_text(directory / "report.html", sealed(page))
 
 
 def _card(
@@ -119,11 +114,10 @@ def _members(entry: Mapping[str, Any]) -> Table:
 def _files(picture: style.Picture, formats: Sequence[str]) -> Iterator[tuple[str, bytes]]:
     """Yield the figure of a check as files."""
     assert picture.figure is not None
-    with style.applied():
-        yield f"{picture.name}.svg", drawing.svg(picture.figure, picture.name).encode()
-        for form in formats:
-            if form != "svg":
-                yield f"{picture.name}.{form}", drawing.binary(picture.figure, form)
+    yield f"{picture.name}.svg", drawing.svg(picture.figure, picture.name).encode()
+    for form in formats:
+        if form != "svg":
+            yield f"{picture.name}.{form}", drawing.binary(picture.figure, form)
 
 
 def _thumbnail(verdict: LadderVerdict) -> Iterator[tuple[str, bytes]]:

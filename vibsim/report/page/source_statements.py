@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from vibsim.experiment import citation
-from vibsim.report.page.source_figures import order
-from vibsim.report.text import words
+from vibsim.report import words
+from vibsim.report.tables.source_figures import order
 
 CORRECTION = "correction of the "
 """Begins the source of a claim that says what is true where a text is wrong."""

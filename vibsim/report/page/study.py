@@ -12,12 +12,11 @@ from vibsim.convergence import LadderVerdict
 from vibsim.convergence.study.figure import convergence_figure, shows_curves
 from vibsim.convergence.study.sentences import digits_of_values, number
 from vibsim.core.vocabulary import worst
-from vibsim.report import style
-from vibsim.report.page import policy
-from vibsim.report.page.templates import environment
+from vibsim.report import style, words
+from vibsim.report.page.templates import environment, sealed
 from vibsim.report.style import Picture
 from vibsim.report.tables.table import Column, Table, Written
-from vibsim.report.text import findings, words
+from vibsim.report.text import findings
 
 UNSEEN = (
     "Levels can agree with each other and still approach a wrong answer. Only an exact solution shows that, and none "
@@ -35,6 +34,7 @@ CURVES = (
 )
 
 
+@style.applied()
 def write(
     verdicts: Sequence[LadderVerdict],
     sources: Sequence[Sequence[str]],
@@ -68,7 +68,7 @@ def write(
         "facts": "verdict.json",
     }
     page = environment().get_template("study.html").render(context)
-    store.write_text(directory / "report.html", policy.sealed(page))
+    store.write_text(directory / "report.html", sealed(page))
     text = json.dumps(content, indent=1, ensure_ascii=False)
     store.write_text(directory / "verdict.json", text + "\n")
 
@@ -185,6 +185,4 @@ def _picture(name: str, verdict: LadderVerdict) -> Picture:
         if shows_curves(verdict):
             caption += " " + CURVES.format(order=f"{order:.3g}")
     alt = f"Error and difference of {verdict.quantity} against {verdict.size_name}. {verdict.sentence}"
-    with style.applied():
-        figure = convergence_figure(verdict)
-    return Picture(f"study-{name}", "", caption, alt, figure)
+    return Picture(f"study-{name}", "", caption, alt, convergence_figure(verdict))

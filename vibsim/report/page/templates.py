@@ -1,13 +1,26 @@
-"""The templates of pages, and what they may use."""
+"""The templates of pages: what they may use, where they are kept compiled, and what a page that they make may run.
+
+Templates are kept as Python code in the private cache: to compile those of one page takes longer than to fill them in.
+A page runs its own scripts, named by their digests in its Content-Security-Policy, and nothing else.
+"""
 
 from __future__ import annotations
 
+import base64
+import hashlib
+import re
+import sys
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import jinja2
+from jinja2 import Environment, FileSystemLoader, StrictUndefined
+from jinja2.bccache import Bucket, BytecodeCache
+from markupsafe import Markup, escape
+
+from vibsim.core import private_cache
 from vibsim.report.text import glossary
-from vibsim.report.types import Environment
 
 if TYPE_CHECKING:
     from vibsim.report.style import Picture
@@ -18,10 +31,6 @@ TEMPLATES = Path(__file__).parents[1] / "templates"
 @cache
 def environment() -> Environment:
     """Return the jinja2 environment of the templates, with escaping always on."""
-    from jinja2 import Environment, FileSystemLoader, StrictUndefined
-
-    from vibsim.report.page.template_cache import TemplateCache
-
     # without `optimized`, the code depends on the text of a template alone, and on nothing that a filter returns
     made = Environment(
         loader=FileSystemLoader(TEMPLATES), autoescape=True, undefined=StrictUndefined, trim_blocks=True,
@@ -34,8 +43,6 @@ def environment() -> Environment:
 
 def _code(text: str) -> str:
     """Escape a text, and set what stands between backticks as code."""
-    from markupsafe import Markup, escape
-
     parts = text.split("`")
     if len(parts) % 2 == 0:
         return escape(text)
@@ -47,15 +54,54 @@ def _code(text: str) -> str:
 
 def markup(text: str) -> str:
     """Mark a drawing of our own as markup; its texts were escaped when it was drawn."""
-    from markupsafe import Markup
-
     return Markup(text)
 
 
 def _drawn(picture: Picture) -> str:
     """Return the SVG element of the picture of a check."""
-    from vibsim.report import style
     from vibsim.report.figures import drawing
 
-    with style.applied():
-        return markup(drawing.element(picture))
+    return markup(drawing.element(picture))
+
+
+_SCRIPT = re.compile(r"<script>(.*?)</script>", re.DOTALL)
+_ANY = "script-src 'unsafe-inline'"
+
+
+def sealed(page: str) -> str:
+    """Return a page whose policy allows just the scripts that it has; `page` allows any.
+
+    Source: Content Security Policy Level 3, section 2.3.1 (hash-source).
+    """
+    own = dict.fromkeys(map(digest_of, _SCRIPT.findall(page))) or {"none": None}
+    return page.replace(_ANY, "script-src " + " ".join(f"'{source}'" for source in own), 1)
+
+
+def digest_of(script: str) -> str:
+    """Return the digest of a script as a policy writes it."""
+    return f"sha256-{base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()}"
+
+
+_KIND = "templates"
+
+
+class TemplateCache(BytecodeCache):
+    """Keeps compiled templates; what is missing or damaged is compiled again, and no cache is no fault."""
+
+    def load_bytecode(self, bucket: Bucket) -> None:
+        """Fill a bucket with the code of its template, if it is kept."""
+        folder = private_cache.opened(_KIND)
+        content = folder and folder.read(_name(bucket))
+        if content:
+            bucket.bytecode_from_string(content)
+
+    def dump_bytecode(self, bucket: Bucket) -> None:
+        """Keep the code in a bucket."""
+        if folder := private_cache.opened(_KIND):
+            folder.write(_name(bucket), bucket.bytecode_to_string())
+
+
+def _name(bucket: Bucket) -> str:
+    """Name an entry by all that the code depends on: Python, jinja2, the place of the template and its text."""
+    parts = (sys.version, jinja2.__version__, bucket.key, bucket.checksum)
+    return hashlib.sha256("\0".join(parts).encode()).hexdigest()

@@ -12,11 +12,10 @@ from collections.abc import Iterator, Sequence
 from vibsim.comparison.best_values import WORDS, scalars
 from vibsim.core.record import Record
 from vibsim.models import Model
-from vibsim.report import style
+from vibsim.report import style, words
 from vibsim.report.data import Member, at, exact_periods, exact_series, flags, swept, unit, whole
-from vibsim.report.superscripts import power
 from vibsim.report.tables.table import Cell, Column, Table, Written
-from vibsim.report.text import words
+from vibsim.report.words import power
 
 CLASSES = {
     "unknown": "–",
@@ -47,7 +46,7 @@ def table(model: Model, record: Record, shown: Sequence[Member]) -> Table | None
         return None
     text = (
         "Best values from the ladder: extrapolated over the levels named, with a bound of the error that held in more "
-        "than 95 % of a large random set; “unknown” where the levels do not approach each other"
+        "than 95 % of a large random set; “unknown” where changes from level to level do not shrink steadily"
     )
     if "scalar" in record:
         text += (
@@ -62,7 +61,7 @@ def _rows(model: Model, record: Record, shown: Sequence[Member]) -> Iterator[tup
     has_series = "scalar" in record
     for k, row in enumerate(scalars(model, not has_series)):
         name, nothing = row.variable, (None, None, None)
-        is_named = row.quantity in words.NAMES
+        is_named = row.quantity in words.NAMES or (row.quantity and model.coordinates > 1)
         text = f"{words.symbol(row.quantity)} {WORDS[row.value]}" if is_named else row.words
         title = style.label(text, unit(record, f"{name}_richardson"))
         for member in shown:

@@ -6,10 +6,9 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 from vibsim.core.record import Record
-from vibsim.report import data
+from vibsim.report import data, words
 from vibsim.report.tables.results import error_of, measured_order, number_of
 from vibsim.report.tables.table import Cell, Column, Table, Written
-from vibsim.report.text import words
 
 ROUND_OFF = 1e-12  # numbers no larger than this have two digits: more would be noise
 

@@ -50,7 +50,7 @@ def table(experiment: Experiment) -> Table | None:
             rows.append((spec.name, degree, None, EXACT, EXACT, "–"))
         else:
             found = theory.miss(stepper, model, degree + 1)
-            off = told(found.start), told(found.step)
+            off = residual_text(found.start), residual_text(found.step)
             rows.append((spec.name, degree, found.degree, *off, _blame(found)))
     # each polynomial has a force of its own
     equation = model.equation.partition(" = ")[0]
@@ -71,7 +71,7 @@ def _blame(found: Miss) -> str:
     return f"the first step, and {cause}" if is_apart and found.cause else cause
 
 
-def told(residual: Residual | None) -> str:
+def residual_text(residual: Residual | None) -> str:
     """Write a residual as text: ``-c_3 dt^3``; a long coefficient is left out."""
     if residual is None:
         return EXACT

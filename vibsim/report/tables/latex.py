@@ -63,6 +63,8 @@ _ACCENTS = {
 }  # fmt: skip
 _SHIFTS = {"<super>": "^", "<sub>": "_"}
 _ROOT = re.compile("√([A-Za-z0-9]+)")
+_HARMLESS = re.compile("[A-Za-z0-9 .,:;+()/=-]*")
+"""What needs no other way of writing."""
 _OPTION = ("[", "*")
 r"""With what a row may not begin: behind ``\\`` it would be an option of that command."""
 
@@ -83,6 +85,8 @@ def _row(cells: list[str]) -> str:
 
 def escape(text: str) -> str:
     """Return text that LaTeX prints as it stands, in ASCII."""
+    if _HARMLESS.fullmatch(text):
+        return text
     written, last = [], 0
     for root in _ROOT.finditer(text):
         written += [_plain(text[last : root.start()]), rf"$\sqrt{{\mathrm{{{root[1]}}}}}$"]

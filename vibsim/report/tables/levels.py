@@ -15,10 +15,9 @@ import numpy as np
 from vibsim.core.array_types import Flags, Floats
 from vibsim.core.record import Record
 from vibsim.core.vocabulary import MEMBER, OF_LEVEL, TYPICAL_NORM
-from vibsim.report import data, frame
+from vibsim.report import data, frame, words
 from vibsim.report.data import Member, at, known, time_unit, unit, whole
 from vibsim.report.tables.table import Cell, Column, Table, Written
-from vibsim.report.text import words
 
 OWN, CENTRED = "energy_deviation_max_abs", "energy_deviation_d2t_max_abs"
 ROUND_OFF = 1e-13

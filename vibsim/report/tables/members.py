@@ -16,10 +16,9 @@ from numpy.typing import NDArray
 from vibsim import store
 from vibsim.core.record import Record
 from vibsim.core.vocabulary import TYPICAL_NORM
-from vibsim.report import finest_level
+from vibsim.report import finest_level, words
 from vibsim.report.data import exact_periods, flags, norm_unit, swept, swept_label, unit, whole
 from vibsim.report.tables.table import Column, Table, csv_line
-from vibsim.report.text import words
 
 LISTED = 10_000
 """Rows up to which a table lists members, and a file has every digit of what was measured."""

@@ -9,13 +9,12 @@ from typing import Any
 import numpy as np
 
 from vibsim.apriori.formal_orders import columns_of
-from vibsim.checks.fields import measured
+from vibsim.checks.fields import field_values
 from vibsim.core.record import Record
 from vibsim.experiment.sweep_columns import members_with
 from vibsim.experiment.value_names import VALUES
-from vibsim.report import data
+from vibsim.report import data, words
 from vibsim.report.tables.table import Cell, Column, Table, Written
-from vibsim.report.text import words
 from vibsim.report.types import Experiment, PublishedRow, PublishedTable
 
 AGREES = "agrees?"
@@ -56,7 +55,7 @@ def tables(experiment: Experiment, record: Record, summary: Mapping[str, Any]) -
         of = f" of {words.symbol(table.quantity)}" if table.quantity else ""
         named = table.source or experiment.source
         caption = (
-            f"{table.title}{f' ({named})' if named else ''}. Ours: {_told(table.value)}{of}; it agrees if it "
+            f"{table.title}{f' ({named})' if named else ''}. Ours: {_value_in_words(table.value)}{of}; it agrees if it "
             "differs by at most half a unit of the last printed digit"
         )
         found.append(Table(f"published_{i}", caption, columns, rows))
@@ -84,10 +83,10 @@ def _beside_header(name: str, table: PublishedTable) -> str:
     if f"{name}{words.CENTRED}" == table.value:
         return OWN
     own = f" {OWN}" if f"{name}{words.CENTRED}" in VALUES else ""
-    return f"beside: {_told(name)}{own}"
+    return f"beside: {_value_in_words(name)}{own}"
 
 
-def _told(value: str) -> str:
+def _value_in_words(value: str) -> str:
     return value.replace("_d2t", " by [D₂ₜu]").replace("_", " ")
 
 
@@ -104,7 +103,9 @@ def _row(
     case = 0 if row.at.case is None else data.place_of(record, row.at.case) or 0
     if row.at.swept:
         case = int(np.argmax(members_with(columns_of(record), row.at.swept, len(record["case"]))))
-    ours = float(measured(record, name, "value")[record.words("scheme").index(row.scheme), case])
+    ours = float(
+        field_values(record, name, "value")[record.words("scheme").index(row.scheme), case]
+    )
     levels: list[int | str] = [*data.whole(record, "level")]
     level = levels[-1] if row.level is None else row.level
     steps = dict(zip(levels, data.steps_of(record, case).tolist(), strict=True))

@@ -1,4 +1,4 @@
-"""The numbers of a result of a summary, as cells of tables."""
+"""Cells of a result of a check; the index needs them without what measures."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from typing import Any
 
 from vibsim.core.vocabulary import ERROR_FACTS, decisive_number
+from vibsim.report import words
 from vibsim.report.tables.table import Cell
-from vibsim.report.text import words
 
 
 def measured_order(result: Mapping[str, Any]) -> tuple[Cell, Cell, Cell, Cell]:

@@ -1,4 +1,4 @@
-"""Which figure of the source stands where on a page, as a table that the index reads."""
+"""The figures of the source texts: which of them stands where on a page, as a table that the index reads again."""
 
 from __future__ import annotations
 
@@ -10,6 +10,14 @@ from vibsim.report.tables.table import Column, Table
 if TYPE_CHECKING:
     from vibsim.experiment.schema.figures import FigureOfSource
     from vibsim.report.style import Picture
+import csv
+import re
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from urllib.parse import quote
+
+from vibsim.core import regular_files
 
 PLAYER = "player"
 """What is shown by the player of the page and not drawn."""
@@ -25,3 +33,49 @@ def table(found: Iterable[tuple[FigureOfSource, Sequence[Picture]]]) -> Table | 
         rows += [(asked.source, asked.shows.replace("_", " "), place) for place in places]
     columns = tuple(map(Column, HEADERS))
     return Table("figures", "Figures of the source", columns, tuple(rows)) if rows else None
+
+
+FILE = "tables/figures.csv"
+"""Within the results of an experiment."""
+PAGE = "report.html"
+_NUMBER = re.compile(r"(\d+)")
+
+
+@dataclass(frozen=True)
+class Place:
+    """A figure on the page of an experiment."""
+
+    name: str
+    """Of the experiment."""
+    shows: str
+    link: str
+
+
+def listed(results: Path, folders: Iterable[Path]) -> list[tuple[str, list[Place]]]:
+    """Return the figures of the texts in their order, with the places where experiments show them.
+
+    A table that cannot be read, or has other columns, counts as not there: the verdicts do not depend on it.
+    """
+    found: dict[str, list[Place]] = {}
+    for folder in folders:
+        rows: list[dict[str, str]] = []
+        with (
+            suppress(OSError, ValueError, csv.Error),
+            regular_files.reading(folder / FILE) as stream,
+        ):
+            rows = list(csv.DictReader(stream.read().decode().splitlines()))
+        page = quote((folder / PAGE).relative_to(results).as_posix())
+        for row in rows:
+            figure, shows, place = (row.get(name) or "" for name in HEADERS)
+            places = found.setdefault(figure, [])
+            # of several pictures the first one has the link
+            if place and (folder.name, shows) not in {(p.name, p.shows) for p in places}:
+                places.append(Place(folder.name, shows, f"{page}#{quote(place)}"))
+    return sorted(((f, p) for f, p in found.items() if f and p), key=lambda row: order(row[0]))
+
+
+def order(figure: str) -> list[tuple[int, str]]:
+    """Order figures by their numbers: figure 2 stands before figure 10."""
+    return [
+        (int(part), "") if part.isdigit() else (0, part) for part in _NUMBER.split(figure.lower())
+    ]

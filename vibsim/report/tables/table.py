@@ -8,7 +8,7 @@ import math
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 
-from vibsim.report.text import words
+from vibsim.report import words
 
 Cell = str | int | float | None
 _FORMULA = ("=", "+", "-", "@", "\t", "\n", "\uff1d", "\uff0b", "\uff0d", "\uff20")
@@ -35,7 +35,7 @@ class Column:
     unit: str = ""
     form: str = "text"
     """``text``, ``printed`` (text of a printed number, `words.printed`), or a form of
-    `vibsim.report.text.words.number`."""
+    `vibsim.report.words.number`."""
 
     @property
     def title(self) -> str:

@@ -15,10 +15,9 @@ from vibsim.analysis.motion_variables import PEAKS
 from vibsim.core.array_types import Floats
 from vibsim.core.record import Record
 from vibsim.core.vocabulary import MEMBER, OF_LEVEL, TYPICAL_NORM
-from vibsim.report import choice, data, finest_level
+from vibsim.report import choice, data, finest_level, words
 from vibsim.report.data import known, swept, whole
 from vibsim.report.tables.table import Cell, Column, Table, Written
-from vibsim.report.text import words
 from vibsim.report.types import Experiment
 
 LIMITS = {0.0: "never", math.inf: "any"}  # words for limits of stability that are no number

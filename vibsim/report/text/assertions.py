@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from vibsim.checks.accurate import rule
 from vibsim.checks.reductions import TAKEN
-from vibsim.checks.value import SAMPLED, what
+from vibsim.checks.value import what
 from vibsim.core.vocabulary import TYPICAL_NORM
-from vibsim.report.text import words
+from vibsim.report import words
 from vibsim.report.types import Check, ConvergesCheck, Measurement
 
 PLACES = ("t", "step", "level", "scheme", "case")  # where a number may be taken
@@ -74,7 +74,7 @@ def measured(check: Measurement) -> str:
                 "the order of its scheme" if check.order == "scheme" else f"order {check.order:g}"
             )
             named = [_listed(check.schemes)] if check.schemes else []
-            only = "".join(f", {part}" for part in [*named, *_swept(check)])
+            only = "".join(f", {part}" for part in [*named, *swept_values(check)])
             why = f" ({check.expect.reason})" if check.expect.reason else ""
             trap = f", expected to end as {check.expect.status}{why}"
             return (
@@ -113,11 +113,11 @@ def subject(check: Measurement) -> str:
         return f"{words.title(check.quantity)} by {check.first}{_where(check)}"
     if check.kind != "value":
         return measured(check)
-    told, is_sampled = what(check, words.PAGE), check.value in SAMPLED
+    told, is_sampled = what(check, words.PAGE), check.number.is_sample
     keys = ("level", "scheme", "case") if is_sampled else PLACES
     places = ((key, getattr(check.at, key)) for key in keys)
     parts = [f"{key} {value}" for key, value in places if value is not None]
-    where = ", ".join([*parts, *_swept(check)])
+    where = ", ".join([*parts, *swept_values(check)])
     if check.take is not None:
         told = f"{TAKEN[check.take]} {told} over {check.over}"
     return f"{told}{(f' ({where})' if is_sampled else f' at {where}') if where else ''}"
@@ -129,11 +129,11 @@ def _where(check: Measurement) -> str:
     parts = [_listed(names)] if names else []
     places = ((key, getattr(check, key, None)) for key in ("level", "case"))
     parts += [f"{key} {value}" for key, value in places if value is not None]
-    parts += _swept(check)
+    parts += swept_values(check)
     return f" ({', '.join(parts)})" if parts else ""
 
 
-def _swept(check: Measurement) -> list[str]:
+def swept_values(check: Measurement) -> list[str]:
     """Name the swept values of the members that a check is about."""
     return [
         f"{key} = {value if isinstance(value, str) else words.number(value, 'step')}"

@@ -1,15 +1,15 @@
-"""The experiment as a file that can be copied: what it asks for, without what is as by default."""
+"""The experiment as a file that can be copied, without what is as by default; and changes of it that mend a check."""
 
 from __future__ import annotations
 
 import json
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from vibsim.models.shared.crossings import is_crossing, written
 from vibsim.report.text import structure
-from vibsim.report.types import Check, Experiment, SchemeSpec
+from vibsim.report.types import Check, Experiment, Measurement, SchemeSpec
 
 WIDTH = 100  # characters of a line
 LONG = 160  # words of a file above which a page leaves its checks out
@@ -67,10 +67,9 @@ def _head(experiment: Experiment) -> list[str]:
         del lines[-1]
     time = experiment.time.model_dump(exclude_none=True)
     if time.get("periods") is not None:
-        time = {
-            "periods": time["periods"],
-            "steps_per_period": time["base_steps"] / time["periods"],
-        }
+        steps = time["base_steps"] / time["periods"]
+        of = {"frequency": f"model.{time['frequency']}"} if "frequency" in time else {}
+        time = {"periods": time["periods"], "steps_per_period": steps, **of}
     elif time.get("steps_per_point") is not None:
         time = {"steps_per_point": time["steps_per_point"]}
     elif time["base_steps"] == 1:
@@ -83,6 +82,7 @@ def _head(experiment: Experiment) -> list[str]:
     if experiment.sweep:
         axes = [_axis(axis) for axis in experiment.sweep.model_dump(mode="json")["axes"]]
         lines += ["sweep:", *(f"  {line}" for axis in axes for line in axis)]
+        lines += [f"  follow: {experiment.sweep.follow}"] if experiment.sweep.follow else []
     if experiment.samples != "auto":
         every = experiment.samples
         lines.append(f"samples: {every if isinstance(every, str) else f'{{every: {every}}}'}")
@@ -160,3 +160,40 @@ def _value(value: Any) -> str:
         is_plain = _PLAIN.fullmatch(value) and not _WORDS.fullmatch(value) and "," not in value
         return value if is_plain else json.dumps(value, ensure_ascii=False)
     return json.dumps(value)
+
+
+MOST_LEVELS = 6
+"""So many finer levels are worth a line to copy; more need another problem, not more levels."""
+WINDOW = 3  # levels below the finest readable one that show an order
+
+
+def change(experiment: Experiment, measured: Measurement | None, check: Mapping[str, Any]) -> str:
+    """Return lines of YAML to put into the file; empty where no fact tells them."""
+    if check["status"] == "PASS" or measured is None or experiment.tolerance is not None:
+        return ""
+    result = check["results"][0]
+    facts, reason = result.get("facts") or {}, result.get("reason")
+    spec = next((spec for spec in experiment.schemes if spec.name == result["scheme"]), None)
+    if reason == "order_low" and spec is not None and spec.options.get("start") == "first_order":
+        return "\n".join(schemes(experiment, spec.name, start="centred"))
+    levels = list(experiment.levels)
+    if levels != list(range(levels[0], levels[-1] + 1)):
+        return ""
+    # of a check of a value that fact is a code, not a count
+    more = (facts.get("levels_needed") or 0) if measured.kind == "converges" else 0
+    ends = next(_ends(levels, reason, facts, more), None)
+    return "" if ends is None else f"levels: {{from: {ends[0]}, to: {ends[1]}}}"
+
+
+def _ends(
+    levels: list[int], reason: str | None, facts: Mapping[str, Any], more: int
+) -> Iterator[tuple[int, int]]:
+    """Yield the first and the last level that would settle the question."""
+    if 0 < more <= MOST_LEVELS:
+        yield levels[0], levels[-1] + more
+    finer = facts.get("level_needed") or -1
+    if levels[-1] < finer <= levels[-1] + MOST_LEVELS:
+        yield levels[0], finer
+    readable = facts.get("readable_level") or -1
+    if reason == "round_off" and WINDOW - 1 <= readable < levels[-1]:
+        yield max(readable - WINDOW, 0), readable

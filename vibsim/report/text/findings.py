@@ -7,11 +7,12 @@ import re
 from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 
+from vibsim.checks.order_context import COINCIDE
 from vibsim.convergence import LadderVerdict
 from vibsim.core.record import Record
-from vibsim.report import data
-from vibsim.report.lead import Lead, is_trap
-from vibsim.report.text import assertions, reasons, words
+from vibsim.report import data, words
+from vibsim.report.choice import Lead, is_trap
+from vibsim.report.text import assertions, reasons
 from vibsim.report.types import Experiment
 
 ORDINALS = {1: "first", 2: "second", 3: "third", 4: "fourth", 5: "fifth", 6: "sixth", 8: "eighth"}
@@ -269,8 +270,13 @@ def _everywhere(record: Record, lead: Lead) -> str:
     if total < 2:
         return by
     if data.swept(record):
-        noun = "members" if total <= len(record["case"]) else "runs"
-        return f" in all {words.number(total, 'integer')} {noun}{by}"
+        members = len(record["case"])
+        which = "both" if total == 2 else f"all {words.number(total, 'integer')}"
+        noun = "members" if total <= members else "runs"
+        values = assertions.swept_values(lead.measured) if lead.measured else []
+        asked = f" with {words.swept(', '.join(values))}" if values else " that are asked about"
+        asked = asked if total < members else ""
+        return f" in {which} {noun}{asked}{by}"
     if total == len(schemes) == 2:
         return " by both schemes"
     return f" by {'all' if total == len(schemes) else f'{total} of'} {len(schemes)} schemes"
@@ -324,7 +330,7 @@ def paragraph(experiment: Experiment, record: Record, lead: Lead, levels: int) -
     ):
         part = _estimate_over_true(record, lead)
         apart = data.coincidence(record, lead.quantity, lead.member)
-        is_rough = apart > data.COINCIDE or (part is not None and part > data.COINCIDE)
+        is_rough = apart > COINCIDE or (part is not None and part > COINCIDE)
         percent = "" if part is None else words.number(max(100.0 * part, 0.1), "brief")
         return CONVERGES.format(
             factor=f"{found:.2g}",

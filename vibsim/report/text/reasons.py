@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from vibsim.checks.value import COUNTED, depends_on_level
 from vibsim.core.vocabulary import BY_TOLERANCE
+from vibsim.experiment.value_names import VALUES
 
 
 class Reason(NamedTuple):
@@ -46,7 +46,8 @@ REASONS = {
     ),
     "wrong_limit": Reason(
         "The levels approach each other, but not the exact solution. The scheme converges to a wrong answer.",
-        "The differences alone cannot show this; the exact solution does. Check the equation that is being solved.",
+        "The differences alone cannot show this; the exact solution does. Check the equation that is being solved, "
+        "and the code of a scheme of your own.",
     ),
     "unstable": Reason(
         "The numerical solution grows where the exact one does not. Either w dt is beyond the limit of the scheme, or "
@@ -159,10 +160,10 @@ def reason(
     if word == "match" and kind in _BY_KIND:
         return _BY_KIND[kind]
     if word == "match" and kind != "converges":
-        is_of_scheme = value and not depends_on_level(value)
+        is_of_scheme = value and not VALUES[value].depends_on_level
         of = (
             "counted"
-            if value in COUNTED
+            if value and VALUES[value].is_count_of_work
             else "scheme"
             if is_of_scheme
             else "several"

@@ -10,8 +10,8 @@ import numpy as np
 from vibsim.core.record import Record
 from vibsim.core.set_option import set_options
 from vibsim.core.vocabulary import HIGHEST
-from vibsim.report import data
-from vibsim.report.text import structure, words
+from vibsim.report import data, words
+from vibsim.report.text import structure
 from vibsim.report.types import Axis, Experiment, SchemeSpec
 
 LISTED = 8  # most values of a key that are written out
@@ -40,7 +40,7 @@ def setup(experiment: Experiment, record: Record) -> Iterator[tuple[str, str]]:
         )
         yield "Table", f"{name} from {spec.file}, columns {spec.place} and {spec.value}; {steps}"
     if model.loaded is not None and experiment.model.structure is not None:
-        yield from structure.told(experiment.model.structure, model.loaded)
+        yield from structure.rows(experiment.model.structure, model.loaded)
     if experiment.units:
         parts = [(name, *text.partition(" ")) for name, text in experiment.units.items()]
         told = [f"1 {name} = {number} {data.pretty_unit(base)}" for name, number, _, base in parts]
@@ -69,6 +69,11 @@ def setup(experiment: Experiment, record: Record) -> Iterator[tuple[str, str]]:
     if axes:
         count = words.number(len(record["case"]), "integer")
         yield "Sweep", f"{count} members. {'; '.join(map(_axis, axes))}"
+    if experiment.chain > 1:
+        yield (
+            "Starts",
+            "along the last key each member starts from the last state of the one before, at its own level",
+        )
 
 
 def _scheme(spec: SchemeSpec, swept: set[str]) -> str:

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from vibsim.models.structure import LOAD, Loaded
-from vibsim.report.text import words
+from vibsim.models.structure import HISTORY, LOAD, Loaded
+from vibsim.report import words
 from vibsim.report.types import ArraySpec, StructureSpec
 
 MOST_SHOWN = 6
@@ -22,12 +22,13 @@ def as_written(spec: StructureSpec, formulas: Mapping[str, str]) -> dict[str, An
         found["damping_ratios"] = spec.ratios[0] if is_same else list(spec.ratios)
     shapes = {key: row for key, row in spec.arrays.items() if key.startswith(f"{LOAD}.")}
     if shapes:
-        rows = [(row.entries, formulas[key]) for key, row in shapes.items()]
+        factors = {key: formulas.get(key) or _table(spec, key) for key in shapes}
+        rows = [(row.entries, factors[key]) for key, row in shapes.items()]
         if all(len(entries) == 1 and entries[0][1] == 1.0 for entries, _ in rows):
-            found[LOAD] = {str(entries[0][0]): text for entries, text in rows}
+            found[LOAD] = {str(entries[0][0]): factor for entries, factor in rows}
         else:
             ((key, row),) = shapes.items()
-            found[LOAD] = {"shape": _array(row), "times": formulas[key]}
+            found[LOAD] = {"shape": _array(row), "times": factors[key]}
     start = {
         key.partition(".")[2]: _array(row)
         for key, row in spec.arrays.items()
@@ -38,6 +39,13 @@ def as_written(spec: StructureSpec, formulas: Mapping[str, str]) -> dict[str, An
     if not spec.is_free:
         found["observe"] = {name: _entries(entries) for name, entries in spec.observe}
     return found
+
+
+def _table(spec: StructureSpec, key: str) -> dict[str, Any]:
+    """Return the table of a load as it is written."""
+    row = spec.arrays[f"{HISTORY}.{key.partition('.')[2]}"]
+    assert row.columns is not None
+    return {"table": row.file, **dict(zip(("t", "p"), row.columns, strict=True))}
 
 
 def _array(row: ArraySpec) -> Any:
@@ -56,7 +64,7 @@ def _entries(entries: tuple[tuple[int, float], ...]) -> Any:
     return {str(dof): value for dof, value in entries}
 
 
-def told(spec: StructureSpec, loaded: Loaded) -> Iterator[tuple[str, str]]:
+def rows(spec: StructureSpec, loaded: Loaded) -> Iterator[tuple[str, str]]:
     """Yield what a page says of a structure."""
     own = loaded.structure
     files = [
@@ -68,6 +76,9 @@ def told(spec: StructureSpec, loaded: Loaded) -> Iterator[tuple[str, str]]:
     found = own.modes.frequencies
     listed = ", ".join(words.number(float(w)) for w in found[:MOST_SHOWN])
     rest = ", ..." if len(found) > MOST_SHOWN or own.dofs > len(found) else ""
+    tables = [row.file for key, row in spec.arrays.items() if key.startswith(f"{HISTORY}.")]
+    if tables:
+        yield "Loads", f"straight between the points of {', '.join(map(str, tables))}"
     yield "Natural frequencies", f"{listed}{rest} (radians per unit of time)"
     parts = []
     for name, entries in spec.observe:

@@ -11,9 +11,17 @@ import numpy as np
 from vibsim.core.array_types import Floats
 from vibsim.core.record import Record
 from vibsim.core.vocabulary import REASONS, SEVERITY, TYPICAL_NORM
-from vibsim.report import finest_level, style
+from vibsim.report import finest_level, style, words
 from vibsim.report.choice import position, tolerance
-from vibsim.report.data import due, exact_periods, norm_unit, of_several, pick, promised_text, whole
+from vibsim.report.data import (
+    basis_of_order,
+    exact_periods,
+    norm_unit,
+    of_several,
+    pick,
+    promised_text,
+    whole,
+)
 from vibsim.report.figures.sweeps.view import (
     View,
     Worst,
@@ -26,7 +34,6 @@ from vibsim.report.figures.sweeps.view import (
 )  # fmt: skip
 from vibsim.report.style import Picture
 from vibsim.report.sweep_layout import Grid
-from vibsim.report.text import words
 from vibsim.report.types import Axes, Experiment, Figure
 
 LEFT, WIDE, TALL, ABOVE, BELOW = 0.8, 5.4, 3.4, 0.32, 0.5
@@ -144,8 +151,8 @@ def _order(experiment: Experiment, record: Record, quantity: str, scheme: int) -
         f"{quantity}_order", f"order of {letter}", quantity, away,
         f"order of {letter} − {promised_text(record, quantity, scheme)}", badness=np.abs(away), kind="distance",
         tolerance=allowed, number=order, told=shared(f"order of {letter}", np.round(order, 3), form="order"),
-        caption=f"Pale colours are orders within ± {allowed:g} of the {due(record, quantity)} one, where the scale "
-        "jumps.",
+        caption=f"Pale colours are orders within ± {allowed:g} of the {basis_of_order(record, quantity)} one, "
+        "where the scale jumps.",
     )  # fmt: skip
     text = "width of the interval"
     yield Map(f"{quantity}_bar", f"error bar of the order of {letter}", quantity, high - low, text)

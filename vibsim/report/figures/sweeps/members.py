@@ -15,16 +15,15 @@ from numpy.typing import NDArray
 from vibsim.core.array_types import Flags, Floats
 from vibsim.core.record import Record
 from vibsim.core.vocabulary import SEVERITY
-from vibsim.report import finest_level, style
+from vibsim.report import finest_level, style, words
 from vibsim.report.choice import position, tolerance
-from vibsim.report.data import due, flags, norm_unit, of_several, promised_text, whole
+from vibsim.report.data import basis_of_order, flags, norm_unit, of_several, promised_text, whole
 from vibsim.report.figures.panels import rows_of
-from vibsim.report.figures.sweeps.view import View, Worst, ring, shared
+from vibsim.report.figures.sweeps.view import View, Worst, key_axis, ring, shared
 from vibsim.report.style import Picture
-from vibsim.report.superscripts import power
 from vibsim.report.sweep_layout import Key, bins, place_in
-from vibsim.report.text import words
 from vibsim.report.types import Axes, Experiment
+from vibsim.report.words import power
 
 Masks = dict[str, Flags]
 """Which members come to each verdict, shape (case,)."""
@@ -185,7 +184,7 @@ class _Projection:
             if np.any(~(np.abs(away) < ORDER_FRAME))
             else ""
         )
-        band = f"Grey: the tolerance around the {due(record, quantity)} order."
+        band = f"Grey: the tolerance around the {basis_of_order(record, quantity)} order."
         places = np.clip(np.nan_to_num(away, nan=-ORDER_FRAME), -ORDER_FRAME, ORDER_FRAME)
         yield self._view("order", name, label, axes, f"{band} {beyond}".rstrip(), order, places)
 
@@ -233,7 +232,9 @@ class _Projection:
         """Finish the axes of a view, and mark the worst member."""
         record, rings = self.record, []
         for i, (ax, key) in enumerate(zip(axes, self.keys, strict=False)):
-            _frame(ax, key)
+            key_axis(ax, key, 0.02)
+            ax.set_xlabel(key.label, fontsize=8.5, labelpad=2)
+            ax.tick_params(labelsize=7.5)
             if i == 0:
                 _legend(ax, self.masks)
             if i % 3 == 0:
@@ -261,16 +262,6 @@ class _Projection:
             places, unit, schemes=(self.scheme,), of=several.removeprefix(", "),
             panels=tuple((i, None) for i in range(len(axes))), worst=self.worst if any(rings) else None,
         )  # fmt: skip
-
-
-def _frame(ax: Axes, key: Key) -> None:
-    if key.is_log:
-        room = (key.distinct[-1] / key.distinct[0]) ** 0.02
-        style.log_axis(ax, "x", float(key.distinct[0] / room), float(key.distinct[-1] * room))
-    if key.words:
-        ax.set_xticks(key.distinct, key.words)
-    ax.set_xlabel(key.label, fontsize=8.5, labelpad=2)
-    ax.tick_params(labelsize=7.5)
 
 
 def _draw_members(

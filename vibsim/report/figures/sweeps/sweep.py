@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -12,15 +12,16 @@ from numpy.typing import NDArray
 from vibsim.core.array_types import Floats
 from vibsim.core.record import Record
 from vibsim.core.vocabulary import SEVERITY, TYPICAL_NORM
-from vibsim.report import finest_level, frame, style, sweep_layout
+from vibsim.report import finest_level, frame, style, sweep_layout, words
 from vibsim.report.choice import position, promises
-from vibsim.report.data import due, exact_periods, flags, norm_unit, whole
+from vibsim.report.data import basis_of_order, exact_periods, flags, norm_unit, whole
 from vibsim.report.figures.panels import explosive, stacked
 from vibsim.report.figures.sweeps import separatrix
 from vibsim.report.figures.sweeps.view import (
     View,
     Worst,
     check_words,
+    key_axis,
     of_check,
     ring,
     shared,
@@ -30,7 +31,6 @@ from vibsim.report.figures.sweeps.view import (
 from vibsim.report.finest_level import Measured
 from vibsim.report.style import Picture
 from vibsim.report.sweep_layout import Along
-from vibsim.report.text import words
 from vibsim.report.types import Axes, Experiment, ValueCheck
 
 TALL, ENTRY = 3.0, 0.18  # least height of a panel, height of an entry of a legend [inch]
@@ -67,160 +67,115 @@ class _Drawing:
     along: Along
     worst: Worst
 
-    @property
-    def _tall(self) -> float:
-        """The height of a panel with room for its legend [inch]."""
-        return max(TALL, ENTRY * len(self.record["scheme"]) * len(self.along.lines))
-
     def _view(
-        self, ax: Axes, stem: str, name: str, caption: str, quantity: str, values: Floats | None, *,
-        places: Floats | None = None, unit: str = "",
+        self, stem: str, name: str, quantity: str, values: Floats, caption: str, draw: Callable[[Axes], str],
+        unit: str = "", form: str = "step",
+    ) -> Iterator[View | str]:  # fmt: skip
+        """Yield a view of values, or the value that all members share; nothing where there is none.
+
+        `draw` draws them, and returns a sentence where they leave the frame.
+        """
+        # an order is read with three decimals
+        if text := shared(name, np.round(values, 3) if form == "order" else values, unit, form):
+            yield text
+        elif np.isfinite(values).any():
+            tall = max(TALL, ENTRY * len(self.record["scheme"]) * len(self.along.lines))
+            (ax,) = stacked([tall])
+            told = style.sentences(caption, draw(ax))
+            yield self._finished(ax, stem, name, told, quantity, values, values, unit)
+
+    def _finished(
+        self, ax: Axes, stem: str, name: str, caption: str, quantity: str, values: Floats | None, places: Floats,
+        unit: str = "",
     ) -> View:  # fmt: skip
         """Finish the axes of a view, and mark the worst member."""
         key, worst = self.along.key, self.worst(quantity)
         marked = _finish(ax, self.experiment, self.along)
-        drawn = values if places is None else places
-        assert drawn is not None
-        place = float(key.values[worst.case]), float(drawn[worst.scheme, worst.case])
         ax.set_gid(style.MEMBER)
-        is_ringed = ring(ax, *place)
-        alt = f"{name[:1].upper()}{name[1:]} of every member against {key.name}"
-        text = style.sentences(caption, marked)
-        figure = ax.get_figure(root=True)
+        is_ringed = ring(ax, float(key.values[worst.case]), float(places[worst.scheme, worst.case]))
+        title = f"{name[:1].upper()}{name[1:]}"
+        alt = f"{title} of every member against {key.name}"
         keys = [one.key for one in sweep_layout.keys(self.record)]
         return View(
-            name, Picture(stem, f"{name[:1].upper()}{name[1:]}", text, alt, figure), quantity, values, places,
-            unit, schemes=tuple(range(len(drawn))), panels=((keys.index(key.key), None),),
-            worst=worst.case if is_ringed else None,
+            name, Picture(stem, title, style.sentences(caption, marked), alt, ax.get_figure(root=True)), quantity,
+            values, places if values is None else None, unit, schemes=tuple(range(len(places))),
+            panels=((keys.index(key.key), None),), worst=worst.case if is_ringed else None,
         )  # fmt: skip
 
     def period(self) -> Iterator[View | str]:
         """Yield the period with its error bar, and its relative error on several levels."""
-        record, quantity = self.record, position(self.experiment)
-        found, exact = finest_level.measured(record, "period", quantity), exact_periods(record)
+        record, along, of = self.record, self.along, position(self.experiment)
+        found, exact = finest_level.measured(record, "period", of), exact_periods(record)
         if not np.isfinite(found.value).any():
             return
-        if text := shared("period", found.value, found.unit):
-            yield text
-        else:
-            is_known, several = bool(np.isfinite(exact).any()), bool(whole(record, "pair"))
-            (ax,) = stacked([self._tall])
-            _draw_numbers(ax, record, self.along, found, exact if is_known else None)
-            yield self._view(
-                ax, "period", "period",
-                f"On the finest level{', with its error bar from the two finest levels' * several}"
-                f"{'; and the exact one' * is_known}.",
-                quantity, found.value, unit=found.unit,
-            )  # fmt: skip
-        error = finest_level.period_error(record, -1)
-        if text := shared("error of the period", error, form="norm"):
-            yield text
-        elif np.isfinite(error).any():
-            (ax,) = stacked([self._tall])
-            _draw_period_errors(ax, record, self.along, found)
-            yield self._view(
-                ax, "period_error", "error of the period",
-                "From level to level it should fall by the same factor, so lines of successive levels are evenly "
-                "spaced. Where they are not, the coarse levels are too coarse. Grey: what the two finest levels "
-                "predict without the exact period." if whole(record, "pair") else "",
-                quantity, error,
-            )  # fmt: skip
+        is_known, several = bool(np.isfinite(exact).any()), bool(whole(record, "pair"))
+        bars = ", with its error bar from the two finest levels" * several
+        yield from self._view(
+            "period", "period", of, found.value, f"On the finest level{bars}{'; and the exact one' * is_known}.",
+            lambda ax: _draw_numbers(ax, record, along, found, exact if is_known else None), found.unit,
+        )  # fmt: skip
+        spacing = (
+            "From level to level it should fall by the same factor, so lines of successive levels are evenly spaced. "
+            "Where they are not, the coarse levels are too coarse. Grey: what the two finest levels predict without "
+            "the exact period."
+        )
+        yield from self._view(
+            "period_error", "error of the period", of, finest_level.period_error(record, -1), spacing * several,
+            lambda ax: _draw_period_errors(ax, record, along, found), form="norm",
+        )  # fmt: skip
 
     def amplitude(self) -> Iterator[View | str]:
         """Yield the amplitude with its error bar, and the error bar alone."""
-        experiment, record, along = self.experiment, self.record, self.along
-        quantity = position(experiment)
-        found = finest_level.measured(record, "amplitude", quantity)
+        record, along, of = self.record, self.along, position(self.experiment)
+        found = finest_level.measured(record, "amplitude", of)
         if not np.isfinite(found.value).any():
             return
-        size = frame.sizes(record, quantity)
+        size = frame.sizes(record, of)
         bounded = frame.is_bounded(found.value, size)
         if not bounded.any():
             bounded = np.isfinite(found.value)
         # what is beyond the frame has no bar across it
         barred = bounded & frame.is_bounded(found.error, size)
-        value = np.where(bounded, found.value, np.nan)
-        error = np.where(barred, found.error, np.nan)
-        if text := shared("amplitude", found.value, found.unit):
-            yield text
-        else:
-            (ax,) = stacked([self._tall])
-            # amplitudes that hardly differ need long numbers
-            ax.yaxis.set_label_coords(-0.115, 0.5)
-            _draw_numbers(ax, record, along, replace(found, error=error), None)
-            usual = style.finite(value)
-            is_wide = usual.size > 0 and float(usual.max()) > LOG_RATIO * float(np.median(usual))
-            if explosive([value.ravel()]) or (is_wide and explosive([found.value.ravel()])):
-                # a motion that a scheme damps away would fill the frame with its decades
-                least = np.nanmin(np.append(size, np.nanmax(value))) / frame.UNBOUNDED
-                style.fit_log_axis(ax, "y", np.maximum(value, least), room=2.0)
-            else:
-                ax.set_ylim(*_room(replace(found, value=value, error=error), None))
-            leaves = _mark_members(ax, along, found.value)
-            yield self._view(
-                ax, "amplitude", "amplitude",
-                style.sentences(
-                    "Half the height between the last peak and the last trough, on the finest level.",
-                    "Members that go over the top have none." if experiment.model.definition.turn else "",
-                    frame.LEAVING if leaves else "",
-                ),
-                quantity, found.value, unit=found.unit,
-            )  # fmt: skip
-        if not whole(record, "pair") or not np.isfinite(found.error).any():
-            return
-        name = "error bar of the amplitude"
-        if text := shared(name, found.error, found.unit, "norm"):
-            yield text
-            return
-        (ax,) = stacked([self._tall])
-        _draw_error_bars(ax, record, along, found, error)
-        leaves = _mark_members(ax, along, found.error)
-        yield self._view(
-            ax, "amplitude_error", name,
-            style.sentences("Estimated from the two finest levels.", frame.LEAVING if leaves else ""),
-            quantity, found.error, unit=found.unit,
+        within = replace(
+            found,
+            value=np.where(bounded, found.value, np.nan),
+            error=np.where(barred, found.error, np.nan),
+        )
+        height = "Half the height between the last peak and the last trough, on the finest level."
+        turn = self.experiment.model.definition.turn
+        over = "Members that go over the top have none." if turn else ""
+        yield from self._view(
+            "amplitude", "amplitude", of, found.value, style.sentences(height, over),
+            lambda ax: _draw_amplitudes(ax, record, along, found, within, size), found.unit,
         )  # fmt: skip
+        if whole(record, "pair"):
+            yield from self._view(
+                "amplitude_error", "error bar of the amplitude", of, found.error,
+                "Estimated from the two finest levels.",
+                lambda ax: _draw_error_bars(ax, record, along, found, within.error), found.unit, "norm",
+            )  # fmt: skip
 
     def order(self, quantity: str) -> Iterator[View | str]:
         """Yield the stated order of every member with its interval."""
-        name, order = (
-            f"order of {words.symbol(quantity)}",
+        band = f"Grey: an order that is {basis_of_order(self.record, quantity)}, with the tolerance of its check."
+        yield from self._view(
+            f"sweep_order_{quantity}", f"order of {words.symbol(quantity)}", quantity,
             finest_level.orders(self.record, quantity)[0],
-        )
-        if text := shared(name, np.round(order, 3), form="order"):
-            yield text
-        elif np.isfinite(order).any():
-            (ax,) = stacked([self._tall])
-            _draw_orders(ax, self.experiment, self.record, self.along, quantity)
-            band = f"Grey: an order that is {due(self.record, quantity)}, with the tolerance of its check."
-            yield self._view(
-                ax, f"sweep_order_{quantity}", name, f"Stated by each member's levels, with its interval. {band}",
-                quantity, order,
-            )  # fmt: skip
+            f"Stated by each member's levels, with its interval. {band}",
+            lambda ax: _draw_orders(ax, self.experiment, self.record, self.along, quantity), form="order",
+        )  # fmt: skip
 
     def error(self, quantity: str) -> Iterator[View | str]:
         """Yield the error of every member at the finest level."""
-        name, error = (
-            f"error of {words.symbol(quantity)}",
-            finest_level.error(self.record, quantity),
-        )
-        unit = norm_unit(self.record, quantity)
-        if text := shared(name, error.best, unit, "norm"):
-            yield text
-        elif np.isfinite(error.best).any():
-            (ax,) = stacked([self._tall])
-            kind, leaves = _draw_errors(ax, self.record, self.along, quantity)
+        found = finest_level.error(self.record, quantity)
+        told = "At the finest level, estimated from two levels"
+        if found.kind == "true":
             told = "At the finest level: true (dots), and what two levels alone say of it (lines)"
-            told = told if kind == "true" else "At the finest level, estimated from two levels"
-            told = (
-                f"{told}, with the interval of the order."
-                if whole(self.record, "pair")
-                else "True."
-            )
-            yield self._view(
-                ax, f"sweep_error_{quantity}", name, style.sentences(told, frame.LEAVING if leaves else ""),
-                quantity, error.best, unit=unit,
-            )  # fmt: skip
+        told = f"{told}, with the interval of the order." if whole(self.record, "pair") else "True."
+        yield from self._view(
+            f"sweep_error_{quantity}", f"error of {words.symbol(quantity)}", quantity, found.best, told,
+            lambda ax: _draw_errors(ax, self.record, self.along, quantity), norm_unit(self.record, quantity), "norm",
+        )  # fmt: skip
 
     def verdict(self, quantity: str) -> Iterator[View | str]:
         """Yield the verdict on every member's order, one row per scheme."""
@@ -236,34 +191,23 @@ class _Drawing:
         _draw_verdicts(ax, self.along, status, self.record.words("scheme"))
         ranks = list(SEVERITY)
         rank = np.array([[ranks.index(word) for word in of_scheme] for of_scheme in status])
-        yield self._view(
-            ax, f"sweep_verdict_{quantity}", name, "", quantity, None,
-            places=np.arange(len(status))[:, None] + RISE * rank,
-        )  # fmt: skip
+        places = np.arange(len(status))[:, None] + RISE * rank
+        yield self._finished(ax, f"sweep_verdict_{quantity}", name, "", quantity, None, places)
 
     def number(self, name: str, check: ValueCheck) -> Iterator[View | str]:
         """Yield the number that a check asks for of every member."""
         values = of_check(self.record, name, check)
-        if text := shared(name, values):
-            yield text
-        elif np.isfinite(values).any():
-            (ax,) = stacked([self._tall])
-            found = finest_level.Measured(
-                check_words(check), "", values, np.full(values.shape, np.nan)
-            )
-            _draw_numbers(ax, self.record, self.along, found, None)
-            ax.set_title(name)
-            yield self._view(ax, f"sweep_check_{name}", name, "", position(self.experiment), values)
+        found = Measured(check_words(check), "", values, np.full(values.shape, np.nan))
+        yield from self._view(
+            f"sweep_check_{name}", name, position(self.experiment), values, "",
+            lambda ax: _draw_numbers(ax, self.record, self.along, found, None, name),
+        )  # fmt: skip
 
 
 def _finish(ax: Axes, experiment: Experiment, along: Along) -> str:
     """Give the axis of the key its scale, label and separatrix; return the sentence on the latter."""
     key = along.key
-    if key.is_log:
-        room = (key.distinct[-1] / key.distinct[0]) ** 0.03
-        style.log_axis(ax, "x", float(key.distinct[0] / room), float(key.distinct[-1] * room))
-    if key.words:
-        ax.set_xticks(key.distinct, key.words)
+    key_axis(ax, key, 0.03)
     ax.set_xlabel(key.label)
     is_alone = len(along.lines) == 1 and not along.follows
     found = separatrix.on_line(experiment, key).tolist() if is_alone else []
@@ -272,35 +216,62 @@ def _finish(ax: Axes, experiment: Experiment, along: Along) -> str:
     return "Dotted: the separatrix, where the exact period is infinite." if found else ""
 
 
+@dataclass(frozen=True)
+class _Curve:
+    """The members of a scheme on one line, in ascending order of the key."""
+
+    scheme: int
+    number: int  # of all curves
+    x: Floats
+    members: NDArray[np.intp]
+    text: str
+    """Words of the scheme, where there are several, and of the line; empty for a curve that is alone."""
+
+    def of(self, values: Floats) -> Floats:
+        """Return its part of values of the shape (scheme, case)."""
+        return np.asarray(values[self.scheme, self.members])
+
+
+def _curves(record: Record, along: Along, *, by_line: bool = False) -> list[_Curve]:
+    """Return the curves of every scheme and line; `by_line` those of a line together."""
+    names, count = record.words("scheme"), len(along.lines)
+    found = [
+        _Curve(
+            s, s * count + k, along.key.values[at], at, _text(name if len(names) > 1 else "", line)
+        )
+        for s, name in enumerate(names)
+        for k, (line, at) in enumerate(along.lines)
+    ]
+    return sorted(found, key=lambda curve: curve.number % count) if by_line else found
+
+
 def _draw_orders(
     ax: Axes, experiment: Experiment, record: Record, along: Along, quantity: str
-) -> None:
+) -> str:
+    """Draw the stated orders with their intervals."""
     promised = promises(experiment, record, quantity)
     for order, tolerance in promised:
         ax.axhspan(order - tolerance, order + tolerance, **style.ALLOWED)
-        text = f"{due(record, quantity)}, {order:g} ± {tolerance:g}"
+        text = f"{basis_of_order(record, quantity)}, {order:g} ± {tolerance:g}"
         ax.axhline(order, **style.REFERENCE, label=text)
     value, low, high = finest_level.orders(record, quantity)
-    several = len(record["scheme"]) > 1
-    for s, scheme in enumerate(record.words("scheme")):
-        for k, (name, members) in enumerate(along.lines):
-            look = style.look(s * len(along.lines) + k) | {"markersize": 4, "linewidth": 0.8}
-            x = along.key.values[members]
-            _interval(ax, x, low[s, members], high[s, members], look["color"])
-            label = _text(scheme if several else "", name) or style.entry(scheme)
-            _line(ax, x, value[s, members], label=label, **look)
+    for curve in _curves(record, along):
+        look = style.look(curve.number) | {"markersize": 4, "linewidth": 0.8}
+        _interval(ax, curve.x, curve.of(low), curve.of(high), look["color"])
+        label = curve.text or style.entry(record.words("scheme")[curve.scheme])
+        _line(ax, curve.x, curve.of(value), label=label, **look)
     if promised:
         least, most = promised[0][0], promised[-1][0]
         bottom, top = style.limits(value, np.array([least - 0.25, most + 0.25]))
         ax.set_ylim(max(bottom, least - 3), min(top, most + 2))
     ax.set_ylabel(f"order of {words.symbol(quantity)} ({TYPICAL_NORM})")
     _beside(ax, along, fontsize=7.5 if style.crowded(record) else 8.5)
+    return ""
 
 
-def _draw_errors(ax: Axes, record: Record, along: Along, quantity: str) -> tuple[str, bool]:
-    """Draw the error of the finest level; return which one is known, and whether any leaves the frame."""
-    found, schemes = finest_level.error(record, quantity), record.words("scheme")
-    size = frame.sizes(record, quantity)
+def _draw_errors(ax: Axes, record: Record, along: Along, quantity: str) -> str:
+    """Draw the error of the finest level; return the sentence on what leaves the frame."""
+    found, size = finest_level.error(record, quantity), frame.sizes(record, quantity)
     bounded = [
         np.where(frame.is_bounded(part, size), part, np.nan)
         for part in (found.true, found.estimate)
@@ -311,36 +282,27 @@ def _draw_errors(ax: Axes, record: Record, along: Along, quantity: str) -> tuple
         for part in (found.low, found.high)
     )
     true, estimate = style.no_zeros(found.true), style.no_zeros(found.estimate)
-    for s, scheme in enumerate(schemes):
-        for k, (name, members) in enumerate(along.lines):
-            look, named = (
-                style.look(s * len(along.lines) + k),
-                _text(scheme if len(schemes) > 1 else "", name),
-            )
-            x, here = along.key.values[members], (s, members)
-            _interval(ax, x, low[here], high[here], look["color"])
-            text = named or "estimated"
-            plain = {"color": look["color"], "linestyle": look["linestyle"]}
-            _line(ax, x, estimate[here], **plain, linewidth=1.0, label=text)
-            if np.isfinite(true[here]).any():
-                text = (
-                    f"_true, {named}"
-                    if named and np.isfinite(estimate[here]).any()
-                    else named or "true"
-                )
-                dots = look | {"linestyle": "none", "markersize": 4, "markerfacecolor": "white"}
-                _line(ax, x, true[here], label=text, **dots)
-    leaves = False
+    for curve in _curves(record, along):
+        x, look = curve.x, style.look(curve.number)
+        _interval(ax, x, curve.of(low), curve.of(high), look["color"])
+        plain = {"color": look["color"], "linestyle": look["linestyle"], "linewidth": 1.0}
+        _line(ax, x, curve.of(estimate), **plain, label=curve.text or "estimated")
+        if np.isfinite(curve.of(true)).any():
+            has_entry = curve.text and np.isfinite(curve.of(estimate)).any()
+            text = f"_true, {curve.text}" if has_entry else curve.text or "true"
+            dots = look | {"linestyle": "none", "markersize": 4, "markerfacecolor": "white"}
+            _line(ax, x, curve.of(true), label=text, **dots)
+    leaving = ""
     # where nothing is bounded all of it makes the range
     for values in (bounded, [found.true, found.estimate]):
         if style.fit_log_axis(ax, "y", np.concatenate(values, axis=None), below=0.005, least=DEEP):
-            leaves = _mark_members(ax, along, found.best)
+            leaving = _leaving(ax, along, found.best)
             break
     text = f"error of {words.symbol(quantity)} ({TYPICAL_NORM})"
     ax.set_ylabel(style.label(text, norm_unit(record, quantity)))
     if not style.crowded(record):
         _beside(ax, along)
-    return found.kind, leaves
+    return leaving
 
 
 def _draw_verdicts(ax: Axes, along: Along, status: NDArray[Any], schemes: list[str]) -> None:
@@ -371,29 +333,46 @@ def _draw_verdicts(ax: Axes, along: Along, status: NDArray[Any], schemes: list[s
 
 
 def _draw_numbers(
-    ax: Axes, record: Record, along: Along, found: Measured, exact: Floats | None
-) -> None:
+    ax: Axes, record: Record, along: Along, found: Measured, exact: Floats | None, title: str = ""
+) -> str:
     """Draw a number of the finest level with its error bars, and the exact number where it is known."""
-    schemes, level = record.words("scheme"), whole(record, "level")[-1]
-    for k, (name, members) in enumerate(along.lines):
-        x = along.key.values[members]
-        if exact is not None:
-            values = np.where(np.isfinite(exact), exact, np.nan)[members]
-            _line(ax, x, values, color="black", linewidth=1.0, label="" if k else "exact", zorder=1)
-        for s, scheme in enumerate(schemes):
-            value, error = found.value[s, members], found.error[s, members]
-            label = _text(scheme if len(schemes) > 1 else "", name) or f"level {level}"
-            number = s * len(along.lines) + k
-            look = _mark(s, number, len(schemes))
-            _interval(ax, x, value - error, value + error, look["color"])
-            # beside the exact line dots are seen better
-            has_dots = exact is not None and x.size <= MOST_MARKERS
-            dashes = "none" if has_dots else style.look(number)["linestyle"]
-            _line(ax, x, value, linestyle=dashes, linewidth=1.0, label=label, **look)
+    count, level = len(record["scheme"]), whole(record, "level")[-1]
+    for curve in _curves(record, along, by_line=True):
+        if exact is not None and curve.scheme == 0:
+            values = np.where(np.isfinite(exact), exact, np.nan)[curve.members]
+            text = "" if curve.number else "exact"
+            _line(ax, curve.x, values, color="black", linewidth=1.0, label=text, zorder=1)
+        value, error = curve.of(found.value), curve.of(found.error)
+        look = _mark(curve.scheme, curve.number, count)
+        _interval(ax, curve.x, value - error, value + error, look["color"])
+        # beside the exact line dots are seen better
+        has_dots = exact is not None and curve.x.size <= MOST_MARKERS
+        dashes = "none" if has_dots else style.look(curve.number)["linestyle"]
+        text = curve.text or f"level {level}"
+        _line(ax, curve.x, value, linestyle=dashes, linewidth=1.0, label=text, **look)
     ax.set_ylim(*_room(found, exact))
     ax.set_ylabel(style.label(found.name, found.unit))
-    ax.set_title(f"{found.name.capitalize()}, level {level}")
+    ax.set_title(title or f"{found.name.capitalize()}, level {level}")
     _beside(ax, along, fontsize=7.5 if style.crowded(record) else 8)
+    return ""
+
+
+def _draw_amplitudes(
+    ax: Axes, record: Record, along: Along, found: Measured, within: Measured, size: Floats
+) -> str:
+    """Draw amplitudes in a frame that holds those `within` it, of a motion of some size."""
+    # amplitudes that hardly differ need long numbers
+    ax.yaxis.set_label_coords(-0.115, 0.5)
+    _draw_numbers(ax, record, along, replace(found, error=within.error), None)
+    value, usual = within.value, style.finite(within.value)
+    is_wide = usual.size > 0 and float(usual.max()) > LOG_RATIO * float(np.median(usual))
+    if explosive([value.ravel()]) or (is_wide and explosive([found.value.ravel()])):
+        # a motion that a scheme damps away would fill the frame with its decades
+        least = np.nanmin(np.append(size, np.nanmax(value))) / frame.UNBOUNDED
+        style.fit_log_axis(ax, "y", np.maximum(value, least), room=2.0)
+    else:
+        ax.set_ylim(*_room(within, None))
+    return _leaving(ax, along, found.value)
 
 
 def _room(found: Measured, exact: Floats | None) -> tuple[float, float]:
@@ -405,50 +384,50 @@ def _room(found: Measured, exact: Floats | None) -> tuple[float, float]:
     return style.limits(*(shown if exact is None else [*shown, exact]))
 
 
-def _draw_period_errors(ax: Axes, record: Record, along: Along, found: Measured) -> None:
-    levels, schemes = whole(record, "level"), record.words("scheme")
+def _draw_period_errors(ax: Axes, record: Record, along: Along, found: Measured) -> str:
+    """Draw the relative error of the period on several levels, and what the two finest predict."""
+    levels, schemes = whole(record, "level"), len(record["scheme"])
     several = len(along.lines) > 1 or style.crowded(record)
-    count = 1 if several else 6 if len(schemes) == 1 else 3
+    count = 1 if several else 6 if schemes == 1 else 3
     spaced = np.linspace(len(levels) - 1, 0, min(len(levels), count)).round().astype(int)
     error = {i: finest_level.period_error(record, i) for i in np.unique(spaced)[::-1].tolist()}
     with np.errstate(invalid="ignore", divide="ignore"):
         predicted = style.no_zeros(found.error / found.value)
-    for k, (name, members) in enumerate(along.lines):
-        x = along.key.values[members]
-        for s, scheme in enumerate(schemes):
-            text = "" if s or k else f"estimated, level {levels[-1]}"
-            grey: dict[str, Any] = {"color": "#9a9a9a", "linewidth": 4.0, "alpha": 0.6, "zorder": 1}
-            _line(ax, x, predicted[s, members], label=text, **grey)
-            for m, (i, of_level) in enumerate(error.items()):
-                colour = k + s if several else m
-                label = _text(scheme if len(schemes) > 1 else "", name, f"level {levels[i]}")
-                look = _mark(s, colour, len(schemes)) | {"linewidth": 1.2}
-                look |= {"linestyle": style.look(colour)["linestyle"]}
-                _line(ax, x, style.no_zeros(of_level[s, members]), label=label, **look)
+    for curve in _curves(record, along, by_line=True):
+        text = "" if curve.number else f"estimated, level {levels[-1]}"
+        grey: dict[str, Any] = {"color": "#9a9a9a", "linewidth": 4.0, "alpha": 0.6, "zorder": 1}
+        _line(ax, curve.x, curve.of(predicted), label=text, **grey)
+        line, s = divmod(curve.number, len(along.lines))[::-1]
+        for m, (i, of_level) in enumerate(error.items()):
+            colour = line + s if several else m
+            text = ", ".join(filter(None, [curve.text, f"level {levels[i]}"]))
+            look = _mark(s, colour, schemes) | {"linewidth": 1.2}
+            look |= {"linestyle": style.look(colour)["linestyle"]}
+            _line(ax, curve.x, curve.of(style.no_zeros(of_level)), label=text, **look)
     style.fit_log_axis(ax, "y", *error.values(), room=2.0)
     ax.set(ylabel="|period / exact − 1|", title="Relative error of the period")
     if not style.crowded(record):
         _beside(ax, along, fontsize=8)
+    return ""
 
 
-def _draw_error_bars(ax: Axes, record: Record, along: Along, found: Measured, held: Floats) -> None:
+def _draw_error_bars(ax: Axes, record: Record, along: Along, found: Measured, held: Floats) -> str:
     """Draw the estimated error of a number of the finest level, in a frame that holds the errors `held`."""
-    for s, scheme in enumerate(record.words("scheme")):
-        for k, (name, members) in enumerate(along.lines):
-            look = style.look(s * len(along.lines) + k) | {"markersize": 4}
-            text = _text(scheme if len(record["scheme"]) > 1 else "", name) or style.entry(scheme)
-            error = style.no_zeros(found.error[s, members])
-            _line(ax, along.key.values[members], error, **look, label=text)
+    for curve in _curves(record, along):
+        look = style.look(curve.number) | {"markersize": 4}
+        text = curve.text or style.entry(record.words("scheme")[curve.scheme])
+        _line(ax, curve.x, style.no_zeros(curve.of(found.error)), **look, label=text)
     # of a motion that is damped away the error falls for ever
     shown = held if np.isfinite(held).any() else found.error
     style.fit_log_axis(ax, "y", shown, least=DEEP, room=2.0)
     ax.set_ylabel(style.label("estimated error", found.unit))
     if len(along.lines) > 1 and not style.crowded(record):
         _beside(ax, along, fontsize=8)
+    return _leaving(ax, along, found.error)
 
 
-def _mark_members(ax: Axes, along: Along, values: Floats) -> bool:
-    """Mark at the upper edge what grows out of the frame, of values of the shape (scheme, case); say whether any does.
+def _leaving(ax: Axes, along: Along, values: Floats) -> str:
+    """Mark at the upper edge what grows out of the frame, of values of the shape (scheme, case); return the sentence.
 
     Of few members each is marked, of many the first of every stretch.
     """
@@ -459,7 +438,7 @@ def _mark_members(ax: Axes, along: Along, values: Floats) -> bool:
             grown = np.where(y > high, y, np.where(np.isfinite(y), high, np.nan))
             each = x.size <= MOST_MARKERS
             leaves |= frame.mark_leaving(ax, x, grown, color=style.look(s)["color"], each=each)
-    return leaves
+    return frame.LEAVING if leaves else ""
 
 
 def _line(ax: Axes, x: Floats, y: Floats, **look: Any) -> None:

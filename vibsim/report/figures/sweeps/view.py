@@ -8,14 +8,14 @@ from typing import Any
 
 import numpy as np
 
-from vibsim.checks.fields import measured
+from vibsim.checks.fields import field_values
 from vibsim.core.array_types import Floats
 from vibsim.core.record import Record
 from vibsim.core.vocabulary import REASONS
-from vibsim.report import finest_level, style
+from vibsim.report import finest_level, style, words
 from vibsim.report.data import Member, flags
 from vibsim.report.style import Picture
-from vibsim.report.text import words
+from vibsim.report.sweep_layout import Key
 from vibsim.report.types import Axes, Experiment, ValueCheck
 
 SHOWN_ALREADY = ("period", "period_error", "exact_period", "amplitude")
@@ -62,7 +62,7 @@ def value_checks(experiment: Experiment) -> list[tuple[str, ValueCheck]]:
 def of_check(record: Record, name: str, check: ValueCheck) -> Floats:
     """Return the number that a check asks for, shape (scheme, case); NaN of schemes that it is not about."""
     schemes = np.array([check.at.scheme in (None, scheme) for scheme in record.words("scheme")])
-    return np.where(schemes[:, None], measured(record, name, "value"), np.nan)
+    return np.where(schemes[:, None], field_values(record, name, "value"), np.nan)
 
 
 def check_words(check: ValueCheck) -> str:
@@ -91,7 +91,19 @@ def shared(name: str, values: Floats, unit: str = "", form: str = "step") -> str
     return f"{name} {number} {unit}".rstrip() + who
 
 
-def ring(ax: Axes, x: float, y: float, *, on_map: bool = False, label: str | None = None) -> bool:
+def key_axis(ax: Axes, key: Key, part: float) -> None:
+    """Give the horizontal axis the scale and the words of a key, of a logarithmic one with room at both ends.
+
+    The room is the `part` of the decades that the key spans.
+    """
+    if key.is_log:
+        room = (key.distinct[-1] / key.distinct[0]) ** part
+        style.log_axis(ax, "x", float(key.distinct[0] / room), float(key.distinct[-1] * room))
+    if key.words:
+        ax.set_xticks(key.distinct, key.words)
+
+
+def ring(ax: Axes, x: float, y: float, *, on_map: bool = False) -> bool:
     """Draw a ring around the worst member, whole at an edge, too; say whether it has a place on the axes."""
     limits = ax.get_xlim(), ax.get_ylim()
     if not all(low <= at <= high for at, (low, high) in zip((x, y), limits, strict=True)):
@@ -104,6 +116,6 @@ def ring(ax: Axes, x: float, y: float, *, on_map: bool = False, label: str | Non
     }
     if on_map:
         ax.plot([x], [y], "o", color="white", markersize=11, markeredgewidth=3.0, **look)
-    ax.plot([x], [y], "o", color="black", markersize=9, markeredgewidth=1.8, label=label, **look)
+    ax.plot([x], [y], "o", color="black", markersize=9, markeredgewidth=1.8, **look)
     ax.set(xlim=limits[0], ylim=limits[1])
     return True

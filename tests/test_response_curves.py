@@ -1,0 +1,218 @@
+"""Both branches of a Duffing oscillator, and the numbers of a steady state, against SciPy and harmonic balance."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from vibsim import Experiment, analyse, simulate, verdicts
+from vibsim.core.home import home
+from vibsim.core.record import Record
+
+FILE = home() / "configs" / "showcase" / "duffing_branches.yaml"
+SAMPLES = 32
+"""Of a period of the force, as those of the coarsest level: what is not steady yet has other sums by other samples."""
+
+
+def continued(omegas: list[float], periods: int) -> tuple[list[complex], list[complex]]:
+    """Return ``A exp(-i phase)`` of each member by SciPy, one from the other, and that of the period before."""
+    state, last, before = [0.0, 0.0], [], []
+    for w in omegas:
+
+        def slope(t: float, y: np.ndarray, w: float = w) -> tuple[float, float]:
+            u, v = y.tolist()
+            return v, math.cos(w * t) - 0.1 * v - u - 0.04 * u**3
+
+        end, period = periods * 2 * np.pi / w, 2 * np.pi / w
+        times = np.append(end - 2 * period + period / SAMPLES * np.arange(2 * SAMPLES), end)
+        found = solve_ivp(
+            slope,
+            (0.0, end),
+            state,
+            "DOP853",
+            times,
+            rtol=1e-10,
+            atol=1e-11,
+        )
+        u = found.y[0]
+        factors = np.exp(-1j * w * times)
+        for rows, part in ((before, slice(0, SAMPLES + 1)), (last, slice(SAMPLES, None))):
+            rows.append(complex(w / np.pi * np.trapezoid(u[part] * factors[part], times[part])))
+        state = list(found.y[:, -1])
+    return last, before
+
+
+def balanced(w: float) -> list[float]:
+    """Return the amplitudes of one harmonic alone: ``((1 - w^2 + 3/4 0.04 A^2)^2 + (0.1 w)^2) A^2 = 1``."""
+    stiff, linear = 0.03, 1.0 - w * w
+    squares = np.roots([stiff**2, 2.0 * stiff * linear, linear**2 + (0.1 * w) ** 2, -1.0])
+    return sorted(float(np.sqrt(x.real)) for x in squares if abs(x.imag) < 1e-9)
+
+
+@pytest.fixture(scope="module")
+def branches() -> tuple[Experiment, Any]:
+    """The showcase experiment with a check that asks for each number of each member."""
+    given = Experiment.from_yaml(FILE)
+    levels = {level: simulate(given, level) for level in given.levels}
+    return given, analyse(given, levels), levels
+
+
+def test_every_verdict_passes(branches: Any) -> None:
+    experiment, convergence, _ = branches
+    assert [v.status for v in verdicts(experiment, convergence)] == ["PASS"] * 9
+
+
+def test_a_number_of_all_members_names_the_branch_and_one_that_is_not_steady_asks_for_periods() -> (
+    None
+):
+    """The largest amplitude is on the way up, where the response jumps down; a curve one way has no branches."""
+    data = {
+        "title": "Two branches",
+        "model": {"kind": "duffing", "delta": 0.1, "beta": 0.04, "gamma": 1.0, "omega": 1.0},
+        "time": {"periods": 8, "steps_per_period": 16, "frequency": "model.omega"},
+        "levels": [1, 2, 3],
+        "schemes": ["rk4"],
+        "checks": [
+            {"value": "steady_amplitude", "quantity": "u", "over": "model.omega",
+             "take": "where_largest", "above": 1},
+            {"value": "steady_change", "quantity": "u", "at": {"case": 2}, "below": 1e-9},
+            {"value": "section_period", "at": {"case": 2}, "equals": 1},
+        ],
+    }  # fmt: skip
+    told = []
+    for omegas in ([1.1, 1.3, 1.5, 1.3, 1.1], [1.1, 1.3, 1.5]):
+        sweep = {"model.omega": omegas, "follow": "model.omega"}
+        experiment = Experiment.from_dict({**data, "sweep": sweep})
+        levels = {level: simulate(experiment, level) for level in experiment.levels}
+        told.append(verdicts(experiment, analyse(experiment, levels)))
+    assert "is at model.omega = 1.3 on the way up; it is above 1" in told[0][0].text
+    assert "is at model.omega = 1.3; it is above 1" in told[1][0].text
+    advice = "Give more `periods:`, if the motion is not steady yet, or change"
+    for verdict, asked in zip(told[0][1:], ("below", "equals"), strict=True):
+        assert verdict.status == "FAIL"
+        assert verdict.advice == f"{advice} `{asked}:`."
+
+
+def test_each_branch_is_that_of_an_independent_continuation(branches: Any) -> None:
+    """Amplitude, phase and change of every member, up and down, by DOP853 at 1e-10."""
+    from vibsim.comparison import best_values, value_numbers
+    from vibsim.observe.member_block import block_of
+
+    experiment, _, levels = branches
+    omegas = list(experiment.sweep.axes[0].values[0])
+    last, before = (np.array(row) for row in continued(omegas, 40))
+    block = block_of(experiment, {level: Record.from_xarray(levels[level]) for level in (2, 3, 4)})
+
+    def number(name: str) -> tuple[Any, Any]:
+        place = value_numbers.Place(block, {}, "u", "best", None, None)
+        return tuple(row[0] for row in best_values.value(name, place))
+
+    amplitude, bound = number("steady_amplitude")
+    off = np.abs(amplitude - np.abs(last))
+    assert np.all(off <= 2e-7 * np.abs(last))
+    assert np.all(off <= bound)
+    phase, _ = number("steady_phase")
+    np.testing.assert_allclose(phase, -np.angle(last), atol=1e-5)
+    finest = value_numbers.Place(block, {}, "u", 4, None, None)
+    change = value_numbers.value("steady_change", finest)[0]
+    np.testing.assert_allclose(change, np.abs(last - before) / np.abs(last), rtol=1e-2, atol=1e-7)
+
+
+def test_each_branch_is_near_one_of_harmonic_balance(branches: Any) -> None:
+    """The jumps are there: up and down differ at 1.3 to 1.5 alone, where one harmonic has three answers."""
+    *_, levels = branches
+    experiment = branches[0]
+    omegas = np.array(experiment.sweep.axes[0].values[0])
+    largest = np.abs(levels[4]["u"].values[0, :, -129:]).max(axis=-1)
+    for w in omegas[:11]:
+        up, down = largest[np.flatnonzero(omegas == w)[[0, -1]]]
+        known = balanced(float(w))
+        for found in (up, down):
+            assert min(abs(found / a - 1.0) for a in known) < 0.03
+        several = len(known) == 3
+        assert (up / down > 2.0) == several
+        if several:
+            assert abs(up / known[2] - 1.0) < 0.03
+            assert abs(down / known[0] - 1.0) < 0.03
+
+
+def test_amplitude_and_phase_of_a_linear_oscillator_converge_to_the_closed_form() -> None:
+    """``A = 1/sqrt((k - w^2)^2 + (b w)^2)``, ``tan(phase) = b w/(k - w^2)``, with the order of the scheme."""
+    b, w, k = 0.4, 1.3, 1.0
+    data: dict[str, Any] = {
+        "title": "A linear response",
+        "model": {
+            "kind": "oscillator",
+            "damping": {"linear": b},
+            "spring": "k*u",
+            "force": "cos(omega*t)",
+            "parameters": {"k": k, "omega": w},
+        },
+        "time": {"periods": 30, "steps_per_period": 16, "frequency": "model.parameters.omega"},
+        "levels": [0, 1, 2, 3],
+        "schemes": ["central", "rk4"],
+    }
+    amplitude = 1.0 / np.hypot(k - w * w, b * w)
+    phase = float(np.arctan2(b * w, k - w * w))
+    checks = [
+        {"value": name, "quantity": "u", "equals": exact, "atol": 1e-7, "at": {"level": "best"}}
+        for name, exact in (("steady_amplitude", amplitude), ("steady_phase", phase))
+    ]
+    checks += [{"value": "steady_change", "quantity": "u", "below": 1e-6}]
+    experiment = Experiment.from_dict({**data, "checks": checks})
+    levels = {level: simulate(experiment, level) for level in experiment.levels}
+    found = verdicts(experiment, analyse(experiment, levels))
+    assert [v.status for v in found] == ["PASS"] * 3, [v.text for v in found]
+    errors = []
+    for level in experiment.levels:
+        checks = [
+            {
+                "value": "steady_amplitude",
+                "quantity": "u",
+                "equals": amplitude,
+                "at": {"level": level},
+            }
+        ]
+        one = Experiment.from_dict({**data, "checks": checks})
+        (verdict,) = verdicts(one, analyse(one, levels))
+        errors.append([abs(row.value - amplitude) for row in verdict.results])
+    rates = np.log2(np.array(errors[1:-1]) / np.array(errors[2:]))
+    np.testing.assert_allclose(rates[-1], [2.0, 4.0], atol=0.1)
+
+
+@pytest.mark.parametrize(
+    ("sections", "message"),
+    [
+        (
+            {"time": {"periods": 40, "steps_per_period": 16}},
+            "time names no frequency.*give time as periods",
+        ),
+        (
+            {"time": {"periods": 40, "steps_per_period": 4, "frequency": "model.omega"}},
+            "at least 8 stored samples in every period",
+        ),
+        ({"samples": {"every": 5}}, "at least 8 stored samples in every period.*there are 6.4"),
+    ],
+)
+def test_numbers_of_a_steady_state_need_periods_of_a_force(
+    sections: dict[str, Any], message: str
+) -> None:
+    from vibsim.core.errors import InputError
+
+    data = {
+        "title": "x",
+        "model": {"kind": "duffing", "delta": 0.1, "gamma": 1.0, "omega": 1.0},
+        "time": {"periods": 40, "steps_per_period": 16, "frequency": "model.omega"},
+        "levels": [1],
+        "schemes": ["rk4"],
+        "checks": [{"value": "steady_amplitude", "quantity": "u", "below": 1}],
+    }
+    Experiment.from_dict({**data, "samples": "common", "levels": [1, 2]})
+    if "steps_per_period" in str(sections):
+        data = {**data, "levels": [0]}
+    with pytest.raises(InputError, match=message):
+        Experiment.from_dict({**data, **sections})

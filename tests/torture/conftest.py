@@ -1,0 +1,1 @@
+from workflow.conftest import finished, place  # noqa: F401

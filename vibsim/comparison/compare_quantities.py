@@ -1,0 +1,43 @@
+"""Every quantity of a block of members, compared between its levels."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from vibsim.apriori.formal_orders import formal_orders
+from vibsim.apriori.roundoff_floor import solution_size
+from vibsim.comparison.phase_amplitude_error import error_parts_to_compare, parts_of_errors
+from vibsim.comparison.quantity_comparison import Compared, Comparison
+from vibsim.observe.member_block import MemberBlock, energy_at_start
+
+
+def comparisons(block: MemberBlock, names: tuple[str, ...]) -> Compared:
+    """Compare quantities between the levels of a part."""
+    positions = block.model.positions
+    apart = error_parts_to_compare(block, names)
+    names = tuple(name for name in names if name not in apart)
+    values = {name: block.series(name) for name in dict.fromkeys((*positions, *names))}
+    # of the energy what it was plus what became of it
+    became = solution_size(block.series("energy_deviation"))
+    sizes = {"energy": np.abs(energy_at_start(block.finest)) + became}
+    # what is rounded in one coordinate is felt by the others
+    whole = [block.size(name, values[name], sizes) for name in positions]
+    sizes |= {name: np.asarray(np.maximum.reduce(whole)) for name in positions}
+    found: dict[str, Comparison] = {}
+    for name in names:
+        scale = block.size(name, values[name], sizes)
+        floor = block.floor_of(name, scale)
+        attrs = block.finest.variables[name].attrs if name in block.finest else {}
+        found[name] = Comparison(
+            block=block,
+            name=name,
+            long_name=str(attrs.get("long_name", name)),
+            units=str(attrs.get("units", "1")),
+            values=values[name],
+            exact=block.exact_of(name),
+            order=formal_orders(block.experiment, name, block.columns, block.eventless),
+            floor=floor,
+            scale=scale,
+            blur=np.zeros_like(floor),
+        )
+    return found | parts_of_errors(block, found, apart)

@@ -1,0 +1,84 @@
+"""Members that start from the last state of the member before: what `follow` asks of a sweep and of an equation.
+
+Every member begins at t = 0. So the motion goes on where it ended only if the equation repeats after the end of each
+member: the end is a whole number of periods of the force, or the equation does not name t.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from vibsim.core.array_types import Floats
+from vibsim.core.errors import nearest
+from vibsim.experiment.faults import Report
+from vibsim.experiment.rules.members import MemberNumbers
+from vibsim.experiment.schema.sweep import Axis
+from vibsim.formula import Expression, names_in, values
+from vibsim.models import Model, tree
+from vibsim.models.shared.free import why_not_free
+
+MOMENTS = np.linspace(0.0, 1.0, 16, endpoint=False)
+"""Times at which an equation is compared with itself one end later, as parts of the end."""
+STATES = np.cos(np.arange(1.0, 17.0))
+"""Positions and velocities at these times: any will do."""
+SAME_FORCE = 1e-6
+"""How far the accelerations may differ there, over the largest of them."""
+KEY = ("sweep", "follow")
+
+
+def check_follow(follow: str, axes: Sequence[Axis], report: Report) -> None:
+    """Check that the key is one of the axis that varies fastest, and that this one gives no start."""
+    known = [key for axis in axes for key in axis.keys]
+    last = axes[-1].keys
+    if follow not in known:
+        report.add(KEY, "is no swept key", nearest(follow, known), follow)
+    elif follow not in last:
+        rule = "must vary fastest, so that members which follow each other are neighbours"
+        report.add(KEY, rule, f"write {follow} last in sweep", follow)
+    elif starts := [key for key in last if key.startswith("initial.")]:
+        rule = f"{starts[0]} is the start of the first member alone; the others start from the one before"
+        report.add(KEY, rule, "follow a parameter of the model", follow)
+
+
+def check_equation(model: Model, numbers: MemberNumbers, report: Report) -> None:
+    """Refuse an equation that no member can continue: one that does not repeat, or whose motion dies out or never."""
+    if model.loaded is not None or model.lookup is not None:
+        report.add(KEY, f"needs an equation of formulas, and {model.kind} has tables or matrices")
+        return
+    if model.start is not None:
+        report.add(
+            KEY,
+            "needs members that may start anywhere, and the exact solution says where these start",
+        )
+        return
+    if not why_not_free(model):
+        report.add(KEY, "needs a steady state to start from, which a free linear motion has not")
+        return
+    forces = [tree(model, formula) for formula in model.accelerations]
+    if not any("t" in names_in(force) for force in forces):
+        return
+    for own, end in numbers.some(numbers.count):
+        if not np.isfinite(end):
+            return
+        if not all(_repeats(model, force, own, end) for force in forces):
+            rule = f"the force does not repeat after the end of a member, {end:.10g} s"
+            hint = "give time as `periods`, `steps_per_period` and `frequency`, the parameter of the force"
+            report.add(KEY, rule, hint)
+            return
+
+
+def _repeats(model: Model, force: Expression, numbers: dict[str, float], end: float) -> bool:
+    states = {state.name: STATES for state in model.states}
+
+    def at(t: Floats) -> Floats:
+        with np.errstate(all="ignore"):
+            return np.asarray(
+                np.broadcast_to(values(force, {**numbers, **states, "t": t}), t.shape)
+            )
+
+    now, later = at(MOMENTS * end), at((1.0 + MOMENTS) * end)
+    known = np.isfinite(now) & np.isfinite(later)
+    size = np.max(np.abs(now[known]), initial=0.0)
+    return bool(np.all(np.abs(later - now)[known] <= SAME_FORCE * size))

@@ -1,0 +1,92 @@
+"""A driven motion at whole periods of its force: amplitude, phase, whether it is steady, and its Poincare section.
+
+**The harmonic of the force in the last period.**
+
+With n + 1 samples ``u_j`` of the period, at ``t_j = T - P + j P/n``, and half the weight at both ends,
+
+    c = (2/n) sum u_j exp(-i w t_j),    u = A cos(w t - phase) + other harmonics,    A = |c|, phase = -arg c,
+
+where the end T is a whole number of periods P = 2 pi/w, so that ``w t_j = 2 pi j/n`` but for whole turns. Of a periodic
+motion the sum is exact up to the harmonics n - 1, n + 1, ..., which are smaller than any power of the sampling step.
+Every level is sampled at the times that all levels have, so that the number means the same at each, steady or not: the
+levels differ by the error of the scheme alone.
+
+Source: A. H. Nayfeh, D. T. Mook, Nonlinear Oscillations (Wiley, 1979), section 4.1, for the response of driven
+oscillators; L. N. Trefethen, J. A. C. Weideman, The exponentially convergent trapezoidal rule, SIAM Review 56 (2014)
+385-458, for the sum.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vibsim.convergence.differences import safe_ratio
+from vibsim.core.array_types import Floats
+from vibsim.observe.common_grid import take
+from vibsim.observe.member_block import MemberBlock
+
+Harmonics = NDArray[np.complex128]
+SAME_STATE = 1e-3
+"""How near a state must come to itself to be the same, of the largest value that it has."""
+
+
+def samples_a_period(block: MemberBlock) -> int:
+    """Return how many intervals of the common grid a period of the force has; 0 where no force is named."""
+    time = block.experiment.time
+    if time.frequency is None or time.periods is None:
+        return 0
+    return (len(block.grid.t) - 1) // round(time.periods)
+
+
+def harmonic(block: MemberBlock, level: int, quantity: str, back: int = 0) -> Harmonics:
+    """Return ``A exp(-i phase)`` of the last period but `back`, shape (scheme, case); NaN where there is none."""
+    record, n = block.records[level], samples_a_period(block)
+    stop = len(block.grid.t) - back * n
+    if quantity not in record or n == 0 or stop <= n:
+        return np.full(block.shape, np.nan, dtype=np.complex128)
+    own = take(block.grid, record, quantity)[..., stop - n - 1 : stop]
+    angle = 2.0 * np.pi / n * np.arange(n + 1)
+    weight = np.where((angle == 0.0) | (angle == angle[-1]), 1.0 / n, 2.0 / n)
+    real, imaginary = (np.sum(own * weight * f(angle), axis=-1) for f in (np.cos, np.sin))
+    return np.asarray(real - 1j * imaginary)
+
+
+def section(block: MemberBlock, level: int, quantity: str) -> Floats:
+    """Return a quantity at the beginning of every period of the force (Poincare), shape (scheme, case, period)."""
+    n = samples_a_period(block)
+    if quantity not in block.records[level] or n == 0:
+        return np.full((*block.shape, 0), np.nan)
+    return take(block.grid, block.records[level], quantity)[..., ::n]
+
+
+def section_period(block: MemberBlock, level: int) -> Floats:
+    """Return after how many periods of the force the state is the same again, shape (scheme, case).
+
+    In the second half of the run, every state must return to `SAME_STATE` of the largest value that it has at these
+    times. 0 where it does so after none of the numbers that this half holds twice: it is chaotic, or not yet steady.
+    """
+    rows = np.stack([section(block, level, state.name) for state in block.model.states])
+    rows = rows[..., rows.shape[-1] // 2 :]
+    found = np.zeros(block.shape)
+    size = np.max(np.abs(rows), axis=-1, initial=0.0)
+    for k in range(rows.shape[-1] // 2, 0, -1):
+        apart = np.max(np.abs(rows[..., k:] - rows[..., :-k]), axis=-1)
+        found = np.where((apart <= SAME_STATE * size).all(axis=0), float(k), found)
+    return np.where(np.isfinite(rows).all(axis=(0, -1)) & (rows.shape[-1] >= 2), found, np.nan)
+
+
+def amplitude(block: MemberBlock, level: int, quantity: str) -> Floats:
+    """Return the amplitude of the harmonic, in the unit of the quantity."""
+    return np.asarray(np.abs(harmonic(block, level, quantity)))
+
+
+def phase(block: MemberBlock, level: int, quantity: str) -> Floats:
+    """Return the angle by which the harmonic lags behind ``cos(w t)`` [rad]."""
+    return np.asarray(-np.angle(harmonic(block, level, quantity)))
+
+
+def change(block: MemberBlock, level: int, quantity: str) -> Floats:
+    """Return how far the harmonic is from that of the period before, over its amplitude."""
+    now, before = (harmonic(block, level, quantity, back) for back in (0, 1))
+    return safe_ratio(np.abs(now - before), np.abs(now))

@@ -1,0 +1,133 @@
+"""The spectrum of the motion with the frequencies that theory knows, and its Poincare section.
+
+Source: `vibsim.observe.spectrum` for the lines; H. Poincare, Les methodes nouvelles de la mecanique celeste (1892), and
+P. Holmes, A nonlinear oscillator with a strange attractor, Phil. Trans. R. Soc. A 292 (1979) 419-448, for the section.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from vibsim.core.record import Record
+from vibsim.observe import spectrum as observed
+from vibsim.report import choice, data, style, words
+from vibsim.report.data import Member, of_level, whole
+from vibsim.report.figures import panels
+from vibsim.report.style import Picture
+from vibsim.report.types import Experiment
+
+DECADES = 1e-8  # what is lower than this part of the highest line is not drawn
+MOST_LEVELS = 3  # most levels of the spectrum, the finest ones
+MOST_PANELS = 6  # most sections
+PANELS_A_ROW = 3
+
+
+def spectrum(experiment: Experiment, record: Record, member: Member) -> Picture | None:
+    """Draw the amplitudes of the lines at the finest levels, with the exact frequency and those that theory predicts.
+
+    None where there are too few samples for a line.
+    """
+    name = choice.position(experiment)
+    t, levels = data.times(record, member.case), whole(record, "level")
+    if t.size < 2 * observed.FIRST_LINE + 4:
+        return None
+    w = 2.0 * math.pi / float(t[-1] - t[0]) * np.arange(t.size // 2 + t.size % 2)
+    (ax,) = panels.stacked([3.0])
+    highest, last = 0.0, 0.0
+    chosen = range(max(len(levels) - MOST_LEVELS, 0), len(levels))
+    for k, level in enumerate(chosen):
+        found = observed.lines(of_level(record, name, member, level))
+        w_of = w[: found.size]
+        look = style.look(k)
+        ax.plot(
+            w_of,
+            found[: w_of.size],
+            color=look["color"],
+            linewidth=1.0,
+            label=f"level {levels[level]}",
+        )
+        top = data.largest(found)
+        highest = max(highest, top)
+        last = max(
+            last, float(w_of[np.flatnonzero(found[: w_of.size] > 1e-3 * top)[-1:]].max(initial=0.0))
+        )
+        predicted = _predicted(experiment, record, member, level)
+        if math.isfinite(predicted):
+            text = style.entry(f"theory, level {levels[level]}")
+            ax.axvline(predicted, color=look["color"], linestyle=":", linewidth=1.2, label=text)
+    if not highest > 0.0:
+        return None
+    model = experiment.model.definition
+    exact = data.natural_frequency(record, member.case)
+    if model.linear and math.isfinite(exact):
+        ax.axvline(exact, label="natural", **style.REFERENCE)
+    style.log_axis(ax, "y", DECADES * highest, 3.0 * highest)
+    ax.set_xlim(
+        0.0, min(float(w[-1]), max(4.0 * last, 4.0 * exact if math.isfinite(exact) else 0.0))
+    )
+    time = data.time_unit(record)
+    radians = f"rad {data.pretty_unit(f'{time}-1')}" if time else ""
+    ax.set(xlabel=style.label("angular frequency", radians))
+    measure = data.unit(record, f"{name}_finest")
+    ax.set_ylabel(style.label(f"amplitude of {words.symbol(name)}", measure))
+    style.beside(ax)
+    return Picture(
+        f"spectrum_{member.case}",
+        f"Spectrum of {words.symbol(name)}{f', {member.scheme_name}' if member.scheme_name else ''}",
+        style.sentences(
+            "The amplitudes of the frequencies in the stored series less its mean, with Hann's window.",
+            "Dotted: the frequency that the scheme itself has by theory. Its distance from the natural one, dashed, is "
+            "the frequency error of the scheme."
+            if model.linear and model.conservative
+            else "",
+        ),
+        "Amplitude against angular frequency at the finest levels, with the frequencies known from theory",
+        ax.get_figure(root=True),
+    )
+
+
+def _predicted(experiment: Experiment, record: Record, member: Member, level: int) -> float:
+    """Return the angular frequency of a scheme's own steps by theory; NaN where there is none."""
+    from vibsim import theory
+
+    model, spec = experiment.model.definition, experiment.schemes[member.scheme]
+    if spec.method.adaptive or not (model.linear and model.conservative):
+        return math.nan
+    p = data.omega_dt(record)[member.case, level : level + 1]
+    with np.errstate(all="ignore"):
+        error = theory.phase_error_per_period(spec.method.stepper(spec.options), p)
+    return data.natural_frequency(record, member.case) / float(1.0 - error[0])
+
+
+def poincare(experiment: Experiment, record: Record, shown: list[Member]) -> Picture | None:
+    """Draw position and velocity after every period of the force in the second half of the run, of each member."""
+    model, periods = experiment.model.definition, experiment.time.periods
+    first = [member for member in shown if member.scheme == shown[0].scheme][:MOST_PANELS]
+    if periods is None or not first:
+        return None
+    columns = [(0.72 + 2.7 * i, 2.1) for i in range(PANELS_A_ROW)]
+    figure, axes = panels.rows_of(len(first), columns, 2.1, 0.45, 0.5)
+    finest = len(whole(record, "level")) - 1
+    units = [data.unit(record, f"{name}_finest") for name in (model.position, model.velocity)]
+    drawn = []
+    for ax, member in zip(axes, first, strict=True):
+        u, v = (of_level(record, name, member, finest) for name in (model.position, model.velocity))
+        n = (u.size - 1) // round(periods)
+        u, v = (values[::n][round(periods) // 2 :] for values in (u, v))
+        ax.plot(u, v, linestyle="none", marker=".", markersize=3.0, color=style.look(0)["color"])
+        ax.set_title(member.case_words or member.scheme_name)
+        ax.set_xlabel(style.label(words.symbol(model.position), units[0]))
+        drawn.append((u, v))
+    for ax in axes:
+        ax.set(xlim=style.limits(*(u for u, _ in drawn)), ylim=style.limits(*(v for _, v in drawn)))
+    axes[0].set_ylabel(style.label(words.symbol(model.velocity), units[1]))
+    return Picture(
+        "poincare",
+        "Poincaré section: the state after every period of the force",
+        f"The second half of the run, at level {whole(record, 'level')[-1]}. A motion with the period of the force is "
+        "one point, one that returns after k of its periods k points, and a chaotic one a set that never closes.",
+        "Velocity against position at the beginning of every period of the force",
+        figure,
+    )
