@@ -5,7 +5,7 @@ from shlex import quote
 
 from vibsim.cli.run.lock import hold
 from vibsim.cli.workflow import names_of
-from vibsim.cli.run.supervise import children_end_with_this
+from vibsim.cli.supervise import children_end_with_this
 
 # What allows programs of users to run is read from the command line alone, never from a file.
 names = names_of(config, workflow.config_settings.config)

@@ -6,6 +6,7 @@ import os
 import signal
 import subprocess
 import sys
+import tempfile
 import time
 from collections.abc import Callable, Iterator
 from contextlib import suppress
@@ -14,6 +15,10 @@ from pathlib import Path
 import pytest
 from torture.kills import TOLD
 from torture.laboratory import is_free, processes, words
+
+from vibsim.cli import supervise
+from vibsim.cli.jobs import simulate
+from workflow.conftest import here
 
 LONG = """\
 title: A run of minutes
@@ -152,3 +157,21 @@ def test_a_signal_that_is_ignored_stays_so(tmp_path: Path) -> None:
         process.terminate()
         assert process.wait(LIMIT) == 143
     assert nothing_is_left(tmp_path)
+
+
+def test_an_interrupt_that_a_library_passes_off_as_its_own_fault_is_an_interrupt(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    file = tmp_path / "long.yaml"
+    file.write_text(LONG)
+
+    def make(*_: object) -> None:
+        supervise._request = signal.SIGINT
+        raise RuntimeError("schema error: Interrupted: 2")
+
+    monkeypatch.setattr(supervise, "_request", 0)
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    monkeypatch.setattr(simulate, "_make", make)
+    with pytest.raises(supervise.Interrupted):
+        here("simulate", file, "--level", "6", "--results", tmp_path)
+    assert not list(tmp_path.glob("vibsim-error-*"))

@@ -33,7 +33,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     gc.set_threshold(YOUNG_OBJECTS)
     try:
         _check_limits()
-        from vibsim.cli.run.supervise import supervised
+        from vibsim.cli.supervise import supervised
 
         return supervised(lambda: _perform(sys.argv[1:]))
     except Exception as error:
@@ -69,7 +69,5 @@ def _perform(arguments: Sequence[str]) -> int:
 
 def _failed(error: Exception) -> int:
     from vibsim.cli.failure import report
-    from vibsim.cli.run.supervise import check_interrupted
 
-    check_interrupted()
     return report(error)

@@ -9,6 +9,7 @@ import tempfile
 import traceback
 from pathlib import Path
 
+from vibsim.cli.supervise import check_interrupted
 from vibsim.core import netcdf
 from vibsim.core.errors import InputError, VibsimError
 
@@ -22,17 +23,24 @@ _OF_MEMORY = (
 
 def report(error: Exception) -> int:
     """Say on stderr what went wrong and return the exit status."""
+    text = sentence(error)
     if isinstance(error, BrokenPipeError):
         # The reader of a pipe has gone (``vibsim list | head``); nobody is left to tell.
         sys.stderr.close()
         return FAILED
-    text = sentence(error)
     print(text if isinstance(error, InputError) else f"vibsim: {text}", file=sys.stderr, flush=True)
     return REFUSED if isinstance(error, InputError) else FAILED
 
 
 def sentence(error: Exception) -> str:
-    """Say what went wrong; for a fault of vibsim itself, where the full text is."""
+    """Say what went wrong; for a fault of vibsim itself, where the full text is.
+
+    Raises
+    ------
+    Interrupted
+        Where this process was told to end: libraries pass off as a fault of their own what is raised inside them.
+    """
+    check_interrupted()
     if isinstance(error, VibsimError):
         return str(error)
     if is_of_memory(error):

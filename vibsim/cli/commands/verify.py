@@ -15,12 +15,12 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
-from vibsim.cli import made_files, results_folder
+from vibsim.cli import made_files, results_folder, supervise
 from vibsim.cli.chosen_plans import plans_of
 from vibsim.cli.jobs.common import chosen_results
 from vibsim.cli.jobs.solve import check_allowed
 from vibsim.cli.made_files import BESIDE, Entry
-from vibsim.cli.run import lock, reasons, supervise
+from vibsim.cli.run import lock, reasons
 from vibsim.cli.terminal import clean
 from vibsim.core.errors import FileError, VibsimError
 from vibsim.core.home import home

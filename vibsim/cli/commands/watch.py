@@ -10,9 +10,9 @@ from argparse import Namespace
 from collections.abc import Sequence
 from pathlib import Path
 
+from vibsim.cli import supervise
 from vibsim.cli.chosen_plans import one_plan_of
 from vibsim.cli.jobs.common import refusal
-from vibsim.cli.run import supervise
 from vibsim.core.errors import VibsimError
 from vibsim.experiment.collection import ENDINGS
 

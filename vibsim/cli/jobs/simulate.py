@@ -46,10 +46,9 @@ def simulate(options: Namespace) -> int:
             made_files.withdraw(results, plan.key, [name])
             make(plan, level, job, path, options.threads)
             made_files.add(results, plan.key, [name], job.digest)
-        except VibsimError as error:
-            failed.append(str(error))
         except Exception as error:
-            failed.append(f"{_named(plan, level, job)}: {sentence(error)}")
+            where = "" if isinstance(error, VibsimError) else f"{_named(plan, level, job)}: "
+            failed.append(f"{where}{sentence(error)}")
     if failed:
         raise VibsimError("\n".join(failed))
     return 0

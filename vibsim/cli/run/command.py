@@ -12,12 +12,12 @@ from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
 
-from vibsim.cli import failure, outcome_text, results_folder, terminal
+from vibsim.cli import failure, outcome_text, results_folder, supervise, terminal
 from vibsim.cli.chosen_plans import plans_of, tell_notes
 from vibsim.cli.jobs.common import chosen_results, refusal
 from vibsim.cli.jobs.simulate import is_made
 from vibsim.cli.jobs.solve import check_allowed
-from vibsim.cli.run import changes, executor, junit, lock, outcome, reasons, snakemake, supervise
+from vibsim.cli.run import changes, executor, junit, lock, outcome, reasons, snakemake
 from vibsim.cli.run.executor import Executor
 from vibsim.cli.run.snakemake import Job, Progress
 from vibsim.core import private_cache

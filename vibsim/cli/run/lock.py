@@ -19,7 +19,7 @@ from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 
-from vibsim.cli.run import supervise
+from vibsim.cli import supervise
 from vibsim.core import regular_files
 from vibsim.core.errors import Fault, InputError, VibsimError
 from vibsim.experiment.collection import ADHOC

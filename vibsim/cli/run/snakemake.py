@@ -17,8 +17,8 @@ from pathlib import Path
 from threading import Thread
 from typing import Any, BinaryIO
 
-from vibsim.cli import resources, results_folder
-from vibsim.cli.run import lock, pending, supervise
+from vibsim.cli import resources, results_folder, supervise
+from vibsim.cli.run import lock, pending
 from vibsim.cli.run.executor import Executor
 from vibsim.core import private_cache
 from vibsim.core.errors import VibsimError

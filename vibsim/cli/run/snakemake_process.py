@@ -22,8 +22,7 @@ from snakemake_interface_logger_plugins.registry import LoggerPluginRegistry
 from snakemake_interface_logger_plugins.settings import LogHandlerSettingsBase
 from snakemake_interface_report_plugins.registry import ReportPluginRegistry
 
-from vibsim.cli import YOUNG_OBJECTS
-from vibsim.cli.run import supervise
+from vibsim.cli import YOUNG_OBJECTS, supervise
 from vibsim.core.processes import end_with
 
 FIELDS = {

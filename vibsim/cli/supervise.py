@@ -119,7 +119,7 @@ def ended_by(status: int) -> int:
 
 
 def check_interrupted() -> None:
-    """Raise the request to end once more: C code takes what is raised in its imports for a fault of the import."""
+    """Raise the request to end once more, if there was one: where it was first raised, it may have been swallowed."""
     if _request:
         raise Interrupted(_request)
 
