@@ -152,7 +152,7 @@ def test_a_scheme_is_given_the_benefit_of_its_promise() -> None:
     assert found(assess(given)) == (OPEN, "pre_asymptotic")
 
 
-FIRST_ORDER_PARTS = {
+LOWER_PARTS = {
     "numbers": None,
     "own shape": np.sqrt(T) * np.cos(9.0 * T),
     "same shape": SHAPE,
@@ -160,26 +160,28 @@ FIRST_ORDER_PARTS = {
 }
 
 
-@pytest.mark.parametrize("kind", FIRST_ORDER_PARTS)
+@pytest.mark.parametrize("kind", LOWER_PARTS)
 @pytest.mark.parametrize("levels", [4, 5, 6])
-@pytest.mark.parametrize("share", [0.01, 0.03, 0.08, 0.12, 0.2, 0.3, 0.5, 1.0])
-def test_a_first_order_part_of_more_than_a_tenth_is_no_second_order(
-    share: float, levels: int, kind: str
+@pytest.mark.parametrize(
+    ("lower", "order", "share"),
+    [
+        *((1.0, 2.0, share) for share in (0.01, 0.03, 0.08, 0.12, 0.2, 0.3, 0.5, 1.0)),
+        *((2.0, 4.0, share) for share in (0.08, 0.12, 1.0)),
+    ],
+)
+def test_a_part_of_lower_order_counts_from_a_tenth_on(
+    lower: float, order: float, share: float, levels: int, kind: str
 ) -> None:
-    """A scheme of order 2 with a first-order start has such a part; `share` is its size at the finest level."""
-    h = 0.1 * 0.5 ** np.arange(levels)
-    first = share * h[-1]
+    """A first-order start leaves such a part, say; `share` is its size at the finest level."""
+    h = 0.4 * 0.5 ** np.arange(levels)
+    size = share * h[-1] ** (order - lower)
     if kind == "numbers":
-        given = ladder(h, numbers(h, (1.0, 2.0), (first, 1.0)))
+        given = ladder(h, numbers(h, (1.0, order), (size, lower)))
     else:
-        shape = (
-            FIRST_ORDER_PARTS[kind]
-            * np.linalg.norm(SHAPE)
-            / np.linalg.norm(FIRST_ORDER_PARTS[kind])
-        )
-        given = ladder(h, series(h, (0.5, 2.0, SHAPE), (0.5 * first, 1.0, shape)))
+        shape = LOWER_PARTS[kind] * np.linalg.norm(SHAPE) / np.linalg.norm(LOWER_PARTS[kind])
+        given = ladder(h, series(h, (0.5, order, SHAPE), (0.5 * size, lower, shape)))
     expected = (PASSES, "asymptotic") if share < 0.1 else (OPEN, "pre_asymptotic")
-    assert found(assess(given, expected=2.0)) == expected
+    assert found(assess(given, expected=order)) == expected
 
 
 @pytest.mark.parametrize("known", [True, False], ids=["exact", "unknown"])
