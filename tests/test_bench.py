@@ -56,6 +56,7 @@ def test_traced_sine_is_the_engine_sine() -> None:
     assert [sine(value) for value in x] == [ELEMENTARY["sin"].full(value) for value in x.tolist()]
 
 
+@pytest.mark.slow
 def test_loops_in_c_and_by_hand_give_the_bits_of_the_engine(tmp_path: Path) -> None:
     theta, steps = np.linspace(0.1, 2.5, 64), 64
     expected = ours.step(theta, 20.0, steps, lane="plain").position[:, -1]

@@ -125,6 +125,7 @@ def test_a_copy_of_a_verdict_is_equal(
         assert copy(a) == a
 
 
+@pytest.mark.slow
 def test_verdicts_and_errors_come_from_another_process(found: list[vibsim.Verdict]) -> None:
     with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as pool:
         assert pool.submit(judged, 10.0).result() == found

@@ -8,6 +8,7 @@ from itertools import accumulate
 
 import mpmath
 import pytest
+from thinned import thinned
 
 from vibsim.elementary import ELEMENTARY
 from vibsim.engine.text import divided, with_quotients
@@ -209,17 +210,20 @@ def test_tanh_and_acos_keep_their_digits_at_the_edge():
 
 @pytest.mark.parametrize(
     "nest",
-    [
-        "(x/{})",
-        "({}*x)",
-        "atan2({}, x)",
-        "tan({})",
-        "({})**x",
-        "hypot({}, x)",
-        "erf({})",
-        "mod({}, 2 + x)",
-        "x if x > 2 else {}",
-    ],
+    thinned(
+        [
+            "(x/{})",
+            "({}*x)",
+            "atan2({}, x)",
+            "tan({})",
+            "({})**x",
+            "hypot({}, x)",
+            "erf({})",
+            "mod({}, 2 + x)",
+            "x if x > 2 else {}",
+        ],
+        4,
+    ),
 )
 def test_the_derivative_of_the_deepest_formula_is_still_python(nest):
     deep = list(accumulate(range(700), lambda formula, _: nest.format(formula), initial="x"))

@@ -27,6 +27,7 @@ def largest(content: dict[str, Any], quantity: str) -> list[Any]:
     return found
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("alpha", "schemes"),
     [

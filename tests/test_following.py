@@ -42,7 +42,11 @@ def alone(settings: dict[str, Any], case: int, u: float, v: float) -> Experiment
 
 
 @pytest.mark.parametrize(
-    ("steps_per_period", "every"), [(16, 1), (4096, 1024)], ids=["plain", "compiled"]
+    ("steps_per_period", "every"),
+    [
+        pytest.param(16, 1, id="plain"),
+        pytest.param(4096, 1024, id="compiled", marks=pytest.mark.slow),
+    ],
 )
 def test_each_member_goes_on_where_the_one_before_ended(steps_per_period: int, every: int) -> None:
     """To the bit, for every scheme from its own last state; a chain begins as the file says."""

@@ -186,6 +186,7 @@ def test_the_least_bound_can_be_reached() -> None:
     assert largest_bound(ladder.best(chosen)) <= 1.1 * least
 
 
+@pytest.mark.slow
 def test_a_start_that_spoils_the_powers_costs_too_much(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(choosing, "MOST_STEPS", 2**22)
     with pytest.raises(InputError, match="finer levels take too many steps"):

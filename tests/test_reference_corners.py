@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from thinned import thinned
 
 from vibsim import Experiment, analyse, simulate
 from vibsim.models import MODELS, Model
@@ -208,7 +209,7 @@ def by_scipy(case: Case, times: np.ndarray) -> np.ndarray:
     return np.array(found).T
 
 
-@pytest.mark.parametrize("name", CASES)
+@pytest.mark.parametrize("name", thinned(CASES, 3))
 def test_scipy_stopped_at_the_corners_finds_the_same_motion(name: str) -> None:
     case = CASES[name]
     numbers = case.parameters or MASS

@@ -61,6 +61,7 @@ def branches() -> tuple[Experiment, Any]:
     return given, analyse(given, levels), levels
 
 
+@pytest.mark.slow
 def test_every_verdict_passes(branches: Any) -> None:
     experiment, convergence, _ = branches
     assert [v.status for v in verdicts(experiment, convergence)] == ["PASS"] * 9
@@ -97,6 +98,7 @@ def test_a_number_of_all_members_names_the_branch_and_one_that_is_not_steady_ask
         assert verdict.advice == f"{advice} `{asked}:`."
 
 
+@pytest.mark.slow
 def test_each_branch_is_that_of_an_independent_continuation(branches: Any) -> None:
     """Amplitude, phase and change of every member, up and down, by DOP853 at 1e-10."""
     from vibsim.comparison import best_values, value_numbers

@@ -90,6 +90,7 @@ def sections(gamma: float, periods: int, start: tuple[float, float] = (1.0, 0.0)
     ).y
 
 
+@pytest.mark.slow
 def test_periods_are_those_of_an_independent_solution() -> None:
     experiment = Experiment.from_yaml(FILE)
     levels = {level: simulate(experiment, level) for level in experiment.levels}

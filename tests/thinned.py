@@ -16,7 +16,9 @@ def thinned(cases: Iterable[Any], every: int) -> list[Any]:
     """
     found, count = [], 0
     for case in cases:
-        one = case if hasattr(case, "marks") else pytest.param(*case)
+        one = case
+        if not hasattr(case, "marks"):
+            one = pytest.param(*(case if isinstance(case, tuple) else (case,)))
         if not one.marks:
             if count % every:
                 one = pytest.param(*one.values, id=one.id, marks=pytest.mark.slow)

@@ -330,6 +330,7 @@ def test_no_kind_of_check_is_left_out() -> None:
     assert set(KINDS) - {"best"} == set(MEASURED)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("model", "words", "advised"),
     [

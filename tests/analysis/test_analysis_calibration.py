@@ -142,10 +142,12 @@ def check(found: list[Finding], seed: int, numbers: range) -> None:
     assert np.mean([covered(one) for one in intervals]) >= COVERS - margin(len(intervals))
 
 
+@pytest.mark.slow
 def test_a_third_of_the_held_out_half_is_judged_rightly(held_out: list[Finding]) -> None:
     check(held_out, HELD_OUT, SAMPLE)
 
 
+@pytest.mark.slow
 def test_an_order_that_passes_fails_wherever_its_interval_excludes_what_is_asked_for(
     held_out: list[Finding],
 ) -> None:
@@ -162,12 +164,14 @@ def test_an_order_that_passes_fails_wherever_its_interval_excludes_what_is_asked
     assert told["INCONCLUSIVE"] <= OPEN_BESIDE * told["FAIL"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("family", FAMILIES)
 def test_intervals_are_calibrated_family_by_family(held_out: list[Finding], family: str) -> None:
     intervals = [one for one in stated(held_out) if one.ladder.family == family]
     assert np.mean([covered(one) for one in intervals]) >= COVERS - margin(len(intervals))
 
 
+@pytest.mark.slow
 def test_intervals_of_clean_ladders_of_four_levels_are_narrow(held_out: list[Finding]) -> None:
     clean = ("pure", "clean_two_term", "two_term", "even", "three_terms")
     widths = [
@@ -179,6 +183,7 @@ def test_intervals_of_clean_ladders_of_four_levels_are_narrow(held_out: list[Fin
     assert np.median(widths) <= WIDTH
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("known", [True, False])
 def test_both_with_and_without_an_exact_solution(held_out: list[Finding], known: bool) -> None:
     part = [one for one in held_out if one.group.known == known]
@@ -187,6 +192,7 @@ def test_both_with_and_without_an_exact_solution(held_out: list[Finding], known:
     assert surprises(part) == set()
 
 
+@pytest.mark.slow
 def test_two_levels_are_left_open(held_out: list[Finding]) -> None:
     assert {o.reason for o in held_out if len(o.group.levels) == 2} == {"too_few_levels"}
 

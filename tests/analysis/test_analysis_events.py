@@ -63,6 +63,7 @@ def test_located_events_pass_with_the_order_of_the_scheme() -> None:
     assert set(reasons("rk4")[2]) <= {"order_high", "pre_asymptotic"}
 
 
+@pytest.mark.slow
 def test_events_on_the_mesh_do_not_pass_by_chance() -> None:
     for order in ORDERS:
         found = reasons("mesh")[order]

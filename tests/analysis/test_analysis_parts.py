@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 from sweeps import CHECKS, SWEEPS, analysed, assert_same_bytes, cut, of, simulated
+from thinned import thinned
 
 from vibsim import Experiment, analyse
 from vibsim.analysis import analyse_records, blockwise, keep_for_verdicts, summarise, verdicts
@@ -69,7 +70,7 @@ def test_a_process_that_is_killed_ends_the_analysis(monkeypatch: pytest.MonkeyPa
         analysed(experiment, simulated(experiment), 5, 2)
 
 
-@pytest.mark.parametrize("name", SWEEPS)
+@pytest.mark.parametrize("name", thinned(SWEEPS, 3))
 def test_a_member_alone_has_the_numbers_and_verdicts_that_it_has_in_the_sweep(
     name: str, storage: str
 ) -> None:

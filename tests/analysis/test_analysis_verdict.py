@@ -281,6 +281,7 @@ def test_many_ladders_at_once_are_judged_as_one_by_one() -> None:
     np.testing.assert_array_equal(together.order.ravel(), [one.order[0] for one in alone])
 
 
+@pytest.mark.slow
 def test_random_ladders_have_no_false_pass() -> None:
     rng = np.random.default_rng(2026)
     false_pass, hidden, false_fail, right, passed, widths = [], [], [], 0, 0, []

@@ -79,6 +79,7 @@ def test_levels_that_have_nothing_to_do_with_the_solution_predict_nothing() -> N
     assert "is not known yet" in found.advice
 
 
+@pytest.mark.slow
 def test_noise_that_grows_predicts_by_the_order_of_the_scheme() -> None:
     """Gauss' method is exact on the solution 2 + t, near which rounding grows: an order of -1.7 reaches no level 40."""
     model = {

@@ -249,6 +249,7 @@ def test_bounds_hold_whatever_the_number_of_levels(held_out: list[Tried], count:
     assert coverage(part) >= COVERS - 2 * np.sqrt(COVERS * (1 - COVERS) / len(part))
 
 
+@pytest.mark.slow
 def test_bounds_hold_where_levels_were_left_out() -> None:
     """The same ladders, with one or two levels less, so that their gaps differ."""
     rng = np.random.default_rng(79)

@@ -201,6 +201,7 @@ def test_a_one_sided_end_velocity_shows_at_the_last_point_only() -> None:
     assert np.abs(order[:-1] - 2.0).max() < 0.05
 
 
+@pytest.mark.slow
 def test_a_stop_left_to_the_mesh_lowers_the_order_behind_it() -> None:
     data = {
         "title": "test",

@@ -13,7 +13,7 @@ from random_ladders import contradictions, drawn_experiment
 
 SECONDS = 75.0
 """CPU time of the slow test; the last experiment may take ten more."""
-EXPERIMENTS = 4
+EXPERIMENTS = 2
 """Of the short one: 16 ladders each, or 8 where one scheme alone can treat the model."""
 DECIDED = 0.3
 """Least part of verdicts that pass: ladders of which nothing is known test nothing."""

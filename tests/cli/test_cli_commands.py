@@ -115,6 +115,7 @@ def test_a_member_alone_is_planned_and_checked(file: Path, capsys: Capture) -> N
     assert "from 0 to 299" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("threads", ["1", "2"])
 def test_several_levels_are_made_in_one_go_at_the_places_of_the_plan(
     file: Path, tmp_path: Path, capsys: Capture, threads: str

@@ -163,6 +163,7 @@ def as_somebody(*arguments: object) -> subprocess.CompletedProcess[str]:
     return ended
 
 
+@pytest.mark.slow
 @needs_root
 def test_results_of_another_user(file: Path, tmp_path: Path) -> None:
     results = tmp_path / "results"
@@ -205,6 +206,7 @@ STRANGE = [
 ]
 
 
+@pytest.mark.slow
 def test_labels_of_any_kind_have_reports(tmp_path: Path) -> None:
     import yaml
 

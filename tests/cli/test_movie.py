@@ -35,6 +35,7 @@ def counted(path: Path) -> int:
         return sum(1 for _ in container.decode(video=0))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("form", ["mp4", "webm", "gif"])
 def test_a_movie_has_its_frames_and_the_same_bytes_every_time(
     made: Made, tmp_path: Path, form: str

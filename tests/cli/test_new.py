@@ -8,6 +8,7 @@ from pathlib import Path
 import jsonschema
 import pytest
 import yaml
+from thinned import thinned
 
 from vibsim import Experiment, analyse, simulate, verdicts
 from vibsim.cli import main
@@ -19,7 +20,7 @@ Capture = pytest.CaptureFixture[str]
 LINE = "# yaml-language-server: $schema="
 
 
-@pytest.mark.parametrize("kind", MODELS)
+@pytest.mark.parametrize("kind", thinned(MODELS, 2))
 def test_a_new_file_of_every_model_passes_as_it_is(kind: str, tmp_path: Path) -> None:
     file = tmp_path / "mine.yaml"
     assert main(["new", str(file), "--model", kind]) == 0

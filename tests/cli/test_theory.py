@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from thinned import thinned
 
 from vibsim import theory
 from vibsim.cli import main
@@ -40,7 +41,7 @@ def series(row: str) -> str:
     return row.partition(" = ")[2].partition(" + O(")[0]
 
 
-@pytest.mark.parametrize("kind", FIXED_STEP)
+@pytest.mark.parametrize("kind", thinned(FIXED_STEP, 3))
 def test_what_is_printed_is_the_theory_of_the_scheme(kind: str, capsys: Capture) -> None:
     found = rows([kind, "--terms", "5"], capsys)
     stepper = SCHEMES[kind].stepper(SCHEMES[kind].defaults())
@@ -80,6 +81,7 @@ def test_the_solution_that_is_printed_is_the_discrete_one(
     np.testing.assert_allclose(growth**n * (begin * np.cos(n * th) + swing), wanted, atol=1e-7)
 
 
+@pytest.mark.slow
 def test_the_documents_have_the_series_of_every_scheme(capsys: Capture) -> None:
     """Schemes with the same series share a row."""
     kinds: dict[tuple[str, str], list[str]] = {}

@@ -119,6 +119,7 @@ def transport(term: str, n: int, courant: float) -> Array:
         return np.array(u.value)
 
 
+@pytest.mark.slow
 def test_upwind_differences_of_finite_volumes_have_order_1() -> None:
     counts = [60, 120, 240, 480]
     h = [1.0 / n for n in counts]
@@ -133,6 +134,7 @@ def test_upwind_differences_of_finite_volumes_have_order_1() -> None:
     assert known.error == pytest.approx(verdict.error, rel=0.1)
 
 
+@pytest.mark.slow
 def test_a_limiter_is_between_the_orders() -> None:
     """Second order but for the extrema, which it clips: order 1 is excluded, and 2 is not simply confirmed."""
     counts = [20, 40, 80]

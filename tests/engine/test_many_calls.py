@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 from vibsim import Experiment, simulate
 
 
+@pytest.mark.slow
 def test_a_function_that_another_text_brings_is_called_too() -> None:
     model = {
         "kind": "elastic_pendulum",

@@ -109,6 +109,7 @@ TOO_LARGE = {
 }
 
 
+@pytest.mark.slow
 def test_refused_with_little_work_and_300_megabytes(tmp_path: Path) -> None:
     for name, body in TOO_LARGE.items():
         time = "" if "time:" in body else "time: {end: 20}\n"

@@ -130,6 +130,7 @@ def test_a_fault_of_the_file_keeps_its_line_and_every_bad_setting_is_told(file: 
     assert len(error.value.faults) == 2
 
 
+@pytest.mark.slow
 def test_the_command_of_a_member_has_the_settings(file: Path) -> None:
     found = Experiment.from_yaml(file, settings=["title=On the moon", "model.g=1.62"])
     convergence = analyse(found, {level: simulate(found, level) for level in found.levels})

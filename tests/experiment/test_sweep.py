@@ -211,6 +211,7 @@ def test_what_is_too_large_is_counted_and_not_written_out(sweep: dict[str, Any])
     assert peak < 10_000_000
 
 
+@pytest.mark.slow
 def test_scattered_points_are_imported_only_where_they_are_drawn() -> None:
     program = (
         "import sys\n"

@@ -22,6 +22,7 @@ def solved(alpha, beta, u, v, times=T):
         return np.array([[float(x) for x in flow(time)] for time in times]).T
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("place", "speed"), thinned(product([1.44, -1.6, 0.5, -0.9], [1e-12, -1e-8, 3e-6]), 2)
 )

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 from scipy.special import mathieu_a, mathieu_cem
+from thinned import thinned
 
 import vibsim
 from vibsim import Experiment, simulate
@@ -85,7 +86,7 @@ CASES = [
 
 
 @pytest.mark.usefixtures("without_references")
-@pytest.mark.parametrize(("name", "case", "right"), CASES)
+@pytest.mark.parametrize(("name", "case", "right"), thinned(CASES, 3))
 def test_the_motion_is_that_of_the_equation_written_out_by_hand(name, case, right):
     experiment = read(name, ENDS.get(name))
     model = experiment.model.definition
@@ -203,6 +204,7 @@ def profile(x):
     return np.sin(np.pi * x) + 0.5 * np.sin(2.0 * np.pi * x)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("without_references")
 def test_the_string_has_the_solution_of_dalembert():
     """Exactly with dt = dx; of second order where space and time are refined at once."""

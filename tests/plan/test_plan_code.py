@@ -157,6 +157,7 @@ def test_a_changed_module_changes_what_can_run_it(
     assert {name for name in before if before[name] != after[name]} == {*touched, "everything"}
 
 
+@pytest.mark.slow
 def test_the_analysis_of_a_solver_runs_what_its_digest_covers(tmp_path: Path) -> None:
     file = tmp_path / "files.yaml"
     file.write_text(
@@ -210,6 +211,7 @@ def test_imports_are_followed_wherever_they_stand(package: Path) -> None:
     }
 
 
+@pytest.mark.slow
 def test_imports_that_are_kept_are_those_of_the_code_as_it_is(
     package: Path, before: dict[str, str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

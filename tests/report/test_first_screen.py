@@ -232,6 +232,7 @@ def test_a_term_is_explained_once_and_text_stays_text():
     assert "&lt;b&gt; and round-off" in made
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "options",
     [

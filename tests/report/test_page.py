@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import samples
+from thinned import thinned
 
 from vibsim import experiment as spec
 from vibsim import report
@@ -111,7 +112,7 @@ def trapped(tmp_path_factory):
     return make(tmp_path_factory.mktemp("trapped"), samples.several())
 
 
-@pytest.mark.parametrize("which", ["plain", "swept", "trapped"])
+@pytest.mark.parametrize("which", thinned(["plain", "swept", "trapped"], 3))
 def test_the_page_is_well_formed_and_loads_nothing(which, request):
     page = request.getfixturevalue(which) / "report.html"
     text, reader = page.read_text(encoding="utf-8"), read(page)
@@ -188,6 +189,7 @@ def test_figures_and_tables_are_files_too(plain):
     assert repr(float(exact)) in first[1]
 
 
+@pytest.mark.slow
 def test_writing_again_gives_the_same_bytes_and_clears_what_is_left(plain, tmp_path):
     formats, provenance = ("svg", "png", "pdf"), PROVENANCE
     (tmp_path / "figures").mkdir()
@@ -261,6 +263,7 @@ def test_a_sweep_shows_period_orders_and_the_worst_member(swept):
     assert rows[0].startswith("case,initial.theta [rad],scheme,status,reason,order of θ,")
 
 
+@pytest.mark.slow
 def test_a_large_sweep_stays_a_small_page(tmp_path):
     exp = samples.swept(3000, levels=[5, 6, 7])
     make(tmp_path, exp)

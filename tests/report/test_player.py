@@ -8,6 +8,7 @@ import re
 import numpy as np
 import pytest
 import samples
+from thinned import thinned
 
 from vibsim.report.figures import scenes
 from vibsim.report.page import player
@@ -73,7 +74,7 @@ def at(lane, look, k):
     return np.broadcast_to(part.at[k], lane.motion.t.shape)
 
 
-@pytest.mark.parametrize("name", MODELS)
+@pytest.mark.parametrize("name", thinned(MODELS, 2))
 def test_every_system_is_drawn_within_its_frame(name):
     exp, record = made(name)
     text, shown = element(exp, record), player.lanes(exp, record)

@@ -342,6 +342,7 @@ def test_without_an_exact_solution_maps_show_the_estimate_and_its_error_bar(monk
     assert np.all(error.estimate[stated] <= error.high[stated])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("sweep", "levels"),
     [

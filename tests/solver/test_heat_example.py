@@ -25,6 +25,7 @@ def test_the_page_shows_the_shipped_file() -> None:
     assert Draft202012Validator(schema()).is_valid(shipped)
 
 
+@pytest.mark.slow
 def test_the_example_converges(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     shutil.copytree(HEAT, tmp_path / "heat")
     file = tmp_path / "heat/heat.yaml"

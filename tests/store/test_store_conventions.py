@@ -72,6 +72,7 @@ def results(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     return found
 
 
+@pytest.mark.slow
 def test_cf_checker_finds_nothing_in_what_jobs_write(
     results: dict[str, Path], tmp_path: Path
 ) -> None:

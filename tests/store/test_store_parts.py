@@ -168,6 +168,7 @@ print(re.search(r"VmHWM:\\s*(\\d+) kB", Path("/proc/self/status").read_text())[1
 """
 
 
+@pytest.mark.slow
 def test_memory_is_that_of_a_part_and_not_of_the_file(tmp_path: Path) -> None:
     def peak(number: int) -> int:
         command = [sys.executable, "-c", MEMORY, str(tmp_path / "large.nc"), str(number)]

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from scheme_variants import VARIANTS
+from thinned import thinned
 
 from vibsim import theory
 from vibsim.models import MODELS
@@ -116,7 +117,7 @@ def test_the_mode_of_one_step_methods_is_that_of_their_stability_function(
     assert slopes == pytest.approx([damping / 2, 1.0], rel=1e-12, abs=1e-13)
 
 
-@pytest.mark.parametrize(("scheme", "options"), VARIANTS)
+@pytest.mark.parametrize(("scheme", "options"), thinned(VARIANTS, 3))
 def test_the_mode_is_that_of_the_roots_and_of_the_discrete_solution(
     scheme: Any, options: Any
 ) -> None:

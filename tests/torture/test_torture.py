@@ -12,7 +12,7 @@ from torture import edits, fuzz
 from torture.__main__ import CASES
 from torture.laboratory import VARIABLES, Laboratory
 
-QUICK = ("a finer level", "without the finest level", "a parameter", "another order of keys")
+QUICK = ("a finer level", "a parameter")
 
 
 HEADER = b"{'descr': '<f8', 'fortran_order': False, 'shape': ((3,), }"
@@ -72,7 +72,7 @@ def test_readers_take_or_refuse_what_is_changed_at_random(target: str) -> None:
     assert known
     for data in known:
         fuzz.TARGETS[target](data)
-    for _ in range(60):
+    for _ in range(20):
         fuzz.TARGETS[target](fuzz.mutated(choose.choice(known), choose))
 
 

@@ -88,6 +88,7 @@ def compiled() -> Iterator[tuple[Path, list[bytes]]]:
         yield cache, [solution(file, cache) for file in files]
 
 
+@pytest.mark.slow
 def test_exchanged_kernels_are_not_taken(folder: Path, compiled: tuple[Path, list[bytes]]) -> None:
     own, before = compiled
     cache = folder / "cache"
@@ -99,6 +100,7 @@ def test_exchanged_kernels_are_not_taken(folder: Path, compiled: tuple[Path, lis
     assert solution(spring(folder, FORMULAS[0]), cache) == before[0]
 
 
+@pytest.mark.slow
 def test_no_code_is_kept_in_or_taken_from_a_shared_folder(
     folder: Path, compiled: tuple[Path, list[bytes]]
 ) -> None:
@@ -153,6 +155,7 @@ def test_another_user_cannot_reach_what_is_kept(
         assert ended.returncode == 0, ended.stderr
 
 
+@pytest.mark.slow
 def test_kernels_of_another_user_are_not_taken(
     folder: Path, compiled: tuple[Path, list[bytes]]
 ) -> None:
@@ -366,6 +369,7 @@ def test_nothing_in_a_results_folder_is_loaded_as_code(place: Place, tmp_path: P
     assert (place.tiny / "figures").is_dir()
 
 
+@pytest.mark.slow
 def test_exchanged_results_are_not_taken(place: Place) -> None:
     """Two experiments that differ by their names alone have files of the same numbers, but not the same files."""
     twin = place.file.with_name("twin.yaml")

@@ -55,6 +55,7 @@ def test_a_dry_run_tells_of_every_changed_result_and_deletes_nothing(
     assert place.content() == before
 
 
+@pytest.mark.slow
 def test_every_changed_or_missing_result_comes_back_with_its_bytes(
     place: Place, finished: Place
 ) -> None:
@@ -171,6 +172,7 @@ def touch(path: Path) -> Path:
     return path
 
 
+@pytest.mark.slow
 def test_what_is_no_longer_asked_for_is_removed_and_nothing_else(place: Place) -> None:
     place.change("8, 9]", "8]")
     touch(place.tiny / "best.nc")

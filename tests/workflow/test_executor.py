@@ -68,6 +68,7 @@ def test_jobs_of_a_scheduler_give_the_same_bytes(place: Place, tmp_path: Path) -
     assert again == [2 * lost[0], 2 * lost[1], lost[2]]
 
 
+@pytest.mark.slow
 def test_an_interrupt_cancels_what_was_submitted(place: Place, tmp_path: Path) -> None:
     change(place.file, "[6, 7, 8, 9]", "[27, 28]")
     change(place.file, "schemes:", "samples: common\nschemes:")

@@ -88,6 +88,7 @@ def test_a_run_says_first_what_changed(place: Place, capsys: pytest.CaptureFixtu
     assert capsys.readouterr().err == ""
 
 
+@pytest.mark.slow
 def test_a_setting_is_told_recorded_and_taken_back(place: Place) -> None:
     given = ("--set", "model.g=1.5", "--set", "title=On 'the' moon {x}")
     whole = ["level_06", "level_07", "level_08", "level_09", "analyse", "report", "index"]

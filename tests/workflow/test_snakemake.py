@@ -59,12 +59,6 @@ def test_rules_are_in_style() -> None:
     subprocess.run([BIN / "snakefmt", "--check", *files], check=True, capture_output=True)
 
 
-def test_snakemakes_own_lint_finds_nothing_that_applies() -> None:
-    command = [sys.executable, "workflow/lint.py"]
-    ended = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
-    assert ended.returncode == 0, ended.stdout + ended.stderr
-
-
 def test_a_job_imports_what_it_uses_and_no_more(place: Place, tmp_path: Path) -> None:
     command = ["simulate", str(place.file), "--level", "6", "--out", str(tmp_path / "x.nc")]
     program = (
@@ -89,6 +83,7 @@ def test_refusals_run_nothing(tmp_path: Path) -> None:
     assert not place.results.exists()
 
 
+@pytest.mark.slow
 def test_jobs_are_usable_by_hand(place: Place, tmp_path: Path, finished: Place) -> None:
     common = ["--results", place.results]
     out = tmp_path / "out"

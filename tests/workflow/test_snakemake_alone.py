@@ -21,6 +21,7 @@ def snakemake(folder: Path, *options: object) -> str:
     return ended.stdout + ended.stderr
 
 
+@pytest.mark.slow
 def test_the_documented_module_makes_shipped_and_own_experiments(
     place: Place, tmp_path: Path
 ) -> None:
@@ -55,6 +56,7 @@ def test_one_experiment_is_named_as_text(named: tuple[object, ...], tmp_path: Pa
     assert found == {"report", "index", "default"}
 
 
+@pytest.mark.slow
 def test_a_report_has_results_with_captions_and_labels(
     named: tuple[object, ...], tmp_path: Path
 ) -> None:
@@ -66,6 +68,7 @@ def test_a_report_has_results_with_captions_and_labels(
         assert caption in page
 
 
+@pytest.mark.slow
 def test_the_documented_archive_holds_a_checkout_that_runs(tmp_path: Path) -> None:
     (options,) = re.findall(
         r"snakemake (.* --archive )", (ROOT / "docs/cluster.md").read_text(), re.MULTILINE

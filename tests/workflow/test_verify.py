@@ -139,6 +139,7 @@ def test_manifests_of_two_experiments_that_changed_places_are_damaged(
     assert place.content() == finished.content()
 
 
+@pytest.mark.slow
 def test_changes_of_runs_are_no_damage(place: Place) -> None:
     """Another title, fewer levels, a second experiment with the index made again, a job by hand, a copy."""
     other = place.file.with_name("other.yaml")
@@ -181,6 +182,7 @@ def test_a_job_that_is_killed_before_its_files_are_on_record_damages_nothing(
     assert problems(place) == {}
 
 
+@pytest.mark.slow
 def test_an_interrupted_run_is_no_damage_and_not_whole(place: Place) -> None:
     # a report begins with its figures, when its page is deleted already
     (place.tiny / "report.html").unlink()
@@ -200,6 +202,7 @@ def test_an_interrupted_run_is_no_damage_and_not_whole(place: Place) -> None:
     assert problems(place) == {}
 
 
+@pytest.mark.slow
 def test_what_is_made_again_has_the_same_bytes(place: Place) -> None:
     ended = vibsim("verify", place.file, "--results", place.results, "--cores", 2)
     assert ended.stdout.splitlines() == [
