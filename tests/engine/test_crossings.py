@@ -310,7 +310,7 @@ def test_a_projectile_ends_where_a_formula_of_both_coordinates_says(kind, stop, 
 
 @pytest.mark.parametrize(
     ("kind", "events"),
-    [*thinned(((kind, "located") for kind in FIXED_STEP), 4), ("ab3", "mesh")],
+    [*thinned(((kind, "located") for kind in FIXED_STEP), 4), ("rk4", "mesh"), ("ab3", "mesh")],
 )
 def test_members_and_lanes_of_a_system_have_the_same_bits(kind, events):
     scheme, count = FIXED_STEP[kind], 3

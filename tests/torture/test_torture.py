@@ -65,14 +65,15 @@ def test_a_byte_that_differs_is_told(lab: Laboratory) -> None:
         lab.compare(place.content(), other)
 
 
+@pytest.mark.parametrize("times", [20, pytest.param(60, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("target", fuzz.TARGETS)
-def test_readers_take_or_refuse_what_is_changed_at_random(target: str) -> None:
+def test_readers_take_or_refuse_what_is_changed_at_random(target: str, times: int) -> None:
     choose = random.Random(f"23 {target}")
     known = sorted(fuzz.seeds(target), key=len)[:8]
     assert known
     for data in known:
         fuzz.TARGETS[target](data)
-    for _ in range(20):
+    for _ in range(times):
         fuzz.TARGETS[target](fuzz.mutated(choose.choice(known), choose))
 
 

@@ -12,7 +12,7 @@ import hashlib
 import json
 import os
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
 from functools import cache
 from pathlib import Path
@@ -25,7 +25,7 @@ from vibsim.store.atomic import write_text
 INDEX = ""
 """Key of the files over all experiments."""
 OVER_ALL = ("index.html", "summary.csv")
-"""These files."""
+"""Files of the index."""
 BESIDE = ("figures", "tables")
 """Folders of a report, whose files only the report knows."""
 _NAME = re.compile(
@@ -77,11 +77,20 @@ def add(results: Path, key: str, names: Iterable[str], job: str = "") -> None:
     digest of the job.
     """
     entries = {}
-    for name in names:
+    for name in _whole(results / key, names):
         file = results / key / name
         digest = seal.stored_digest(file) if file.suffix == ".nc" else content(file)
         entries[name] = entry(file.lstat(), digest, job, machine())
     _append(results, key, entries)
+
+
+def _whole(folder: Path, names: Iterable[str]) -> Iterator[str]:
+    """Yield files, and behind a report those of its folders, which it has to itself."""
+    for name in names:
+        yield name
+        if name == "report.html":
+            beside = (path for part in BESIDE for path in sorted((folder / part).glob("[!.]*")))
+            yield from (path.relative_to(folder).as_posix() for path in beside if path.is_file())
 
 
 def withdraw(results: Path, key: str, names: Iterable[str]) -> None:

@@ -5,8 +5,15 @@ from __future__ import annotations
 from argparse import Namespace
 from typing import TYPE_CHECKING
 
-from vibsim.cli import made_files
-from vibsim.cli.jobs.common import check_digest, one_plan, open_levels, titled, with_settings
+from vibsim.cli.jobs.common import (
+    COMPARED,
+    check_digest,
+    on_record,
+    one_plan,
+    open_levels,
+    titled,
+    with_settings,
+)
 from vibsim.plan.digests import analysed
 
 if TYPE_CHECKING:
@@ -27,22 +34,19 @@ def analyse(options: Namespace) -> int:
     experiment = plan.experiment
     folder = options.out or results / plan.key
     thin: list[Record] = []
-    if options.out is None:
-        made_files.withdraw(results, plan.key, ["convergence.nc", "summary.json"])
-    with open_levels(plan, options, results) as levels:
-        parts = keep_for_verdicts(
-            experiment, analyse_parts(experiment, levels, processes=options.threads), thin
-        )
-        store.write_parts(
-            folder / "convergence.nc",
-            (titled(part, f"{plan.key}: comparison of levels") for part in parts),
-            cases=plan.cases,
-            digest=plan.analysis,
-            provenance=with_settings(plan, analysed(plan.content)),
-        )
-    record = join_parts(thin)
-    summary = summarise(experiment, verdicts(experiment, record), record)
-    store.write_json(folder / "summary.json", summary, digest=plan.analysis)
-    if options.out is None:
-        made_files.add(results, plan.key, ["convergence.nc", "summary.json"], plan.analysis)
+    with on_record(options, results, plan.key, COMPARED, plan.analysis):
+        with open_levels(plan, options, results) as levels:
+            parts = keep_for_verdicts(
+                experiment, analyse_parts(experiment, levels, processes=options.threads), thin
+            )
+            store.write_parts(
+                folder / "convergence.nc",
+                (titled(part, f"{plan.key}: comparison of levels") for part in parts),
+                cases=plan.cases,
+                digest=plan.analysis,
+                provenance=with_settings(plan, analysed(plan.content)),
+            )
+        record = join_parts(thin)
+        summary = summarise(experiment, verdicts(experiment, record), record)
+        store.write_json(folder / "summary.json", summary, digest=plan.analysis)
     return 0

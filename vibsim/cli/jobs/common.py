@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import sys
 from argparse import Namespace
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import replace
 from functools import partial
@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import vibsim
-from vibsim.cli import results_folder
+from vibsim.cli import made_files, results_folder
 from vibsim.cli.chosen_plans import one_plan_of
 from vibsim.core.errors import Fault, FileError, InputError, VibsimError
 from vibsim.core.home import default_results
@@ -24,6 +24,9 @@ from vibsim.plan import Plan
 
 if TYPE_CHECKING:
     from vibsim.core.record import Record
+
+COMPARED = ("convergence.nc", "summary.json")
+"""Files that a comparison of levels writes."""
 
 
 def chosen_results(options: Namespace) -> Path:
@@ -59,6 +62,22 @@ def check_digest(plan: Plan, wanted: str | None, found: str) -> None:
 def refusal(key: str, value: Any, rule: str, hint: str = "") -> InputError:
     """Return the error of a command line."""
     return InputError([Fault("command line", 0, key, str(value), rule, hint)])
+
+
+@contextmanager
+def on_record(
+    options: Namespace, results: Path, key: str, names: Sequence[str], job: str = ""
+) -> Iterator[None]:
+    """Take files off the manifest while a job makes them, and put them back when it has; not those of ``--out``.
+
+    A job that is killed leaves none then that seems changed.
+    """
+    if options.out is not None:
+        yield
+        return
+    made_files.withdraw(results, key, names)
+    yield
+    made_files.add(results, key, names, job)
 
 
 def read_all(

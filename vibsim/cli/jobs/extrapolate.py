@@ -4,8 +4,15 @@ from __future__ import annotations
 
 from argparse import Namespace
 
-from vibsim.cli import made_files
-from vibsim.cli.jobs.common import check_digest, one_plan, open_levels, provenance, refusal, titled
+from vibsim.cli.jobs.common import (
+    check_digest,
+    on_record,
+    one_plan,
+    open_levels,
+    provenance,
+    refusal,
+    titled,
+)
 from vibsim.plan.digests import extrapolated
 
 PART_BYTES = 64 * 10**6
@@ -21,10 +28,11 @@ def extrapolate(options: Namespace) -> int:
     from vibsim import store
     from vibsim.comparison.best_solution import best_record
 
-    if options.out is None:
-        made_files.withdraw(results, plan.key, ["best.nc"])
     size = max(1, PART_BYTES * plan.cases // plan.bytes)
-    with open_levels(plan, options, results) as levels:
+    with (
+        on_record(options, results, plan.key, ["best.nc"], plan.extrapolation),
+        open_levels(plan, options, results) as levels,
+    ):
         parts = (
             best_record(
                 plan.experiment,
@@ -42,6 +50,4 @@ def extrapolate(options: Namespace) -> int:
             digest=plan.extrapolation,
             provenance=provenance(plan, extrapolated(plan.content)),
         )
-    if options.out is None:
-        made_files.add(results, plan.key, ["best.nc"], plan.extrapolation)
     return 0

@@ -6,8 +6,7 @@ from argparse import Namespace
 from pathlib import Path
 
 from vibsim import store
-from vibsim.cli import made_files
-from vibsim.cli.jobs.common import check_levels, titled, with_settings
+from vibsim.cli.jobs.common import COMPARED, check_levels, on_record, titled, with_settings
 from vibsim.core.record import Record
 from vibsim.experiment.solver import restore
 from vibsim.plan import Plan
@@ -28,16 +27,13 @@ def judge_levels(plan: Plan, options: Namespace, results: Path) -> int:
     folder = options.out or results / plan.key
     record = titled(analysis.record(experiment, checks), f"{plan.key}: comparison of levels")
     uses = solved_and_judged(plan.content)
-    if options.out is None:
-        made_files.withdraw(results, plan.key, ["convergence.nc", "summary.json"])
-    store.write(
-        folder / "convergence.nc",
-        record,
-        digest=plan.analysis,
-        provenance=with_settings(plan, uses),
-    )
     summary = analysis.summarise(experiment, checks)
-    store.write_json(folder / "summary.json", summary, digest=plan.analysis)
-    if options.out is None:
-        made_files.add(results, plan.key, ["convergence.nc", "summary.json"], plan.analysis)
+    with on_record(options, results, plan.key, COMPARED, plan.analysis):
+        store.write(
+            folder / "convergence.nc",
+            record,
+            digest=plan.analysis,
+            provenance=with_settings(plan, uses),
+        )
+        store.write_json(folder / "summary.json", summary, digest=plan.analysis)
     return 0

@@ -12,6 +12,7 @@ from vibsim.cli import made_files
 from vibsim.cli.jobs.common import (
     check_digest,
     chosen_results,
+    on_record,
     one_plan,
     read_all,
     refusal,
@@ -47,28 +48,18 @@ def report(options: Namespace) -> int:
         summary |= named
         if options.out is None:
             # No number depends on title and source: after other ones the analysis need not run again.
-            made_files.withdraw(results, plan.key, ["summary.json"])
-            store.write_json(results / plan.summary, summary, digest=plan.analysis)
-            made_files.add(results, plan.key, ["summary.json"], plan.analysis)
-    if options.out is None:
-        made_files.withdraw(results, plan.key, ["report.html"])
-    write(
-        plan,
-        found[plan.convergence],
-        summary,
-        options.out or results / plan.key,
-        formats=formats,
-        provenance=with_settings(plan, plan.content) | {"digest": plan.analysis},
-    )
-    if options.out is None:
-        made_files.add(results, plan.key, _written(results / plan.key), plan.report)
+            with on_record(options, results, plan.key, ["summary.json"], plan.analysis):
+                store.write_json(results / plan.summary, summary, digest=plan.analysis)
+    with on_record(options, results, plan.key, ["report.html"], plan.report):
+        write(
+            plan,
+            found[plan.convergence],
+            summary,
+            options.out or results / plan.key,
+            formats=formats,
+            provenance=with_settings(plan, plan.content) | {"digest": plan.analysis},
+        )
     return 0
-
-
-def _written(folder: Path) -> list[str]:
-    """Name the files of a report, which has its folders to itself."""
-    beside = (path for part in made_files.BESIDE for path in sorted((folder / part).glob("[!.]*")))
-    return ["report.html", *(p.relative_to(folder).as_posix() for p in beside if p.is_file())]
 
 
 def _index(options: Namespace) -> int:
@@ -81,11 +72,8 @@ def _index(options: Namespace) -> int:
     from vibsim.report import write_index
 
     results = chosen_results(options)
-    if options.out is None:
-        made_files.withdraw(results, made_files.INDEX, made_files.OVER_ALL)
-    write_index(options.out or results)
-    if options.out is None:
-        made_files.add(results, made_files.INDEX, made_files.OVER_ALL)
+    with on_record(options, results, made_files.INDEX, made_files.OVER_ALL):
+        write_index(options.out or results)
     return 0
 
 

@@ -11,9 +11,8 @@ from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
 
-from vibsim.cli import made_files
 from vibsim.cli.failure import sentence
-from vibsim.cli.jobs.common import check_digest, one_plan, provenance, refusal, titled
+from vibsim.cli.jobs.common import check_digest, on_record, one_plan, provenance, refusal, titled
 from vibsim.core.errors import FileError, VibsimError
 from vibsim.plan import Plan, ShardJob
 from vibsim.plan.digests import batch_digest
@@ -43,9 +42,8 @@ def simulate(options: Namespace) -> int:
             continue
         name = Path(job.path).relative_to(plan.key).as_posix()
         try:
-            made_files.withdraw(results, plan.key, [name])
-            make(plan, level, job, path, options.threads)
-            made_files.add(results, plan.key, [name], job.digest)
+            with on_record(options, results, plan.key, [name], job.digest):
+                make(plan, level, job, path, options.threads)
         except Exception as error:
             where = "" if isinstance(error, VibsimError) else f"{_named(plan, level, job)}: "
             failed.append(f"{where}{sentence(error)}")

@@ -425,7 +425,7 @@ def orders(experiment: Experiment, record: Record, lead: Lead) -> Picture | None
     title = (
         "All members keep their order"
         if inside.all()
-        else f"{kept} of all {every} members have an order within the band"
+        else f"{kept} of {every} members have an order in the band"
     )
     more = (
         f" {words.number(missing, 'integer')} members have no order and are left out."
