@@ -12,8 +12,9 @@ from experiment_files import GOOD, build, content, faults_of, file_faults, only_
 
 from vibsim.analysis import analyse_records
 from vibsim.core.errors import InputError
-from vibsim.experiment import VALUES, Experiment, kinds
+from vibsim.experiment import Experiment, kinds
 from vibsim.experiment.rules import checks as check_rules
+from vibsim.experiment.value_names import VALUES
 from vibsim.models import MODELS, quantities
 from vibsim.schemes import SCHEMES
 from vibsim.simulation import simulate_record

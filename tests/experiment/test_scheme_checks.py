@@ -9,9 +9,10 @@ import pytest
 from experiment_files import build, faults_of, only_fault, smallest_section
 from test_experiment_faults import change_model
 
-from vibsim.experiment import VALUES, Experiment, canonical, restore
+from vibsim.experiment import Experiment, canonical, restore
 from vibsim.experiment.data import schemes_of
 from vibsim.experiment.rules import checks as check_rules
+from vibsim.experiment.value_names import VALUES
 from vibsim.models import MODELS, centred, quantities
 from vibsim.schemes import FIXED_STEP, SCHEMES
 

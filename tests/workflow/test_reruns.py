@@ -10,7 +10,7 @@ import pytest
 
 from vibsim.cli.chosen_plans import plans_of
 from vibsim.cli.run import command, reasons
-from vibsim.store.provenance import read_provenance
+from vibsim.store.reading import read_provenance
 
 from .conftest import TEXT, Place
 

@@ -15,7 +15,7 @@ from vibsim import store
 from vibsim.cli import made_files
 from vibsim.cli.chosen_plans import plans_of
 from vibsim.cli.commands import verify
-from vibsim.store.provenance import read_provenance
+from vibsim.store.reading import read_provenance
 
 from .conftest import Place, here
 

@@ -65,9 +65,8 @@ def is_of_memory(error: BaseException) -> bool:
     """Tell whether an exception, or one that led to it, says that memory is short."""
     if isinstance(error, MemoryError) or getattr(error, "errno", None) == errno.ENOMEM:
         return True
-    if isinstance(error, ImportError | OSError | RuntimeError) and any(
-        words in str(error).lower() for words in _OF_MEMORY
-    ):
+    says_so = any(words in str(error).lower() for words in _OF_MEMORY)
+    if says_so and isinstance(error, ImportError | OSError | RuntimeError):
         return True
     cause = error.__cause__ or error.__context__
     return cause is not None and is_of_memory(cause)

@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from vibsim import plan
 from vibsim.comparison.extrapolate_members import (
     Extrapolated,
     Method,
@@ -21,7 +20,7 @@ from vibsim.convergence.state_extrapolation import Pair
 from vibsim.core.array_types import Floats, Integers
 from vibsim.core.record import Attribute, Record, Variable, flags
 from vibsim.core.vocabulary import MEMBER, SERIES
-from vibsim.experiment import Experiment
+from vibsim.experiment import Experiment, sweep_columns
 from vibsim.observe.common_grid import Grid, check_belonging, common_grid, take
 from vibsim.simulation.members import Members, members
 from vibsim.simulation.scaled import in_scales
@@ -82,7 +81,7 @@ def methods(experiment: Experiment, scheme: int, group: Members) -> list[tuple[M
     model, method = experiment.model.definition, experiment.schemes[scheme].method
     return [
         (Method(model, method, options), where)
-        for options, where in plan.option_groups(experiment, scheme, group.columns)
+        for options, where in sweep_columns.option_groups(experiment, scheme, group.columns)
     ]
 
 

@@ -80,7 +80,7 @@ class Experiment(ExperimentSpec):
         path
             A YAML file.
         collection
-            Name of the collection; by default that of `vibsim.experiment.collection_of`.
+            Name of the collection; by default that of `vibsim.experiment.collection.collection_of`.
         configs
             The folder of collections; by default that of the checkout.
         settings

@@ -22,7 +22,7 @@ from vibsim.experiment.rules.figures import check_figures
 from vibsim.experiment.rules.model import Equation, are_known
 from vibsim.experiment.rules.model import equation as read_equation
 from vibsim.experiment.rules.scaling import Numbers, characteristic
-from vibsim.experiment.rules.starts import Starts, check_starts
+from vibsim.experiment.rules.starts import check_starts
 from vibsim.experiment.rules.structure import check_histories
 from vibsim.experiment.rules.sweep import read_sweep
 from vibsim.experiment.rules.timing import rising_levels
@@ -136,8 +136,7 @@ def build(
     InputError with every fault of the file.
     """
     report = Report(source, kinds)
-    for what, text in (("experiment", name), ("collection", collection)):
-        check_name(f"the name of the {what}, '{shorten(text)}',", text, report)
+    check_names(name, collection, report)
     source = with_repeats(source, report)
     document = read_document(source, report)
     swept = sorted(set(_keys(source.data.get("sweep"))))
@@ -228,7 +227,7 @@ def _check_members(
     model, parameters = equation.model, equation.parameters
     if time is None or model is None or not are_known(model, parameters):
         return
-    numbers = members.MemberNumbers(model, parameters, time, sweep.axes)
+    numbers = members.MemberNumbers(model, parameters, initial, time, sweep.axes)
     members.check_ends(numbers, report)
     for table in equation.tables:
         members.check_length(numbers, table, report)
@@ -238,18 +237,19 @@ def _check_members(
     members.check_jumps(numbers, equation.formulas, report)
     if sweep.follow is not None:
         continuation.check_equation(model, numbers, report)
-    starts = Starts(model, parameters, initial, sweep.axes)
-    check_starts(starts, equation.formulas, report)
+    check_starts(numbers, equation.formulas, report)
 
 
-def check_name(what: str, text: str, report: Report) -> None:
-    """Note what is wrong with the name of an experiment or a collection, which `what` says."""
-    if not re.fullmatch(IDENTIFIER, text):
-        report.add((), f"{what} must consist of a to z, 0 to 9 and _")
-    elif len(text) > MAX_NAME:
-        report.add((), f"{what} must not be longer than {MAX_NAME} characters")
-    elif _PERIODIC.search(text):
-        report.add((), f"{what} must not end with {MAX_REPEATS} times the same")
+def check_names(experiment: str, collection: str, report: Report) -> None:
+    """Note what is wrong with the names of an experiment and its collection."""
+    for what, name in (("experiment", experiment), ("collection", collection)):
+        who = f"the name of the {what}, '{shorten(name)}',"
+        if not re.fullmatch(IDENTIFIER, name):
+            report.add((), f"{who} must consist of a to z, 0 to 9 and _")
+        elif len(name) > MAX_NAME:
+            report.add((), f"{who} must not be longer than {MAX_NAME} characters")
+        elif _PERIODIC.search(name):
+            report.add((), f"{who} must not end with {MAX_REPEATS} times the same")
 
 
 def _keys(section: Any) -> Iterator[str]:

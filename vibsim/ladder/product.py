@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from vibsim import plan
 from vibsim.comparison.best_solution import in_order, methods, record_of, start_of
 from vibsim.comparison.extrapolate_members import Extrapolated, join_members
+from vibsim.experiment import storage
 from vibsim.ladder.choosing import resolve
 from vibsim.ladder.solving import climb
 from vibsim.simulation.level import coordinates
@@ -52,7 +52,7 @@ def best(
     elif not experiment.levels:
         experiment = resolve(experiment)
     steps = tuple(experiment.steps(level) for level in experiment.levels)
-    every = plan.sampling(experiment, experiment.levels[0])
+    every = storage.sampling(experiment, experiment.levels[0])
     points = steps[0] // every
     size = max(POINTS_AT_A_TIME // (points + 1), 1)
     schemes = experiment.ladder

@@ -124,7 +124,7 @@ def _key(choice: Choice) -> str:
     libraries = repr(versions(NUMERICAL + DRAWING))
     words = [choice.collection, choice.name, str(choice.case), code_digest.everything(), libraries]
     words.append(json.dumps(choice.settings))
-    return _sha256(b"\0".join([*(word.encode() for word in words), content]))
+    return hashlib.sha256(b"\0".join([*(word.encode() for word in words), content])).hexdigest()
 
 
 def _has_inputs(plan: Plan, choice: Choice) -> bool:
@@ -146,7 +146,3 @@ def _has_inputs(plan: Plan, choice: Choice) -> bool:
         except (OSError, ValueError):
             return False
     return True
-
-
-def _sha256(content: bytes) -> str:
-    return hashlib.sha256(content).hexdigest()

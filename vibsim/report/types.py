@@ -10,10 +10,11 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from matplotlib.transforms import Bbox
 
-    from vibsim.experiment import Check, Experiment
+    from vibsim.experiment import Experiment
     from vibsim.experiment.data import ArraySpec, SchemeSpec, StructureSpec, TableSpec
     from vibsim.experiment.schema.checks import (
         AccurateCheck,
+        Check,
         ConservesCheck,
         ConvergesCheck,
         EqualCheck,

@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from vibsim import plan
 from vibsim.core.array_types import Floats, Integers
 from vibsim.core.record import Attribute, Record, Variable, attributes
 from vibsim.core.vocabulary import HIGHEST, MEMBER, SERIES
 from vibsim.engine import EventTimes, Extrema, Gathered, Trajectories
+from vibsim.experiment import storage
 from vibsim.experiment.storage import (
     RUNNING,
     asks_for_peaks,
@@ -94,7 +94,7 @@ def simulate_record(
         raise ValueError(f"level {level} is none of {list(experiment.levels)}")
     model = experiment.model.definition
     group = members(experiment, start, experiment.members if stop is None else stop)
-    steps, every = experiment.steps(level), plan.sampling(experiment, level)
+    steps, every = experiment.steps(level), storage.sampling(experiment, level)
     is_lean, wanted = is_bounded(experiment), stored_series(experiment)
     kept = extrema_kept(steps, experiment.trajectories)
     of_states = {state.name for state in model.states}.union(ENERGIES)

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from vibsim import plan
 from vibsim.core.array_types import Floats, Integers
+from vibsim.experiment import sweep_columns
 
 if TYPE_CHECKING:
     from vibsim.experiment import Experiment
@@ -37,7 +37,7 @@ class Members:
 
 def members(experiment: Experiment, start: int, stop: int) -> Members:
     """Work out the numbers of members start..stop-1."""
-    columns = plan.columns(experiment, start, stop)
+    columns = sweep_columns.columns(experiment, start, stop)
     parameters, initial = numbers_of(experiment, columns, stop - start)
     if experiment.chain > 1:
         starts = np.arange(start, stop) % experiment.chain == 0

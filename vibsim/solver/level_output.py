@@ -80,11 +80,9 @@ def _on_grid(name: str, table: Mapping[str, Floats], dims: Sequence[str]) -> Gri
     """Return a column as values on the grid of its coordinates; without them a number, or a series over the rows."""
     column = table[name]
     if not dims:
-        return (
-            GridValues(column[0], (), {}, name)
-            if len(column) == 1
-            else GridValues(column, ("row",), {}, name)
-        )
+        if len(column) == 1:
+            return GridValues(column[0], (), {}, name)
+        return GridValues(column, ("row",), {}, name)
     points = [np.unique(table[dim], return_inverse=True) for dim in dims]
     shape = tuple(len(axis) for axis, _ in points)
     flat = np.ravel_multi_index(tuple(place for _, place in points), shape)
@@ -146,14 +144,10 @@ def record(
                 raise VibsimError(f"{name}: has other points along {dim} than another quantity")
             if points is not None and known is None:
                 coords[dim] = _variable((dim,), points, f"coordinate {dim}")
-    variables = {
-        name: Variable(
-            one.dims,
-            one.values,
-            attributes(name, one.units or "1", **{EPSILON: one.epsilon}),
-        )
-        for name, one in values.items()
-    }
+    variables = {}
+    for name, one in values.items():
+        text = attributes(name, one.units or "1", **{EPSILON: one.epsilon})
+        variables[name] = Variable(one.dims, one.values, text)
     return Record(coords, variables)
 
 

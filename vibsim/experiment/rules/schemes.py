@@ -87,7 +87,8 @@ def _check_forces(method: Scheme, i: int, model: Model, report: Report) -> None:
     """Refuse a scheme that cannot treat the forces of the model."""
     if method.treats(model):
         return
-    able = [other for other, row in report.kinds.all_schemes().items() if row.treats(model)]
+    rows = map(report.kinds.scheme, report.kinds.names("schemes"))
+    able = [row.kind for row in rows if row is not None and row.treats(model)]
     hint = "choose from " + ", ".join(able) if able else "no scheme can"
     rule = f"cannot treat {model.kind}, whose acceleration depends on {_velocities(model)}"
     unknowns = method.unknowns(model)
@@ -138,7 +139,8 @@ def _check_events(section: Any, i: int, model: Model, report: Report) -> None:
     is_unsure = report.doubts_model
     if given is None or is_unsure or model.events is not None:
         return
-    able = [kind for kind, other in report.kinds.all_models().items() if other.events is not None]
+    rows = map(report.kinds.model, report.kinds.names("model"))
+    able = [row.kind for row in rows if row is not None and row.events is not None]
     hint = f"models with events are {', '.join(able)}, and oscillator with damping: {{coulomb: c}}, events or stop"
     rule = f"{model.kind} has no events here: its motion is smooth"
     report.add(("schemes", i, EVENTS.name), rule, hint, given)

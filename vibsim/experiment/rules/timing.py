@@ -85,9 +85,8 @@ def _by_force(
     for name in ("periods", "steps_per_period"):
         value = getattr(section, name)
         if value % 1.0:
-            report.add(
-                ("time", name), "must be a whole number where frequency is given", value=value
-            )
+            rule = "must be a whole number where frequency is given"
+            report.add(("time", name), rule, value=value)
             return None
     key = str(section.frequency).removeprefix("model.")
     if f"model.{key}" != section.frequency or key not in parameters:
