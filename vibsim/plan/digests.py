@@ -25,10 +25,8 @@ def extrapolated(content: Mapping[str, Any]) -> dict[str, Any]:
 
 def analysed(content: Mapping[str, Any]) -> dict[str, Any]:
     """Return the part of an experiment in normal form that an analysis depends on and tells of."""
-    of_solver = "title source solver resources"
-    return _without(
-        content, of_solver if "solver" in content else "title source output figures units"
-    )
+    other = "title source output figures units"
+    return _without(content, "title source solver resources" if "solver" in content else other)
 
 
 def solved(experiment: SolverExperiment, level: int, member: int) -> dict[str, Any]:

@@ -8,6 +8,7 @@ hours, and vibsim only stores what it wrote.
 from __future__ import annotations
 
 import json
+from functools import partial
 from typing import Any
 
 from vibsim.core import regular_files
@@ -23,6 +24,9 @@ from vibsim.plan.versions import DRAWING, NUMERICAL, versions
 MEGABYTE = 10**6
 ANALYSIS_MEMORY = 500 * MEGABYTE
 """Bytes that an analysis may hold; the sizes of fields are not known before they are made."""
+
+_level = partial(LevelJob, steps=0, every=1, member_steps=0, bytes=0, seconds=0.0, shared=0.0)
+"""A level that a solver makes, which has neither counts nor costs."""
 
 
 def build(experiment: SolverExperiment) -> Plan:
@@ -53,19 +57,8 @@ def build(experiment: SolverExperiment) -> Plan:
             number = None if experiment.sweep is None else member
             place = shard_path(key, level, number)
             shards.append(ShardJob(member, member, member + 1, place, digest))
-        levels.append(
-            LevelJob(
-                level=level,
-                steps=0,
-                every=1,
-                member_steps=0,
-                bytes=0,
-                seconds=0.0,
-                shared=0.0,
-                memory=resources.mem_mb * MEGABYTE,
-                shards=tuple(shards),
-            )
-        )
+        memory = resources.mem_mb * MEGABYTE
+        levels.append(_level(level=level, memory=memory, shards=tuple(shards)))
     made: dict[str, Any] = {
         "levels": [[shard.digest for shard in level.shards] for level in levels]
     }

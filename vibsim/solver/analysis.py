@@ -23,6 +23,7 @@ from vibsim.core.vocabulary import REASON_NAMES, SEVERITY, STATUSES, jsonable, w
 from vibsim.experiment.schema.solver import SolverCheck
 from vibsim.experiment.solver import SolverExperiment
 from vibsim.solver import level_output
+from vibsim.solver.level_output import plain
 from vibsim.solver.verdicts import SolverResult, expected, judge
 
 SCHEME = "solver"
@@ -169,17 +170,15 @@ def _result(experiment: SolverExperiment, result: SolverResult) -> dict[str, Any
 def record(experiment: SolverExperiment, checks: Iterable[CheckResults]) -> Record:
     """Return what is stored of all checks: the table of levels of every member, and the values of the decisive one."""
     members, levels = experiment.members, list(experiment.levels)
-    position = attributes("position of the level, the coarsest 0", "1")
     coords = {
-        "level": Variable(("level",), np.array(levels), position),
-        "case": Variable(("case",), np.arange(members), attributes("member of the sweep", "1")),
+        "level": plain(("level",), levels, "position of the level, the coarsest 0"),
+        "case": plain(("case",), np.arange(members), "member of the sweep"),
     }
     for name, sizes in experiment.sizes.items():
-        values = np.array(sizes, dtype=np.float64)
-        coords[name] = Variable(("level",), values, attributes(f"size {name} of the level", "1"))
+        coords[name] = plain(("level",), np.array(sizes, float), f"size {name} of the level")
     for name in experiment.parameters_of(0):
-        column = np.array([experiment.parameters_of(i)[name] for i in range(members)])
-        coords[name] = Variable(("case",), column, attributes(f"parameter {name}", "1"))
+        column = [experiment.parameters_of(i)[name] for i in range(members)]
+        coords[name] = plain(("case",), column, f"parameter {name}")
     variables: dict[str, Variable] = {}
     for found in checks:
         variables |= _of_check(found)

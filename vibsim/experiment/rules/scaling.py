@@ -59,8 +59,9 @@ def _scaled(given: Numbers, time: TimeSpec, model: Model) -> Numbers | tuple[str
     end = float(time.end_of(model, parameters)) if time.is_of_model else time.end / rows["t"]
     if not (0.0 < end < math.inf and all(map(math.isfinite, initial.values()))):
         return "the scaled end or initial values are not finite", ""
-    own = {"parameters": dict(given.parameters), "initial": dict(given.initial)}
-    kept = Scaling(scales=rows, end=time.end, **own)
+    kept = Scaling(
+        scales=rows, parameters=dict(given.parameters), initial=dict(given.initial), end=time.end
+    )
     return Numbers(parameters, initial, time.model_copy(update={"end": end}), kept)
 
 

@@ -109,8 +109,17 @@ class Setting:
         series = max(known, _SMALLEST_MODEL) + 1 + (_D2T if d2t else 0)
         extrema = extrema_kept(steps, self.trajectories)
         events = events_kept(self.trajectories) if has_events else 0
-        kept = {"extrema": extrema, "events": events, "chain": self.sweep.chain}
-        return Load(self.scheme_count, steps, samples, series, exact=2, d2t=True, **kept)
+        return Load(
+            self.scheme_count,
+            steps,
+            samples,
+            series,
+            exact=2,
+            extrema=extrema,
+            events=events,
+            d2t=True,
+            chain=self.sweep.chain,
+        )
 
 
 def check(setting: Setting, report: Report) -> None:
