@@ -88,7 +88,7 @@ def _members(experiment: Experiment) -> None:
 
 def experiment(data: bytes) -> None:
     """Read the bytes of an experiment file."""
-    attempt(lambda: build(Experiment, parse(data, "fuzz.yaml"), "adhoc", "fuzz"))
+    attempt(lambda: Experiment.made_of(build(parse(data, "fuzz.yaml"), "adhoc", "fuzz")))
 
 
 def formula(data: bytes) -> None:

@@ -9,7 +9,7 @@ import math
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from shlex import quote
-from typing import Annotated, Any, Literal, Self, TypeVar
+from typing import Annotated, Any, Literal, TypeVar
 
 from pydantic import AfterValidator, Field, PrivateAttr, StrictBool
 
@@ -346,13 +346,6 @@ class ExperimentSpec(ReadExperiment):
     scaling: Scaling | None = None
     """Present where the run is made in the characteristic units of the model."""
     _notes: tuple[tuple[int, str], ...] = PrivateAttr(default=())
-
-    @classmethod
-    def made_of(cls, spec: ExperimentSpec) -> Self:
-        """Return the experiment of this class with the fields of `spec`, which are checked already."""
-        found: Any = cls.model_construct(**spec.__dict__)
-        made: Self = found
-        return made
 
     @property
     def notes(self) -> tuple[tuple[int, str], ...]:

@@ -11,7 +11,7 @@ from typing import Any
 
 from vibsim.core.errors import Fault, InputError, nearest
 from vibsim.experiment.collection import collection_of
-from vibsim.experiment.data import AnyExperiment, ExperimentSpec, ModelSpec, Sweep, TimeSpec
+from vibsim.experiment.data import ExperimentSpec, ModelSpec, Sweep, TimeSpec
 from vibsim.experiment.faults import MISSING, Report, shorten
 from vibsim.experiment.kinds import Kinds
 from vibsim.experiment.repeat import with_repeats
@@ -54,31 +54,23 @@ _PERIODIC = re.compile(rf"(.+)\1{{{MAX_REPEATS - 1}}}$")
 
 
 def from_file(
-    kind: type[AnyExperiment],
-    path: Path,
-    collection: str | None,
-    configs: Path | None,
-    settings: Sequence[str] = (),
-) -> AnyExperiment:
+    path: Path, collection: str | None, configs: Path | None, settings: Sequence[str]
+) -> ExperimentSpec:
     """Read the experiment file at `path`; see `vibsim.experiment.Experiment.from_yaml`."""
     source = with_settings(read(path, list(Document.model_fields)), settings)
     if (place := source.place((SOLVER,))) is not None:
         rule = "belongs to an experiment with a solver of the user, which vibsim run makes"
         hint = "in Python, vibsim.judge compares levels"
         raise InputError([Fault(str(path), place.key_line, SOLVER, "", rule, hint)])
-    return build(kind, source, collection or collection_of(path, configs), path.stem, path)
+    return build(source, collection or collection_of(path, configs), path.stem, path)
 
 
-def from_content(
-    kind: type[AnyExperiment], data: Mapping[str, Any], name: str, collection: str
-) -> AnyExperiment:
+def from_content(data: Mapping[str, Any], name: str, collection: str) -> ExperimentSpec:
     """Build an experiment from `data`; see `vibsim.experiment.Experiment.from_dict`."""
-    return build(kind, Source(name, _plain(data, name)), collection, name)
+    return build(Source(name, _plain(data, name)), collection, name)
 
 
-def from_objects(
-    kind: type[AnyExperiment], data: Mapping[str, Any], name: str, collection: str
-) -> AnyExperiment:
+def from_objects(data: Mapping[str, Any], name: str, collection: str) -> ExperimentSpec:
     """Build an experiment from what a file would hold, with models and schemes themselves in place of their kinds."""
     given: dict[type[Model | Scheme], list[Any]] = {Model: [], Scheme: []}
 
@@ -100,7 +92,7 @@ def from_objects(
         "schemes": [named(scheme) for scheme in schemes] if are_listed else schemes,
     }
     kinds = Kinds(MODELS.own(given[Model]), SCHEMES.own(given[Scheme]))
-    return build(kind, Source(name, _plain(content, name)), collection, name, kinds=kinds)
+    return build(Source(name, _plain(content, name)), collection, name, kinds=kinds)
 
 
 def _plain(data: Any, name: str, depth: int = 0) -> Any:
@@ -122,14 +114,13 @@ def _plain(data: Any, name: str, depth: int = 0) -> Any:
 
 
 def build(
-    kind: type[AnyExperiment],
     source: Source,
     collection: str,
     name: str,
     file: Path | None = None,
     kinds: Kinds | None = None,
-) -> AnyExperiment:
-    """Validate what `source` holds and fill in every default; `kind` is the class of what is built.
+) -> ExperimentSpec:
+    """Validate what `source` holds and fill in every default.
 
     `kinds` says which models and schemes it may name, by default those that are registered.
 
@@ -183,7 +174,7 @@ def build(
     report.raise_any()
     assert model is not None
     assert numbers.time is not None
-    spec = ExperimentSpec(
+    experiment = ExperimentSpec(
         collection=collection,
         name=name,
         **{key: getattr(document, key) for key in AS_WRITTEN},
@@ -206,8 +197,7 @@ def build(
         scaling=numbers.scaling,
     )
     if model.kind in report.kinds.own_models:
-        spec.model.hold(report.kinds.own_models[model.kind])
-    experiment = kind.made_of(spec)
+        experiment.model.hold(report.kinds.own_models[model.kind])
     experiment._file, experiment._settings = file, source.settings
     size_limits.check_files(experiment, report)
     report.raise_any()

@@ -81,9 +81,8 @@ def _built(choice: Choice, resolve: Resolver | None) -> Plan:
         return solver_plan.build(found if choice.case is None else found.alone(choice.case))
     from vibsim.plan import build
 
-    stem = choice.file.stem
-    experiment = reading.build(Experiment, source, choice.collection, stem, choice.file)
-    return build.build(_resolved(experiment, choice, resolve))
+    spec = reading.build(source, choice.collection, choice.file.stem, choice.file)
+    return build.build(_resolved(Experiment.made_of(spec), choice, resolve))
 
 
 def _resolved(experiment: Experiment, choice: Choice, resolve: Resolver | None) -> Experiment:
