@@ -38,7 +38,6 @@ def finish_schemes(
         found.extend(several)
         if model is not None:
             _check_options(section, i, scheme, model, report)
-            _check_events(section, i, model, report)
             _check_forces(scheme, i, model, report)
         _check_names(several, i, first, report)
     if are_known(sections, report.kinds) and all(spec.adaptive for spec in found):
@@ -123,7 +122,7 @@ def _velocities(model: Model) -> str:
 
 
 def _check_options(section: Any, i: int, scheme: Scheme, model: Model, report: Report) -> None:
-    """Refuse options without a meaning on this model."""
+    """Refuse options without a meaning on this model, and a treatment of events where there are none."""
     if isinstance(section, str):
         return
     known = scheme.options_on(model)
@@ -131,13 +130,8 @@ def _check_options(section: Any, i: int, scheme: Scheme, model: Model, report: R
         if option not in known and option.name in section.model_fields_set:
             rule = f"has no meaning for {model.kind}, on which the scheme has one form"
             report.add(("schemes", i, option.name), rule, "leave it out", at_key=True)
-
-
-def _check_events(section: Any, i: int, model: Model, report: Report) -> None:
-    """Refuse a treatment of events where there are none."""
-    given = None if isinstance(section, str) else getattr(section, EVENTS.name, None)
-    is_unsure = report.doubts_model
-    if given is None or is_unsure or model.events is not None:
+    given = getattr(section, EVENTS.name, None)
+    if given is None or report.doubts_model or model.events is not None:
         return
     rows = map(report.kinds.model, report.kinds.names("model"))
     able = [row.kind for row in rows if row is not None and row.events is not None]
