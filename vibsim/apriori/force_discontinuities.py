@@ -99,7 +99,8 @@ def _of_scheme(
 ) -> tuple[Floats, Floats, Integers]:
     """Return power, time and switch of the first corner of every member, each of shape (case,)."""
     cases, samples = t.shape
-    q, modes = _modes(held, states.reshape(len(states), -1), t.ravel())
+    u, v = np.split(states.reshape(len(states), -1), 2)
+    q, modes = held.modes(u, v, t.ravel())
     q, modes = (row.reshape(len(q), cases, samples) for row in (q, modes))
     edge = np.maximum(modes[..., :-1], modes[..., 1:])
     edge = np.where(held.whole[:, None, None], edge, 0.0)
@@ -157,18 +158,6 @@ def _of_time(held: Sides) -> list[bool]:
         if not found[-1]:
             moved.add(row.mode)
     return found
-
-
-def _modes(held: Sides, states: Floats, t: Floats) -> tuple[Floats, Floats]:
-    """Return what all switches look at, and their modes, shape (switch, sample)."""
-    u, v = np.split(states, 2)
-    modes = np.zeros((len(held.switches), len(t)))
-    q = np.zeros(modes.shape)
-    for k, is_whole in enumerate(held.whole):
-        # a switch may look at the modes of those before it
-        q[k] = held.quantity(k, modes, u, v, t)
-        modes[k] = np.floor(q[k]) if is_whole else np.where(q[k] > 0.0, 0.0, -1.0)
-    return q, modes
 
 
 @dataclass(frozen=True)

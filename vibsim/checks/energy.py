@@ -9,9 +9,10 @@ import numpy as np
 
 from vibsim.apriori.formal_orders import columns_of, formal_orders
 from vibsim.checks.fields import LEVEL, MOTION, Field, Measured
-from vibsim.checks.outcome import Judged, Reason, first_reason
+from vibsim.checks.outcome import Judged
 from vibsim.checks.sentences import MOVE, NOT_FINITE, NOTHING_MOVES, Description, Found
 from vibsim.comparison.quantity_comparison import Compared
+from vibsim.convergence.reasons import first_reason
 from vibsim.convergence.thresholds import ABOVE_ROUND_OFF
 from vibsim.core.array_types import Flags
 from vibsim.core.record import Record
@@ -97,15 +98,15 @@ def judge(experiment: Experiment, record: Record, check: ConservesCheck, found: 
     # an error that theory has, lost in round-off, may grow in any way; one that it has not does not grow
     has_error = np.isfinite(formal_orders(experiment, check.about or "", columns_of(record)))
     cases = [
-        (broken, Reason.NON_FINITE),
-        (np.isnan(largest) & unclear, Reason.NOT_APPLICABLE),
-        (still & is_none, Reason.NOT_APPLICABLE),
+        (broken, "non_finite"),
+        (np.isnan(largest) & unclear, "not_applicable"),
+        (still & is_none, "not_applicable"),
         # an error above round-off is not none, however short the run
-        (unclear & (check.drift != "none"), Reason.PRE_ASYMPTOTIC),
-        (wanted, Reason.MATCH),
-        (is_none & has_error, Reason.ROUND_OFF),
+        (unclear & (check.drift != "none"), "pre_asymptotic"),
+        (wanted, "match"),
+        (is_none & has_error, "round_off"),
     ]
-    reason = first_reason(cases, Reason.MISMATCH)
+    reason = first_reason(cases, "mismatch")
     return Judged(reason, largest)
 
 

@@ -21,7 +21,7 @@ import numpy as np
 from vibsim.apriori.formal_orders import even_powers, orders_in, relative_floors
 from vibsim.checks.accurate import ERROR, known_error
 from vibsim.checks.fields import REASON, STATUS, Field, Measured
-from vibsim.checks.outcome import Judged, Reason, as_expected
+from vibsim.checks.outcome import Judged, as_expected
 from vibsim.comparison.order_evidence import (
     CAUSES,
     causes,
@@ -32,6 +32,7 @@ from vibsim.comparison.order_evidence import (
 )
 from vibsim.comparison.quantity_comparison import Compared, Comparison
 from vibsim.convergence.differences import largest, safe_ratio
+from vibsim.convergence.reasons import code
 from vibsim.convergence.thresholds import (
     HALF_SPACING,
     LEAST_CANDIDATE,
@@ -160,7 +161,7 @@ def _more_levels(q: Comparison, judged: Judgement, order: Floats, tolerance: flo
     """
     shape, orders = judged.reason.shape, judged.orders
     needed = np.full(shape, UNKNOWN, dtype=np.int8)
-    early = judged.reason == Reason.PRE_ASYMPTOTIC
+    early = judged.reason == code("pre_asymptotic")
     if not np.any(early) or not orders.shape[-1]:
         return needed
     last, has = orders[..., -1], np.broadcast_to(q.order, shape)
@@ -191,7 +192,7 @@ def _finest_readable(
     found = np.full(judged.reason.shape, UNKNOWN, dtype=np.int8)
     with np.errstate(invalid="ignore"):
         p = np.where(judged.order >= LEAST_CANDIDATE, judged.order, order)
-    lost = (judged.reason == Reason.ROUND_OFF) & np.isfinite(p)
+    lost = (judged.reason == code("round_off")) & np.isfinite(p)
     if not np.any(lost):
         return found
     size, at = _clean_difference(q, norm, p)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -21,7 +20,7 @@ from vibsim.apriori.formal_orders import (
 )
 from vibsim.checks.accurate import error_in_words
 from vibsim.checks.phase_amplitude_text import parts_in_words
-from vibsim.checks.sentences import Found, cost_in_words, growth_in_words
+from vibsim.checks.sentences import Found, growth_in_words
 from vibsim.checks.stable import ALIKE
 from vibsim.comparison.comparison_variables import has_exact
 from vibsim.core.record import Record
@@ -52,9 +51,10 @@ class OrderContext:
         experiment, record, scheme, case = f.experiment, f.record, f.scheme, f.case
         model, quantity, columns = f.model, check.converges, columns_of(record)
 
-        def of_case(name: str) -> float:
-            return float(record[name][case]) if name in record else math.nan
+        def stored(name: str, *place: int) -> float:
+            return float(record[name][place]) if name in record else math.nan
 
+        self.experiment = experiment
         self.quantity, self.norm, self.tolerance = quantity, check.norm, check.tolerance
         self.is_position = quantity in model.positions
         self.notation, self.reason = f.notation, f.reason
@@ -67,7 +67,10 @@ class OrderContext:
         self.levels = tuple(int(level) for level in record["level"])
         self.orders = _orders(record, check, scheme, case)
         """Of successive levels in the norm of the check, the coarsest first."""
-        self.apart = _apart(record, quantity, scheme, case, self.levels, self.last)
+        sound = [i for i, finest in enumerate(self.levels[2:]) if finest == self.last]
+        self.apart = (
+            stored(f"{quantity}_coincidence", scheme, case, sound[0]) if sound else math.nan
+        )
         """How far the finest two rescaled differences of the levels that decide are apart, over the finer one."""
         self.more: int = f.fact("levels_needed")
         """Finer levels that are probably needed."""
@@ -76,7 +79,6 @@ class OrderContext:
         self.compensated: int = f.fact("readable_level_compensated")
         """... and the same in compensated arithmetic."""
         self.has_exact = has_exact(record, quantity, scheme, case)
-        self.cost = partial(cost_in_words, experiment)
         self.error = error_in_words(f, quantity)
         """How large the error of the finest level is; empty where it is not known."""
 
@@ -108,18 +110,16 @@ class OrderContext:
         """How the solution grows at the culprit."""
         if not math.isnan(self.omega_dt) and not method.adaptive:
             predicted = float(theory.dominant(method.stepper(self.options), self.omega_dt)[0])
-            name = "measured_growth"
-            measured = float(record[name][scheme, case, at]) if name in record else math.nan
+            measured = stored("measured_growth", scheme, case, self.levels.index(self.culprit))
             self.growth_in_words = growth_in_words(f, predicted, measured)
         self.failures = _failures(record, scheme, case)
 
         self.has_corners = has_corners(model)
         """Whether steps have corners of a force from a table inside."""
         self.corner = _corner(f)
-        self.pulse = of_case("pulse_time"), of_case("pulse_width")
+        self.pulse = stored("pulse_time", case), stored("pulse_width", case)
         """Time and length of a pulse of the force that no level sees."""
-        rate = "decay_rate"
-        self.decay = float(record[rate][scheme, case]) if rate in record else math.nan
+        self.decay = stored("decay_rate", scheme, case)
         """The largest rate at which damping takes a velocity away."""
         self.shortest = record.step(-1, case)
 
@@ -194,16 +194,6 @@ def _orders(record: Record, check: ConvergesCheck, scheme: int, case: int) -> tu
     if name not in record or check.norm not in norms:
         return ()
     return tuple(record[name][scheme, case, :, norms.index(check.norm)].astype(float).tolist())
-
-
-def _apart(
-    record: Record, quantity: str, scheme: int, case: int, levels: tuple[int, ...], last: int
-) -> float:
-    """Return how far the two finest rescaled differences up to a level are apart; NaN where that is not known."""
-    name = f"{quantity}_coincidence"
-    if name not in record or last not in levels[2:]:
-        return math.nan
-    return float(record[name][scheme, case, levels.index(last) - 2])
 
 
 def _failures(record: Record, scheme: int, case: int) -> tuple[float, ...]:

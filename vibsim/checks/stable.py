@@ -21,9 +21,10 @@ import numpy as np
 from vibsim.apriori.formal_orders import columns_of, stability_limits
 from vibsim.checks.fields import LEVEL, STATUS, Field, Measured
 from vibsim.checks.notation import ROUND_OFF
-from vibsim.checks.outcome import FAIL, PASS, STATUS_OF, Judged, Reason
+from vibsim.checks.outcome import Judged
 from vibsim.checks.sentences import Description, Found, growth_in_words
 from vibsim.comparison.quantity_comparison import Compared
+from vibsim.convergence.reasons import FAIL, PASS, STATUS_OF, code, first_reason
 from vibsim.convergence.thresholds import BLOWN_UP
 from vibsim.core.array_types import Flags, Floats
 from vibsim.core.record import Record
@@ -69,11 +70,8 @@ def measure(block: MemberBlock, compared: Compared, check: StableCheck) -> Measu
     contradicted = ~broken & predicted_oscillation.is_simple(block) & beyond
     contradicted &= _differs(block, index, found, expected)
     unstable = (broken & ~escaped) | beyond | grown
-    reason = np.select(
-        [contradicted, unstable, escaped],
-        [Reason.MISMATCH, Reason.UNSTABLE, Reason.NON_FINITE],
-        default=Reason.MATCH,
-    )
+    cases = [(contradicted, "mismatch"), (unstable, "unstable"), (escaped, "non_finite")]
+    reason = first_reason(cases, "match")
     return {
         "status": STATUS_OF[reason],
         "reason": reason,
@@ -127,7 +125,7 @@ def judge(experiment: Experiment, record: Record, check: StableCheck, found: Mea
     """Compare whether schemes are stable with what a check expects."""
     with np.errstate(divide="ignore", invalid="ignore"):
         size = np.abs(np.log(found["growth"]))
-    as_expected = found["reason"] == (Reason.MATCH if check.stable else Reason.UNSTABLE)
+    as_expected = found["reason"] == code("match" if check.stable else "unstable")
     away = np.where(np.isnan(size), np.inf, size)
     return Judged(found["reason"], away, np.where(as_expected, PASS, FAIL))
 

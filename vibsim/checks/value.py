@@ -17,10 +17,11 @@ import numpy as np
 from vibsim.apriori.formal_orders import columns_of, options_of
 from vibsim.checks.fields import Field, Measured
 from vibsim.checks.notation import PLAIN, ROUND_OFF, Notation
-from vibsim.checks.outcome import Judged, Reason, first_reason
+from vibsim.checks.outcome import Judged
 from vibsim.checks.sentences import NOT_FINITE, Description, Found, cost_in_words
 from vibsim.comparison import best_values, value_numbers
 from vibsim.comparison.quantity_comparison import Compared
+from vibsim.convergence.reasons import first_reason
 from vibsim.core.array_types import Flags, Floats
 from vibsim.core.record import Record
 from vibsim.experiment import Experiment
@@ -158,18 +159,18 @@ def judge(experiment: Experiment, record: Record, check: ValueCheck, found: Meas
         # a time that the levels leave open agrees by chance, perhaps of another event
         holds &= bound <= np.maximum(-away, 0.0 if check.equals is None else check.allowed)
     cases = [
-        ((_failed(record, check) & ~survives) | infinite, Reason.NON_FINITE),
+        ((_failed(record, check) & ~survives) | infinite, "non_finite"),
         (
             does_not_exist,
-            Reason.TOO_FEW_LEVELS if _lacks_levels(experiment, check) else Reason.NOT_APPLICABLE,
+            "too_few_levels" if _lacks_levels(experiment, check) else "not_applicable",
         ),
-        (holds, Reason.MATCH),
+        (holds, "match"),
         (
             may_be_right,
-            Reason.TOO_FEW_LEVELS if len(record["level"]) < FEWEST else Reason.PRE_ASYMPTOTIC,
+            "too_few_levels" if len(record["level"]) < FEWEST else "pre_asymptotic",
         ),
     ]
-    reason = first_reason(cases, Reason.MISMATCH)
+    reason = first_reason(cases, "mismatch")
     return Judged(reason, away)
 
 

@@ -22,10 +22,11 @@ from vibsim.comparison.thresholds import STRAIGHT, THEORY_ROUNDING, VANISHING_RA
 from vibsim.convergence.batches import batches
 from vibsim.convergence.circumstances import Evidence, at_rest, floor_of_pairs, unresolved
 from vibsim.convergence.differences import largest, safe_ratio
+from vibsim.convergence.reasons import is_one_of
 from vibsim.convergence.thresholds import ABOVE_ROUND_OFF, HALF_SPACING
 from vibsim.convergence.verdict import Judgement, judge, judge_together
 from vibsim.core.array_types import Codes, Flags, Floats
-from vibsim.core.vocabulary import NORMS, ORDER_TOLERANCE, REASON_NAMES, TYPICAL_NORM, is_error_part
+from vibsim.core.vocabulary import NORMS, ORDER_TOLERANCE, TYPICAL_NORM, is_error_part
 from vibsim.experiment.schema.checks import ConvergesCheck
 from vibsim.models import ENERGIES
 from vibsim.observe import predicted_oscillation
@@ -215,9 +216,7 @@ def causes(
     shape = judged.reason.shape
     found = np.full(shape, NONE, dtype=np.int8)
 
-    def has(*reasons: str) -> Flags:
-        return np.isin(judged.reason, [REASON_NAMES.index(word) for word in reasons])
-
+    has = partial(is_one_of, judged.reason)
     low, high, lost, unseen = has("order_low"), has("order_high"), has("round_off"), has(*UNSEEN)
     coarse = has("pre_asymptotic")
     if np.any(lost | unseen | coarse):

@@ -299,7 +299,7 @@ KNOWN: Mapping[str, Number] = {
     "force_evaluations": _at_level(oscillation.force_evaluations),
     "error_rate": lambda p: np.log2(_fall(_own_norm)(p)),
     "second_difference_fraction": _second_difference,
-    "discrete_error": lambda p: _at_level(lambda b, level: discrete_error(b, level, p.quantity))(p),
+    "discrete_error": _of_quantity(discrete_error),
     "error_l1": _error("l1"),
     "error_l2": _error("l2"),
     "error_linf": _error("linf"),

@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 
 from vibsim.convergence.error_model.posterior import Ladder
+from vibsim.convergence.reasons import STATUS_OF, code
 from vibsim.core.array_types import Floats, Integers
-from vibsim.core.vocabulary import REASON_NAMES, REASONS, STATUSES
 
 BLOCK = 1024
 """So many ladders are judged together at most."""
@@ -29,9 +29,9 @@ def in_blocks(
         np.isfinite(ladder.floor), axis=-1
     )
     found = _nothing(count, n)
-    reason = found["reason"] = np.full(count, REASON_NAMES.index("non_finite"))
+    reason = found["reason"] = np.full(count, code("non_finite"))
     if n < 3:
-        reason[finite] = REASON_NAMES.index("too_few_levels")
+        reason[finite] = code("too_few_levels")
     else:
         every = np.flatnonzero(finite)
         for start in range(0, len(every), BLOCK):
@@ -40,8 +40,7 @@ def in_blocks(
             for name, value in work(part, factors).items():
                 in_units = name in ("error", "error_bound", "best_bound")
                 found[name][rows] = value * size if in_units else value
-    status = np.array([STATUSES.index(REASONS[REASON_NAMES[code]]) for code in reason])
-    return {**found, "status": status.astype(np.int8), "reason": reason.astype(np.int8)}
+    return {**found, "status": STATUS_OF[reason], "reason": reason.astype(np.int8)}
 
 
 def _nothing(count: int, levels: int) -> dict[str, np.ndarray]:

@@ -61,7 +61,8 @@ class Call:
 
 Expression = Number | Name | Negate | Binary | Compare | Call
 
-ZERO, ONE = Number(0.0), Number(1.0)
+ZERO: Expression = Number(0.0)
+ONE: Expression = Number(1.0)
 CONSTANTS: Mapping[str, float] = {"pi": math.pi, "e": math.e}
 """Names that stand for a number wherever a formula does not declare them otherwise."""
 

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibsim import plan
-from vibsim.comparison.best_solution import methods, start_of
+from vibsim.comparison.best_solution import starts
 from vibsim.comparison.extrapolate_members import (
     Extrapolated,
     Method,
@@ -163,9 +163,9 @@ def _runs(experiment: Experiment) -> list[_Run]:
     group = _gathered(experiment, cases)
     names = [scheme.name for scheme in experiment.schemes]
     return [
-        _Run(method, names[i], start_of(method, group, where), cases[where], [], [])
+        _Run(method, names[i], start, cases[where], [], [])
         for i in experiment.ladder
-        for method, where in methods(experiment, i, group)
+        for method, start, where in starts(experiment, i, group)
     ]
 
 

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from vibsim import plan
-from vibsim.comparison.best_solution import in_order, methods, record_of, start_of
+from vibsim.comparison.best_solution import in_order, record_of, starts
 from vibsim.comparison.extrapolate_members import Extrapolated, join_members
 from vibsim.ladder.choosing import resolve
 from vibsim.ladder.solving import climb
@@ -58,11 +58,12 @@ def best(
     schemes = experiment.ladder
 
     def climbed(scheme: int, group: Members) -> Extrapolated:
-        parts = []
-        for method, where in methods(experiment, scheme, group):
-            start = start_of(method, group, where)
-            parts.append((climb(method, start, steps, points, threads=threads), where))
-        return in_order(parts)
+        return in_order(
+            [
+                (climb(method, start, steps, points, threads=threads), where)
+                for method, start, where in starts(experiment, scheme, group)
+            ]
+        )
 
     groups = [
         members(experiment, first, min(first + size, experiment.members))

@@ -41,7 +41,7 @@ from vibsim.formula import (
     times,
     values,
 )
-from vibsim.models.base import Model, Numbers, Parameter, State, declared_parameters
+from vibsim.models.base import Model, Numbers, Parameter, declared_parameters
 from vibsim.models.shared.matrices import (
     Complex,
     Matrix,
@@ -51,7 +51,7 @@ from vibsim.models.shared.matrices import (
     lowest_modes,
     mode_motion,
 )
-from vibsim.models.system import terms_of, velocities_of
+from vibsim.models.system import states_of, terms_of, velocities_of
 
 MOST_DOFS = 10_000
 """Degrees of freedom, at most."""
@@ -365,14 +365,6 @@ def _structure(
     loads = tuple(parse(text, known) if text else _TABULATED for text in texts)
     own = Loaded(structure, loads, parameters, terms)
     is_conservative = not own.is_damped and not own.loads
-    states = [
-        State(name, "1", word)
-        for word, names in (
-            ("displacement", structure.names),
-            ("velocity", velocities_of(structure.names)),
-        )
-        for name in names
-    ]
     accelerations = tuple(Name(f"_acceleration_{i}") for i in range(len(structure.names)))
     sides = ["M u''", *(["C u'"] if own.is_damped else []), "K u"]
     right = "p(t)" if own.is_driven else "p" if own.loads else "0"
@@ -381,7 +373,7 @@ def _structure(
         title="Linear structure",
         source="the experiment file",
         equation=f"{' + '.join(sides)} = {right}, {structure.dofs} degrees of freedom",
-        states=tuple(states),
+        states=states_of(structure.names, "displacement"),
         parameters=parameters,
         # of the whole structure, known to those alone who step it
         acceleration=accelerations[0],

@@ -24,7 +24,7 @@ import keyword
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cache, cached_property, partial
+from functools import cache, cached_property, partial, reduce
 from typing import Any
 
 import numpy as np
@@ -101,6 +101,12 @@ SHOWN = 6
 def velocities_of(coordinates: tuple[str, ...]) -> tuple[str, ...]:
     """Name the velocities."""
     return ("v",) if coordinates == ("u",) else tuple(f"v{name}" for name in coordinates)
+
+
+def states_of(coordinates: tuple[str, ...], word: str) -> tuple[State, ...]:
+    """Return the states of coordinates without units; `word` says what they are."""
+    positions = (State(name, "1", word) for name in coordinates)
+    return (*positions, *(State(name, "1", "velocity") for name in velocities_of(coordinates)))
 
 
 def name_fault(name: str, others: tuple[str, ...] = ()) -> str:
@@ -240,14 +246,10 @@ class Written:
         """The potential energy, 0 where none is known."""
         if terms := self.terms("potential"):
             return paired(terms, plus)
-        moving, total = {*self.velocities, "t"}, []
-        forces = []
+        moving, total, forces = {*self.velocities, "t"}, [], []
         for whole in self.forces:
             still = (term for term in terms_of(whole) if moving.isdisjoint(names_in(term)))
-            force: Expression = ZERO
-            for term in still:
-                force = plus(force, term)
-            forces.append(force)
+            forces.append(reduce(plus, still, ZERO))
         for i, (name, force) in enumerate(zip(self.coordinates, forces, strict=True)):
             for later in self.coordinates[i + 1 :]:
                 if later in names_in(force):
@@ -270,6 +272,10 @@ class Written:
             for energy in (self.kinetic, self.potential)
         )
         return tuple(term for term in found if term != ZERO)
+
+    def is_constant(self, node: Expression) -> bool:
+        """Tell whether a formula names parameters alone."""
+        return {*self.states, "t"}.isdisjoint(names_in(node))
 
     def vanishes(self, terms: Any) -> bool:
         """Tell whether a sum is 0 wherever it has a value, and that it has one somewhere."""
@@ -380,12 +386,6 @@ def system(
         more = {"driving": power} if drives else {"dissipation": minus(ZERO, power)}
     if motion is not None:
         more |= {"exact": motion.exact, "start": motion.start}
-    words = "position", "velocity"
-    states = tuple(
-        State(name, "1", word)
-        for word, names in zip(words, (own.coordinates, own.velocities), strict=True)
-        for name in names
-    )
     outputs = (key.partition(".") for key, _ in formulas)
     if len(coordinates) == 1:
         more |= {"linear": _is_linear(own), "damping": _damping(own)}
@@ -401,7 +401,7 @@ def system(
         title="System of equations",
         source="the experiment file",
         equation=_equation(own),
-        states=states,
+        states=states_of(coordinates, "position"),
         parameters=own.parameters,
         acceleration=first,
         further_accelerations=tuple(rest),
@@ -427,28 +427,22 @@ def _is_linear(own: Written) -> bool:
     """Tell whether the acceleration of the only coordinate is a number times it, beside what does not name it."""
     (a,), (u,) = own.accelerations, own.coordinates
     jumps = (part for part in walk(a) if is_jump(part) and u in names_in(part))
-    return not any(jumps) and {*own.states, "t"}.isdisjoint(names_in(derivative(a, u)))
+    return not any(jumps) and own.is_constant(derivative(a, u))
 
 
 def _has_constant_slopes(own: Written) -> bool:
     """Tell whether the accelerations are linear in all states, with constant coefficients."""
-    varying = {*own.states, "t"}
     slopes = (derivative(a, s) for a in own.accelerations for s in own.states if s in names_in(a))
     jumps = (part for a in own.accelerations for part in walk(a) if is_jump(part))
-    return all(varying.isdisjoint(names_in(part)) for part in (*slopes, *jumps))
+    return all(map(own.is_constant, (*slopes, *jumps)))
 
 
 def _damping(own: Written) -> Damping | None:
     """Return the damping of the only coordinate, where it is linear or quadratic with a constant rate."""
     (a,), (v,) = own.accelerations, own.velocities
-    force: Expression = ZERO
-    for term in terms_of(a):
-        if v in names_in(term):
-            force = minus(force, term)
+    force = reduce(minus, (term for term in terms_of(a) if v in names_in(term)), ZERO)
     found = damping_of(force, v) if force != ZERO else None
-    if found is None or not {*own.states, "t"}.isdisjoint(names_in(found[1])):
-        return None
-    return Damping(*found)
+    return Damping(*found) if found is not None and own.is_constant(found[1]) else None
 
 
 def _equation(own: Written) -> str:

@@ -100,12 +100,12 @@ def _conditioned(block: MemberBlock, level: int, size: Floats) -> Floats:
     if not model.conservative:
         return np.broadcast_to(block.magnified, size.shape)
     states = {s.name: np.asarray(record[s.name], dtype=float) for s in model.states}
-    named = {row.name: block.group.parameters[row.key][:, None] for row in model.parameters}
+    numbers = {**block.group.by_name(model), **states, "t": 0.0}
     energy = plus(tree(model, model.kinetic_energy), tree(model, model.potential_energy))
     square = np.zeros(next(iter(states.values())).shape)
     with np.errstate(all="ignore"):
         for name, values_of in states.items():
-            slope = values(derivative(energy, name), {**named, **states, "t": 0.0})
+            slope = values(derivative(energy, name), numbers)
             square = square + (slope * largest(values_of)[..., None]) ** 2
         felt = 0.5 * safe_ratio(np.sqrt(largest(square)), size)
     return np.asarray(np.fmax(felt, 1.0))

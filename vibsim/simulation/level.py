@@ -246,11 +246,7 @@ def _exact(
         # members that start from others have starts of every level's own
         few = few and experiment.chain == 1
         return _computed(model, group, number / steps) if few else {}
-    exact = model.exact(
-        number * (group.end / steps)[:, None],
-        {name: values[:, None] for name, values in group.initial.items()},
-        {name: values[:, None] for name, values in group.parameters.items()},
-    )
+    exact = group.exact(model, number * (group.end / steps)[:, None])
     rows = (
         (f"{row.name}_exact", exact[row.name], f"exact {row.long_name}", row.unit)
         for row in model.states

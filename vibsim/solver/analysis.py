@@ -14,9 +14,8 @@ from vibsim.analysis.summary import WORST
 from vibsim.checks.fields import GROUP, name_of
 from vibsim.checks.outcome import compared_reason
 from vibsim.checks.solver_facts import SOLVER_FACTS
-from vibsim.convergence import LadderVerdict
 from vibsim.convergence.study.labelled import COLUMNS, dataset
-from vibsim.convergence.study.verdict_data import Level
+from vibsim.convergence.study.verdict import LadderVerdict, Level
 from vibsim.core.array_types import Floats
 from vibsim.core.errors import VibsimError
 from vibsim.core.record import Record, Variable, attributes, flags

@@ -12,8 +12,7 @@ from vibsim.convergence.study.common_points import CommonValues
 from vibsim.convergence.study.outcomes import FEWEST, Outcome, Question
 from vibsim.convergence.study.refinement import Refinement
 from vibsim.convergence.study.sentences import Setting, describe
-from vibsim.convergence.study.verdict import LadderVerdict
-from vibsim.convergence.study.verdict_data import Level
+from vibsim.convergence.study.verdict import LadderVerdict, Level
 from vibsim.convergence.thresholds import GCI_TRUSTED
 from vibsim.core.array_types import Floats
 from vibsim.core.vocabulary import ORDER_TOLERANCE, REASONS

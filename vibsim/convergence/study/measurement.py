@@ -11,22 +11,20 @@ from vibsim.core.array_types import Flags, Floats
 
 LARGEST = 1e150
 """Scaled values do not exceed it: their squares are numbers."""
+FURTHEST = 1e100
+"""Distance from the exact solution, over the size of the values, beyond which it is all the same."""
 
 
 @dataclass(frozen=True)
 class Measurement:
-    """What was measured of the ladders of all members, in units of `scale`."""
+    """What was measured of the ladders of all members."""
 
     ladder: Ladder
-    """With the leading dimension member."""
+    """In units of `scale`, with the leading dimension member."""
     scale: Floats
     """A power of two for each member, so that squares neither overflow nor vanish, shape (member,)."""
-    size: Floats
-    """Root mean square of the values of the finest level, shape (member,)."""
     norms: Floats
-    """The same of every level, but in the units of the values, shape (member, n)."""
-    products: Floats
-    """Inner products of the differences of successive levels, shape (member, n-1, n-1)."""
+    """Root mean square of the values of every level, shape (member, n)."""
 
 
 def scale_of(values: Floats) -> Floats:
@@ -65,7 +63,7 @@ def measurement(
     scale = scale_of(values)
     scaled = values / scale[:, None, None]
     points = values.shape[2]
-    norms = _rms(scaled)
+    norms = np.sqrt(np.mean(scaled * scaled, axis=-1))
     rows = scaled[:, :-1] - scaled[:, 1:]
     if exact is not None:
         with np.errstate(over="ignore"):
@@ -78,7 +76,6 @@ def measurement(
     floor = 0.5 * epsilon * norms
     if noise is not None:
         floor = np.maximum(floor, noise / scale[:, None])
-    n = len(h)
     ladder = Ladder(
         h=h,
         gram=gram,
@@ -86,14 +83,4 @@ def measurement(
         numbers=np.full(len(values), points == 1),
         exact_known=exact is not None,
     )
-    return Measurement(
-        ladder, scale, norms[:, -1], norms * scale[:, None], gram[:, : n - 1, : n - 1]
-    )
-
-
-FURTHEST = 1e100
-"""Distance from the exact solution, over the size of the values, beyond which it is all the same."""
-
-
-def _rms(values: Floats) -> Floats:
-    return np.asarray(np.sqrt(np.mean(values * values, axis=-1)))
+    return Measurement(ladder, scale, norms * scale[:, None])

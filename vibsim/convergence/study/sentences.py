@@ -7,10 +7,12 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from types import MappingProxyType
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from vibsim.convergence.study.verdict_data import VerdictData
 from vibsim.core.vocabulary import ORDER_TOLERANCE
+
+if TYPE_CHECKING:
+    from vibsim.convergence.study.verdict import LadderVerdict
 
 
 @dataclass(frozen=True)
@@ -119,7 +121,7 @@ SENTENCES: Mapping[str, tuple[str, str]] = MappingProxyType(
 ``noisy`` are cases of ``pre_asymptotic``."""
 
 
-def describe(facts: VerdictData, setting: Setting) -> tuple[str, str]:
+def describe(facts: LadderVerdict, setting: Setting) -> tuple[str, str]:
     """Return the sentence on a ladder, and the advice; the advice on one that passed is empty."""
     key = "interpolation" if setting.interpolation else facts.reason
     if key == "pre_asymptotic" and _is_noise_seen(facts, setting):
@@ -143,7 +145,7 @@ def describe(facts: VerdictData, setting: Setting) -> tuple[str, str]:
     return _joined([sentence, *more]), _joined([advice, *setting.notes])
 
 
-def _is_noise_seen(facts: VerdictData, setting: Setting) -> bool:
+def _is_noise_seen(facts: LadderVerdict, setting: Setting) -> bool:
     """Say whether the finest difference may be the stated noise: a finer level would show no more."""
     finest = facts.levels[-2:][0].difference
     return finest is not None and abs(finest) <= NOISE_SEEN * setting.noise
@@ -153,7 +155,7 @@ def _joined(parts: Sequence[str]) -> str:
     return " ".join(part for part in parts if part)
 
 
-def _phrases(facts: VerdictData, setting: Setting) -> dict[str, Any]:
+def _phrases(facts: LadderVerdict, setting: Setting) -> dict[str, Any]:
     kind, own = setting.interpolation or ("", 0)
     h, count = [level.h for level in facts.levels], len(facts.levels)
     finer = h[-1] * (h[-1] / h[-2] if count > 1 else 0.5)
@@ -181,7 +183,7 @@ def _phrases(facts: VerdictData, setting: Setting) -> dict[str, Any]:
     }
 
 
-def order_with_interval(facts: VerdictData) -> str:
+def order_with_interval(facts: LadderVerdict) -> str:
     """Write an order with its interval, ``2.00 (1.97 to 2.03)``."""
     if facts.order is None:
         return "unknown"
@@ -193,7 +195,7 @@ def order_with_interval(facts: VerdictData) -> str:
     )
 
 
-def _as_expected(facts: VerdictData) -> str:
+def _as_expected(facts: LadderVerdict) -> str:
     if facts.expected is not None:
         return ", as expected"
     return f", at least {facts.at_least:g} as expected" if facts.at_least is not None else ""
@@ -207,19 +209,19 @@ def higher_part(order: float, expected: float, tolerance: float) -> str:
     return f"A part of the error of higher order is still seen. It {moves} the measured order."
 
 
-def _higher_part(facts: VerdictData) -> str:
+def _higher_part(facts: LadderVerdict) -> str:
     if facts.reason != "asymptotic" or facts.expected is None or facts.order is None:
         return ""
     return higher_part(facts.order, facts.expected, ORDER_TOLERANCE)
 
 
-def _wanted(facts: VerdictData) -> str:
+def _wanted(facts: LadderVerdict) -> str:
     if facts.expected is not None:
         return f"{facts.expected:g}"
     return f"at least {facts.at_least:g}" if facts.at_least is not None else "another one"
 
 
-def _interval(facts: VerdictData) -> str:
+def _interval(facts: LadderVerdict) -> str:
     """Say between which orders the levels leave it open."""
     if facts.reason != "pre_asymptotic" or facts.order_low is None or facts.order_high is None:
         return ""
@@ -228,7 +230,7 @@ def _interval(facts: VerdictData) -> str:
     return f"They are consistent with orders from {facts.order_low:.2f} to {facts.order_high:.2f}."
 
 
-def _finer(facts: VerdictData) -> str:
+def _finer(facts: LadderVerdict) -> str:
     """Say behind which level an order that was decided on is not seen."""
     decided = facts.reason in ("asymptotic", "order_low", "order_high")
     if not decided or not facts.h_used or facts.h_used[-1] == facts.levels[-1].h:
@@ -237,7 +239,7 @@ def _finer(facts: VerdictData) -> str:
     return f"The levels finer than {facts.size_name} = {last} do not show this order."
 
 
-def _copies(facts: VerdictData) -> str:
+def _copies(facts: LadderVerdict) -> str:
     """Doubt neighbouring levels that do not differ at all, where those beside them differ by more than round-off."""
     levels, size = facts.levels, facts.size_name
     sizes = [abs(level.difference or 0.0) for level in levels[:-1]]
@@ -254,7 +256,7 @@ def _copies(facts: VerdictData) -> str:
     return ""
 
 
-def _error(facts: VerdictData) -> str:
+def _error(facts: LadderVerdict) -> str:
     """Say the error of the finest level with its bound."""
     if facts.error is None:
         return ""
@@ -268,7 +270,7 @@ def _error(facts: VerdictData) -> str:
     return f"The error of the finest level is {size}{share}{limit}."
 
 
-def _best(facts: VerdictData) -> str:
+def _best(facts: LadderVerdict) -> str:
     """Say the extrapolated number with its bound."""
     if (
         facts.best is None

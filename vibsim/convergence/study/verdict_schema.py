@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from vibsim.convergence.study.verdict_data import KEYS
+from vibsim.convergence.study.verdict import KEYS
 from vibsim.core.vocabulary import FORMAT, REASON_NAMES, STATUSES
 
 NUMBERS = {

@@ -70,7 +70,7 @@ class Inertia:
 
     def rest(self, i: int) -> Expression:
         """Return ``sum_jk c_ijk q_j' q_k'``; what cancels by symmetry is left out."""
-        found: Expression = ZERO
+        found = ZERO
         count = len(self.positions) if self._slopes else 0
         for j in range(count):
             for k in range(j, count):
@@ -102,7 +102,7 @@ class Inertia:
                 raise ExpressionError(MASS, 0, rule, "solve for the accelerations and write these")
             whole = self._minor(group, group)
             for i in group:
-                total: Expression = ZERO
+                total = ZERO
                 for j in group:
                     rows, columns = (tuple(n for n in group if n != out) for out in (j, i))
                     is_odd = (group.index(i) + group.index(j)) % 2
@@ -124,7 +124,7 @@ class Inertia:
         """Return the determinant of some rows and columns, by the first row."""
         if not rows:
             return ONE
-        total: Expression = ZERO
+        total = ZERO
         for place, column in enumerate(columns):
             rest = columns[:place] + columns[place + 1 :]
             term = times(self.of(rows[0], column), self._minor(rows[1:], rest))

@@ -138,7 +138,7 @@ def _exactly(forces: Forces, scales: Scales) -> dict[str, Formula]:
 
 def amplitude_and_frequency(force: Expression) -> tuple[Expression, Expression] | None:
     """Return A and phi of a force ``A sin(phi t)`` or ``A cos(phi t)``; None for any other one."""
-    amplitude: Expression = ONE
+    amplitude = ONE
     frequency: Expression | None = None
     parts = [force]
     while parts:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, reduce
 from typing import Any, Literal
 
 import numpy as np
@@ -204,10 +204,7 @@ def damping_of(
     rest = [factor for factor in factors if factor not in (speed, size)]
     if any(velocity in names_in(factor) for factor in rest):
         return None
-    rate: Expression = ONE
-    for factor in rest:
-        rate = times(rate, factor)
-    return "quadratic", rate
+    return "quadratic", reduce(times, rest, ONE)
 
 
 def _factors(node: Expression) -> list[Expression]:
