@@ -280,7 +280,7 @@ KNOWN: Mapping[str, Number] = {
     "phase_error_per_period": _at_level(oscillation.phase_error),
     "predicted_phase_error": _at_level(predicted_oscillation.phase_error),
     "phase_error_slope": _needs_data(lambda p, data: oscillation.phase_error_slope(data)),
-    "amplitude_error": _needs_data(lambda p, data: oscillation.amplitude_error(data)),
+    "amplitude_error": _needs_data(lambda p, data: oscillation.growth_factor(data) - 1.0),
     "steady_amplitude": _of_quantity(steady_state.amplitude),
     "steady_phase": _of_quantity(steady_state.phase),
     "steady_change": _of_quantity(steady_state.change),

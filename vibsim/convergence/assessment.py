@@ -184,7 +184,8 @@ def _evaluate(ladder: Ladder, question: Question, left_out: float) -> _Evaluatio
     exact = _is_only_noise(ladder, question.noise_factor)
     away = np.zeros_like(exact)
     if ladder.exact_known:
-        away = exact & _is_away(ladder, question.noise_factor)
+        noise = question.noise_factor * ladder.floor[:, -1]
+        away = exact & (np.sqrt(ladder.gram[:, -1, -1]) > noise)
     by_three, cut_short = rests_on_three(believed), _is_cut_short(ladder, believed)
     by_theory = question.by_theory and not ladder.exact_known
     return _Evaluation(believed, of_sides, exact, away, by_three, by_theory, cut_short)
@@ -321,11 +322,6 @@ def _is_only_noise(ladder: Ladder, factor: float) -> Flags:
     d = np.sqrt(np.diagonal(ladder.gram, axis1=1, axis2=2))[:, : n - 1]
     allowed = factor * (ladder.floor[:, :-1] + ladder.floor[:, 1:])
     return np.asarray(np.all(d <= allowed, axis=-1))
-
-
-def _is_away(ladder: Ladder, factor: float) -> Flags:
-    """Say where the finest level is further from the exact solution than noise explains."""
-    return np.asarray(np.sqrt(ladder.gram[:, -1, -1]) > factor * ladder.floor[:, -1])
 
 
 def _least_noise(ladder: Ladder) -> Floats:

@@ -163,14 +163,10 @@ def unresolved(e: Evidence) -> Flags:
     return np.asarray(e.decay > th.RESOLVED_DECAY)
 
 
-def accuracy(e: Evidence) -> Floats:
-    """Return how well the finest error is known."""
-    return np.asarray(th.ABOVE_ROUND_OFF * e.floor[..., -1] + th.EXACT_ACCURACY * e.size)
-
-
 def far_from_exact(e: Evidence) -> Flags:
     """Say where the finest level is further from the exact solution than that is known."""
-    return np.asarray(np.nan_to_num(e.error, nan=0.0) > accuracy(e))
+    known_to = th.ABOVE_ROUND_OFF * e.floor[..., -1] + th.EXACT_ACCURACY * e.size
+    return np.asarray(np.nan_to_num(e.error, nan=0.0) > known_to)
 
 
 def pick(values: Floats, index: Integers) -> Floats:

@@ -35,10 +35,8 @@ from vibsim.formula import (
     Negate,
     derivative,
     names_in,
-    over,
     parse,
     put,
-    times,
     values,
 )
 from vibsim.models.base import Model, Numbers, Parameter, declared_parameters
@@ -209,7 +207,7 @@ def _harmonic(term: Expression) -> Harmonic | None:
         case Binary("*", left, right) if "t" not in names_in(right):
             inner, factor = _harmonic(left), right
         case Binary("/", left, right) if "t" not in names_in(right):
-            inner, factor = _harmonic(left), over(ONE, right)
+            inner, factor = _harmonic(left), ONE / right
         case Call("cos" | "sin" as name, (angle,)):
             angular = derivative(angle, "t")
             if "t" in names_in(angular):
@@ -222,7 +220,7 @@ def _harmonic(term: Expression) -> Harmonic | None:
             return None
     if inner is None:
         return None
-    return replace(inner, amplitude=times(factor, inner.amplitude))
+    return replace(inner, amplitude=factor * inner.amplitude)
 
 
 @dataclass(frozen=True)
@@ -347,13 +345,16 @@ def written(
 ) -> Model:
     """Return the model of a structure under loads, ``load.0`` the formula of the first one, with declared parameters.
 
-    A load that is a table of the structure has no formula.
+    A load that is a table of the structure has no formula. Without a structure it has one degree of freedom, with the
+    mass and the stiffness 1.
 
     ExpressionError where a formula names something else than t and parameters.
     """
-    own = unit_structure() if structure is None else structure
-    texts = tuple(formulas.get(f"{LOAD}.{i}", "") for i in range(len(own.shapes)))
-    return _structure(own, texts, declared, frozenset())
+    if structure is None:
+        one = Matrix.of(np.eye(1))
+        structure = Structure(one, one, names=("u",))
+    texts = tuple(formulas.get(f"{LOAD}.{i}", "") for i in range(len(structure.shapes)))
+    return _structure(structure, texts, declared, frozenset())
 
 
 @cache
@@ -393,12 +394,6 @@ def _structure(
         optional=tuple(row.name for row in RAYLEIGH),
         variant=partial(_structure, structure, texts, declared),
     )
-
-
-def unit_structure() -> Structure:
-    """Return the structure of one degree of freedom, with the mass and the stiffness 1."""
-    one = Matrix.of(np.eye(1))
-    return Structure(one, one, names=("u",))
 
 
 STRUCTURE = replace(written({}, ()), equation="M u'' + C u' + K u = p(t), with matrices M, C, K")

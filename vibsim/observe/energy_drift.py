@@ -30,7 +30,7 @@ from vibsim.convergence.differences import largest, safe_ratio
 from vibsim.convergence.thresholds import ABOVE_ROUND_OFF
 from vibsim.core.array_types import Codes, Flags, Floats
 from vibsim.core.vocabulary import DRIFTS
-from vibsim.formula import derivative, plus, values
+from vibsim.formula import derivative, values
 from vibsim.models.base import tree
 from vibsim.observe import thresholds as th
 from vibsim.observe.member_block import CENTRED, MemberBlock, energy_at_start, stored_or_nan
@@ -101,7 +101,7 @@ def _conditioned(block: MemberBlock, level: int, size: Floats) -> Floats:
         return np.broadcast_to(block.magnified, size.shape)
     states = {s.name: np.asarray(record[s.name], dtype=float) for s in model.states}
     numbers = {**block.group.by_name(model), **states, "t": 0.0}
-    energy = plus(tree(model, model.kinetic_energy), tree(model, model.potential_energy))
+    energy = tree(model, model.kinetic_energy) + tree(model, model.potential_energy)
     square = np.zeros(next(iter(states.values())).shape)
     with np.errstate(all="ignore"):
         for name, values_of in states.items():

@@ -27,7 +27,7 @@ from vibsim.simulation.derived import derived
 from vibsim.simulation.members import Members, members
 from vibsim.simulation.reference.solve import method, reference
 from vibsim.simulation.scaled import in_scales
-from vibsim.simulation.solution import has_adaptive, solve
+from vibsim.simulation.solution import solve
 
 if TYPE_CHECKING:
     import xarray
@@ -131,7 +131,11 @@ def simulate_record(
         **(_extrema(model, found.extrema) if found.extrema else {}),
         **(_table(MEMBER, _events(found.events)) if found.events else {}),
         **(_event_times(found.events) if found.events and event_times(experiment) else {}),
-        **(_table(MEMBER, _own_steps(run)) if has_adaptive(experiment) else {}),
+        **(
+            _table(MEMBER, _own_steps(run))
+            if any(scheme.adaptive for scheme in experiment.schemes)
+            else {}
+        ),
         **_table(("case",), _constants(model, group, steps)),
     }
     attrs: dict[str, Attribute] = {

@@ -80,11 +80,6 @@ def of_kind(model: Model, scheme: Scheme) -> Callable[..., Trajectories]:
     return integrate if model.loaded is None else structure.integrate
 
 
-def has_adaptive(experiment: Experiment) -> bool:
-    """Tell whether a scheme of `experiment` chooses its own steps."""
-    return any(scheme.adaptive for scheme in experiment.schemes)
-
-
 def _in_order(runs: Sequence[tuple[Trajectories, Integers]]) -> Trajectories:
     """Put members that were stepped with different options where they belong."""
     if len(runs) == 1:

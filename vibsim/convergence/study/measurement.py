@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from vibsim.convergence.error_model.posterior import Ladder
-from vibsim.core.array_types import Flags, Floats
+from vibsim.core.array_types import Floats
 
 LARGEST = 1e150
 """Scaled values do not exceed it: their squares are numbers."""
@@ -35,11 +35,6 @@ def scale_of(values: Floats) -> Floats:
     sizes = np.max(np.abs(values), axis=2)
     size = np.maximum(sizes[:, -1], np.max(sizes, axis=1) / LARGEST)
     return np.asarray(np.ldexp(1.0, np.frexp(np.where(size > 0.0, size, 1.0))[1] - 1))
-
-
-def finite_levels(values: Floats) -> Flags:
-    """Tell which levels hold finite numbers only, shape (member, n)."""
-    return np.asarray(np.all(np.isfinite(values), axis=2))
 
 
 def measurement(

@@ -9,7 +9,7 @@ import numpy as np
 from vibsim.convergence.assessment import Assessment, assess
 from vibsim.convergence.assessment import Question as Asked
 from vibsim.convergence.differences import order_of_differences
-from vibsim.convergence.study.measurement import Measurement, finite_levels, measurement
+from vibsim.convergence.study.measurement import Measurement, measurement
 from vibsim.convergence.thresholds import NOISE_FACTOR, STATED_NOISE_FACTOR
 from vibsim.core.array_types import Flags, Floats, Integers
 from vibsim.core.vocabulary import REASON_NAMES
@@ -79,7 +79,7 @@ def outcomes(
     exact
         Exact values, shape (member, points); None where they are not known.
     """
-    finite = finite_levels(values)
+    finite = np.isfinite(values).all(axis=2)
     found: dict[int, Outcome] = {}
     for pattern in np.unique(finite, axis=0):
         members = np.flatnonzero(np.all(finite == pattern, axis=1))
