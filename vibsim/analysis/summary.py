@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from shlex import quote
 from typing import TYPE_CHECKING, Any
 
@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     import xarray
 
     from vibsim.experiment import Experiment
+    from vibsim.experiment.solver import SolverExperiment
 
 WORST = 10
 """Of a sweep, so many results of a check and so many failures are listed."""
@@ -45,6 +46,18 @@ def summarise(
     """
     record = convergence if isinstance(convergence, Record) else Record.from_xarray(convergence)
     most = None if experiment.sweep is None else WORST
+    checks = [_check(experiment, record, verdict, most) for verdict in verdicts]
+    failures = _failures(experiment, record, most)
+    return content(experiment, checks, failures, int(np.count_nonzero(record["status"])))
+
+
+def content(
+    experiment: Experiment | SolverExperiment,
+    checks: Sequence[Mapping[str, Any]],
+    failures: Sequence[Mapping[str, Any]] = (),
+    failure_count: int = 0,
+) -> dict[str, Any]:
+    """Return the summary of an experiment with these checks and failures, as plain data."""
     given = {"settings": list(experiment.settings)} if experiment.settings else {}
     plain: dict[str, Any] = jsonable(
         {
@@ -54,10 +67,10 @@ def summarise(
             **given,
             "title": experiment.title,
             "source": citation.fields(experiment.source),
-            "status": worst(verdict.status for verdict in verdicts),
-            "checks": [_check(experiment, record, verdict, most) for verdict in verdicts],
-            "failures": _failures(experiment, record, most),
-            "failure_count": int(np.count_nonzero(record["status"])),
+            "status": worst(check["status"] for check in checks),
+            "checks": checks,
+            "failures": failures,
+            "failure_count": failure_count,
         }
     )
     return plain

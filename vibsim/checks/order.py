@@ -31,6 +31,7 @@ from vibsim.comparison.order_evidence import (
     order_of,
 )
 from vibsim.comparison.quantity_comparison import Compared, Comparison
+from vibsim.convergence.circumstances import pick
 from vibsim.convergence.differences import largest, safe_ratio
 from vibsim.convergence.reasons import code
 from vibsim.convergence.thresholds import (
@@ -143,7 +144,7 @@ def phase_at_start(q: Comparison) -> dict[str, Variable]:
     # of the coarsest pair that the order rests on: furthest from round-off
     pair = np.where(first < 0, len(levels) - 1, np.searchsorted(levels, first))
     share = np.stack([safe_ratio(np.abs(d[..., 0]), largest(d)) for d in q.differences], axis=-1)
-    chosen = np.take_along_axis(share, pair[..., None], axis=-1)[..., 0]
+    chosen = pick(share, pair)
     words = f"{q.long_name}: what is there from the start over the largest"
     return {f"{q.name}_at_start": Variable.of(MEMBER, chosen, words)}
 
@@ -215,7 +216,7 @@ def _clean_difference(q: Comparison, norm: str, p: Floats) -> tuple[Floats, Floa
     e = evidence(q, norm, q.order, ORDINARY_ORDER)
     clean = e.difference >= ORDER_ABOVE_ROUND_OFF * (e.floor[..., :-1] + e.floor[..., 1:])
     place = np.max(np.where(clean, np.arange(len(levels) - 1), 0), axis=-1)
-    size = np.take_along_axis(e.difference, place[..., None], axis=-1)[..., 0]
+    size = pick(e.difference, place)
     gap = np.diff(levels)[place]
     whole = np.where(gap > 1, np.expm1(-p * np.log(2.0)) / np.expm1(-p * gap * np.log(2.0)), 1.0)
     return size * whole, levels.astype(np.float64)[place]

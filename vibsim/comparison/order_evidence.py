@@ -20,7 +20,7 @@ from vibsim.apriori.roundoff_floor import SPACING_AT_ONE, norm_of_floor
 from vibsim.comparison.quantity_comparison import Compared, Comparison
 from vibsim.comparison.thresholds import STRAIGHT, THEORY_ROUNDING, VANISHING_RATE
 from vibsim.convergence.batches import batches
-from vibsim.convergence.circumstances import Evidence, at_rest, floor_of_pairs, unresolved
+from vibsim.convergence.circumstances import Evidence, at_rest, floor_of_pairs, pick, unresolved
 from vibsim.convergence.differences import largest, safe_ratio
 from vibsim.convergence.reasons import is_one_of
 from vibsim.convergence.thresholds import ABOVE_ROUND_OFF, HALF_SPACING
@@ -97,7 +97,7 @@ def order_in(q: Comparison, norm: str) -> Floats:
         return typical.order
     # of the finest three levels up to the last one of the window
     at = np.searchsorted(q.block.grid.levels, typical.last) - 2
-    found = np.take_along_axis(orders, np.maximum(at, 0)[..., None], axis=-1)[..., 0]
+    found = pick(orders, at)
     return np.where(np.isnan(typical.order), np.nan, found)
 
 

@@ -127,33 +127,28 @@ class _Evaluation:
     """What the posterior of ladders leads to, but for an exact solution that is missed."""
 
     posterior: Posterior
-    sides: tuple[Floats, Floats, Floats]
+    sides: Floats  # probabilities of a lower, an expected and a higher power, shape (3, ladder)
     exact: Flags
     away: Flags  # only noise, and not the exact solution
     by_three: Flags  # whether three levels decide behind others that do not fit
-    by_theory: (
-        bool  # whether theory promises the order that is expected, and no exact solution is known
-    )
+    by_theory: bool  # whether theory promises the expected order, and no exact solution is known
     cut_short: Flags  # whether noise that may be far less than predicted ends the window: nothing is decided
 
-    def some(self, rows: Integers, *, cut_short: bool) -> _Evaluation:
+    def some(self, rows: Integers) -> _Evaluation:
         """Return what was found of some of the ladders."""
-        lower, right, higher = (side[rows] for side in self.sides)
-        return _Evaluation(
-            self.posterior.some(rows),
-            (lower, right, higher),
-            self.exact[rows],
-            self.away[rows],
-            self.by_three[rows],
-            self.by_theory,
-            np.full(len(rows), cut_short),
+        parts = {name: getattr(self, name)[rows] for name in ("exact", "away", "by_three")}
+        return replace(
+            self,
+            posterior=self.posterior.some(rows),
+            sides=self.sides[:, rows],
+            cut_short=self.cut_short[rows],
+            **parts,
         )
 
     def replace(self, ladders: Integers, other: _Evaluation, rows: Flags) -> None:
         """Take what was found of some ladders from some rows of another one."""
         self.posterior.replace(ladders, other.posterior, rows)
-        for one, of_other in zip(self.sides, other.sides, strict=True):
-            one[ladders] = of_other[rows]
+        self.sides[:, ladders] = other.sides[:, rows]
         self.by_three[ladders] = other.by_three[rows]
 
 
@@ -180,7 +175,7 @@ def _decide_block(ladder: Ladder, factors: Floats, question: Question) -> dict[s
 
 def _evaluate(ladder: Ladder, question: Question, left_out: float) -> _Evaluation:
     believed = posterior(ladder, question.promise, left_out=left_out)
-    of_sides = sides(believed, question.expected, question.at_least, question.tolerance)
+    of_sides = np.stack(sides(believed, question.expected, question.at_least, question.tolerance))
     exact = _is_only_noise(ladder, question.noise_factor)
     away = np.zeros_like(exact)
     if ladder.exact_known:
@@ -214,11 +209,8 @@ def _is_sure(ladder: Ladder, found: _Evaluation, question: Question) -> Flags:
     window = np.sort(p.window, axis=-1)
     if window.shape[1] > 1:
         margins.append(window[:, -1] - window[:, -2])
-    sure = (
-        np.asarray(np.all(np.abs(margins) > ROUGHLY, axis=0))
-        & ~((fails | found.by_theory) & found.by_three)
-        & ~found.cut_short
-    )
+    sure: Flags = np.all(np.abs(margins) > ROUGHLY, axis=0) & ~found.cut_short
+    sure &= ~((fails | found.by_theory) & found.by_three)
     if ladder.exact_known:
         open_still = np.flatnonzero(sure & ~_meets(ladder, p))
         if len(open_still):
@@ -254,10 +246,10 @@ def _with_less_noise(ladder: Ladder, found: _Evaluation, question: Question) -> 
     rows = np.flatnonzero(found.cut_short & ~found.exact)
     if not len(rows):
         return found
-    first = found.some(rows, cut_short=False)
-    less = replace(ladder.some(rows), floor=_least_noise(ladder)[rows])
-    other = _evaluate(less, question, LEFT_OUT).some(np.arange(len(rows)), cut_short=False)
     none = np.zeros(len(rows), dtype=bool)
+    first = replace(found.some(rows), cut_short=none)
+    less = replace(ladder.some(rows), floor=_least_noise(ladder)[rows])
+    other = replace(_evaluate(less, question, LEFT_OUT), cut_short=none)
     own, others = (_reasons(one, none) for one in (first, other))
     excluded = _probability(own, other) < RISK
     added = ~is_one_of(own, *DECIDED) & is_one_of(others, *DECIDED)

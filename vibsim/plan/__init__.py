@@ -6,7 +6,7 @@ experiments each time it starts.
 
 from typing import TYPE_CHECKING
 
-from vibsim.core.lazy import loader
+from vibsim.core.lazy import lazy
 from vibsim.plan.cache import load, load_all
 from vibsim.plan.choose import Choice, choose, experiments
 from vibsim.plan.jobs import Batch, LevelJob, Plan, ShardJob
@@ -32,11 +32,10 @@ __all__ = [
     "sampling",
 ]
 
-__getattr__ = loader(
+__getattr__, __dir__ = lazy(
     __name__,
     {
-        "columns": "vibsim.experiment.sweep_columns",
-        "option_groups": "vibsim.experiment.sweep_columns",
-        "sampling": "vibsim.experiment.storage",
+        "vibsim.experiment.sweep_columns": ("columns", "option_groups"),
+        "vibsim.experiment.storage": ("sampling",),
     },
 )

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from vibsim.analysis.summary import WORST
+from vibsim.analysis.summary import WORST, content
 from vibsim.checks.fields import GROUP, name_of
 from vibsim.checks.outcome import compared_reason
 from vibsim.checks.solver_facts import SOLVER_FACTS
@@ -20,8 +20,7 @@ from vibsim.core.array_types import Floats
 from vibsim.core.errors import VibsimError
 from vibsim.core.record import Record, Variable, attributes, flags
 from vibsim.core.set_option import set_options
-from vibsim.core.vocabulary import FORMAT, REASON_NAMES, SEVERITY, STATUSES, jsonable, worst
-from vibsim.experiment import citation
+from vibsim.core.vocabulary import REASON_NAMES, SEVERITY, STATUSES, worst
 from vibsim.experiment.schema.solver import SolverCheck
 from vibsim.experiment.solver import SolverExperiment
 from vibsim.solver import level_output
@@ -103,22 +102,7 @@ def _bare(verdict: LadderVerdict) -> LadderVerdict:
 
 def summarise(experiment: SolverExperiment, checks: Sequence[CheckResults]) -> dict[str, Any]:
     """Return the summary of an experiment, as `vibsim.analysis.summary.summarise` does."""
-    given = {"settings": list(experiment.settings)} if experiment.settings else {}
-    plain: dict[str, Any] = jsonable(
-        {
-            "vibsim_format": FORMAT,
-            "collection": experiment.collection,
-            "experiment": experiment.name,
-            **given,
-            "title": experiment.title,
-            "source": citation.fields(experiment.source),
-            "status": worst(check.status for check in checks),
-            "checks": [_check(experiment, check) for check in checks],
-            "failures": [],
-            "failure_count": 0,
-        }
-    )
-    return plain
+    return content(experiment, [_check(experiment, check) for check in checks])
 
 
 def _check(experiment: SolverExperiment, found: CheckResults) -> dict[str, Any]:

@@ -160,12 +160,19 @@ def _phrases(facts: LadderVerdict, setting: Setting) -> dict[str, Any]:
     h, count = [level.h for level in facts.levels], len(facts.levels)
     finer = h[-1] * (h[-1] / h[-2] if count > 1 else 0.5)
     not_finite = [level.h for level in facts.levels if level.value is None]
+    if facts.expected is not None:
+        wanted, as_expected = f"{facts.expected:g}", ", as expected"
+    elif facts.at_least is not None:
+        wanted = f"at least {facts.at_least:g}"
+        as_expected = f", {wanted} as expected"
+    else:
+        wanted, as_expected = "another one", ""
     points = "Take levels that have the coarsest points in common (restrict: subset)"
     return {
         "quantity": facts.quantity,
         "order": order_with_interval(facts),
-        "as_expected": _as_expected(facts),
-        "wanted": _wanted(facts),
+        "as_expected": as_expected,
+        "wanted": wanted,
         "value": "value" if facts.is_number else "values",
         "noise": "the stated noise" if setting.noise else "round-off",
         "floor": "the stated noise" if setting.noise else "round-off or other noise",
@@ -195,12 +202,6 @@ def order_with_interval(facts: LadderVerdict) -> str:
     )
 
 
-def _as_expected(facts: LadderVerdict) -> str:
-    if facts.expected is not None:
-        return ", as expected"
-    return f", at least {facts.at_least:g} as expected" if facts.at_least is not None else ""
-
-
 def higher_part(order: float, expected: float, tolerance: float) -> str:
     """Say why the measured order is away from the one that dominates; empty where it is near."""
     if abs(order - expected) <= tolerance:
@@ -213,12 +214,6 @@ def _higher_part(facts: LadderVerdict) -> str:
     if facts.reason != "asymptotic" or facts.expected is None or facts.order is None:
         return ""
     return higher_part(facts.order, facts.expected, ORDER_TOLERANCE)
-
-
-def _wanted(facts: LadderVerdict) -> str:
-    if facts.expected is not None:
-        return f"{facts.expected:g}"
-    return f"at least {facts.at_least:g}" if facts.at_least is not None else "another one"
 
 
 def _interval(facts: LadderVerdict) -> str:
