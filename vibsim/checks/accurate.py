@@ -8,6 +8,7 @@ whose errors fall by no known power bounds nothing.
 from __future__ import annotations
 
 import math
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -21,8 +22,9 @@ from vibsim.checks.sentences import (
     Description,
     Found,
     add_levels,
+    cost_in_words,
 )
-from vibsim.checks.value import unit_of_quantity
+from vibsim.checks.value import FINER, unit_of_quantity
 from vibsim.comparison.finest_error import FinestError, error_of_finest
 from vibsim.comparison.order_evidence import judgement
 from vibsim.comparison.quantity_comparison import Compared, Comparison
@@ -61,8 +63,6 @@ ORDER_KNOWN = "asymptotic", "exact", "order_low", "order_high"
 """Reasons of verdicts on an order that say by which power errors fall."""
 MOST = 12
 """More levels than that are no prediction."""
-FINER = 2
-"""So many finer levels are advised."""
 
 
 def measure(block: MemberBlock, compared: Compared, check: AccurateCheck) -> Measured:
@@ -222,6 +222,7 @@ class _Phrases:
         self.subject = f.notation.opening(self.what)
         self.level: int = f.fact("level")
         self.asked = f.notation.number(check.accuracy)
+        self.cost = partial(cost_in_words, f.experiment)
 
     def _counted(self, error: float) -> str:
         """Write an error as the check counts it."""
@@ -267,12 +268,12 @@ class _Phrases:
             return WRONG_LIMIT.format(scheme=self.f.scheme_name)
         if needed < 0:
             return f"Take finer `levels:` or a scheme of higher order (`schemes:`), or c{change}."
-        add = add_levels(self.f.experiment, self.level, needed - self.level)
+        add = add_levels(self.level, needed - self.level, self.cost)
         return f"A{add}, which probably reaches it by the measured order, or c{change}."
 
     def more_levels(self) -> str:
         """Say what shows an order."""
         ask = f"The check `{{converges: {self.check.accurate}}}` says what its order needs"
         if self.f.reason in ("pre_asymptotic", "too_few_levels", "oscillating"):
-            return f"A{add_levels(self.f.experiment, self.level, FINER)}. {ask}."
+            return f"A{add_levels(self.level, FINER, self.cost)}. {ask}."
         return f"{ask}. The bound of the error rests on it."

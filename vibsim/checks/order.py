@@ -19,7 +19,7 @@ from collections.abc import Callable
 import numpy as np
 
 from vibsim.apriori.formal_orders import even_powers, orders_in, relative_floors
-from vibsim.checks.accurate import ERROR, known_error
+from vibsim.checks.accurate import ERROR, MOST, known_error
 from vibsim.checks.fields import REASON, STATUS, Field, Measured
 from vibsim.checks.outcome import Judged, as_expected
 from vibsim.comparison.order_evidence import (
@@ -82,8 +82,6 @@ BESIDE = {
 """Facts that are not measured by the check."""
 
 UNKNOWN = -1
-MOST = 12
-"""More levels than that are no prediction."""
 SLOWEST = 0.9
 """Orders that approach by a larger factor do not tell where they go."""
 FINEST = 40

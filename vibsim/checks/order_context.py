@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -20,8 +21,8 @@ from vibsim.apriori.formal_orders import (
 )
 from vibsim.checks.accurate import error_in_words
 from vibsim.checks.phase_amplitude_text import parts_in_words
-from vibsim.checks.sentences import Found, growth_in_words
-from vibsim.checks.stable import ALIKE
+from vibsim.checks.sentences import Found, cost_in_words, growth_in_words
+from vibsim.checks.stable import ALIKE, first_within
 from vibsim.comparison.comparison_variables import has_exact
 from vibsim.core.record import Record
 from vibsim.core.vocabulary import is_error_part, whole_of
@@ -54,7 +55,6 @@ class OrderContext:
         def stored(name: str, *place: int) -> float:
             return float(record[name][place]) if name in record else math.nan
 
-        self.experiment = experiment
         self.quantity, self.norm, self.tolerance = quantity, check.norm, check.tolerance
         self.is_position = quantity in model.positions
         self.notation, self.reason = f.notation, f.reason
@@ -79,6 +79,7 @@ class OrderContext:
         self.compensated: int = f.fact("readable_level_compensated")
         """... and the same in compensated arithmetic."""
         self.has_exact = has_exact(record, quantity, scheme, case)
+        self.cost = partial(cost_in_words, experiment)
         self.error = error_in_words(f, quantity)
         """How large the error of the finest level is; empty where it is not known."""
 
@@ -185,7 +186,7 @@ class OrderContext:
         """The coarsest level whose w dt is within the limit."""
         if not self.is_beyond_limit:
             return self.levels[-1] + 1
-        return self.culprit + math.ceil(math.log2(self.omega_dt / self.limit) - 1e-9)
+        return first_within(self.limit, self.culprit, self.omega_dt)
 
 
 def _orders(record: Record, check: ConvergesCheck, scheme: int, case: int) -> tuple[float, ...]:

@@ -11,14 +11,7 @@ from collections.abc import Mapping
 from itertools import pairwise
 
 from vibsim.checks.order_context import COINCIDE, OrderContext
-from vibsim.checks.sentences import (
-    WRONG_LIMIT,
-    Description,
-    Found,
-    Template,
-    add_levels,
-    cost_in_words,
-)
+from vibsim.checks.sentences import WRONG_LIMIT, Description, Found, Template, add_levels
 from vibsim.convergence.study.sentences import higher_part
 from vibsim.convergence.thresholds import HALF_SPACING
 from vibsim.core.vocabulary import order_interval
@@ -361,7 +354,7 @@ class _Phrases(OrderContext):
         return max([self.culprit, self.levels[0], *failed]) + 1
 
     def cost_of_first(self) -> str:
-        return cost_in_words(self.experiment, [self.first_good()])
+        return self.cost([self.first_good()])
 
     def place(self) -> str:
         """Say where a calculation broke down, as far as it is known."""
@@ -408,7 +401,7 @@ class _Phrases(OrderContext):
 
     def add(self, count: int = 2) -> str:
         """Ask for so many finer levels, with what they cost."""
-        return f"A{add_levels(self.experiment, self.levels[-1], count)}"
+        return f"A{add_levels(self.levels[-1], count, self.cost)}"
 
     def add_missing(self) -> str:
         return self.add(min(max(4 - len(self.levels), 1), 2))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import string
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, NamedTuple
@@ -146,13 +146,13 @@ def cost_in_words(experiment: Experiment, levels: Sequence[int]) -> str:
     return f"{count} steps, {time} on one core, {size} of memory"
 
 
-def add_levels(experiment: Experiment, finest: int, count: int) -> str:
-    """Ask for so many levels finer than one, with what they cost; from the second letter on."""
+def add_levels(finest: int, count: int, cost: Callable[[Sequence[int]], str]) -> str:
+    """Ask for so many levels finer than one, with what they cost in words; from the second letter on."""
     last = finest + count
     finer = list(range(finest + 1, last + 1))
     names = {1: f"level {last}", 2: f"levels {finer[0]} and {last}"}
     which = names.get(count, f"levels {finer[0]} to {last}")
-    return f"dd {which} to `levels:` ({cost_in_words(experiment, finer)})"
+    return f"dd {which} to `levels:` ({cost(finer)})"
 
 
 def _time(seconds: float) -> str:

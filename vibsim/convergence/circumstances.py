@@ -76,7 +76,7 @@ def beside_each_other(rows: Sequence[Evidence]) -> Evidence:
 def breakdown(e: Evidence) -> tuple[Flags, Flags, Flags]:
     """Say of every level whether it broke down or is beyond the limit, and of every ladder whether it grows."""
     # at the limit itself a scheme may still be stable, and w dt carries rounding
-    beyond = e.omega_dt > e.stability_limit[..., None] * (1 + 1e-9)
+    beyond = e.omega_dt > e.stability_limit[..., None] * (1.0 + th.LIMIT_ROUNDING)
     last, before = e.growth[..., -1], e.growth[..., -2:][..., 0]
     growing = (last > th.BLOWN_UP) & ~(last < 0.5 * before)
     # long steps go on with a velocity that has gone, and with its rounding: as far as that on every level

@@ -1,9 +1,14 @@
-"""Ladders that are judged in blocks, each of them in units of its own size."""
+"""Ladders that are worked on together: few are put beside each other, many are judged in blocks in their own units.
+
+A call of an array operation costs as much as hundreds of numbers, so the few ladders of a small experiment are put
+beside each other. Arrays of many more would not stay in the cache of a core. No number depends on it.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
+from typing import TypeVar
 
 import numpy as np
 
@@ -11,10 +16,21 @@ from vibsim.convergence.error_model.posterior import Ladder
 from vibsim.convergence.reasons import STATUS_OF, code
 from vibsim.core.array_types import Floats, Integers
 
+LADDERS = 4096
+"""So many ladders at most are put beside each other; one row of more is worked on by itself."""
 BLOCK = 1024
 """So many ladders are judged together at most."""
 LARGEST_RATIO = 1e60
 """Of a difference to the largest finer one, and of noise to the largest difference: more says no more."""
+
+Row = TypeVar("Row")
+
+
+def batches(rows: Sequence[Row], ladders: int) -> Iterator[Sequence[Row]]:
+    """Yield rows, of so many ladders each, that are worked on together."""
+    size = max(LADDERS // max(ladders, 1), 1)
+    for start in range(0, len(rows), size):
+        yield rows[start : start + size]
 
 
 def in_blocks(

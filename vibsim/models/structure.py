@@ -24,7 +24,7 @@ from typing import Any
 
 import numpy as np
 
-from vibsim.core.array_types import Floats
+from vibsim.core.array_types import Complexes, Floats
 from vibsim.formula import (
     ONE,
     ZERO,
@@ -41,7 +41,6 @@ from vibsim.formula import (
 )
 from vibsim.models.base import Model, Numbers, Parameter, declared_parameters
 from vibsim.models.shared.matrices import (
-    Complex,
     Matrix,
     Modes,
     all_modes,
@@ -312,7 +311,7 @@ class Loaded:
         weighed = own.mass.sparse @ modes.shapes
         start = tuple(weighed.T @ x for x in own.start_of(initial))
         pushes = own.shapes @ modes.shapes
-        loads: list[tuple[Complex, float]] = []
+        loads: list[tuple[Complexes, float]] = []
         for push, rows in zip(pushes, self.harmonics, strict=True):
             for row in rows:
                 amplitude, angular, phase = (
