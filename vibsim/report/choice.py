@@ -14,9 +14,9 @@ from vibsim.experiment.storage import checked_quantities
 from vibsim.report.data import (
     Member,
     basis_of_order,
-    case_name,
     flags,
     formal_orders,
+    of_case,
     place_of,
     swept,
 )
@@ -81,10 +81,9 @@ def members(record: Record, quantity: str) -> list[Member]:
     These are the worst member, judged by the verdicts on `quantity` and then by the distance of the order from the
     promised one (of several schemes the worst decides), and a typical one of those that pass, if any does.
     """
-    schemes = record.words("scheme")
     if not swept(record) or f"{quantity}_status" not in record:
         # a large sweep has verdicts on what checks ask about alone
-        return [Member(s, 0, name, case_name(record, 0)) for s, name in enumerate(schemes)]
+        return of_case(record, 0)
     status = flags(record, f"{quantity}_status")
     severity = np.max([(status == word) * rank for word, rank in SEVERITY.items()], axis=(0, 1))
     away = np.abs(deviation(record, quantity))
@@ -93,11 +92,8 @@ def members(record: Record, quantity: str) -> list[Member]:
     score = np.sum(status == "PASS", axis=0) * (len(status) + 1) - np.sum(status == "FAIL", axis=0)
     healthy = ranking[score[ranking] == score.max()]
     roles = {int(healthy[healthy.size // 2]): "typical", int(ranking[-1]): "worst"}
-    return [
-        Member(s, case, name, case_name(record, case), role)
-        for case, role in reversed(roles.items())
-        for s, name in enumerate(schemes)
-    ]
+    shown = reversed(roles.items())
+    return [member for case, role in shown for member in of_case(record, case, role)]
 
 
 def worst(record: Record, quantity: str) -> Member:
@@ -142,6 +138,11 @@ class Lead:
         return {} if self.entry is None else self.entry["results"][0]
 
     @property
+    def facts(self) -> Mapping[str, Any]:
+        """What was measured where the check is decided."""
+        return self.result.get("facts") or {}
+
+    @property
     def is_on_order(self) -> bool:
         """Whether the check asks for an order."""
         return self.measured is not None and self.measured.kind == "converges"
@@ -153,14 +154,15 @@ class Lead:
         return check.norm if check is not None and check.kind == "converges" else TYPICAL_NORM
 
 
+def is_refutation(check: Check | None) -> bool:
+    """Say whether a check expects a statement to be false."""
+    return check is not None and check.kind == "claim" and not check.holds
+
+
 def is_trap(check: Check | None) -> bool:
     """Say whether a check expects a verdict other than PASS, or a statement to be false."""
-    if check is None:
-        return False
-    if check.kind == "claim":
-        return not check.holds
     expected = getattr(check, "expect", None)
-    return expected is not None and expected.status != "PASS"
+    return is_refutation(check) or (expected is not None and expected.status != "PASS")
 
 
 def find_lead(experiment: Experiment, record: Record, summary: Mapping[str, Any]) -> Lead:
@@ -183,18 +185,13 @@ def find_lead(experiment: Experiment, record: Record, summary: Mapping[str, Any]
 
     listed = [entry for entry in summary["checks"] if entry.get("results")]
     if not listed:
-        return Lead(usual, _member(record, {}))
+        return Lead(usual, of_case(record, 0)[0])
     entry = min(listed, key=rank)
     check = asserted.get(entry["id"])
     named = str(entry.get("quantity") or usual)
     is_compared = any(f"{named}_{of}_norm" in record for of in ("difference", "error"))
     quantity = named if is_compared else usual
-    return Lead(quantity, _member(record, entry["results"][0]), entry, check)
-
-
-def _member(record: Record, result: Mapping[str, Any]) -> Member:
-    """Return the scheme and the member of a result; the first ones where it names none."""
-    names = record.words("scheme")
-    scheme = names.index(result["scheme"]) if result.get("scheme") in names else 0
-    case = place_of(record, result.get("case", -1)) or 0
-    return Member(scheme, case, names[scheme], case_name(record, case))
+    result = entry["results"][0]
+    every = of_case(record, place_of(record, result.get("case", -1)) or 0)
+    member = next((one for one in every if one.scheme_name == result.get("scheme")), every[0])
+    return Lead(quantity, member, entry, check)

@@ -136,8 +136,8 @@ PROSE = {"phase", "amplitude", "largest"} | {name.partition("_")[0] for name in 
 """With what the name of a value, or of a part of an error, begins."""
 
 
-RAISE = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
-"""Digits to superscripts."""
+RAISE, LOWER = (str.maketrans("-0123456789", to) for to in ("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "₋₀₁₂₃₄₅₆₇₈₉"))
+"""Digits to superscripts, and to subscripts."""
 
 
 def power(exponent: int) -> str:
@@ -238,7 +238,7 @@ def _significant(value: float, digits: int, fixed: bool) -> str:
 
 def lowered(level: int) -> str:
     """Write a level as a subscript."""
-    return str(level).translate(str.maketrans("-0123456789", "₋₀₁₂₃₄₅₆₇₈₉"))
+    return str(level).translate(LOWER)
 
 
 def raised(exponent: float) -> str:
@@ -263,8 +263,20 @@ def interval(bounds: Sequence[float | None] | None) -> str:
     if len(known) < 2:
         return "–"
     if max(map(abs, known)) >= 1e4:
-        return f"{number(known[0], 'order')} to {number(known[1], 'order')}"
+        return " to ".join(number(end, "order") for end in known)
     return " to ".join(end.replace("-", "−") for end in order_interval(*known))
+
+
+def between(bounds: Sequence[float | None] | None) -> str:
+    """Write the interval of an order as part of a sentence; empty where there is none."""
+    text = interval(bounds)
+    return f"between {text.replace(' to ', ' and ')}" if text != "–" else ""
+
+
+def with_interval(order: float | None, bounds: Sequence[float | None] | None) -> str:
+    """Write an order, and in brackets its interval."""
+    text = interval(bounds)
+    return f"{number(order, 'order')}{f' ({text})' if text != '–' else ''}"
 
 
 def levels(window: Sequence[int] | None) -> str:

@@ -20,8 +20,9 @@ from vibsim.report.data import Member
 from vibsim.report.figures import panels, time
 from vibsim.report.figures.sweeps.view import ring
 from vibsim.report.style import Picture
+from vibsim.report.sweep_layout import Along, Grid
 from vibsim.report.text import findings
-from vibsim.report.types import Axes, Experiment, Figure
+from vibsim.report.types import Axes, Experiment
 
 LEFT, RIGHT, HEIGHT = 5.4, 3.9, 2.75
 """Widths of the left picture and of the right one, and their height [inch]."""
@@ -51,12 +52,6 @@ def _name(ax: Axes, title: str) -> None:
     ax.set_title(title, fontweight="normal", fontsize=8.5, color=style.GREY)
 
 
-def _root(ax: Axes) -> Figure:
-    figure = ax.get_figure(root=True)
-    assert figure is not None
-    return figure
-
-
 def _legend(ax: Axes, columns: int, size: float) -> None:
     """Write the legend in a strip of its own above the curves, where it hides none."""
     rows = -(-len(ax.get_legend_handles_labels()[0]) // columns)
@@ -76,26 +71,19 @@ def differences(record: Record, lead: Lead) -> Picture | None:
         return None
     quantity, member = lead.quantity, lead.member
     t, curves = data.times(record, member.case), time.differences(record, quantity, member)
-    shown = [curve for curve in curves if curve.is_whole and curve.sound] or curves
+    shown = [curve for curve in curves if curve.is_readable] or curves
     values = [curve.values for curve in shown]
-    if not style.finite(*values).size or not np.any(style.finite(*values)):
+    if not np.any(style.finite(*values)):
         return None
-    wild = panels.explosive(values)
-    exponent = 0 if wild else style.scale(*values)
+    scale = panels.Scale.of(values)
     letter, measure = words.symbol(quantity), data.unit(record, f"{quantity}_difference")
-    ax = _panel(LEFT, style.label(f"rescaled differences of {letter}", measure, exponent))
+    ax = _panel(LEFT, style.label(f"rescaled differences of {letter}", measure, scale.exponent))
     ax.set_gid(style.TIME)
     for i, curve in enumerate(shown):
-        y = style.no_zeros(curve.values) if wild else curve.values / 10.0**exponent
-        look: dict[str, Any] = {
-            "color": style.COLOURS[i % style.MANY],
-            "linewidth": 5.5 - 4.2 * i / max(1, len(shown) - 1),
-        }
-        ax.plot(*style.thin(t, y, 200), label=curve.label, gid=curve.group, **look)
-    if wild:
-        style.log_axis(ax, "y", *panels.decades(values))
-    else:
-        ax.set_ylim(*style.limits(*(part / 10.0**exponent for part in values)))
+        colour, width = style.COLOURS[i % style.MANY], 5.5 - 4.2 * i / max(1, len(shown) - 1)
+        line = style.thin(t, scale.scaled(curve.values), 200)
+        ax.plot(*line, label=curve.label, gid=curve.group, color=colour, linewidth=width)
+    scale.apply(ax)
     ax.set_xlim(float(t[0]), float(t[-1]) if t[-1] > t[0] else 1.0)
     ax.set_xlabel(data.time_label(record))
     size = 8.0 if max(len(curve.label) for curve in shown) < LONG else 6.0
@@ -106,7 +94,7 @@ def differences(record: Record, lead: Lead) -> Picture | None:
         "The difference between each level and the next finer one, multiplied so that the curves fall on one another "
         "where the error has the promised order.",
         f"Rescaled differences of {words.name(quantity)} between successive levels against time, {member.title}",
-        _root(ax),
+        ax.get_figure(root=True),
     )
 
 
@@ -130,7 +118,8 @@ def against_step(experiment: Experiment, record: Record, lead: Lead) -> Picture 
     size, part = SIZES[lead.norm]
     names = record.words("scheme")
     others = [s for s in range(len(names)) if s != lead.member.scheme][: MOST_SCHEMES - 1]
-    dt, scale = data.steps_of(record, case), duration(record, case) ** part
+    # an L2 norm over the root of the duration is the root of the mean square
+    dt, scale = data.steps_of(record, case), float(data.ends_of(record)[case]) ** part
     ax = _panel(RIGHT, style.label(f"{size} of {letter}", measure))
     ax.set_gid(style.STEP)
     drawn: list[Floats] = []
@@ -140,13 +129,10 @@ def against_step(experiment: Experiment, record: Record, lead: Lead) -> Picture 
         if not math.isfinite(data.formal_order(record, member, quantity)):
             continue
         estimate, true = (one / scale for one in _errors(record, quantity, member, lead.norm))
-        colour = style.COLOURS[s % style.MANY]
-        is_lead = s == lead.member.scheme
-        shape = style.MARKERS[s % style.MANY]
-        mark: dict[str, Any] = {"color": colour, "linestyle": "none", "marker": shape}
-        alone = len(names) == 1
+        is_lead, alone = s == lead.member.scheme, len(names) == 1
         text = "estimated" if alone else style.entry(names[s])
-        mark["gid"] = None if alone else text
+        mark: dict[str, Any] = {"linestyle": "none", "gid": None if alone else text}
+        mark |= {"color": style.COLOURS[s % style.MANY], "marker": style.MARKERS[s % style.MANY]}
         if style.finite(estimate).size:
             ax.plot(dt, estimate, **mark, markersize=5 if is_lead else 3.5, label=text)
             drawn.append(estimate)
@@ -156,18 +142,15 @@ def against_step(experiment: Experiment, record: Record, lead: Lead) -> Picture 
             ax.plot(dt, true, **ring, label="true" if alone else f"_true, {names[s]}")
             drawn.append(true)
             told["Rings: the true error."] = None
-        has_order = math.isfinite(
-            data.stated_order(record, quantity, member, data.norm_index(record, lead.norm))[0]
-        )
+        norm = data.norm_index(record, lead.norm)
+        has_order = math.isfinite(data.stated_order(record, quantity, member, norm)[0])
         if is_lead and (has_order or lead.is_on_order) and lead.result.get("reason") != "exact":
-            order = data.formal_order(record, member, quantity)
-            _slope(
-                ax,
-                dt,
-                np.where(np.isfinite(true), true, estimate),
-                order,
-                data.basis_of_order(record, quantity),
-            )
+            error = np.where(np.isfinite(true), true, estimate)
+            for last in np.flatnonzero(np.isfinite(error))[-1:]:
+                order = data.formal_order(record, member, quantity)
+                line = error[last] * (dt / dt[last]) ** order
+                due = f"order {order:g}, {data.basis_of_order(record, quantity)}"
+                ax.plot(dt, line, **style.REFERENCE | {"color": style.GREY}, label=due)
     if sum(style.finite(part).size for part in drawn) < FEWEST:
         return None
     high = max(float(part[np.isfinite(part)].max()) for part in drawn)
@@ -189,7 +172,7 @@ def against_step(experiment: Experiment, record: Record, lead: Lead) -> Picture 
             "Both axes are logarithmic, so an error of order p is a line of slope p.", *told
         ),
         f"Error of {words.name(quantity)} against the time step",
-        _root(ax),
+        ax.get_figure(root=True),
     )
 
 
@@ -204,10 +187,8 @@ def solution(record: Record, quantity: str, member: Member, *, is_left: bool) ->
     has_exact = bool(np.isfinite(exact).any())
     if has_exact:
         ax.plot(*style.thin(t, exact, 200), color=style.PALE, linewidth=4.5, label="exact")
-    steps = words.number(int(record["steps"][-1]), "integer")
-    ax.plot(
-        *style.thin(t, values, 200), color=style.COLOURS[0], linewidth=1.4, label=f"{steps} steps"
-    )
+    text = f"{words.number(int(record['steps'][-1]), 'integer')} steps"
+    ax.plot(*style.thin(t, values, 200), color=style.COLOURS[0], linewidth=1.4, label=text)
     panels.fit_values(ax, [values], exact)
     panels.stop_at_breakdown(ax, t, [values])
     ax.set_xlabel(data.time_label(record))
@@ -215,14 +196,8 @@ def solution(record: Record, quantity: str, member: Member, *, is_left: bool) ->
     return Picture(
         "hero_solution", f"{letter}(t), {member.scheme_name}",
         "The solution of the finest level." + " Wide and grey: the exact solution." * has_exact,
-        f"{words.name(quantity)} against time for {member.title}", _root(ax),
+        f"{words.name(quantity)} against time for {member.title}", ax.get_figure(root=True),
     )  # fmt: skip
-
-
-def duration(record: Record, case: int) -> float:
-    """Return how long a member runs; an L2 norm over its root is the root of the mean square."""
-    ends = data.ends_of(record)
-    return float(ends[case if ends.size > 1 else 0])
 
 
 def _errors(record: Record, quantity: str, member: Member, name: str) -> tuple[Floats, Floats]:
@@ -246,16 +221,6 @@ def _errors(record: Record, quantity: str, member: Member, name: str) -> tuple[F
     return style.positive(estimate), style.positive(true)
 
 
-def _slope(ax: Axes, dt: Floats, error: Floats, order: float, due: str) -> None:
-    """Draw the slope of an order through the finest error that is known."""
-    if not math.isfinite(order):
-        return
-    for last in np.flatnonzero(np.isfinite(error))[-1:]:
-        line = error[last] * (dt / dt[last]) ** order
-        look = style.REFERENCE | {"color": style.GREY}
-        ax.plot(dt, line, **look, label=f"order {order:g}, {due}")
-
-
 def response(experiment: Experiment, record: Record, lead: Lead) -> Picture | None:
     """Draw a number of every member over the swept parameters, the one that decides marked; None without a sweep."""
     keys = sweep_layout.keys(record)
@@ -263,11 +228,11 @@ def response(experiment: Experiment, record: Record, lead: Lead) -> Picture | No
     if found is None:
         return None
     name, text, values = found
-    along, grid = sweep_layout.along_of(keys), sweep_layout.grid_of(keys)
-    if along is not None:
-        ax = _curves(record, lead, along, values, text)
-    elif grid is not None:
-        ax = _map(lead, grid, values, text)
+    layout = sweep_layout.layout_of(keys)
+    if isinstance(layout, Along):
+        ax = _curves(lead, layout, values, text)
+    elif isinstance(layout, Grid):
+        ax = _map(lead, layout, values, text)
     else:
         ax = _dots(lead, max(keys, key=lambda key: key.distinct.size), values, text)
     count = words.number(len(record["case"]), "integer")
@@ -278,7 +243,7 @@ def response(experiment: Experiment, record: Record, lead: Lead) -> Picture | No
         "Each member is one run of the sweep, at its finest level."
         + " The ring is the member that decides." * is_marked,
         f"{name} of every member over the swept parameters",
-        _root(ax),
+        ax.get_figure(root=True),
     )
 
 
@@ -300,17 +265,16 @@ def _number(experiment: Experiment, record: Record, lead: Lead) -> tuple[str, st
     error = finest_level.error(record, quantity).best[scheme]
     if not finest_level.varies(error):
         return None
-    label = style.label(f"error of {words.symbol(quantity)}", data.norm_unit(record, quantity))
-    return f"error of {words.symbol(quantity)}", label, error
+    text = f"error of {words.symbol(quantity)}"
+    return text, style.label(text, data.norm_unit(record, quantity)), error
 
 
 def _scaled(ax: Axes, which: str, values: Floats) -> None:
     """Make an axis logarithmic where positive values spread over decades."""
-    known = style.finite(values)
-    if known.min() > 0.0 and known.max() > sweep_layout.LOG_RATIO * known.min():
-        style.log_axis(ax, which, *style.log_limits(known), most=5)
+    if style.spans_decades(values):
+        style.log_axis(ax, which, *style.log_limits(values), most=5)
     else:
-        ax.set(**{f"{which}lim": style.limits(known)})
+        ax.set(**{f"{which}lim": style.limits(values)})
 
 
 def _across(ax: Axes, key: sweep_layout.Key) -> None:
@@ -324,9 +288,7 @@ def _across(ax: Axes, key: sweep_layout.Key) -> None:
     ax.set_xlabel(key.label)
 
 
-def _curves(
-    record: Record, lead: Lead, along: sweep_layout.Along, values: Floats, text: str
-) -> Axes:
+def _curves(lead: Lead, along: Along, values: Floats, text: str) -> Axes:
     ax = _panel(LEFT, text)
     for i, (name, cases) in enumerate(along.lines):
         x, y = along.key.values[cases], values[cases]
@@ -341,12 +303,11 @@ def _curves(
     return ax
 
 
-def _map(lead: Lead, grid: sweep_layout.Grid, values: Floats, text: str) -> Axes:
+def _map(lead: Lead, grid: Grid, values: Floats, text: str) -> Axes:
     from matplotlib.colors import LogNorm, Normalize
 
     ax = _panel(LEFT, text, right=0.95)
-    known = style.finite(values)
-    is_log = known.min() > 0.0 and known.max() > sweep_layout.LOG_RATIO * known.min()
+    known, is_log = style.finite(values), style.spans_decades(values)
     ends = float(known.min()), float(known.max())
     norm = LogNorm(*ends) if is_log else Normalize(*ends)
     table = np.ma.masked_invalid(grid.worst(values))
@@ -360,7 +321,7 @@ def _map(lead: Lead, grid: sweep_layout.Grid, values: Floats, text: str) -> Axes
     ax.set_ylabel(grid.y.label)
     ax.grid(visible=False)
     inside = ax.inset_axes((1.03, 0.0, 0.035, 1.0))
-    bar = _root(ax).colorbar(mesh, cax=inside)
+    bar = ax.figure.colorbar(mesh, cax=inside)
     if is_log:
         style.log_ticks(bar.ax.yaxis, *ends, most=5)
     _mark(ax, grid.x.values, grid.y.values, lead, on_map=True)
@@ -368,10 +329,8 @@ def _map(lead: Lead, grid: sweep_layout.Grid, values: Floats, text: str) -> Axes
 
 
 def _dots(lead: Lead, key: sweep_layout.Key, values: Floats, text: str) -> Axes:
-    ax = _panel(LEFT, text)
-    ax.plot(
-        key.values, values, ".", color=style.COLOURS[0], markersize=3, rasterized=values.size > 500
-    )
+    ax, is_many = _panel(LEFT, text), values.size > 500
+    ax.plot(key.values, values, ".", color=style.COLOURS[0], markersize=3, rasterized=is_many)
     _across(ax, key)
     _scaled(ax, "y", values)
     _mark(ax, key.values, values, lead)
@@ -400,14 +359,12 @@ def orders(experiment: Experiment, record: Record, lead: Lead) -> Picture | None
     due = np.unique(promised[np.isfinite(promised)])
     around = np.concatenate([due - 2 * allowed, due + 2 * allowed]) if due.size else order[known]
     shown = np.clip(order, around.min() - 1.0, around.max() + 1.0)
-    missing = int(np.sum(~known))
     if order.size > FEW:
         ax = _panel(RIGHT, "members (logarithmic)")
         borders = np.linspace(*style.limits(shown[known], around), 41)
         ax.hist(shown[known], borders.tolist(), color=style.COLOURS[0])
         for value in due:
             ax.axvspan(value - allowed, value + allowed, **style.ALLOWED)
-        ax.set_yscale("log")
         most = float(np.histogram(shown[known], borders)[0].max())
         style.log_axis(ax, "y", 0.7, 2.0 * most, most=5)
         ax.set_xlabel(f"observed order of {letter}")
@@ -421,18 +378,14 @@ def orders(experiment: Experiment, record: Record, lead: Lead) -> Picture | None
         ax.set_ylim(*style.limits(shown[known], around))
         _mark(ax, key.values, shown, lead)
     inside = known & (np.abs(order - promised) <= allowed)
-    kept, every = (words.number(int(n), "integer") for n in (inside.sum(), order.size))
-    title = (
-        "All members keep their order"
-        if inside.all()
-        else f"{kept} of {every} members have an order in the band"
-    )
-    more = (
-        f" {words.number(missing, 'integer')} members have no order and are left out."
-        if missing
-        else ""
-    )
+    counts = (inside.sum(), order.size, np.sum(~known))
+    kept, every, missing = (words.number(int(count), "integer") for count in counts)
+    title = f"{kept} of {every} members have an order in the band"
     return Picture(
-        "hero_orders", title, f"The band is what the tolerance allows around the promised order.{more}",
-        f"Observed orders of {words.name(quantity)} of all members", _root(ax),
-    )  # fmt: skip
+        "hero_orders",
+        "All members keep their order" if inside.all() else title,
+        "The band is what the tolerance allows around the promised order."
+        + f" {missing} members have no order and are left out." * (not known.all()),
+        f"Observed orders of {words.name(quantity)} of all members",
+        ax.get_figure(root=True),
+    )

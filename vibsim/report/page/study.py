@@ -81,25 +81,36 @@ def finding(verdicts: Sequence[LadderVerdict]) -> str:
 
 def numbers(verdict: LadderVerdict) -> list[dict[str, str]]:
     """Return the large numbers of a ladder: the order, the error of the finest level, and the best value."""
-    between = words.interval((verdict.order_low, verdict.order_high))
+    span = words.between((verdict.order_low, verdict.order_high))
     asked = verdict.expected or verdict.at_least
     wanted = (
-        "" if asked is None else f"expected{'' if verdict.expected else ' at least'}: {asked:g}"
+        ""
+        if asked is None
+        else f"{'expected' if verdict.expected else 'expected at least'}: {asked:g}"
     )
-    span = f"between {between.replace(' to ', ' and ')}" if between != "–" else ""
-    share = verdict.relative_error
+    error, share, bound = verdict.error, verdict.relative_error, verdict.best_bound
+    of_size = f"{words.share(share)} of its size" if share is not None else ""
+    best = (
+        f"± {words.number(bound, 'brief')}, extrapolated"
+        if bound is not None
+        else NO_BEST[verdict.is_number]
+    )
     rows = (
-        ("Observed order", words.number(verdict.order, "order"), "; ".join(filter(None, [span, wanted]))),
-        ("Error of the finest level", words.number(abs(verdict.error) if verdict.error is not None else None, "brief"),
-         f"{words.share(share)} of its size" if share is not None else ""),
-        ("Best value", words.number(verdict.best, "value"),
-         NO_BEST[verdict.is_number] if verdict.best_bound is None
-         else f"± {words.number(verdict.best_bound, 'brief')}, extrapolated"),
-    )  # fmt: skip
-    keys = ("label", "value", "note")
+        (
+            "Observed order",
+            words.number(verdict.order, "order"),
+            "; ".join(filter(None, [span, wanted])),
+        ),
+        (
+            "Error of the finest level",
+            words.number(None if error is None else abs(error), "brief"),
+            of_size,
+        ),
+        ("Best value", words.number(verdict.best, "value"), best),
+    )
     return [
-        dict(zip(keys, row, strict=True)) | {"value": row[1] if row[1] != "–" else "not known"}
-        for row in rows
+        {"label": label, "value": value if value != "–" else "not known", "note": note}
+        for label, value, note in rows
     ]
 
 
@@ -116,7 +127,7 @@ def card(name: str, verdict: LadderVerdict, asked: str, files: Sequence[str]) ->
     """Return what the page shows of a quantity: `asked` is what was expected, and `name` unique on the page."""
     rows = [
         ("Expected", asked),
-        ("Order", _order(verdict)),
+        ("Order", words.with_interval(verdict.order, (verdict.order_low, verdict.order_high))),
         ("Levels used", ", ".join(words.number(h, "step") for h in verdict.h_used) or "–"),
         ("Error of the finest level", words.number(verdict.error, "small")),
         ("Its bound (95 %)", words.number(verdict.error_bound, "small")),
@@ -137,12 +148,6 @@ def card(name: str, verdict: LadderVerdict, asked: str, files: Sequence[str]) ->
         "picture": _picture(name, verdict),
         "doubt": UNSEEN if verdict.status == "PASS" and not verdict.is_exact_known else "",
     }
-
-
-def _order(verdict: LadderVerdict) -> str:
-    text = words.number(verdict.order, "order")
-    interval = words.interval((verdict.order_low, verdict.order_high))
-    return text if interval == "–" else f"{text} ({interval})"
 
 
 def _table(verdict: LadderVerdict) -> Table:
