@@ -16,7 +16,6 @@ from vibsim.experiment.schema.figures import KINDS
 from vibsim.report import choice, style
 from vibsim.report.figures import accuracy, of_source
 from vibsim.report.page import player
-from vibsim.report.page.templates import environment
 from vibsim.report.tables import source_figures
 
 ROOT = Path(__file__).parents[2]
@@ -53,7 +52,7 @@ def drawn(exp: Experiment) -> tuple[list, list[str]]:
     decisive = choice.find_lead(exp, record, samples.summary(exp, record))
     with style.applied():
         found = of_source.pictures(exp, record, decisive)
-    has_player = bool(player.element(exp, record, environment()))
+    has_player = bool(player.element(exp, record))
     return found, of_source.undrawn(found, has_player=has_player)
 
 

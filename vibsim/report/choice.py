@@ -21,7 +21,7 @@ from vibsim.report.data import (
     swept,
 )
 from vibsim.report.finest_level import deviation
-from vibsim.report.types import Check, ConvergesCheck, Experiment, Measurement
+from vibsim.report.types import Check, ConvergesCheck, Experiment, Measurement, SchemeSpec
 
 
 def promises(experiment: Experiment, record: Record, quantity: str) -> list[tuple[float, float]]:
@@ -61,6 +61,12 @@ def _on_order(experiment: Experiment, quantity: str) -> list[ConvergesCheck]:
 def position(experiment: Experiment) -> str:
     """Return the name of the model's position."""
     return experiment.model.definition.position
+
+
+def has_swept_options(experiment: Experiment, spec: SchemeSpec) -> bool:
+    """Say whether the sweep varies an option of a scheme."""
+    keys = experiment.sweep.keys if experiment.sweep is not None else ()
+    return any(key.startswith(f"schemes.{spec.name}.") for key in keys)
 
 
 def quantities(experiment: Experiment, record: Record) -> list[str]:

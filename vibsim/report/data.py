@@ -115,6 +115,12 @@ def time_unit(record: Record, name: str = "t") -> str:
     return (unit(record, name) or "s") if has_time_unit(record) else ""
 
 
+def radians_unit(record: Record) -> str:
+    """Return the unit of an angular frequency; empty where times have none."""
+    time = time_unit(record)
+    return f"rad {pretty_unit(f'{time}-1')}" if time else ""
+
+
 def time_text(record: Record, value: float) -> str:
     """Write a time, such as that of a step, with its unit."""
     return f"{words.number(float(value), 'step')} {time_unit(record, 'dt')}".rstrip()

@@ -16,7 +16,7 @@ from vibsim.experiment import citation
 from vibsim.experiment.collection import ADHOC, SITE
 from vibsim.report import words
 from vibsim.report.page import history, source_statements
-from vibsim.report.page.templates import digest_of, environment, markup
+from vibsim.report.page.templates import digest_of, environment, source
 from vibsim.report.tables import source_figures
 from vibsim.report.tables.results import error_of, measured_order, number_of
 from vibsim.report.tables.table import Column, Table, to_csv
@@ -131,21 +131,14 @@ def write_index(results: Path) -> None:
         "statements": source_statements.listed((row.name, row.link, row.checks) for row in rows),
         "site": f"{SITE}/index.html" if (results / SITE / "index.html").is_file() else "",
         "history": history.FILE,
-        "script": markup(_script()),
-        "script_digest": digest_of(_script()),
+        "script": source("index.js"),
+        "script_digest": digest_of(source("index.js")),
     }
     store.write_text(results / "index.html", template.render(context))
     cells = tuple(line for row in rows for line in _lines(row))
     table = Table("summary", "All checks", tuple(map(Column, HEADERS)), cells)
     store.write_text(results / "summary.csv", to_csv(table))
     history.update(results, {row.key: (row.status, str(row.headline)) for row in rows})
-
-
-def _script() -> str:
-    """Return the script of the page as it stands between its tags."""
-    loader = environment().loader
-    assert loader is not None
-    return loader.get_source(environment(), "index.js")[0]
 
 
 def _row(results: Path, folder: Path) -> Row:
@@ -204,10 +197,8 @@ def headline(checks: Sequence[Mapping[str, Any]]) -> Headline:
             )
     passed = [] if ranked and ranked[0]["status"] != "PASS" else wanted or found
     for check, result in passed:
-        sentence = str(result.get("sentence") or "")
-        text = words.labelled(sentence.partition("; ")[0].rstrip("."), check["quantity"])
-        text = words.PAGE.powers(text)
-        if text:
+        sentence = str(result.get("sentence") or "").partition("; ")[0].rstrip(".")
+        if text := words.PAGE.powers(words.labelled(sentence, check["quantity"])):
             return Headline(text=f"{text[: LONGEST - 1]}…" if len(text) > LONGEST else text)
     return Headline()
 
@@ -248,5 +239,5 @@ def _lines(row: Row) -> Iterator[tuple[Any, ...]]:
 
 def _source(row: Row, check: Mapping[str, Any]) -> tuple[str | None, ...]:
     """Return where a check stands, by `citation.FIELDS`: its own source, else that of its experiment."""
-    source = check.get("source") or row.source or {}
-    return tuple(source.get(name) for name in citation.FIELDS)
+    found = check.get("source") or row.source or {}
+    return tuple(found.get(name) for name in citation.FIELDS)

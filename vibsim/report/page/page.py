@@ -119,7 +119,7 @@ def write(
         members.write_csv(directory / "tables/members.csv", convergence, position)
         files.pop("members.csv", None)
     replace_files(directory / "tables", files, kept)
-    played = player.element(experiment, convergence, environment())
+    played = player.element(experiment, convergence)
     made = cards.cards(experiment, convergence, summary)
     if "hero_evidence" in names and decisive.entry is not None:
         made = [c | {"picture": None} if c["id"] == decisive.entry["id"] else c for c in made]

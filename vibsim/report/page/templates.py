@@ -52,6 +52,13 @@ def _code(text: str) -> str:
     return Markup("").join(pieces)
 
 
+def source(name: str) -> str:
+    """Return a file of the templates as it is, for a script or a style."""
+    loader = environment().loader
+    assert loader is not None
+    return markup(loader.get_source(environment(), name)[0])
+
+
 def markup(text: str) -> str:
     """Mark a drawing of our own as markup; its texts were escaped when it was drawn."""
     return Markup(text)

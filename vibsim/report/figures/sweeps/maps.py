@@ -25,6 +25,7 @@ from vibsim.report.data import (
 from vibsim.report.figures.sweeps.view import (
     View,
     Worst,
+    by_scheme,
     check_words,
     of_check,
     ring,
@@ -200,13 +201,13 @@ def _reasons(record: Record, quantity: str, scheme: int) -> Map:
     """Return the map of the reasons of the verdicts; of several members in a cell the worst."""
     reason = pick(record, f"{quantity}_reason", scheme=scheme)
     meanings = record.meanings(f"{quantity}_reason")
-    counted = [
-        (-int(n), int(code)) for code, n in zip(*np.unique(reason, return_counts=True), strict=True)
-    ]
+    found, counts = (part.tolist() for part in np.unique(reason, return_counts=True))
+    named = [(code, meanings[code], count) for code, count in zip(found, counts, strict=True)]
     # the milder first, of equal ones the rarer last
-    ranked = sorted(counted, key=lambda row: (SEVERITY[REASONS[meanings[row[1]]]], row[0]))
-    named = [(code, meanings[code]) for _, code in ranked]
-    codes = [(code, f"{REASONS[word]}: {word}", style.REASON_COLOURS[word]) for code, word in named]
+    named.sort(key=lambda row: (SEVERITY[REASONS[row[1]]], -row[2]))
+    codes = [
+        (code, f"{REASONS[word]}: {word}", style.REASON_COLOURS[word]) for code, word, _ in named
+    ]
     name = f"verdict on {words.symbol(quantity)}"
     told = shared_verdict(record, quantity, scheme)
     return _coded(f"{quantity}_verdict", name, quantity, reason, codes, told=told)
@@ -219,14 +220,14 @@ def _window(record: Record, quantity: str, scheme: int) -> Map:
 
     first = pick(record, f"{quantity}_window_first", scheme=scheme)
     levels = whole(record, "level")
-    shades = zip(levels, np.linspace(1.0, 0.0, len(levels)), strict=True)
+    shades = colormaps["viridis"](np.linspace(1.0, 0.0, len(levels)))
     codes = [
-        (level, f"from level {level} on", to_hex(colormaps["viridis"](shade)))
-        for level, shade in shades
+        (level, f"from level {level} on", to_hex(shade))
+        for level, shade in zip(levels, shades, strict=True)
         if np.any(first == level)
     ]
     name = f"levels used for the order of {words.symbol(quantity)}"
-    told = f"{name} {codes[0][1]}" if len(codes) == 1 and np.all(first == codes[0][0]) else ""
+    told = f"{name} {codes[0][1]}" if codes and np.all(first == codes[0][0]) else ""
     texts = tuple(text for _, text, _ in codes)
     return _coded(f"{quantity}_levels", name, quantity, first, codes, told=told, texts=texts)
 
@@ -240,14 +241,13 @@ def _view(record: Record, grid: Grid, each: Map, scheme: int, worst: int) -> Vie
     title = f"{each.name[:1].upper()}{each.name[1:]}{several}"
     text = style.sentences(
         each.caption,
-        "Grey hatched cells have no such number." if not np.isfinite(table).all() else "",
-        "The dotted line is the separatrix, where the exact period is infinite." if grid.separatrix[0].size else "",
+        "Grey hatched cells have no such number." * (not np.isfinite(table).all()),
+        "The dotted line is the separatrix, where the exact period is infinite."
+        * bool(grid.separatrix[0].size),
         grid.note,
-    )  # fmt: skip
-    values = None
-    if each.kind != "code" or each.texts:
-        values = np.full((len(record["scheme"]), each.values.size), np.nan)
-        values[scheme] = each.values if each.number is None else each.number
+    )
+    own, is_told = each.values if each.number is None else each.number, each.kind != "code"
+    values = by_scheme(record, scheme, own) if is_told or each.texts else None
     return View(
         each.name, Picture(f"map_{each.stem}_{scheme}", title, text, f"{title} over two swept parameters", figure),
         each.quantity, values, None, each.unit, each.texts, (scheme,), several.removeprefix(", "), ((0, 1),),
