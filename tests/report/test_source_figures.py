@@ -233,6 +233,29 @@ def test_the_second_difference_is_measured_on_its_formula() -> None:
     assert measured == pytest.approx((2.0 / p * np.sin(p / 2.0)) ** 2, rel=1e-9)
 
 
+def test_parameters_of_the_users_own_go_by_their_names_in_formulas() -> None:
+    model = {
+        "kind": "oscillator",
+        "m": 2.0,
+        "damping": {"linear": 0.2},
+        "spring": "k*u",
+        "parameters": {"k": 8.0},
+    }
+    exp = spring(
+        {"shows": "over_time", "quantities": ["potential_energy"]},
+        {"shows": "over_time", "beside": {"decay": "exp(-b*t/(2*m))"}},
+        {"shows": "spring"},
+        model=model, levels=[6, 7],
+    )  # fmt: skip
+    ((_, [energy]), (_, [motion]), (_, [force])), _ = drawn(exp)
+    ((*_, (_, _, stored)),) = lines(energy)
+    assert stored.max() == pytest.approx(4.0)
+    ((*_, (_, t, decay)),) = lines(motion)
+    np.testing.assert_allclose(decay, np.exp(-0.05 * t))
+    (((_, u, pull),),) = lines(force)
+    np.testing.assert_allclose(pull, 8.0 * u)
+
+
 def test_springs_of_members_are_their_own() -> None:
     exp = samples.experiment(
         model={"kind": "sliding_box", "mu": 0.01}, initial={"u": 1.0}, time={"end": 8.0}, levels=[6, 7],

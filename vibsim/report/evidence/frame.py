@@ -86,11 +86,11 @@ def below(ax: Axes, limit: float) -> None:
 def points(ax: Axes, x: Sequence[float], y: Floats, counts: Sequence[bool]) -> None:
     """Draw dots, hollow ones that do not count; those beyond the frame are triangles on its edge."""
     low, high = ax.get_ylim()
-    for is_full in (False, True):
+    for is_full, face in ((False, "white"), (True, COLOUR)):
         of_kind = np.array(counts) == is_full
         place, value = np.asarray(x, dtype=np.float64)[of_kind], y[of_kind]
         inside = (value >= low) & (value <= high)
-        look: dict[str, Any] = {"color": COLOUR, "markerfacecolor": COLOUR if is_full else "white"}
+        look: dict[str, Any] = {"color": COLOUR, "markerfacecolor": face}
         if inside.any():
             dot: Any = {"markersize": 5.0, "clip_on": False, "zorder": 4}
             ax.plot(place[inside], value[inside], "o", **look, **dot)

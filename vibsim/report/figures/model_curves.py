@@ -75,7 +75,7 @@ def spring(experiment: Experiment, record: Record) -> Picture | None:
     u = np.linspace(-reach, reach, POINTS)
     curves: dict[bytes, tuple[str, Floats]] = {}
     for case in range(len(record["case"])):
-        numbers, _ = series.numbers_of(experiment, record, case)
+        numbers = series.parameters_of(experiment, record, case)
         at = {**numbers, velocity: 0.0, "t": 0.0}
         formula = tree(model, model.acceleration)
         pull = values(formula, {**at, position: 0.0}) - values(formula, {**at, position: u})

@@ -185,7 +185,7 @@ def _draw(
         ax.plot(*style.thin(t, found), label=style.entry(text), **_look(k, t.size, jumps))
         drawn.append(found)
     fine = np.linspace(float(t[0]), end, SMOOTH)
-    parameters, _ = series.numbers_of(experiment, record, first.case)
+    parameters = series.parameters_of(experiment, record, first.case)
     for k, (text, formula) in enumerate(asked.beside.items()):
         curve = values(parse(formula, ("t", *parameters)), {**parameters, "t": fine})
         curve = np.broadcast_to(curve, fine.shape)

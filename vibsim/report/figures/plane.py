@@ -53,8 +53,9 @@ def phase(experiment: Experiment, record: Record, shown: list[Member]) -> Pictur
     figure, axes = rows_of(len(chosen), columns, 2.35, 0.5, 0.45)
     size = _draw_orbit(axes, record, model, case, w, t <= 1.02 * period)
     is_long = bool(t[-1] > (PERIODS + 1.0) * period)
-    parts = [(t <= t[0] + period, 0.9), (t >= t[-1] - PERIODS * period, 1.4)]
-    parts = parts if is_long else [(np.ones(t.size, dtype=bool), 1.2)]
+    parts = [(np.ones(t.size, dtype=bool), 1.2)]
+    if is_long:
+        parts = [(t <= t[0] + period, 0.9), (t >= t[-1] - PERIODS * period, 1.4)]
     largest = 0.0
     for ax, i in zip(axes, chosen, strict=True):
         for k, member in enumerate(members):
@@ -77,19 +78,14 @@ def phase(experiment: Experiment, record: Record, shown: list[Member]) -> Pictur
         if n % PANELS_A_ROW == 0:
             ax.set_ylabel(style.label(f"{words.symbol(model.velocity)} / w", measure))
     legend_above(figure, axes[0])
-    told = (
-        f"Of the whole motion the first period (thin) and the last {PERIODS:g} are drawn."
-        if is_long
-        else ""
-    )
+    told = f"Of the whole motion the first period (thin) and the last {PERIODS:g} are drawn. "
     return Picture(
         name=f"phase_plane_{case}",
         title="Phase plane: velocity against position",
-        caption=style.sentences(
-            told,
-            "Black, dashed: the exact orbit. The marker is the end of the motion. A spiral outwards gains energy, one "
-            "inwards loses it; an orbit that closes beside the exact one conserves an energy of its own.",
-        ),
+        caption=told
+        * is_long
+        + "Black, dashed: the exact orbit. The marker is the end of the motion. A spiral outwards gains energy, one "
+        "inwards loses it; an orbit that closes beside the exact one conserves an energy of its own.",
         alt="Velocity over the natural frequency against position for each level, with the exact orbit",
         figure=figure,
     )
@@ -170,12 +166,10 @@ def path(experiment: Experiment, record: Record, shown: list[Member]) -> Picture
 
 def _points(record: Record, names: tuple[str, ...], member: Member, level: int | None) -> Points:
     """Return the path of a member on a level, or the exact one, which is NaN where it is not known."""
-    x, y = (
-        data.exact_series(record, name, member)
-        if level is None
-        else of_level(record, name, member, level)
-        for name in names
-    )
+    if level is None:
+        x, y = (data.exact_series(record, name, member) for name in names)
+    else:
+        x, y = (of_level(record, name, member, level) for name in names)
     return x, y
 
 

@@ -18,6 +18,7 @@ from vibsim.core.record import Record
 from vibsim.report import data, style, words
 from vibsim.report.figures import moments, scenes
 from vibsim.report.figures.scenes import Scene
+from vibsim.report.series import parameters_of
 from vibsim.report.types import Experiment
 
 MOST_FRAMES = 1500
@@ -84,7 +85,7 @@ def run(experiment: Experiment, record: Record, scheme: str, quantity: str) -> R
         series=np.asarray(record[quantity][place, 0], dtype=np.float64),
         states={name: record[name][place, 0] for name in names if name in record},
         exact=np.asarray(record[exact][0], dtype=np.float64) if exact in record else None,
-        parameters=moments.parameters(experiment, record, 0),
+        parameters=parameters_of(experiment, record, 0),
     )
 
 

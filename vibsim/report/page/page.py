@@ -44,9 +44,7 @@ MOST_ROWS = 8  # of a table that the page itself holds; the CSV file holds all
 ROOM = 220  # cells of all tables of numbers together; a table beyond is a file only
 BYTES = 1_000_000  # of all figures behind tabs; figures beyond are files only
 FIGURES = 6  # most figures behind the tabs of a section
-COPIED = (
-    40_000  # letters of a table that a page holds whole, to be copied; a longer one is a file only
-)
+COPIED = 40_000  # letters of a table that a page holds whole, to be copied; a longer one is a file
 LONG_HEADING = 90  # letters of a caption of which a heading has the first words only
 PYTHON = """\
 from vibsim import Experiment, analyse, simulate, verdicts
@@ -144,9 +142,7 @@ def write(
             "alike": alike,
             "reading_of_checks": _reading_of_checks(alone),
             "failures": broken and cut(broken),
-            "unlisted": f"In all {failures} runs broke down; listed are the first {more}."
-            if failures > more
-            else "",
+            "unlisted": f"In all {failures} runs broke down; listed are the first {more}." * (failures > more),
             "numbers_shown": [cut(table) for table in listed],
             "tables": {table.name: copied(written[table.name]) for table in (*printed, *listed)},
             "scales": scales,
@@ -174,7 +170,7 @@ class _Drawn:
     """Pictures as markup for the page, and as files beside it."""
 
     def __init__(self, formats: Sequence[str]) -> None:
-        self.formats = [form for form in formats if form != "svg"]
+        self.formats = formats
         self.files: dict[str, bytes] = {}
         self.room = BYTES
         self.left_out: list[str] = []
@@ -182,11 +178,9 @@ class _Drawn:
 
     def add(self, picture: Picture) -> tuple[Picture, str]:
         """Return a picture with its markup, and keep its files."""
-        assert picture.figure is not None
-        text = drawing.svg(picture.figure, picture.name)
-        self.files[f"{picture.name}.svg"] = text.encode()
-        for form in self.formats:
-            self.files[f"{picture.name}.{form}"] = drawing.binary(picture.figure, form)
+        files = drawing.files(picture, self.formats)
+        self.files |= files
+        text = files[f"{picture.name}.svg"].decode()
         return picture, markup(drawing.inline(text, picture.alt))
 
     def tabs(
@@ -266,12 +260,11 @@ def texts_of(table: Table) -> dict[str, str]:
 
 def files_of(written: Mapping[str, Mapping[str, str]]) -> dict[str, bytes]:
     """Return the files of tables by their names, from the `texts_of` each table."""
-    ends = {"CSV": "csv", "LaTeX": "tex"}
-    return {
-        f"{name}.{ends[form]}": text.encode()
-        for name, texts in written.items()
-        for form, text in texts.items()
-    }
+    found = {}
+    for name, texts in written.items():
+        found[f"{name}.csv"] = texts["CSV"].encode()
+        found[f"{name}.tex"] = texts["LaTeX"].encode()
+    return found
 
 
 def copied(texts: Mapping[str, str]) -> Mapping[str, str]:

@@ -26,6 +26,7 @@ from vibsim.report.figures import moments, scenes
 from vibsim.report.figures.moments import SECONDS_A_PERIOD, UNBOUNDED, VISIBLE
 from vibsim.report.figures.scenes import Motion, Part, Scene
 from vibsim.report.page.templates import environment, markup, source
+from vibsim.report.series import parameters_of
 from vibsim.report.types import Experiment
 
 FRAMES_A_PERIOD = 48  # where there is room
@@ -77,7 +78,7 @@ def lanes(experiment: Experiment, record: Record) -> list[Lane]:
     reach = {
         name: max(data.largest(series[name][there]) for _, _, series in chosen) for name in states
     }
-    parameters = moments.parameters(experiment, record, first.case)
+    parameters = parameters_of(experiment, record, first.case)
     found = []
     for one, level, series in chosen:
         motion = moments.motion(model, t, samples, series, parameters, reach)

@@ -15,15 +15,13 @@ import numpy as np
 from vibsim.core.array_types import Flags, Floats
 from vibsim.core.record import Record
 from vibsim.core.vocabulary import MEMBER, OF_LEVEL, TYPICAL_NORM
-from vibsim.report import data, frame, words
-from vibsim.report.data import Member, at, known, time_unit, unit, whole
+from vibsim.report import data, frame, style, words
+from vibsim.report.data import Member, known, time_unit, unit, whole
 from vibsim.report.tables.table import Cell, Column, Table, Written
 
 OWN, CENTRED = "energy_deviation_max_abs", "energy_deviation_d2t_max_abs"
 ROUND_OFF = 1e-13
 """A relative error that is no larger is rounding, and nothing is worth comparing with it."""
-
-
 _Fill = Callable[[Member, int], Cell]
 """Returns the cell of a member and the position of a level."""
 
@@ -80,20 +78,13 @@ def orders(
     """Return norms, ratios and orders of a quantity, one row per scheme, member and level."""
     measure, n = data.norm_unit(record, quantity, norm), data.norm_index(record, norm)
     letter, pairs = words.symbol(quantity), bool(whole(record, "pair"))
-    triples, count = bool(whole(record, "triple")), len(whole(record, "level"))
+    triples = bool(whole(record, "triple"))
     floors = {member: data.floor_norm(record, quantity, member, norm) for member in shown}
     notes = {member: _notes(record, quantity, member) for member in shown}
 
     def of(name: str) -> _Fill:
-        name = f"{quantity}_{name}"
-        found = {
-            m: [
-                *(at(record, name, m, norm=n).tolist() if name in record else []),
-                *[math.nan] * count,
-            ]
-            for m in shown
-        }
-        return lambda member, i: found[member][i]
+        found = known(record, f"{quantity}_{name}", (*MEMBER, "level"), norm=n)
+        return lambda m, i: float(found[m.scheme, m.case, i]) if i < found.shape[2] else math.nan
 
     filled = (
         (Column("steps", form="integer"), lambda member, i: int(record["steps"][i])),
@@ -134,21 +125,17 @@ def maxima(record: Record, shown: Sequence[Member]) -> Table | None:
     if OWN not in record:
         return None
     measure, several = unit(record, OWN), len(whole(record, "level")) > 1
-    filled: list[tuple[Column, _Fill] | None] = []
+    filled: list[tuple[Column, _Fill]] = []
     for name, text, ratio in (
         (OWN, "max |dE|", "ratio"),
         (f"{OWN}_interior", "max |dE| without the last point", "ratio, without"),
     ):
         # lean records leave the second out
         if name in record:
-            values = np.asarray(record[name], dtype=np.float64)
+            values, is_sound = known(record, name, OF_LEVEL), record["status"] == 0
             filled.append((Column(text, measure, "norm"), _cells(values)))
-            is_sound = np.asarray(record["status"]) == 0
-            filled.append(
-                (Column(ratio, form="order"), _cells(_ratios(values, is_sound)))
-                if several
-                else None
-            )
+            if several:
+                filled.append((Column(ratio, form="order"), _cells(_ratios(values, is_sound))))
     caption = "Largest energy deviation over every step; the last point has its own end formula"
     return _by_level(record, "energy_maxima", caption, shown, filled, titled=True)
 
@@ -184,8 +171,7 @@ def velocities(record: Record) -> Table | None:
     """Return the largest relative energy error with both velocities; None where no scheme has one of its own."""
     if CENTRED not in record or not np.isfinite(known(record, CENTRED, OF_LEVEL)).any():
         return None
-    first = np.abs(known(record, "energy_initial", MEMBER))[..., None]
-    first = np.where(first > 0.0, first, np.nan)
+    first = style.positive(np.abs(known(record, "energy_initial", MEMBER)))[..., None]
     own, centred, interior = (
         known(record, name, OF_LEVEL) / first for name in (OWN, CENTRED, f"{OWN}_interior")
     )
@@ -244,7 +230,7 @@ def events(record: Record) -> Table | None:
         "Events (impacts; turns and starts of a body under friction; events of the file): where they are located, "
         "their times move with the level as the error of the scheme does, else by part of a step"
     )
-    seconds = time_unit(record, "first_event_time")
+    seconds, has_rest = time_unit(record, "first_event_time"), np.isfinite(rest).any()
 
     def change(member: Member, i: int) -> Cell:
         """Return by how much the last event is later than on the next finer level; None where it is another event."""
@@ -257,9 +243,7 @@ def events(record: Record) -> Table | None:
         (Column("events", form="integer"), _cells(count, int)),
         (Column("first", seconds, "value"), _cells(first)),
         (Column("last", seconds, "value"), _cells(last)),
-        (Column("at rest from", seconds, "value"), _cells(rest))
-        if np.isfinite(rest).any()
-        else None,
+        (Column("at rest from", seconds, "value"), _cells(rest)) if has_rest else None,
         (Column("last, less that of the next finer level", seconds, "small"), change),
     )
     return _by_level(record, "events", caption, data.everyone(record), filled)

@@ -49,13 +49,13 @@ def schemes(experiment: Experiment, record: Record) -> Table | None:
         if whole(record, "triple"):
             columns.append(Column("measured, ± half its interval", form="order"))
     rows = tuple(tuple(_scheme(experiment, record, s, quantities)) for s in range(len(names)))
-    measured = several = ""
-    if whole(record, "triple"):
-        measured = f", and the order measured in the {TYPICAL_NORM} norm"
-        several = "; in a sweep, that of the member farthest from the stated order"
+    is_measured = bool(whole(record, "triple"))
     caption = (
-        f"Schemes: stated properties (explicit or implicit, s: symplectic){measured} (order ∞: exact, no error "
-        f"to shrink){several if swept(record) else ''}"
+        "Schemes: stated properties (explicit or implicit, s: symplectic)"
+        + f", and the order measured in the {TYPICAL_NORM} norm" * is_measured
+        + " (order ∞: exact, no error to shrink)"
+        + "; in a sweep, that of the member farthest from the stated order"
+        * (is_measured and bool(swept(record)))
     )
     return Table("schemes", caption, tuple(columns), rows)
 
@@ -115,12 +115,11 @@ def predictions(record: Record) -> list[Table]:
     )
     growth = "growth of the amplitude per natural period, predicted by the matrix of one step"
     phase = "frequency, and the time by which the peaks come early (+) or late (−) in each period"
-    shown = {"frequency": ("frequency", rate), "phase_error": ("phase error", time)}
+    alone = {"growth": ("growth per period − 1", "")}
+    both = {"frequency": ("frequency", rate), "phase_error": ("phase error", time)}
     return [
-        _predictions(
-            record, "growth", f"{growth}. {how}", {"growth": ("growth per period − 1", "")}
-        ),
-        _predictions(record, "phase", f"{phase}. {how}", shown),
+        _predictions(record, "growth", f"{growth}. {how}", alone),
+        _predictions(record, "phase", f"{phase}. {how}", both),
     ]
 
 
@@ -170,9 +169,8 @@ def _prediction_rows(record: Record, names: list[str]) -> Iterator[tuple[Cell, .
                 for value in (a, b):
                     shown = value - 1.0 if name == "growth" else value
                     is_noise = 0.0 < abs(shown) <= noise
-                    numbers.append(
-                        Written(shown, words.number(shown, "brief")) if is_noise else shown
-                    )
+                    text = words.number(shown, "brief")
+                    numbers.append(Written(shown, text) if is_noise else shown)
                 # nothing where it is round-off
                 numbers.append(None if abs(b - a) <= noise else b - a)
             yield (*who, level, p, is_stable(p, float(limit[place[:2]])), *numbers)

@@ -136,16 +136,13 @@ class _Drawing:
             bounded = np.isfinite(found.value)
         # what is beyond the frame has no bar across it
         barred = bounded & frame.is_bounded(found.error, size)
-        within = replace(
-            found,
-            value=np.where(bounded, found.value, np.nan),
-            error=np.where(barred, found.error, np.nan),
-        )
-        height = "Half the height between the last peak and the last trough, on the finest level."
-        turn = self.experiment.model.definition.turn
-        over = "Members that go over the top have none." if turn else ""
+        value, error = np.where(bounded, found.value, np.nan), np.where(barred, found.error, np.nan)
+        within = replace(found, value=value, error=error)
+        told = "Half the height between the last peak and the last trough, on the finest level."
+        turns = bool(self.experiment.model.definition.turn)
+        told += " Members that go over the top have none." * turns
         yield from self._view(
-            "amplitude", "amplitude", of, found.value, style.sentences(height, over),
+            "amplitude", "amplitude", of, found.value, told,
             lambda ax: _draw_amplitudes(ax, record, along, found, within, size), found.unit,
         )  # fmt: skip
         if whole(record, "pair"):
@@ -235,13 +232,11 @@ class _Curve:
 def _curves(record: Record, along: Along, *, by_line: bool = False) -> list[_Curve]:
     """Return the curves of every scheme and line; `by_line` those of a line together."""
     names, count = record.words("scheme"), len(along.lines)
-    found = [
-        _Curve(
-            s, s * count + k, along.key.values[at], at, _text(name if len(names) > 1 else "", line)
-        )
-        for s, name in enumerate(names)
-        for k, (line, at) in enumerate(along.lines)
-    ]
+    found = []
+    for s, name in enumerate(names):
+        who = name if len(names) > 1 else ""
+        for k, (line, at) in enumerate(along.lines):
+            found.append(_Curve(s, s * count + k, along.key.values[at], at, _text(who, line)))
     return sorted(found, key=lambda curve: curve.number % count) if by_line else found
 
 
@@ -272,16 +267,13 @@ def _draw_orders(
 def _draw_errors(ax: Axes, record: Record, along: Along, quantity: str) -> str:
     """Draw the error of the finest level; return the sentence on what leaves the frame."""
     found, size = finest_level.error(record, quantity), frame.sizes(record, quantity)
-    bounded = [
-        np.where(frame.is_bounded(part, size), part, np.nan)
-        for part in (found.true, found.estimate)
-    ]
-    # what is beyond the frame has no bar across it
-    low, high = (
-        np.where(np.isfinite(bounded[1]), style.no_zeros(part), np.nan)
-        for part in (found.low, found.high)
+    both = np.stack([found.true, found.estimate])
+    bounded = np.where(frame.is_bounded(both, size), both, np.nan)
+    true, estimate, low, high = map(
+        style.no_zeros, (found.true, found.estimate, found.low, found.high)
     )
-    true, estimate = style.no_zeros(found.true), style.no_zeros(found.estimate)
+    # what is beyond the frame has no bar across it
+    low, high = (np.where(np.isfinite(bounded[1]), end, np.nan) for end in (low, high))
     for curve in _curves(record, along):
         x, look = curve.x, style.look(curve.number)
         _interval(ax, x, curve.of(low), curve.of(high), look["color"])
@@ -292,17 +284,16 @@ def _draw_errors(ax: Axes, record: Record, along: Along, quantity: str) -> str:
             text = f"_true, {curve.text}" if has_entry else curve.text or "true"
             dots = look | {"linestyle": "none", "markersize": 4, "markerfacecolor": "white"}
             _line(ax, x, curve.of(true), label=text, **dots)
-    leaving = ""
-    # where nothing is bounded all of it makes the range
-    for values in (bounded, [found.true, found.estimate]):
-        if style.fit_log_axis(ax, "y", np.concatenate(values, axis=None), below=0.005, least=DEEP):
-            leaving = _leaving(ax, along, found.best)
-            break
     text = f"error of {words.symbol(quantity)} ({TYPICAL_NORM})"
     ax.set_ylabel(style.label(text, norm_unit(record, quantity)))
     if not style.crowded(record):
         _beside(ax, along)
-    return leaving
+    # where nothing is bounded all of it makes the range
+    fitted = any(
+        style.fit_log_axis(ax, "y", np.ravel(values), below=0.005, least=DEEP)
+        for values in (bounded, both)
+    )
+    return _leaving(ax, along, found.best) if fitted else ""
 
 
 def _draw_verdicts(ax: Axes, along: Along, status: NDArray[Any], schemes: list[str]) -> None:
@@ -310,13 +301,12 @@ def _draw_verdicts(ax: Axes, along: Along, status: NDArray[Any], schemes: list[s
     order = np.argsort(along.key.values, kind="stable")
     x, many = along.key.values[order], len(schemes) > style.MANY
     for i, word in enumerate(SEVERITY):
-        xs, ys = [np.empty(0)], [np.empty(0)]
+        places = []
         for s in range(len(schemes)):
             found = x[status[s][order] == word]
-            thinned = style.thin(found, np.full(found.size, s + RISE * i))
-            xs, ys = [*xs, thinned[0]], [*ys, thinned[1]]
+            places.append(style.thin(found, np.full(found.size, s + RISE * i)))
         ax.plot(
-            np.concatenate(xs), np.concatenate(ys), linestyle="none", marker=style.STATUS_MARKERS[word],
+            *np.hstack(places), linestyle="none", marker=style.STATUS_MARKERS[word],
             markersize=3.5 if many else 5, color=style.STATUS_COLOURS[word], markeredgecolor="black",
             markeredgewidth=0.3, label=f"{word} ({int((status == word).sum())})", clip_on=False,
         )  # fmt: skip
@@ -474,7 +464,6 @@ def _beside(ax: Axes, along: Along, **options: Any) -> None:
 def _mark(scheme: int, colour: int, count: int) -> dict[str, Any]:
     """Return a marker of a scheme; of several the first is large and hollow, so that all stay visible."""
     look = {"marker": style.look(scheme)["marker"], "color": style.look(colour)["color"]}
-    is_hollow = count > 1 and scheme == 0
-    return look | (
-        {"markerfacecolor": "none", "markersize": 8} if is_hollow else {"markersize": 4.5}
-    )
+    if count > 1 and scheme == 0:
+        return look | {"markerfacecolor": "none", "markersize": 8}
+    return look | {"markersize": 4.5}
