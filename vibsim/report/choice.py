@@ -11,15 +11,8 @@ import numpy as np
 from vibsim.core.record import Record
 from vibsim.core.vocabulary import ORDER_TOLERANCE, SEVERITY, TYPICAL_NORM
 from vibsim.experiment.storage import checked_quantities
-from vibsim.report.data import (
-    Member,
-    basis_of_order,
-    flags,
-    formal_orders,
-    of_case,
-    place_of,
-    swept,
-)
+from vibsim.report import data
+from vibsim.report.data import Member
 from vibsim.report.finest_level import deviation
 from vibsim.report.types import Check, ConvergesCheck, Experiment, Measurement, SchemeSpec
 
@@ -35,9 +28,9 @@ def promises(experiment: Experiment, record: Record, quantity: str) -> list[tupl
         for check in _on_order(experiment, quantity)
         if isinstance(check.order, float)
     }
-    if basis_of_order(record, quantity) == "expected" and asked_for:
+    if data.basis_of_order(record, quantity) == "expected" and asked_for:
         return sorted(asked_for)
-    promised = formal_orders(record, quantity)
+    promised = data.formal_orders(record, quantity)
     found = {
         (float(order), tolerance(experiment, quantity, scheme))
         for s, scheme in enumerate(record.words("scheme"))
@@ -87,10 +80,10 @@ def members(record: Record, quantity: str) -> list[Member]:
     These are the worst member, judged by the verdicts on `quantity` and then by the distance of the order from the
     promised one (of several schemes the worst decides), and a typical one of those that pass, if any does.
     """
-    if not swept(record) or f"{quantity}_status" not in record:
+    if not data.swept(record) or f"{quantity}_status" not in record:
         # a large sweep has verdicts on what checks ask about alone
-        return of_case(record, 0)
-    status = flags(record, f"{quantity}_status")
+        return data.of_case(record, 0)
+    status = data.flags(record, f"{quantity}_status")
     severity = np.max([(status == word) * rank for word, rank in SEVERITY.items()], axis=(0, 1))
     away = np.abs(deviation(record, quantity))
     ranking = np.lexsort((np.max(np.where(np.isnan(away), np.inf, away), axis=0), severity))
@@ -99,7 +92,7 @@ def members(record: Record, quantity: str) -> list[Member]:
     healthy = ranking[score[ranking] == score.max()]
     roles = {int(healthy[healthy.size // 2]): "typical", int(ranking[-1]): "worst"}
     shown = reversed(roles.items())
-    return [member for case, role in shown for member in of_case(record, case, role)]
+    return [member for case, role in shown for member in data.of_case(record, case, role)]
 
 
 def worst(record: Record, quantity: str) -> Member:
@@ -107,7 +100,7 @@ def worst(record: Record, quantity: str) -> Member:
     found = [member for member in members(record, quantity) if member.role != "typical"]
     if f"{quantity}_status" not in record:
         return found[0]
-    status, away = flags(record, f"{quantity}_status"), np.abs(deviation(record, quantity))
+    status, away = data.flags(record, f"{quantity}_status"), np.abs(deviation(record, quantity))
 
     def badness(member: Member) -> tuple[int, float]:
         place = member.scheme, member.case
@@ -191,13 +184,13 @@ def find_lead(experiment: Experiment, record: Record, summary: Mapping[str, Any]
 
     listed = [entry for entry in summary["checks"] if entry.get("results")]
     if not listed:
-        return Lead(usual, of_case(record, 0)[0])
+        return Lead(usual, data.of_case(record, 0)[0])
     entry = min(listed, key=rank)
     check = asserted.get(entry["id"])
     named = str(entry.get("quantity") or usual)
     is_compared = any(f"{named}_{of}_norm" in record for of in ("difference", "error"))
     quantity = named if is_compared else usual
     result = entry["results"][0]
-    every = of_case(record, place_of(record, result.get("case", -1)) or 0)
+    every = data.of_case(record, data.place_of(record, result.get("case", -1)) or 0)
     member = next((one for one in every if one.scheme_name == result.get("scheme")), every[0])
     return Lead(quantity, member, entry, check)

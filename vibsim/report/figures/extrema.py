@@ -258,14 +258,10 @@ def frequency(experiment: Experiment, record: Record) -> Picture | None:
         line["marker"] = look["marker"] if t.size <= MARKED else ""
         for ax, values in zip(axes, (2.0 * np.pi / np.diff(t), amplitude), strict=True):
             ax.plot(np.arange(1, values.size + 1), values, **line)
-    size, measure = (
-        exact_amplitude(experiment, record, case),
-        data.unit(record, f"{position(experiment)}_finest"),
-    )
-    rows = (
-        ("angular frequency", data.radians_unit(record), 2.0 * math.pi / period),
-        ("amplitude", measure, size),
-    )
+    size = exact_amplitude(experiment, record, case)
+    measure = data.unit(record, f"{position(experiment)}_finest")
+    frequency_row = "angular frequency", data.radians_unit(record), 2.0 * math.pi / period
+    rows = frequency_row, ("amplitude", measure, size)
     for ax, (text, unit, value) in zip(axes, rows, strict=True):
         if math.isfinite(value):
             ax.axhline(value, label="exact", **style.REFERENCE)

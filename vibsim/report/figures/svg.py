@@ -184,10 +184,8 @@ class Writer(RendererBase):  # type: ignore[misc, unused-ignore]
     def _axis(self, ax: Any, axis: Any, i: int) -> None:
         """Draw grid, ticks, their numbers and the label of an axis: of x with `i` 0, of y with 1."""
         known, which = axis.get_tick_params("major"), "xy"[i]
-        size, plain = (
-            float(known.get("labelsize", RC[f"{which}tick.labelsize"])),
-            RC[f"{which}tick.color"],
-        )
+        size = float(known.get("labelsize", RC[f"{which}tick.labelsize"]))
+        plain = RC[f"{which}tick.color"]
         colour, words = (to_hex(known.get(key, plain)) for key in ("color", "labelcolor"))
         near, far = (("bottom", "top"), ("left", "right"))[i]
         length, pad = RC[f"{which}tick.major.size"], RC[f"{which}tick.major.pad"]

@@ -69,15 +69,10 @@ def order_and_stability(experiment: Experiment, record: Record) -> Picture | Non
             _dots(ax, p, found[s], look, style.entry(name))
         _finish(ax, told, found, limits, grid)
     alike = _alike(record.words("scheme"), curves)
-    axes[0].set(
-        ylabel="|growth per period − 1|",
-        title="Growth of the amplitude: filled grows, hollow decays",
-    )
-    axes[1].set(
-        ylabel="|phase error| / period",
-        title="Phase error per period: filled comes early, hollow late",
-    )
-    axes[1].set_xlabel("w dt")
+    axes[0].set_ylabel("|growth per period − 1|")
+    axes[0].set_title("Growth of the amplitude: filled grows, hollow decays")
+    axes[1].set_title("Phase error per period: filled comes early, hollow late")
+    axes[1].set(xlabel="w dt", ylabel="|phase error| / period")
     style.beside(axes[0], fontsize=8, handlelength=1.6)
     if not style.crowded(record):
         # in the upper panel below the legend

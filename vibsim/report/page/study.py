@@ -82,30 +82,19 @@ def finding(verdicts: Sequence[LadderVerdict]) -> str:
 def numbers(verdict: LadderVerdict) -> list[dict[str, str]]:
     """Return the large numbers of a ladder: the order, the error of the finest level, and the best value."""
     span = words.between((verdict.order_low, verdict.order_high))
-    asked = verdict.expected or verdict.at_least
-    wanted = (
-        ""
-        if asked is None
-        else f"{'expected' if verdict.expected else 'expected at least'}: {asked:g}"
-    )
-    error, share, bound = verdict.error, verdict.relative_error, verdict.best_bound
+    asked, wanted = verdict.expected or verdict.at_least, ""
+    if asked is not None:
+        wanted = f"expected{'' if verdict.expected else ' at least'}: {asked:g}"
+    share, bound = verdict.relative_error, verdict.best_bound
+    size = None if verdict.error is None else abs(verdict.error)
     of_size = f"{words.share(share)} of its size" if share is not None else ""
-    best = (
-        f"± {words.number(bound, 'brief')}, extrapolated"
-        if bound is not None
-        else NO_BEST[verdict.is_number]
-    )
+    best = NO_BEST[verdict.is_number]
+    if bound is not None:
+        best = f"± {words.number(bound, 'brief')}, extrapolated"
+    of_order = "; ".join(filter(None, [span, wanted]))
     rows = (
-        (
-            "Observed order",
-            words.number(verdict.order, "order"),
-            "; ".join(filter(None, [span, wanted])),
-        ),
-        (
-            "Error of the finest level",
-            words.number(None if error is None else abs(error), "brief"),
-            of_size,
-        ),
+        ("Observed order", words.number(verdict.order, "order"), of_order),
+        ("Error of the finest level", words.number(size, "brief"), of_size),
         ("Best value", words.number(verdict.best, "value"), best),
     )
     return [

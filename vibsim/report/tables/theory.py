@@ -136,10 +136,8 @@ def _predictions(
             Column("measured", measure, "close"),
             Column("difference", measure, "brief"),
         ]
-    caption, rows = (
-        f"Theory beside measurement: {caption}",
-        tuple(_prediction_rows(record, [*shown])),
-    )
+    caption = f"Theory beside measurement: {caption}"
+    rows = tuple(_prediction_rows(record, [*shown]))
     table = Table(f"theory_{name}", caption, tuple(columns), rows, 2 * bool(swept(record)))
     found = table.without_empty(["difference"])
     agree = ". Where no difference is shown, the two agree to round-off"

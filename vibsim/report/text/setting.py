@@ -47,10 +47,8 @@ def setup(experiment: Experiment, record: Record) -> Iterator[tuple[str, str]]:
         parameters = _listing("model", scaling.parameters, sizes)
         initial = _listing("initial", scaling.initial, units)
         rest = "the run uses the scales of the table below, and every other number is dimensionless"
-        yield (
-            "Scaled",
-            f"the file has {parameters}; {initial}; end = {_plain(scaling.end)} s; {rest}",
-        )
+        given = f"the file has {parameters}; {initial}; end = {_plain(scaling.end)} s"
+        yield "Scaled", f"{given}; {rest}"
         sizes, units = {}, {}
     yield "Parameters", _listing("model", experiment.model.parameters, sizes, keys)
     yield "Initial values", _listing("initial", experiment.initial, units, keys)

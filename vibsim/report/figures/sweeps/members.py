@@ -172,10 +172,8 @@ class _Projection:
         """Yield the error of the finest level."""
         from matplotlib.ticker import FuncFormatter, MaxNLocator
 
-        error, unit = (
-            finest_level.error(self.record, self.quantity),
-            norm_unit(self.record, self.quantity),
-        )
+        error = finest_level.error(self.record, self.quantity)
+        unit = norm_unit(self.record, self.quantity)
         name = f"error of {words.symbol(self.quantity)}"
         size = np.log10(style.positive(error.best[self.scheme]))
         if not np.isfinite(size).any():
