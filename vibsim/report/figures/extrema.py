@@ -34,13 +34,10 @@ Run = tuple[str, Member, int]
 
 def local(experiment: Experiment, record: Record, shown: list[Member]) -> Picture | None:
     """Draw local periods, amplitudes and the phase error of one member; None where there are fewer than two periods."""
-    if "peak_time" not in record or not shown:
-        return None
-    case = shown[0].case
-    runs = runs_of(record, [member for member in shown if member.case == case])
+    runs = runs_of(record, shown)
     if not runs:
         return None
-    axes = stacked([2.1, 2.1, 2.1])
+    axes, case = stacked([2.1, 2.1, 2.1]), shown[0].case
     exact = float(data.exact_periods(record)[case])
     start = first_peak(experiment, record, case, exact)
     looks = looks_of(runs)
@@ -79,7 +76,10 @@ def local(experiment: Experiment, record: Record, shown: list[Member]) -> Pictur
 
 
 def runs_of(record: Record, members: list[Member]) -> list[Run]:
-    """Choose the curves: of one or two schemes several levels, of more schemes the coarsest level."""
+    """Choose the curves of the first member: of one or two schemes several levels, of more the coarsest level."""
+    if "peak_time" not in record:
+        return []
+    members = [member for member in members if member.case == members[0].case]
     levels = whole(record, "level")
     each = max(1, min(len(levels), 4, MOST_CURVES // max(1, len(members))))
     found = []
@@ -240,14 +240,11 @@ def _grow(ax: Axes, lines: tuple[Any, ...], size: float) -> None:
 
 def frequency(experiment: Experiment, record: Record) -> Picture | None:
     """Draw local angular frequency and amplitude against the number of the peak; None with fewer than two peaks."""
-    if "peak_time" not in record:
-        return None
     everyone = choice.with_levels(experiment, data.everyone(record))
-    case = everyone[0].case
-    runs = runs_of(record, [member for member in everyone if member.case == case])
+    runs = runs_of(record, everyone)
     if not runs:
         return None
-    axes = stacked([2.3, 2.3])
+    axes, case = stacked([2.3, 2.3]), everyone[0].case
     several = len({member.scheme for _, member, _ in runs}) > 1
     step, period = data.steps_of(record, case), float(data.exact_periods(record)[case])
     for (_, member, level), look in zip(runs, looks_of(runs), strict=True):

@@ -22,51 +22,46 @@ from vibsim.report.tables.table import Cell, Column, Table, Written
 OWN, CENTRED = "energy_deviation_max_abs", "energy_deviation_d2t_max_abs"
 ROUND_OFF = 1e-13
 """A relative error that is no larger is rounding, and nothing is worth comparing with it."""
-_Fill = Callable[[Member, int], Cell]
+Fill = Callable[[Member, int], Cell]
 """Returns the cell of a member and the position of a level."""
 
 
-def _key(member: Member) -> str:
-    """Return the name of a scheme, and of a member with its keys as the experiment file has them."""
-    return ", ".join(filter(None, [member.scheme_name, member.case_name]))
-
-
-def _by_level(
+def by_level(
     record: Record,
     name: str,
     caption: str,
     members: Sequence[Member],
-    filled: Sequence[tuple[Column, _Fill] | None],
+    filled: Sequence[tuple[Column, Fill] | None],
     *,
     titled: bool = False,
+    there: Flags | None = None,
 ) -> Table:
-    """Return a table with a row for every member and level.
+    """Return a table with a row for every member and level, or for those that are `there`, shape (scheme, case, level).
 
     `filled` are the columns after scheme, member and level, each with what fills it (None is left out); scheme and
     member share a column where the table is `titled`.
     """
-    several = bool(data.swept(record))
-    names = ["scheme", "member"] if several and not titled else ["scheme"]
+    names = ["scheme", "member"] if data.swept(record) and not titled else ["scheme"]
     shown = [column for column in filled if column is not None]
     columns = (*map(Column, names), Column("level", form="integer"), *(c for c, _ in shown))
-    rows = tuple(
-        (
-            *([_key(m)] if titled else [m.scheme_name, m.case_name])[: len(names)],
-            level,
-            *(fill(m, i) for _, fill in shown),
-        )
-        for m in members
-        for i, level in enumerate(whole(record, "level"))
-    )
-    return Table(name, caption, columns, rows, heads=len(names) * several)
+    rows = []
+    for member in members:
+        # keys as the experiment file has them
+        own = [text for text in (member.scheme_name, member.case_name) if text]
+        own = [", ".join(own)] if titled else own
+        for i, level in enumerate(whole(record, "level")):
+            if there is None or there[member.scheme, member.case, i]:
+                rows.append((*own, level, *(fill(member, i) for _, fill in shown)))
+    heads = len(names) if data.swept(record) else 0
+    return Table(name, caption, columns, tuple(rows), heads)
 
 
-def _cells(values: Floats, kind: type[int] | type[float] = float) -> _Fill:
+def cells(values: Floats, kind: type[int] | type[float] = float) -> Fill:
     """Return what fills a column with numbers of shape (scheme, case, level)."""
     return lambda member, i: kind(values[member.scheme, member.case, i])
 
 
-def _step_column(record: Record) -> tuple[Column, _Fill]:
+def _step_column(record: Record) -> tuple[Column, Fill]:
     """Return the column of the time steps."""
     column = Column("dt", time_unit(record, "dt"), "step")
     return column, lambda member, i: float(data.steps_of(record, member.case)[i])
@@ -82,7 +77,7 @@ def orders(
     floors = {member: data.floor_norm(record, quantity, member, norm) for member in shown}
     notes = {member: _notes(record, quantity, member) for member in shown}
 
-    def of(name: str) -> _Fill:
+    def of(name: str) -> Fill:
         found = known(record, f"{quantity}_{name}", (*MEMBER, "level"), norm=n)
         return lambda m, i: float(found[m.scheme, m.case, i]) if i < found.shape[2] else math.nan
 
@@ -98,7 +93,7 @@ def orders(
     )
     caption = f"{letter}: {norm} norm of {f'{letter}(level) − {letter}(next level)' if pairs else 'its error'}"
     caption += "; ratio and order from three levels starting here" if triples else ""
-    return _by_level(record, f"orders_{quantity}_{norm}", caption, shown, filled)
+    return by_level(record, f"orders_{quantity}_{norm}", caption, shown, filled)
 
 
 def _notes(record: Record, quantity: str, member: Member) -> list[str]:
@@ -125,7 +120,7 @@ def maxima(record: Record, shown: Sequence[Member]) -> Table | None:
     if OWN not in record:
         return None
     measure, several = unit(record, OWN), len(whole(record, "level")) > 1
-    filled: list[tuple[Column, _Fill]] = []
+    filled: list[tuple[Column, Fill]] = []
     for name, text, ratio in (
         (OWN, "max |dE|", "ratio"),
         (f"{OWN}_interior", "max |dE| without the last point", "ratio, without"),
@@ -133,11 +128,11 @@ def maxima(record: Record, shown: Sequence[Member]) -> Table | None:
         # lean records leave the second out
         if name in record:
             values, is_sound = known(record, name, OF_LEVEL), record["status"] == 0
-            filled.append((Column(text, measure, "norm"), _cells(values)))
+            filled.append((Column(text, measure, "norm"), cells(values)))
             if several:
-                filled.append((Column(ratio, form="order"), _cells(_ratios(values, is_sound))))
+                filled.append((Column(ratio, form="order"), cells(_ratios(values, is_sound))))
     caption = "Largest energy deviation over every step; the last point has its own end formula"
-    return _by_level(record, "energy_maxima", caption, shown, filled, titled=True)
+    return by_level(record, "energy_maxima", caption, shown, filled, titled=True)
 
 
 def _ratios(values: Floats, is_sound: Flags) -> Floats:
@@ -157,14 +152,14 @@ def scalars(record: Record, shown: Sequence[Member]) -> Table | None:
     time, angle = unit(record, "period"), unit(record, "amplitude")
     usable = np.where(np.isfinite(exact), exact, np.nan)[:, None]
     filled = (
-        (Column("period", time, "full"), _cells(period)),
+        (Column("period", time, "full"), cells(period)),
         (Column("exact period", time, "full"), lambda member, i: float(exact[member.case])),
-        (Column("relative error", form="norm"), _cells(period / usable - 1.0)),
+        (Column("relative error", form="norm"), cells(period / usable - 1.0)),
         # the peak of a run that grows without bound may have either sign
-        (Column("amplitude", angle, "full"), _cells(np.abs(record["amplitude"]))),
+        (Column("amplitude", angle, "full"), cells(np.abs(record["amplitude"]))),
     )
     caption = "Period (interpolated) and amplitude"
-    return _by_level(record, "scalars", caption, shown, filled, titled=True)
+    return by_level(record, "scalars", caption, shown, filled, titled=True)
 
 
 def velocities(record: Record) -> Table | None:
@@ -201,12 +196,12 @@ def velocities(record: Record) -> Table | None:
     )
     filled = (
         _step_column(record),
-        (Column("max |dE|/E(0), own velocity", form="small"), _cells(own)),
-        (Column("max |dE|/E(0), [D₂ₜu]", form="small"), _cells(second)),
+        (Column("max |dE|/E(0), own velocity", form="small"), cells(own)),
+        (Column("max |dE|/E(0), [D₂ₜu]", form="small"), cells(second)),
         (Column("second over first", form="norm"), quotient),
         (Column("drift of the energy, own velocity"), drift) if is_named else None,
     )
-    return _by_level(record, "energy_velocities", caption, data.everyone(record), filled)
+    return by_level(record, "energy_velocities", caption, data.everyone(record), filled)
 
 
 def _plain(quotient: float) -> Cell:
@@ -240,10 +235,10 @@ def events(record: Record) -> Table | None:
 
     filled = (
         _step_column(record),
-        (Column("events", form="integer"), _cells(count, int)),
-        (Column("first", seconds, "value"), _cells(first)),
-        (Column("last", seconds, "value"), _cells(last)),
-        (Column("at rest from", seconds, "value"), _cells(rest)) if has_rest else None,
+        (Column("events", form="integer"), cells(count, int)),
+        (Column("first", seconds, "value"), cells(first)),
+        (Column("last", seconds, "value"), cells(last)),
+        (Column("at rest from", seconds, "value"), cells(rest)) if has_rest else None,
         (Column("last, less that of the next finer level", seconds, "small"), change),
     )
-    return _by_level(record, "events", caption, data.everyone(record), filled)
+    return by_level(record, "events", caption, data.everyone(record), filled)

@@ -74,7 +74,10 @@ def views(
 
 
 def _maps(experiment: Experiment, record: Record, found: list[str], scheme: int) -> Iterator[Map]:
-    yield from _motion(experiment, record, scheme)
+    """Yield the maps of a scheme: of the motion, without friction or force the period first, and of each quantity."""
+    both = [_period, _amplitude]
+    for of_motion in both if experiment.model.definition.conservative else both[::-1]:
+        yield from of_motion(position(experiment), record, scheme)
     for quantity in found:
         yield from _order(experiment, record, quantity, scheme)
         yield from _errors(record, quantity, scheme)
@@ -84,13 +87,6 @@ def _maps(experiment: Experiment, record: Record, found: list[str], scheme: int)
             f"check_{name}", name, position(experiment), values, view.check_words(check), badness=np.abs(values),
             caption="The number that the check of this name asks for.",
         )  # fmt: skip
-
-
-def _motion(experiment: Experiment, record: Record, scheme: int) -> Iterator[Map]:
-    """Yield period and amplitude with their errors; without friction or force the period first."""
-    both = [_period, _amplitude]
-    for found in both if experiment.model.definition.conservative else both[::-1]:
-        yield from found(position(experiment), record, scheme)
 
 
 def _period(of: str, record: Record, scheme: int) -> Iterator[Map]:
