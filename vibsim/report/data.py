@@ -260,9 +260,9 @@ def basis_of_order(record: Record, quantity: str) -> str:
 def promised_text(record: Record, quantity: str, scheme: int) -> str:
     """Write the order that is due to a quantity: a number, or whose it is where it depends on the member."""
     found = np.unique(formal_orders(record, quantity)[scheme])
-    return (
-        f"{found[0]:g}".replace("inf", "∞") if found.size == 1 else basis_of_order(record, quantity)
-    )
+    if found.size != 1:
+        return basis_of_order(record, quantity)
+    return f"{found[0]:g}".replace("inf", "∞")
 
 
 def stated_order(

@@ -68,9 +68,7 @@ def spectrum(experiment: Experiment, record: Record, member: Member) -> Picture 
         style.sentences(
             "The amplitudes of the frequencies in the stored series less its mean, with Hann's window.",
             "Dotted: the frequency that the scheme itself has by theory. Its distance from the natural one, dashed, is "
-            "the frequency error of the scheme."
-            if model.linear and model.conservative
-            else "",
+            "the frequency error of the scheme." * (model.linear and model.conservative),
         ),
         "Amplitude against angular frequency at the finest levels, with the frequencies known from theory",
         ax.get_figure(root=True),

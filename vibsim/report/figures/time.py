@@ -51,11 +51,9 @@ def overlay(record: Record, quantity: str, member: Member) -> Picture:
         _draw_orders(axes[-1], t, record, quantity, member, good)
     axes[-1].set_xlabel(data.time_label(record))
     law = f"dt{words.raised(order)}" if order != 1.0 else "dt"
-    what = (
-        ". The scheme is exact in this quantity, so nothing is rescaled and what is seen is round-off."
-        if math.isinf(data.formal_order(record, member, quantity))
-        else f", {_multiplied(order, levels)}; if the error shrinks as {law}, the curves fall on one another."
-    )
+    what = f", {_multiplied(order, levels)}; if the error shrinks as {law}, the curves fall on one another."
+    if math.isinf(data.formal_order(record, member, quantity)):
+        what = ". The scheme is exact in this quantity, so nothing is rescaled and what is seen is round-off."
     return Picture(
         name=name_of_differences(quantity, member),
         title=f"Do the levels agree? {words.title(quantity)}, {member.title}",

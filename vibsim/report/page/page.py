@@ -100,7 +100,7 @@ def write(
     below = gallery.pictures(experiment, convergence, shown, decisive, names)
     moving = [drawn.add(picture) for picture in below.motion]
     drawings = {"hero": first, "source": sourced, "motion": moving}
-    tabs = {"belief": drawn.tabs(below.belief, FIGURES)}
+    tabs = {"belief": drawn.tabs(below.belief)}
     views = drawn.views(below.members)
     small = thumbnail.thumbnail(experiment, convergence, shown[0])
     replace_files(directory / "figures", {**drawn.files, "thumbnail.svg": small.encode()})
@@ -183,11 +183,9 @@ class _Drawn:
         text = files[f"{picture.name}.svg"].decode()
         return picture, markup(drawing.inline(text, picture.alt))
 
-    def tabs(
-        self, tabs: Sequence[gallery.Tab], most: int
-    ) -> list[tuple[str, list[tuple[Picture, str]]]]:
+    def tabs(self, tabs: Sequence[gallery.Tab]) -> list[tuple[str, list[tuple[Picture, str]]]]:
         """Return the labels of tabs with their pictures, as long as the page has room; the others are files only."""
-        found = []
+        found, most = [], FIGURES
         for tab in tabs:
             added = [self.add(picture) for picture in tab.pictures]
             most -= len(added)

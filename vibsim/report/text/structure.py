@@ -19,7 +19,7 @@ def as_written(spec: StructureSpec, formulas: Mapping[str, str]) -> dict[str, An
     found: dict[str, Any] = {key: _array(row) for key, row in spec.arrays.items() if "." not in key}
     if spec.ratios:
         is_same = len(set(spec.ratios)) == 1 and len(spec.ratios) > 1
-        found["damping_ratios"] = spec.ratios[0] if is_same else list(spec.ratios)
+        found["damping_ratios"] = spec.ratios[0] if is_same else spec.ratios
     shapes = {key: row for key, row in spec.arrays.items() if key.startswith(f"{LOAD}.")}
     if shapes:
         factors = {key: formulas.get(key) or _table(spec, key) for key in shapes}
@@ -51,7 +51,7 @@ def _array(row: ArraySpec) -> Any:
         return {"mode": row.mode, **({"size": row.size} if row.size != 1.0 else {})}
     if row.entries:
         return {str(dof): value for dof, value in row.entries}
-    return [list(line) if isinstance(line, tuple) else line for line in row.rows]
+    return row.rows
 
 
 def _entries(entries: tuple[tuple[int, float], ...]) -> Any:

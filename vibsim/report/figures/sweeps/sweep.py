@@ -161,11 +161,8 @@ class _Drawing:
         told = "At the finest level, estimated from two levels"
         if found.kind == "true":
             told = "At the finest level: true (dots), and what two levels alone say of it (lines)"
-        told = (
-            f"{told}, with the interval of the order."
-            if data.whole(self.record, "pair")
-            else "True."
-        )
+        has_pairs = bool(data.whole(self.record, "pair"))
+        told = f"{told}, with the interval of the order." if has_pairs else "True."
         unit = data.norm_unit(self.record, quantity)
         yield from self._view(
             f"sweep_error_{quantity}", f"error of {words.symbol(quantity)}", quantity, found.best, told,
