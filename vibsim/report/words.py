@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from vibsim.checks.notation import Notation
+from vibsim.core import vocabulary
 from vibsim.core.vocabulary import AMPLITUDE, PHASE, is_error_part, order_interval, whole_of
 from vibsim.experiment.value_names import VALUES
 
@@ -302,3 +303,16 @@ def interval_of(result: Mapping[str, Any]) -> tuple[float, float] | None:
 def levels_of(result: Mapping[str, Any]) -> Sequence[int] | None:
     """Return the first and the last level that the order of a result rests on."""
     return None if fact(result, "order") is None else fact(result, "levels")
+
+
+def number_of(result: Mapping[str, Any]) -> float | None:
+    """Return the number that decides a result."""
+    return vocabulary.decisive_number(result.get("facts") or {})
+
+
+def measured(result: Mapping[str, Any]) -> tuple[Any, ...]:
+    """Return the cells of a result: order, ends of its interval, levels, the number that decides, and `ERROR_FACTS`."""
+    low, high = interval_of(result) or (None, None)
+    window = levels_of(result)
+    of_order = fact(result, "order"), low, high, levels(window) if window else None
+    return (*of_order, number_of(result), *(fact(result, name) for name in vocabulary.ERROR_FACTS))

@@ -18,7 +18,6 @@ from vibsim.report import words
 from vibsim.report.page import history, source_statements
 from vibsim.report.page.templates import digest_of, environment, source
 from vibsim.report.tables import source_figures
-from vibsim.report.tables.results import error_of, measured_order, number_of
 from vibsim.report.tables.table import Column, Table, to_csv
 
 UNREADABLE = ("DAMAGED", "MISSING")
@@ -230,10 +229,9 @@ def _lines(row: Row) -> Iterator[tuple[Any, ...]]:
     of_check = ("id", "kind", "text", "quantity", "expected", "status", "reason")
     for check in row.checks or [{"status": row.status, "reason": row.why}]:
         decides = _decides(check)
-        measured = (*measured_order(decides), number_of(decides), *error_of(decides))
         yield (
             row.collection, row.name, row.title, *_source(row, check), row.status, *map(check.get, of_check),
-            decides.get("scheme"), decides.get("case"), *measured, check.get("advice"), row.broken,
+            decides.get("scheme"), decides.get("case"), *words.measured(decides), check.get("advice"), row.broken,
         )  # fmt: skip
 
 
