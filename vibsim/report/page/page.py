@@ -100,16 +100,16 @@ def write(
     below = gallery.pictures(experiment, convergence, shown, decisive, names)
     moving = [drawn.add(picture) for picture in below.motion]
     drawings = {"hero": first, "source": sourced, "motion": moving}
-    tabs = {"belief": drawn.tabs(below.belief)}
-    views = drawn.views(below.members)
+    belief, views = drawn.tabs(below.belief), drawn.views(below.members)
     small = thumbnail.thumbnail(experiment, convergence, shown[0])
     replace_files(directory / "figures", {**drawn.files, "thumbnail.svg": small.encode()})
-    listed, others = _tables(experiment, convergence)
+    everyone = members.table(convergence, position)
+    listed, others = _tables(experiment, convergence, everyone)
     scales = scales_table(experiment, convergence)
     printed = published.tables(experiment, convergence, summary)
     broken = checks.failures(summary, convergence)
     every = [*printed, *listed, *others, scales, checks.checks(summary), broken]
-    every += [source_figures.table(sources), members.table(convergence, position)]
+    every += [source_figures.table(sources), everyone]
     written = {table.name: texts_of(table) for table in every if table is not None}
     files = files_of(written)
     kept = ("members.csv",) if data.swept(convergence) else ()
@@ -119,9 +119,10 @@ def write(
     replace_files(directory / "tables", files, kept)
     played = player.element(experiment, convergence)
     made = cards.cards(experiment, convergence, summary)
-    if "hero_evidence" in names and decisive.entry is not None:
-        made = [c | {"picture": None} if c["id"] == decisive.entry["id"] else c for c in made]
-    alone, alike = cards.gathered(made, decisive.entry["id"] if decisive.entry else None)
+    lead = decisive.entry["id"] if decisive.entry else None
+    if "hero_evidence" in names:
+        made = [c | {"picture": None} if c["id"] == lead else c for c in made]
+    alone, alike = cards.gathered(made, lead)
     failures, more = words.broken(summary), len(summary.get("failures") or [])
     page = environment().get_template("report.html").render(
         hero.context(experiment, convergence, summary, decisive)
@@ -130,10 +131,10 @@ def write(
             "name": experiment.name,
             "title": experiment.title,
             "status": summary["status"],
-            "lead": next((c for c in made if decisive.entry and c["id"] == decisive.entry["id"]), None),
-            "figures": drawings | tabs | {"members": views},
+            "lead": next((c for c in made if c["id"] == lead), None),
+            "figures": drawings | {"belief": belief, "members": views},
             "reading": {name: _captions(group) for name, group in drawings.items()}
-            | {name: _captions(p for _, group in found for p in group) for name, found in tabs.items()}
+            | {"belief": _captions(one for _, group in belief for one in group)}
             | {"members": _readings(view.picture for view, _ in views)},
             "members": explorer.content(experiment, convergence, [view for view, _ in views]),
             "worst": explorer.worst(experiment, convergence, [view for view, _ in views]),
@@ -279,7 +280,9 @@ def replace_files(directory: Path, files: Mapping[str, bytes], others: Sequence[
             path.unlink()
 
 
-def _tables(experiment: Experiment, record: Record) -> tuple[list[Table], list[Table]]:
+def _tables(
+    experiment: Experiment, record: Record, everyone: Table | None
+) -> tuple[list[Table], list[Table]]:
     """Return the tables that the page shows, as far as it has room for them, and those that are files only."""
     found, model = choice.quantities(experiment, record), experiment.model.definition
     shown = choice.with_levels(experiment, choice.members(record, choice.first(experiment, record)))
@@ -292,7 +295,6 @@ def _tables(experiment: Experiment, record: Record) -> tuple[list[Table], list[T
         *((levels.velocities(record), levels.maxima(record, shown)) if model.conservative else ()),
         None if data.is_lean(record) else work.table(experiment, record),
     ]  # fmt: skip
-    everyone = members.table(record, choice.position(experiment))
     if everyone is not None and len(everyone.rows) <= MOST_ROWS:
         wanted.append(everyone)
     listed, room = list[Table](), ROOM
