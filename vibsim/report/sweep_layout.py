@@ -16,7 +16,7 @@ from vibsim.core.array_types import Floats
 from vibsim.core.record import Record
 from vibsim.report import words
 from vibsim.report.data import swept, swept_label
-from vibsim.report.style import label, spans_decades
+from vibsim.report.style import LOG_RATIO, label
 
 LARGEST_TO_SCALE = 1e100  # swept values from here on are not drawn to scale
 FEW, LINES = 5, 6
@@ -81,7 +81,7 @@ def _key(record: Record, name: str) -> Key:
 def is_geometric(distinct: Floats) -> bool:
     """Say whether ascending values spread over decades, and more evenly in their logarithm than as they are."""
     low, high = float(distinct[0]), float(distinct[-1])
-    if not spans_decades(distinct):
+    if low <= 0.0 or high < LOG_RATIO * low:
         return False
     even = np.linspace(0.0, 1.0, distinct.size)
     linear = np.max(np.abs((distinct - low) / (high - low) - even))

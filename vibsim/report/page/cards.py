@@ -57,9 +57,10 @@ def gathered(
         made = [c for c in made if c not in plain]
         wanted = {c["wanted"] for c in plain}
         is_same = len(wanted) == 1
-        columns = {"check": "what", **({} if is_same else {"wanted": "wanted"}), "got": "got"}
-        rows = tuple(tuple(c[key] for key in columns.values()) for c in plain)
-        table = Table(f"checks_{kind}", "Checks that passed", tuple(map(Column, columns)), rows)
+        keys = ["what", "got"] if is_same else ["what", "wanted", "got"]
+        rows = tuple(tuple(c[key] for key in keys) for c in plain)
+        columns = tuple(map(Column, ["check", *keys[1:]]))
+        table = Table(f"checks_{kind}", "Checks that passed", columns, rows)
         what = f"{plain[0]['what']}, and {len(plain) - 1} more"
         groups.append(
             {"what": what, "wanted": wanted.pop() if is_same else "as listed", "table": table}
@@ -88,7 +89,9 @@ def card(experiment: Experiment, record: Record, check: Mapping[str, Any]) -> di
     facts = (decisive[key] for key in ("scheme", "case", "status", "reason", "facts"))
     result = Result(*facts)
     decides = worst(word for word, count in counts.items() if count)
-    is_said = _is_said(asserted, check)
+    told = wording.text(result, counts, check["where"])
+    if _is_said(asserted, check):
+        told = _hardest(record, check)
     wanted = assertions.wanted(experiment, measured, words.fact(decisive, "expected"))
     results, more = _results(record, check, unit)
     return {
@@ -110,9 +113,7 @@ def card(experiment: Experiment, record: Record, check: Mapping[str, Any]) -> di
         "where": [f"{place['text']}." for word, place in check["where"].items() if word != decides],
         "alone": _alone(check),
         "picture": figure.picture(experiment, record, asserted, check),
-        "text": _hardest(record, check)
-        if is_said
-        else wording.text(result, counts, check["where"]),
+        "text": told,
         "advice": wording.advice(status, result, counts),
         "change": experiment_file.change(experiment, measured, check),
     }

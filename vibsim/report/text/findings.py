@@ -203,10 +203,10 @@ def _phrases(experiment: Experiment, record: Record, lead: Lead) -> dict[str, st
             asked, other = found if measured.stable else found[::-1]
             filled |= {"stability": asked, "not_stability": f"{other}, against what is asked"}
     if _has_own_orders(record, lead):
-        each = len(named)
-        schemes = "both schemes promise" if each == 2 else f"each of {each} schemes promises"
-        filled["at"] = f"at the order that {schemes if each > 1 else 'its scheme promises'}"
-        filled["everywhere"] *= each == 1
+        filled["at"] = "at the order that its scheme promises"
+        if (each := len(named)) > 1:
+            schemes = "both schemes promise" if each == 2 else f"each of {each} schemes promises"
+            filled |= {"at": f"at the order that {schemes}", "everywhere": ""}
     return filled
 
 

@@ -64,9 +64,9 @@ def views(
     for scheme in schemes:
         several = data.of_several(record, scheme)
         for each in _maps(experiment, record, found, scheme):
-            text = (
-                view.shared(each.name, each.values, each.unit) if each.told is None else each.told
-            )
+            text = each.told
+            if text is None:
+                text = view.shared(each.name, each.values, each.unit)
             if text:
                 yield f"{text}{several}"
             elif np.isfinite(each.values).any():

@@ -65,15 +65,14 @@ class _Drawing:
         `draw` draws them, and returns a sentence where they leave the frame.
         """
         # an order is read with three decimals
-        if text := view.shared(
-            name, np.round(values, 3) if form == "order" else values, unit, form
-        ):
+        told = np.round(values, 3) if form == "order" else values
+        if text := view.shared(name, told, unit, form):
             yield text
         elif np.isfinite(values).any():
             tall = max(TALL, ENTRY * len(self.record["scheme"]) * len(self.along.lines))
             (ax,) = stacked([tall])
-            told = style.sentences(caption, draw(ax))
-            yield self._finished(ax, stem, name, told, quantity, values, values, unit)
+            caption = style.sentences(caption, draw(ax))
+            yield self._finished(ax, stem, name, caption, quantity, values, values, unit)
 
     def _finished(
         self, ax: Axes, stem: str, name: str, caption: str, quantity: str, values: Floats | None, places: Floats,
