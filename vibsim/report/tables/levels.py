@@ -56,7 +56,7 @@ def by_level(
     return Table(name, caption, columns, tuple(rows), heads)
 
 
-def cells(values: Floats, kind: type[int] | type[float] = float) -> Fill:
+def _cells(values: Floats, kind: type[int] | type[float] = float) -> Fill:
     """Return what fills a column with numbers of shape (scheme, case, level)."""
     return lambda member, i: kind(values[member.scheme, member.case, i])
 
@@ -128,9 +128,9 @@ def maxima(record: Record, shown: Sequence[Member]) -> Table | None:
         # lean records leave the second out
         if name in record:
             values, is_sound = known(record, name, OF_LEVEL), record["status"] == 0
-            filled.append((Column(text, measure, "norm"), cells(values)))
+            filled.append((Column(text, measure, "norm"), _cells(values)))
             if several:
-                filled.append((Column(ratio, form="order"), cells(_ratios(values, is_sound))))
+                filled.append((Column(ratio, form="order"), _cells(_ratios(values, is_sound))))
     caption = "Largest energy deviation over every step; the last point has its own end formula"
     return by_level(record, "energy_maxima", caption, shown, filled, titled=True)
 
@@ -152,11 +152,11 @@ def scalars(record: Record, shown: Sequence[Member]) -> Table | None:
     time, angle = unit(record, "period"), unit(record, "amplitude")
     usable = np.where(np.isfinite(exact), exact, np.nan)[:, None]
     filled = (
-        (Column("period", time, "full"), cells(period)),
+        (Column("period", time, "full"), _cells(period)),
         (Column("exact period", time, "full"), lambda member, i: float(exact[member.case])),
-        (Column("relative error", form="norm"), cells(period / usable - 1.0)),
+        (Column("relative error", form="norm"), _cells(period / usable - 1.0)),
         # the peak of a run that grows without bound may have either sign
-        (Column("amplitude", angle, "full"), cells(np.abs(record["amplitude"]))),
+        (Column("amplitude", angle, "full"), _cells(np.abs(record["amplitude"]))),
     )
     caption = "Period (interpolated) and amplitude"
     return by_level(record, "scalars", caption, shown, filled, titled=True)
@@ -196,8 +196,8 @@ def velocities(record: Record) -> Table | None:
     )
     filled = (
         _step_column(record),
-        (Column("max |dE|/E(0), own velocity", form="small"), cells(own)),
-        (Column("max |dE|/E(0), [D₂ₜu]", form="small"), cells(second)),
+        (Column("max |dE|/E(0), own velocity", form="small"), _cells(own)),
+        (Column("max |dE|/E(0), [D₂ₜu]", form="small"), _cells(second)),
         (Column("second over first", form="norm"), quotient),
         (Column("drift of the energy, own velocity"), drift) if is_named else None,
     )
@@ -235,10 +235,10 @@ def events(record: Record) -> Table | None:
 
     filled = (
         _step_column(record),
-        (Column("events", form="integer"), cells(count, int)),
-        (Column("first", seconds, "value"), cells(first)),
-        (Column("last", seconds, "value"), cells(last)),
-        (Column("at rest from", seconds, "value"), cells(rest)) if has_rest else None,
+        (Column("events", form="integer"), _cells(count, int)),
+        (Column("first", seconds, "value"), _cells(first)),
+        (Column("last", seconds, "value"), _cells(last)),
+        (Column("at rest from", seconds, "value"), _cells(rest)) if has_rest else None,
         (Column("last, less that of the next finer level", seconds, "small"), change),
     )
     return by_level(record, "events", caption, data.everyone(record), filled)

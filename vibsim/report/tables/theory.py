@@ -17,7 +17,7 @@ from vibsim.core.record import Record
 from vibsim.core.vocabulary import MEMBER, OF_LEVEL, TYPICAL_NORM
 from vibsim.report import choice, data, finest_level, words
 from vibsim.report.data import Member, known, swept, whole
-from vibsim.report.tables.levels import Fill, by_level, cells
+from vibsim.report.tables.levels import Fill, by_level
 from vibsim.report.tables.table import Cell, Column, Table, Written
 from vibsim.report.types import Experiment
 
@@ -143,12 +143,10 @@ def _predictions(
     for kind, (text, measure) in shown.items():
         told, seen = (known(record, f"{who}_{kind}", OF_LEVEL) for who in ("theory", "measured"))
         noise, less = step * sizes.get(kind, np.fmax(np.abs(told), 1.0)), float(kind == "growth")
-        # nothing where it is round-off
-        gap = np.where(np.abs(seen - told) <= noise, np.nan, seen - told)
         filled += [
             (Column(f"{text}: predicted", measure, "close"), _written(told - less, noise)),
             (Column("measured", measure, "close"), _written(seen - less, noise)),
-            (Column("difference", measure, "brief"), cells(gap)),
+            (Column("difference", measure, "brief"), _beyond(seen - told, noise)),
         ]
     caption, there = (
         f"Theory beside measurement: {caption}",
@@ -158,6 +156,16 @@ def _predictions(
     found = table.without_empty(["difference"])
     agree = ". Where no difference is shown, the two agree to round-off"
     return found if found.columns == table.columns else replace(found, caption=caption + agree)
+
+
+def _beyond(values: Floats, noise: Floats) -> Fill:
+    """Return what fills a column with numbers, and leaves out those that are no larger than the noise."""
+
+    def cell(member: Member, i: int) -> Cell:
+        value = float(values[member.scheme, member.case, i])
+        return None if abs(value) <= noise[member.scheme, member.case, i] else value
+
+    return cell
 
 
 def _written(values: Floats, noise: Floats) -> Fill:
