@@ -81,6 +81,68 @@ def test_the_solution_that_is_printed_is_the_discrete_one(
     np.testing.assert_allclose(growth**n * (begin * np.cos(n * th) + swing), wanted, atol=1e-7)
 
 
+@pytest.mark.parametrize("kind", thinned(FIXED_STEP, 3))
+def test_the_printed_recurrence_is_that_of_the_scheme(kind: str, capsys: Capture) -> None:
+    found = rows([kind], capsys)
+    formula = re.split(r" (?:\(\d/\d\) )?\[", found["without v"])[0]
+    scheme = SCHEMES[kind]
+    u, _ = theory.discrete(scheme.stepper(scheme.defaults()), 1.0, P, 1.1, -0.6, np.arange(30))
+    left, right = (
+        value(
+            re.sub(r"u\^(?:n|\(n([+-]\d+)\))", lambda x: f"u[{20 + int(x[1] or 0)}]", side),
+            p=P,
+            u=u,
+        )
+        for side in formula.split(" = ")
+    )
+    assert left == pytest.approx(right, abs=1e-7)
+
+
+@pytest.mark.parametrize(
+    ("kind", "without", "system"),
+    [
+        (
+            "central",
+            "[D_t D_t u = -w^2 u]^n",
+            "[D_t+ u = -(1/2) w^2 dt u + v]^n, [D_t v = -w^2 mean u]^(n+1/2)",
+        ),
+        (
+            "forward_euler",
+            "[D_t D_t u]^n = -w^2 u^(n-1)",
+            "[D_t+ u = v]^n, [D_t+ v = -w^2 u]^n",
+        ),
+        (
+            "backward_euler",
+            "[D_t D_t u]^n = -w^2 u^(n+1)",
+            "[D_t- u = v]^(n+1), [D_t- v = -w^2 u]^(n+1)",
+        ),
+        (
+            "crank_nicolson",
+            "[D_t D_t u = -w^2 mean mean u]^n",
+            "[D_t u = mean v]^(n+1/2), [D_t v = -w^2 mean u]^(n+1/2)",
+        ),
+    ],
+)
+def test_the_equations_of_the_text_are_printed_in_its_operators(
+    kind: str, without: str, system: str, capsys: Capture
+) -> None:
+    found = rows([kind], capsys)
+    assert without in found["without v"]
+    assert found["with v"] == system
+    means = found["operators"].split("; ")
+    assert "[D_t u]^n = (u^(n+1/2) - u^(n-1/2))/dt" in means
+    assert ("[mean u]^n = (u^(n+1/2) + u^(n-1/2))/2" in means) == ("mean" in without + system)
+
+
+def test_the_limits_of_the_frequency_are_printed(capsys: Capture) -> None:
+    """B, section 4.3, and pi/dt at w dt = 2 of section 4.6."""
+    wanted = f"w~/w -> 1 as p -> 0; w~ dt -> pi and w~/w -> {np.pi / 2:.6g} as p -> 2"
+    assert rows(["central"], capsys)["limits"] == wanted
+    # cos(w~ dt) = -1/3 at p = sqrt(8), by hand
+    assert f"w~ dt -> {np.arccos(-1 / 3):.6g}" in rows(["rk4"], capsys)["limits"]
+    assert rows(["gauss4"], capsys)["limits"] == "w~/w -> 1 as p -> 0"
+
+
 @pytest.mark.slow
 def test_the_documents_have_the_series_of_every_scheme(capsys: Capture) -> None:
     """Schemes with the same series share a row."""

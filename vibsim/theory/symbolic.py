@@ -37,19 +37,19 @@ def symbol(name: str) -> Any:
 
 def matrix(stepper: Stepper) -> Any:
     """Return the matrix of a step, `vibsim.theory.Amplification.matrix`, as a function of p."""
-    return _expressions(_matrices(stepper)[0])
+    return _expressions(matrices(stepper)[0])
 
 
 def start(stepper: Stepper) -> Any:
     """Return the matrix of the start, on ``(u_0, v_0 dt)``."""
-    return _expressions(_matrices(stepper)[1])
+    return _expressions(matrices(stepper)[1])
 
 
 def characteristic(stepper: Stepper) -> Any:
     """Return the characteristic polynomial in x; its roots are the amplification factors A of B, section 4.1."""
     result: Any = 1
-    for value in characteristic_of(_matrices(stepper)[0][None])[1:]:
-        result = result * symbol("x") + _expression(value[0])
+    for value in characteristic_of(matrices(stepper)[0][None])[1:]:
+        result = result * symbol("x") + expression(value[0])
     return result.expand()
 
 
@@ -87,7 +87,7 @@ def two_roots(stepper: Stepper) -> TwoRoots:
     """Return the parts of the solution; ValueError with parasitic roots, or a start that is no step."""
     from sympy import sqrt
 
-    step, first = _matrices(stepper)
+    step, first, _ = matrices(stepper)
     polynomial = [value[0] for value in characteristic_of(step[None])]
     trace, determinant = -polynomial[1], polynomial[2]
     # u^2 - T u^1 + D u^0 for u_0 = 1 and for v_0 dt = 1
@@ -96,9 +96,9 @@ def two_roots(stepper: Stepper) -> TwoRoots:
         raise ValueError(
             "the scheme has parasitic roots, so that its solution has more than two terms"
         )
-    r = sqrt(_expression(determinant))
-    one, other = map(_expression, first[0])
-    return TwoRoots(r, _expression(trace) / (2 * r), (one, other))
+    r = sqrt(expression(determinant))
+    one, other = map(expression, first[0])
+    return TwoRoots(r, expression(trace) / (2 * r), (one, other))
 
 
 def solution(stepper: Stepper) -> Any:
@@ -113,8 +113,8 @@ def solution(stepper: Stepper) -> Any:
 
 
 @lru_cache(maxsize=64)
-def _matrices(stepper: Stepper) -> tuple[NDArray[Any], NDArray[Any]]:
-    """Return the matrices of step and start, whose entries are functions of p in a field of fractions of SymPy."""
+def matrices(stepper: Stepper) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any]]:
+    """Return step, start and velocity of `vibsim.theory.Amplification` in a field of fractions of SymPy."""
     from sympy import field
 
     domain, elements = coefficients(stepper)
@@ -126,11 +126,11 @@ def _matrices(stepper: Stepper) -> tuple[NDArray[Any], NDArray[Any]]:
         lambda formula: fractions.ground_new(elements[formula]),
         substitutes={solved: _solved, solved_together: _solved_together},
     )
-    step, first = (
-        np.array([[fractions.one * x for x in column] for column in columns], dtype=object).T
-        for columns in (units.step, units.start)
+    step, first, velocity = (
+        (np.array(found, dtype=object) * fractions.one).T
+        for found in (units.step, units.start, units.velocity)
     )
-    return step, first
+    return step, first, velocity
 
 
 def _solved(
@@ -152,14 +152,15 @@ def _solved_together(
     return (one * (1.0 - d) + b * two) / bottom, (two * (1.0 - a) + c * one) / bottom
 
 
-def _expression(element: Any) -> Any:
+def expression(element: Any) -> Any:
+    """Return an element of a field of fractions, or of a ring, as a formula in p."""
     return element.as_expr(symbol("p"))
 
 
 def _expressions(entries: NDArray[Any]) -> Any:
     from sympy import Matrix
 
-    return Matrix([[_expression(entry) for entry in row] for row in entries])
+    return Matrix([[expression(entry) for entry in row] for row in entries])
 
 
 def _principal(stepper: Stepper, terms: int) -> Principal:
