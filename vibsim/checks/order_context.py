@@ -28,6 +28,7 @@ from vibsim.core.record import Record
 from vibsim.core.vocabulary import is_error_part, whole_of
 from vibsim.experiment.schema.checks import ConvergesCheck
 from vibsim.observe.member_block import fastest
+from vibsim.schemes.central import LOW_STARTS
 
 COINCIDE = 0.1
 """Rescaled differences that are further apart, over the finer one, do not coincide."""
@@ -89,7 +90,7 @@ class OrderContext:
         """... has at most, in a special case of motion, model or options, ..."""
         self.centred = math.nan
         """... and would promise with `start: centred`, where it has another start."""
-        if self.options.get("start") == "first_order":
+        if self.options.get("start") in LOW_STARTS:
             centred = {**self.options, "start": "centred"}
             self.centred = float(method.formal_order(whole_of(quantity), model, centred))
         self.expected = self.promised if check.order == "scheme" else float(check.order)
@@ -136,7 +137,12 @@ class OrderContext:
     @property
     def starts_low(self) -> bool:
         """Whether the first step explains the order."""
-        return self.options.get("start") == "first_order" and 0.5 < self.order < 1.5
+        return self.start_fault != "" and 0.5 < self.order < 1.5
+
+    @property
+    def start_fault(self) -> str:
+        """What is wrong with the formula of the first step; empty where nothing is."""
+        return LOW_STARTS.get(str(self.options.get("start")), "")
 
     @property
     def ends_low(self) -> bool:

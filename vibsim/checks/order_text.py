@@ -190,7 +190,7 @@ DIAGNOSES: Words = {
         "Set `order: scheme`, or give scheme {scheme} another `kind:`.",
     ),
     "order_low, start": (
-        " The likely cause is the first step, because `start: first_order` omits its dt^2 term.",
+        " The likely cause is the first step, because `start: {options[start]}` {start_fault}.",
         "Set `start: centred` for scheme {scheme}.",
     ),
     "order_low, end": (

@@ -10,6 +10,7 @@ from typing import Any
 from vibsim.models.shared.crossings import is_crossing, written
 from vibsim.report.text import structure
 from vibsim.report.types import Check, Experiment, Measurement, SchemeSpec
+from vibsim.schemes.central import LOW_STARTS
 
 WIDTH = 100  # characters of a line
 LONG = 160  # words of a file above which a page leaves its checks out
@@ -174,7 +175,7 @@ def change(experiment: Experiment, measured: Measurement | None, check: Mapping[
     result = check["results"][0]
     facts, reason = result.get("facts") or {}, result.get("reason")
     spec = next((spec for spec in experiment.schemes if spec.name == result["scheme"]), None)
-    if reason == "order_low" and spec is not None and spec.options.get("start") == "first_order":
+    if reason == "order_low" and spec is not None and spec.options.get("start") in LOW_STARTS:
         return "\n".join(schemes(experiment, spec.name, start="centred"))
     levels = list(experiment.levels)
     if levels != list(range(levels[0], levels[-1] + 1)):
