@@ -155,6 +155,18 @@ def test_the_documents_have_the_series_of_every_scheme(capsys: Capture) -> None:
     assert "\n".join(table) in (home() / "docs/schemes.md").read_text()
 
 
+@pytest.mark.parametrize(
+    "kind", ["central", "euler_cromer", "forward_euler", "backward_euler", "crank_nicolson"]
+)
+def test_the_documents_have_the_equations_of_the_schemes_of_the_text(
+    kind: str, capsys: Capture
+) -> None:
+    found = rows([kind], capsys)
+    without, _, at_one = found["without v"].partition(" with all at one time: ")
+    row = f"| `{kind}` | {found['with v']} | {without[without.index('[') :]} | {at_one} |"
+    assert row in (home() / "docs/schemes.md").read_text()
+
+
 def test_formulas_are_written_as_latex(capsys: Capture) -> None:
     found = rows(["central", "--latex", "--terms", "2"], capsys)
     assert found["frequency"] == r"w~/w = 1 + \frac{p^{2}}{24} + O(p^{4})"
