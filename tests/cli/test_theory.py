@@ -138,9 +138,26 @@ def test_the_limits_of_the_frequency_are_printed(capsys: Capture) -> None:
     """B, section 4.3, and pi/dt at w dt = 2 of section 4.6."""
     wanted = f"w~/w -> 1 as p -> 0; w~ dt -> pi and w~/w -> {np.pi / 2:.6g} as p -> 2"
     assert rows(["central"], capsys)["limits"] == wanted
+    assert "; w~ dt -> 0 and" in rows(["yoshida4"], capsys)["limits"]
     # cos(w~ dt) = -1/3 at p = sqrt(8), by hand
     assert f"w~ dt -> {np.arccos(-1 / 3):.6g}" in rows(["rk4"], capsys)["limits"]
     assert rows(["gauss4"], capsys)["limits"] == "w~/w -> 1 as p -> 0"
+
+
+@pytest.mark.parametrize(("kind", "least"), [("central", 5.5), ("rk4", 5.5), ("ab2", 3.5)])
+def test_the_printed_error_is_that_of_the_scheme(kind: str, least: float, capsys: Capture) -> None:
+    """What it leaves falls with the next power of p: B, section 4.4."""
+    formula, _, rest = (
+        rows([kind], capsys)["error"].removeprefix("u(t) - u_n = I ").rpartition(" + O(")
+    )
+    assert rest.endswith("died out") == (kind == "ab2")
+    scheme, w, t = SCHEMES[kind], 1.3, 2.0
+    left = []
+    for n in (80, 160):
+        u, _ = theory.discrete(scheme.stepper(scheme.defaults()), w, t / n, 1.0, 0.0, n)
+        told = value(formula, p=w * t / n, w=w, t=t, sin=np.sin, cos=np.cos)
+        left.append(abs(np.cos(w * t) - float(u) - told))
+    assert np.log2(left[0] / left[1]) > least
 
 
 @pytest.mark.slow

@@ -3,13 +3,15 @@
 import numpy as np
 import pytest
 import sympy
+from scheme_variants import VARIANTS
+from thinned import thinned
 
 from vibsim import theory
 from vibsim.schemes import FIXED_STEP, SCHEMES
 from vibsim.theory import symbolic
 
 P, X, N = (symbolic.symbol(name) for name in ("p", "x", "n"))
-BEGIN, PUSH, W = (symbolic.symbol(name) for name in ("I", "V", "w"))
+BEGIN, PUSH, W, TIME = (symbolic.symbol(name) for name in ("I", "V", "w", "t"))
 
 
 def stepper(kind, **options):
@@ -78,6 +80,32 @@ def test_the_series_of_the_text():
     corrected = symbolic.frequency_series(stepper("central", frequency_correction=True), 3)
     assert corrected.coeff(P, 2) == 0
     assert corrected.coeff(P, 4) != 0
+
+
+@pytest.mark.parametrize(("scheme", "options"), thinned(VARIANTS, 2))
+def test_the_error_at_a_time_is_that_of_the_exact_discrete_solution(scheme, options):
+    """What is left falls with the power that is told."""
+    method, w, t = scheme.stepper(options), 1.3, 1.7
+    error, following = symbolic.error_series(method)
+    left = []
+    for n in (48, 96):
+        u, _ = theory.discrete(method, w, t / n, 1.0, 0.0, n)
+        told = error.subs({P: sympy.Rational(t) * sympy.Rational(w) / n, W: w, TIME: t}).evalf(30)
+        left.append(abs(float(sympy.cos(w * t) - float(u) - told)))
+    power = sympy.degree(following, P)
+    assert power >= 3
+    assert left[1] <= left[0] * 2.0 ** (0.3 - power) + 4e-16
+
+
+def test_the_errors_of_the_text():
+    """Section 4.4, with the term that the erratum to it adds, and 5.6: growth and frequency of Forward Euler."""
+    angle = W * TIME
+    fourth = angle**2 * sympy.cos(angle) / 1152 + 3 * angle * sympy.sin(angle) / 640
+    error, following = symbolic.error_series(stepper("central"))
+    assert sympy.expand(error - P**2 * angle * sympy.sin(angle) / 24 - P**4 * fourth) == 0
+    assert following == P**6
+    error, _ = symbolic.error_series(stepper("forward_euler"))
+    assert error.coeff(P, 1) == -angle * sympy.cos(angle) / 2
 
 
 def test_the_characteristic_polynomial_of_the_text():

@@ -20,14 +20,16 @@ from vibsim.schemes.newton import solved, solved_together
 from vibsim.theory.arithmetic import characteristic as characteristic_of
 from vibsim.theory.basis import unit_steps
 from vibsim.theory.laurent import HALF, Laurent, coefficients
-from vibsim.theory.phase_amplitude import Principal, principal
+from vibsim.theory.phase_amplitude import Principal, principal, principal_mode
 
+POWERS = 9
+"""Power of p from which on errors are not worked out."""
 TERMS = 4
 """Terms of a series, in even powers of p, unless told."""
 
 
 def symbol(name: str) -> Any:
-    """Return one of the symbols of results: p, x, I, V, w real, n a whole number."""
+    """Return one of the symbols of results: p, x, I, V, w, t, dt real, n a whole number."""
     from sympy import Symbol
 
     if name == "n":
@@ -66,6 +68,42 @@ def frequency_series(stepper: Stepper, terms: int = TERMS) -> Any:
 def phase_error_series(stepper: Stepper, terms: int = TERMS) -> Any:
     """Return ``(P - P~)/P = 1 - w/w~``, the part of a period by which peaks come early in each, likewise."""
     return _polynomial(1.0 - _principal(stepper, terms).square.shifted(-2) ** -HALF, terms)
+
+
+def error_series(stepper: Stepper) -> tuple[Any, Any]:
+    """Return the error ``u(t) - u^n`` at a time t for ``u(0) = 1``, ``u'(0) = 0``: two terms in p, B, section 4.4.
+
+    The other formula is the next power of p. Of a scheme with parasitic roots it is the error once they have died out.
+    """
+    from sympy import cos, ring, sin
+
+    mode, p, angle = principal_mode(stepper, 0.0), symbol("p"), symbol("w") * symbol("t")
+    formulas, turned = ring("turned", mode.rate.field.domain)
+
+    def row(series: Laurent) -> NDArray[Any]:
+        """Return the factors of the powers of p as polynomials in w t."""
+        found = [formulas.ground_new(series.at(k)) for k in range(POWERS)]
+        return np.array(found, dtype=object)
+
+    def product(a: NDArray[Any], b: NDArray[Any]) -> NDArray[Any]:
+        return np.array([sum(a[: k + 1] * b[k::-1]) for k in range(POWERS)], dtype=object)
+
+    # the motion is the real part of B exp(i w t) exp(apart), where apart vanishes with p
+    apart = row(mode.rate) * turned, row(mode.frequency - 1.0) * turned
+    power = total = row(mode.position[0]), -row(mode.slope[0] / mode.frequency)
+    for k in range(1, POWERS):
+        (a, b), (c, d) = power, apart
+        power = (product(a, c) - product(b, d)) / k, (product(a, d) + product(b, c)) / k
+        total = total[0] + power[0], total[1] + power[1]
+    along, beside = total[0] * -1, total[1]
+    along[0] += 1
+    parts = (
+        one.as_expr(angle) * cos(angle) + other.as_expr(angle) * sin(angle)
+        for one, other in zip(along, beside, strict=True)
+    )
+    terms = [(p**k, part) for k, part in enumerate(parts) if part != 0]
+    following = [power for power, _ in terms[2:]]
+    return sum(factor * power for power, factor in terms[:2]), (*following, p**POWERS)[0]
 
 
 @dataclass(frozen=True)

@@ -60,7 +60,8 @@ def theory_rows(scheme: Scheme, options: Options, terms: int, *, latex: bool) ->
     yield "scheme", "; ".join((f"{scheme.kind}: {scheme.title}", *changed))
     yield "problem", "u'' + w^2 u = 0, u(0) = I, u'(0) = V; p = w dt"
     yield "stability limit", stable_until(scheme, options)
-    yield "roots", f"{_characteristic(operators.recurrence(stepper), write)} = 0"
+    factors = operators.recurrence(stepper)
+    yield "roots", f"{_characteristic(factors, write)} = 0"
     yield (
         "amplitude",
         f"changes by the factor r = {series(symbolic.growth_series(stepper, terms))} in each step",
@@ -68,6 +69,9 @@ def theory_rows(scheme: Scheme, options: Options, terms: int, *, latex: bool) ->
     yield "frequency", f"w~/w = {series(symbolic.frequency_series(stepper, terms))}"
     early = series(symbolic.phase_error_series(stepper, terms))
     yield "phase", f"peaks come early by 1 - w/w~ = {early} of a period, in each period"
+    error, following = map(write, symbolic.error_series(stepper))
+    late = ", once parasitic roots have died out" if len(factors) > 3 else ""
+    yield "error", f"u(t) - u_n = I ({error}) + O({following}) at a time t, for V = 0{late}"
     yield "limits", _limits(scheme, options, stepper, write)
     yield from _in_operators(stepper, write, latex=latex)
     try:
@@ -90,7 +94,9 @@ def _limits(scheme: Scheme, options: Options, stepper: Stepper, write: Callable[
     if not 0.0 < limit < math.inf:
         return small
     angle = float(roots(stepper, limit).angle)
-    turned = "pi" if math.isclose(angle, math.pi, rel_tol=1e-7) else f"{angle:.6g}"
+    # where the roots meet, half of the digits are left
+    angle = next((x for x in (0.0, math.pi) if abs(angle - x) < 1e-6), angle)
+    turned = "pi" if angle == math.pi else f"{angle:.6g}"
     return f"{small}; w~ dt -> {turned} and w~/w -> {angle / limit:.6g} as p -> {limit:.6g}"
 
 
