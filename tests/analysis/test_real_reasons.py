@@ -73,6 +73,14 @@ LADDERS = {
         ("FAIL", "order_low"),
         ("first step", "start: first_order", "The phase is of first order"),
     ),
+    "start by a backward difference": Ladder(
+        {**PENDULUM, "time": {"end": 20.0}},
+        {"kind": "central", "start": "backward"},
+        (8, 9, 10, 11, 12),
+        {"converges": "theta", "order": 2},
+        ("FAIL", "order_low"),
+        ("first step", "`start: backward` has twice its dt^2 term"),
+    ),
     "one-sided end": Ladder(
         {**PENDULUM, "time": {"end": 20.0}},
         {"kind": "central", "end_velocity": "backward"},

@@ -187,6 +187,9 @@ def test_the_documents_have_the_equations_of_the_schemes_of_the_text(
 def test_formulas_are_written_as_latex(capsys: Capture) -> None:
     found = rows(["central", "--latex", "--terms", "2"], capsys)
     assert found["frequency"] == r"w~/w = 1 + \frac{p^{2}}{24} + O(p^{4})"
+    assert "[D_{t} D_{t} u = -w^{2} u]^{n}" in found["without v"]
+    assert r"[D_{t} v = -w^{2} \mathrm{mean}\, u]^{n+1/2}" in found["with v"]
+    assert "[D_{t}^{+} u]^{n} = (u^{n+1} - u^n)/dt" in found["operators"]
 
 
 def test_a_scheme_with_parasitic_roots_has_no_written_solution(capsys: Capture) -> None:
