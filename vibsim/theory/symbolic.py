@@ -1,9 +1,9 @@
-r"""The theory of a scheme as formulas in ``p = w dt``: matrix, characteristic polynomial, series, discrete solution.
+r"""The theory of a scheme as formulas in ``p = w dt``: matrix, series, error at a time, discrete solution.
 
 Exact, for every scheme whose step is polynomial or rational on a linear problem; all of them are. SymPy is imported on
-first use, and every result is one of its expressions in the symbols p, x, n, I, V and w.
+first use, and every result is one of its expressions in the symbols p, n, I, V, w and t.
 
-Source: vibration text (B), equations (18)-(20), sections 5.6 and 7.2, exercises 7 and 17.
+Source: vibration text (B), equations (18)-(20), sections 4.4, 5.6 and 7.2, exercises 7 and 17.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from vibsim.schemes.base import Stepper
 from vibsim.schemes.newton import solved, solved_together
-from vibsim.theory.arithmetic import characteristic as characteristic_of
+from vibsim.theory.arithmetic import characteristic
 from vibsim.theory.basis import unit_steps
 from vibsim.theory.laurent import HALF, Laurent, coefficients
 from vibsim.theory.phase_amplitude import Principal, principal, principal_mode
@@ -45,14 +45,6 @@ def matrix(stepper: Stepper) -> Any:
 def start(stepper: Stepper) -> Any:
     """Return the matrix of the start, on ``(u_0, v_0 dt)``."""
     return _expressions(matrices(stepper)[1])
-
-
-def characteristic(stepper: Stepper) -> Any:
-    """Return the characteristic polynomial in x; its roots are the amplification factors A of B, section 4.1."""
-    result: Any = 1
-    for value in characteristic_of(matrices(stepper)[0][None])[1:]:
-        result = result * symbol("x") + expression(value[0])
-    return result.expand()
 
 
 def growth_series(stepper: Stepper, terms: int = TERMS) -> Any:
@@ -126,7 +118,7 @@ def two_roots(stepper: Stepper) -> TwoRoots:
     from sympy import sqrt
 
     step, first, _ = matrices(stepper)
-    polynomial = [value[0] for value in characteristic_of(step[None])]
+    polynomial = [value[0] for value in characteristic(step[None])]
     trace, determinant = -polynomial[1], polynomial[2]
     # u^2 - T u^1 + D u^0 for u_0 = 1 and for v_0 dt = 1
     gaps = (step @ first)[0] - first[0] * trace + np.array([1, 0], dtype=object) * determinant
