@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -12,8 +13,9 @@ from thinned import thinned
 
 from vibsim import theory
 from vibsim.cli import main
+from vibsim.cli.commands.theory import theory_rows
 from vibsim.core.home import home
-from vibsim.schemes import FIXED_STEP, SCHEMES
+from vibsim.schemes import FIXED_STEP, SCHEMES, Stepper
 
 Capture = pytest.CaptureFixture[str]
 P = 0.1
@@ -158,6 +160,25 @@ def test_the_printed_error_is_that_of_the_scheme(kind: str, least: float, capsys
         told = value(formula, p=w * t / n, w=w, t=t, sin=np.sin, cos=np.cos)
         left.append(abs(np.cos(w * t) - float(u) - told))
     assert np.log2(left[0] / left[1]) > least
+
+
+def test_a_scheme_of_another_equation_is_told_by_its_samples() -> None:
+    """A kick that is too strong by a half; there is no series of w~ about w."""
+
+    def start(variant: int, u: float, v: float, dt: float, p: Any, acceleration: Any) -> Any:
+        return step((u, v), 0.0, dt, p, acceleration)[0]
+
+    def step(state: Any, t: float, dt: float, p: Any, acceleration: Any) -> Any:
+        u, v = state
+        ahead = v + 1.5 * dt * acceleration(u, v, t, p)
+        return (u + dt * ahead, ahead), v
+
+    wrong = replace(SCHEMES["forward_euler"], stepper=lambda options: Stepper(start, step))
+    found = dict(theory_rows(wrong, {}, 3, latex=False))
+    assert found["series"].startswith("not written: the numerical frequency does not tend to w")
+    assert found["without v"] == "u^(n+1) = (2 - 3 p^2/2) u^n - u^(n-1)"
+    assert found["with v"] == "[D_t- u = v]^(n+1), [D_t+ v = -(3/2) w^2 u]^n"
+    assert "frequency" not in found
 
 
 @pytest.mark.slow

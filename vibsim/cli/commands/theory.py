@@ -53,26 +53,16 @@ def theory_rows(scheme: Scheme, options: Options, terms: int, *, latex: bool) ->
     stepper = scheme.stepper(options)
     write = _latex if latex else _plain
 
-    def series(formula: Any) -> str:
-        return f"{write(formula)} + O({write(symbolic.symbol('p') ** (2 * terms))})"
-
     changed = (f"{k} = {v}" for k, v in options.items() if v != scheme.defaults()[k])
     yield "scheme", "; ".join((f"{scheme.kind}: {scheme.title}", *changed))
     yield "problem", "u'' + w^2 u = 0, u(0) = I, u'(0) = V; p = w dt"
     yield "stability limit", stable_until(scheme, options)
-    factors = operators.recurrence(stepper)
-    yield "roots", f"{_characteristic(factors, write)} = 0"
-    yield (
-        "amplitude",
-        f"changes by the factor r = {series(symbolic.growth_series(stepper, terms))} in each step",
-    )
-    yield "frequency", f"w~/w = {series(symbolic.frequency_series(stepper, terms))}"
-    early = series(symbolic.phase_error_series(stepper, terms))
-    yield "phase", f"peaks come early by 1 - w/w~ = {early} of a period, in each period"
-    error, following = map(write, symbolic.error_series(stepper))
-    late = ", once parasitic roots have died out" if len(factors) > 3 else ""
-    yield "error", f"u(t) - u_n = I ({error}) + O({following}) at a time t, for V = 0{late}"
-    yield "limits", _limits(scheme, options, stepper, write)
+    yield "roots", f"{_characteristic(operators.recurrence(stepper), write)} = 0"
+    try:
+        yield from [*_series_rows(scheme, options, terms, write)]
+    except ValueError:
+        reason = "the numerical frequency does not tend to w as dt tends to 0"
+        yield "series", f"not written: {reason}, so the scheme is not one for this equation"
     yield from _in_operators(stepper, write, latex=latex)
     try:
         parts = symbolic.two_roots(stepper)
@@ -83,6 +73,29 @@ def theory_rows(scheme: Scheme, options: Options, terms: int, *, latex: bool) ->
     yield "", f"r = {write(parts.growth)}"
     yield "", f"cos(th) = {write(parts.cosine)}"
     yield "", f"u_1 = {_sum(zip(parts.first, ('I', 'V dt'), strict=True), write)}"
+
+
+def _series_rows(
+    scheme: Scheme, options: Options, terms: int, write: Callable[[Any], str]
+) -> Iterator[Row]:
+    """Yield what is known as series in p; ValueError where the frequency does not begin with w."""
+    from vibsim.theory import operators, symbolic
+
+    stepper = scheme.stepper(options)
+
+    def series(formula: Any) -> str:
+        return f"{write(formula)} + O({write(symbolic.symbol('p') ** (2 * terms))})"
+
+    growth = series(symbolic.growth_series(stepper, terms))
+    yield "amplitude", f"changes by the factor r = {growth} in each step"
+    yield "frequency", f"w~/w = {series(symbolic.frequency_series(stepper, terms))}"
+    early = series(symbolic.phase_error_series(stepper, terms))
+    yield "phase", f"peaks come early by 1 - w/w~ = {early} of a period, in each period"
+    error, following = map(write, symbolic.error_series(stepper))
+    has_parasites = len(operators.recurrence(stepper)) > 3
+    late = ", once parasitic roots have died out" if has_parasites else ""
+    yield "error", f"u(t) - u_n = I ({error}) + O({following}) at a time t, for V = 0{late}"
+    yield "limits", _limits(scheme, options, stepper, write)
 
 
 def _limits(scheme: Scheme, options: Options, stepper: Stepper, write: Callable[[Any], str]) -> str:
