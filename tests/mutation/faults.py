@@ -267,8 +267,8 @@ FAULTS = (
         "first step of first order",
         "start",
         "schemes/central.py",
-        "    kick = ZERO if variant == FORWARD_START else share * (dt * dt) * acceleration(u, v, 0.0, p)\n    push = dt * v",
-        "    kick = 0.0\n    push = dt * v",
+        "kick = ZERO if variant == FORWARD_START else share * (dt * dt) * acceleration(u, v, 0.0, p)\n    push",
+        "kick = 0.0\n    push",
     ),
     Fault(
         "start of Euler-Cromer exchanged",
