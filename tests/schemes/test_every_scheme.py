@@ -10,7 +10,7 @@ from thinned import thinned
 
 from vibsim import Experiment, analyse, simulate, verdicts
 from vibsim.schemes import FIXED_STEP, SCHEMES, NumberOption
-from vibsim.schemes.central import LOW_STARTS
+from vibsim.schemes.base import LOW_STARTS
 
 UNIT = 2.0**-53
 

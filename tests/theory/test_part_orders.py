@@ -14,7 +14,7 @@ from thinned import thinned
 from vibsim import theory
 from vibsim.models import MODELS
 from vibsim.schemes import SCHEMES, Stepper
-from vibsim.schemes.central import LOW_STARTS
+from vibsim.schemes.base import LOW_STARTS
 from vibsim.theory.phase_amplitude import principal_mode
 
 SPRING = MODELS["spring"]

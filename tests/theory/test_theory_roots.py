@@ -12,7 +12,7 @@ from vibsim.engine import integrate
 from vibsim.models import MODELS
 from vibsim.observe.oscillation import fit_recurrence
 from vibsim.schemes import FIXED_STEP, SCHEMES
-from vibsim.schemes.central import LOW_STARTS
+from vibsim.schemes.base import LOW_STARTS
 
 SPRING = MODELS["spring"]
 LIMITS = {

@@ -28,7 +28,7 @@ from vibsim.core.record import Record
 from vibsim.core.vocabulary import is_error_part, whole_of
 from vibsim.experiment.schema.checks import ConvergesCheck
 from vibsim.observe.member_block import fastest
-from vibsim.schemes.central import LOW_STARTS
+from vibsim.schemes.base import LOW_STARTS
 
 COINCIDE = 0.1
 """Rescaled differences that are further apart, over the finer one, do not coincide."""

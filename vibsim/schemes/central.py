@@ -43,6 +43,7 @@ from vibsim.core.array_types import Floats
 from vibsim.elementary import ELEMENTARY
 from vibsim.models.base import Model
 from vibsim.schemes.base import (
+    LOW_STARTS,
     UNIT_ROUND_OFF,
     VECTOR,
     ZERO,
@@ -59,8 +60,6 @@ from vibsim.schemes.orders import Orders, depends_on_velocity, same_orders
 
 FORWARD_START, BACKWARD_START = 1, 2
 """Variants of a start with a one-sided difference of the initial velocity."""
-LOW_STARTS = {"first_order": "omits its dt^2 term", "backward": "has twice its dt^2 term"}
-"""What is wrong with these starts, in words: they leave order 1."""
 
 
 def start_three_term(

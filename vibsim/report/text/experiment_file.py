@@ -10,7 +10,7 @@ from typing import Any
 from vibsim.models.shared.crossings import is_crossing, written
 from vibsim.report.text import structure
 from vibsim.report.types import Check, Experiment, Measurement, SchemeSpec
-from vibsim.schemes.central import LOW_STARTS
+from vibsim.schemes.base import LOW_STARTS
 
 WIDTH = 100  # characters of a line
 LONG = 160  # words of a file above which a page leaves its checks out
