@@ -53,6 +53,8 @@ FEWEST = 3
 """Fewer levels do not show how large an error is."""
 FINER = 2
 """So many finer levels are advised."""
+FEWEST_DIGITS, MOST_DIGITS = 4, 10
+"""Significant digits of a number."""
 
 
 def compare(check: ValueCheck, number: Floats) -> tuple[Flags, Floats]:
@@ -303,14 +305,23 @@ def describe(f: Found, check: ValueCheck) -> Description:
                     f"Add levels {finer[0]} and {finer[-1]} to `levels:` ({cost}) to shrink the error bound, or ask "
                     "for the number of one level (`at: {level: ...}`)."
                 )
-    return Description(sentence, advice, brief)
+    return Description(sentence, advice, _measured(f, check, _digits(f, check)))
 
 
-def _measured(f: Found, check: ValueCheck) -> str:
+def _digits(f: Found, check: ValueCheck) -> int:
+    """Return how many digits of a number tell it from what a check asks for, and one more."""
+    found, (key, wanted) = f.fact("value"), _border(check)
+    room = check.allowed if key == "equals" else abs(found - wanted)
+    if not (math.isfinite(found) and found != 0.0 and room > 0.0):
+        return MOST_DIGITS
+    return min(max(FEWEST_DIGITS, 2 + math.ceil(math.log10(abs(found) / room))), MOST_DIGITS)
+
+
+def _measured(f: Found, check: ValueCheck, digits: int = MOST_DIGITS) -> str:
     """Write a number with its unit, and with the bound of its error where it has one."""
     found, bound = f.fact("value"), f.fact("error_bound")
     # of round-off two digits say all
-    digits = 2 if f.reason == "match" and abs(found) <= ROUND_OFF else 10
+    digits = 2 if f.reason == "match" and abs(found) <= ROUND_OFF else digits
     told = f"{f.notation.number(found, digits)} {unit_of(f.experiment, f.record, check)}".rstrip()
     if check.value == "stability_limit" and found == 0.0:
         told += " (it grows at every step)"

@@ -111,6 +111,16 @@ def badge(check: Mapping[str, Any]) -> str:
     return TRAP if is_trap(check) else BADGES["PASS"]
 
 
+MARKS = TRAP, REFUTED
+"""Words on checks that are told beside a verdict: that something went wrong, as expected."""
+
+
+def marks(checks: Sequence[Mapping[str, Any]]) -> list[tuple[str, int]]:
+    """Return those of `MARKS` that checks have, with the number of checks."""
+    found = [badge(check) for check in checks]
+    return [(mark, found.count(mark)) for mark in MARKS if mark in found]
+
+
 def is_trap(check: Mapping[str, Any]) -> bool:
     """Say whether a check of a summary expects a failure, or a statement to be false."""
     if check["kind"] == "claim":
@@ -165,12 +175,11 @@ class _Page(Notation):
         mantissa, has_power, exponent = text.partition("e")
         if len(mantissa) > MOST_DIGITS or (mantissa.endswith(".0") and not has_power):
             mantissa = f"{float(mantissa):.10g}"
+        mantissa = mantissa.replace("-", "−")
         if not has_power:
             return mantissa
         ten = power(int(exponent))
-        if abs(float(mantissa)) != 1.0:
-            return f"{mantissa}·{ten}"
-        return f"-{ten}" if mantissa.startswith("-") else ten
+        return mantissa.replace("1", ten) if mantissa in ("1", "−1") else f"{mantissa}·{ten}"
 
     def powers(self, text: str) -> str:
         """Write the powers of ten in a sentence that was made for a terminal."""

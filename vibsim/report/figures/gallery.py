@@ -6,6 +6,8 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cache
 
+import numpy as np
+
 from vibsim.core.record import Record
 from vibsim.core.vocabulary import SEVERITY
 from vibsim.experiment.storage import checked_quantities
@@ -109,6 +111,11 @@ def pictures(
         return [*tab(f"{letter}, order" if several else letter, drawn), *tabs]
 
     tabs = [one for quantity in found if quantity == lead.quantity for one in of(quantity)]
+    if series:
+        working = tab("work", [work.precision(experiment, record, case) for case in cases[:1]])
+        # where a scheme chooses its own steps, the work compares it with the others
+        has_own_steps = bool(np.isnan(data.formal_orders(record, lead.quantity)).any())
+        tabs[1:1] = working * has_own_steps
     if has_pairs:
         tabs += tab("estimated error", [solution.solution(record, position, m) for m in own[:1]])
     if series:
@@ -121,8 +128,8 @@ def pictures(
     theories: Drawn = [theory.order_and_stability(experiment, record)]
     theories += [theory.growing(experiment, record)] if has_series else []
     tabs += tab("theory", theories)
-    if series:
-        tabs += tab("work", [work.precision(experiment, record, case) for case in cases[:1]])
+    if series and not has_own_steps:
+        tabs += working
     tabs += [one for quantity in found if quantity != lead.quantity for one in of(quantity)]
     shown_below = (picture for picture in moving if picture and picture.name not in first)
     belief = tuple(

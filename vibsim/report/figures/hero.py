@@ -66,7 +66,7 @@ def _legend(ax: Axes, columns: int, size: float) -> None:
     else:
         ax.set_ylim(low, high + STRIP * (high - low) * rows)
     ax.legend(
-        loc="upper left", ncols=columns, fontsize=size, handlelength=1.6, borderaxespad=0.2, columnspacing=1.2
+        loc="upper left", ncols=columns, fontsize=size, handlelength=1.6, borderaxespad=0.2, columnspacing=1.9
     )  # fmt: skip
 
 
@@ -85,20 +85,24 @@ def differences(record: Record, lead: Lead) -> Picture | None:
     letter, measure = words.symbol(quantity), data.unit(record, f"{quantity}_difference")
     ax = _panel(LEFT, style.label(f"rescaled differences of {letter}", measure, exponent))
     ax.set_gid(style.TIME)
+    # a name of several words would leave no room for the curves
+    labels = [
+        curve.label.replace(letter, "level") if "_" in letter else curve.label for curve in shown
+    ]
     for i, curve in enumerate(shown):
         y = style.no_zeros(curve.values) if wild else curve.values / 10.0**exponent
         look: dict[str, Any] = {
             "color": style.COLOURS[i % style.MANY],
             "linewidth": 5.5 - 4.2 * i / max(1, len(shown) - 1),
         }
-        ax.plot(*style.thin(t, y, 200), label=curve.label, gid=curve.group, **look)
+        ax.plot(*style.thin(t, y, 200), label=labels[i], gid=curve.group, **look)
     if wild:
         style.log_axis(ax, "y", *panels.decades(values))
     else:
         ax.set_ylim(*style.limits(*(part / 10.0**exponent for part in values)))
     ax.set_xlim(float(t[0]), float(t[-1]) if t[-1] > t[0] else 1.0)
     ax.set_xlabel(data.time_label(record))
-    size = 8.0 if max(len(curve.label) for curve in shown) < LONG else 6.0
+    size = 8.0 if max(map(len, labels)) < LONG else 6.0
     _legend(ax, columns=3, size=size)
     return Picture(
         "hero_differences",
@@ -181,7 +185,7 @@ def against_step(experiment: Experiment, record: Record, lead: Lead) -> Picture 
         due = words.fact(lead.result, "expected")
         is_other = lead.result["reason"] != "asymptotic" and due is not None
         missed = f", not by {2.0**due:.2g}" if is_other else ""
-        title = f"The error falls by {found:.2g} a level{missed}"
+        title = f"Each level divides the error by {found:.2g}{missed}"
     return Picture(
         "hero_error",
         title,
@@ -361,6 +365,7 @@ def _map(lead: Lead, grid: sweep_layout.Grid, values: Floats, text: str) -> Axes
     ax.grid(visible=False)
     inside = ax.inset_axes((1.03, 0.0, 0.035, 1.0))
     bar = _root(ax).colorbar(mesh, cax=inside)
+    inside.grid(visible=False)
     if is_log:
         style.log_ticks(bar.ax.yaxis, *ends, most=5)
     _mark(ax, grid.x.values, grid.y.values, lead, on_map=True)
@@ -390,7 +395,9 @@ def orders(experiment: Experiment, record: Record, lead: Lead) -> Picture | None
     keys, quantity = sweep_layout.keys(record), lead.quantity
     if not keys or not data.whole(record, "triple"):
         return None
-    order = finest_level.orders(record, quantity, lead.norm)[0][lead.member.scheme]
+    order, low, high = (
+        part[lead.member.scheme] for part in finest_level.orders(record, quantity, lead.norm)
+    )
     promised = data.formal_orders(record, quantity)[lead.member.scheme]
     known = np.isfinite(order)
     if not known.any():
@@ -404,7 +411,7 @@ def orders(experiment: Experiment, record: Record, lead: Lead) -> Picture | None
     if order.size > FEW:
         ax = _panel(RIGHT, "members (logarithmic)")
         borders = np.linspace(*style.limits(shown[known], around), 41)
-        ax.hist(shown[known], borders.tolist(), color=style.COLOURS[0])
+        ax.hist(shown[known], borders.tolist(), color=style.COLOURS[0], zorder=2)
         for value in due:
             ax.axvspan(value - allowed, value + allowed, **style.ALLOWED)
         ax.set_yscale("log")
@@ -416,23 +423,31 @@ def orders(experiment: Experiment, record: Record, lead: Lead) -> Picture | None
         ax = _panel(RIGHT, f"observed order of {letter}")
         for value in due:
             ax.axhspan(value - allowed, value + allowed, **style.ALLOWED)
+        ends = (np.clip(part, around.min() - 1.0, around.max() + 1.0) for part in (low, high))
+        ax.vlines(key.values, *ends, color=style.COLOURS[0], linewidth=1.6, alpha=0.5)
         ax.plot(key.values, shown, ".", color=style.COLOURS[0], markersize=4)
         _across(ax, key)
         ax.set_ylim(*style.limits(shown[known], around))
         _mark(ax, key.values, shown, lead)
-    inside = known & (np.abs(order - promised) <= allowed)
+    # as in a verdict, the interval counts where there is one
+    inside = (
+        known
+        & (np.fmin(order, low) <= promised + allowed)
+        & (np.fmax(order, high) >= promised - allowed)
+    )
     kept, every = (words.number(int(n), "integer") for n in (inside.sum(), order.size))
     title = (
         "All members keep their order"
         if inside.all()
         else f"{kept} of {every} members have an order in the band"
     )
+    bars = "" if order.size > FEW else "; the bars are the intervals of the orders"
     more = (
         f" {words.number(missing, 'integer')} members have no order and are left out."
         if missing
         else ""
     )
     return Picture(
-        "hero_orders", title, f"The band is what the tolerance allows around the promised order.{more}",
+        "hero_orders", title, f"The band is what the tolerance allows around the promised order{bars}.{more}",
         f"Observed orders of {words.name(quantity)} of all members", _root(ax),
     )  # fmt: skip

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping
 from typing import Any
 
@@ -126,8 +127,12 @@ def _is_said(asserted: Check | None, check: Mapping[str, Any]) -> bool:
     """Say whether the line of a check tells all of what was measured: it is as asked for, without a doubt."""
     if check["status"] != "PASS" or asserted is None:
         return False
-    order, low = (words.fact(check["results"][0], f"order{end}") for end in ("", "_low"))
+    result = check["results"][0]
+    order, low, wanted = (words.fact(result, name) for name in ("order", "order_low", "expected"))
+    allowed = getattr(asserted.measured, "tolerance", math.inf)
     is_doubtful = order is not None and low is not None and order - low > WIDE
+    # that the interval reaches what is wanted, where the order itself does not, is worth a sentence
+    is_doubtful |= None not in (order, wanted) and abs(order - wanted) > allowed
     is_plain = asserted.measured.kind in SAID_BY_THE_LINE and not is_trap(asserted)
     return is_plain and not is_doubtful
 

@@ -48,10 +48,22 @@ def context(
     return {
         "finding": findings.title(experiment, record, lead, published.ids(experiment)),
         "counts": words.passed(statuses),
+        "marks": words.marks(summary["checks"]),
         "facts": findings.sentence(*_facts(experiment, record)),
         "numbers": list(numbers(experiment, record, lead))[:NUMBERS],
-        "meaning": findings.paragraph(experiment, record, lead, levels),
+        "meaning": " ".join(
+            [findings.paragraph(experiment, record, lead, levels), *_traps(summary, lead)]
+        ),
     }
+
+
+def _traps(summary: Mapping[str, Any], lead: Lead) -> Iterator[str]:
+    """Say of every scheme that is a trap which order it has, where the page is about something else."""
+    for check in summary["checks"]:
+        order = words.fact(check["results"][0], "order") if check["results"] else None
+        if words.badge(check) == words.TRAP and check is not lead.entry and order is not None:
+            scheme = check["results"][0]["scheme"]
+            yield f"The trap, scheme {scheme}, has order {words.number(order, 'order')}, as the check expects."
 
 
 def _facts(experiment: Experiment, record: Record) -> Iterator[str]:
@@ -74,9 +86,9 @@ def numbers(experiment: Experiment, record: Record, lead: Lead) -> Iterator[Numb
     if lead.entry is not None and not lead.is_on_order:
         yield from _measured(experiment, record, lead)
     if data.whole(record, "triple") or lead.is_on_order:
-        yield from _order(record, lead)
+        yield from _order(experiment, record, lead)
     if lead.measured is None or lead.measured.kind != "accurate":
-        yield from _error(record, lead)
+        yield from _error(experiment, record, lead)
     is_of_one = lead.entry is not None and sum(lead.entry["counts"].values()) < 2
     if data.swept(record) and lead.result.get("command") and not is_of_one:
         text = ", ".join(
@@ -133,7 +145,7 @@ def _measured(experiment: Experiment, record: Record, lead: Lead) -> Iterator[Nu
     yield {"label": label, "value": value, "note": note}
 
 
-def _order(record: Record, lead: Lead) -> Iterator[Number]:
+def _order(experiment: Experiment, record: Record, lead: Lead) -> Iterator[Number]:
     """Yield the observed order with its interval, of a sweep the range over its members, and the promised one.
 
     The members are those that the check is about.
@@ -141,7 +153,7 @@ def _order(record: Record, lead: Lead) -> Iterator[Number]:
     quantity, member = lead.quantity, lead.member
     if f"{quantity}_order" not in record:
         return
-    label = f"Observed order of {words.symbol(quantity)}{data.of_several(record, member.scheme)}"
+    label = f"Observed order of {findings.short(experiment, quantity)}{data.of_several(record, member.scheme)}"
     promised = data.promised_text(record, quantity, member.scheme)
     of = data.basis_of_order(record, quantity)
     due = f"the scheme promises {promised}" if of == "promised" else f"{promised} is expected"
@@ -178,7 +190,7 @@ def _order(record: Record, lead: Lead) -> Iterator[Number]:
         yield {"label": label, "value": words.number(float(order), "order"), "note": f"{span}{due}"}
 
 
-def _error(record: Record, lead: Lead) -> Iterator[Number]:
+def _error(experiment: Experiment, record: Record, lead: Lead) -> Iterator[Number]:
     """Yield the root-mean-square error of the finest level, in its unit and over the size of the solution."""
     quantity, member = lead.quantity, lead.member
     facts = lead.result.get("facts") or {}
@@ -194,10 +206,11 @@ def _error(record: Record, lead: Lead) -> Iterator[Number]:
         return
     mean = error / math.sqrt(drawn.duration(record, member.case))
     unit = data.norm_unit(record, quantity, "linf")
-    size = f"{words.share(relative)} of the size of {words.symbol(quantity)}, " if relative else ""
+    what = findings.short(experiment, quantity)
+    size = f"{words.share(relative)} of its size, " if relative else ""
     steps = words.number(int(record["steps"][-1]), "integer")
     yield {
-        "label": f"Error of {words.symbol(quantity)} at {steps} steps{data.of_several(record, member.scheme)}",
+        "label": f"Error of {what} at {steps} steps{data.of_several(record, member.scheme)}",
         "value": f"{words.number(mean, 'brief')} {unit}".rstrip(),
         "note": f"{size}{word}, root mean square{_of_member(record, lead)}",
     }

@@ -23,8 +23,6 @@ from vibsim.report.tables.table import Column, Table, to_csv
 
 UNREADABLE = ("DAMAGED", "MISSING")
 """Words for an experiment whose verdict cannot be read: it counts as failed."""
-MARKS = words.TRAP, words.REFUTED
-"""Words on checks that a card has, too: that something went wrong, as expected."""
 FILTERS = (
     ("PASS", "passed"),
     ("INCONCLUSIVE", "undecided"),
@@ -75,7 +73,7 @@ class Row:
     broken: int = 0  # number of runs that broke down
     headline: Headline = field(default_factory=Headline)
     marks: Sequence[tuple[str, int]] = ()
-    """Which of `MARKS` its checks have, with the number of checks."""
+    """Which of `words.MARKS` its checks have, with the number of checks."""
 
     @property
     def key(self) -> str:
@@ -167,7 +165,7 @@ def _row(results: Path, folder: Path) -> Row:
         collection, name, summary["title"], summary["status"], _why(checks),
         sum(check["status"] == "PASS" for check in checks), relative("report.html"),
         relative("figures/thumbnail.svg"), summary.get("source"), checks, words.broken(summary), headline(checks),
-        marks(checks),
+        words.marks(checks),
     )  # fmt: skip
 
 
@@ -207,15 +205,11 @@ def headline(checks: Sequence[Mapping[str, Any]]) -> Headline:
         sentence = str(result.get("sentence") or "")
         text = words.labelled(sentence.partition("; ")[0].rstrip("."), check["quantity"])
         text = words.PAGE.powers(text)
+        named, verb, told = text.partition(" is ")
+        text = f"{words.PAGE.value(named)}{verb}{told}" if named.isidentifier() else text
         if text:
             return Headline(text=f"{text[: LONGEST - 1]}…" if len(text) > LONGEST else text)
     return Headline()
-
-
-def marks(checks: Sequence[Mapping[str, Any]]) -> list[tuple[str, int]]:
-    """Return those of `MARKS` that checks have, with the number of checks."""
-    found = [words.badge(check) for check in checks]
-    return [(mark, found.count(mark)) for mark in MARKS if mark in found]
 
 
 def _heading(rows: Sequence[Row]) -> str:

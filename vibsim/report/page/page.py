@@ -106,7 +106,7 @@ def write(
     views = drawn.views(below.members)
     small = thumbnail.thumbnail(experiment, convergence, shown[0])
     replace_files(directory / "figures", {**drawn.files, "thumbnail.svg": small.encode()})
-    listed, others = _tables(experiment, convergence)
+    listed, others = _tables(experiment, convergence, decisive.quantity)
     scales = scales_table(experiment, convergence)
     printed = published.tables(experiment, convergence, summary)
     broken = checks.failures(summary, convergence)
@@ -288,9 +288,13 @@ def replace_files(directory: Path, files: Mapping[str, bytes], others: Sequence[
             path.unlink()
 
 
-def _tables(experiment: Experiment, record: Record) -> tuple[list[Table], list[Table]]:
-    """Return the tables that the page shows, as far as it has room for them, and those that are files only."""
-    found, model = choice.quantities(experiment, record), experiment.model.definition
+def _tables(experiment: Experiment, record: Record, first: str) -> tuple[list[Table], list[Table]]:
+    """Return the tables that the page shows, as far as it has room for them, and those that are files only.
+
+    The quantity `first` comes first, if there are tables of it.
+    """
+    model = experiment.model.definition
+    found = sorted(choice.quantities(experiment, record), key=lambda quantity: quantity != first)
     shown = choice.with_levels(experiment, choice.members(record, choice.first(experiment, record)))
     norms = [name for name in record.words("norm") if name != TYPICAL_NORM]
     orders = [levels.orders(record, quantity, shown) for quantity in found]

@@ -15,6 +15,7 @@ from vibsim.core.vocabulary import worst
 from vibsim.report import style, words
 from vibsim.report.page.templates import environment, sealed
 from vibsim.report.style import Picture
+from vibsim.report.tables.best import rounded
 from vibsim.report.tables.table import Column, Table, Written
 from vibsim.report.text import findings
 
@@ -92,7 +93,7 @@ def numbers(verdict: LadderVerdict) -> list[dict[str, str]]:
         ("Observed order", words.number(verdict.order, "order"), "; ".join(filter(None, [span, wanted]))),
         ("Error of the finest level", words.number(abs(verdict.error) if verdict.error is not None else None, "brief"),
          f"{words.share(share)} of its size" if share is not None else ""),
-        ("Best value", words.number(verdict.best, "value"),
+        ("Best value", _best(verdict),
          NO_BEST[verdict.is_number] if verdict.best_bound is None
          else f"± {words.number(verdict.best_bound, 'brief')}, extrapolated"),
     )  # fmt: skip
@@ -101,6 +102,13 @@ def numbers(verdict: LadderVerdict) -> list[dict[str, str]]:
         dict(zip(keys, row, strict=True)) | {"value": row[1] if row[1] != "–" else "not known"}
         for row in rows
     ]
+
+
+def _best(verdict: LadderVerdict) -> str:
+    """Write the best value with the digits that its bound leaves."""
+    if verdict.best is None or verdict.best_bound is None:
+        return words.number(verdict.best, "value")
+    return rounded(verdict.best, verdict.best_bound).text
 
 
 def _asked(verdict: LadderVerdict) -> str:

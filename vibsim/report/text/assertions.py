@@ -117,6 +117,7 @@ def subject(check: Measurement) -> str:
     keys = ("level", "scheme", "case") if is_sampled else PLACES
     places = ((key, getattr(check.at, key)) for key in keys)
     parts = [f"{key} {value}" for key, value in places if value is not None]
+    parts = ["extrapolated" if part == "level best" else part for part in parts]
     where = ", ".join([*parts, *swept_values(check)])
     if check.take is not None:
         told = f"{TAKEN[check.take]} {told} over {check.over}"

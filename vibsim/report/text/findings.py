@@ -259,6 +259,12 @@ def _named(experiment: Experiment, quantity: str) -> str:
     return f"the {long[quantity]}" if "_" in quantity else f"the {long[quantity]} {quantity}"
 
 
+def short(experiment: Experiment, quantity: str) -> str:
+    """Return the letter of a quantity; in words where it has none and its name has several."""
+    letter = words.symbol(quantity)
+    return _named(experiment, quantity) if "_" in letter else letter
+
+
 def _everywhere(record: Record, lead: Lead) -> str:
     """Say of how many members and schemes it holds; empty for one result of the only scheme."""
     assert lead.entry is not None

@@ -15,6 +15,7 @@ from vibsim.report.text import structure
 from vibsim.report.types import Axis, Experiment, SchemeSpec
 
 LISTED = 8  # most values of a key that are written out
+NO_LETTERS: Mapping[str, str] = {}
 
 
 def not_in_file(settings: Sequence[str]) -> Iterator[tuple[str, str]]:
@@ -30,6 +31,7 @@ def setup(experiment: Experiment, record: Record) -> Iterator[tuple[str, str]]:
     keys = {key for axis in axes for key in axis.keys}
     sizes = {p.key: data.pretty_unit(p.unit) for p in model.parameters}
     units = {state.name: data.pretty_unit(state.unit) for state in model.states}
+    letters = {p.key: p.name for p in model.parameters}
     yield "Model", model.title
     yield from not_in_file(experiment.settings)
     for name, spec in experiment.model.tables.items():
@@ -57,7 +59,7 @@ def setup(experiment: Experiment, record: Record) -> Iterator[tuple[str, str]]:
             "table below, and every other number is dimensionless",
         )
         sizes, units = {}, {}
-    yield "Parameters", _listing("model", experiment.model.parameters, sizes, keys)
+    yield "Parameters", _listing("model", experiment.model.parameters, sizes, keys, letters)
     yield "Initial values", _listing("initial", experiment.initial, units, keys)
     yield from _times(experiment, record)
     if experiment.tolerance is not None:
@@ -105,25 +107,28 @@ def _times(experiment: Experiment, record: Record) -> Iterator[tuple[str, str]]:
         f"{named}: {steps} steps, dt = {coarsest}{f' to {finest}' if several else ''} {time}",
     )
     if "omega_dt" in record:
+        told = 0.0
         for name, term, text in (
             ("omega_dt", "w dt", "natural frequency"),
             (HIGHEST, "Highest w dt", "frequency of the fastest oscillation"),
         ):
             largest = data.largest(np.asarray(record[name], np.float64)) if name in record else 0.0
-            # a ball in free fall has no frequency
-            if largest > 0.0:
+            # a ball in free fall has no frequency, and one oscillation alone is the fastest one, too
+            if largest > 0.0 and largest != told:
+                told = largest
                 yield term, f"at most {words.number(largest)} ({text} times step)"
 
 
 def _listing(
-    section: str, values: Mapping[str, Any], units: Mapping[str, str], swept: Collection[str] = ()
-) -> str:
-    parts = (
-        f"{key} swept"
-        if f"{section}.{key}" in swept
-        else f"{key} = {_plain(value)} {units.get(key, '')}".strip()
-        for key, value in values.items()
-    )
+    section: str, values: Mapping[str, Any], units: Mapping[str, str], swept: Collection[str] = (),
+    letters: Mapping[str, str] = NO_LETTERS,
+) -> str:  # fmt: skip
+    """List values by their keys; those with a letter in the equation by that, and by the key if it is another word."""
+    parts = []
+    for key, value in values.items():
+        name, word = letters.get(key, key), key.rpartition(".")[2]
+        told = "swept" if f"{section}.{key}" in swept else f"= {_plain(value)} {units.get(key, '')}"
+        parts.append(f"{name} {told.strip()}{'' if name in (key, word) else f' ({key})'}")
     return ", ".join(parts)
 
 
