@@ -102,8 +102,10 @@ class OrderContext:
         """Level that failed or is beyond the stability limit."""
         at = self.levels.index(self.culprit) if self.culprit >= 0 else None
         self.omega_dt = math.nan if at is None else float(fastest(record)[case, at])
-        self.limit = f.of_member(stability_limits(experiment, columns))
-        """The largest stable w dt of the scheme; infinite for none."""
+        self.limit = math.nan
+        """The largest stable w dt of the scheme, infinite for none; sought only where a level failed."""
+        if at is not None:
+            self.limit = f.of_member(stability_limits(experiment, columns))
         self.growth_in_words = ""
         """How the solution grows at the culprit."""
         if not math.isnan(self.omega_dt) and not method.adaptive:
