@@ -117,11 +117,11 @@ def subject(check: Measurement) -> str:
     keys = ("level", "scheme", "case") if is_sampled else PLACES
     places = ((key, getattr(check.at, key)) for key in keys)
     parts = [f"{key} {value}" for key, value in places if value is not None]
-    parts = ["extrapolated" if part == "level best" else part for part in parts]
     where = ", ".join([*parts, *swept_values(check)])
     if check.take is not None:
         told = f"{TAKEN[check.take]} {told} over {check.over}"
-    return f"{told}{(f' ({where})' if is_sampled else f' at {where}') if where else ''}"
+    told = f"{told}{(f' ({where})' if is_sampled else f' at {where}') if where else ''}"
+    return told.replace("level best", "the limit of the levels")
 
 
 def _where(check: Measurement) -> str:
