@@ -272,6 +272,28 @@ def test_an_order_beside_the_band_whose_interval_reaches_it_counts_as_kept(monke
             assert drawn.orders(exp, record, decisive).title.startswith(title)
 
 
+def test_an_order_that_its_scheme_promises_is_not_said_to_be_less_than_that():
+    checks = [{"converges": "theta", "order": 3}]
+    exp = samples.experiment(checks=checks)
+    shown, (check,) = first(exp), cards.cards(exp, *found(exp)[:2])
+    assert shown["meaning"] == check["meaning"]
+    assert "promises here, which is lower than the expected one" in shown["meaning"]
+
+
+def test_the_promised_slope_goes_no_further_than_the_errors():
+    exp = samples.experiment(
+        schemes=[{"kind": "central", "arithmetic": "three_term"}], levels=[14, 15, 16, 17, 18]
+    )
+    record, _, decisive = found(exp)
+    with style.applied():
+        ax = drawn.against_step(exp, record, decisive).figure.axes[0]
+    slope, *errors = (
+        np.asarray(line.get_ydata())
+        for line in sorted(ax.lines, key=lambda line: "order" not in str(line.get_label()))
+    )
+    assert np.nanmax(slope) <= 2.0 * max(map(np.nanmax, errors))
+
+
 def test_a_quantity_with_a_long_name_is_told_in_words_and_leaves_the_legend_small():
     exp = Experiment.from_yaml(CONFIGS / "vibration_text/bumpy_road.yaml")
     assert findings.short(exp, "absolute_position") == "the height of the body"

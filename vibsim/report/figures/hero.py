@@ -256,6 +256,8 @@ def _slope(ax: Axes, dt: Floats, error: Floats, order: float, due: str) -> None:
         return
     for last in np.flatnonzero(np.isfinite(error))[-1:]:
         line = error[last] * (dt / dt[last]) ** order
+        # no further than the errors, above which the legend stands
+        line[line > 2.0 * float(np.nanmax(error))] = np.nan
         look = style.REFERENCE | {"color": style.GREY}
         ax.plot(dt, line, **look, label=f"order {order:g}, {due}")
 

@@ -19,8 +19,8 @@ from vibsim.report.evidence import figure
 from vibsim.report.tables import checks as check_tables
 from vibsim.report.tables import published
 from vibsim.report.tables.table import Column, Table
-from vibsim.report.text import assertions, experiment_file, reasons
-from vibsim.report.types import Check, Experiment, Measurement
+from vibsim.report.text import assertions, experiment_file, findings, reasons
+from vibsim.report.types import Check, Experiment
 
 SAID_BY_THE_LINE = ("value", "equal", "converges")
 """Kinds of checks of which the line says all where they pass."""
@@ -83,7 +83,7 @@ def card(experiment: Experiment, record: Record, check: Mapping[str, Any]) -> di
         measured.kind if measured else check["kind"],
         value=value.value if value else "",
         levels=len(data.whole(record, "level")),
-        is_promised=_keeps_promise(record, measured, check),
+        is_promised=findings.keeps_promise(record, measured, check),
     )
     # of a claim that is refuted as expected, what the reason does not say is the point
     is_false = asserted is not None and asserted.kind == "claim" and not asserted.holds
@@ -182,20 +182,6 @@ def _results(record: Record, check: Mapping[str, Any], unit: str) -> tuple[Any, 
     told = ", ".join(f"{n} {word}" for word, n in counts.items() if n)
     listed = len(table.rows)
     return table, f"In all: {told}. Listed are the {listed} worst." if total > listed else ""
-
-
-def _keeps_promise(record: Record, measured: Measurement | None, check: Mapping[str, Any]) -> bool:
-    """Say whether the result that decides has the order of its scheme, and the check asks for another one."""
-    decisive: Mapping[str, Any] = next(iter(check.get("results") or []), {})
-    order, place = words.fact(decisive, "order"), data.place_of(record, decisive.get("case", -1))
-    if measured is None or measured.kind != "converges" or measured.order == "scheme":
-        return False
-    if order is None or place is None:
-        return False
-    promised = data.formal_orders(record, measured.converges)
-    own = promised[record.words("scheme").index(decisive["scheme"]), place]
-    is_due = data.basis_of_order(record, measured.converges) == "promised"
-    return bool(is_due and abs(own - order) <= measured.tolerance)
 
 
 def _alone(check: Mapping[str, Any]) -> str:

@@ -13,7 +13,7 @@ from vibsim.core.record import Record
 from vibsim.report import data, words
 from vibsim.report.choice import Lead, is_trap
 from vibsim.report.text import assertions, reasons
-from vibsim.report.types import Experiment
+from vibsim.report.types import Experiment, Measurement
 
 ORDINALS = {1: "first", 2: "second", 3: "third", 4: "fourth", 5: "fifth", 6: "sixth", 8: "eighth"}
 WITH_AN_ORDER = ("asymptotic", "order_low", "order_high")
@@ -355,7 +355,22 @@ def paragraph(experiment: Experiment, record: Record, lead: Lead, levels: int) -
     kind = lead.measured.kind if lead.measured else lead.entry["kind"]
     value = getattr(lead.measured, "value", "") if kind == "value" else ""
     word = lead.result.get("reason") if lead.is_on_order else lead.entry["reason"]
-    return reasons.reason(word, kind, value=value, levels=levels).meaning
+    is_promised = keeps_promise(record, lead.measured, lead.entry)
+    return reasons.reason(word, kind, value, levels, is_promised).meaning
+
+
+def keeps_promise(record: Record, measured: Measurement | None, check: Mapping[str, Any]) -> bool:
+    """Say whether the result that decides has the order of its scheme, and the check asks for another one."""
+    decisive: Mapping[str, Any] = next(iter(check.get("results") or []), {})
+    order, place = words.fact(decisive, "order"), data.place_of(record, decisive.get("case", -1))
+    if measured is None or measured.kind != "converges" or measured.order == "scheme":
+        return False
+    if order is None or place is None:
+        return False
+    promised = data.formal_orders(record, measured.converges)
+    own = promised[record.words("scheme").index(decisive["scheme"]), place]
+    is_due = data.basis_of_order(record, measured.converges) == "promised"
+    return bool(is_due and abs(own - order) <= measured.tolerance)
 
 
 def _estimate_over_true(record: Record, lead: Lead) -> float | None:
