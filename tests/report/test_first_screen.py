@@ -244,7 +244,7 @@ def test_a_trap_has_its_mark_and_its_order_beside_the_finding():
     shown = first(samples.experiment(schemes=["central", *WRONG_AS_TRAP], checks=[plain, trap]))
     assert shown["marks"] == [(words.TRAP, 1)]
     assert re.search(
-        r"The trap, scheme wrong, has order [01]\.\d{3}, as the check", shown["meaning"]
+        r"As the trap expects, θ has order [01]\.\d{3} with scheme wrong", shown["meaning"]
     )
 
 

@@ -62,8 +62,8 @@ def _traps(summary: Mapping[str, Any], lead: Lead) -> Iterator[str]:
     for check in summary["checks"]:
         order = words.fact(check["results"][0], "order") if check["results"] else None
         if words.badge(check) == words.TRAP and check is not lead.entry and order is not None:
-            scheme = check["results"][0]["scheme"]
-            yield f"The trap, scheme {scheme}, has order {words.number(order, 'order')}, as the check expects."
+            scheme, letter = check["results"][0]["scheme"], words.title(check["quantity"])
+            yield f"As the trap expects, {letter} has order {words.number(order, 'order')} with scheme {scheme}."
 
 
 def _facts(experiment: Experiment, record: Record) -> Iterator[str]:

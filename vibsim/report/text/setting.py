@@ -126,9 +126,11 @@ def _listing(
     """List values by their keys; those with a letter in the equation by that, and by the key if it is another word."""
     parts = []
     for key, value in values.items():
-        name, word = letters.get(key, key), key.rpartition(".")[2]
+        name = letters.get(key, key)
         told = "swept" if f"{section}.{key}" in swept else f"= {_plain(value)} {units.get(key, '')}"
-        parts.append(f"{name} {told.strip()}{'' if name in (key, word) else f' ({key})'}")
+        parts.append(
+            f"{name} {told.strip()}{'' if key in (name, f'parameters.{name}') else f' ({key})'}"
+        )
     return ", ".join(parts)
 
 
