@@ -262,6 +262,15 @@ def test_a_number_has_the_digits_that_tell_it_from_what_is_asked(asked, told):
     assert cards.card(exp, record, summary["checks"][0])["got"] == told
 
 
+def test_a_large_number_is_not_rounded_before_its_point():
+    exp = samples.experiment(
+        model={"kind": "pendulum", "g": 1e-8}, time={"end": 2e5}, levels=[9],
+        checks=[{"value": "period", "at": {"level": 9}, "above": 6e4}],
+    )  # fmt: skip
+    record, summary, _ = found(exp)
+    assert cards.card(exp, record, summary["checks"][0])["got"] == "66996 s"
+
+
 def test_an_order_beside_the_band_whose_interval_reaches_it_counts_as_kept(monkeypatch):
     exp = samples.experiment(sweep={"initial.theta": [0.5, 1.0]}, checks=[{"converges": "theta"}])
     record, _, decisive = found(exp)

@@ -314,7 +314,9 @@ def _digits(f: Found, check: ValueCheck) -> int:
     room = check.allowed if key == "equals" else abs(found - wanted)
     if not (math.isfinite(found) and found != 0.0 and room > 0.0):
         return MOST_DIGITS
-    return min(max(FEWEST_DIGITS, 2 + math.ceil(math.log10(abs(found) / room))), MOST_DIGITS)
+    # a whole number is not rounded
+    whole, apart = (math.log10(abs(found) / unit) for unit in (1.0, room))
+    return min(max(FEWEST_DIGITS, 1 + math.floor(whole), 2 + math.ceil(apart)), MOST_DIGITS)
 
 
 def _measured(f: Found, check: ValueCheck, digits: int = MOST_DIGITS) -> str:
