@@ -279,3 +279,12 @@ def test_the_grey_line_of_a_motion_is_named_where_it_is_drawn(levels):
     lines = picture.figure.axes[0].lines
     assert ("grey" in picture.caption) == any(line.get_color() == style.PALE for line in lines)
     assert ("grey" in picture.caption) == (len(levels) > 1)
+
+
+@pytest.mark.parametrize(("end", "is_drawn"), [(15.0, False), (22.0, True)])
+def test_periods_of_fewer_than_three_peaks_are_not_drawn(end, is_drawn):
+    exp = samples.experiment(time={"end": end}, levels=[8, 9])
+    record = samples.record(exp)
+    with style.applied():
+        picture = extrema.local(exp, record, gallery.choose(exp, record)[0])
+    assert (picture is not None) == is_drawn

@@ -20,6 +20,7 @@ from vibsim.report.figures.panels import note, stacked
 from vibsim.report.style import Picture
 from vibsim.report.types import Axes, Experiment
 
+FEWEST_PERIODS = 2  # fewer do not show how a period changes
 MOST_CURVES = 6  # most curves; more lie on one another
 MOST_MARKERS = 40  # most numbers of one curve that get a marker each
 MARKED = 60  # most local frequencies of one curve that get a marker each
@@ -88,7 +89,7 @@ def runs_of(record: Record, members: list[Member]) -> list[Run]:
     found = []
     for member in members[:MOST_CURVES]:
         for i in range(each):
-            if np.isfinite(at(record, "peak_time", member, level=i)).sum() >= 2:
+            if np.isfinite(at(record, "peak_time", member, level=i)).sum() > FEWEST_PERIODS:
                 who = member.scheme_name if len(members) > 1 else ""
                 label = ", ".join(filter(None, [who, f"level {levels[i]}" if each > 1 else ""]))
                 found.append((label or f"level {levels[i]}", member, i))
@@ -241,7 +242,7 @@ def _grow(ax: Axes, lines: tuple[Any, ...], size: float) -> None:
 
 
 def frequency(experiment: Experiment, record: Record) -> Picture | None:
-    """Draw local angular frequency and amplitude against the number of the peak; None with fewer than two peaks."""
+    """Draw local angular frequency and amplitude against the number of the peak; None with fewer than two periods."""
     if "peak_time" not in record:
         return None
     everyone = choice.with_levels(experiment, data.everyone(record))
