@@ -20,7 +20,7 @@ from vibsim.report.figures.panels import note, stacked
 from vibsim.report.style import Picture
 from vibsim.report.types import Axes, Experiment
 
-FEWEST_PERIODS = 2  # fewer do not show how a period changes
+FEWEST = 3  # peaks that show how a period changes
 MOST_CURVES = 6  # most curves; more lie on one another
 MOST_MARKERS = 40  # most numbers of one curve that get a marker each
 MARKED = 60  # most local frequencies of one curve that get a marker each
@@ -33,12 +33,14 @@ Run = tuple[str, Member, int]
 """A curve: its label, the scheme and member, and the position of its level."""
 
 
-def local(experiment: Experiment, record: Record, shown: list[Member]) -> Picture | None:
-    """Draw local periods, amplitudes and the phase error of one member; None where there are fewer than two periods."""
+def local(
+    experiment: Experiment, record: Record, shown: list[Member], peaks: int = 2
+) -> Picture | None:
+    """Draw local periods, amplitudes and the phase error of one member; None where there are fewer peaks."""
     if "peak_time" not in record or not shown:
         return None
     case = shown[0].case
-    runs = runs_of(record, [member for member in shown if member.case == case])
+    runs = runs_of(record, [member for member in shown if member.case == case], peaks)
     if not runs:
         return None
     axes = stacked([2.1, 2.1, 2.1])
@@ -82,14 +84,14 @@ def local(experiment: Experiment, record: Record, shown: list[Member]) -> Pictur
     )
 
 
-def runs_of(record: Record, members: list[Member]) -> list[Run]:
-    """Choose the curves: of one or two schemes several levels, of more schemes the coarsest level."""
+def runs_of(record: Record, members: list[Member], peaks: int = 2) -> list[Run]:
+    """Choose the curves that have so many peaks: of one or two schemes several levels, of more the coarsest level."""
     levels = whole(record, "level")
     each = max(1, min(len(levels), 4, MOST_CURVES // max(1, len(members))))
     found = []
     for member in members[:MOST_CURVES]:
         for i in range(each):
-            if np.isfinite(at(record, "peak_time", member, level=i)).sum() > FEWEST_PERIODS:
+            if np.isfinite(at(record, "peak_time", member, level=i)).sum() >= peaks:
                 who = member.scheme_name if len(members) > 1 else ""
                 label = ", ".join(filter(None, [who, f"level {levels[i]}" if each > 1 else ""]))
                 found.append((label or f"level {levels[i]}", member, i))
@@ -242,7 +244,7 @@ def _grow(ax: Axes, lines: tuple[Any, ...], size: float) -> None:
 
 
 def frequency(experiment: Experiment, record: Record) -> Picture | None:
-    """Draw local angular frequency and amplitude against the number of the peak; None with fewer than two periods."""
+    """Draw local angular frequency and amplitude against the number of the peak; None with fewer than two peaks."""
     if "peak_time" not in record:
         return None
     everyone = choice.with_levels(experiment, data.everyone(record))

@@ -121,7 +121,7 @@ def pictures(
     if series:
         if experiment.model.definition.conservative:
             tabs += tab("energy", [energy.running(record, case) for case in cases[:1]])
-        beside: Drawn = [extrema.local(experiment, record, series)]
+        beside: Drawn = [extrema.local(experiment, record, series, extrema.FEWEST)]
         if not data.swept(record) and experiment.model.definition.is_alone:
             beside.append(plane.phase(experiment, record, series))
         tabs += tab("phase and amplitude", beside)
