@@ -248,6 +248,16 @@ def test_a_trap_has_its_mark_and_its_order_beside_the_finding():
     )
 
 
+def test_statements_are_counted_beside_the_finding_but_not_where_one_is_the_finding():
+    claim = {"claim": "it takes longer", "that": {"value": "period", "above": 6.0}}
+    order = {"converges": "theta", "order": 2}
+    assert (
+        "1 statement holds as claimed."
+        in first(samples.experiment(checks=[order, claim]))["meaning"]
+    )
+    assert "statement" not in first(samples.experiment(checks=[claim]))["meaning"]
+
+
 @pytest.mark.parametrize(
     ("asked", "told"),
     [

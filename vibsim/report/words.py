@@ -98,8 +98,8 @@ def passed(statuses: Sequence[str], one: str = "check", many: str = "checks") ->
 
 
 BADGES = {"PASS": "passed", "INCONCLUSIVE": "undecided", "FAIL": "failed"}
-TRAP, REFUTED = "trap caught", "refuted"
-"""Words on a check that expected a failure and got it, and on a statement that is false as the experiment expects."""
+TRAP, REFUTED, CLAIMED = "trap caught", "refuted", "as claimed"
+"""Words on a check that expected a failure and got it, and on a statement that is false or true as expected."""
 
 
 def badge(check: Mapping[str, Any]) -> str:
@@ -107,7 +107,7 @@ def badge(check: Mapping[str, Any]) -> str:
     if check["status"] != "PASS":
         return BADGES.get(check["status"], str(check["status"]))
     if check["kind"] == "claim":
-        return REFUTED if is_trap(check) else "as claimed"
+        return REFUTED if is_trap(check) else CLAIMED
     return TRAP if is_trap(check) else BADGES["PASS"]
 
 

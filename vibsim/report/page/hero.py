@@ -52,13 +52,16 @@ def context(
         "facts": findings.sentence(*_facts(experiment, record)),
         "numbers": list(numbers(experiment, record, lead))[:NUMBERS],
         "meaning": " ".join(
-            [findings.paragraph(experiment, record, lead, levels), *_traps(summary, lead)]
+            [findings.paragraph(experiment, record, lead, levels), *_others(summary, lead)]
         ),
     }
 
 
-def _traps(summary: Mapping[str, Any], lead: Lead) -> Iterator[str]:
-    """Say of every scheme that is a trap which order it has, where the page is about something else."""
+def _others(summary: Mapping[str, Any], lead: Lead) -> Iterator[str]:
+    """Say what came of statements and traps, where the page is about something else."""
+    told = [words.badge(check) for check in summary["checks"] if check is not lead.entry]
+    if count := told.count(words.CLAIMED):
+        yield f"{count} {'statement holds' if count == 1 else 'statements hold'} as claimed."
     for check in summary["checks"]:
         order = words.fact(check["results"][0], "order") if check["results"] else None
         if words.badge(check) == words.TRAP and check is not lead.entry and order is not None:
