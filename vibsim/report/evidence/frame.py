@@ -67,8 +67,12 @@ def scale(ax: Axes, *shown: Floats, is_log: bool = False, margin: float = 0.15) 
     if is_log:
         style.log_axis(ax, "y", *style.log_limits(*shown, margin=margin), most=5)
         return
-    ax.set_ylim(*style.limits(*shown, margin=margin))
+    low, high = style.limits(*shown, margin=margin)
+    ax.set_ylim(low, high)
     round_ticks(ax.yaxis)
+    if words.number(low, "step") == words.number(high, "step"):
+        # several numbers would read alike
+        ax.set_yticks([0.5 * (low + high)])
 
 
 def allowed(ax: Axes, low: float, high: float) -> None:
