@@ -77,7 +77,18 @@ def _nodes(folder: Path, chunks: Mapping[str, int] | None) -> Iterator[tuple[str
 
 
 def _joined(parts: list[xr.Dataset]) -> xr.Dataset:
-    """Join the files of a level; what does not depend on the member is the same in all."""
+    """Join the files of a level along the member; what does not depend on it is the same in all."""
+    if all("case" not in part.dims for part in parts):  # a file of a solver holds one member
+        numbered = [part.assign_coords(case=number) for number, part in enumerate(parts)]
+        return xr.concat(
+            numbered,
+            "case",
+            data_vars="all",
+            coords="different",
+            compat="equals",
+            join="outer",
+            combine_attrs="drop_conflicts",
+        )
     return xr.concat(
         parts,
         "case",
