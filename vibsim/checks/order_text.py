@@ -88,6 +88,15 @@ DIAGNOSES: Words = {
         "The differences of {what} have reached round-off, so they say nothing about the scheme{before_round_off}.",
         "{other_arithmetic}.",
     ),
+    "round_off, zero": (
+        "{subject} is 0 up to round-off, so it has no order.",
+        "Check another quantity (`converges:`), or choose an `initial:` that moves this one.",
+    ),
+    "round_off, parted": (
+        "The levels of {what} have parted: the finest two differ by more than 1 % of its size, and finer levels do not "
+        "come closer. A motion that magnifies small errors does that.{error}",
+        "End the time interval (`time: end`) before the levels part, or choose another `initial:`.",
+    ),
     "round_off, noise": (
         "The finest differences of {what} look like noise, but are larger than the predicted round-off. They say "
         "nothing about the scheme{before_round_off}.",

@@ -22,7 +22,7 @@ from vibsim.comparison.thresholds import STRAIGHT, THEORY_ROUNDING, VANISHING_RA
 from vibsim.convergence.batches import batches
 from vibsim.convergence.circumstances import Evidence, at_rest, floor_of_pairs, unresolved
 from vibsim.convergence.differences import largest, safe_ratio
-from vibsim.convergence.thresholds import ABOVE_ROUND_OFF, HALF_SPACING
+from vibsim.convergence.thresholds import ABOVE_ROUND_OFF, HALF_SPACING, ROUND_OFF_SAFETY
 from vibsim.convergence.verdict import Judgement, judge, judge_together
 from vibsim.core.array_types import Codes, Flags, Floats
 from vibsim.core.vocabulary import NORMS, ORDER_TOLERANCE, REASON_NAMES, TYPICAL_NORM, is_error_part
@@ -33,11 +33,13 @@ from vibsim.observe.member_block import plain_name, stored_or_nan
 
 CAUSES = (
     *("none", "last_point", "one_quantity", "everything", "special_times", "one_norm", "theory"),
-    *("stored", "still", "pulse", "noise", "decay"),
+    *("stored", "still", "pulse", "noise", "decay", "parted", "zero"),
 )
 """What was found; files hold a position here."""
 NONE, LAST_POINT, ONE_QUANTITY, EVERYTHING, SPECIAL_TIMES, ONE_NORM, THEORY = range(7)
-STORED, STILL, PULSE, NOISE, DECAY = range(7, len(CAUSES))
+STORED, STILL, PULSE, NOISE, DECAY, PARTED, ZERO = range(7, len(CAUSES))
+FAR_APART = 0.01
+"""Levels that do not come closer have parted where they differ by this part of the quantity. [convention]"""
 
 UNSEEN = ("pre_asymptotic", "not_applicable")
 """What is said of a motion that lies still wherever levels are compared."""
@@ -225,6 +227,9 @@ def causes(
         found[lost & (e.difference[..., -1] > ABOVE_ROUND_OFF * floor_of_pairs(e)[..., -1])] = NOISE
         if q.block.stored_floor[-1] > 0.0:
             found[lost] = STORED
+        if q.name in (state.name for state in q.block.model.states):
+            found[lost & (e.difference[..., -1] >= FAR_APART * e.size)] = PARTED
+            found[lost & (e.size <= ROUND_OFF_SAFETY * e.relative_floor * e.scale)] = ZERO
         found[unseen & at_rest(e)] = STILL
         found[coarse & unresolved(e) & (found == NONE)] = DECAY
     found[has(*ROUGH) & np.isfinite(q.block.missed.time)] = PULSE
