@@ -299,6 +299,8 @@ CASES: list[tuple[dict[str, Any], str, str, str]] = [
     ({"output": "bst"}, "output", "unknown choice", "did you mean 'best'?"),
     ({"output": "best", "levels": [6]}, "output", "at least 2 levels, there is 1", ""),
     ({"levels": None}, "levels", "required key is missing", "or tolerance"),
+    ({"levels": [8, 7, 6]}, "levels[1]", "increasing order", "write [6, 7, 8]"),
+    ({"checks": {"converges": "theta"}}, "checks", "must be a list", "begin each one with `- `"),
     ({"tolerance": 1e-10}, "tolerance", "must not be given together with levels", ""),
     (by_tolerance(0), "tolerance", "must be greater than 0", ""),
     (by_tolerance(1), "tolerance", "must be less than 1", ""),

@@ -20,6 +20,7 @@ from vibsim.experiment import Experiment
 from vibsim.experiment.schema.checks import ConservesCheck, Drift
 from vibsim.observe.energy_drift import drift_at
 from vibsim.observe.member_block import MemberBlock
+from vibsim.observe.thresholds import LEAST_SAMPLES
 
 FIELDS = {
     "drift": Field("how the energy error grows", np.int8, DRIFTS),
@@ -146,7 +147,10 @@ def describe(f: Found, check: ConservesCheck) -> Description:
 
 def _advice(reason: str, drift: str, check: ConservesCheck) -> str:
     if reason == "pre_asymptotic":
-        return "Lengthen the run (`time: end`), or store more of it (`samples: all`). It is too short to show a drift."
+        return (
+            "Lengthen the run (`time: end`), or store more of it (`samples: all`). To show a drift takes at least four "
+            f"periods of the slowest small oscillation, and {LEAST_SAMPLES} stored samples."
+        )
     other = "leave the check out (`checks:`)"
     if drift in EXPECTED_DRIFTS:
         if EXPECTED_DRIFTS.index(drift) < EXPECTED_DRIFTS.index(check.drift):

@@ -342,7 +342,8 @@ def finer_levels(f: Found) -> tuple[list[int], str]:
 
 def _on_mismatch(f: Found, check: ValueCheck) -> str:
     """Say what to change where a number is another one; finer levels only where they change it enough."""
-    change = f"hange `{_border(check)[0]}:`"
+    is_printed = f.id.startswith("published_")
+    change = f"hange `{'printed' if is_printed else _border(check)[0]}:`"
     if check.number.is_count_of_work or not check.number.depends_on_level:
         return f"C{change}."
     if _is_on_the_mesh(f, check):

@@ -263,7 +263,7 @@ def _levels(document: Any, source: Source, report: Report) -> tuple[int, ...]:
     """Return the levels; none where the section is missing or faulty, or a tolerance stands for it."""
     given = [key for key in ("levels", "tolerance") if source.data.get(key) is not None]
     if not given:
-        report.add(("levels",), MISSING, "or tolerance")
+        report.add(("levels",), MISSING, "e.g. {from: 6, to: 9}, or tolerance in its place")
     elif len(given) > 1:
         report.add(("tolerance",), "must not be given together with levels", at_key=True)
     return rising_levels(document.levels, report)

@@ -47,7 +47,10 @@ def read(paths: Sequence[Path], size: str, quantities: Sequence[str]) -> list[St
         Where a file cannot be read, or does not have them.
     """
     if not quantities:
-        _refuse(str(paths[0]), "--quantity", "", "must name the variables to be judged")
+        with opened(paths[0]) as dataset:
+            sized = (name for name in dataset.variables if name not in (*dataset.dimensions, size))
+            hint = f"choose from {', '.join(sized)}"
+        _refuse(str(paths[0]), "--quantity", "", "must name the variables to be judged", hint)
     listed = _listed(size)
     if listed is not None and len(listed) != len(paths):
         rule = f"has {len(listed)} step sizes for {len(paths)} files"

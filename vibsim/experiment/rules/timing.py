@@ -151,8 +151,10 @@ def rising_levels(
         return tuple(range(section.from_, section.to + 1))
     levels = section or ()
     falling = [i for i, (low, high) in enumerate(pairwise(levels), 1) if low >= high]
-    for i in falling:
+    is_reversed = list(levels) == sorted(set(levels), reverse=True)
+    for i in falling[:1] if is_reversed else falling:
         is_same = levels[i] == levels[i - 1]
         word = "must not be repeated" if is_same else "must be in increasing order"
-        report.add((*path, i), f"levels {word}", value=levels[i])
+        hint = f"write {sorted(levels)}: a higher level has smaller steps" if is_reversed else ""
+        report.add((*path, i), f"levels {word}", hint, levels[i])
     return () if falling else levels
