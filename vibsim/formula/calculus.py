@@ -274,6 +274,13 @@ def _found(node: Expression, name: str) -> Expression | None:
             if more <= 1.0:
                 return None
             return _of_linear("max(x, 0)**n/n", x, node, name, n=Number(more))
+        case Binary("**", base, exponent):
+            # a spring between two coordinates; the powers of u - 1 are left to points, whose sum does not cancel
+            power, start = literal(exponent) or 0.0, put(base, name, ZERO)
+            is_spring = bool(names_in(start)) or values(start, {}) == 0.0
+            if power < 1.0 or not power.is_integer() or not is_spring:
+                return None
+            return _of_linear("x**n/n", base, node, name, n=Number(power + 1.0))
         case Call("where", (condition, yes, no)) if is_free(condition):
             first, second = _found(yes, name), _found(no, name)
             if first is None or second is None:
