@@ -28,8 +28,18 @@ def report(error: Exception) -> int:
         # The reader of a pipe has gone (``vibsim list | head``); nobody is left to tell.
         sys.stderr.close()
         return FAILED
-    print(text if isinstance(error, InputError) else f"vibsim: {text}", file=sys.stderr, flush=True)
+    text = from_here(text) if isinstance(error, InputError) else f"vibsim: {text}"
+    print(text, file=sys.stderr, flush=True)
     return REFUSED if isinstance(error, InputError) else FAILED
+
+
+def from_here(text: str) -> str:
+    """Write paths at the beginning of lines from the current folder on, as they were probably given."""
+    try:
+        here = f"{Path.cwd()}{os.sep}"
+    except OSError:
+        return text
+    return "\n".join(line.removeprefix(here) for line in text.split("\n"))
 
 
 def sentence(error: Exception) -> str:

@@ -39,6 +39,8 @@ NOISE_SEEN = 4.0
 """A difference of two levels that is larger than so many times their noise is hardly noise."""
 BEYOND_ROUND_OFF = 1e-10
 """A difference that is a larger part of the values is no round-off."""
+APART = 1e-3
+"""Differences that grow up to this part of the values are levels that move apart, unless a noise is stated."""
 LOOK_FOR = (
     "Look for a part of lower order, such as the first step, a formula at a boundary, a limiter, or an iteration that "
     "stops too early"
@@ -85,8 +87,8 @@ SENTENCES: Mapping[str, tuple[str, str]] = MappingProxyType(
         ),
         "growing": (
             "The differences of {quantity} grow towards the finer levels{estimate}.",
-            "Check that {size} is a step size, not a number of cells or steps. If it is a step size, add a finer "
-            "level, such as {size} = {finer}.",
+            "Check that {size} is a step size, not a number of cells or steps, and that each level has its own. If so, "
+            "add a finer level, such as {size} = {finer}.",
         ),
         "round_off": (
             "The differences of {quantity} have reached {floor}, so they do not show its order{estimate}.",
@@ -115,8 +117,8 @@ SENTENCES: Mapping[str, tuple[str, str]] = MappingProxyType(
         ),
     }
 )
-"""Reason to the templates of sentence and advice; ``interpolation`` is a case of ``not_applicable``, ``growing`` and
-``noisy`` are cases of ``pre_asymptotic``."""
+"""Reason to the templates of sentence and advice; ``interpolation`` is a case of ``not_applicable``, ``noisy`` is a
+case of ``pre_asymptotic``, ``growing`` of that and of ``round_off``."""
 
 
 def describe(facts: VerdictData, setting: Setting) -> tuple[str, str]:
@@ -124,7 +126,7 @@ def describe(facts: VerdictData, setting: Setting) -> tuple[str, str]:
     key = "interpolation" if setting.interpolation else facts.reason
     if key == "pre_asymptotic" and _is_noise_seen(facts, setting):
         key = "noisy"
-    elif key == "pre_asymptotic" and facts.order is not None and facts.order < 0.0:
+    elif facts.order is not None and facts.order < 0.0 and _is_growth(facts, setting):
         key = "growing"
     phrases = _phrases(facts, setting)
     sentence, advice = (template.format_map(phrases) for template in SENTENCES[key])
@@ -147,6 +149,15 @@ def _is_noise_seen(facts: VerdictData, setting: Setting) -> bool:
     """Say whether the finest difference may be the stated noise: a finer level would show no more."""
     finest = facts.levels[-2:][0].difference
     return finest is not None and abs(finest) <= NOISE_SEEN * setting.noise
+
+
+def _is_growth(facts: VerdictData, setting: Setting) -> bool:
+    """Say whether levels whose differences grow move apart: by more than noise, where that is the reason."""
+    if facts.reason != "round_off":
+        return facts.reason == "pre_asymptotic"
+    finest = facts.levels[-2:][0]
+    size = abs(finest.value or 0.0)
+    return not setting.noise and abs(finest.difference or 0.0) > APART * size > 0.0
 
 
 def _joined(parts: Sequence[str]) -> str:

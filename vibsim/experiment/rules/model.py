@@ -263,7 +263,8 @@ def _check_length(model: Model) -> None:
         formulas += tuple(tree(model, value) for row in rows for _, value in row.then)
     if sum(size(formula, MAX_NODES) for formula in formulas) > MAX_NODES:
         rule = f"the equation that follows, with its slopes and energies, has more than {MAX_NODES} operations"
-        hint = "write a simpler formula, or the energy as `potential` where the model has that"
+        hint = "write a simpler formula, or the energy as `potential` where the model has that; in place of masses "
+        hint += "that depend on each other, write each `acceleration`"
         raise ExpressionError("", 0, rule, hint)
 
 
@@ -424,6 +425,11 @@ def _is_sound(
     more = f"; it may name {f'{_some(row.names)} and ' if row.names else ''}parameters"
     is_file = row.table is not None and text.lower().endswith(ENDINGS)
     hint = f"for a table write {{{TABLE}: {text}}}" if is_file else ""
+    is_oscillator = report.source.data.get("model", {}).get("kind") == "oscillator"
+    if is_oscillator and ({"u", "v"} - set(row.names)) & set(_NAME.findall(text)):
+        hint = (
+            "`spring` takes u, `damping` takes v; a force that depends on both takes `kind: system`"
+        )
     read_tree = report.formula(path, text, (*row.names, *known), more, hint)
     if read_tree is None:
         return False
