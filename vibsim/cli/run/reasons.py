@@ -60,10 +60,10 @@ def _told(plan: Plan, made: Mapping[str, Any]) -> str:
         )
         found = settings.differences(before, now)
     if not found:
+        own = [kind for _, kind, _ in plan.packages]
+        whose = f"{', '.join(own)} or of vibsim" if own else "vibsim"
         return (
-            "the solver, its inputs or the code of vibsim changed"
-            if plan.has_solver
-            else "the code of vibsim changed"
+            f"{'the solver, its inputs or ' if plan.has_solver else ''}the code of {whose} changed"
         )
     more = [f"{len(found) - _SHOWN} more changes"] if len(found) > _SHOWN + 1 else []
     shown = found[:_SHOWN] if more else found
