@@ -134,3 +134,30 @@ def test_an_exact_value_may_be_any_distance_away() -> None:
     for size, exact in ((1e-200, 1.0), (1e-100, 1e300)):
         verdict = judge(H, [size * (1 + h * h) for h in H], exact=exact, order=2)
         assert (verdict.status, verdict.reason) == ("FAIL", "wrong_limit")
+
+
+@pytest.mark.parametrize("limit", [1.23456, -3.21987])
+@pytest.mark.parametrize("digits", [4, 5, 6])
+@pytest.mark.parametrize("order", [1, 2, 4])
+def test_bounds_hold_of_printed_numbers(limit: float, digits: int, order: int) -> None:
+    """A table shows 4 to 6 digits of values whose limit is known."""
+    h = [0.2 * 0.5**k for k in range(6)]
+    values = [float(f"{limit + 0.7 * x**order + 0.3 * x ** (order + 1):.{digits}g}") for x in h]
+    for asked in (None, order):
+        verdict = judge(h, values, order=asked)
+        assert verdict.error_bound is not None
+        assert verdict.best is not None
+        assert verdict.best_bound is not None
+        assert abs(values[-1] - limit) <= verdict.error_bound
+        assert abs(verdict.best - limit) <= verdict.best_bound
+        said = "rounding of the values to their last digit" in verdict.sentence
+        assert said or verdict.error_bound > 5.0 * 10.0 ** (1 - digits)
+    unprinted = judge(h, [limit + 0.7 * x**order for x in h])
+    assert "last digit" not in unprinted.sentence
+
+
+@pytest.mark.parametrize("value", [0.0, 1.0, 0.25, 1.0 / 3.0])
+def test_equal_levels_that_may_be_exact_are_not_taken_for_printed_numbers(value: float) -> None:
+    verdict = judge(H, [value] * 4)
+    assert verdict.error_bound is not None
+    assert verdict.error_bound <= 4e-16

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from decimal import Decimal
 
 import numpy as np
 
@@ -11,6 +12,14 @@ from vibsim.core.array_types import Flags, Floats
 
 LARGEST = 1e150
 """Scaled values do not exceed it: their squares are numbers."""
+
+
+FEW_DIGITS = 11
+"""Values with no more decimal digits than these were rounded to them: those of a calculation have 15 and more."""
+EXACT_DIGITS = 3
+"""Levels that are all the same may have so many digits because they are exact."""
+SAMPLED = 64
+"""Values of a level whose digits are counted."""
 
 
 @dataclass(frozen=True)
@@ -37,6 +46,27 @@ def scale_of(values: Floats) -> Floats:
     sizes = np.max(np.abs(values), axis=2)
     size = np.maximum(sizes[:, -1], np.max(sizes, axis=1) / LARGEST)
     return np.asarray(np.ldexp(1.0, np.frexp(np.where(size > 0.0, size, 1.0))[1] - 1))
+
+
+def half_last_digit(values: Floats) -> float:
+    """Return half a unit of the last decimal place of finite values, shape (n, points), where they have few digits.
+
+    It is how far each of them is from what it was before it was printed or stored with these digits; else 0.
+    """
+    sampled = values[:, :: -(-values.shape[1] // SAMPLED)]
+    largest = float(np.max(np.abs(sampled)))
+    size = Decimal(repr(largest)).adjusted()
+    last = size
+    for value in sampled[::-1].flat:
+        number = Decimal(repr(float(value))).normalize()
+        if number:
+            last = min(last, int(number.as_tuple().exponent))
+        if size - last >= FEW_DIGITS:
+            return 0.0
+    is_same = not np.any(values != values[-1])
+    if largest == 0.0 or (is_same and size - last < EXACT_DIGITS):
+        return 0.0
+    return float(Decimal(5).scaleb(last - 1))
 
 
 def finite_levels(values: Floats) -> Flags:

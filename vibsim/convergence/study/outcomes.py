@@ -8,7 +8,12 @@ import numpy as np
 
 from vibsim.convergence.assessment import Assessment, assess
 from vibsim.convergence.differences import order_of_differences
-from vibsim.convergence.study.measurement import Measurement, finite_levels, measurement
+from vibsim.convergence.study.measurement import (
+    Measurement,
+    finite_levels,
+    half_last_digit,
+    measurement,
+)
 from vibsim.convergence.thresholds import NOISE_FACTOR, STATED_NOISE_FACTOR
 from vibsim.core.array_types import Flags, Floats, Integers
 from vibsim.core.vocabulary import ORDER_TOLERANCE, REASON_NAMES
@@ -58,6 +63,8 @@ class Outcome:
     """Extrapolated values, shape (points,)."""
     best_bound: float = np.nan
     """How far they are from the limit at most, in the norm."""
+    rounded: float = 0.0
+    """How far the extrapolated values are off because those of the levels have few digits; part of the bounds."""
 
 
 def outcomes(
@@ -193,11 +200,14 @@ def _decided(
     order, used, weights = _estimate(one, measured.ladder.h, decided, k)
     # added up one by one, so that a member has the same digits alone and among others
     best: Floats | None = None
+    rounded = 0.0
     if np.isfinite(weights).all():
         best = sum((w * row for w, row in zip(weights, part, strict=True)), 0.0 * part[0])
+        rounded = half_last_digit(part) * float(np.sum(np.abs(weights)))
     error, bound, errors = one.error, one.error_bound, one.errors
     if not one.exact_known:
-        error, bound = float(decided.error[k]) * scale, float(decided.error_bound[k]) * scale
+        error = float(decided.error[k]) * scale
+        bound = float(decided.error_bound[k]) * scale + rounded
         if best is not None:
             errors = one.errors.copy()
             errors[one.finite] = _distances(part, best, one.is_number, scale)
@@ -213,7 +223,8 @@ def _decided(
         error_bound=bound,
         errors=errors,
         best=best,
-        best_bound=float(decided.best_bound[k]) * scale,
+        best_bound=float(decided.best_bound[k]) * scale + rounded,
+        rounded=rounded,
     )
 
 
