@@ -161,3 +161,31 @@ def test_equal_levels_that_may_be_exact_are_not_taken_for_printed_numbers(value:
     verdict = judge(H, [value] * 4)
     assert verdict.error_bound is not None
     assert verdict.error_bound <= 4e-16
+
+
+def test_averages_of_cells_taken_for_points_are_told_of_in_a_pass() -> None:
+    """Cells begin at other points on each level, which is an error of order 1 of its own."""
+    counts = [10, 20, 40, 80]
+    cells = [np.sin(2.0 * (np.arange(n) + 0.5) / n) * (1.0 + 0.3 / n**2) for n in counts]
+    around = [np.cos(2.0 * np.pi * np.arange(n) / n) * (1.0 + 0.3 / n**2) for n in counts]
+    h, told = [1 / n for n in counts], "taken for those of a periodic grid"
+    for asked in ({}, {"order": 1}, {"at_least": 1}):
+        verdict = judge(h, cells, **asked)
+        assert verdict.status == "PASS"
+        assert told in verdict.sentence
+    assert told not in judge(h, around, order=2).sentence
+
+
+def test_a_low_order_behind_a_higher_one_is_explained() -> None:
+    """Two shapes: -12 times the part of order 4 is of order 2 at the finest level, and the estimate is above 4."""
+    h, x = [0.2 * 0.5**k for k in range(6)], np.linspace(0.0, 1.0, 20)
+    shape, other = np.sin(3 * x), np.sin(3 * x) + 0.3 * np.cos(5 * x)
+    values = [x + shape * k**4 - 12.0 * other * h[-1] ** 2 * k**2 for k in h]
+    verdict = judge(h, values, order=4)
+    assert verdict.reason == "order_low"
+    assert verdict.order is not None
+    assert verdict.order > 4.0
+    assert "Another part still raises the measured order." in verdict.sentence
+    low = judge(h, [x + shape * k**2 for k in h], order=4)
+    assert low.reason == "order_low"
+    assert "Another part" not in low.sentence

@@ -12,7 +12,7 @@ from itertools import pairwise
 
 from vibsim.checks.order_context import COINCIDE, OrderContext
 from vibsim.checks.sentences import WRONG_LIMIT, Description, Found, Template, add_levels
-from vibsim.convergence.study.sentences import higher_part
+from vibsim.convergence.study.sentences import higher_part, opposite_part
 from vibsim.convergence.thresholds import HALF_SPACING
 from vibsim.core.vocabulary import order_interval
 from vibsim.experiment.schema.checks import ConvergesCheck
@@ -314,7 +314,13 @@ class _Phrases(OrderContext):
             return f"{self.subject} should be exact here, but levels differ by more than round-off{with_order}."
         word = "more slowly" if self.reason == "order_low" else "faster"
         expected = self.notation.number(self.expected)
-        return f"{self.subject} converges {word} than order {expected}{with_order}."
+        hidden = opposite_part(self.reason, self.order, self.expected)
+        return " ".join(
+            filter(
+                None,
+                [f"{self.subject} converges {word} than order {expected}{with_order}.", hidden],
+            )
+        )
 
     def whose(self) -> str:
         """Say whose the order is: the scheme's, or that of the check alone, where theory has none or another one."""

@@ -26,7 +26,7 @@ class Setting:
     interpolation: tuple[str, int] | None = None
     """Kind and order of an interpolation that hides the order."""
     notes: tuple[str, ...] = ()
-    """What else may be wrong, where it does not pass."""
+    """What else may be wrong, where it does not pass with an expected order above 1."""
     parts: tuple[str, ...] = ()
     """Which part of the points is compared."""
 
@@ -130,6 +130,9 @@ def describe(facts: VerdictData, setting: Setting) -> tuple[str, str]:
     sentence, advice = (template.format_map(phrases) for template in SENTENCES[key])
     more = [
         _higher_part(facts),
+        opposite_part(
+            facts.reason, facts.order, facts.expected if facts.at_least is None else facts.at_least
+        ),
         _interval(facts),
         _error(facts),
         _best(facts),
@@ -139,7 +142,9 @@ def describe(facts: VerdictData, setting: Setting) -> tuple[str, str]:
         _copies(facts),
     ]
     if facts.status == "PASS":
-        return _joined([sentence, *more]), ""
+        # points that are not the same have an error of order 1 of their own
+        confirmed = (facts.expected or 0.0) > 1.0 + ORDER_TOLERANCE
+        return _joined([sentence, *more, *(() if confirmed else setting.notes)]), ""
     return _joined([sentence, *more]), _joined([advice, *setting.notes])
 
 
@@ -205,6 +210,17 @@ def higher_part(order: float, expected: float, tolerance: float) -> str:
         return ""
     moves = "raises" if order > expected else "lowers"
     return f"A part of the error of higher order is still seen. It {moves} the measured order."
+
+
+def opposite_part(reason: str, order: float | None, wanted: float | None) -> str:
+    """Say why an order fails as too low or too high although the measured one is not; empty where it is."""
+    if order is None or wanted is None or not math.isfinite(wanted):
+        return ""
+    if reason == "order_low" and order >= wanted:
+        return "The largest part of the error has a lower order. Another part still raises the measured order."
+    if reason == "order_high" and order <= wanted:
+        return "The largest part of the error has a higher order. Another part still lowers the measured order."
+    return ""
 
 
 def _higher_part(facts: VerdictData) -> str:
