@@ -156,7 +156,7 @@ def test_bounds_hold_of_printed_numbers(limit: float, digits: int, order: int) -
     assert "last digit" not in unprinted.sentence
 
 
-@pytest.mark.parametrize("value", [0.0, 1.0, 0.25, 1.0 / 3.0])
+@pytest.mark.parametrize("value", [0.0, 1.0, 0.25, 0.3, 0.0625, 1.0 / 3.0])
 def test_equal_levels_that_may_be_exact_are_not_taken_for_printed_numbers(value: float) -> None:
     verdict = judge(H, [value] * 4)
     assert verdict.error_bound is not None
@@ -189,3 +189,20 @@ def test_a_low_order_behind_a_higher_one_is_explained() -> None:
     low = judge(h, [x + shape * k**2 for k in h], order=4)
     assert low.reason == "order_low"
     assert "Another part" not in low.sentence
+
+
+@pytest.mark.parametrize(
+    ("values", "exact"),
+    [
+        ([1.235, 1.235, 1.235], 1.2346),
+        ([1.4, 1.4, 1.4, 1.4], 1.3988),
+        ([3.11, 3.22, 3.28, 3.32, 3.33], 3.345),
+    ],
+)
+def test_printed_numbers_do_not_miss_what_they_were_rounded_from(
+    values: list[float], exact: float
+) -> None:
+    h = [0.2 * 0.5**k for k in range(len(values))]
+    assert judge(h, values, exact=exact).status != "FAIL"
+    assert judge(h, values, exact=exact + 0.1).reason == "wrong_limit"
+    assert judge(h[:3], [3.0, 3.0, 3.0], exact=3.001).reason == "wrong_limit"

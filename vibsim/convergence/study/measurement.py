@@ -16,8 +16,8 @@ LARGEST = 1e150
 
 FEW_DIGITS = 11
 """Values with no more decimal digits than these were rounded to them: those of a calculation have 15 and more."""
-EXACT_DIGITS = 3
-"""Levels that are all the same may have so many digits because they are exact."""
+BINARY = 2.0**20
+"""Multiples of its inverse that are whole have few digits anyway: 0.125, 3 or 65 may be results as they are."""
 SAMPLED = 64
 """Values of a level whose digits are counted."""
 
@@ -54,8 +54,7 @@ def half_last_digit(values: Floats) -> float:
     It is how far each of them is from what it was before it was printed or stored with these digits; else 0.
     """
     sampled = values[:, :: -(-values.shape[1] // SAMPLED)]
-    largest = float(np.max(np.abs(sampled)))
-    size = Decimal(repr(largest)).adjusted()
+    size = Decimal(repr(float(np.max(np.abs(sampled))))).adjusted()
     last = size
     for value in sampled[::-1].flat:
         number = Decimal(repr(float(value))).normalize()
@@ -63,10 +62,9 @@ def half_last_digit(values: Floats) -> float:
             last = min(last, int(number.as_tuple().exponent))
         if size - last >= FEW_DIGITS:
             return 0.0
-    is_same = not np.any(values != values[-1])
-    if largest == 0.0 or (is_same and size - last < EXACT_DIGITS):
-        return 0.0
-    return float(Decimal(5).scaleb(last - 1))
+    with np.errstate(over="ignore"):
+        is_binary = np.all(sampled * BINARY == np.rint(sampled * BINARY))
+    return 0.0 if is_binary else float(Decimal(5).scaleb(last - 1))
 
 
 def finite_levels(values: Floats) -> Flags:

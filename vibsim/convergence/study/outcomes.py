@@ -14,12 +14,14 @@ from vibsim.convergence.study.measurement import (
     half_last_digit,
     measurement,
 )
-from vibsim.convergence.thresholds import NOISE_FACTOR, STATED_NOISE_FACTOR
+from vibsim.convergence.thresholds import MISSED, NOISE_FACTOR, STATED_NOISE_FACTOR
 from vibsim.core.array_types import Flags, Floats, Integers
 from vibsim.core.vocabulary import ORDER_TOLERANCE, REASON_NAMES
 
 FEWEST = 3
 """Levels that show an order."""
+MOST_ROUNDED = 5e-4
+"""Levels that are all the same may be exact where half of their last digit is a larger part: of up to three digits."""
 
 
 @dataclass(frozen=True)
@@ -120,9 +122,10 @@ def _with_finite(
         )
     found = []
     for k in range(len(values)):
-        one = _measured(measured, k, finite, part[k], None if exact is None else exact[k], n)
+        truth = None if exact is None else exact[k]
+        one = _measured(measured, k, finite, part[k], truth, n)
         if decided is not None:
-            one = _decided(one, decided, k, measured, part[k])
+            one = _decided(one, decided, k, measured, part[k], truth)
         if len(finite) < n:
             # levels that are not finite decide, whatever the others say; the error is that of the finest level
             one = replace(one, reason="non_finite")
@@ -192,9 +195,14 @@ def _distances(part: Floats, limit: Floats, is_number: bool, scale: float) -> Fl
 
 
 def _decided(
-    one: Outcome, decided: Assessment, k: int, measured: Measurement, part: Floats
+    one: Outcome,
+    decided: Assessment,
+    k: int,
+    measured: Measurement,
+    part: Floats,
+    truth: Floats | None,
 ) -> Outcome:
-    """Add what was decided of member `k`."""
+    """Add what was decided of member `k`, whose finite levels are `part` and whose exact values are `truth`."""
     scale = float(measured.scale[k])
     one = replace(one, reason=REASON_NAMES[int(decided.reason[k])])
     order, used, weights = _estimate(one, measured.ladder.h, decided, k)
@@ -204,6 +212,14 @@ def _decided(
     if np.isfinite(weights).all():
         best = sum((w * row for w, row in zip(weights, part, strict=True)), 0.0 * part[0])
         rounded = half_last_digit(part) * float(np.sum(np.abs(weights)))
+    bound_of_best = float(decided.best_bound[k]) * scale
+    if one.reason == "wrong_limit" and rounded and best is not None and truth is not None:
+        away = float(np.max(np.abs(_distances(best[None], truth, one.is_number, scale))))
+        if away <= MISSED * bound_of_best + rounded:
+            # the exact values, with so many digits, may be what was printed
+            one = replace(one, reason="round_off")
+    if one.reason == "exact" and rounded > MOST_ROUNDED * one.size:
+        rounded = 0.0
     error, bound, errors = one.error, one.error_bound, one.errors
     if not one.exact_known:
         error = float(decided.error[k]) * scale
@@ -223,7 +239,7 @@ def _decided(
         error_bound=bound,
         errors=errors,
         best=best,
-        best_bound=float(decided.best_bound[k]) * scale + rounded,
+        best_bound=bound_of_best + rounded,
         rounded=rounded,
     )
 
