@@ -200,14 +200,15 @@ def _cases(
     )
     alternating = says("oscillating")
     # neither the higher order nor a failure of the promised one, until the levels exclude this or show it
-    hidden = is_promise_hidden(e, np.where(noise, np.nan, b.order), b.last)
-    lower = np.where(hidden, np.minimum(b.low, e.promised), b.low)
-    hidden &= p >= e.promised - tol
+    hides = is_promise_hidden(e, np.where(noise, np.nan, b.order), b.last)
+    lower = np.where(hides, np.minimum(b.low, e.promised), b.low)
+    hidden = hides & (p >= e.promised - tol)
     # any other power is the accident of where events or corners lie between grid points
     left, rough = e.left_to_the_mesh, ~np.isnan(e.left_to_the_mesh)
     regular = ~rough | (np.abs(b.order - left) <= tol)
-    # two levels may then be near each other, and both be away from the exact solution
-    missed &= ~(rough | ~np.isnan(e.corner)) | errors_stay(e)
+    # two levels may then be near each other, and both be away from the exact solution; so may those be that show only
+    # the higher power
+    missed &= ~(rough | ~np.isnan(e.corner) | hides) | errors_stay(e)
     # a corner leaves all powers up to its own: a ladder that settles lower has another cause
     below = (b.order < p - tol) | np.any(orders[..., -2:] < (p - tol)[..., None], axis=-1)
     kinked = ~np.isnan(e.corner) & (p >= e.corner) & (below | alternating | noise)
