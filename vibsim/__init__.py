@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from vibsim.core.lazy import loader
+from vibsim.core.lazy import lazy
 
 if TYPE_CHECKING:
     from vibsim.analysis import Verdict, analyse, verdicts
@@ -19,20 +19,6 @@ if TYPE_CHECKING:
     from vibsim.store.tree import open as open  # noqa: A004
 
 __version__ = "0.1.0"
-
-_HOME = {
-    "Experiment": "vibsim.experiment",
-    "InputError": "vibsim.core.errors",
-    "LadderVerdict": "vibsim.convergence",
-    "Verdict": "vibsim.analysis",
-    "VibsimError": "vibsim.core.errors",
-    "analyse": "vibsim.analysis",
-    "best": "vibsim.ladder",
-    "judge": "vibsim.convergence",
-    "open": "vibsim.store.tree",
-    "simulate": "vibsim.simulation",
-    "verdicts": "vibsim.analysis",
-}
 
 __all__ = [
     "Experiment",
@@ -48,8 +34,18 @@ __all__ = [
     "verdicts",
 ]
 
-
-__getattr__ = loader(__name__, _HOME)
+__getattr__, _ = lazy(
+    __name__,
+    {
+        "vibsim.analysis": ("Verdict", "analyse", "verdicts"),
+        "vibsim.convergence": ("LadderVerdict", "judge"),
+        "vibsim.core.errors": ("InputError", "VibsimError"),
+        "vibsim.experiment": ("Experiment",),
+        "vibsim.ladder": ("best",),
+        "vibsim.simulation": ("simulate",),
+        "vibsim.store.tree": ("open",),
+    },
+)
 
 
 def __dir__() -> list[str]:

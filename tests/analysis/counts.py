@@ -23,7 +23,7 @@ from synthetic import TOLERANCE, Group, groups
 from synthetic import Ladder as Truth
 
 from vibsim.comparison import order_evidence
-from vibsim.convergence.assessment import assess
+from vibsim.convergence.assessment import Question, assess
 from vibsim.convergence.error_model.posterior import Ladder
 from vibsim.core.vocabulary import REASON_NAMES, STATUSES
 
@@ -108,7 +108,7 @@ def tally(seed: int, folder: Path, number: int = 42, size: int = 55) -> tuple[Co
             by_pipeline.add(one.ladder, one.formal, one.status, one.reason)
         ladder = ladder_of(group, read)
         for order in ORDERS:
-            a = assess(ladder, expected=order)
+            a = assess(ladder, Question(order))
             for truth, status, reason in zip(group.ladders, a.status, a.reason, strict=True):
                 by_model.add(truth, order, STATUSES[status], REASON_NAMES[reason])
     return by_pipeline, by_model

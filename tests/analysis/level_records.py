@@ -7,9 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from vibsim import plan
 from vibsim.core.record import Record, Variable
-from vibsim.experiment import Experiment
+from vibsim.experiment import Experiment, sweep_columns
 
 Floats = np.ndarray
 
@@ -130,7 +129,7 @@ def _record(
     }
     if ends is not None:
         coords["end"] = Variable(("case",), end, {"units": "s"})
-    for key, values in plan.columns(exp, 0, members).items():
+    for key, values in sweep_columns.columns(exp, 0, members).items():
         coords[key.replace(".", "_")] = Variable(("case",), values, {"sweep_key": key})
     return Record(coords, variables, {"level": level, "steps": steps, "every": every})
 

@@ -104,6 +104,7 @@ def test_growth_that_theory_predicts_without_damping_is_said_to_be_so() -> None:
     model = {"kind": "oscillator", "damping": {"linear": 0.2}, "spring": "40*u"}
     told = spring(["rk4"], {"stable": True}, model=model).verdicts[0].text
     assert "predicted for free oscillations without damping) and 0.9" in told
+    assert "(measured, with damping and forces)" in told
     assert "without damping" not in spring(["rk4"], {"stable": True}).verdicts[0].text
 
 

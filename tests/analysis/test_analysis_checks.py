@@ -13,7 +13,7 @@ from vibsim.analysis import Verdict, analyse_records, summarise, verdicts
 from vibsim.comparison import value_numbers as values
 from vibsim.comparison.compare_quantities import comparisons
 from vibsim.comparison.order_evidence import evidence
-from vibsim.experiment import VALUES
+from vibsim.experiment.value_names import VALUES
 from vibsim.observe.member_block import block_of
 
 T = np.linspace(0.0, 8.0, 17)

@@ -183,6 +183,17 @@ def test_members_of_a_sweep_have_their_own_corner() -> None:
         assert alone["corner_time"].values[0, 0] == pytest.approx(times[case], nan_ok=True)
 
 
+def test_a_velocity_that_an_event_turns_has_passed_no_corner() -> None:
+    event = {"when": "u", "falling": True, "then": {"v": "-0.75*v"}}
+    ball = {**QUADRATIC, "spring": "g", "parameters": {"g": 9.81}, "events": [event]}
+    # it falls from rest, bounces at 0.75 and turns at the top at 1.07
+    made = experiment(["rk4"], model=ball, initial={"u": 2.0}, time={"end": 1.2})
+    convergence = analyse(made, [simulate(made, level) for level in made.levels])
+    bounce, turn = convergence.event_time.values[0, 0, -1, 0], convergence.corner_time.item()
+    assert bounce == pytest.approx(0.7532, abs=0.01)
+    assert turn > bounce + 0.1
+
+
 def test_a_turn_with_friction_is_an_event_and_no_corner_within_a_step() -> None:
     """Steps end where friction turns; a ladder that is too coarse is not blamed on it. The driving force may jump."""
     box = {"kind": "sliding_box", "mu": 0.3}

@@ -19,9 +19,8 @@ from vibsim.analysis import analyse_records, blockwise, keep_for_verdicts, summa
 from vibsim.comparison.value_numbers import KNOWN
 from vibsim.core.errors import VibsimError
 from vibsim.core.record import Record, Variable
-from vibsim.experiment import VALUES
 from vibsim.experiment.storage import stored_series
-from vibsim.experiment.value_names import Value
+from vibsim.experiment.value_names import VALUES, Value
 from vibsim.models import MODELS
 
 

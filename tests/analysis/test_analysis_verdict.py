@@ -10,7 +10,7 @@ import pytest
 from ladders import T, Truth, evidence_of, random_truth, shape_in_time
 
 from vibsim.convergence import circumstances, verdict
-from vibsim.convergence.batches import LADDERS, batches
+from vibsim.convergence.ladder_blocks import LADDERS, batches
 from vibsim.convergence.verdict import judge, judge_together
 from vibsim.core.vocabulary import NORMS, REASON_NAMES, STATUSES
 

@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 from thinned import thinned
 
-from vibsim import Experiment, analyse, plan, simulate, verdicts
+from vibsim import Experiment, analyse, simulate, verdicts
 from vibsim.analysis import Verdict
 from vibsim.apriori.formal_orders import BEGINNINGS, beginnings, formal_orders
+from vibsim.experiment import sweep_columns
 from vibsim.models import MODELS
 from vibsim.schemes import SCHEMES
 
@@ -103,7 +104,7 @@ def test_euler_cromer_gains_an_order_from_rest_and_where_no_force_acts(
 ) -> None:
     declared, orders = {**FREE, **OTHERS}[model], GAINS[model]
     e = every_start(declared, kind)
-    columns = plan.columns(e, 0, len(STARTS))
+    columns = sweep_columns.columns(e, 0, len(STARTS))
     found = [formal_orders(e, name, columns)[0] for name in declared[1:]]
     assert [np.broadcast_to(row, len(STARTS)).tolist() for row in found] == orders
 
@@ -114,7 +115,7 @@ def test_a_swept_start_has_the_orders_of_every_choice(start: str) -> None:
     declared = {"kind": "euler_cromer", "start": start}
     sweep = {"schemes.euler_cromer.start": ["first_order", "centred"]}
     e = experiment(FREE["pendulum"], declared, STARTS["rest"], sweep=sweep)
-    columns = plan.columns(e, 0, 2)
+    columns = sweep_columns.columns(e, 0, 2)
     assert formal_orders(e, "omega", columns).tolist() == [[2.0, 1.0]]
     assert formal_orders(e, "theta", columns).tolist() == [[1.0, 2.0]]
 

@@ -109,14 +109,14 @@ TABLE = {
 @pytest.mark.parametrize("case", TABLE)
 def test_every_row_of_the_table_of_decisions(case: str) -> None:
     given, order, expected = TABLE[case]
-    assert found(assess(given, expected=order)) == expected
+    assert found(assess(given, Question(order))) == expected
 
 
 @pytest.mark.parametrize("h", [HALVED, UNEVEN], ids=["halved", "uneven"])
 @pytest.mark.parametrize("p", [0.5, 1.0, 4 / 3, 1.786, 2.0, 3.0, 4.0, 6.0])
 def test_any_power_on_any_step_sizes(p: float, h: Floats) -> None:
     values = numbers(h, (0.3, p))
-    a = assess(ladder(h, values, noise=1e-15), expected=p)
+    a = assess(ladder(h, values, noise=1e-15), Question(p))
     assert found(a) == (PASSES, "asymptotic")
     assert a.order[0] == pytest.approx(p, abs=1e-4)
     assert a.low[0] <= p + 1e-4
@@ -131,7 +131,7 @@ def test_three_levels_have_the_order_and_the_extrapolation_of_their_equation() -
     """The grid study of the NASA tutorial: order 1.786170, extrapolated pressure recovery 0.971300."""
     h = np.array([4.0, 2.0, 1.0])
     values = [0.96178, 0.96854, 0.97050]
-    a = assess(ladder(h, values))
+    a = assess(ladder(h, values), Question())
     assert a.order[0] == pytest.approx(1.786170, abs=1e-6)
     assert a.weights[0] @ np.array(values) == pytest.approx(0.971300, abs=1e-6)
     assert found(a) == (OPEN, "pre_asymptotic")
@@ -139,17 +139,17 @@ def test_three_levels_have_the_order_and_the_extrapolation_of_their_equation() -
 
 def test_without_an_expectation_any_order_will_do() -> None:
     given = ladder(HALVED, series(HALVED, (1.0, 3.0, SHAPE)))
-    assert found(assess(given)) == (PASSES, "asymptotic")
-    assert found(assess(given, at_least=2.0)) == (PASSES, "asymptotic")
-    assert found(assess(given, at_least=4.0)) == (FAILS, "order_low")
+    assert found(assess(given, Question())) == (PASSES, "asymptotic")
+    assert found(assess(given, Question(at_least=2.0))) == (PASSES, "asymptotic")
+    assert found(assess(given, Question(at_least=4.0))) == (FAILS, "order_low")
 
 
 def test_a_scheme_is_given_the_benefit_of_its_promise() -> None:
     """Three numbers with the order 2.007 are enough for a promised order of 2, but not without a promise."""
     h = np.array([4.0, 2.0, 1.0])
     given = ladder(h, [1.0 + 0.01 * (1.0 + 4.02), 1.0 + 0.01, 1.0])
-    assert found(assess(given, expected=2.0)) == (PASSES, "asymptotic")
-    assert found(assess(given)) == (OPEN, "pre_asymptotic")
+    assert found(assess(given, Question(2.0))) == (PASSES, "asymptotic")
+    assert found(assess(given, Question())) == (OPEN, "pre_asymptotic")
 
 
 LOWER_PARTS = {
@@ -181,7 +181,7 @@ def test_a_part_of_lower_order_counts_from_a_tenth_on(
         shape = LOWER_PARTS[kind] * np.linalg.norm(SHAPE) / np.linalg.norm(LOWER_PARTS[kind])
         given = ladder(h, series(h, (0.5, order, SHAPE), (0.5 * size, lower, shape)))
     expected = (PASSES, "asymptotic") if share < 0.1 else (OPEN, "pre_asymptotic")
-    assert found(assess(given, expected=order)) == expected
+    assert found(assess(given, Question(order))) == expected
 
 
 @pytest.mark.parametrize("known", [True, False], ids=["exact", "unknown"])
@@ -201,7 +201,7 @@ def test_a_power_that_shows_below_the_predicted_noise_counts(
     h = 0.5 ** np.arange(14)
     values = [x**4 * SHAPE + share * x**2 * OTHER_SHAPE for x in h]
     given = ladder(h, values, exact=0.0 * SHAPE if known else None, noise=1e-13 * h**-1.5)
-    assert found(assess(given, expected=expected)) == verdict
+    assert found(assess(given, Question(expected))) == verdict
 
 
 def falling(*powers: float) -> list[Floats]:
@@ -224,14 +224,14 @@ def test_three_levels_behind_others_that_do_not_fit_may_fall_like_a_power_by_acc
     values: list[Floats], exact: Floats | None, expected: float, verdict: tuple[str, str]
 ) -> None:
     given = ladder(HALVED[: len(values)], values, exact=exact)
-    assert found(assess(given, expected=expected)) == verdict
+    assert found(assess(given, Question(expected))) == verdict
 
 
 @pytest.mark.parametrize("factor", [1e-30, 1e30])
 def test_units_do_not_matter(factor: float) -> None:
     usual = series(UNEVEN, (1.0, 2.0, SHAPE), (0.5, 3.0, OTHER_SHAPE))
     one, other = (
-        assess(ladder(h, [f * u for u in usual]), expected=2.0)
+        assess(ladder(h, [f * u for u in usual]), Question(2.0))
         for h, f in ((UNEVEN, 1.0), (1e3 * UNEVEN, factor))
     )
     assert found(one) == found(other)
@@ -256,7 +256,7 @@ def test_rounding_of_steep_differences_is_no_evidence(kind: str) -> None:
 
 
 def test_levels_with_another_limit_have_their_own_order() -> None:
-    a = assess(ladder(HALVED, numbers(HALVED, (1.0, 2.0)), exact=1.001), expected=2.0)
+    a = assess(ladder(HALVED, numbers(HALVED, (1.0, 2.0)), exact=1.001), Question(2.0))
     assert found(a) == (FAILS, "wrong_limit")
     assert a.low[0] == pytest.approx(2.0, abs=0.05)
     assert a.high[0] == pytest.approx(2.0, abs=0.05)
@@ -267,7 +267,7 @@ def test_the_bound_of_noise_is_as_large_as_the_noise() -> None:
         rng = np.random.default_rng(seed)
         h = 0.1 * 0.5 ** np.arange(6)
         values = [np.cos(T) + 1e-3 * rng.normal(size=T.size) for _ in h]
-        a = assess(ladder(h, values), expected=2.0)
+        a = assess(ladder(h, values), Question(2.0))
         true = rms(values[-1] - np.cos(T))
         assert true / 3.0 < a.error_bound[0] < 100.0 * true, seed
 
@@ -276,14 +276,14 @@ def test_many_levels_can_be_judged() -> None:
     """More than a table of logarithms would hold."""
     h = 0.1 * 0.9 ** np.arange(101)
     given = ladder(h, series(h, (1.0, 2.0, SHAPE)))
-    assert found(assess(given, expected=2.0)) == (PASSES, "asymptotic")
+    assert found(assess(given, Question(2.0))) == (PASSES, "asymptotic")
 
 
 def test_a_wrong_limit_is_told_whatever_order_is_expected() -> None:
     values = series(HALVED, (1.0, 1.0, SHAPE))
     for order in (1.0, 2.0):
         given = ladder(HALVED, values, exact=np.cos(T) + 0.3)
-        assert found(assess(given, expected=order)) == (FAILS, "wrong_limit")
+        assert found(assess(given, Question(order))) == (FAILS, "wrong_limit")
 
 
 def test_probabilities_add_up_to_one() -> None:
@@ -301,7 +301,7 @@ def test_a_ladder_is_judged_the_same_alone_and_among_others(known: bool) -> None
     given, _ = of_group(group)
 
     def in_full(ladder: Ladder) -> Assessment:
-        return assess(ladder, expected=2.0)
+        return assess(ladder, Question(2.0))
 
     def quickly(ladder: Ladder) -> Decision:
         return decide(ladder, Question(2.0))
@@ -335,10 +335,10 @@ def test_the_compiled_loop_has_the_bits_of_its_text(monkeypatch: pytest.MonkeyPa
         ladder(HALVED, numbers(HALVED, (1.0, 2.0), (0.1, 3.0))),
         ladder(HALVED, series(HALVED, (1.0, 2.0, SHAPE), (0.5, 3.0, OTHER_SHAPE))),
     ):
-        compiled = assess(given, expected=2.0)
+        compiled = assess(given, Question(2.0))
         with monkeypatch.context() as plain:
             plain.setattr(likelihood, "weigh", lambda: kernel.kernel)
-            by_text = assess(given, expected=2.0)
+            by_text = assess(given, Question(2.0))
         for name, values in vars(by_text).items():
             np.testing.assert_array_equal(vars(compiled)[name], values, err_msg=name)
 
@@ -364,7 +364,7 @@ def test_no_more_is_left_out_than_may_be(known: bool, left_out: float) -> None:
 def test_a_decision_is_that_of_the_whole_posterior(expected: float | None) -> None:
     for group in groups(HELD_OUT, 9, 12):
         given, _ = of_group(group)
-        quick, whole = decide(given, Question(expected)), assess(given, expected=expected)
+        quick, whole = decide(given, Question(expected)), assess(given, Question(expected))
         for field in fields(Decision):
             np.testing.assert_array_equal(
                 getattr(quick, field.name), getattr(whole, field.name), err_msg=field.name
@@ -379,7 +379,7 @@ def test_a_quick_decision_asks_as_much_of_three_levels_as_a_whole_one() -> None:
     floor, numbers = np.full((len(gram), 4), EPSILON), np.zeros(len(gram), dtype=bool)
     given = Ladder(HALVED[:4], gram, floor, numbers, exact_known=False)
     quick = decide(given, Question(2.0, by_theory=True))
-    whole = assess(given, expected=2.0, by_theory=True)
+    whole = assess(given, Question(2.0, by_theory=True))
     assert len(np.unique(whole.reason)) == 2
     np.testing.assert_array_equal(quick.reason, whole.reason)
 
@@ -468,7 +468,7 @@ def counted(
             continue
         given, errors = of_group(group)
         for p in orders:
-            a = assess(given, expected=p)
+            a = assess(given, Question(p))
             total["judged"] += len(group.ladders)
             for i, one in enumerate(group.ladders):
                 status, mine = STATUSES[a.status[i]], abs(one.order - p) <= TOLERANCE

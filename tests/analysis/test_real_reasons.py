@@ -73,6 +73,14 @@ LADDERS = {
         ("FAIL", "order_low"),
         ("first step", "start: first_order", "The phase is of first order"),
     ),
+    "start by a backward difference": Ladder(
+        {**PENDULUM, "time": {"end": 20.0}},
+        {"kind": "central", "start": "backward"},
+        (8, 9, 10, 11, 12),
+        {"converges": "theta", "order": 2},
+        ("FAIL", "order_low"),
+        ("first step", "`start: backward` has twice its dt^2 term"),
+    ),
     "one-sided end": Ladder(
         {**PENDULUM, "time": {"end": 20.0}},
         {"kind": "central", "end_velocity": "backward"},
@@ -115,6 +123,34 @@ LADDERS = {
         {"converges": "u", "order": 2},
         ("INCONCLUSIVE", "round_off"),
         ("have reached round-off",),
+    ),
+    "a swing up to the top, which every error ends on another side": Ladder(
+        {
+            "model": {"kind": "pendulum"},
+            "initial": {"theta": 0.0, "omega": 2.0},
+            "time": {"end": 40.0},
+        },
+        "central",
+        (9, 10, 11, 12, 13),
+        {"converges": "theta", "order": 2},
+        ("INCONCLUSIVE", "round_off"),
+        ("theta have parted", "more than 1 % of its size"),
+    ),
+    "a coordinate that stays at 0 but for round-off": Ladder(
+        {
+            "model": {
+                "kind": "system",
+                "coordinates": ["x", "y"],
+                "acceleration": {"x": "-sin(x)", "y": "-sin(y)"},
+            },
+            "initial": {"x": 1.0, "y": "cos(pi/2)"},
+            "time": {"end": 20.0},
+        },
+        "rk4",
+        (6, 7, 8, 9),
+        {"converges": "y", "order": 4},
+        ("INCONCLUSIVE", "round_off"),
+        ("y is 0 up to round-off",),
     ),
     "three levels whose true errors leave no room for another power": Ladder(
         {"model": {"kind": "spring", "w": 2.0}, "initial": {"u": 1.0}, "time": {"end": 20.0}},

@@ -13,6 +13,7 @@ import pytest
 from vibsim.cli import json_schemas, main
 from vibsim.cli.chosen_plans import plans_of
 from vibsim.cli.run import junit, outcome
+from vibsim.cli.run.snakemake import Job
 
 from .test_outcome_text import check, entry
 
@@ -82,7 +83,8 @@ def test_the_report_of_an_earlier_run_does_not_stay(tmp_path: Path) -> None:
 def test_an_experiment_without_a_summary_is_as_its_schema_says(tmp_path: Path) -> None:
     (plan,) = plans_of(["theta_convergence"], cached=True)
     summaries = [outcome.collect(plan, tmp_path)]
-    failures = [outcome.failed_job("analyse a/x", tmp_path / "none.log", tmp_path, "lost")]
+    job = Job("analyse", ("a/x/convergence.nc",), "none.log", "lost")
+    failures = [outcome.failed_job(job, tmp_path)]
     assert failures[0]["tail"] == ["lost"]
     content = json.loads(outcome.as_json(summaries, failures, tmp_path))
     assert content["experiments"][0]["error"]

@@ -52,11 +52,8 @@ def watched(
             raise EndedError
         step()
 
-    def start(command: list[str], **_: object) -> None:
-        found.append(command[4:])
-
     monkeypatch.setattr(watch.time, "sleep", pause)
-    monkeypatch.setattr(watch.subprocess, "run", start)
+    monkeypatch.setattr(watch.supervise, "child", found.append)
     with pytest.raises(EndedError):
         watch.watch(_options(file, *options))
     return found
@@ -100,7 +97,7 @@ def test_a_file_that_is_away_for_a_moment_or_faulty_is_waited_for(
 def test_options_are_those_of_the_run(monkeypatch: pytest.MonkeyPatch, file: Path) -> None:
     options = ["--results", "there", "--cores", "2", "-q", "--allow-commands"]
     (found,) = watched(monkeypatch, file, [], *options)
-    assert found[2:] == ["--results", "there", "--cores", "2", "--quiet", "--allow-commands"]
+    assert found[2:] == ["--results", "there", "--cores", "2", "--allow-commands", "--quiet"]
     (found,) = watched(monkeypatch, file, [], "--set", "time.end=1", "--set", "initial.u=0")
     assert found[2:] == ["--set", "time.end=1", "--set", "initial.u=0"]
     (found,) = watched(monkeypatch, file, [], "-v")

@@ -43,7 +43,7 @@ def test_every_assessment_has_a_verdict(
     reason: str, known: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(
-        outcomes, "assess", lambda ladder, **_: decided(ladder, reason, known=known)
+        outcomes, "assess", lambda ladder, asked: decided(ladder, reason, known=known)
     )
     falling = [1.0, 1.5, 1.75, 1.875]
     swinging = [1.0, 2.0, 1.5, 1.75]

@@ -198,6 +198,19 @@ def test_numbers_of_cells_in_place_of_step_sizes_are_suspected() -> None:
     assert "not a number of cells or steps" in verdict.advice
 
 
+def test_levels_upside_down_are_suspected_and_not_called_round_off() -> None:
+    steps = (0.1, 0.05, 0.025, 0.0125)
+    grids = [np.linspace(0.0, 1.0, round(1 / h) + 1) for h in steps]
+    fields = [
+        xarray.DataArray(np.sin(3 * x) * (1 + h**2), {"x": x}, ["x"])
+        for h, x in zip(steps, grids, strict=True)
+    ]
+    verdict = judge(steps, fields[::-1], restrict="linear")
+    assert verdict.status == "INCONCLUSIVE"
+    assert "grow towards the finer levels" in verdict.sentence
+    assert "that each level has its own" in verdict.advice
+
+
 def test_three_levels_have_an_order_and_a_best_value_whatever_the_status() -> None:
     h, u = [0.4, 0.2, 0.1], [1.0, 0.7, 0.69]
     for more in ({}, {"order": 1.0}, {"order": 2.0}, {"noise": 0.1}, {"exact": 2.0}):

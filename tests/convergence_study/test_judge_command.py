@@ -343,7 +343,7 @@ def test_files_that_do_not_fit_are_refused(tmp_path: Path, capsys: Capture) -> N
     netCDF4.Dataset(empty, "w").close()
     quantity = ["--quantity", "T"]
     for arguments, told in (
-        ([*files, "--h", "dx"], f"{files[0]}: --quantity: must name the variables"),
+        ([*files, "--h", "dx"], f"{files[0]}: --quantity: must name the variables to be judged: choose from"),
         ([*files, "--h", "dz", *quantity], f"{files[0]}: --h: dz: is neither an attribute nor"),
         ([*files, "--h", "solver", *quantity], f"{files[0]}: solver: mine: must be a number"),
         ([*files, "--h", "x", *quantity], f"{files[0]}: --h: x: has 11 values, and must have one"),

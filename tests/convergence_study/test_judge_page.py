@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from vibsim.cli import main
-from vibsim.convergence.study.verdict_data import KEYS
+from vibsim.convergence.study.verdict import KEYS
 
 ROOT = Path(__file__).parents[2]
 PAGE = ROOT / "docs/judge.md"

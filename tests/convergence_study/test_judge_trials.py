@@ -134,3 +134,75 @@ def test_an_exact_value_may_be_any_distance_away() -> None:
     for size, exact in ((1e-200, 1.0), (1e-100, 1e300)):
         verdict = judge(H, [size * (1 + h * h) for h in H], exact=exact, order=2)
         assert (verdict.status, verdict.reason) == ("FAIL", "wrong_limit")
+
+
+@pytest.mark.parametrize("limit", [1.23456, -3.21987])
+@pytest.mark.parametrize("digits", [4, 5, 6])
+@pytest.mark.parametrize("order", [1, 2, 4])
+def test_bounds_hold_of_printed_numbers(limit: float, digits: int, order: int) -> None:
+    """A table shows 4 to 6 digits of values whose limit is known."""
+    h = [0.2 * 0.5**k for k in range(6)]
+    values = [float(f"{limit + 0.7 * x**order + 0.3 * x ** (order + 1):.{digits}g}") for x in h]
+    for asked in (None, order):
+        verdict = judge(h, values, order=asked)
+        assert verdict.error_bound is not None
+        assert verdict.best is not None
+        assert verdict.best_bound is not None
+        assert abs(values[-1] - limit) <= verdict.error_bound
+        assert abs(verdict.best - limit) <= verdict.best_bound
+        said = "rounding of the values to their last digit" in verdict.sentence
+        assert said or verdict.error_bound > 5.0 * 10.0 ** (1 - digits)
+    unprinted = judge(h, [limit + 0.7 * x**order for x in h])
+    assert "last digit" not in unprinted.sentence
+
+
+@pytest.mark.parametrize("value", [0.0, 1.0, 0.25, 0.3, 0.0625, 1.0 / 3.0])
+def test_equal_levels_that_may_be_exact_are_not_taken_for_printed_numbers(value: float) -> None:
+    verdict = judge(H, [value] * 4)
+    assert verdict.error_bound is not None
+    assert verdict.error_bound <= 4e-16
+
+
+def test_averages_of_cells_taken_for_points_are_told_of_in_a_pass() -> None:
+    """Cells begin at other points on each level, which is an error of order 1 of its own."""
+    counts = [10, 20, 40, 80]
+    cells = [np.sin(2.0 * (np.arange(n) + 0.5) / n) * (1.0 + 0.3 / n**2) for n in counts]
+    around = [np.cos(2.0 * np.pi * np.arange(n) / n) * (1.0 + 0.3 / n**2) for n in counts]
+    h, told = [1 / n for n in counts], "taken for those of a periodic grid"
+    for asked in ({}, {"order": 1}, {"at_least": 1}):
+        verdict = judge(h, cells, **asked)
+        assert verdict.status == "PASS"
+        assert told in verdict.sentence
+    assert told not in judge(h, around, order=2).sentence
+
+
+def test_a_low_order_behind_a_higher_one_is_explained() -> None:
+    """Two shapes: -12 times the part of order 4 is of order 2 at the finest level, and the estimate is above 4."""
+    h, x = [0.2 * 0.5**k for k in range(6)], np.linspace(0.0, 1.0, 20)
+    shape, other = np.sin(3 * x), np.sin(3 * x) + 0.3 * np.cos(5 * x)
+    values = [x + shape * k**4 - 12.0 * other * h[-1] ** 2 * k**2 for k in h]
+    verdict = judge(h, values, order=4)
+    assert verdict.reason == "order_low"
+    assert verdict.order is not None
+    assert verdict.order > 4.0
+    assert "Another part still raises the measured order." in verdict.sentence
+    low = judge(h, [x + shape * k**2 for k in h], order=4)
+    assert low.reason == "order_low"
+    assert "Another part" not in low.sentence
+
+
+@pytest.mark.parametrize(
+    ("values", "exact"),
+    [
+        ([1.235, 1.235, 1.235], 1.2346),
+        ([1.4, 1.4, 1.4, 1.4], 1.3988),
+        ([3.11, 3.22, 3.28, 3.32, 3.33], 3.345),
+    ],
+)
+def test_printed_numbers_do_not_miss_what_they_were_rounded_from(
+    values: list[float], exact: float
+) -> None:
+    h = [0.2 * 0.5**k for k in range(len(values))]
+    assert judge(h, values, exact=exact).status != "FAIL"
+    assert judge(h, values, exact=exact + 0.1).reason == "wrong_limit"
+    assert judge(h[:3], [3.0, 3.0, 3.0], exact=3.001).reason == "wrong_limit"

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from vibsim.engine import LANES, energies, extrema, integrate, observed
+from vibsim.engine import LANES, energies, extrema, extrema_of, integrate, observed
 from vibsim.models import MODELS
 from vibsim.schemes import FIXED_STEP, SCHEMES
 
@@ -132,6 +132,13 @@ def test_extrema_are_those_of_the_texts_program(model, kind, lane):
         found = minmax(np.arange(STEPS + 1) * dt, runs.position[case])
         for name, points in zip(("peak", "trough"), found, strict=True):
             check_extrema(runs, case, name, points, dt)
+        # and those that are found in the positions alone
+        alone = extrema_of(runs.position[case], float(dt))
+        for field in dataclasses.fields(alone):
+            one, other = getattr(alone, field.name)[0], getattr(runs.extrema, field.name)[case]
+            if one.ndim:
+                one, other = one[:KEPT], other[: len(one)]
+            assert np.array_equal(one, other, equal_nan=True)
     # the member at rest has none
     assert runs.extrema.peak_count[4] == runs.extrema.trough_count[4] == 0
     assert runs.extrema.peak_count.max() > 1

@@ -9,9 +9,8 @@ from typing import Any
 import pytest
 from experiment_files import GOOD, build, write
 
-from vibsim import plan
 from vibsim.core.errors import InputError
-from vibsim.experiment import Experiment, canonical, restore
+from vibsim.experiment import Experiment, canonical, restore, sweep_columns
 
 SWEEP: dict[str, Any] = {
     "schemes.trap.start": ["centred", "first_order"],
@@ -23,7 +22,7 @@ SCHEMES = ["central", {"kind": "central", "label": "trap", "arithmetic": "increm
 
 def test_alone_has_the_values_of_the_member() -> None:
     whole = build(schemes=SCHEMES, sweep=SWEEP, model={"kind": "pendulum", "L": 2})
-    columns = plan.columns(whole, 0, whole.members)
+    columns = sweep_columns.columns(whole, 0, whole.members)
     for case in range(whole.members):
         one = whole.alone(case)
         assert one.name == f"experiment_case_{case}"

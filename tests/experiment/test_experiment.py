@@ -18,9 +18,9 @@ from pydantic import ValidationError
 from vibsim.core.errors import InputError
 from vibsim.experiment import Experiment, canonical, restore
 from vibsim.experiment import collection as collections
-from vibsim.experiment.storage import stride
+from vibsim.experiment.storage import sampling, stride
 from vibsim.models import MODELS
-from vibsim.plan import choose, sampling
+from vibsim.plan import choose
 from vibsim.plan import load as load_plan
 from vibsim.schemes import SCHEMES
 

@@ -12,8 +12,9 @@ from experiment_files import GOOD, build, content, faults_of, file_faults, only_
 
 from vibsim.analysis import analyse_records
 from vibsim.core.errors import InputError
-from vibsim.experiment import VALUES, Experiment, kinds
+from vibsim.experiment import Experiment, kinds
 from vibsim.experiment.rules import checks as check_rules
+from vibsim.experiment.value_names import VALUES
 from vibsim.models import MODELS, quantities
 from vibsim.schemes import SCHEMES
 from vibsim.simulation import simulate_record
@@ -299,6 +300,8 @@ CASES: list[tuple[dict[str, Any], str, str, str]] = [
     ({"output": "bst"}, "output", "unknown choice", "did you mean 'best'?"),
     ({"output": "best", "levels": [6]}, "output", "at least 2 levels, there is 1", ""),
     ({"levels": None}, "levels", "required key is missing", "or tolerance"),
+    ({"levels": [8, 7, 6]}, "levels[1]", "increasing order", "write [6, 7, 8]"),
+    ({"checks": {"converges": "theta"}}, "checks", "must be a list", "begin each one with `- `"),
     ({"tolerance": 1e-10}, "tolerance", "must not be given together with levels", ""),
     (by_tolerance(0), "tolerance", "must be greater than 0", ""),
     (by_tolerance(1), "tolerance", "must be less than 1", ""),

@@ -101,6 +101,7 @@ FAULTY: list[tuple[str, int, str, str, str]] = [
     ("force: cos(u)", 0, "force", "cos(u)", "it may name t and parameters"),
     ("exact: cos(w*t)", 0, "exact", "cos(w*t)", "unknown name 'w' at character 5"),
     ("spring: v", 0, "spring", "v", "it may name u and parameters"),
+    ("damping: (1 - u**2)*v", 0, "damping", "(1 - u**2)*v", "on both takes `kind: system`"),
     ("spring: t*u", 0, "spring", "t*u", "unknown name 't'"),
     ("potential: x**2/2", 0, "potential", "x**2/2", "unknown name 'x'"),
     ("spring: sine(u)", 0, "spring", "sine(u)", "did you mean 'sin'?"),

@@ -11,8 +11,7 @@ from hypothesis import strategies as st
 from torture.fuzz import attempt
 from torture.fuzz import experiment as read
 
-from vibsim import plan
-from vibsim.experiment import Experiment
+from vibsim.experiment import Experiment, sweep_columns
 
 QUIET = settings(
     max_examples=150, deadline=None, suppress_health_check=[HealthCheck.too_slow], derandomize=True
@@ -164,7 +163,7 @@ def test_sound_sweeps(sweep: dict[str, Any]) -> None:
     """They are accepted, and every member alone is the member of the grid."""
     experiment = Experiment.from_dict(content(sweep=sweep, levels=[1, 2]))
     attempt(lambda: experiment)
-    columns = plan.columns(experiment, 0, experiment.members)
+    columns = sweep_columns.columns(experiment, 0, experiment.members)
     case = experiment.members // 2
     alone = experiment.alone(case)
     values = {f"model.{name}": value for name, value in alone.model.parameters.items()}

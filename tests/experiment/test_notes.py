@@ -53,6 +53,10 @@ TOLD = {
         {"checks": [{"converges": "theta", "order": 2, "tolerance": 10}]},
         "checks[0].tolerance: lets every order up to 12 pass",
     ),
+    "two levels": (
+        {"levels": [6, 7], "checks": [{"converges": "theta"}]},
+        "levels: 2 of them decide no order: three are needed",
+    ),
     "digits": (
         {"checks": [{"value": "period", "equals": 6.7}]},
         "checks[0].equals: has no tolerance, and is compared to 1e-9 of it: `atol: 0.05`",

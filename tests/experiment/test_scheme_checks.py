@@ -9,9 +9,10 @@ import pytest
 from experiment_files import build, faults_of, only_fault, smallest_section
 from test_experiment_faults import change_model
 
-from vibsim.experiment import VALUES, Experiment, canonical, restore
+from vibsim.experiment import Experiment, canonical, restore
 from vibsim.experiment.data import schemes_of
 from vibsim.experiment.rules import checks as check_rules
+from vibsim.experiment.value_names import VALUES
 from vibsim.models import MODELS, centred, quantities
 from vibsim.schemes import FIXED_STEP, SCHEMES
 
@@ -96,6 +97,8 @@ def test_defaults_of_the_checks() -> None:
             "reason of status FAIL",
             "",
         ),
+        (ACCURATE | {"expect": "fail"}, "expect", "must be a mapping", "{status: FAIL, reason:"),
+        (ACCURATE | {"at": {"level": 6}}, "at.level", "unknown key", "there is none"),
         ({"stable": "yes"}, "stable", "must be true or false", ""),
         ({"stable": True, "scheme": "x"}, "scheme", "unknown key", "did you mean 'schemes'?"),
         (STABLE | {"schemes": ["centrl"]}, "schemes[0]", "not a scheme", "did you mean 'central'?"),
@@ -186,6 +189,21 @@ def test_what_is_exact_must_be_known(monkeypatch: pytest.MonkeyPatch) -> None:
     assert "the exact energy" in only_fault(checks=check("energy"), **rk4).rule
     fault = only_fault(checks=[{"conserves": "energy"}], **rk4)
     assert fault.rule == "the energy of pendulum is not conserved"
+
+
+@pytest.mark.parametrize(
+    ("section", "hint"),
+    [
+        ({"kind": "oscillator", "damping": {"linear": 0.1}}, "`converges: energy_budget`"),
+        ({"kind": "system", "acceleration": "-u*exp(u*sin(u)**3)"}, "write its `potential`"),
+    ],
+)
+def test_an_energy_that_is_not_conserved_has_what_is_in_its_place(
+    section: dict[str, Any], hint: str
+) -> None:
+    checks = [{"conserves": "energy"}]
+    fault = only_fault(checks=checks, schemes=["rk4"], model=section, initial={"u": 1.0})
+    assert hint in fault.hint
 
 
 @pytest.mark.parametrize("kind", [k for k in MODELS if SCHEMES["rk4"].treats(MODELS[k])])

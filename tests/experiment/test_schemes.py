@@ -12,8 +12,7 @@ import numpy as np
 import pytest
 from experiment_files import GOOD, build, faults_of, file_faults, only_fault
 
-from vibsim import plan
-from vibsim.experiment import Experiment, canonical, kinds, restore
+from vibsim.experiment import Experiment, canonical, kinds, restore, sweep_columns
 from vibsim.experiment.schema.sweep import tolerance_name
 from vibsim.models import MODELS
 from vibsim.schemes import FIXED_STEP, SCHEMES, AnyOption, Flag, NumberOption, Option
@@ -63,9 +62,9 @@ def test_an_option_is_a_value_of_its_own_type(kind: str, option: AnyOption) -> N
 def test_an_option_can_be_swept(kind: str, option: AnyOption) -> None:
     values, key = values_of(option), f"schemes.mine.{option.name}"
     experiment = build(schemes=entry(kind), sweep={key: values, "model.g": [1, 2]})
-    columns = plan.columns(experiment, 0, 4)
+    columns = sweep_columns.columns(experiment, 0, 4)
     assert columns[key].dtype.kind == ("f" if isinstance(option, NumberOption) else "U")
-    groups = plan.option_groups(experiment, 1, columns)
+    groups = sweep_columns.option_groups(experiment, 1, columns)
     assert [(options[option.name], list(where)) for options, where in groups] == [
         (values[0], [0, 1]),
         (values[1], [2, 3]),
@@ -225,8 +224,8 @@ def test_many_sets_of_options_come_in_the_order_of_the_members() -> None:
         "over": {f"schemes.mine.{option.name}": [low, high]},
     }
     experiment = build(schemes=entry(kind), sweep={"model.g": [1, 2], "sample": drawn})
-    columns = plan.columns(experiment, 0, 600)
-    groups = plan.option_groups(experiment, 1, columns)
+    columns = sweep_columns.columns(experiment, 0, 600)
+    groups = sweep_columns.option_groups(experiment, 1, columns)
     column = columns[f"schemes.mine.{option.name}"]
     assert [options[option.name] for options, _ in groups] == list(column[:300])
     for i, (_, where) in enumerate(groups):

@@ -183,6 +183,24 @@ def test_a_tab_is_named(tmp_path: Path) -> None:
     assert "tabs are not allowed for indentation" in fault.rule
 
 
+@pytest.mark.parametrize(
+    ("text", "line", "hint"),
+    [
+        ("model:\n  kind:spring\n  w: 1\n", 3, "a colon needs a blank behind it, on line 2"),
+        ("model:\n  kind: spring\n    w: 1\n", 3, "it is indented further than line 2"),
+        ("title: Sheet 1: a start\n", 1, "a text with a colon and a blank in it needs quotation"),
+        ("initial: {u: 1\ntime: {end: 2}\n", 2, "the bracket that opens on line 1 is not closed"),
+        ("title: 'a\ntime: {end: 2}\n", 3, "the quotation mark that opens on line 1 is not"),
+    ],
+)
+def test_a_slip_of_syntax_is_said_in_plain_words(
+    tmp_path: Path, text: str, line: int, hint: str
+) -> None:
+    (fault,) = file_faults(tmp_path, text)
+    assert (fault.line, fault.rule) == (line, "is not valid YAML")
+    assert fault.hint.startswith(hint)
+
+
 @pytest.mark.parametrize("name", ["[q{i}]", "{q{i+1}: 1}", "[a, x{row-2}]"])
 def test_an_index_inside_brackets_is_sent_into_quotation_marks(tmp_path: Path, name: str) -> None:
     (fault,) = file_faults(tmp_path, f"model:\n  names: {name}\n")

@@ -215,14 +215,14 @@ def test_what_is_too_large_is_counted_and_not_written_out(sweep: dict[str, Any])
 def test_scattered_points_are_imported_only_where_they_are_drawn() -> None:
     program = (
         "import sys\n"
-        "from vibsim import plan\n"
+        "from vibsim.experiment import sweep_columns\n"
         "from vibsim.experiment import Experiment\n"
         "for method in ('random', 'sobol'):\n"
         "  e = Experiment.from_dict({'title': 'x', 'model': {'kind': 'pendulum'}, 'levels': [6],\n"
         "    'time': {'end': 1}, 'schemes': ['central'], 'sweep': {'sample': {'method': method,\n"
         "    'n': 4, 'seed': 1, 'over': {'model.g': [1, 2]}}}})\n"
         "  assert 'scipy' not in sys.modules\n"
-        "  plan.columns(e, 0, 4)\n"
+        "  sweep_columns.columns(e, 0, 4)\n"
         "  print('scipy' in sys.modules)"
     )
     command = [sys.executable, "-c", program]

@@ -16,8 +16,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from test_fuzz import QUIET, attempt
 
-from vibsim import plan
-from vibsim.experiment import Experiment
+from vibsim.experiment import Experiment, sweep_columns
 from vibsim.experiment.schema.unit_text import MAX_EXPONENT, MAX_UNIT, UnitError, factors, split
 from vibsim.experiment.units import DEFINITIONS, MAX_OWN, finite, meaning, registry, unit_named
 from vibsim.models import MODELS
@@ -87,7 +86,9 @@ def test_a_decimal_is_rounded_once(value: object) -> None:
     assert experiment.initial["theta"] == float(str(value))
     assert experiment.initial["omega"] == float(f"{value}e3")
     sweep = {"initial.omega": [f"{value} rad/ms"]}
-    assert plan.columns(build(sweep=sweep), 0, 1)["initial.omega"][0] == float(f"{value}e3")
+    assert sweep_columns.columns(build(sweep=sweep), 0, 1)["initial.omega"][0] == float(
+        f"{value}e3"
+    )
 
 
 def test_plain_numbers_stay_what_they_are() -> None:
@@ -105,7 +106,7 @@ def test_sweeps() -> None:
             "sample": {"method": "random", "n": 2, "seed": 1, "over": {"initial.theta": ["1 deg", "2 deg"]}},
         }
     )  # fmt: skip
-    columns = plan.columns(experiment, 0, experiment.members)
+    columns = sweep_columns.columns(experiment, 0, experiment.members)
     assert sorted(set(columns["model.L"])) == [1, 2, 3, 4]
     assert sorted(set(columns["model.g"])) == [1, 1.5, 2]
     assert sorted(set(columns["initial.omega"])) == [0, 1, 2]
@@ -138,7 +139,7 @@ def test_oscillator() -> None:
 def test_swept_oscillator() -> None:
     model = {**OSCILLATOR, "parameters": {"k": 1}}
     sweep = {"model.damping.linear": ["1 g/s", 2], "model.parameters.k": ["1 kN/m", 3]}
-    columns = plan.columns(build(model=model, initial={"u": 1}, sweep=sweep), 0, 4)
+    columns = sweep_columns.columns(build(model=model, initial={"u": 1}, sweep=sweep), 0, 4)
     assert sorted(set(columns["model.damping.linear"])) == [1e-3, 2]
     assert sorted(set(columns["model.parameters.k"])) == [3, 1000]
 

@@ -95,6 +95,12 @@ def test_a_chain_moves_as_its_modes_do(count):
             "(x - y)**2/2",
             False,
         ),
+        (
+            ("x", "y"),
+            {"force.x": "mu*(y - x)**3 - x", "force.y": "-mu*(y - x)**3 + (mu - 2*y)**2"},
+            "mu*(x - y)**4/4 + x**2/2 + ((mu - 2*y)**3 - mu**3)/6",
+            True,
+        ),
     ],
 )  # fmt: skip
 def test_the_energy_is_found_where_there_is_one(names, formulas, potential, is_conservative):

@@ -103,7 +103,7 @@ FAULTS = (
         "mass not divided by",
         "model",
         "models/shared/mechanical.py",
-        "inverse = over(ONE, self.mass)",
+        "inverse = ONE / self.mass",
         "inverse = self.mass",
     ),
     # damping terms
@@ -267,8 +267,8 @@ FAULTS = (
         "first step of first order",
         "start",
         "schemes/central.py",
-        "    kick = ZERO if variant else 0.5 * (dt * dt) * acceleration(u, v, 0.0, p)\n    push = dt * v",
-        "    kick = 0.0\n    push = dt * v",
+        "kick = ZERO if variant == FORWARD_START else share * (dt * dt) * acceleration(u, v, 0.0, p)\n    push",
+        "kick = 0.0\n    push",
     ),
     Fault(
         "start of Euler-Cromer exchanged",
@@ -361,8 +361,8 @@ FAULTS = (
         "exact solution at other times",
         "exact",
         "simulation/level.py",
-        "number * (group.end / steps)[:, None],",
-        "number * (group.end / (steps + 1))[:, None],",
+        "number * (group.end / steps)[:, None])",
+        "number * (group.end / (steps + 1))[:, None])",
     ),
     # analysis
     Fault(

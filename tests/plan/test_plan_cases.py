@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from vibsim import plan
 from vibsim.analysis import analyse_records, verdicts
-from vibsim.experiment import Experiment
+from vibsim.experiment import Experiment, storage, sweep_columns
 from vibsim.experiment.storage import SMALL
 from vibsim.schemes import SCHEMES
 from vibsim.simulation import simulate_record
@@ -30,12 +29,12 @@ def experiment(**changes: Any) -> Experiment:
 
 def test_without_a_sweep_there_is_one_member_and_no_column() -> None:
     assert experiment().members == 1
-    assert plan.columns(experiment(), 0, 1) == {}
+    assert sweep_columns.columns(experiment(), 0, 1) == {}
 
 
 def test_a_grid_runs_through_its_last_key_first() -> None:
     grid = experiment(sweep={"initial.theta": [0.1, 0.2], "model.g": [1.0, 2.0, 3.0]})
-    found = plan.columns(grid, 0, 6)
+    found = sweep_columns.columns(grid, 0, 6)
     assert grid.members == 6
     np.testing.assert_array_equal(found["initial.theta"], [0.1, 0.1, 0.1, 0.2, 0.2, 0.2])
     np.testing.assert_array_equal(found["model.g"], [1, 2, 3, 1, 2, 3])
@@ -47,9 +46,9 @@ def test_members_do_not_depend_on_the_range_that_is_asked() -> None:
         "initial.theta": {"linspace": [0.1, 3.0, 7]},
     }
     grid = experiment(sweep=sweep)
-    whole = plan.columns(grid, 0, 35)
+    whole = sweep_columns.columns(grid, 0, 35)
     for start, stop in ((0, 1), (3, 11), (34, 35), (12, 12)):
-        part = plan.columns(grid, start, stop)
+        part = sweep_columns.columns(grid, start, stop)
         for key, values in part.items():
             np.testing.assert_array_equal(values, whole[key][start:stop])
 
@@ -70,11 +69,11 @@ SWEEPS: list[dict[str, Any]] = [
 @pytest.mark.parametrize("sweep", SWEEPS)
 def test_every_range_of_members_is_that_part_of_the_whole(sweep: dict[str, Any]) -> None:
     grid = experiment(sweep=sweep)
-    whole = plan.columns(grid, 0, grid.members)
+    whole = sweep_columns.columns(grid, 0, grid.members)
     assert {len(values) for values in whole.values()} == {grid.members}
     for start in range(grid.members + 1):
         for stop in {start, start + 1, start + 5, start + 9, grid.members}:
-            part = plan.columns(grid, start, min(stop, grid.members))
+            part = sweep_columns.columns(grid, start, min(stop, grid.members))
             assert list(part) == list(whole)
             for key, values in part.items():
                 np.testing.assert_array_equal(values, whole[key][start:stop])
@@ -82,7 +81,7 @@ def test_every_range_of_members_is_that_part_of_the_whole(sweep: dict[str, Any])
 
 def one(rule: Any, key: str = "initial.theta") -> NDArray[np.float64]:
     grid = experiment(levels=[1], sweep={key: rule})
-    return plan.columns(grid, 0, grid.members)[key]
+    return sweep_columns.columns(grid, 0, grid.members)[key]
 
 
 def test_a_line_is_its_formula_with_exact_ends() -> None:
@@ -123,7 +122,9 @@ def test_a_range_is_its_formula_and_grows_at_its_end() -> None:
 @pytest.mark.parametrize("method", ["sobol", "random"])
 def test_points_that_are_added_leave_the_first_ones_alone(method: str) -> None:
     few, many = (
-        plan.columns(experiment(sweep={"sample": SAMPLE | {"method": method, "n": n}}), 0, n)
+        sweep_columns.columns(
+            experiment(sweep={"sample": SAMPLE | {"method": method, "n": n}}), 0, n
+        )
         for n in (37, 300)
     )
     for key, values in few.items():
@@ -134,7 +135,7 @@ def test_points_that_are_added_leave_the_first_ones_alone(method: str) -> None:
 def test_points_fill_their_box(method: str) -> None:
     def draw(seed: int, n: int = 2**12) -> dict[str, NDArray[np.float64]]:
         sample = SAMPLE | {"method": method, "n": n, "seed": seed}
-        return plan.columns(experiment(levels=[1], sweep={"sample": sample}), 0, n)
+        return sweep_columns.columns(experiment(levels=[1], sweep={"sample": sample}), 0, n)
 
     found, again, other = draw(5), draw(5), draw(6)
     bounds = SAMPLE["over"]
@@ -160,7 +161,7 @@ def test_points_fill_their_box(method: str) -> None:
 def test_random_numbers_are_those_of_the_generator() -> None:
     """Row by row from one stream, whatever numpy does with it later: pinned."""
     grid = experiment(sweep={"sample": SAMPLE | {"method": "random"}})
-    found = plan.columns(grid, 0, 37)
+    found = sweep_columns.columns(grid, 0, 37)
     drawn = np.random.Generator(np.random.Philox(key=5)).random((37, 2))
     np.testing.assert_array_equal(found["model.g"], 1.0 + drawn[:, 0])
     np.testing.assert_array_equal(found["initial.omega"], -1.0 + 4.0 * drawn[:, 1])
@@ -180,9 +181,9 @@ def test_random_numbers_are_those_of_the_generator() -> None:
 def test_a_few_of_a_million_members_take_no_memory(sweep: dict[str, Any]) -> None:
     """A column of all of them takes 8 MB."""
     grid = experiment(levels=[1], sweep=sweep)
-    plan.columns(grid, 0, 1)
+    sweep_columns.columns(grid, 0, 1)
     tracemalloc.start()
-    found = plan.columns(grid, 999_980, 10**6)
+    found = sweep_columns.columns(grid, 999_980, 10**6)
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
     assert {len(values) for values in found.values()} == {20}
@@ -194,12 +195,12 @@ def test_options_come_in_groups() -> None:
     start, velocity = ["first_order", "centred", "first_order"], ["kick", "kick", "backward"]
     together = {"schemes.trap.start": start, "schemes.trap.end_velocity": velocity}
     grid = experiment(schemes=schemes, sweep={"zip": together, "model.g": [1.0, 2.0]})
-    columns = plan.columns(grid, 1, 6)
+    columns = sweep_columns.columns(grid, 1, 6)
     base = dict(grid.schemes[1].options)
-    ((options, members),) = plan.option_groups(grid, 0, columns)
+    ((options, members),) = sweep_columns.option_groups(grid, 0, columns)
     assert options == grid.schemes[0].options
     assert list(members) == [0, 1, 2, 3, 4]
-    groups = plan.option_groups(grid, 1, columns)
+    groups = sweep_columns.option_groups(grid, 1, columns)
     expected = [
         ({**base, "start": "first_order", "end_velocity": "kick"}, [0]),
         ({**base, "start": "centred", "end_velocity": "kick"}, [1, 2]),
@@ -212,13 +213,15 @@ def test_options_come_in_groups() -> None:
 
 
 def test_without_swept_options_there_is_one_group() -> None:
-    ((options, members),) = plan.option_groups(experiment(), 0, {})
+    ((options, members),) = sweep_columns.option_groups(experiment(), 0, {})
     assert options == experiment().schemes[0].options
     assert list(members) == [0]
     swept = experiment(sweep={"model.g": [1.0, 2.0]})
-    ((_, members),) = plan.option_groups(swept, 0, plan.columns(swept, 0, 2))
+    ((_, members),) = sweep_columns.option_groups(swept, 0, sweep_columns.columns(swept, 0, 2))
     assert list(members) == [0, 1]
-    assert [len(m) for _, m in plan.option_groups(swept, 0, plan.columns(swept, 1, 1))] == [0]
+    assert [
+        len(m) for _, m in sweep_columns.option_groups(swept, 0, sweep_columns.columns(swept, 1, 1))
+    ] == [0]
 
 
 @pytest.mark.parametrize("samples", ["auto", "common", "all"])
@@ -226,7 +229,7 @@ def test_without_swept_options_there_is_one_group() -> None:
 def test_the_common_grid_and_the_end_are_always_kept(samples: str, base: int) -> None:
     e = experiment(samples=samples, base=base)
     for level in e.levels:
-        every = plan.sampling(e, level)
+        every = storage.sampling(e, level)
         kept = set(range(0, e.steps(level) + 1, every))
         common = e.steps(level) // e.steps(e.levels[0])
         assert set(range(0, e.steps(level) + 1, common)) <= kept
@@ -240,7 +243,7 @@ def test_the_common_grid_and_the_end_are_always_kept(samples: str, base: int) ->
 @pytest.mark.parametrize(("base", "n"), [(1, 1), (1, 16), (3, 3), (3, 24), (7, 7 * 64)])
 def test_every_nth_step_is_every_nth_step_of_each_level(base: int, n: int) -> None:
     e = experiment(samples={"every": n}, base=base)
-    assert [plan.sampling(e, level) for level in e.levels] == [n] * 3
+    assert [storage.sampling(e, level) for level in e.levels] == [n] * 3
 
 
 @pytest.mark.parametrize(("base", "n"), [(3, 3), (1, 8), (5, 10)])
@@ -271,7 +274,7 @@ def test_auto_keeps_everything_while_it_is_small() -> None:
     sweep = {"model.L": {"linspace": [1, 2, members]}}
     small = experiment(levels=[0, 1], base=steps // 2, sweep=sweep)
     assert members * (small.steps(1) + 1) <= SMALL
-    assert plan.sampling(small, 1) == 1
+    assert storage.sampling(small, 1) == 1
     large = experiment(levels=[0, 1], base=steps, sweep=sweep)
-    assert plan.sampling(large, 1) == 2
-    assert plan.sampling(large, 0) == 1
+    assert storage.sampling(large, 1) == 2
+    assert storage.sampling(large, 0) == 1

@@ -193,7 +193,7 @@ def test_imports_are_followed_wherever_they_stand(package: Path) -> None:
     (package / "new.py").write_text(
         "from typing import TYPE_CHECKING\n"
         "from vibsim import store\n"
-        "from vibsim.experiment import schemes_of\n"
+        "from vibsim.experiment import canonical\n"
         "if TYPE_CHECKING:\n    from vibsim.report import write\n"
         "def f():\n    import vibsim.variables\n    from vibsim.models import has_solution\n"
         "    store.write_text()\n"
@@ -204,7 +204,7 @@ def test_imports_are_followed_wherever_they_stand(package: Path) -> None:
         "vibsim.models",
         "vibsim.models.base",
         "vibsim.experiment",
-        "vibsim.experiment.data",
+        "vibsim.experiment.experiment",
         "vibsim.store",
         "vibsim.store.atomic",
         "vibsim.variables",

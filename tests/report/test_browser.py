@@ -13,7 +13,6 @@ from test_player import made
 from vibsim import report
 from vibsim.report.figures import scenes
 from vibsim.report.page import history, player
-from vibsim.report.page.templates import environment
 
 pytestmark = pytest.mark.slow
 
@@ -125,7 +124,7 @@ def test_the_script_draws_what_the_still_picture_draws(tmp_path, name):
     lanes = player.lanes(exp, record)
     path, frame = tmp_path / "page.html", 37
     go = GO.replace("FRAME", str(frame))
-    path.write_text(f"<!DOCTYPE html><body>{player.element(exp, record, environment())}{go}</body>")
+    path.write_text(f"<!DOCTYPE html><body>{player.element(exp, record)}{go}</body>")
     page = shown(path)
     found = paths(page)
     assert len(found) == len(lanes)
@@ -176,7 +175,7 @@ const wait = setInterval(() => {
 
 def test_the_player_plays_pauses_and_steps_by_keys(tmp_path):
     exp, record = made()
-    text, path = player.element(exp, record, environment()), tmp_path / "page.html"
+    text, path = player.element(exp, record), tmp_path / "page.html"
     path.write_text(f"<!DOCTYPE html><head><title></title>{CLOCK}</head><body>{text}{KEYS}</body>")
     told = re.search(r"<title>([^<]*)</title>", shown(path, wait=6000))
     assert told is not None

@@ -10,11 +10,11 @@ import pytest
 import samples
 
 from vibsim import report
-from vibsim.report import choice, data, style
+from vibsim.report import choice, data, style, words
 from vibsim.report.data import Member
 from vibsim.report.figures import order, solution, time
 from vibsim.report.tables import levels as contents
-from vibsim.report.text import findings
+from vibsim.report.text import findings, setting
 
 STIFF = {
     "model": {"kind": "linear_pendulum"},
@@ -132,7 +132,8 @@ def test_a_sweep_names_a_member_once_per_block_of_a_page_and_in_every_row_of_a_f
     start = page.index('<section id="numbers"')
     table = page[start : page.index("</table>", start)]
     assert re.findall(r'rowgroup" colspan="9">([^<]*)<', table) == [
-        f"central, {data.case_name(record, m.case)}" for m in choice.members(record, "theta")
+        f"central, {words.swept(data.case_name(record, m.case))}"
+        for m in choice.members(record, "theta")
     ]
     assert table.count('<th scope="col"') == 9
     rows = re.findall(r"<tr><td.*?</tr>", table, flags=re.DOTALL)
@@ -198,3 +199,18 @@ def test_an_amplitude_is_never_negative():
     record.variables["amplitude"] = replace(amplitude, values=0 * amplitude.values - 8.7e88)
     table = contents.scalars(record, [Member(0, 0, "central")])
     assert [row[-1] for row in table.rows] == [8.7e88] * 4
+
+
+def test_the_set_up_names_parameters_as_the_equation_does():
+    exp = samples.experiment(
+        model={
+            "kind": "oscillator",
+            "spring": "k*u",
+            "damping": {"linear": 0.1},
+            "parameters": {"k": 2.0},
+        },
+        initial={"u": 1.0},
+        levels=[6, 7, 8],
+    )
+    rows = dict(setting.setup(exp, samples.record(exp)))
+    assert rows["Parameters"] == "m = 1 kg, b = 0.1 kg s⁻¹ (damping.linear), k = 2"

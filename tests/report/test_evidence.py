@@ -204,3 +204,11 @@ def test_an_error_in_a_norm_is_drawn_on_a_logarithmic_scale():
     heights = np.log(sorted(y for _, y in dots(found)))
     assert np.diff(heights) == pytest.approx(np.diff(heights)[0], rel=0.1)
     assert "largest error of θ [rad]" in texts(found)
+
+
+def test_a_range_too_narrow_for_its_numbers_has_one_of_them():
+    with style.applied():
+        ax = style.canvas(2.0).add_subplot()
+        frame.scale(ax, np.array([3.0 - 1e-9, 3.0 + 1e-9]))
+        told = ax.yaxis.get_major_formatter().format_ticks(ax.get_yticks())
+    assert told == ["3"]

@@ -18,7 +18,7 @@ from vibsim.experiment.experiment import canonical
 from vibsim.experiment.schema.checks import MEASURED
 from vibsim.report import choice, data, style, words
 from vibsim.report.figures import hero as drawn
-from vibsim.report.page import cards, hero, index
+from vibsim.report.page import cards, hero
 from vibsim.report.text import equation, experiment_file, findings, glossary
 
 CONFIGS = Path(__file__).parents[2] / "configs"
@@ -149,7 +149,7 @@ def test_badges_tell_a_claim_and_a_trap_from_a_check_that_passed():
         "passed", "as claimed", "refuted", "trap caught", "failed",
     ]  # fmt: skip
     # the index says the same words of the same checks
-    assert index.marks(summary["checks"]) == [("trap caught", 1), ("refuted", 1)]
+    assert words.marks(summary["checks"]) == [("trap caught", 1), ("refuted", 1)]
 
 
 @pytest.mark.parametrize("norm", ["l1", "l2", "linf", "linf_interior"])
@@ -224,6 +224,93 @@ def test_an_equation_becomes_markup():
     assert "<msup><msub><mi>w</mi><mi>0</mi></msub><mn>2</mn></msup>" in made
     assert re.sub(r"<[^>]*>", "", made) == "mu″+w02u=F(t)"
     assert "&lt;" in equation.mathml("a < b")
+
+
+def test_a_long_equation_has_powers_of_python_and_may_be_broken_between_its_terms():
+    text = "a'' = (-3*g*sin(a) - 2*sin(a - b)*(b'**2 + a'**2*cos(a - b)))/(3 - cos(b)), b'' = -b + (a - b)"
+    made = str(equation.mathml(text))
+    assert made.count("<msup>") == 2
+    lines = [re.sub(r"<[^>]*>", "", part) for part in made.split("</math>")]
+    assert [line.strip()[:4] for line in lines[:5]] == ["a″=(", "−2·s", "−cos", "b″=−", "+(a"]
+    assert "".join(lines).replace(" ", "") == (
+        "a″=(−3·g·sin(a)−2·sin(a−b)·(b′2+a′2·cos(a−b)))/(3−cos(b)),b″=−b+(a−b)"
+    )
+    assert str(equation.mathml("u'' + u = 0, v -> -e*v")).count("<math>") == 2
+
+
+def test_a_trap_has_its_mark_and_its_order_beside_the_finding():
+    trap = {"converges": "theta", "order": 2, "schemes": ["wrong"], "expect": {"status": "FAIL"}}
+    plain = {"converges": "theta", "order": 2, "schemes": ["central"]}
+    shown = first(samples.experiment(schemes=["central", *WRONG_AS_TRAP], checks=[plain, trap]))
+    assert shown["marks"] == [(words.TRAP, 1)]
+    assert re.search(
+        r"As the trap expects, θ has order [01]\.\d{3} with scheme wrong", shown["meaning"]
+    )
+
+
+def test_statements_are_counted_beside_the_finding_but_not_where_one_is_the_finding():
+    claim = {"claim": "it takes longer", "that": {"value": "period", "above": 6.0}}
+    order = {"converges": "theta", "order": 2}
+    assert (
+        "1 statement holds as claimed."
+        in first(samples.experiment(checks=[order, claim]))["meaning"]
+    )
+    assert "statement" not in first(samples.experiment(checks=[claim]))["meaning"]
+
+
+@pytest.mark.parametrize(
+    ("asked", "told"),
+    [
+        ({"above": 6.0}, "6.7 s"),
+        ({"above": 6.699}, "6.699603 s"),
+        ({"equals": 6.7, "atol": 1e-2}, "6.6996 s"),
+    ],
+)
+def test_a_number_has_the_digits_that_tell_it_from_what_is_asked(asked, told):
+    exp = samples.experiment(levels=[9], checks=[{"value": "period", "at": {"level": 9}} | asked])
+    record, summary, _ = found(exp)
+    assert cards.card(exp, record, summary["checks"][0])["got"] == told
+
+
+def test_a_large_number_is_not_rounded_before_its_point():
+    exp = samples.experiment(
+        model={"kind": "pendulum", "g": 1e-8}, time={"end": 2e5}, levels=[9],
+        checks=[{"value": "period", "at": {"level": 9}, "above": 6e4}],
+    )  # fmt: skip
+    record, summary, _ = found(exp)
+    assert cards.card(exp, record, summary["checks"][0])["got"] == "66996 s"
+
+
+def test_an_order_beside_the_band_whose_interval_reaches_it_counts_as_kept(monkeypatch):
+    exp = samples.experiment(sweep={"initial.theta": [0.5, 1.0]}, checks=[{"converges": "theta"}])
+    record, _, decisive = found(exp)
+    for low, title in (2.05, "All members keep"), (2.15, "1 of 2 members have"):
+        ends = (np.array([row]) for row in ([2.0, 2.3], [2.0, low], [2.0, 2.3]))
+        monkeypatch.setattr(drawn.finest_level, "orders", lambda *_, ends=tuple(ends): ends)
+        with style.applied():
+            assert drawn.orders(exp, record, decisive).title.startswith(title)
+
+
+def test_an_order_that_its_scheme_promises_is_not_said_to_be_less_than_that():
+    checks = [{"converges": "theta", "order": 3}]
+    exp = samples.experiment(checks=checks)
+    shown, (check,) = first(exp), cards.cards(exp, *found(exp)[:2])
+    assert shown["meaning"] == check["meaning"]
+    assert "promises here, which is lower than the expected one" in shown["meaning"]
+
+
+def test_the_promised_slope_goes_no_further_than_the_errors():
+    dt, errors = 0.5 ** np.arange(5), np.array([1e-9, 3e-9, 1e-9, 4e-9, 8e-9])
+    with style.applied():
+        ax = style.canvas(2.0).add_subplot()
+        drawn._slope(ax, dt, errors, 2.0, "promised")
+    assert np.nanmax(ax.lines[0].get_ydata()) <= 2.0 * errors.max()
+
+
+def test_a_quantity_with_a_long_name_is_told_in_words_and_leaves_the_legend_small():
+    exp = Experiment.from_yaml(CONFIGS / "vibration_text/bumpy_road.yaml")
+    assert findings.short(exp, "absolute_position") == "the height of the body"
+    assert findings.short(exp, "u") == "u"
 
 
 def test_a_term_is_explained_once_and_text_stays_text():

@@ -279,3 +279,16 @@ def test_the_grey_line_of_a_motion_is_named_where_it_is_drawn(levels):
     lines = picture.figure.axes[0].lines
     assert ("grey" in picture.caption) == any(line.get_color() == style.PALE for line in lines)
     assert ("grey" in picture.caption) == (len(levels) > 1)
+
+
+@pytest.mark.parametrize(("end", "is_drawn"), [(15.0, False), (22.0, True)])
+def test_a_page_shows_periods_from_three_peaks_on(end, is_drawn):
+    exp = samples.experiment(time={"end": end}, levels=[8, 9, 10], checks=[{"converges": "theta"}])
+    record = samples.record(exp)
+    decisive = choice.find_lead(exp, record, samples.summary(exp, record))
+    shown = gallery.choose(exp, record)[0]
+    with style.applied():
+        tabs = gallery.pictures(exp, record, shown, decisive, []).belief
+        assert extrema.local(exp, record, shown) is not None
+    names = [picture.name for tab in tabs for picture in tab.pictures]
+    assert ("extrema_0" in names) == is_drawn

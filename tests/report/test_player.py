@@ -12,7 +12,6 @@ from thinned import thinned
 
 from vibsim.report.figures import scenes
 from vibsim.report.page import player
-from vibsim.report.page.templates import environment
 
 PENDULUM = {"kind": "pendulum"}
 DRAGGED = {"kind": "pendulum", "drag": 0.4}
@@ -59,7 +58,7 @@ def made(name="pendulum", **changes):
 
 
 def element(exp, record):
-    return player.element(exp, record, environment())
+    return player.element(exp, record)
 
 
 def data(text):

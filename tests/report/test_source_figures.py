@@ -16,7 +16,6 @@ from vibsim.experiment.schema.figures import KINDS
 from vibsim.report import choice, style
 from vibsim.report.figures import accuracy, of_source
 from vibsim.report.page import player
-from vibsim.report.page.templates import environment
 from vibsim.report.tables import source_figures
 
 ROOT = Path(__file__).parents[2]
@@ -53,7 +52,7 @@ def drawn(exp: Experiment) -> tuple[list, list[str]]:
     decisive = choice.find_lead(exp, record, samples.summary(exp, record))
     with style.applied():
         found = of_source.pictures(exp, record, decisive)
-    has_player = bool(player.element(exp, record, environment()))
+    has_player = bool(player.element(exp, record))
     return found, of_source.undrawn(found, has_player=has_player)
 
 
@@ -232,6 +231,29 @@ def test_the_second_difference_is_measured_on_its_formula() -> None:
     _, p, measured = lines(picture)[0][-1]
     assert p == pytest.approx([0.5, 2.0, 3.0])
     assert measured == pytest.approx((2.0 / p * np.sin(p / 2.0)) ** 2, rel=1e-9)
+
+
+def test_parameters_of_the_users_own_go_by_their_names_in_formulas() -> None:
+    model = {
+        "kind": "oscillator",
+        "m": 2.0,
+        "damping": {"linear": 0.2},
+        "spring": "k*u",
+        "parameters": {"k": 8.0},
+    }
+    exp = spring(
+        {"shows": "over_time", "quantities": ["potential_energy"]},
+        {"shows": "over_time", "beside": {"decay": "exp(-b*t/(2*m))"}},
+        {"shows": "spring"},
+        model=model, levels=[6, 7],
+    )  # fmt: skip
+    ((_, [energy]), (_, [motion]), (_, [force])), _ = drawn(exp)
+    ((*_, (_, _, stored)),) = lines(energy)
+    assert stored.max() == pytest.approx(4.0)
+    ((*_, (_, t, decay)),) = lines(motion)
+    np.testing.assert_allclose(decay, np.exp(-0.05 * t))
+    (((_, u, pull),),) = lines(force)
+    np.testing.assert_allclose(pull, 8.0 * u)
 
 
 def test_springs_of_members_are_their_own() -> None:

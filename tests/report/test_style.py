@@ -116,6 +116,15 @@ def test_a_figure_carries_no_date_and_no_metadata(documents):
     assert not re.search(r"20\d\d-\d\d-\d\d", documents[0])
 
 
+@pytest.mark.parametrize("height", [0.5, 1.3])
+def test_a_legend_has_its_lines_above_a_figure_too(height):
+    with style.applied():
+        figure = style.canvas(2.0)
+        figure.add_axes((0.1, 0.1, 0.8, 0.8)).plot([0, 1], [0, 1], color="#123456", label="one")
+        figure.legend(loc="lower left", bbox_to_anchor=(0.1, height))
+        assert drawing.svg(figure, "legend").count('stroke="#123456"') == 2
+
+
 def test_ids_of_a_figure_are_unique_and_references_resolve(documents):
     ids = re.findall(r'\bid="([^"]*)"', documents[0])
     used = set(re.findall(r'(?:url\(#|href="#)([^")]+)', documents[0]))

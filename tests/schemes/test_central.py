@@ -14,12 +14,12 @@ CENTRAL = SCHEMES["central"]
 ARITHMETICS = next(o.choices for o in CENTRAL.options if o.name == "arithmetic")
 
 
-def run(kind, level, *, theta=1.0, omega=0.0, end=20.0, g=1.0, **options):
+def run(kind, level, *, theta=1.0, omega=0.0, end=20.0, g=1.0, scheme=CENTRAL, **options):
     steps = 2**level
     return integrate(
         MODELS[kind],
-        CENTRAL,
-        {**CENTRAL.defaults(), **options},
+        scheme,
+        {**scheme.defaults(), **options},
         np.array([[g, 1.0, 1.0, 0.0][: len(MODELS[kind].parameters)]]),
         np.array([[theta, omega]]),
         np.array([end / steps]),
@@ -85,12 +85,16 @@ def test_increment_beats_three_term_by_four_orders_at_level_20():
     assert defects["increment"] <= 1e-3 * defects["three_term"]
 
 
-@pytest.mark.parametrize("start", ["centred", "taylor", "first_order"])
+SHARES = {"centred": 0.5, "taylor": 0.5, "first_order": 0.0, "backward": 1.0}
+"""Of dt^2 times the acceleration, in the first step."""
+
+
+@pytest.mark.parametrize("start", SHARES)
 @pytest.mark.parametrize(("kind", "force"), [("pendulum", math.sin(0.7)), ("linear_pendulum", 0.7)])
 def test_first_step(kind, force, start):
     runs = run(kind, 6, theta=0.7, omega=0.4, start=start)
     dt = 20.0 / 64
-    expected = 0.7 + dt * 0.4 - (0.0 if start == "first_order" else 0.5 * dt**2 * force)
+    expected = 0.7 + dt * 0.4 - SHARES[start] * dt**2 * force
     assert runs.position[0, 1] == pytest.approx(expected, rel=1e-15)
 
 
@@ -199,6 +203,17 @@ def test_there_is_no_amplitude_before_there_is_a_trough():
     assert run("pendulum", 10, theta=-1.0, end=20.0).gathered.last_trough[0] == pytest.approx(
         -1.0, abs=1e-3
     )
+
+
+@pytest.mark.parametrize(
+    ("start", "kind"), [("backward", "euler_cromer"), ("first_order", "euler_cromer_u_first")]
+)
+@pytest.mark.parametrize("arithmetic", ["compensated", "increment", "three_term"])
+def test_one_sided_differences_start_as_euler_cromer_does(start, kind, arithmetic):
+    """Vibration text, section 7.2: backward with the velocity first, forward with the position first."""
+    found = run("pendulum", 6, theta=0.7, omega=0.4, start=start, arithmetic=arithmetic)
+    other = run("pendulum", 6, theta=0.7, omega=0.4, scheme=SCHEMES[kind])
+    np.testing.assert_allclose(found.position, other.position, rtol=0, atol=1e-12)
 
 
 def test_a_taylor_polynomial_starts_as_the_centred_difference_does():

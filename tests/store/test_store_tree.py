@@ -126,3 +126,23 @@ def test_level_files_are_put_side_by_side(made: Path) -> None:
         xr.testing.assert_equal(
             found.period.sel(level=7).compute().drop_vars("level"), finest.period.drop_vars("level")
         )
+
+
+def test_members_of_a_solver_are_joined_though_their_times_differ(tmp_path: Path) -> None:
+    for case, gain in enumerate((1.0, 3.0)):
+        times = np.linspace(0.0, 1.0, 3 + 2 * case)
+        member = xr.Dataset(
+            {"T": ("t", gain * times), "last": gain},
+            {"t": times, "level": 0, "h": 0.5, "gain": gain},
+        )
+        for name in member.variables:
+            member[name].attrs = {"long_name": str(name), "units": "1"}
+        file = tmp_path / "level_00" / f"shard_{case:04d}.nc"
+        write(file, Record.from_xarray(member.assign_attrs(title="T")), digest="job", provenance={})
+    with vibsim.open(tmp_path) as tree:
+        level = tree["level_00"]
+        assert level["T"].dims == ("case", "t")
+        assert level["gain"].values.tolist() == level["last"].values.tolist() == [1.0, 3.0]
+        assert level["h"].dims == ()
+        assert level["T"].sel(case=1, t=0.25) == 0.75
+        assert np.isnan(level["T"].sel(case=0, t=0.25))

@@ -3,13 +3,15 @@
 import numpy as np
 import pytest
 import sympy
+from scheme_variants import VARIANTS
+from thinned import thinned
 
 from vibsim import theory
 from vibsim.schemes import FIXED_STEP, SCHEMES
-from vibsim.theory import symbolic
+from vibsim.theory import operators, symbolic
 
-P, X, N = (symbolic.symbol(name) for name in ("p", "x", "n"))
-BEGIN, PUSH, W = (symbolic.symbol(name) for name in ("I", "V", "w"))
+P, N = (symbolic.symbol(name) for name in ("p", "n"))
+BEGIN, PUSH, W, TIME = (symbolic.symbol(name) for name in ("I", "V", "w", "t"))
 
 
 def stepper(kind, **options):
@@ -28,10 +30,12 @@ def test_formulas_and_numbers_are_one_theory(scheme):
     ):
         values = np.array(formula.subs(P, at).evalf(30).tolist(), dtype=float)
         np.testing.assert_allclose(values, matrix.rounded, rtol=1e-15, atol=1e-30)
-    polynomial = sympy.Poly(symbolic.characteristic(method).subs(P, at).evalf(30), X)
-    np.testing.assert_allclose(
-        np.array(polynomial.all_coeffs(), dtype=float), np.poly(numbers.matrix.rounded), atol=1e-13
-    )
+    first, *others = (factor.subs(P, at) for factor in operators.recurrence(method))
+    # roots that are 0 are left out
+    wanted = np.poly(numbers.matrix.rounded)
+    found = np.zeros(len(wanted))
+    found[: len(others) + 1] = [1.0, *(float((factor / first).evalf(30)) for factor in others)]
+    np.testing.assert_allclose(found, wanted, atol=1e-13)
 
 
 @pytest.mark.parametrize("scheme", FIXED_STEP.values(), ids=FIXED_STEP)
@@ -80,10 +84,36 @@ def test_the_series_of_the_text():
     assert corrected.coeff(P, 4) != 0
 
 
+@pytest.mark.parametrize(("scheme", "options"), thinned(VARIANTS, 2))
+def test_the_error_at_a_time_is_that_of_the_exact_discrete_solution(scheme, options):
+    """What is left falls with the power that is told."""
+    method, w, t = scheme.stepper(options), 1.3, 1.7
+    error, following = symbolic.error_series(method)
+    left = []
+    for n in (48, 96):
+        u, _ = theory.discrete(method, w, t / n, 1.0, 0.0, n)
+        told = error.subs({P: sympy.Rational(t) * sympy.Rational(w) / n, W: w, TIME: t}).evalf(30)
+        left.append(abs(float(sympy.cos(w * t) - float(u) - told)))
+    power = sympy.degree(following, P)
+    assert power >= 3
+    assert left[1] <= left[0] * 2.0 ** (0.3 - power) + 4e-16
+
+
+def test_the_errors_of_the_text():
+    """Section 4.4, with the term that the erratum to it adds, and 5.6: growth and frequency of Forward Euler."""
+    angle = W * TIME
+    fourth = angle**2 * sympy.cos(angle) / 1152 + 3 * angle * sympy.sin(angle) / 640
+    error, following = symbolic.error_series(stepper("central"))
+    assert sympy.expand(error - P**2 * angle * sympy.sin(angle) / 24 - P**4 * fourth) == 0
+    assert following == P**6
+    error, _ = symbolic.error_series(stepper("forward_euler"))
+    assert error.coeff(P, 1) == -angle * sympy.cos(angle) / 2
+
+
 def test_the_characteristic_polynomial_of_the_text():
     """Section 4.1: A^2 - (2 - p^2) A + 1 = 0."""
-    found = symbolic.characteristic(stepper("central", arithmetic="three_term"))
-    assert sympy.expand(found - (X**2 - (2 - P**2) * X + 1)) == 0
+    found = operators.recurrence(stepper("central", arithmetic="three_term"))
+    assert [sympy.expand(factor) for factor in found] == [1, -2 + P**2, 1]
 
 
 @pytest.mark.parametrize(("kind", "sign"), [("euler_cromer", 1), ("euler_cromer_u_first", -1)])

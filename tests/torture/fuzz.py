@@ -27,9 +27,8 @@ from typing import Any
 import numpy as np
 import yaml
 
-from vibsim import plan
 from vibsim.core.errors import InputError
-from vibsim.experiment import Experiment, canonical, restore
+from vibsim.experiment import Experiment, canonical, restore, sweep_columns
 from vibsim.experiment.reading import build
 from vibsim.experiment.tables import file, matrix
 from vibsim.experiment.tables.content import TableError
@@ -72,7 +71,10 @@ def attempt(make: Callable[[], Experiment]) -> None:
 def _members(experiment: Experiment) -> None:
     """Require that members are what the plan says, at both ends, and that the last one that can stands alone."""
     last = experiment.members - 1
-    for found in (plan.columns(experiment, 0, 1), plan.columns(experiment, last, last + 1)):
+    for found in (
+        sweep_columns.columns(experiment, 0, 1),
+        sweep_columns.columns(experiment, last, last + 1),
+    ):
         assert all(len(values) == 1 for values in found.values())
         assert all(
             values.dtype.kind == "U" or np.isfinite(values).all() for values in found.values()
@@ -86,7 +88,7 @@ def _members(experiment: Experiment) -> None:
 
 def experiment(data: bytes) -> None:
     """Read the bytes of an experiment file."""
-    attempt(lambda: build(Experiment, parse(data, "fuzz.yaml"), "adhoc", "fuzz"))
+    attempt(lambda: Experiment.made_of(build(parse(data, "fuzz.yaml"), "adhoc", "fuzz")))
 
 
 def formula(data: bytes) -> None:

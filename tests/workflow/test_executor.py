@@ -16,8 +16,8 @@ from torture.laboratory import processes, words
 
 from vibsim.cli.arguments import parsed
 from vibsim.cli.run import executor, pending
+from vibsim.cli.workflow import names_of
 from vibsim.core.errors import InputError
-from vibsim.plan import Names
 
 from .conftest import Place, here
 
@@ -98,7 +98,8 @@ def computing(results: Path) -> list[int]:
 
 
 def test_memory_holds_what_the_executor_needs_and_grows_with_each_attempt(place: Place) -> None:
-    names = Names.of([str(place.file)], str(place.results), Path(), overhead=500, cores=3)
+    config = {"experiments": str(place.file), "results": str(place.results)}
+    names = names_of(config | {"overhead": 500, "cores": 3}, {})
     (simulation,) = names.simulations
     asked = names.memory(simulation.megabytes)
     assert asked(None, 1) == simulation.megabytes + 500
@@ -108,7 +109,7 @@ def test_memory_holds_what_the_executor_needs_and_grows_with_each_attempt(place:
 def test_jobs_are_grouped_to_minutes_and_long_ones_are_not(place: Place) -> None:
     def made(levels: str) -> list[tuple[str | None, int | None]]:
         change(place.file, "levels: [6, 7, 8, 9]", f"levels: {levels}")
-        names = Names.of([str(place.file)], str(place.results), Path())
+        names = names_of({"experiments": str(place.file), "results": str(place.results)}, {})
         change(place.file, f"levels: {levels}", "levels: [6, 7, 8, 9]")
         return [(one.group, one.minutes) for one in names.simulations]
 

@@ -10,7 +10,7 @@ import pytest
 
 from vibsim.cli.chosen_plans import plans_of
 from vibsim.cli.run import command, reasons
-from vibsim.store.provenance import read_provenance
+from vibsim.store.reading import read_provenance
 
 from .conftest import TEXT, Place
 
@@ -70,6 +70,8 @@ def test_only_a_change_of_the_code_is_left_where_the_settings_are_the_same(
     other = replace(plan, analysis="0" * 64)
     assert reasons.why(plan, place.results) == ""
     assert reasons.why(other, place.results) == "the code of vibsim changed"
+    offered = replace(other, packages=(("vibsim.schemes", "lab", "0" * 64),))
+    assert reasons.why(offered, place.results) == "the code of lab or of vibsim changed"
     newer = replace(other, versions={**other.versions, "numpy": "99.0"})
     assert reasons.why(newer, place.results).endswith(" -> 99.0")
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from vibsim.core.lazy import loader
+from vibsim.core.lazy import lazy
 
 if TYPE_CHECKING:
     from vibsim.analysis.blockwise import analyse_parts, join_parts, keep_for_verdicts
@@ -28,15 +28,13 @@ __all__ = [
     "verdicts",
 ]
 
-_HOMES = {
-    "blockwise": ("analyse_parts", "join_parts", "keep_for_verdicts"),
-    "check_verdicts": ("Verdict", "verdicts"),
-    "compare_levels": ("analyse", "analyse_records"),
-    "summary": ("summarise",),
-}
-_HOME = {name: f"vibsim.analysis.{module}" for module, names in _HOMES.items() for name in names}
-__getattr__ = loader(__name__, _HOME | {"Result": "vibsim.checks.outcome"})
-
-
-def __dir__() -> list[str]:
-    return __all__
+__getattr__, __dir__ = lazy(
+    __name__,
+    {
+        ".blockwise": ("analyse_parts", "join_parts", "keep_for_verdicts"),
+        ".check_verdicts": ("Verdict", "verdicts"),
+        ".compare_levels": ("analyse", "analyse_records"),
+        ".summary": ("summarise",),
+        "vibsim.checks.outcome": ("Result",),
+    },
+)

@@ -16,7 +16,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from vibsim import plan
 from vibsim.analysis.compare_levels import analyse_records
 from vibsim.checks.order import is_of_parts
 from vibsim.checks.tolerance import is_bound
@@ -26,7 +25,7 @@ from vibsim.core.errors import VibsimError
 from vibsim.core.processes import as_worker_of
 from vibsim.core.record import Record, Variable
 from vibsim.core.vocabulary import HIGHEST
-from vibsim.experiment import Experiment
+from vibsim.experiment import Experiment, storage
 from vibsim.experiment.cost import PART_SAMPLES
 
 if TYPE_CHECKING:
@@ -65,7 +64,7 @@ def analyse_parts(
         As `analyse_records`, and where one of the processes is killed.
     """
     coarsest = experiment.levels[0]
-    points = experiment.steps(coarsest) // plan.sampling(experiment, coarsest) + 1
+    points = experiment.steps(coarsest) // storage.sampling(experiment, coarsest) + 1
     size = size or max(PART_SAMPLES // (points * len(experiment.schemes)), 1)
     count = experiment.members
     given = (

@@ -89,7 +89,10 @@ def analyse_records(experiment: Experiment, records: Mapping[int, Record]) -> Re
     What is found of a member does not depend on the members beside it.
     """
     block = block_of(experiment, records)
-    found = comparisons(block, compared(experiment, block.lean) + _centred(block))
+    # what is made with ``[D_2t u]``, where series are kept and a scheme has another velocity
+    by_differences = () if block.lean else centred(block.model)
+    stored = tuple(name for name in by_differences if name in block.finest)
+    found = comparisons(block, compared(experiment, block.lean) + stored)
     measured = (check.measured for check in experiment.checks)
     asked_for = checked_quantities(experiment)
     # a sweep too large for its series has verdicts on what checks ask about, and its sentences need
@@ -132,12 +135,6 @@ def compared(experiment: Experiment, lean: bool = False) -> tuple[str, ...]:
     states = (state.name for state in experiment.model.definition.states)
     own = lean_series(experiment) if lean else (*states, "energy", "energy_deviation")
     return tuple(dict.fromkeys([*own, *checked_quantities(experiment)]))
-
-
-def _centred(block: MemberBlock) -> tuple[str, ...]:
-    """Name what is made with ``[D_2t u]``, where series are kept and a scheme has another velocity."""
-    names = () if block.lean else centred(block.model)
-    return tuple(name for name in names if name in block.finest)
 
 
 def _coords(block: MemberBlock) -> Table:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from shlex import quote
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,7 +11,6 @@ from vibsim.analysis.check_verdicts import Verdict
 from vibsim.apriori.formal_orders import columns_of
 from vibsim.checks.verdict_text import Wording
 from vibsim.core.record import Record
-from vibsim.core.set_option import set_options
 from vibsim.core.vocabulary import FORMAT, jsonable, worst
 from vibsim.experiment import citation
 
@@ -20,6 +18,7 @@ if TYPE_CHECKING:
     import xarray
 
     from vibsim.experiment import Experiment
+    from vibsim.experiment.data import ReadExperiment
 
 WORST = 10
 """Of a sweep, so many results of a check and so many failures are listed."""
@@ -45,22 +44,29 @@ def summarise(
     """
     record = convergence if isinstance(convergence, Record) else Record.from_xarray(convergence)
     most = None if experiment.sweep is None else WORST
-    given = {"settings": list(experiment.settings)} if experiment.settings else {}
     plain: dict[str, Any] = jsonable(
         {
-            "vibsim_format": FORMAT,
-            "collection": experiment.collection,
-            "experiment": experiment.name,
-            **given,
-            "title": experiment.title,
-            "source": citation.fields(experiment.source),
-            "status": worst(verdict.status for verdict in verdicts),
+            **heading(experiment, worst(verdict.status for verdict in verdicts)),
             "checks": [_check(experiment, record, verdict, most) for verdict in verdicts],
             "failures": _failures(experiment, record, most),
             "failure_count": int(np.count_nonzero(record["status"])),
         }
     )
     return plain
+
+
+def heading(experiment: ReadExperiment, status: str) -> dict[str, Any]:
+    """Return what a summary says of a whole experiment, whatever makes its levels."""
+    given = {"settings": list(experiment.settings)} if experiment.settings else {}
+    return {
+        "vibsim_format": FORMAT,
+        "collection": experiment.collection,
+        "experiment": experiment.name,
+        **given,
+        "title": experiment.title,
+        "source": citation.fields(experiment.source),
+        "status": status,
+    }
 
 
 def _check(
@@ -83,10 +89,7 @@ def _member(experiment: Experiment, record: Record, case: int) -> dict[str, Any]
     found = {"values": {key: values[at] for key, values in columns_of(record).items()}}
     if case % experiment.chain:
         return found
-    return {
-        **found,
-        "command": f"vibsim run {quote(f'{experiment.word}@{case}')}{set_options(experiment.settings)}",
-    }
+    return found | {"command": experiment.command_of(case)}
 
 
 def _failures(experiment: Experiment, record: Record, most: int | None) -> list[dict[str, Any]]:

@@ -31,15 +31,14 @@ def known_values(
         "potential_energy": model.potential_energy,
         **{row.name: row.formula for row in model.outputs},
     }
-    parameters = {row.name: group.parameters[row.key][:, None] for row in model.parameters}
-    numbers = {**parameters, **states, "t": t}
-    if model.lookup is not None:
-        place = np.broadcast_to(values(tree(model, model.lookup.place), numbers), t.shape)
-        numbers |= zip((HEIGHT, BEND), model.lookup.table.read(place), strict=True)
+    numbers = {**group.by_name(model), **states, "t": t}
 
     def of(formula: Formula) -> Floats:
         return np.broadcast_to(values(tree(model, formula), numbers), t.shape)
 
+    if model.lookup is not None:
+        place = of(model.lookup.place)
+        numbers |= zip((HEIGHT, BEND), model.lookup.table.read(place), strict=True)
     if name in formulas:
         return of(formulas[name])
     if name in ("energy", "energy_deviation"):

@@ -89,26 +89,46 @@ def corners_of(model: Model, finest: Record, group: Members, dt: Floats) -> Corn
     numbers = {row.name: group.parameters[row.key] for row in model.parameters}
     held = sides(model, {name: np.repeat(x, samples) for name, x in numbers.items()})
     with np.errstate(all="ignore"):
-        rows = [_of_scheme(held, states[:, k], t, numbers, dt) for k in range(schemes)]
+        changed = _has_event(finest, t, schemes)
+        rows = [_of_scheme(held, states[:, k], t, numbers, dt, changed[k]) for k in range(schemes)]
     power, time, switch = (np.stack(column) for column in zip(*rows, strict=True))
     return Corners(power, time, switch)
 
 
+def _has_event(finest: Record, t: Floats, schemes: int) -> Flags:
+    """Say between which samples an event changed the state, which passed nothing then: (scheme, case, sample)."""
+    cases, samples = t.shape
+    found = np.zeros((schemes, cases, samples - 1), dtype=bool)
+    if "event_time" not in finest:
+        return found
+    times = np.asarray(finest["event_time"], dtype=float)
+    for k, case, event in np.argwhere(np.isfinite(times)):
+        place = int(np.searchsorted(t[case], times[k, case, event])) - 1
+        found[k, case, np.clip(place, 0, samples - 2)] = True
+    return found
+
+
 def _of_scheme(
-    held: Sides, states: Floats, t: Floats, numbers: Mapping[str, Floats], dt: Floats
+    held: Sides,
+    states: Floats,
+    t: Floats,
+    numbers: Mapping[str, Floats],
+    dt: Floats,
+    has_event: Flags,
 ) -> tuple[Floats, Floats, Integers]:
     """Return power, time and switch of the first corner of every member, each of shape (case,)."""
     cases, samples = t.shape
-    q, modes = _modes(held, states.reshape(len(states), -1), t.ravel())
+    u, v = np.split(states.reshape(len(states), -1), 2)
+    q, modes = held.modes(u, v, t.ravel())
     q, modes = (row.reshape(len(q), cases, samples) for row in (q, modes))
     edge = np.maximum(modes[..., :-1], modes[..., 1:])
     edge = np.where(held.whole[:, None, None], edge, 0.0)
     part = (edge - q[..., :-1]) / (q[..., 1:] - q[..., :-1])
     at = t[:, :-1] + part * np.diff(t)
-    passed = np.diff(modes) != 0.0
+    of_time = np.array(_of_time(held))[:, None, None]
+    passed = (np.diff(modes) != 0.0) & (of_time | ~has_event)
     passed &= np.array([_is_left_to_steps(held.model, row) for row in held.switches])[:, None, None]
     is_within = ~is_on_a_point(at, dt[:, None])
-    of_time = np.array(_of_time(held))[:, None, None]
 
     def first(when: Floats) -> tuple[Floats, Floats, Integers]:
         """Return the first corner of those whose times are given, infinite elsewhere, shape (switch, case, sample)."""
@@ -157,18 +177,6 @@ def _of_time(held: Sides) -> list[bool]:
         if not found[-1]:
             moved.add(row.mode)
     return found
-
-
-def _modes(held: Sides, states: Floats, t: Floats) -> tuple[Floats, Floats]:
-    """Return what all switches look at, and their modes, shape (switch, sample)."""
-    u, v = np.split(states, 2)
-    modes = np.zeros((len(held.switches), len(t)))
-    q = np.zeros(modes.shape)
-    for k, is_whole in enumerate(held.whole):
-        # a switch may look at the modes of those before it
-        q[k] = held.quantity(k, modes, u, v, t)
-        modes[k] = np.floor(q[k]) if is_whole else np.where(q[k] > 0.0, 0.0, -1.0)
-    return q, modes
 
 
 @dataclass(frozen=True)

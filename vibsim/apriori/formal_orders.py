@@ -12,12 +12,12 @@ from typing import Any, get_args
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from vibsim import plan, theory
+from vibsim import theory
 from vibsim.apriori.roundoff_floor import SPACING_AT_ONE
 from vibsim.core.array_types import Flags, Floats, Integers
 from vibsim.core.record import Record
 from vibsim.core.vocabulary import PHASE, is_error_part, whole_of
-from vibsim.experiment import Experiment
+from vibsim.experiment import Experiment, sweep_columns
 from vibsim.formula import values
 from vibsim.models import Model, tree
 from vibsim.models.shared.free import free_oscillation, why_not_free
@@ -50,7 +50,7 @@ def options_swept(experiment: Experiment) -> bool:
 def options_of(experiment: Experiment, columns: Columns, scheme: int, case: int) -> Options:
     """Return the options that one member has of one scheme, by their positions."""
     own = {key: values[case : case + 1] for key, values in columns.items()}
-    return plan.option_groups(experiment, scheme, own)[0][0]
+    return sweep_columns.option_groups(experiment, scheme, own)[0][0]
 
 
 def beginning_matters(experiment: Experiment) -> bool:
@@ -164,7 +164,7 @@ def part_orders(experiment: Experiment, quantity: str, columns: Columns) -> Floa
     for s, spec in enumerate(experiment.schemes):
         if spec.adaptive:
             continue
-        for options, cases in plan.option_groups(experiment, s, columns):
+        for options, cases in sweep_columns.option_groups(experiment, s, columns):
             stepper = spec.method.stepper_for(model, options)
             damping = motion.damping[cases]
             # worked out once for each damping
@@ -275,7 +275,7 @@ def _each(
     """Return what every scheme promises with the options that each member has of it."""
     rows = []
     for i, scheme in enumerate(experiment.schemes):
-        groups = plan.option_groups(experiment, i, columns)
+        groups = sweep_columns.option_groups(experiment, i, columns)
         values = [np.asarray(promise(scheme.method, o), dtype=float) for o, _ in groups]
         count = sum(len(cases) for _, cases in groups) if len(groups) > 1 else 1
         row = np.empty((count, *values[0].shape))

@@ -15,7 +15,7 @@ import numpy as np
 
 from vibsim.checks.fields import LEVEL, Field, Measured
 from vibsim.checks.notation import PLAIN, Notation, beside
-from vibsim.checks.outcome import Judged, Reason, as_expected, first_reason, is_open
+from vibsim.checks.outcome import Judged, as_expected
 from vibsim.checks.sentences import (
     NOT_FINITE,
     WRONG_LIMIT,
@@ -24,10 +24,11 @@ from vibsim.checks.sentences import (
     add_levels,
     cost_in_words,
 )
-from vibsim.checks.value import unit_of_quantity
+from vibsim.checks.value import FINER, unit_of_quantity
 from vibsim.comparison.finest_error import FinestError, error_of_finest
 from vibsim.comparison.order_evidence import judgement
 from vibsim.comparison.quantity_comparison import Compared, Comparison
+from vibsim.convergence.reasons import code, first_reason, is_one_of, is_open
 from vibsim.convergence.verdict import Judgement
 from vibsim.core.array_types import Codes
 from vibsim.core.record import Record
@@ -58,14 +59,10 @@ FIELDS = {
         none=-1,
     ),
 }
-ORDER_KNOWN = [
-    REASON_NAMES.index(reason) for reason in ("asymptotic", "exact", "order_low", "order_high")
-]
+ORDER_KNOWN = "asymptotic", "exact", "order_low", "order_high"
 """Reasons of verdicts on an order that say by which power errors fall."""
 MOST = 12
 """More levels than that are no prediction."""
-FINER = 2
-"""So many finer levels are advised."""
 
 
 def measure(block: MemberBlock, compared: Compared, check: AccurateCheck) -> Measured:
@@ -73,7 +70,9 @@ def measure(block: MemberBlock, compared: Compared, check: AccurateCheck) -> Mea
     quantity = compared[check.accurate]
     found, judged = error_of_finest(quantity), judgement(quantity, TYPICAL_NORM)
     # a scheme that chooses its own steps has no order, and may have a true error all the same
-    has_none = (judged.reason == Reason.NOT_APPLICABLE) & ~(block.adaptive[:, None] & found.is_true)
+    has_none = (judged.reason == code("not_applicable")) & ~(
+        block.adaptive[:, None] & found.is_true
+    )
     basis = np.select([has_none, found.is_true], [NONE, EXACT], EXTRAPOLATED)
     return {
         **facts_of_error(found),
@@ -96,10 +95,8 @@ def facts_of_error(found: FinestError) -> dict[str, Any]:
 def known_error(q: Comparison) -> dict[str, Any]:
     """Return the values of `ERROR` where the error of a quantity can be believed, NaN elsewhere."""
     found, reason = error_of_finest(q), judgement(q, TYPICAL_NORM).reason
-    decides = found.is_true & ~np.isin(
-        reason, (Reason.UNSTABLE, Reason.NON_FINITE, Reason.NOT_APPLICABLE)
-    )
-    decides |= np.isin(reason, ORDER_KNOWN)
+    decides = found.is_true & ~is_one_of(reason, "unstable", "non_finite", "not_applicable")
+    decides |= is_one_of(reason, *ORDER_KNOWN)
     facts = facts_of_error(found)
     return {name: np.where(decides, values, np.nan) for name, values in facts.items()}
 
@@ -133,7 +130,7 @@ def _level_needed(last: int, found: FinestError, judged: Judgement, check: Accur
         steps = np.ceil(np.log2(found.bound / asked) / judged.order)
         # neither round-off nor another limit vanishes with the step
         known = (judged.order > 0.0) & (steps >= 1.0) & (steps <= MOST)
-        known &= (found.round_off < asked) & (judged.reason != REASON_NAMES.index("wrong_limit"))
+        known &= (found.round_off < asked) & (judged.reason != code("wrong_limit"))
     return np.where(known, last + np.where(known, steps, 0.0), -1.0).astype(np.int16)
 
 
@@ -144,16 +141,16 @@ def judge(experiment: Experiment, record: Record, check: AccurateCheck, found: M
     asked = found["accuracy"] * (size if check.is_relative else np.ones_like(size))
     # as far below the error as the bound is above it
     least = np.maximum(2.0 * error - bound, 0.0)
-    decides = is_true | np.isin(order_reason, ORDER_KNOWN)
+    decides = is_true | is_one_of(order_reason, *ORDER_KNOWN)
     cases = [
-        (np.isin(order_reason, (Reason.UNSTABLE, Reason.NON_FINITE)), order_reason),
-        ((found["basis"] == NONE) | ~(asked > 0.0), Reason.NOT_APPLICABLE),
-        (decides & (bound < asked), Reason.MATCH),
-        (decides & (least > asked), Reason.MISMATCH),
-        (is_true, Reason.ROUND_OFF),
+        (is_one_of(order_reason, "unstable", "non_finite"), order_reason),
+        ((found["basis"] == NONE) | ~(asked > 0.0), "not_applicable"),
+        (decides & (bound < asked), "match"),
+        (decides & (least > asked), "mismatch"),
+        (is_true, "round_off"),
         (is_open(order_reason), order_reason),
     ]
-    reason = first_reason(cases, Reason.PRE_ASYMPTOTIC)
+    reason = first_reason(cases, "pre_asymptotic")
     with np.errstate(all="ignore"):
         away = bound / asked
     return Judged(reason, away, as_expected(check.expect, reason))
@@ -207,18 +204,13 @@ def describe(f: Found, check: AccurateCheck) -> Description:
                     f"{s.open()} Round-off alone may be as large.",
                     f"Change `{check.key}:`, or take an arithmetic with less round-off (`arithmetic: compensated`).",
                 )
-    if is_known_order(f.word("order_reason")):
+    if f.word("order_reason") in ORDER_KNOWN:
         return Description(s.open(), s.finer())
     return Description(
         f"{s.subject} may or may not be as accurate as asked ({s.asked}). The order is not known, so the estimate of "
         f"the error at level {s.level}{s.estimate()} cannot be trusted.",
         s.more_levels(),
     )
-
-
-def is_known_order(reason: str) -> bool:
-    """Say whether a verdict on an order with this reason says by which power errors fall."""
-    return REASON_NAMES.index(reason) in ORDER_KNOWN
 
 
 class _Phrases:

@@ -9,9 +9,10 @@ import numpy as np
 
 from vibsim.apriori.formal_orders import columns_of, formal_orders
 from vibsim.checks.fields import LEVEL, MOTION, Field, Measured
-from vibsim.checks.outcome import Judged, Reason, first_reason
+from vibsim.checks.outcome import Judged
 from vibsim.checks.sentences import MOVE, NOT_FINITE, NOTHING_MOVES, Description, Found
 from vibsim.comparison.quantity_comparison import Compared
+from vibsim.convergence.reasons import first_reason
 from vibsim.convergence.thresholds import ABOVE_ROUND_OFF
 from vibsim.core.array_types import Flags
 from vibsim.core.record import Record
@@ -20,6 +21,7 @@ from vibsim.experiment import Experiment
 from vibsim.experiment.schema.checks import ConservesCheck, Drift
 from vibsim.observe.energy_drift import drift_at
 from vibsim.observe.member_block import MemberBlock
+from vibsim.observe.thresholds import LEAST_SAMPLES
 
 FIELDS = {
     "drift": Field("how the energy error grows", np.int8, DRIFTS),
@@ -97,15 +99,15 @@ def judge(experiment: Experiment, record: Record, check: ConservesCheck, found: 
     # an error that theory has, lost in round-off, may grow in any way; one that it has not does not grow
     has_error = np.isfinite(formal_orders(experiment, check.about or "", columns_of(record)))
     cases = [
-        (broken, Reason.NON_FINITE),
-        (np.isnan(largest) & unclear, Reason.NOT_APPLICABLE),
-        (still & is_none, Reason.NOT_APPLICABLE),
+        (broken, "non_finite"),
+        (np.isnan(largest) & unclear, "not_applicable"),
+        (still & is_none, "not_applicable"),
         # an error above round-off is not none, however short the run
-        (unclear & (check.drift != "none"), Reason.PRE_ASYMPTOTIC),
-        (wanted, Reason.MATCH),
-        (is_none & has_error, Reason.ROUND_OFF),
+        (unclear & (check.drift != "none"), "pre_asymptotic"),
+        (wanted, "match"),
+        (is_none & has_error, "round_off"),
     ]
-    reason = first_reason(cases, Reason.MISMATCH)
+    reason = first_reason(cases, "mismatch")
     return Judged(reason, largest)
 
 
@@ -146,7 +148,10 @@ def describe(f: Found, check: ConservesCheck) -> Description:
 
 def _advice(reason: str, drift: str, check: ConservesCheck) -> str:
     if reason == "pre_asymptotic":
-        return "Lengthen the run (`time: end`), or store more of it (`samples: all`). It is too short to show a drift."
+        return (
+            "Lengthen the run (`time: end`), or store more of it (`samples: all`). To show a drift takes at least four "
+            f"periods of the slowest small oscillation, and {LEAST_SAMPLES} stored samples."
+        )
     other = "leave the check out (`checks:`)"
     if drift in EXPECTED_DRIFTS:
         if EXPECTED_DRIFTS.index(drift) < EXPECTED_DRIFTS.index(check.drift):

@@ -9,10 +9,11 @@ import numpy as np
 
 from vibsim.checks.energy import lies_still
 from vibsim.checks.fields import LEVEL, MOTION, Field, Measured
-from vibsim.checks.outcome import Judged, Reason, first_reason
+from vibsim.checks.outcome import Judged
 from vibsim.checks.sentences import MOVE, NOT_FINITE, NOTHING_MOVES, Description, Found
 from vibsim.comparison.quantity_comparison import Compared
 from vibsim.comparison.solution_distance import solution_distance
+from vibsim.convergence.reasons import first_reason
 from vibsim.core.array_types import Floats
 from vibsim.core.record import Record
 from vibsim.experiment import Experiment
@@ -84,12 +85,12 @@ def judge(experiment: Experiment, record: Record, check: EqualCheck, found: Meas
     involved = [names.index(name) for name in check.equal if name in names]
     broken = np.any(record["status"][involved, :, place] != 0, axis=0)
     cases = [
-        (np.broadcast_to(broken, distance.shape), Reason.NON_FINITE),
-        (np.isnan(distance) | np.isnan(allowed), Reason.NOT_APPLICABLE),
-        ((distance <= allowed) & still, Reason.NOT_APPLICABLE),
-        (distance <= allowed, Reason.MATCH),
+        (np.broadcast_to(broken, distance.shape), "non_finite"),
+        (np.isnan(distance) | np.isnan(allowed), "not_applicable"),
+        ((distance <= allowed) & still, "not_applicable"),
+        (distance <= allowed, "match"),
     ]
-    reason = first_reason(cases, Reason.MISMATCH)
+    reason = first_reason(cases, "mismatch")
     # as a part of what is allowed, which differs from member to member
     with np.errstate(divide="ignore", invalid="ignore"):
         away = np.where(distance > 0, distance / allowed, distance)

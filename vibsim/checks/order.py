@@ -19,9 +19,9 @@ from collections.abc import Callable
 import numpy as np
 
 from vibsim.apriori.formal_orders import even_powers, orders_in, relative_floors
-from vibsim.checks.accurate import ERROR, known_error
+from vibsim.checks.accurate import ERROR, MOST, known_error
 from vibsim.checks.fields import REASON, STATUS, Field, Measured
-from vibsim.checks.outcome import Judged, Reason, as_expected
+from vibsim.checks.outcome import Judged, as_expected
 from vibsim.comparison.order_evidence import (
     CAUSES,
     causes,
@@ -31,7 +31,9 @@ from vibsim.comparison.order_evidence import (
     order_of,
 )
 from vibsim.comparison.quantity_comparison import Compared, Comparison
+from vibsim.convergence.circumstances import pick
 from vibsim.convergence.differences import largest, safe_ratio
+from vibsim.convergence.reasons import code
 from vibsim.convergence.thresholds import (
     HALF_SPACING,
     LEAST_CANDIDATE,
@@ -80,8 +82,6 @@ BESIDE = {
 """Facts that are not measured by the check."""
 
 UNKNOWN = -1
-MOST = 12
-"""More levels than that are no prediction."""
 SLOWEST = 0.9
 """Orders that approach by a larger factor do not tell where they go."""
 FINEST = 40
@@ -142,7 +142,7 @@ def phase_at_start(q: Comparison) -> dict[str, Variable]:
     # of the coarsest pair that the order rests on: furthest from round-off
     pair = np.where(first < 0, len(levels) - 1, np.searchsorted(levels, first))
     share = np.stack([safe_ratio(np.abs(d[..., 0]), largest(d)) for d in q.differences], axis=-1)
-    chosen = np.take_along_axis(share, pair[..., None], axis=-1)[..., 0]
+    chosen = pick(share, pair)
     words = f"{q.long_name}: what is there from the start over the largest"
     return {f"{q.name}_at_start": Variable.of(MEMBER, chosen, words)}
 
@@ -160,7 +160,7 @@ def _more_levels(q: Comparison, judged: Judgement, order: Floats, tolerance: flo
     """
     shape, orders = judged.reason.shape, judged.orders
     needed = np.full(shape, UNKNOWN, dtype=np.int8)
-    early = judged.reason == Reason.PRE_ASYMPTOTIC
+    early = judged.reason == code("pre_asymptotic")
     if not np.any(early) or not orders.shape[-1]:
         return needed
     last, has = orders[..., -1], np.broadcast_to(q.order, shape)
@@ -191,7 +191,7 @@ def _finest_readable(
     found = np.full(judged.reason.shape, UNKNOWN, dtype=np.int8)
     with np.errstate(invalid="ignore"):
         p = np.where(judged.order >= LEAST_CANDIDATE, judged.order, order)
-    lost = (judged.reason == Reason.ROUND_OFF) & np.isfinite(p)
+    lost = (judged.reason == code("round_off")) & np.isfinite(p)
     if not np.any(lost):
         return found
     size, at = _clean_difference(q, norm, p)
@@ -214,7 +214,7 @@ def _clean_difference(q: Comparison, norm: str, p: Floats) -> tuple[Floats, Floa
     e = evidence(q, norm, q.order, ORDINARY_ORDER)
     clean = e.difference >= ORDER_ABOVE_ROUND_OFF * (e.floor[..., :-1] + e.floor[..., 1:])
     place = np.max(np.where(clean, np.arange(len(levels) - 1), 0), axis=-1)
-    size = np.take_along_axis(e.difference, place[..., None], axis=-1)[..., 0]
+    size = pick(e.difference, place)
     gap = np.diff(levels)[place]
     whole = np.where(gap > 1, np.expm1(-p * np.log(2.0)) / np.expm1(-p * gap * np.log(2.0)), 1.0)
     return size * whole, levels.astype(np.float64)[place]

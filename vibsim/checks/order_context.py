@@ -22,12 +22,13 @@ from vibsim.apriori.formal_orders import (
 from vibsim.checks.accurate import error_in_words
 from vibsim.checks.phase_amplitude_text import parts_in_words
 from vibsim.checks.sentences import Found, cost_in_words, growth_in_words
-from vibsim.checks.stable import ALIKE
+from vibsim.checks.stable import ALIKE, first_within
 from vibsim.comparison.comparison_variables import has_exact
 from vibsim.core.record import Record
 from vibsim.core.vocabulary import is_error_part, whole_of
 from vibsim.experiment.schema.checks import ConvergesCheck
 from vibsim.observe.member_block import fastest
+from vibsim.schemes.base import LOW_STARTS
 
 COINCIDE = 0.1
 """Rescaled differences that are further apart, over the finer one, do not coincide."""
@@ -52,8 +53,8 @@ class OrderContext:
         experiment, record, scheme, case = f.experiment, f.record, f.scheme, f.case
         model, quantity, columns = f.model, check.converges, columns_of(record)
 
-        def of_case(name: str) -> float:
-            return float(record[name][case]) if name in record else math.nan
+        def stored(name: str, *place: int) -> float:
+            return float(record[name][place]) if name in record else math.nan
 
         self.quantity, self.norm, self.tolerance = quantity, check.norm, check.tolerance
         self.is_position = quantity in model.positions
@@ -67,7 +68,10 @@ class OrderContext:
         self.levels = tuple(int(level) for level in record["level"])
         self.orders = _orders(record, check, scheme, case)
         """Of successive levels in the norm of the check, the coarsest first."""
-        self.apart = _apart(record, quantity, scheme, case, self.levels, self.last)
+        sound = [i for i, finest in enumerate(self.levels[2:]) if finest == self.last]
+        self.apart = (
+            stored(f"{quantity}_coincidence", scheme, case, sound[0]) if sound else math.nan
+        )
         """How far the finest two rescaled differences of the levels that decide are apart, over the finer one."""
         self.more: int = f.fact("levels_needed")
         """Finer levels that are probably needed."""
@@ -89,7 +93,7 @@ class OrderContext:
         """... has at most, in a special case of motion, model or options, ..."""
         self.centred = math.nan
         """... and would promise with `start: centred`, where it has another start."""
-        if self.options.get("start") == "first_order":
+        if self.options.get("start") in LOW_STARTS:
             centred = {**self.options, "start": "centred"}
             self.centred = float(method.formal_order(whole_of(quantity), model, centred))
         self.expected = self.promised if check.order == "scheme" else float(check.order)
@@ -102,24 +106,24 @@ class OrderContext:
         """Level that failed or is beyond the stability limit."""
         at = self.levels.index(self.culprit) if self.culprit >= 0 else None
         self.omega_dt = math.nan if at is None else float(fastest(record)[case, at])
-        self.limit = f.of_member(stability_limits(experiment, columns))
-        """The largest stable w dt of the scheme; infinite for none."""
+        self.limit = math.nan
+        """The largest stable w dt of the scheme, infinite for none; sought only where a level failed."""
+        if at is not None:
+            self.limit = f.of_member(stability_limits(experiment, columns))
         self.growth_in_words = ""
         """How the solution grows at the culprit."""
         if not math.isnan(self.omega_dt) and not method.adaptive:
             predicted = float(theory.dominant(method.stepper(self.options), self.omega_dt)[0])
-            name = "measured_growth"
-            measured = float(record[name][scheme, case, at]) if name in record else math.nan
+            measured = stored("measured_growth", scheme, case, self.levels.index(self.culprit))
             self.growth_in_words = growth_in_words(f, predicted, measured)
         self.failures = _failures(record, scheme, case)
 
         self.has_corners = has_corners(model)
         """Whether steps have corners of a force from a table inside."""
         self.corner = _corner(f)
-        self.pulse = of_case("pulse_time"), of_case("pulse_width")
+        self.pulse = stored("pulse_time", case), stored("pulse_width", case)
         """Time and length of a pulse of the force that no level sees."""
-        rate = "decay_rate"
-        self.decay = float(record[rate][scheme, case]) if rate in record else math.nan
+        self.decay = stored("decay_rate", scheme, case)
         """The largest rate at which damping takes a velocity away."""
         self.shortest = record.step(-1, case)
 
@@ -136,7 +140,12 @@ class OrderContext:
     @property
     def starts_low(self) -> bool:
         """Whether the first step explains the order."""
-        return self.options.get("start") == "first_order" and 0.5 < self.order < 1.5
+        return self.start_fault != "" and 0.5 < self.order < 1.5
+
+    @property
+    def start_fault(self) -> str:
+        """What is wrong with the formula of the first step; empty where nothing is."""
+        return LOW_STARTS.get(str(self.options.get("start")), "")
 
     @property
     def ends_low(self) -> bool:
@@ -185,7 +194,7 @@ class OrderContext:
         """The coarsest level whose w dt is within the limit."""
         if not self.is_beyond_limit:
             return self.levels[-1] + 1
-        return self.culprit + math.ceil(math.log2(self.omega_dt / self.limit) - 1e-9)
+        return first_within(self.limit, self.culprit, self.omega_dt)
 
 
 def _orders(record: Record, check: ConvergesCheck, scheme: int, case: int) -> tuple[float, ...]:
@@ -194,16 +203,6 @@ def _orders(record: Record, check: ConvergesCheck, scheme: int, case: int) -> tu
     if name not in record or check.norm not in norms:
         return ()
     return tuple(record[name][scheme, case, :, norms.index(check.norm)].astype(float).tolist())
-
-
-def _apart(
-    record: Record, quantity: str, scheme: int, case: int, levels: tuple[int, ...], last: int
-) -> float:
-    """Return how far the two finest rescaled differences up to a level are apart; NaN where that is not known."""
-    name = f"{quantity}_coincidence"
-    if name not in record or last not in levels[2:]:
-        return math.nan
-    return float(record[name][scheme, case, levels.index(last) - 2])
 
 
 def _failures(record: Record, scheme: int, case: int) -> tuple[float, ...]:

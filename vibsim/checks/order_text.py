@@ -11,8 +11,14 @@ from collections.abc import Mapping
 from itertools import pairwise
 
 from vibsim.checks.order_context import COINCIDE, OrderContext
-from vibsim.checks.sentences import WRONG_LIMIT, Description, Found, Template, add_levels
-from vibsim.convergence.study.sentences import higher_part
+from vibsim.checks.sentences import (
+    WRONG_LIMIT,
+    Description,
+    Found,
+    Template,
+    add_levels,
+)
+from vibsim.convergence.study.sentences import higher_part, opposite_part
 from vibsim.convergence.thresholds import HALF_SPACING
 from vibsim.core.vocabulary import order_interval
 from vibsim.experiment.schema.checks import ConvergesCheck
@@ -87,6 +93,15 @@ DIAGNOSES: Words = {
     "round_off": (
         "The differences of {what} have reached round-off, so they say nothing about the scheme{before_round_off}.",
         "{other_arithmetic}.",
+    ),
+    "round_off, zero": (
+        "{subject} is 0 up to round-off, so it has no order.",
+        "Check another quantity (`converges:`), or choose an `initial:` that moves this one.",
+    ),
+    "round_off, parted": (
+        "The levels of {what} have parted: the finest two differ by more than 1 % of its size, and finer levels do not "
+        "come closer. A motion that magnifies small errors does that.{error}",
+        "End the time interval (`time: end`) before the levels part, or choose another `initial:`.",
     ),
     "round_off, noise": (
         "The finest differences of {what} look like noise, but are larger than the predicted round-off. They say "
@@ -190,7 +205,7 @@ DIAGNOSES: Words = {
         "Set `order: scheme`, or give scheme {scheme} another `kind:`.",
     ),
     "order_low, start": (
-        " The likely cause is the first step, because `start: first_order` omits its dt^2 term.",
+        " The likely cause is the first step, because `start: {options[start]}` {start_fault}.",
         "Set `start: centred` for scheme {scheme}.",
     ),
     "order_low, end": (
@@ -314,7 +329,13 @@ class _Phrases(OrderContext):
             return f"{self.subject} should be exact here, but levels differ by more than round-off{with_order}."
         word = "more slowly" if self.reason == "order_low" else "faster"
         expected = self.notation.number(self.expected)
-        return f"{self.subject} converges {word} than order {expected}{with_order}."
+        hidden = opposite_part(self.reason, self.order, self.expected)
+        return " ".join(
+            filter(
+                None,
+                [f"{self.subject} converges {word} than order {expected}{with_order}.", hidden],
+            )
+        )
 
     def whose(self) -> str:
         """Say whose the order is: the scheme's, or that of the check alone, where theory has none or another one."""

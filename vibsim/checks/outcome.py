@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from enum import IntEnum
 from functools import cached_property
 from types import MappingProxyType
 from typing import Any, NamedTuple, overload
@@ -14,36 +13,14 @@ from numpy.typing import NDArray
 
 from vibsim.apriori.formal_orders import columns_of
 from vibsim.checks.fields import Facts, facts_of
+from vibsim.convergence.reasons import FAIL, INCONCLUSIVE, PASS, STATUS_OF, code, is_open
 from vibsim.core.array_types import Codes, Flags, Floats, Integers
 from vibsim.core.record import Record
-from vibsim.core.vocabulary import REASON_NAMES, REASONS, SEVERITY, STATUSES, decisive_number
+from vibsim.core.vocabulary import REASON_NAMES, SEVERITY, STATUSES, decisive_number
 from vibsim.experiment import Experiment
 from vibsim.experiment.data import schemes_of
 from vibsim.experiment.schema.checks import ClaimCheck, Expect, Measurement, MeasuringCheck
 from vibsim.experiment.sweep_columns import members_with
-
-PASS, FAIL, INCONCLUSIVE = map(STATUSES.index, ("PASS", "FAIL", "INCONCLUSIVE"))
-"""Index into `STATUSES`."""
-STATUS_OF = np.array([STATUSES.index(status) for status in REASONS.values()], dtype=np.int8)
-"""The status that each of `REASON_NAMES` belongs to."""
-
-
-class Reason(IntEnum):
-    """Index into `REASON_NAMES` of what checks decide themselves."""
-
-    MATCH = REASON_NAMES.index("match")
-    MISMATCH = REASON_NAMES.index("mismatch")
-    UNSTABLE = REASON_NAMES.index("unstable")
-    NON_FINITE = REASON_NAMES.index("non_finite")
-    PRE_ASYMPTOTIC = REASON_NAMES.index("pre_asymptotic")
-    ROUND_OFF = REASON_NAMES.index("round_off")
-    TOO_FEW_LEVELS = REASON_NAMES.index("too_few_levels")
-    NOT_APPLICABLE = REASON_NAMES.index("not_applicable")
-
-
-def first_reason(cases: Sequence[tuple[Flags, Codes | int]], otherwise: Reason) -> Codes:
-    """Return the reason of the first case that applies to each result, by flags of the shape of the results."""
-    return np.select([where for where, _ in cases], [reason for _, reason in cases], otherwise)
 
 
 @dataclass(frozen=True)
@@ -261,16 +238,11 @@ class Results(Sequence[Result]):
         )
 
 
-def is_open(reason: Codes) -> Flags:
-    """Say where a reason, index into `REASON_NAMES`, is that of a verdict which decides nothing."""
-    return np.asarray(STATUS_OF[reason] == INCONCLUSIVE)
-
-
 def as_expected(expect: Expect, reason: Codes) -> Codes:
     """Return the statuses of results with these reasons, compared with the expected verdict."""
     right = STATUS_OF[reason] == STATUSES.index(expect.status)
     if expect.reason is not None:
-        right &= reason == REASON_NAMES.index(expect.reason)
+        right &= reason == code(expect.reason)
     return np.where(right, PASS, np.where(is_open(reason), INCONCLUSIVE, FAIL))
 
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 
 from vibsim.checks.sentences import Found
-from vibsim.core.vocabulary import AMPLITUDE, PHASE, STATUSES, TYPICAL_NORM
+from vibsim.convergence.reasons import INCONCLUSIVE
+from vibsim.core.vocabulary import AMPLITUDE, PHASE, TYPICAL_NORM
 
 APART = 0.5
 """Orders that differ by less are the same."""
@@ -32,7 +33,7 @@ def parts_in_words(f: Found, quantity: str, expected: float) -> str:
         float(record[f"{position}{end}_order"][*place, norm]) for end in (PHASE, AMPLITUDE)
     )
     lower = AMPLITUDE if amplitude < phase else PHASE
-    if record[f"{position}{lower}_status"][place] == STATUSES.index("INCONCLUSIVE"):
+    if record[f"{position}{lower}_status"][place] == INCONCLUSIVE:
         return ""
     share = float(record[f"{position}{PHASE}_at_start"][place])
     whose = "" if quantity == position else f" of {f.notation.quantity(position)}"

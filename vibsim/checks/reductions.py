@@ -19,8 +19,9 @@ import numpy as np
 from vibsim.apriori.formal_orders import columns_of
 from vibsim.checks import value
 from vibsim.checks.fields import Field, Measured, field_values
-from vibsim.checks.outcome import Judged, Reason, about_members
+from vibsim.checks.outcome import Judged, about_members
 from vibsim.checks.sentences import Description, Found
+from vibsim.convergence.reasons import code, is_one_of
 from vibsim.core.array_types import Flags, Floats
 from vibsim.core.record import Record
 from vibsim.experiment import Experiment
@@ -143,12 +144,12 @@ def judge(experiment: Experiment, record: Record, check: ValueCheck, found: Meas
     own = value.judge(experiment, record, check, found)
     about = np.flatnonzero(about_members(record, check))
     schemes = len(record["scheme"])
-    places, reasons = np.full(schemes, about[0]), np.full(schemes, Reason.MATCH)
+    places, reasons = np.full(schemes, about[0]), np.full(schemes, code("match"))
     table = {name: np.full(schemes, np.nan) for name in ("value", "error_bound", *FACTS)}
     enough = len(record["level"]) >= value.FEWEST
     for s in range(schemes):
-        broken = np.isin(own.reason[s, about], (Reason.NON_FINITE, Reason.NOT_APPLICABLE))
-        broken |= (own.reason[s, about] == Reason.TOO_FEW_LEVELS) & np.isnan(
+        broken = is_one_of(own.reason[s, about], "non_finite", "not_applicable")
+        broken |= (own.reason[s, about] == code("too_few_levels")) & np.isnan(
             found["value"][s, about]
         )
         table["members"][s], table["undecided"][s] = len(about), np.count_nonzero(broken)
@@ -160,8 +161,8 @@ def judge(experiment: Experiment, record: Record, check: ValueCheck, found: Meas
         one = _reduced(experiment, record, check, found, s, about)
         places[s] = about[one.member]
         holds = is_as_asked(check, one.low, one.high)
-        unclear = Reason.PRE_ASYMPTOTIC if enough else Reason.TOO_FEW_LEVELS
-        reasons[s] = unclear if holds is None else Reason.MATCH if holds else Reason.MISMATCH
+        unclear = "pre_asymptotic" if enough else "too_few_levels"
+        reasons[s] = code(unclear if holds is None else "match" if holds else "mismatch")
         table["value"][s], table["low"][s], table["high"][s] = one.value, one.low, one.high
         table["error_bound"][s] = max(one.high - one.value, one.value - one.low)
         table["at"][s] = _key(record, check)[places[s]]

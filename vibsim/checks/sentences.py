@@ -124,11 +124,13 @@ def growth_in_words(f: Found, predicted: float, measured: float) -> str:
     theory = "predicted" if f.model.linear else "predicted for small oscillations"
     if len(f.model.positions) > 1:
         theory = "predicted for the fastest small oscillations"
+    seen = "measured"
     if not f.model.conservative:
         theory = "predicted for free oscillations without damping"
+        seen = "measured, with damping and forces"
     told = [
         f"{f.notation.factor(value)} ({word})"
-        for value, word in ((predicted, theory), (measured, "measured"))
+        for value, word in ((predicted, theory), (measured, seen))
         if not math.isnan(value)
     ]
     return f" The growth factor per period is {' and '.join(told)}." if told else ""

@@ -21,10 +21,11 @@ import numpy as np
 from vibsim.apriori.formal_orders import columns_of, stability_limits
 from vibsim.checks.fields import LEVEL, STATUS, Field, Measured
 from vibsim.checks.notation import ROUND_OFF
-from vibsim.checks.outcome import FAIL, PASS, STATUS_OF, Judged, Reason
+from vibsim.checks.outcome import Judged
 from vibsim.checks.sentences import Description, Found, growth_in_words
 from vibsim.comparison.quantity_comparison import Compared
-from vibsim.convergence.thresholds import BLOWN_UP
+from vibsim.convergence.reasons import FAIL, PASS, STATUS_OF, code, first_reason
+from vibsim.convergence.thresholds import BLOWN_UP, LIMIT_ROUNDING
 from vibsim.core.array_types import Flags, Floats
 from vibsim.core.record import Record
 from vibsim.core.vocabulary import REASON_NAMES
@@ -46,8 +47,6 @@ FIELDS = {
     "level": LEVEL,
 }
 
-LIMIT_ROUNDING = 1e-9
-"""w dt within this part of the limit is at the limit, as in `circumstances.breakdown`."""
 ALIKE = 0.15
 """Two levels fail at one time that fail within this part of it: the finer one sees it at most a step earlier."""
 NEAR = 0.1
@@ -69,11 +68,8 @@ def measure(block: MemberBlock, compared: Compared, check: StableCheck) -> Measu
     contradicted = ~broken & predicted_oscillation.is_simple(block) & beyond
     contradicted &= _differs(block, index, found, expected)
     unstable = (broken & ~escaped) | beyond | grown
-    reason = np.select(
-        [contradicted, unstable, escaped],
-        [Reason.MISMATCH, Reason.UNSTABLE, Reason.NON_FINITE],
-        default=Reason.MATCH,
-    )
+    cases = [(contradicted, "mismatch"), (unstable, "unstable"), (escaped, "non_finite")]
+    reason = first_reason(cases, "match")
     return {
         "status": STATUS_OF[reason],
         "reason": reason,
@@ -127,7 +123,7 @@ def judge(experiment: Experiment, record: Record, check: StableCheck, found: Mea
     """Compare whether schemes are stable with what a check expects."""
     with np.errstate(divide="ignore", invalid="ignore"):
         size = np.abs(np.log(found["growth"]))
-    as_expected = found["reason"] == (Reason.MATCH if check.stable else Reason.UNSTABLE)
+    as_expected = found["reason"] == code("match" if check.stable else "unstable")
     away = np.where(np.isnan(size), np.inf, size)
     return Judged(found["reason"], away, np.where(as_expected, PASS, FAIL))
 
@@ -176,6 +172,11 @@ def _vanishing(f: Found, factors: tuple[float, float]) -> str:
     return f" This growth {much} per period vanishes with dt."
 
 
+def first_within(limit: float, level: int, omega_dt: float) -> int:
+    """Return the coarsest level whose w dt is within a stability limit, from a level that is beyond it."""
+    return level + math.ceil(math.log2(omega_dt / limit) - LIMIT_ROUNDING)
+
+
 def _advice(f: Found, level: int, p: float, time: str) -> str:
     if f.reason == "match":
         return "Set `stable: true`, or take coarser `levels:` if the scheme has a limit (w dt beyond it)."
@@ -186,10 +187,9 @@ def _advice(f: Found, level: int, p: float, time: str) -> str:
         )
     limit = f.of_member(stability_limits(f.experiment, columns_of(f.record)))
     if math.isfinite(limit) and math.isfinite(p) and p > limit:
-        first = level + math.ceil(math.log2(p / limit) - 1e-9)
         return (
-            f"Take finer `levels:`, from {first} on (w dt within the limit {f.notation.number(limit)}), or correct "
-            "`stable:`."
+            f"Take finer `levels:`, from {first_within(limit, level, p)} on (w dt within the limit "
+            f"{f.notation.number(limit)}), or correct `stable:`."
         )
     if time:
         return (

@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 
 from vibsim.apriori.formal_orders import columns_of
 from vibsim.checks.notation import PLAIN
-from vibsim.checks.outcome import PASS, Outcome
+from vibsim.checks.outcome import Outcome
+from vibsim.convergence.reasons import PASS
 from vibsim.core.array_types import Integers
 from vibsim.core.record import Record
 from vibsim.core.vocabulary import STATUSES

@@ -12,9 +12,10 @@ import numpy as np
 
 from vibsim.checks.fields import Field
 from vibsim.checks.notation import Notation
-from vibsim.checks.outcome import Judged, Outcome, Reason, outcome_of
+from vibsim.checks.outcome import Judged, Outcome, outcome_of
 from vibsim.checks.sentences import Description, Found
 from vibsim.comparison.best_solution import extrapolated
+from vibsim.convergence.reasons import code
 from vibsim.core.array_types import Floats, Integers
 from vibsim.core.errors import VibsimError
 from vibsim.core.record import Record, Variable
@@ -67,7 +68,7 @@ def judge(experiment: Experiment, record: Record) -> Outcome:
     if experiment.tolerance is None or any(f"{name}{_BOUND}" not in record for name in states):
         raise VibsimError("the analysis knows of no tolerance: analyse the levels again")
     largest, which = _largest_bound(experiment, record)
-    reason = np.where(largest <= experiment.tolerance, Reason.MATCH, Reason.MISMATCH)
+    reason = np.where(largest <= experiment.tolerance, code("match"), code("mismatch"))
     facts = {
         "error_bound": (BOUND, largest),
         "state": (Field("state with the largest bound", np.int8, states), which),

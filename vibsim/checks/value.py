@@ -17,10 +17,11 @@ import numpy as np
 from vibsim.apriori.formal_orders import columns_of, options_of
 from vibsim.checks.fields import Field, Measured
 from vibsim.checks.notation import PLAIN, ROUND_OFF, Notation
-from vibsim.checks.outcome import Judged, Reason, first_reason
+from vibsim.checks.outcome import Judged
 from vibsim.checks.sentences import NOT_FINITE, Description, Found, cost_in_words
 from vibsim.comparison import best_values, value_numbers
 from vibsim.comparison.quantity_comparison import Compared
+from vibsim.convergence.reasons import first_reason
 from vibsim.core.array_types import Flags, Floats
 from vibsim.core.record import Record
 from vibsim.experiment import Experiment
@@ -53,6 +54,8 @@ FEWEST = 3
 """Fewer levels do not show how large an error is."""
 FINER = 2
 """So many finer levels are advised."""
+FEWEST_DIGITS, MOST_DIGITS = 4, 10
+"""Significant digits of a number."""
 
 
 def compare(check: ValueCheck, number: Floats) -> tuple[Flags, Floats]:
@@ -158,18 +161,18 @@ def judge(experiment: Experiment, record: Record, check: ValueCheck, found: Meas
         # a time that the levels leave open agrees by chance, perhaps of another event
         holds &= bound <= np.maximum(-away, 0.0 if check.equals is None else check.allowed)
     cases = [
-        ((_failed(record, check) & ~survives) | infinite, Reason.NON_FINITE),
+        ((_failed(record, check) & ~survives) | infinite, "non_finite"),
         (
             does_not_exist,
-            Reason.TOO_FEW_LEVELS if _lacks_levels(experiment, check) else Reason.NOT_APPLICABLE,
+            "too_few_levels" if _lacks_levels(experiment, check) else "not_applicable",
         ),
-        (holds, Reason.MATCH),
+        (holds, "match"),
         (
             may_be_right,
-            Reason.TOO_FEW_LEVELS if len(record["level"]) < FEWEST else Reason.PRE_ASYMPTOTIC,
+            "too_few_levels" if len(record["level"]) < FEWEST else "pre_asymptotic",
         ),
     ]
-    reason = first_reason(cases, Reason.MISMATCH)
+    reason = first_reason(cases, "mismatch")
     return Judged(reason, away)
 
 
@@ -303,14 +306,25 @@ def describe(f: Found, check: ValueCheck) -> Description:
                     f"Add levels {finer[0]} and {finer[-1]} to `levels:` ({cost}) to shrink the error bound, or ask "
                     "for the number of one level (`at: {level: ...}`)."
                 )
-    return Description(sentence, advice, brief)
+    return Description(sentence, advice, _measured(f, check, _digits(f, check)))
 
 
-def _measured(f: Found, check: ValueCheck) -> str:
+def _digits(f: Found, check: ValueCheck) -> int:
+    """Return how many digits of a number tell it from what a check asks for, and one more."""
+    found, (key, wanted) = f.fact("value"), _border(check)
+    room = check.allowed if key == "equals" else abs(found - wanted)
+    if not (math.isfinite(found) and found != 0.0 and room > 0.0):
+        return MOST_DIGITS
+    # a whole number is not rounded
+    whole, apart = (math.log10(abs(found) / unit) for unit in (1.0, room))
+    return min(max(FEWEST_DIGITS, 1 + math.floor(whole), 2 + math.ceil(apart)), MOST_DIGITS)
+
+
+def _measured(f: Found, check: ValueCheck, digits: int = MOST_DIGITS) -> str:
     """Write a number with its unit, and with the bound of its error where it has one."""
     found, bound = f.fact("value"), f.fact("error_bound")
     # of round-off two digits say all
-    digits = 2 if f.reason == "match" and abs(found) <= ROUND_OFF else 10
+    digits = 2 if f.reason == "match" and abs(found) <= ROUND_OFF else digits
     told = f"{f.notation.number(found, digits)} {unit_of(f.experiment, f.record, check)}".rstrip()
     if check.value == "stability_limit" and found == 0.0:
         told += " (it grows at every step)"
@@ -342,7 +356,8 @@ def finer_levels(f: Found) -> tuple[list[int], str]:
 
 def _on_mismatch(f: Found, check: ValueCheck) -> str:
     """Say what to change where a number is another one; finer levels only where they change it enough."""
-    change = f"hange `{_border(check)[0]}:`"
+    is_printed = f.id.startswith("published_")
+    change = f"hange `{'printed' if is_printed else _border(check)[0]}:`"
     if check.number.is_count_of_work or not check.number.depends_on_level:
         return f"C{change}."
     if _is_on_the_mesh(f, check):

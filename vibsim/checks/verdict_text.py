@@ -32,9 +32,9 @@ def expectation(experiment: Experiment, check: Check | None, notation: Notation 
         case "claim":
             return "true" if check.holds else "false"
         case "converges":
-            return _verdict(check.expect)
+            return expected_verdict(check.expect)
         case "accurate" if check.expect.status != "PASS":
-            return _verdict(check.expect)
+            return expected_verdict(check.expect)
         case "accurate":
             return accurate.rule(check, notation)
         case "value":
@@ -46,7 +46,8 @@ def expectation(experiment: Experiment, check: Check | None, notation: Notation 
     return f"equal to {equal.other_solution(check)}"
 
 
-def _verdict(expect: Expect) -> str:
+def expected_verdict(expect: Expect) -> str:
+    """Write the verdict that a check expects."""
     return expect.status if expect.reason is None else f"{expect.status} ({expect.reason})"
 
 
@@ -107,7 +108,7 @@ class Wording:
         expect = None if check is None else check.expected_verdict
         if expect is not None:
             reason = compared_reason(check, status, result.status, result.reason)
-            expected = _verdict(expect)
+            expected = expected_verdict(expect)
             if expect.status == "PASS" and reason == result.reason:
                 pass
             elif reason == "match":

@@ -108,12 +108,8 @@ def commands() -> Iterator[Command]:
     file = _row("file", _path, "FILE", "experiment file")
     text = "Run an experiment file, and again whenever it is saved."
     yield "watch", "commands.watch", text, (results, file, settings, cores, allow, *_detail())
-    yield (
-        "check",
-        "commands.plan",
-        "Validate experiment files, without running them.",
-        (files, settings),
-    )
+    text = "Validate experiment files, without running them."
+    yield "check", "commands.plan", text, (files, settings)
     text = "Show members, jobs, steps, memory, disk space and time of experiments before they run."
     as_json = _flag("--json", "print the plans as JSON")
     yield "plan", "commands.plan", text, (results, files, settings, as_json)
@@ -122,12 +118,9 @@ def commands() -> Iterator[Command]:
     text = "Judge whether the results of any solver converge."
     yield "judge", "commands.judge", text, tuple(_judge())
     what: _Row = "what", {"choices": LISTS}
-    yield (
-        "list",
-        "commands.listing",
-        "List what there is to choose from, or print the JSON Schema of experiment files.",
-        (what, _row("name", _word, "NAME", "one entry, in full", nargs="?")),
-    )
+    entry = _row("name", _word, "NAME", "one entry, in full", nargs="?")
+    text = "List what there is to choose from, or print the JSON Schema of experiment files."
+    yield "list", "commands.listing", text, (what, entry)
     text = "Write a commented experiment file to begin with, and the JSON Schema for editors."
     yield "new", "commands.new", text, tuple(_new())
     text = "experiment, FILE.yaml, or a folder of results"
@@ -195,14 +188,11 @@ def commands() -> Iterator[Command]:
 
 def _detail() -> Iterator[_Row]:
     """Yield the options that say how much is printed: the last one counts."""
-    for short, name, value, text in (
-        ("-v", "--verbose", "full", "show every check, also those that passed"),
-        ("-q", "--quiet", "quiet", "print nothing but errors; the exit status tells the rest"),
+    for names, value, text in (
+        (("-v", "--verbose"), "full", "show every check, also those that passed"),
+        (("-q", "--quiet"), "quiet", "print nothing but errors; the exit status tells the rest"),
     ):
-        yield (
-            (short, name),
-            {"action": "store_const", "const": value, "dest": "detail", "help": text},
-        )
+        yield names, {"action": "store_const", "const": value, "dest": "detail", "help": text}
 
 
 def _new() -> Iterator[_Row]:
@@ -227,10 +217,8 @@ def _show() -> Iterator[_Row]:
     yield _row("what", _word, "EXPERIMENT", text)
     yield _row("--quantity", _word, "NAME", "what to draw (default: the first position)")
     yield _row("--scheme", _word, "NAME", "scheme to draw (default: the first)")
-    yield _row(
-        "--level", _from_zero_whole, "L", "level to draw (default: the finest that is there)"
-    )
-    yield _row("--case", _from_zero_whole, "K", "member of a sweep to draw (default: 0)")
+    yield _row("--level", _index, "L", "level to draw (default: the finest that is there)")
+    yield _row("--case", _index, "K", "member of a sweep to draw (default: 0)")
     yield _row("--rows", _positive, "N", "lines of the plot (default: 40)", default=40)
     yield _row("--from", _finite, "T", "time at which the plot begins", default=0.0, dest="start")
     yield _flag("--no-plot", "show the verdicts alone")
@@ -247,8 +235,8 @@ def _movie() -> Iterator[_Row]:
     text = "one scheme, or two side by side (default: the first, beside it what differs visibly)"
     yield _row("--scheme", _word, "NAME", text, nargs="+", action="extend")
     text = "one level, or two side by side (default: the finest, beside it the coarsest)"
-    yield _row("--level", _from_zero_whole, "L", text, nargs="+", action="extend")
-    yield _row("--case", _from_zero_whole, "K", "member of a sweep (default: 0)")
+    yield _row("--level", _index, "L", text, nargs="+", action="extend")
+    yield _row("--case", _index, "K", "member of a sweep (default: 0)")
     yield _row("--quantity", _word, "NAME", "what is shown over time (default: the first position)")
     yield _row("--from", _finite, "T", "first time that is shown", dest="start")
     yield _row("--to", _finite, "T", "last time that is shown", dest="end")
@@ -279,22 +267,36 @@ def _judge() -> Iterator[_Row]:
     yield _flag("--json", "print the verdicts as JSON, and nothing else")
 
 
-def _above_zero(text: str) -> float:
-    return _number(text, "above 0", least=math.ulp(0.0))
+def _number(bound: str, least: float) -> Callable[[str], float]:
+    """Return what reads a finite number of at least so much, as `bound` says in words."""
+
+    def read(text: str) -> float:
+        try:
+            found = float(text)
+        except ValueError:
+            found = math.nan
+        if not (math.isfinite(found) and found >= least):
+            raise argparse.ArgumentTypeError(f"'{text}' is not a finite number {bound}".rstrip())
+        return found
+
+    return read
 
 
-def _from_zero(text: str) -> float:
-    return _number(text, "from 0", least=0.0)
+def _whole(least: int) -> Callable[[str], int]:
+    """Return what reads a whole number of at least so much."""
+
+    def read(text: str) -> int:
+        if not text.isdecimal() or int(text) < least:
+            raise argparse.ArgumentTypeError(f"'{text}' is not a whole number from {least}")
+        return int(text)
+
+    return read
 
 
-def _number(text: str, bound: str, least: float) -> float:
-    try:
-        found = float(text)
-    except ValueError:
-        found = math.nan
-    if not least <= found < math.inf or math.isinf(found):
-        raise argparse.ArgumentTypeError(f"'{text}' is not a finite number {bound}".rstrip())
-    return found
+_finite = _number("", -math.inf)
+_from_zero = _number("from 0", 0.0)
+_above_zero = _number("above 0", math.ulp(0.0))
+_index, _positive = _whole(0), _whole(1)
 
 
 def _path(text: str) -> Path:
@@ -306,19 +308,3 @@ def _word(text: str) -> str:
     if not text.strip():
         raise argparse.ArgumentTypeError("must not be empty")
     return text
-
-
-def _finite(text: str) -> float:
-    return _number(text, "", least=-math.inf)
-
-
-def _from_zero_whole(text: str) -> int:
-    if not text.isdecimal():
-        raise argparse.ArgumentTypeError(f"'{text}' is not a whole number from 0")
-    return int(text)
-
-
-def _positive(text: str) -> int:
-    if not text.isdecimal() or int(text) < 1:
-        raise argparse.ArgumentTypeError(f"'{text}' is not a whole number from 1")
-    return int(text)

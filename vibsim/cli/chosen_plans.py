@@ -6,6 +6,7 @@ import sys
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+from vibsim.cli.failure import from_here
 from vibsim.core.errors import Fault, InputError
 from vibsim.core.home import home
 from vibsim.plan import Plan, choose, load, load_all
@@ -39,7 +40,7 @@ def tell_notes(plans: Sequence[Plan]) -> None:
     """Say on stderr what files say and probably do not mean."""
     for plan in plans:
         for remark in plan.remarks:
-            print(remark, file=sys.stderr, flush=True)
+            print(from_here(remark), file=sys.stderr, flush=True)
 
 
 def one_plan_of(word: str, settings: Sequence[str] = ()) -> Plan:

@@ -13,7 +13,7 @@ from vibsim.core.errors import nearest
 
 if TYPE_CHECKING:
     from vibsim.models import Model
-    from vibsim.models.base import FormulaField, Parameter
+    from vibsim.models.base import FormulaField, Output, Parameter, State
     from vibsim.schemes import AnyOption, Options, Scheme
 
 COORDINATES = "1 to 64 names; the velocity of x is vx, that of u alone v"
@@ -97,9 +97,8 @@ def scheme_rows(scheme: Scheme) -> Iterator[Row]:
     if not scheme.velocity_forces:
         kinds = ", ".join(kind for kind, _ in scheme.damped if " " not in kind) or "none"
         yield "damping", f"of its own treatment: {kinds}; any other is refused"
-    for number, option in enumerate(scheme.options):
-        label = "" if number else "options"
-        yield label, f"{option.name}: {choices(option)}: {option.description}"
+    texts = (f"{row.name}: {choices(row)}: {row.description}" for row in scheme.options)
+    yield from _under("options", texts)
     yield "write", f"schemes: [{scheme.kind}]"
 
 
@@ -112,13 +111,8 @@ def facts(scheme: Scheme) -> tuple[str, ...]:
     options = scheme.defaults()
     kind = "explicit" if scheme.explicit else "implicit"
     per_step = forces if scheme.explicit else f"{forces} x iterations"
-    return (
-        f"{scheme.orders(options).position:g}",
-        kind,
-        symplectic,
-        per_step,
-        stable_until(scheme, options),
-    )
+    order = f"{scheme.orders(options).position:g}"
+    return order, kind, symplectic, per_step, stable_until(scheme, options)
 
 
 def stable_until(scheme: Scheme, options: Options) -> str:
@@ -150,25 +144,35 @@ def model_rows(model: Model) -> Iterator[Row]:
         yield "is", f"{shape}, {'conservative' if model.conservative else 'not conservative'}"
     if model.named is not None:
         yield "coordinates", COORDINATES
-    for number, state in enumerate(model.states):
-        yield "" if number else "initial", f"{state.name}: {state.long_name}{unit_text(state.unit)}"
-    for number, row in enumerate(model.parameters):
-        yield "" if number else "parameters", f"{row.key}: {parameter_text(row)}"
-    for number, field in enumerate(model.formulas):
-        default = f" (default {field.default})" if field.default else ""
-        yield "" if number else "formulas", f"{field.name}: {field.description}{default}"
+    yield from _under("initial", map(_quantity, model.states))
+    yield from _under(
+        "parameters", (f"{row.key}: {parameter_text(row)}" for row in model.parameters)
+    )
+    yield from _under("formulas", map(_formula, model.formulas))
     if model.takes_events:
-        yield (
-            "events",
-            "events: states get new values where a formula crosses 0; stop: the motion ends there",
+        text = (
+            "events: states get new values where a formula crosses 0; stop: the motion ends there"
         )
-    for number, output in enumerate(model.outputs):
-        label = "" if number else "also stored"
-        yield label, f"{output.name}: {output.long_name}{unit_text(output.unit)}"
+        yield "events", text
+    yield from _under("also stored", map(_quantity, model.outputs))
     if not model.formulas:
         yield "exact solution", "known" if model.exact is not None else "not known"
     required = "".join(f", {field.name}: {field.default}" for field in needed(model))
     yield "write", f"model: {{kind: {model.kind}{required}}}"
+
+
+def _under(label: str, texts: Iterable[str]) -> Iterator[Row]:
+    """Yield a row for each text, the first with a label."""
+    for number, text in enumerate(texts):
+        yield "" if number else label, text
+
+
+def _quantity(row: State | Output) -> str:
+    return f"{row.name}: {row.long_name}{unit_text(row.unit)}"
+
+
+def _formula(row: FormulaField) -> str:
+    return f"{row.name}: {row.description}" + (f" (default {row.default})" if row.default else "")
 
 
 def needed(model: Model) -> tuple[FormulaField, ...]:

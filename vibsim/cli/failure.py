@@ -28,8 +28,18 @@ def report(error: Exception) -> int:
         # The reader of a pipe has gone (``vibsim list | head``); nobody is left to tell.
         sys.stderr.close()
         return FAILED
-    print(text if isinstance(error, InputError) else f"vibsim: {text}", file=sys.stderr, flush=True)
+    text = from_here(text) if isinstance(error, InputError) else f"vibsim: {text}"
+    print(text, file=sys.stderr, flush=True)
     return REFUSED if isinstance(error, InputError) else FAILED
+
+
+def from_here(text: str) -> str:
+    """Write paths at the beginning of lines from the current folder on, as they were probably given."""
+    try:
+        here = f"{Path.cwd()}{os.sep}"
+    except OSError:
+        return text
+    return "\n".join(line.removeprefix(here) for line in text.split("\n"))
 
 
 def sentence(error: Exception) -> str:
@@ -65,9 +75,8 @@ def is_of_memory(error: BaseException) -> bool:
     """Tell whether an exception, or one that led to it, says that memory is short."""
     if isinstance(error, MemoryError) or getattr(error, "errno", None) == errno.ENOMEM:
         return True
-    if isinstance(error, ImportError | OSError | RuntimeError) and any(
-        words in str(error).lower() for words in _OF_MEMORY
-    ):
+    says_so = any(words in str(error).lower() for words in _OF_MEMORY)
+    if says_so and isinstance(error, ImportError | OSError | RuntimeError):
         return True
     cause = error.__cause__ or error.__context__
     return cause is not None and is_of_memory(cause)

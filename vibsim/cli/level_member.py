@@ -24,11 +24,10 @@ def made(plan: Plan, results: Path, case: int, word: str) -> tuple[list[int], li
     if not 0 <= case < plan.cases:
         raise refusal("--case", case, f"must be from 0 to {plan.cases - 1}")
     levels = [level.level for level in plan.levels]
-    found = [level for level in levels if (results / _place(plan, level, case)[0]).is_file()]
+    found = [level for level in levels if (results / _shard(plan, level, case).path).is_file()]
     if not found:
-        raise VibsimError(
-            f"{plan.key}: there are no results yet: vibsim run {word} (looked in {results})"
-        )
+        problem = f"there are no results yet: vibsim run {word} (looked in {results})"
+        raise VibsimError(f"{plan.key}: {problem}")
     return levels, found
 
 
@@ -40,8 +39,8 @@ def check_level(level: int, levels: Sequence[int]) -> None:
 
 def of_level(plan: Plan, results: Path, level: int, case: int) -> Record:
     """Return one member at one level."""
-    path, first = _place(plan, level, case)
-    return read(results / path, case - first)
+    shard = _shard(plan, level, case)
+    return read(results / shard.path, case - shard.start)
 
 
 def is_outdated(plan: Plan, record: Record, level: int, case: int) -> bool:
@@ -79,11 +78,6 @@ def chosen(option: str, wanted: str | None, names: Sequence[str]) -> str:
     return wanted
 
 
-def _place(plan: Plan, level: int, case: int) -> tuple[str, int]:
-    """Return the file of a member at a level, and the first member in it."""
-    shard = _shard(plan, level, case)
-    return shard.path, shard.start
-
-
 def _shard(plan: Plan, level: int, case: int) -> ShardJob:
+    """Return the file of a member at a level."""
     return next(shard for shard in plan.level(level).shards if shard.start <= case < shard.stop)

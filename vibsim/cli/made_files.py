@@ -168,8 +168,7 @@ def content(file: Path) -> str:
     if file.suffix == ".nc":
         seal.check(file)
         return seal.stored_digest(file)
-    with file.open("rb") as stream:
-        return hashlib.file_digest(stream, "sha256").hexdigest()
+    return regular_files.digest(file)
 
 
 def entry(status: os.stat_result, digest: str, job: str = "", machine: str = "") -> Entry:

@@ -111,6 +111,5 @@ def numbers(check: Entry) -> list[str]:
 
 def _name(entry: Entry) -> str:
     """Return the name of an experiment, with what the command line gave in place of values of its file."""
-    return clean(
-        f"{entry['collection']}/{entry['experiment']}{set_options(entry.get('settings', ()))}"
-    )
+    settings = set_options(entry.get("settings", ()))
+    return clean(f"{entry['collection']}/{entry['experiment']}{settings}")

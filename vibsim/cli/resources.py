@@ -22,11 +22,8 @@ def check(plans: Sequence[Plan], results: Path) -> None:
     InputError
         With what is needed and what is there.
     """
-    needed, free, total = (
-        _missing_bytes(plans, results),
-        free_bytes(results),
-        psutil.virtual_memory().total,
-    )
+    needed, free = _missing_bytes(plans, results), free_bytes(results)
+    total = psutil.virtual_memory().total
     problems = [
         f"{plan.key}: a job needs {size(plan.memory)} of memory, the machine has {size(total)}"
         for plan in plans

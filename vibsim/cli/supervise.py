@@ -11,11 +11,10 @@ from __future__ import annotations
 import mmap
 import os
 import signal
-import struct
 import sys
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from typing import NoReturn
 
@@ -49,7 +48,9 @@ def supervised(work: Work) -> int:
     It is that of the command, which may raise `Interrupted`, or 128 and the number of the signal that ended it.
     """
     if parent := os.environ.pop(_PARENT, ""):
-        return _as_child(int(parent), work)
+        # a job of a run, which a signal ends on the spot: its files appear whole or not at all
+        as_worker_of(int(parent))
+        return work()
     ends = heeded()
     signal.signal(signal.SIGCHLD, signal.SIG_DFL)
     before = signal.pthread_sigmask(signal.SIG_BLOCK, ends | {signal.SIGCHLD})
@@ -75,19 +76,22 @@ def environment() -> dict[str, str]:
     return {_PARENT: str(os.getpid())}
 
 
-def end_at_once() -> None:
-    """End this process as soon as it is told to, whatever handlers are set later.
+def child(words: Sequence[str], *, is_heard: bool = True) -> int:
+    """Run another command of vibsim, which ends with this process, and return its exit status.
 
-    The signals are blocked in every thread but one, which does nothing else than wait for them: a handler would
-    run in the middle of whatever the main thread does, locks held.
+    Where it is not heard, what it prints goes nowhere; its messages are shown.
     """
-    ends = heeded()
-    signal.pthread_sigmask(signal.SIG_BLOCK, ends)
+    import subprocess
 
-    def wait() -> None:
-        os._exit(128 + signal.sigwait(ends))
+    command = [sys.executable, "-P", "-m", "vibsim", *words]
+    output = None if is_heard else subprocess.DEVNULL
+    ended = subprocess.run(command, env=os.environ | environment(), stdout=output, check=False)
+    return ended.returncode
 
-    threading.Thread(target=wait, daemon=True).start()
+
+def end_at_once() -> None:
+    """End this process as soon as it is told to, whatever handlers are set later."""
+    _when_told(lambda number: os._exit(128 + number))
 
 
 def end_in_order() -> None:
@@ -95,21 +99,25 @@ def end_in_order() -> None:
 
     Snakemake then cancels what it has submitted. Further requests must not disturb that.
     """
+    signal.signal(signal.SIGUSR1, signal.default_int_handler)
+    main = threading.main_thread().ident or 0
+    _when_told(lambda _: signal.pthread_kill(main, signal.SIGUSR1))
+
+
+def _when_told(act: Callable[[int], None]) -> None:
+    """Act once, in a thread of its own, when this process is told to end.
+
+    The signals are blocked in every thread but that one, which does nothing else than wait for them: a handler would
+    run in the middle of whatever the main thread does, locks held.
+    """
     ends = heeded()
     signal.pthread_sigmask(signal.SIG_BLOCK, ends)
-    signal.signal(signal.SIGUSR1, signal.default_int_handler)
-
-    def wait() -> None:
-        signal.sigwait(ends)
-        signal.pthread_kill(threading.main_thread().ident or 0, signal.SIGUSR1)
-
-    threading.Thread(target=wait, daemon=True).start()
+    threading.Thread(target=lambda: act(signal.sigwait(ends)), daemon=True).start()
 
 
 def take_time(seconds: float) -> None:
     """Ask the process that supervises this one for more time to end, from now on."""
-    _grace.seek(0)
-    _grace.write(struct.pack("d", seconds))
+    _grace[0] = seconds
 
 
 def ended_by(status: int) -> int:
@@ -129,16 +137,10 @@ def known_pid() -> int:
     return _supervisor or os.getpid()
 
 
-_grace = mmap.mmap(-1, struct.calcsize("d"))
+_grace = memoryview(mmap.mmap(-1, mmap.PAGESIZE)).cast("d")
 """Seconds that the worker asks for to end, in memory that it shares with its supervisor; 0 where it does not."""
 _supervisor = 0
 _request = 0
-
-
-def _as_child(parent: int, work: Work) -> int:
-    """Work as a job of a run, which a signal ends on the spot: its files appear whole or not at all."""
-    as_worker_of(parent)
-    return work()
 
 
 def _work(
@@ -185,7 +187,7 @@ def _watch(worker: int, ends: set[signal.Signals]) -> tuple[int, int]:
         if found == signal.SIGCHLD:
             continue
         if found and not asked:
-            asked, deadline = found, time.monotonic() + max(_GRACE, _asked_for())
+            asked, deadline = found, time.monotonic() + max(_GRACE, _grace[0])
             os.kill(worker, signal.SIGTERM)
         elif asked and (found or time.monotonic() >= deadline):
             # out of time, or asked again
@@ -200,12 +202,6 @@ def _ended(worker: int) -> int | None:
             return status
         if not process:
             return None
-
-
-def _asked_for() -> float:
-    _grace.seek(0)
-    (seconds,) = struct.unpack("d", _grace.read())
-    return float(seconds)
 
 
 def _wait_for_children() -> None:

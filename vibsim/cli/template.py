@@ -51,36 +51,25 @@ def _lines(model: Model, schema: str) -> Iterator[str]:
     yield from textwrap.wrap(model.equation, 100, initial_indent="# ", subsequent_indent="# ")
     yield "model:"
     yield f"  kind: {model.kind}"
-    if model.loaded is not None:
-        yield from _column(STRUCTURE)
-    else:
-        yield from _column(
-            [(f"  {row.key}: {row.default!r}", parameter_text(row)) for row in model.parameters]
-        )
+    numbers = [(f"  {row.key}: {row.default!r}", parameter_text(row)) for row in model.parameters]
+    yield from _column(numbers if model.loaded is None else STRUCTURE)
     if model.named is not None:
         yield from _column([(f"  coordinates: [{', '.join(model.positions)}]", COORDINATES)])
     required = needed(model)
-    yield from _column(
-        [
-            (
-                f"  {'' if field in required else '# '}{field.name}: {field.default}".rstrip(),
-                field.description,
-            )
-            for field in model.formulas
-        ]
-    )
+    formulas = [
+        (f"  {'' if row in required else '# '}{row.name}: {row.default}".rstrip(), row.description)
+        for row in model.formulas
+    ]
+    yield from _column(formulas)
     yield ""
     if model.start is None:
         yield "initial:"
-        yield from _column(
-            [
-                (
-                    f"  {state.name}: {_START if state.name == model.position else 0.0!r}",
-                    f"{state.long_name}{unit_text(state.unit)}",
-                )
-                for state in model.states
-            ]
-        )
+        start = {model.position: _START}
+        states = [
+            (f"  {row.name}: {start.get(row.name, 0.0)!r}", row.long_name + unit_text(row.unit))
+            for row in model.states
+        ]
+        yield from _column(states)
         yield ""
     yield from _column(
         [

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
 
 from vibsim.cli import results_folder
-from vibsim.cli.chosen_plans import resolve
+from vibsim.cli.chosen_plans import plans_of
 from vibsim.cli.jobs.solve import check_allowed
-from vibsim.core.home import default_results, home
+from vibsim.core.home import default_results
 from vibsim.plan import Names
 
 
@@ -18,10 +19,9 @@ def names_of(config: Mapping[str, Any], command_line: Mapping[str, Any]) -> Name
     Parameters
     ----------
     config
-        The ``experiments`` with the ``settings`` of all of them, one as text or several in a list, and the ``results``
-        folder, as for
-        `vibsim.plan.Names.of`; without any the default experiments as they are, and `vibsim.core.home.default_results`.
-        ``cores`` and ``overhead`` (megabytes) of a job, where it runs elsewhere.
+        The ``experiments`` (files, names, collections) with the ``settings`` of all of them, one as text or several in
+        a list, and the ``results`` folder; without any the default experiments as they are, and
+        `vibsim.core.home.default_results`. ``cores`` and ``overhead`` (megabytes) of a job, where it runs elsewhere.
     command_line
         What ``--config`` says on the command line: ``allow_commands=true`` lets programs of users run.
 
@@ -35,9 +35,10 @@ def names_of(config: Mapping[str, Any], command_line: Mapping[str, Any]) -> Name
         [words] if isinstance(words := config.get(key, []), str) else words
         for key in ("experiments", "settings")
     )
-    results = str(config.get("results", default_results()))
+    plans = {plan.key: plan for plan in plans_of(experiments, settings, cached=True)}
+    results = Path(config.get("results", default_results())).absolute()
     more = {key: int(config[key]) for key in ("cores", "overhead") if key in config}
-    names = Names.of(experiments, results, home(), resolve, is_allowed, settings, **more)
+    names = Names(plans, results, is_allowed, tuple(settings), **more)
     results_folder.check(names.results, names.plans)
     check_allowed(names.plans.values(), is_allowed)
     return names

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from vibsim import plan
 from vibsim.comparison.extrapolate_members import (
     Extrapolated,
     Method,
@@ -18,10 +17,10 @@ from vibsim.comparison.extrapolate_members import (
     noise_of,
 )
 from vibsim.convergence.state_extrapolation import Pair
-from vibsim.core.array_types import Floats, Integers
+from vibsim.core.array_types import Integers
 from vibsim.core.record import Attribute, Record, Variable, flags
 from vibsim.core.vocabulary import MEMBER, SERIES
-from vibsim.experiment import Experiment
+from vibsim.experiment import Experiment, sweep_columns
 from vibsim.observe.common_grid import Grid, check_belonging, common_grid, take
 from vibsim.simulation.members import Members, members
 from vibsim.simulation.scaled import in_scales
@@ -67,55 +66,33 @@ def extrapolated(
     group = members(experiment, int(finest["case"][0]), int(finest["case"][-1]) + 1)
     states = [state.name for state in experiment.model.definition.states]
     levels = [tuple(take(grid, records[level], name) for name in states) for level in grid.levels]
+    every = [grid.apart * n // grid.steps[0] for n in grid.steps]
+    t = (np.arange(len(grid.t)) * grid.apart / grid.steps[0])[:, None]
     rows = []
     for i in experiment.ladder:
-        parts = [
-            (_of_method(method, start_of(method, group, where), grid, levels, i, where), where)
-            for method, where in methods(experiment, i, group)
-        ]
+        parts = []
+        for method, start, where in starts(experiment, i, group):
+            # in memory time comes first, and all members are taken without a copy
+            some = slice(None) if len(where) == len(group.end) else where
+            pairs: list[Pair] = [(u[i].T[:, some], v[i].T[:, some]) for u, v in levels]
+            noise = noise_of(method, start, grid.steps, every, pairs)
+            parts.append((extrapolate_members(method, start, grid.steps, t, pairs, noise), where))
         rows.append(in_order(parts))
     return rows
 
 
-def methods(experiment: Experiment, scheme: int, group: Members) -> list[tuple[Method, Integers]]:
-    """Return the methods of one scheme, which differ where options are swept, and the members that have each."""
+def starts(
+    experiment: Experiment, scheme: int, group: Members
+) -> Iterator[tuple[Method, Start, Integers]]:
+    """Yield the methods of one scheme, which differ where options are swept, with the members that have each."""
     model, method = experiment.model.definition, experiment.schemes[scheme].method
-    return [
-        (Method(model, method, options), where)
-        for options, where in plan.option_groups(experiment, scheme, group.columns)
-    ]
-
-
-def start_of(method: Method, group: Members, where: Integers) -> Start:
-    """Return the numbers of the members at the places `where` of `group`."""
-    model = method.model
-    end = group.end[where]
-    parameters = {name: values[where] for name, values in group.parameters.items()}
-    table = np.empty((len(end), len(model.parameters)))
-    for i, parameter in enumerate(model.parameters):
-        table[:, i] = parameters[parameter.key]
-    initial = np.stack([group.initial[state.name][where] for state in model.states], axis=-1)
-    frequency = np.broadcast_to(np.asarray(model.natural_frequency(parameters)), end.shape)
-    return Start(table, initial, end, frequency)
-
-
-def _of_method(
-    method: Method,
-    start: Start,
-    grid: Grid,
-    levels: Sequence[tuple[Floats, ...]],
-    scheme: int,
-    where: Integers,
-) -> Extrapolated:
-    # in memory time comes first, and all members are taken without a copy
-    some = slice(None) if len(where) == levels[0][0].shape[1] else where
-    pairs: list[Pair] = [
-        (position[scheme].T[:, some], velocity[scheme].T[:, some]) for position, velocity in levels
-    ]
-    t = (np.arange(len(grid.t)) * grid.apart / grid.steps[0])[:, None]
-    every = [grid.apart * n // grid.steps[0] for n in grid.steps]
-    noise = noise_of(method, start, grid.steps, every, pairs)
-    return extrapolate_members(method, start, grid.steps, t, pairs, noise)
+    initial = np.stack([group.initial[state.name] for state in model.states], axis=-1)
+    frequency = np.asarray(model.natural_frequency(group.parameters))
+    every = Start(
+        group.numbers(model), initial, group.end, np.broadcast_to(frequency, group.end.shape)
+    )
+    for options, where in sweep_columns.option_groups(experiment, scheme, group.columns):
+        yield Method(model, method, options), every.of(where), where
 
 
 def in_order(parts: Sequence[tuple[Extrapolated, Integers]]) -> Extrapolated:

@@ -22,7 +22,7 @@ from vibsim.comparison.comparison_variables import Table
 from vibsim.comparison.quantity_comparison import Compared
 from vibsim.comparison.thresholds import IRREGULAR, MISSED_EXTREMUM, OF_GRID, OF_PARABOLA
 from vibsim.convergence import gci
-from vibsim.convergence.batches import batches
+from vibsim.convergence.ladder_blocks import batches
 from vibsim.convergence.number_extrapolation import Limit, limit, observed_order
 from vibsim.convergence.thresholds import ORDER_ABOVE_ROUND_OFF
 from vibsim.core.array_types import Flags, Floats

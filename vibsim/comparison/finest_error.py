@@ -16,12 +16,10 @@ from vibsim.apriori.roundoff_floor import norm_of_floor
 from vibsim.comparison.order_evidence import judgement
 from vibsim.comparison.quantity_comparison import Comparison
 from vibsim.convergence import differences
+from vibsim.convergence.reasons import is_one_of
 from vibsim.convergence.thresholds import ROUND_OFF_SAFETY
 from vibsim.core.array_types import Flags, Floats
-from vibsim.core.vocabulary import REASON_NAMES, TYPICAL_NORM
-
-OTHER_ORDERS = [REASON_NAMES.index(reason) for reason in ("order_low", "order_high")]
-"""Reasons of verdicts that found another order than the promised one."""
+from vibsim.core.vocabulary import TYPICAL_NORM
 
 
 class FinestError(NamedTuple):
@@ -69,7 +67,7 @@ def error_of_finest(q: Comparison) -> FinestError:
 def _of_other_order(q: Comparison, error: Floats, bound: Floats) -> tuple[Floats, Floats]:
     """Return an error and its bound by the order that was measured, where that is another one than the promised."""
     judged = judgement(q, TYPICAL_NORM)
-    is_other = np.isin(judged.reason, OTHER_ORDERS)
+    is_other = is_one_of(judged.reason, "order_low", "order_high")
     if not np.any(is_other):
         return error, bound
     levels, change = q.block.grid.levels, q.in_norm(TYPICAL_NORM).difference[..., -1]

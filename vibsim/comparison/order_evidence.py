@@ -19,13 +19,14 @@ import numpy as np
 from vibsim.apriori.roundoff_floor import SPACING_AT_ONE, norm_of_floor
 from vibsim.comparison.quantity_comparison import Compared, Comparison
 from vibsim.comparison.thresholds import STRAIGHT, THEORY_ROUNDING, VANISHING_RATE
-from vibsim.convergence.batches import batches
-from vibsim.convergence.circumstances import Evidence, at_rest, floor_of_pairs, unresolved
+from vibsim.convergence.circumstances import Evidence, at_rest, floor_of_pairs, pick, unresolved
 from vibsim.convergence.differences import largest, safe_ratio
-from vibsim.convergence.thresholds import ABOVE_ROUND_OFF, HALF_SPACING
+from vibsim.convergence.ladder_blocks import batches
+from vibsim.convergence.reasons import is_one_of
+from vibsim.convergence.thresholds import ABOVE_ROUND_OFF, HALF_SPACING, ROUND_OFF_SAFETY
 from vibsim.convergence.verdict import Judgement, judge, judge_together
 from vibsim.core.array_types import Codes, Flags, Floats
-from vibsim.core.vocabulary import NORMS, ORDER_TOLERANCE, REASON_NAMES, TYPICAL_NORM, is_error_part
+from vibsim.core.vocabulary import NORMS, ORDER_TOLERANCE, TYPICAL_NORM, is_error_part
 from vibsim.experiment.schema.checks import ConvergesCheck
 from vibsim.models import ENERGIES
 from vibsim.observe import predicted_oscillation
@@ -33,11 +34,13 @@ from vibsim.observe.member_block import plain_name, stored_or_nan
 
 CAUSES = (
     *("none", "last_point", "one_quantity", "everything", "special_times", "one_norm", "theory"),
-    *("stored", "still", "pulse", "noise", "decay"),
+    *("stored", "still", "pulse", "noise", "decay", "parted", "zero"),
 )
 """What was found; files hold a position here."""
 NONE, LAST_POINT, ONE_QUANTITY, EVERYTHING, SPECIAL_TIMES, ONE_NORM, THEORY = range(7)
-STORED, STILL, PULSE, NOISE, DECAY = range(7, len(CAUSES))
+STORED, STILL, PULSE, NOISE, DECAY, PARTED, ZERO = range(7, len(CAUSES))
+FAR_APART = 0.01
+"""Levels that do not come closer have parted where they differ by this part of the quantity. [convention]"""
 
 UNSEEN = ("pre_asymptotic", "not_applicable")
 """What is said of a motion that lies still wherever levels are compared."""
@@ -96,7 +99,7 @@ def order_in(q: Comparison, norm: str) -> Floats:
         return typical.order
     # of the finest three levels up to the last one of the window
     at = np.searchsorted(q.block.grid.levels, typical.last) - 2
-    found = np.take_along_axis(orders, np.maximum(at, 0)[..., None], axis=-1)[..., 0]
+    found = pick(orders, at)
     return np.where(np.isnan(typical.order), np.nan, found)
 
 
@@ -215,9 +218,7 @@ def causes(
     shape = judged.reason.shape
     found = np.full(shape, NONE, dtype=np.int8)
 
-    def has(*reasons: str) -> Flags:
-        return np.isin(judged.reason, [REASON_NAMES.index(word) for word in reasons])
-
+    has = partial(is_one_of, judged.reason)
     low, high, lost, unseen = has("order_low"), has("order_high"), has("round_off"), has(*UNSEEN)
     coarse = has("pre_asymptotic")
     if np.any(lost | unseen | coarse):
@@ -225,6 +226,9 @@ def causes(
         found[lost & (e.difference[..., -1] > ABOVE_ROUND_OFF * floor_of_pairs(e)[..., -1])] = NOISE
         if q.block.stored_floor[-1] > 0.0:
             found[lost] = STORED
+        if q.name in (state.name for state in q.block.model.states):
+            found[lost & (e.difference[..., -1] >= FAR_APART * e.size)] = PARTED
+            found[lost & (e.size <= ROUND_OFF_SAFETY * e.relative_floor * e.scale)] = ZERO
         found[unseen & at_rest(e)] = STILL
         found[coarse & unresolved(e) & (found == NONE)] = DECAY
     found[has(*ROUGH) & np.isfinite(q.block.missed.time)] = PULSE

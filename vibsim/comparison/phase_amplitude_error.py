@@ -116,9 +116,8 @@ def _phase_and_amplitude(
     for q in states:
         known &= q.exact is not None and np.isfinite(np.broadcast_to(q.exact, shape)).all((0, 2))
     truth = {q.name: _truth(q, known, shape) for q in states}
-    numbers = {row.name: block.group.parameters[row.key][:, None] for row in model.parameters}
-    times = grid.times(block.group.end)
-    push = values(tree(model, model.accelerations[place]), {**numbers, **truth, "t": times})
+    numbers = {**block.group.by_name(model), **truth, "t": grid.times(block.group.end)}
+    push = values(tree(model, model.accelerations[place]), numbers)
     u, v, a = (_rows(x) for x in (truth[position], truth[speed], np.broadcast_to(push, shape)))
     period = np.broadcast_to(period_scale(block), block.shape).ravel()
     spacing = np.broadcast_to(grid.spacing, block.shape).ravel()

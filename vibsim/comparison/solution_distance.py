@@ -28,7 +28,6 @@ from vibsim.observe.member_block import (
     stored_or_nan,
 )
 from vibsim.observe.predicted_oscillation import is_simple, natural_frequency, steppers
-from vibsim.observe.sensitivity import in_columns
 
 
 @dataclass(frozen=True)
@@ -133,8 +132,7 @@ def exact_series(block: MemberBlock, level: int, name: str) -> Floats:
     n = np.arange(shape[-1]) * whole(record, "every")
     t = n * (block.group.end / block.grid.steps[block.grid.levels.index(level)])[:, None]
     if model.exact is not None:
-        group = block.group
-        states = model.exact(t, in_columns(group.initial), in_columns(group.parameters))
+        states = block.group.exact(model, t)
     else:
         names = (model.position, model.velocity)
         states = {n: record[f"{n}_exact"] for n in names if f"{n}_exact" in record}

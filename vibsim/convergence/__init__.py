@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from vibsim.core.lazy import loader
+from vibsim.core.lazy import lazy
 
 if TYPE_CHECKING:
     from vibsim.convergence.study.judgement import judge
@@ -12,14 +12,6 @@ if TYPE_CHECKING:
 
 __all__ = ["LadderVerdict", "judge"]
 
-__getattr__ = loader(
-    __name__,
-    {
-        "LadderVerdict": "vibsim.convergence.study.verdict",
-        "judge": "vibsim.convergence.study.judgement",
-    },
+__getattr__, __dir__ = lazy(
+    __name__, {".study.verdict": ("LadderVerdict",), ".study.judgement": ("judge",)}
 )
-
-
-def __dir__() -> list[str]:
-    return __all__

@@ -45,17 +45,12 @@ from vibsim.convergence.likely_powers import (
     sides,
     tails,
 )
-from vibsim.convergence.predicted_noise import is_away, is_only_noise, least_noise
-from vibsim.convergence.thresholds import (
-    DEFINITE,
-    NOISE_FACTOR,
-    RISK,
-    RISK_OF_THREE,
-)
+from vibsim.convergence.reasons import code, first_reason, is_one_of
+from vibsim.convergence.thresholds import DEFINITE, NOISE_FACTOR, RISK, RISK_OF_THREE
 from vibsim.core.array_types import Codes, Flags, Floats, Integers
-from vibsim.core.vocabulary import ORDER_TOLERANCE, REASON_NAMES
+from vibsim.core.vocabulary import ORDER_TOLERANCE
 
-DECIDED = tuple(REASON_NAMES.index(name) for name in ("asymptotic", "order_low", "order_high"))
+DECIDED = "asymptotic", "order_low", "order_high"
 """Reasons of verdicts on an order."""
 ROUGHLY = 1e-3
 """Part of all evidence that may be left out where only the verdict is asked, if that part cannot change it."""
@@ -65,13 +60,18 @@ NEAR = 0.1
 
 @dataclass(frozen=True)
 class Question:
-    """What is asked of ladders; see `assess`."""
+    """What is asked of ladders. Without an order that is expected any one will do that can be believed."""
 
     expected: float | None = None
+    """The order that is expected."""
     at_least: float | None = None
+    """The least order that is expected."""
     tolerance: float = ORDER_TOLERANCE
+    """How far from `expected`, or below `at_least`, an order may be."""
     noise_factor: float = NOISE_FACTOR
+    """Noise may be so many times `Ladder.floor` where levels are said to differ by nothing else."""
     by_theory: bool = False
+    """Whether theory promises the order that is expected."""
 
     @property
     def promise(self) -> Promise | None:
@@ -102,33 +102,8 @@ class Assessment(Decision):
     best_bound: Floats  # how far the limit is from the best value, at most
 
 
-def assess(
-    ladder: Ladder,
-    *,
-    expected: float | None = None,
-    at_least: float | None = None,
-    tolerance: float = ORDER_TOLERANCE,
-    noise_factor: float = NOISE_FACTOR,
-    by_theory: bool = False,
-) -> Assessment:
-    """Decide whether ladders converge as expected.
-
-    Parameters
-    ----------
-    ladder
-        The numbers of any number of ladders with the same step sizes.
-    expected
-        The order that is expected.
-    at_least
-        The least order that is expected. Without either, any order will do that can be believed.
-    tolerance
-        How far from `expected`, or below `at_least`, an order may be.
-    noise_factor
-        Noise may be so many times `Ladder.floor` where levels are said to differ by nothing else.
-    by_theory
-        Whether theory promises the order that is expected.
-    """
-    question = Question(expected, at_least, tolerance, noise_factor, by_theory)
+def assess(ladder: Ladder, question: Question) -> Assessment:
+    """Decide whether ladders, any number of them with the same step sizes, converge as expected."""
     found = in_blocks(ladder, partial(_assess_block, question=question))
     return Assessment(**{field.name: found[field.name] for field in fields(Assessment)})
 
@@ -152,33 +127,28 @@ class _Evaluation:
     """What the posterior of ladders leads to, but for an exact solution that is missed."""
 
     posterior: Posterior
-    sides: tuple[Floats, Floats, Floats]
+    sides: Floats  # probabilities of a lower, an expected and a higher power, shape (3, ladder)
     exact: Flags
     away: Flags  # only noise, and not the exact solution
     by_three: Flags  # whether three levels decide behind others that do not fit
-    by_theory: (
-        bool  # whether theory promises the order that is expected, and no exact solution is known
-    )
+    by_theory: bool  # whether theory promises the expected order, and no exact solution is known
     cut_short: Flags  # whether noise that may be far less than predicted ends the window: nothing is decided
 
-    def some(self, rows: Integers, *, cut_short: bool) -> _Evaluation:
+    def some(self, rows: Integers) -> _Evaluation:
         """Return what was found of some of the ladders."""
-        lower, right, higher = (side[rows] for side in self.sides)
-        return _Evaluation(
-            self.posterior.some(rows),
-            (lower, right, higher),
-            self.exact[rows],
-            self.away[rows],
-            self.by_three[rows],
-            self.by_theory,
-            np.full(len(rows), cut_short),
+        parts = {name: getattr(self, name)[rows] for name in ("exact", "away", "by_three")}
+        return replace(
+            self,
+            posterior=self.posterior.some(rows),
+            sides=self.sides[:, rows],
+            cut_short=self.cut_short[rows],
+            **parts,
         )
 
     def replace(self, ladders: Integers, other: _Evaluation, rows: Flags) -> None:
         """Take what was found of some ladders from some rows of another one."""
         self.posterior.replace(ladders, other.posterior, rows)
-        for one, of_other in zip(self.sides, other.sides, strict=True):
-            one[ladders] = of_other[rows]
+        self.sides[:, ladders] = other.sides[:, rows]
         self.by_three[ladders] = other.by_three[rows]
 
 
@@ -205,11 +175,12 @@ def _decide_block(ladder: Ladder, factors: Floats, question: Question) -> dict[s
 
 def _evaluate(ladder: Ladder, question: Question, left_out: float) -> _Evaluation:
     believed = posterior(ladder, question.promise, left_out=left_out)
-    of_sides = sides(believed, question.expected, question.at_least, question.tolerance)
-    exact = is_only_noise(ladder, question.noise_factor)
+    of_sides = np.stack(sides(believed, question.expected, question.at_least, question.tolerance))
+    exact = _is_only_noise(ladder, question.noise_factor)
     away = np.zeros_like(exact)
     if ladder.exact_known:
-        away = exact & is_away(ladder, question.noise_factor)
+        noise = question.noise_factor * ladder.floor[:, -1]
+        away = exact & (np.sqrt(ladder.gram[:, -1, -1]) > noise)
     by_three, cut_short = rests_on_three(believed), _is_cut_short(ladder, believed)
     by_theory = question.by_theory and not ladder.exact_known
     return _Evaluation(believed, of_sides, exact, away, by_three, by_theory, cut_short)
@@ -238,11 +209,8 @@ def _is_sure(ladder: Ladder, found: _Evaluation, question: Question) -> Flags:
     window = np.sort(p.window, axis=-1)
     if window.shape[1] > 1:
         margins.append(window[:, -1] - window[:, -2])
-    sure = (
-        np.asarray(np.all(np.abs(margins) > ROUGHLY, axis=0))
-        & ~((fails | found.by_theory) & found.by_three)
-        & ~found.cut_short
-    )
+    sure: Flags = np.all(np.abs(margins) > ROUGHLY, axis=0) & ~found.cut_short
+    sure &= ~((fails | found.by_theory) & found.by_three)
     if ladder.exact_known:
         open_still = np.flatnonzero(sure & ~_meets(ladder, p))
         if len(open_still):
@@ -266,7 +234,7 @@ def _meets(ladder: Ladder, p: Posterior) -> Flags:
 def _is_cut_short(ladder: Ladder, believed: Posterior) -> Flags:
     """Say where noise that may be far less than predicted ends the most probable window."""
     every, last = np.arange(len(ladder.gram)), likely_window(believed)[1]
-    least = least_noise(ladder)[every, last]
+    least = _least_noise(ladder)[every, last]
     return np.asarray(NOISE_FACTOR * least < ladder.floor[every, last])
 
 
@@ -278,28 +246,28 @@ def _with_less_noise(ladder: Ladder, found: _Evaluation, question: Question) -> 
     rows = np.flatnonzero(found.cut_short & ~found.exact)
     if not len(rows):
         return found
-    first = found.some(rows, cut_short=False)
-    less = replace(ladder.some(rows), floor=least_noise(ladder)[rows])
-    other = _evaluate(less, question, LEFT_OUT).some(np.arange(len(rows)), cut_short=False)
     none = np.zeros(len(rows), dtype=bool)
-    code, code_of_other = (_reasons(one, none) for one in (first, other))
-    excluded = _probability(code, other) < RISK
-    added = ~np.isin(code, DECIDED) & np.isin(code_of_other, DECIDED)
-    added &= _probability(code_of_other, first) >= RISK
+    first = replace(found.some(rows), cut_short=none)
+    less = replace(ladder.some(rows), floor=_least_noise(ladder)[rows])
+    other = replace(_evaluate(less, question, LEFT_OUT), cut_short=none)
+    own, others = (_reasons(one, none) for one in (first, other))
+    excluded = _probability(own, other) < RISK
+    added = ~is_one_of(own, *DECIDED) & is_one_of(others, *DECIDED)
+    added &= _probability(others, first) >= RISK
     chosen = excluded | added
     found.replace(rows[chosen], other, chosen)
     found.cut_short[rows] = excluded & ~added
     return found
 
 
-def _probability(codes: Integers, found: _Evaluation) -> Floats:
+def _probability(codes: Codes, found: _Evaluation) -> Floats:
     """Return the probability of what is decided, 1 where nothing is."""
     lower, right, higher = found.sides
-    right = np.where(codes == DECIDED[0], right, lower + higher)
-    return np.where(np.isin(codes, DECIDED), right, 1.0)
+    right = np.where(codes == code("asymptotic"), right, lower + higher)
+    return np.where(is_one_of(codes, *DECIDED), right, 1.0)
 
 
-def _reasons(found: _Evaluation, missed: Flags) -> Integers:
+def _reasons(found: _Evaluation, missed: Flags) -> Codes:
     """Return the reasons of the verdicts, as positions in `REASON_NAMES`; see the head of this module."""
     p, (lower, right, higher) = found.posterior, found.sides
     risk = np.where(found.by_three, RISK_OF_THREE, RISK)
@@ -315,8 +283,7 @@ def _reasons(found: _Evaluation, missed: Flags) -> Integers:
         (p.noise > np.maximum(1.0 - p.noise - p.alternating, p.alternating), "round_off"),
         (p.alternating > 1.0 - p.noise - p.alternating, "oscillating"),
     ]
-    codes = [REASON_NAMES.index(name) for _, name in cases]
-    return np.select([mask for mask, _ in cases], codes, REASON_NAMES.index("pre_asymptotic"))
+    return first_reason(cases, "pre_asymptotic")
 
 
 def _numbers(
@@ -339,3 +306,21 @@ def _numbers(
         "first": np.where(exact, 0, first),
         "last": np.where(exact, n - 1, last),
     }
+
+
+def _is_only_noise(ladder: Ladder, factor: float) -> Flags:
+    """Say where all levels differ by no more than the noise that is expected of them."""
+    n = len(ladder.h)
+    d = np.sqrt(np.diagonal(ladder.gram, axis1=1, axis2=2))[:, : n - 1]
+    allowed = factor * (ladder.floor[:, :-1] + ladder.floor[:, 1:])
+    return np.asarray(np.all(d <= allowed, axis=-1))
+
+
+def _least_noise(ladder: Ladder) -> Floats:
+    """Return the noise of every level if it grows no more than the finest differences show, shape (ladder, n).
+
+    At the coarsest level it is as predicted, since storing numbers makes noise even where differences are 0.
+    """
+    finest = np.sqrt(np.max(np.diagonal(ladder.gram, axis1=1, axis2=2)[:, -2:], axis=-1))
+    least = np.maximum(ladder.floor[:, :1], NOISE_FACTOR * finest[:, None])
+    return np.asarray(np.minimum(ladder.floor, least))

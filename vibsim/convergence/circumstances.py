@@ -76,7 +76,7 @@ def beside_each_other(rows: Sequence[Evidence]) -> Evidence:
 def breakdown(e: Evidence) -> tuple[Flags, Flags, Flags]:
     """Say of every level whether it broke down or is beyond the limit, and of every ladder whether it grows."""
     # at the limit itself a scheme may still be stable, and w dt carries rounding
-    beyond = e.omega_dt > e.stability_limit[..., None] * (1 + 1e-9)
+    beyond = e.omega_dt > e.stability_limit[..., None] * (1.0 + th.LIMIT_ROUNDING)
     last, before = e.growth[..., -1], e.growth[..., -2:][..., 0]
     growing = (last > th.BLOWN_UP) & ~(last < 0.5 * before)
     # long steps go on with a velocity that has gone, and with its rounding: as far as that on every level
@@ -163,14 +163,10 @@ def unresolved(e: Evidence) -> Flags:
     return np.asarray(e.decay > th.RESOLVED_DECAY)
 
 
-def accuracy(e: Evidence) -> Floats:
-    """Return how well the finest error is known."""
-    return np.asarray(th.ABOVE_ROUND_OFF * e.floor[..., -1] + th.EXACT_ACCURACY * e.size)
-
-
 def far_from_exact(e: Evidence) -> Flags:
     """Say where the finest level is further from the exact solution than that is known."""
-    return np.asarray(np.nan_to_num(e.error, nan=0.0) > accuracy(e))
+    known_to = th.ABOVE_ROUND_OFF * e.floor[..., -1] + th.EXACT_ACCURACY * e.size
+    return np.asarray(np.nan_to_num(e.error, nan=0.0) > known_to)
 
 
 def pick(values: Floats, index: Integers) -> Floats:

@@ -1,20 +1,36 @@
-"""Ladders that are judged in blocks, each of them in units of its own size."""
+"""Ladders that are worked on together: few are put beside each other, many are judged in blocks in their own units.
+
+A call of an array operation costs as much as hundreds of numbers, so the few ladders of a small experiment are put
+beside each other. Arrays of many more would not stay in the cache of a core. No number depends on it.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
+from typing import TypeVar
 
 import numpy as np
 
 from vibsim.convergence.error_model.posterior import Ladder
+from vibsim.convergence.reasons import STATUS_OF, code
 from vibsim.core.array_types import Floats, Integers
-from vibsim.core.vocabulary import REASON_NAMES, REASONS, STATUSES
 
+LADDERS = 4096
+"""So many ladders at most are put beside each other; one row of more is worked on by itself."""
 BLOCK = 1024
 """So many ladders are judged together at most."""
 LARGEST_RATIO = 1e60
 """Of a difference to the largest finer one, and of noise to the largest difference: more says no more."""
+
+Row = TypeVar("Row")
+
+
+def batches(rows: Sequence[Row], ladders: int) -> Iterator[Sequence[Row]]:
+    """Yield rows, of so many ladders each, that are worked on together."""
+    size = max(LADDERS // max(ladders, 1), 1)
+    for start in range(0, len(rows), size):
+        yield rows[start : start + size]
 
 
 def in_blocks(
@@ -29,9 +45,9 @@ def in_blocks(
         np.isfinite(ladder.floor), axis=-1
     )
     found = _nothing(count, n)
-    reason = found["reason"] = np.full(count, REASON_NAMES.index("non_finite"))
+    reason = found["reason"] = np.full(count, code("non_finite"))
     if n < 3:
-        reason[finite] = REASON_NAMES.index("too_few_levels")
+        reason[finite] = code("too_few_levels")
     else:
         every = np.flatnonzero(finite)
         for start in range(0, len(every), BLOCK):
@@ -40,8 +56,7 @@ def in_blocks(
             for name, value in work(part, factors).items():
                 in_units = name in ("error", "error_bound", "best_bound")
                 found[name][rows] = value * size if in_units else value
-    status = np.array([STATUSES.index(REASONS[REASON_NAMES[code]]) for code in reason])
-    return {**found, "status": status.astype(np.int8), "reason": reason.astype(np.int8)}
+    return {**found, "status": STATUS_OF[reason], "reason": reason.astype(np.int8)}
 
 
 def _nothing(count: int, levels: int) -> dict[str, np.ndarray]:

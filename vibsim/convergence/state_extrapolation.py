@@ -60,10 +60,6 @@ def _choose(condition: bool, a: Any, b: Any) -> Any:
     return a if condition else b
 
 
-def _itself(value: float) -> float:
-    return value
-
-
 def _so_far(values: Any) -> Any:
     if values.shape[1] < MANY_MEMBERS:
         return np.fmax.accumulate(values, axis=0)
@@ -75,7 +71,7 @@ def _so_far(values: Any) -> Any:
 MANY_MEMBERS = 16
 """From so many members on numpy's own loop over times is slower than one of ours over rows of members."""
 
-FLOATS = Arithmetic(_larger, _smaller, _choose, _itself, bool)
+FLOATS = Arithmetic(_larger, _smaller, _choose, lambda value: value, bool)
 """For one member at one time."""
 ARRAYS = Arithmetic(np.fmax, np.fmin, np.where, _so_far, np.any)
 """For arrays of shape (t, case)."""

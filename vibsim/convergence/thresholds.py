@@ -55,6 +55,7 @@ NOISE_FACTOR, STATED_NOISE_FACTOR = 10.0, 2.0
 
 # ---- Facts from outside a ladder
 
+LIMIT_ROUNDING = 1e-9  # w dt within this part of a stability limit is at the limit [convention]
 BLOWN_UP = 10.0  # a solution so many times larger than the exact one has grown [convention]
 # A step no longer than so many times that in which damping takes a velocity away sees how it goes. [derived]
 RESOLVED_DECAY = 1.0

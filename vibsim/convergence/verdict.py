@@ -37,6 +37,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import partial
 
 import numpy as np
 
@@ -58,8 +59,15 @@ from vibsim.convergence.circumstances import (
 from vibsim.convergence.differences import order_of_ratio, safe_ratio
 from vibsim.convergence.error_model.posterior import Ladder
 from vibsim.convergence.hidden_order import is_promise_hidden
+from vibsim.convergence.reasons import (
+    INCONCLUSIVE,
+    STATUS_OF,
+    code,
+    first_reason,
+    is_one_of,
+    is_open,
+)
 from vibsim.core.array_types import Codes, Flags, Floats, Integers
-from vibsim.core.vocabulary import REASON_NAMES, REASONS, STATUSES
 
 
 @dataclass(frozen=True)
@@ -107,13 +115,11 @@ def judge(e: Evidence) -> Judgement:
         )
         first, last = (np.where(stated, levels[x], -1) for x in (believed.first, believed.last))
     # without a case that applies it is not yet asymptotic
-    codes = [REASON_NAMES.index(reason) for _, reason in cases]
-    reason = np.select([mask for mask, _ in cases], codes, REASON_NAMES.index("pre_asymptotic"))
-    of_reason = np.array([STATUSES.index(status) for status in REASONS.values()], dtype=np.int8)
+    reason = first_reason(cases, "pre_asymptotic")
     # a last estimate is no order of which one could say how surely it is known
-    guess = of_reason[reason] == STATUSES.index("INCONCLUSIVE")
+    guess = is_open(reason)
     return Judgement(
-        status=of_reason[reason],
+        status=STATUS_OF[reason],
         reason=reason.astype(np.int8),
         order=order,
         low=np.where(guess, np.nan, low),
@@ -129,8 +135,8 @@ def _believed(e: Evidence, asked: Flags) -> Decision:
     """Return what the error model says of the ladders that it is asked about, and of all others that they are noise."""
     shape, n = asked.shape, len(e.levels)
     found = Decision(
-        status=np.full(shape, STATUSES.index("INCONCLUSIVE"), dtype=np.int8),
-        reason=np.full(shape, REASON_NAMES.index("round_off"), dtype=np.int8),
+        status=np.full(shape, INCONCLUSIVE, dtype=np.int8),
+        reason=np.full(shape, code("round_off"), dtype=np.int8),
         order=np.full(shape, np.nan),
         low=np.full(shape, np.nan),
         high=np.full(shape, np.nan),
@@ -186,10 +192,7 @@ def _cases(
 
     With them the lower end of the interval, which reaches to a promised power that may hide, and where all is noise.
     """
-
-    def says(*reasons: str) -> Flags:
-        return np.isin(b.reason, [REASON_NAMES.index(reason) for reason in reasons])
-
+    says = partial(is_one_of, b.reason)
     exactly, tol, p = np.isinf(e.order), e.tolerance, _expected(e)
     noise = says("exact") | (says("round_off", "pre_asymptotic") & is_noise(e))
     exact = (exactly | noise) & truly_exact(e)
@@ -200,14 +203,15 @@ def _cases(
     )
     alternating = says("oscillating")
     # neither the higher order nor a failure of the promised one, until the levels exclude this or show it
-    hidden = is_promise_hidden(e, np.where(noise, np.nan, b.order), b.last)
-    lower = np.where(hidden, np.minimum(b.low, e.promised), b.low)
-    hidden &= p >= e.promised - tol
+    hides = is_promise_hidden(e, np.where(noise, np.nan, b.order), b.last)
+    lower = np.where(hides, np.minimum(b.low, e.promised), b.low)
+    hidden = hides & (p >= e.promised - tol)
     # any other power is the accident of where events or corners lie between grid points
     left, rough = e.left_to_the_mesh, ~np.isnan(e.left_to_the_mesh)
     regular = ~rough | (np.abs(b.order - left) <= tol)
-    # two levels may then be near each other, and both be away from the exact solution
-    missed &= ~(rough | ~np.isnan(e.corner)) | errors_stay(e)
+    # two levels may then be near each other, and both be away from the exact solution; so may those be that show only
+    # the higher power
+    missed &= ~(rough | ~np.isnan(e.corner) | hides) | errors_stay(e)
     # a corner leaves all powers up to its own: a ladder that settles lower has another cause
     below = (b.order < p - tol) | np.any(orders[..., -2:] < (p - tol)[..., None], axis=-1)
     kinked = ~np.isnan(e.corner) & (p >= e.corner) & (below | alternating | noise)

@@ -2,7 +2,7 @@
 
 from vibsim.engine.kernel import LANES
 from vibsim.engine.results import EventTimes, Extrema, Gathered, Series, Trajectories
-from vibsim.engine.trajectories import energies, integrate, lane_for, observed
+from vibsim.engine.trajectories import energies, extrema_of, integrate, lane_for, observed
 
 __all__ = [
     "LANES",
@@ -12,6 +12,7 @@ __all__ = [
     "Series",
     "Trajectories",
     "energies",
+    "extrema_of",
     "integrate",
     "lane_for",
     "observed",

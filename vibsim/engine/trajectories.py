@@ -138,6 +138,20 @@ def integrate(
     )
 
 
+def extrema_of(u: Floats, dt: float) -> results.Extrema:
+    """Return peaks and troughs of positions at equal steps, shape (n_samples,), as a run finds those of one member.
+
+    Source: vibration text, section 3.5.
+    """
+    kept = np.full((extrema.N_KEPT, 1, len(u)), np.nan)
+    counts = np.zeros((1, extrema.N_COUNTS_KEPT), dtype=np.int64)
+    for n, near in enumerate(zip(*(u[i:].tolist() for i in range(3)), strict=False), 1):
+        if extrema.is_turned(*near):
+            extrema.note_turned(kept, counts, 0, n, dt, *near)
+    found = counts[:, [extrema.PEAK_COUNT, extrema.TROUGH_COUNT]].T
+    return results.Extrema(*kept[:, :, : found.max()], *found)
+
+
 def _check_shapes(model: Model, parameters: Floats, initial: Floats, members: int) -> None:
     known, wanted = len(model.parameters), (members, len(model.states))
     # what is tabulated stands behind the parameters

@@ -7,39 +7,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from vibsim.core.lazy import loader
+from vibsim.core.lazy import lazy
 
 if TYPE_CHECKING:
-    from vibsim.experiment.collection import collection_of
-    from vibsim.experiment.data import schemes_of
     from vibsim.experiment.experiment import Experiment, canonical, restore
-    from vibsim.experiment.schema.checks import Check, ConvergesCheck, ValueCheck
-    from vibsim.experiment.value_names import VALUES
 
-_HOMES = {
-    "data": ("schemes_of",),
-    "collection": ("collection_of",),
-    "experiment": ("Experiment", "canonical", "restore"),
-    "schema.checks": ("Check", "ConvergesCheck", "ValueCheck"),
-    "value_names": ("VALUES",),
-}
-_HOME = {name: f"vibsim.experiment.{module}" for module, names in _HOMES.items() for name in names}
+__all__ = ["Experiment", "canonical", "restore"]
 
-__all__ = [
-    "VALUES",
-    "Check",
-    "ConvergesCheck",
-    "Experiment",
-    "ValueCheck",
-    "canonical",
-    "collection_of",
-    "restore",
-    "schemes_of",
-]
-
-
-__getattr__ = loader(__name__, _HOME)
-
-
-def __dir__() -> list[str]:
-    return __all__
+__getattr__, __dir__ = lazy(__name__, {".experiment": ("Experiment", "canonical", "restore")})

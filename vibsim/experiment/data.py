@@ -8,11 +8,13 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Annotated, Any, Literal, Self, TypeVar
+from shlex import quote
+from typing import Annotated, Any, Literal, TypeVar
 
 from pydantic import AfterValidator, Field, PrivateAttr, StrictBool
 
 from vibsim.core.errors import Fault, InputError, VibsimError
+from vibsim.core.set_option import set_options
 from vibsim.experiment.collection import ADHOC
 from vibsim.experiment.schema.checks import Check, ConservesCheck, EqualCheck, ValueCheck
 from vibsim.experiment.schema.fields import (
@@ -274,9 +276,13 @@ class Sweep(Section):
         return None if by_model or "time.end" in differ else self.least_end(time)
 
 
-class ReadSection(Section):
-    """What is read from a file."""
+class ReadExperiment(Section):
+    """What every experiment is called, and where it was read."""
 
+    collection: Identifier
+    name: Identifier
+    title: Text
+    source: Text | None
     _file: Path | None = PrivateAttr(default=None)
     _settings: tuple[str, ...] = PrivateAttr(default=())
 
@@ -295,14 +301,26 @@ class ReadSection(Section):
         """What a command line gave in place of values of the file, as ``KEY=VALUE``; not part of its identity."""
         return self._settings
 
+    @property
+    def word(self) -> str:
+        """How a command line names the experiment.
 
-class ExperimentSpec(ReadSection):
+        One that comes with vibsim is named by its collection, any other by its file, in the folder of that file:
+        results hold no path of a machine, and are the same wherever they are made.
+        """
+        file = self._file or Path(f"{self.name}.yaml")
+        word = file.name if self.collection == ADHOC else f"{self.collection}/{file.stem}"
+        is_whole = self.name == file.stem
+        return word if is_whole else f"{word}@{self.name.removeprefix(f'{file.stem}_case_')}"
+
+    def command_of(self, case: int) -> str:
+        """Return the command that runs one member of the sweep alone."""
+        return f"vibsim run {quote(f'{self.word}@{case}')}{set_options(self.settings)}"
+
+
+class ExperimentSpec(ReadExperiment):
     """The fields of an experiment, and what follows from them alone."""
 
-    collection: Identifier
-    name: Identifier
-    title: Text
-    source: Text | None
     model: ModelSpec
     initial: Numbers
     """Initial value of every state."""
@@ -329,29 +347,10 @@ class ExperimentSpec(ReadSection):
     """Present where the run is made in the characteristic units of the model."""
     _notes: tuple[tuple[int, str], ...] = PrivateAttr(default=())
 
-    @classmethod
-    def made_of(cls, spec: ExperimentSpec) -> Self:
-        """Return the experiment of this class with the fields of `spec`, which are checked already."""
-        found: Any = cls.model_construct(**spec.__dict__)
-        made: Self = found
-        return made
-
     @property
     def notes(self) -> tuple[tuple[int, str], ...]:
         """What the file says and probably does not mean: line (0 without one) and text; not part of its identity."""
         return self._notes
-
-    @property
-    def word(self) -> str:
-        """How a command line names the experiment.
-
-        One that comes with vibsim is named by its collection, any other by its file, in the folder of that file:
-        results hold no path of a machine, and are the same wherever they are made.
-        """
-        stem = self._file.stem if self._file else self.name
-        file = self._file.name if self._file else f"{self.name}.yaml"
-        word = file if self.collection == ADHOC else f"{self.collection}/{stem}"
-        return word if self.name == stem else f"{word}@{self.name.removeprefix(f'{stem}_case_')}"
 
     @property
     def members(self) -> int:

@@ -25,7 +25,7 @@ from vibsim.experiment.schema.fields import FrozenDict
 from vibsim.experiment.schema.figures import LEVEL
 from vibsim.experiment.schema.published import PublishedTable, claims
 from vibsim.experiment.schema.sweep import as_option
-from vibsim.experiment.sweep_columns import columns, members_with
+from vibsim.experiment.sweep_columns import Column, columns, members_with
 from vibsim.experiment.validation import read_value
 from vibsim.experiment.yaml.parse import Source
 
@@ -45,7 +45,8 @@ def alone(experiment: AnyExperiment, case: int) -> AnyExperiment:
         name, rule = str(experiment.file or experiment.name), "starts where the member before ends"
         hint = f"run the sweep, or @{case - case % experiment.chain}, which starts as the file says"
         raise InputError([Fault(name, 0, "sweep.follow", str(case), rule, hint)])
-    swept = {key: column[0].item() for key, column in columns(experiment, case, case + 1).items()}
+    own = columns(experiment, case, case + 1)
+    swept = {key: column[0].item() for key, column in own.items()}
     parameters = _filled(swept, "model", experiment.model.parameters)
     # a term that is 0 for this member alone stays, and with it every bit
     model = experiment.model.model_copy(update={"parameters": parameters})
@@ -56,8 +57,7 @@ def alone(experiment: AnyExperiment, case: int) -> AnyExperiment:
     end = swept.get("time.end", float(experiment.natural_end(parameters)))
     # where times are fractions of a member's end, they become times
     unit = end if experiment.end_varies else 1.0
-    published = _published_of(experiment, case, unit)
-    own = columns(experiment, case, case + 1)
+    published = _published_of(experiment, case, unit, own)
     ours = [
         check
         for check in experiment.written
@@ -72,10 +72,8 @@ def alone(experiment: AnyExperiment, case: int) -> AnyExperiment:
     checks += [ConvergesCheck(id=f"check_{i}", converges=u) for i, u in enumerate(positions, 1)]
     # nothing is divided by members any more
     figures = tuple(
-        figure.model_copy(
-            update={"panels": LEVEL if figure.panels == LEVEL else None, "each": None}
-        )
-        for figure in experiment.figures
+        row.model_copy(update={"panels": row.panels if row.panels == LEVEL else None, "each": None})
+        for row in experiment.figures
     )
     found = experiment.model_copy(
         update={
@@ -104,13 +102,16 @@ def _scheme(swept: dict[str, Any], scheme: SchemeSpec) -> SchemeSpec:
     return scheme.model_copy(update={"options": FrozenDict(options)})
 
 
-def _published_of(experiment: ExperimentSpec, case: int, unit: float) -> tuple[PublishedTable, ...]:
-    found, here = [], columns(experiment, case, case + 1)
+def _published_of(
+    experiment: ExperimentSpec, case: int, unit: float, own: Mapping[str, Column]
+) -> tuple[PublishedTable, ...]:
+    """Return the rows of printed tables that are of a member with its `own` swept values."""
+    found = []
     for table in experiment.published:
         ours = (
             row
             for row in table.rows
-            if row.at.case in (None, case) and members_with(here, row.at.swept, 1).all()
+            if row.at.case in (None, case) and members_with(own, row.at.swept, 1).all()
         )
         rows = tuple(row.model_copy(update={"at": _at_of_member(row.at, unit)}) for row in ours)
         if rows:

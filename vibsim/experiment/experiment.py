@@ -61,8 +61,14 @@ class Experiment(ExperimentSpec):
             "schemes": schemes,
             **sections,
         }
-        found = from_objects(type(self), content, name, collection)
-        self.__setstate__(found.__getstate__())
+        self.__setstate__(from_objects(content, name, collection).__getstate__())
+
+    @classmethod
+    def made_of(cls, spec: ExperimentSpec) -> Self:
+        """Return the experiment of this class with all that `spec` holds, which is checked already."""
+        made = cls.__new__(cls)
+        made.__setstate__(spec.__getstate__())
+        return made
 
     @classmethod
     def from_yaml(
@@ -80,7 +86,7 @@ class Experiment(ExperimentSpec):
         path
             A YAML file.
         collection
-            Name of the collection; by default that of `vibsim.experiment.collection_of`.
+            Name of the collection; by default that of `vibsim.experiment.collection.collection_of`.
         configs
             The folder of collections; by default that of the checkout.
         settings
@@ -94,7 +100,7 @@ class Experiment(ExperimentSpec):
         """
         from vibsim.experiment.reading import from_file
 
-        return from_file(cls, Path(path), collection, configs, settings)
+        return cls.made_of(from_file(Path(path), collection, configs, settings))
 
     @classmethod
     def from_dict(
@@ -103,7 +109,7 @@ class Experiment(ExperimentSpec):
         """Build an experiment from what a file would hold; InputError with every fault of it."""
         from vibsim.experiment.reading import from_content
 
-        return from_content(cls, data, name, collection)
+        return cls.made_of(from_content(data, name, collection))
 
     def alone(self, case: int) -> Self:
         """Return the experiment of one member, without a sweep; see `vibsim.experiment.derived`."""

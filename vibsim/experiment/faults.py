@@ -48,6 +48,8 @@ _EXAMPLES: Mapping[Path_, str] = {
     ("time",): "e.g. {end: 10.0}",
     ("model", "rayleigh"): "e.g. {alpha: 0.1, beta: 0.001}",
     ("model", "observe"): "e.g. {tip: 10, stretch: {1: -1, 2: 1}}",
+    ("checks",): "begin each one with `- `",
+    ("model", "events"): "begin each one with `- `",
 }
 """How a list or a mapping is written, where the rule alone would help nobody."""
 
@@ -157,6 +159,8 @@ class Report:
             hint = nearest(value, re.findall(r"'([^']*)'", context["expected"]))
         if kind in ("tuple_type", "dict_type", "model_type", "model_attributes_type"):
             hint = _EXAMPLES.get(path, hint)
+            if path[-1] == "expect":
+                hint = "e.g. {status: FAIL, reason: order_low}"
         if kind in ("missing", "too_long", "tuple_type"):
             path, rule = _whole_list(path, rule)
         # a list with wrong items is too short only for pydantic, which counts the right ones

@@ -50,11 +50,3 @@ class Kinds:
         if section == "model":
             return (*MODELS, *self.own_models)
         return (*SCHEMES, *self.own_schemes)
-
-    def all_models(self) -> dict[str, Model]:
-        """Return every model: for messages, as it imports every package that offers one."""
-        return {**MODELS, **self.own_models}
-
-    def all_schemes(self) -> dict[str, Scheme]:
-        """Return every scheme, likewise."""
-        return {**SCHEMES, **self.own_schemes}

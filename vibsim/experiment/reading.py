@@ -11,7 +11,7 @@ from typing import Any
 
 from vibsim.core.errors import Fault, InputError, nearest
 from vibsim.experiment.collection import collection_of
-from vibsim.experiment.data import AnyExperiment, ExperimentSpec, ModelSpec, Sweep, TimeSpec
+from vibsim.experiment.data import ExperimentSpec, ModelSpec, Sweep, TimeSpec
 from vibsim.experiment.faults import MISSING, Report, shorten
 from vibsim.experiment.kinds import Kinds
 from vibsim.experiment.repeat import with_repeats
@@ -22,7 +22,7 @@ from vibsim.experiment.rules.figures import check_figures
 from vibsim.experiment.rules.model import Equation, are_known
 from vibsim.experiment.rules.model import equation as read_equation
 from vibsim.experiment.rules.scaling import Numbers, characteristic
-from vibsim.experiment.rules.starts import Starts, check_starts
+from vibsim.experiment.rules.starts import check_starts
 from vibsim.experiment.rules.structure import check_histories
 from vibsim.experiment.rules.sweep import read_sweep
 from vibsim.experiment.rules.timing import rising_levels
@@ -54,31 +54,23 @@ _PERIODIC = re.compile(rf"(.+)\1{{{MAX_REPEATS - 1}}}$")
 
 
 def from_file(
-    kind: type[AnyExperiment],
-    path: Path,
-    collection: str | None,
-    configs: Path | None,
-    settings: Sequence[str] = (),
-) -> AnyExperiment:
+    path: Path, collection: str | None, configs: Path | None, settings: Sequence[str]
+) -> ExperimentSpec:
     """Read the experiment file at `path`; see `vibsim.experiment.Experiment.from_yaml`."""
     source = with_settings(read(path, list(Document.model_fields)), settings)
     if (place := source.place((SOLVER,))) is not None:
         rule = "belongs to an experiment with a solver of the user, which vibsim run makes"
         hint = "in Python, vibsim.judge compares levels"
         raise InputError([Fault(str(path), place.key_line, SOLVER, "", rule, hint)])
-    return build(kind, source, collection or collection_of(path, configs), path.stem, path)
+    return build(source, collection or collection_of(path, configs), path.stem, path)
 
 
-def from_content(
-    kind: type[AnyExperiment], data: Mapping[str, Any], name: str, collection: str
-) -> AnyExperiment:
+def from_content(data: Mapping[str, Any], name: str, collection: str) -> ExperimentSpec:
     """Build an experiment from `data`; see `vibsim.experiment.Experiment.from_dict`."""
-    return build(kind, Source(name, _plain(data, name)), collection, name)
+    return build(Source(name, _plain(data, name)), collection, name)
 
 
-def from_objects(
-    kind: type[AnyExperiment], data: Mapping[str, Any], name: str, collection: str
-) -> AnyExperiment:
+def from_objects(data: Mapping[str, Any], name: str, collection: str) -> ExperimentSpec:
     """Build an experiment from what a file would hold, with models and schemes themselves in place of their kinds."""
     given: dict[type[Model | Scheme], list[Any]] = {Model: [], Scheme: []}
 
@@ -100,7 +92,7 @@ def from_objects(
         "schemes": [named(scheme) for scheme in schemes] if are_listed else schemes,
     }
     kinds = Kinds(MODELS.own(given[Model]), SCHEMES.own(given[Scheme]))
-    return build(kind, Source(name, _plain(content, name)), collection, name, kinds=kinds)
+    return build(Source(name, _plain(content, name)), collection, name, kinds=kinds)
 
 
 def _plain(data: Any, name: str, depth: int = 0) -> Any:
@@ -122,22 +114,20 @@ def _plain(data: Any, name: str, depth: int = 0) -> Any:
 
 
 def build(
-    kind: type[AnyExperiment],
     source: Source,
     collection: str,
     name: str,
     file: Path | None = None,
     kinds: Kinds | None = None,
-) -> AnyExperiment:
-    """Validate what `source` holds and fill in every default; `kind` is the class of what is built.
+) -> ExperimentSpec:
+    """Validate what `source` holds and fill in every default.
 
     `kinds` says which models and schemes it may name, by default those that are registered.
 
     InputError with every fault of the file.
     """
     report = Report(source, kinds)
-    for what, text in (("experiment", name), ("collection", collection)):
-        check_name(f"the name of the {what}, '{shorten(text)}',", text, report)
+    check_names(name, collection, report)
     source = with_repeats(source, report)
     document = read_document(source, report)
     swept = sorted(set(_keys(source.data.get("sweep"))))
@@ -184,7 +174,7 @@ def build(
     report.raise_any()
     assert model is not None
     assert numbers.time is not None
-    spec = ExperimentSpec(
+    experiment = ExperimentSpec(
         collection=collection,
         name=name,
         **{key: getattr(document, key) for key in AS_WRITTEN},
@@ -207,8 +197,7 @@ def build(
         scaling=numbers.scaling,
     )
     if model.kind in report.kinds.own_models:
-        spec.model.hold(report.kinds.own_models[model.kind])
-    experiment = kind.made_of(spec)
+        experiment.model.hold(report.kinds.own_models[model.kind])
     experiment._file, experiment._settings = file, source.settings
     size_limits.check_files(experiment, report)
     report.raise_any()
@@ -228,7 +217,7 @@ def _check_members(
     model, parameters = equation.model, equation.parameters
     if time is None or model is None or not are_known(model, parameters):
         return
-    numbers = members.MemberNumbers(model, parameters, time, sweep.axes)
+    numbers = members.MemberNumbers(model, parameters, initial, time, sweep.axes)
     members.check_ends(numbers, report)
     for table in equation.tables:
         members.check_length(numbers, table, report)
@@ -238,18 +227,19 @@ def _check_members(
     members.check_jumps(numbers, equation.formulas, report)
     if sweep.follow is not None:
         continuation.check_equation(model, numbers, report)
-    starts = Starts(model, parameters, initial, sweep.axes)
-    check_starts(starts, equation.formulas, report)
+    check_starts(numbers, equation.formulas, report)
 
 
-def check_name(what: str, text: str, report: Report) -> None:
-    """Note what is wrong with the name of an experiment or a collection, which `what` says."""
-    if not re.fullmatch(IDENTIFIER, text):
-        report.add((), f"{what} must consist of a to z, 0 to 9 and _")
-    elif len(text) > MAX_NAME:
-        report.add((), f"{what} must not be longer than {MAX_NAME} characters")
-    elif _PERIODIC.search(text):
-        report.add((), f"{what} must not end with {MAX_REPEATS} times the same")
+def check_names(experiment: str, collection: str, report: Report) -> None:
+    """Note what is wrong with the names of an experiment and its collection."""
+    for what, name in (("experiment", experiment), ("collection", collection)):
+        who = f"the name of the {what}, '{shorten(name)}',"
+        if not re.fullmatch(IDENTIFIER, name):
+            report.add((), f"{who} must consist of a to z, 0 to 9 and _")
+        elif len(name) > MAX_NAME:
+            report.add((), f"{who} must not be longer than {MAX_NAME} characters")
+        elif _PERIODIC.search(name):
+            report.add((), f"{who} must not end with {MAX_REPEATS} times the same")
 
 
 def _keys(section: Any) -> Iterator[str]:
@@ -263,7 +253,7 @@ def _levels(document: Any, source: Source, report: Report) -> tuple[int, ...]:
     """Return the levels; none where the section is missing or faulty, or a tolerance stands for it."""
     given = [key for key in ("levels", "tolerance") if source.data.get(key) is not None]
     if not given:
-        report.add(("levels",), MISSING, "or tolerance")
+        report.add(("levels",), MISSING, "e.g. {from: 6, to: 9}, or tolerance in its place")
     elif len(given) > 1:
         report.add(("tolerance",), "must not be given together with levels", at_key=True)
     return rising_levels(document.levels, report)

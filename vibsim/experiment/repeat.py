@@ -78,7 +78,7 @@ class _Writer:
         """Return a mapping with its keys written out, in their order; those without an index take precedence."""
         found: dict[str, Any] = {}
         for key, value in written.items():
-            for values in self._values((*path, key), str(key)):
+            for values in self._values(str(key)):
                 own = self._put((*path, key), str(key), values)
                 if own == key or own not in written:
                     found[own] = self._value((*path, key), value, values)
@@ -91,11 +91,11 @@ class _Writer:
             return [
                 self._put((*path, i), item, own) if isinstance(item, str) else item
                 for i, item in enumerate(value)
-                for own in (self._values((*path, i), item) if isinstance(item, str) else [{}])
+                for own in (self._values(item) if isinstance(item, str) else [{}])
             ]
         return self._put(path, value, values) if isinstance(value, str) else value
 
-    def _values(self, path: Path_, text: str) -> Iterator[dict[str, int]]:
+    def _values(self, text: str) -> Iterator[dict[str, int]]:
         """Yield the values of the indices in a text, the last one fastest; once nothing where it has none."""
         names = dict.fromkeys(match[1] for match in _INDEX.finditer(text))
         known = {name: self.indices[name] for name in names if name in self.indices}

@@ -101,14 +101,11 @@ def _path(top: Node, key: str, refuse: _Refusal) -> Path_:
 
 def _name(node: Node | None, path: Path_, rest: str) -> str:
     """Return the next key: the longest one that is there, else up to the next dot, of swept keys up to the end."""
-    known = [key for key in (node.keys if node else None) or () if _begins(rest, key)]
+    there = filter(None, (node.keys if node else None) or ())
+    known = [key for key in there if rest == key or rest.startswith((f"{key}.", f"{key}["))]
     end = r"[^\[]*" if path[-1:] in _OF_MEMBERS else r"[^.\[]*"
     found = re.match(end, rest)
     return max(known, key=len) if known else found[0] if found else ""
-
-
-def _begins(rest: str, key: str) -> bool:
-    return bool(key) and (rest == key or rest.startswith((f"{key}.", f"{key}[")))
 
 
 def _check_index(node: Node | None, path: Path_, place: int, refuse: _Refusal) -> None:

@@ -15,10 +15,9 @@ from typing import Annotated, Any
 
 from pydantic import AfterValidator
 
-from vibsim.experiment.collection import ADHOC
-from vibsim.experiment.data import ReadSection, Sweep, check_member
+from vibsim.experiment.data import ReadExperiment, Sweep, check_member
 from vibsim.experiment.schema.checks import as_data, without_kind
-from vibsim.experiment.schema.fields import FrozenDict, Identifier, Section, Text
+from vibsim.experiment.schema.fields import FrozenDict, Section, Text
 from vibsim.experiment.schema.solver import (
     PLACE,
     Kind,
@@ -43,13 +42,9 @@ class SolverSpec(Section):
     """Paths of files that it depends on, from the folder of the experiment file."""
 
 
-class SolverExperiment(ReadSection):
+class SolverExperiment(ReadExperiment):
     """One experiment with a solver of the user."""
 
-    collection: Identifier
-    name: Identifier
-    title: Text
-    source: Text | None
     solver: SolverSpec
     sizes: Annotated[dict[str, tuple[int | float, ...]], AfterValidator(FrozenDict)]
     """Of every level, the coarsest first; the first name is the step size."""
@@ -63,13 +58,6 @@ class SolverExperiment(ReadSection):
     """Parameters of one member alone."""
     resources: ResourcesSection
     checks: tuple[SolverCheck, ...]
-
-    @property
-    def word(self) -> str:
-        """How a command line names the experiment; see `vibsim.experiment.Experiment.word`."""
-        stem = self._file.stem if self._file else self.name
-        file = self._file.name if self._file else f"{self.name}.yaml"
-        return file if self.collection == ADHOC else f"{self.collection}/{stem}"
 
     @property
     def step(self) -> str:

@@ -12,7 +12,7 @@ from vibsim.core.errors import nearest
 from vibsim.experiment.collection import collection_of
 from vibsim.experiment.data import Sweep
 from vibsim.experiment.faults import Report
-from vibsim.experiment.reading import KEYS, SOLVER, check_name
+from vibsim.experiment.reading import KEYS, SOLVER, check_names
 from vibsim.experiment.rules.checks import check_expect, check_ids, given_one
 from vibsim.experiment.rules.size_limits import MAX_FILES
 from vibsim.experiment.rules.sweep import SweepReader
@@ -45,21 +45,19 @@ def from_file(path: Path) -> SolverExperiment:
 def read_solver(source: Source, collection: str, file: Path) -> SolverExperiment:
     """Validate what `source` holds and fill in every default; InputError with every fault of the file."""
     report, name = Report(source), file.stem
-    for what, text in (("experiment", name), ("collection", collection)):
-        check_name(f"the name of the {what}, '{text}',", text, report)
+    check_names(name, collection, report)
     document = read_document(source, report, SolverDocument)
     numbers, sizes = _sizes(document.refine, report)
     sweep, whole = _sweep(document.sweep, source, report)
     # as written, faulty or not: nothing more is said about placeholders of what is faulty
-    names = {
-        "sizes": [name for name in _keys(source.data.get("refine")) if name != "levels"],
-        "sweep": [name for name, _ in _written(source.data.get("sweep"))],
-    }
-    _check_names(names, document.quantities, report)
-    has_level = "levels" in _keys(source.data.get("refine"))
-    solver = _solver(document.solver, names, has_level=has_level, report=report)
+    refined, swept = _keys(source.data.get("refine")), list(_written(source.data.get("sweep")))
+    size_names = [name for name in refined if name != "levels"]
+    swept_names = [name for name, _ in swept]
+    _check_names(size_names, swept_names, document.quantities, report)
+    of_level = [*size_names, *(["level"] if "levels" in refined else [])]
+    solver = _solver(document.solver, of_level, swept_names, report)
     checks = _checks(document, report)
-    numbers_of = [key for key, values in _written(source.data.get("sweep")) if not _is_text(values)]
+    numbers_of = [name for name, values in swept if not _is_text(values)]
     _check_exact(document.quantities, numbers_of, report)
     report.raise_any()
     assert solver is not None
@@ -104,20 +102,20 @@ def _sizes(section: Any, report: Report) -> tuple[tuple[int, ...], dict[str, tup
             values = tuple(map(int, written)) if _is_whole(raw[name]) else written
         if values:
             found[name] = values
-    count = len(numbers) or len(next(iter(found.values()), ()))
+    step, steps = next(iter(found.items()), ("", ()))
+    count = len(numbers) or len(steps)
     for name, values in found.items():
         if len(values) != count:
-            of = "there are levels" if numbers else f"{next(iter(found))} has"
+            of = "there are levels" if numbers else f"{step} has"
             rule = f"must have as many values as {of}, {count}, has {len(values)}"
             report.add(("refine", name), rule, at_key=True)
     if count > MOST_LEVELS:
         report.add(("refine",), f"must not have more than {MOST_LEVELS} levels, has {count}")
-    for i, size in enumerate(next(iter(found.values()), ())):
-        path = ("refine", next(iter(found)), i)
+    for i, size in enumerate(steps):
         if not size > 0.0:
-            report.add(path, "a step size must be greater than 0", value=size)
-        elif size in next(iter(found.values()))[:i]:
-            report.add(path, "a step size must not be repeated", value=size)
+            report.add(("refine", step, i), "a step size must be greater than 0", value=size)
+        elif size in steps[:i]:
+            report.add(("refine", step, i), "a step size must not be repeated", value=size)
     return numbers, found
 
 
@@ -199,13 +197,13 @@ def _is_name(text: str) -> bool:
 
 
 def _check_names(
-    names: Mapping[str, list[str]], quantities: Mapping[str, Any], report: Report
+    sizes: Sequence[str], swept: Sequence[str], quantities: Mapping[str, Any], report: Report
 ) -> None:
     """Check that names of sizes, parameters, quantities and coordinates can stand side by side."""
     taken: dict[str, str] = {}
     places: list[tuple[Path_, str, str]] = [
-        *((("refine", name), name, "a size") for name in names["sizes"]),
-        *((("sweep", name), name, "a swept parameter") for name in names["sweep"]),
+        *((("refine", name), name, "a size") for name in sizes),
+        *((("sweep", name), name, "a swept parameter") for name in swept),
         *((("quantities", name), name, "a quantity") for name in quantities),
     ]
     for path, name, what in places:
@@ -229,9 +227,9 @@ def _check_names(
 
 
 def _solver(
-    section: Any, names: Mapping[str, list[str]], *, has_level: bool, report: Report
+    section: Any, of_level: Sequence[str], swept: Sequence[str], report: Report
 ) -> SolverSpec | None:
-    """Return how levels are made; None where that is faulty."""
+    """Return how levels are made, by names `of_level` and `swept` ones; None where that is faulty."""
     kind = None if section is None else given_one(section, KINDS, (SOLVER,), report)
     if not kind:
         return None
@@ -240,13 +238,13 @@ def _solver(
         rule = "belong to a command or a function: a file that is there is an input itself"
         report.add((SOLVER, "inputs"), rule, at_key=True)
     if kind != "python":
-        _check_template(kind, text, names, has_level, report)
+        _check_template(kind, text, of_level, swept, report)
     known: Kind = next(name for name in KINDS if name == kind)
     return SolverSpec.model_construct(kind=known, text=text, inputs=section.inputs)
 
 
 def _check_template(
-    kind: str, text: str, names: Mapping[str, list[str]], has_level: bool, report: Report
+    kind: str, text: str, of_level: Sequence[str], swept: Sequence[str], report: Report
 ) -> None:
     """Check the placeholders of a command or of the path of a file."""
     path = (SOLVER, kind)
@@ -265,18 +263,17 @@ def _check_template(
         report.add(path, "must name a program", value=text)
     if kind == "files" and not text.lower().endswith(ENDINGS):
         report.add(path, f"must end with {' or '.join(ENDINGS)}", value=text)
-    levels = [*names["sizes"], *(["level"] if has_level else [])]
-    known = [*levels, *names["sweep"]]
+    known = [*of_level, *swept]
     known += [*OUTPUTS, "threads"] if kind == "command" else []
     unknown = [name for name in dict.fromkeys(used) if name not in known]
     for name in unknown:
         report.add(path, f"unknown placeholder {{{name}}}", nearest(name, known), text)
-    if not set(used) & set(levels) and levels and not unknown:
-        hint = "e.g. {" + levels[0] + "}"
+    if not set(used) & set(of_level) and of_level and not unknown:
+        hint = "e.g. {" + of_level[0] + "}"
         report.add(path, "has no placeholder that differs between levels", hint, text)
     if kind == "command" and not set(used) & set(OUTPUTS) and not unknown:
         report.add(path, "has no placeholder for the file that it writes", "{output}", text)
-    for name in names["sweep"]:
+    for name in swept:
         if name not in used:
             rule = f"is no placeholder of `{kind}:`, so it would change nothing"
             report.add(("sweep", name), rule, f"write {{{name}}} where it belongs", at_key=True)

@@ -83,11 +83,10 @@ def columns_of(axes: Sequence[Axis], start: int, stop: int) -> dict[str, Column]
             blocks, place = _block(axis, first % axis.count, last % axis.count + 1), turn - first
         else:
             # the range ends in the next turn of the axis
-            ends = (
-                _block(axis, first % axis.count, axis.count),
-                _block(axis, 0, last % axis.count + 1),
-            )
-            blocks, place = [np.concatenate(pair) for pair in zip(*ends, strict=True)], turn - first
+            head = _block(axis, first % axis.count, axis.count)
+            tail = _block(axis, 0, last % axis.count + 1)
+            pairs = zip(head, tail, strict=True)
+            blocks, place = [np.concatenate(pair) for pair in pairs], turn - first
         found |= {key: block[place] for key, block in zip(axis.keys, blocks, strict=True)}
     return found
 
@@ -142,9 +141,8 @@ def _power(first: float, last: float, n: int, start: int, stop: int) -> Floats:
     out exact.
     """
     context = Context(prec=_DIGITS)
-    rise = context.divide(
-        context.subtract(context.ln(Decimal(last)), context.ln(Decimal(first))), Decimal(n - 1)
-    )
+    height = context.subtract(context.ln(Decimal(last)), context.ln(Decimal(first)))
+    rise = context.divide(height, Decimal(n - 1))
     ratio = context.exp(rise)
     value = context.multiply(Decimal(first), context.exp(context.multiply(rise, Decimal(start))))
     found = np.empty(stop - start)

@@ -234,7 +234,7 @@ degree_Fahrenheit = 5 / 9 * kelvin; offset: 255.372222 = degF = fahrenheit
 """In the notation of pint's definition files."""
 _OFFERED = """
 m km cm mm kg g s ms min h day rad deg turn rpm Hz N kN Pa J W A V C ohm F H K t % percent
-metre meter gram second minute hour radian degree newton joule
+metre meter gram second minute hour sec radian degree newton joule
 """
 """What a message offers in place of an unknown name."""
 _WORDS = """

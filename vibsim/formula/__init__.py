@@ -6,7 +6,7 @@ allow-list of what it may hold: numbers, declared names, ``+ - * / **``, compari
 evaluated as Python.
 """
 
-from vibsim.formula.algebra import is_multiple, is_zero, minus, over, plus, tidied, times
+from vibsim.formula.algebra import is_multiple, is_zero, tidied
 from vibsim.formula.arrays import bounds, values
 from vibsim.formula.calculus import derivative, has_rule, integral
 from vibsim.formula.jumps import Pulses, Switch, first_jump, held, hidden_pulses
@@ -36,6 +36,6 @@ __all__ = [
     "CONSTANTS", "FUNCTIONS", "MAX_CHARACTERS", "MAX_DEPTH", "ONE", "ZERO", "Binary", "Call",
     "Compare", "Expression", "ExpressionError", "Name", "Negate", "Number", "Pulses", "Switch",
     "bounds", "constant", "derivative", "evaluate", "first_jump", "has_rule", "held", "hidden_pulses", "integral",
-    "is_multiple", "is_zero", "literal", "minus", "names_in", "over", "parse", "plus", "put",
-    "rebuilt", "size", "tidied", "times", "to_formula", "to_statements", "values", "walk",
+    "is_multiple", "is_zero", "literal", "names_in", "parse", "put",
+    "rebuilt", "size", "tidied", "to_formula", "to_statements", "values", "walk",
 ]  # fmt: skip

@@ -8,6 +8,7 @@ from vibsim.formula.parser import parse
 from vibsim.formula.render import evaluate
 from vibsim.formula.tree import (
     ONE,
+    OPERATORS,
     STEPS,
     ZERO,
     Binary,
@@ -24,36 +25,7 @@ from vibsim.formula.tree import (
     walk,
 )
 
-
-def times(left: Expression, right: Expression) -> Expression:
-    """Return the product of two formulas, without factors 0 and 1."""
-    if ZERO in (left, right):
-        return ZERO
-    if ONE in (left, right):
-        return right if left == ONE else left
-    return Binary("*", left, right)
-
-
-def over(left: Expression, right: Expression) -> Expression:
-    """Return the quotient of two formulas."""
-    return left if right == ONE else Binary("/", left, right)
-
-
-def plus(left: Expression, right: Expression) -> Expression:
-    """Return the sum of two formulas, without 0."""
-    if left == ZERO:
-        return right
-    return left if right == ZERO else Binary("+", left, right)
-
-
-def minus(left: Expression, right: Expression) -> Expression:
-    """Return the difference of two formulas, without 0."""
-    if right == ZERO:
-        return left
-    return Negate(right) if left == ZERO else Binary("-", left, right)
-
-
-_OPERATIONS = {"+": plus, "-": minus, "*": times, "/": over}
+_OPERATIONS = {symbol: OPERATORS[symbol] for symbol in "+-*/"}
 
 
 @cache
@@ -142,7 +114,7 @@ def slope_of(node: Expression, name: str, *, with_start: bool = True) -> Express
             return Negate(found) if found is not None and symbol == "-" else found
         case Binary("*", left, right) if name not in names_in(left):
             found = inner(right)
-            return None if found is None else times(left, found)
+            return None if found is None else left * found
         case Binary("*" | "/" as symbol, left, right) if name not in names_in(right):
             found = inner(left)
             return None if found is None else _OPERATIONS[symbol](found, right)

@@ -118,6 +118,7 @@ def _bounds(node: Expression, numbers: Mapping[str, Any]) -> Interval:
         case Call(function, arguments):
             inner = [_bounds(argument, numbers) for argument in arguments]
             return _known(*_called(function, inner))
+    raise AssertionError(node)
 
 
 def _times(a: Interval, b: Interval) -> Interval:

@@ -16,7 +16,7 @@ from functools import partial, reduce
 
 import numpy as np
 
-from vibsim.formula.algebra import filled, minus, plus, slope_of, times
+from vibsim.formula.algebra import filled, slope_of
 from vibsim.formula.arrays import values
 from vibsim.formula.parser import ExpressionError
 from vibsim.formula.tree import (
@@ -97,26 +97,25 @@ def _derivative(node: Expression, name: str) -> Expression:
         case Name(own):
             return ONE if own == name else ZERO
         case Negate(operand):
-            return minus(ZERO, _derivative(operand, name))
-        case Binary("+" | "-" as symbol, left, right):
-            parts = _derivative(left, name), _derivative(right, name)
-            return plus(*parts) if symbol == "+" else minus(*parts)
+            return -_derivative(operand, name)
+        case Binary("+", left, right):
+            return _derivative(left, name) + _derivative(right, name)
+        case Binary("-", left, right):
+            return _derivative(left, name) - _derivative(right, name)
         case Binary("*", left, right):
-            first = times(_derivative(left, name), right)
-            return plus(first, times(left, _derivative(right, name)))
+            return _derivative(left, name) * right + left * _derivative(right, name)
         case Binary("/", left, right):
             # not over right**2, which overflows before the quotient does
-            change = times(node, _derivative(right, name))
-            return _over(minus(_derivative(left, name), change), right)
+            return _over(_derivative(left, name) - node * _derivative(right, name), right)
         case Binary("**", base, exponent):
             by_base, value = _derivative(base, name), literal(exponent)
             if value is not None:
                 lowered = Binary("**", base, number(value - 1.0))
                 power = base if value == 2.0 else ONE if value == 1.0 else lowered
-                return times(times(number(value), power), by_base)
+                return number(value) * power * by_base
             lowered = Binary("**", base, Binary("-", exponent, ONE))
-            by_exponent = times(times(node, Call("log", (base,))), _derivative(exponent, name))
-            return plus(times(times(exponent, lowered), by_base), by_exponent)
+            by_exponent = node * Call("log", (base,)) * _derivative(exponent, name)
+            return exponent * lowered * by_base + by_exponent
         case Call(function, arguments):
             return _of_call(node, function, arguments, name)
     return ZERO
@@ -130,7 +129,7 @@ def _of_call(
         return ZERO
     x, *more = arguments
     if function in _RULES:
-        return times(filled(_RULES[function], x=x, f=node), dx)
+        return filled(_RULES[function], x=x, f=node) * dx
     if function == "where":
         return Call("where", (x, *others))
     [y], [dy] = more, others
@@ -140,15 +139,15 @@ def _of_call(
         case "max":
             return filled("where(x >= y, dx, dy)", x=x, y=y, dx=dx, dy=dy)
         case "atan2":
-            return _over(minus(times(y, dx), times(x, dy)), filled("x**2 + y**2", x=x, y=y))
+            return _over(y * dx - x * dy, filled("x**2 + y**2", x=x, y=y))
         case "hypot":
             # 0 where both are 0, as that of abs
             by_x, by_y = (filled("part/(f + (f == 0))", part=part, f=node) for part in (x, y))
-            return plus(times(by_x, dx), times(by_y, dy))
+            return by_x * dx + by_y * dy
         case "mod":
             # the whole number that mod has taken away, which a rounded quotient may miss by 1
             taken = filled("round((x - f)/y)", x=x, y=y, f=node)
-            return minus(dx, times(taken, dy))
+            return dx - taken * dy
     raise NotImplementedError(f"{function} has no derivative here")
 
 
@@ -274,6 +273,13 @@ def _found(node: Expression, name: str) -> Expression | None:
             if more <= 1.0:
                 return None
             return _of_linear("max(x, 0)**n/n", x, node, name, n=Number(more))
+        case Binary("**", base, exponent):
+            # a spring between two coordinates; the powers of u - 1 are left to points, whose sum does not cancel
+            power, start = literal(exponent) or 0.0, put(base, name, ZERO)
+            is_spring = bool(names_in(start)) or values(start, {}) == 0.0
+            if power < 1.0 or not power.is_integer() or not is_spring:
+                return None
+            return _of_linear("x**n/n", base, node, name, n=Number(power + 1.0))
         case Call("where", (condition, yes, no)) if is_free(condition):
             first, second = _found(yes, name), _found(no, name)
             if first is None or second is None:

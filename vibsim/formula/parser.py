@@ -45,6 +45,7 @@ INSTEAD = {
     **{"^": "** for a power", "%": "mod(x, y)", "&": "and", "|": "or", "\u03c0": "pi"},
     **dict.fromkeys("\u00d7\u00b7\u22c5", "*"),
     **dict.fromkeys("\u2212\u2013", "-"),
+    **{"'": "the name of the velocity, such as v", "\u2019": "the name of the velocity, such as v"},
     **{"\u00f7": "/", "\u00b2": "**2", "\u00b3": "**3"},
 }
 """What to write for a character that is not allowed."""

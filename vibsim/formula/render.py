@@ -83,6 +83,7 @@ def _value(node: Expression, values: Mapping[str, float]) -> float:
         case Call(function, arguments):
             found = [_value(argument, values) for argument in arguments]
             return _existing(FUNCTIONS[function][1](*found))
+    raise AssertionError(node)
 
 
 def _existing(value: float) -> float:
@@ -140,6 +141,7 @@ def _written(node: Expression) -> tuple[str, int]:
             return f"{_within(left, least)} {symbol} {_within(right, least)}", _COMPARED
         case Call(function, arguments):
             return f"{function}({', '.join(_within(a, 0) for a in arguments)})", _ATOM
+    raise AssertionError(node)
 
 
 def _within(node: Expression, least: int) -> str:

@@ -1,4 +1,4 @@
-"""The tree of a formula: six kinds of node, all frozen."""
+"""The tree of a formula: six kinds of node, all frozen, of which the operators ``+ - * /`` make further formulas."""
 
 from __future__ import annotations
 
@@ -12,29 +12,56 @@ from typing import Any
 from vibsim.elementary import ELEMENTARY
 
 
+class Expression:
+    """A formula. A sum, product or quotient of two has no terms 0 and no factors 1; a product with 0 is 0."""
+
+    def __add__(self, right: Expression) -> Expression:
+        if self == ZERO:
+            return right
+        return self if right == ZERO else Binary("+", self, right)
+
+    def __sub__(self, right: Expression) -> Expression:
+        if right == ZERO:
+            return self
+        return Negate(right) if self == ZERO else Binary("-", self, right)
+
+    def __neg__(self) -> Expression:
+        return ZERO - self
+
+    def __mul__(self, right: Expression) -> Expression:
+        if ZERO in (self, right):
+            return ZERO
+        if ONE in (self, right):
+            return right if self == ONE else self
+        return Binary("*", self, right)
+
+    def __truediv__(self, right: Expression) -> Expression:
+        return self if right == ONE else Binary("/", self, right)
+
+
 @dataclass(frozen=True)
-class Number:
+class Number(Expression):
     """A finite number that is not negative."""
 
     value: float
 
 
 @dataclass(frozen=True)
-class Name:
+class Name(Expression):
     """A state, the time or a parameter."""
 
     name: str
 
 
 @dataclass(frozen=True)
-class Negate:
+class Negate(Expression):
     """``-operand``."""
 
     operand: Expression
 
 
 @dataclass(frozen=True)
-class Binary:
+class Binary(Expression):
     """``left operator right`` with an operator out of ``+ - * / **``."""
 
     operator: str
@@ -43,7 +70,7 @@ class Binary:
 
 
 @dataclass(frozen=True)
-class Compare:
+class Compare(Expression):
     """``left operator right`` with an operator out of ``< <= > >= == !=``; its value is 1 or 0."""
 
     operator: str
@@ -52,16 +79,15 @@ class Compare:
 
 
 @dataclass(frozen=True)
-class Call:
+class Call(Expression):
     """A call of one of `FUNCTIONS`."""
 
     function: str
     arguments: tuple[Expression, ...]
 
 
-Expression = Number | Name | Negate | Binary | Compare | Call
-
-ZERO, ONE = Number(0.0), Number(1.0)
+ZERO: Expression = Number(0.0)
+ONE: Expression = Number(1.0)
 CONSTANTS: Mapping[str, float] = {"pi": math.pi, "e": math.e}
 """Names that stand for a number wherever a formula does not declare them otherwise."""
 

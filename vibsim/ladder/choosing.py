@@ -17,8 +17,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from vibsim import plan
-from vibsim.comparison.best_solution import methods, start_of
+from vibsim.comparison.best_solution import starts
 from vibsim.comparison.extrapolate_members import (
     Extrapolated,
     Method,
@@ -30,6 +29,7 @@ from vibsim.comparison.extrapolate_members import (
 from vibsim.convergence.state_extrapolation import Pair
 from vibsim.core.array_types import Floats, Integers
 from vibsim.core.errors import Fault, InputError, VibsimError
+from vibsim.experiment import storage, sweep_columns
 from vibsim.experiment.schema.fields import MAX_LEVEL
 from vibsim.ladder.solving import climb
 from vibsim.simulation.members import Members, members
@@ -163,9 +163,9 @@ def _runs(experiment: Experiment) -> list[_Run]:
     group = _gathered(experiment, cases)
     names = [scheme.name for scheme in experiment.schemes]
     return [
-        _Run(method, names[i], start_of(method, group, where), cases[where], [], [])
+        _Run(method, names[i], start, cases[where], [], [])
         for i in experiment.ladder
-        for method, where in methods(experiment, i, group)
+        for method, start, where in starts(experiment, i, group)
     ]
 
 
@@ -179,7 +179,7 @@ def pilot(experiment: Experiment) -> Integers:
     corners = itertools.islice(itertools.product(*ends), PILOT // 2)
     found = [0, count - 1, *(int(np.ravel_multi_index(corner, shape)) for corner in corners)]
     if count <= SEARCHED:
-        columns = plan.columns(experiment, 0, count)
+        columns = sweep_columns.columns(experiment, 0, count)
         numbers = [c for c in columns.values() if c.dtype.kind == "f"]
         found += [int(place) for c in numbers for place in (np.argmin(c), np.argmax(c))]
     # multiples of the golden ratio leave no large gap, however many there are
@@ -226,7 +226,7 @@ def _largest(found: Extrapolated) -> Floats:
 def _is_enough(chosen: Experiment, runs: Sequence[_Run], tolerance: float) -> bool:
     """Tell whether an experiment reaches the tolerance at every time that would be stored."""
     steps = tuple(chosen.steps(level) for level in chosen.levels)
-    points = steps[0] // plan.sampling(chosen, chosen.levels[0])
+    points = steps[0] // storage.sampling(chosen, chosen.levels[0])
     found = (climb(run.method, run.start, steps, points) for run in runs)
     return all(bool(np.all(_largest(one) <= tolerance)) for one in found)
 

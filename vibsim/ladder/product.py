@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from vibsim import plan
-from vibsim.comparison.best_solution import in_order, methods, record_of, start_of
+from vibsim.comparison.best_solution import in_order, record_of, starts
 from vibsim.comparison.extrapolate_members import Extrapolated, join_members
+from vibsim.experiment import storage
 from vibsim.ladder.choosing import resolve
 from vibsim.ladder.solving import climb
 from vibsim.simulation.level import coordinates
@@ -52,17 +52,18 @@ def best(
     elif not experiment.levels:
         experiment = resolve(experiment)
     steps = tuple(experiment.steps(level) for level in experiment.levels)
-    every = plan.sampling(experiment, experiment.levels[0])
+    every = storage.sampling(experiment, experiment.levels[0])
     points = steps[0] // every
     size = max(POINTS_AT_A_TIME // (points + 1), 1)
     schemes = experiment.ladder
 
     def climbed(scheme: int, group: Members) -> Extrapolated:
-        parts = []
-        for method, where in methods(experiment, scheme, group):
-            start = start_of(method, group, where)
-            parts.append((climb(method, start, steps, points, threads=threads), where))
-        return in_order(parts)
+        return in_order(
+            [
+                (climb(method, start, steps, points, threads=threads), where)
+                for method, start, where in starts(experiment, scheme, group)
+            ]
+        )
 
     groups = [
         members(experiment, first, min(first + size, experiment.members))

@@ -17,10 +17,8 @@ from vibsim.formula import (
     Name,
     derivative,
     is_zero,
-    minus,
     parse,
     put,
-    times,
     to_formula,
 )
 from vibsim.models.base import FormulaField, Model, Output, Parameter, State, declared_parameters
@@ -56,7 +54,7 @@ def circuit(voltage: str, declared: tuple[str, ...], terms: frozenset[str]) -> M
 
     source = parse(voltage, ("t", *known))
     is_driven, has_resistor = not is_zero(source), "R" in terms
-    capacitor = minus(source, read("L*di_dt + R*i" if has_resistor else "L*di_dt"))
+    capacitor = source - read("L*di_dt + R*i" if has_resistor else "L*di_dt")
     forces = Forces(
         spring=read("1/C*i"),
         damping=read("R*di_dt") if has_resistor else ZERO,
@@ -78,7 +76,7 @@ def circuit(voltage: str, declared: tuple[str, ...], terms: frozenset[str]) -> M
         kinetic_energy="0.5*L*i**2",
         potential_energy=put(read("0.5*C*di_dt**2"), "di_dt", capacitor),
         dissipation="R*i**2" if has_resistor else None,
-        driving=times(source, Name("i")) if is_driven else None,
+        driving=source * Name("i") if is_driven else None,
         conservative=not is_driven and not has_resistor,
         outputs=(
             Output("capacitor_voltage", "V", "voltage of the capacitor", capacitor),

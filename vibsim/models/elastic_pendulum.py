@@ -33,7 +33,7 @@ from typing import Any
 import numpy as np
 
 from vibsim.core.array_types import Floats
-from vibsim.formula import Name, parse, plus, times
+from vibsim.formula import Name, parse
 from vibsim.models.base import (
     Damping,
     FormulaField,
@@ -143,9 +143,9 @@ def elastic_pendulum(
         positions = tuple(parse(text, ("t", *known)) for text in given)
         followed = Manufactured(positions, tuple(formulas.values()), states, parameters)
         pushes = followed.forces(forces)
-        forces = [plus(force, push) for force, push in zip(forces, pushes, strict=True)]
-        powers = (times(push, Name(v)) for push, v in zip(pushes, ("vx", "vy"), strict=True))
-        more = {"exact": followed.exact, "start": followed.start, "driving": plus(*powers)}
+        forces = [force + push for force, push in zip(forces, pushes, strict=True)]
+        along_x, along_y = (push * Name(v) for push, v in zip(pushes, ("vx", "vy"), strict=True))
+        more = {"exact": followed.exact, "start": followed.start, "driving": along_x + along_y}
     elif not terms:
         more["exact"] = vertical_motion
     if is_dragged:

@@ -29,11 +29,8 @@ from vibsim.formula import (
     Expression,
     Name,
     is_zero,
-    minus,
     parse,
-    plus,
     put,
-    times,
     to_formula,
     values,
 )
@@ -126,8 +123,7 @@ class Written:
         motion = self.manufactured
         if motion is None:
             return self.read("force")
-        inertia = times(self.mass, motion.accelerations[0])
-        return plus(inertia, motion.along(plus(self.damping, self.spring)))
+        return self.mass * motion.accelerations[0] + motion.along(self.damping + self.spring)
 
 
 def written(formulas: Mapping[str, str], declared: tuple[str, ...]) -> Model:
@@ -203,7 +199,7 @@ def _friction(own: Written, forces: Forces) -> dict[str, Any]:
         "dissipation": None,
         "exact": held if forces.is_linear and not forces.is_driven else None,
         "events": Friction(
-            drive=forces.over_mass(minus(forces.force, forces.spring)),
+            drive=forces.over_mass(forces.force - forces.spring),
             limit=forces.over_mass(Name("b")),
             cost=Name("b"),
         ),

@@ -15,9 +15,10 @@ from typing import Any
 import numpy as np
 
 from vibsim.core.array_types import Floats
-from vibsim.models.base import Model, Numbers, Parameter, State
+from vibsim.models.base import Model, Numbers, Parameter
 from vibsim.models.events import Friction
 from vibsim.models.shared.linear_motion import friction_motion
+from vibsim.models.shared.mechanical import STATES
 from vibsim.models.shared.scales import Scales
 
 _PULL = "where(alpha == 0, (k/m)*u, (k/m)/alpha*tanh(alpha*u))"
@@ -53,7 +54,7 @@ SLIDING_BOX = Model(
     title="Sliding box on a spring",
     source="vibration text, section 10.3 and exercise 19",
     equation="m u'' + mu m g sign(u') + s(u) = 0, s(u) = (k/alpha) tanh(alpha u)",
-    states=(State("u", "m", "displacement"), State("v", "m s-1", "velocity")),
+    states=STATES,
     parameters=(
         Parameter("m", 1.0, "kg", "mass", minimum=0.0, exclusive=True),
         Parameter("k", 1.0, "N m-1", "stiffness of the spring at u = 0", 0.0, exclusive=True),

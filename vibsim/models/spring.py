@@ -9,11 +9,10 @@ Scaled by ``t_c = 2 pi/w`` it is the same model with ``w = 2 pi`` and initial po
 
 from __future__ import annotations
 
-from vibsim.models.base import Model, Parameter, State
+from vibsim.models.base import Model, Parameter
 from vibsim.models.shared.linear_motion import harmonic
+from vibsim.models.shared.mechanical import STATES
 from vibsim.models.shared.scales import Scales
-
-STATES = (State("u", "m", "displacement"), State("v", "m s-1", "velocity"))
 
 SPRING = Model(
     kind="spring",

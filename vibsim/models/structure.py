@@ -24,7 +24,7 @@ from typing import Any
 
 import numpy as np
 
-from vibsim.core.array_types import Floats
+from vibsim.core.array_types import Complexes, Floats
 from vibsim.formula import (
     ONE,
     ZERO,
@@ -35,15 +35,12 @@ from vibsim.formula import (
     Negate,
     derivative,
     names_in,
-    over,
     parse,
     put,
-    times,
     values,
 )
-from vibsim.models.base import Model, Numbers, Parameter, State, declared_parameters
+from vibsim.models.base import Model, Numbers, Parameter, declared_parameters
 from vibsim.models.shared.matrices import (
-    Complex,
     Matrix,
     Modes,
     all_modes,
@@ -51,7 +48,7 @@ from vibsim.models.shared.matrices import (
     lowest_modes,
     mode_motion,
 )
-from vibsim.models.system import terms_of, velocities_of
+from vibsim.models.system import states_of, terms_of, velocities_of
 
 MOST_DOFS = 10_000
 """Degrees of freedom, at most."""
@@ -209,7 +206,7 @@ def _harmonic(term: Expression) -> Harmonic | None:
         case Binary("*", left, right) if "t" not in names_in(right):
             inner, factor = _harmonic(left), right
         case Binary("/", left, right) if "t" not in names_in(right):
-            inner, factor = _harmonic(left), over(ONE, right)
+            inner, factor = _harmonic(left), ONE / right
         case Call("cos" | "sin" as name, (angle,)):
             angular = derivative(angle, "t")
             if "t" in names_in(angular):
@@ -222,7 +219,7 @@ def _harmonic(term: Expression) -> Harmonic | None:
             return None
     if inner is None:
         return None
-    return replace(inner, amplitude=times(factor, inner.amplitude))
+    return replace(inner, amplitude=factor * inner.amplitude)
 
 
 @dataclass(frozen=True)
@@ -314,7 +311,7 @@ class Loaded:
         weighed = own.mass.sparse @ modes.shapes
         start = tuple(weighed.T @ x for x in own.start_of(initial))
         pushes = own.shapes @ modes.shapes
-        loads: list[tuple[Complex, float]] = []
+        loads: list[tuple[Complexes, float]] = []
         for push, rows in zip(pushes, self.harmonics, strict=True):
             for row in rows:
                 amplitude, angular, phase = (
@@ -347,13 +344,16 @@ def written(
 ) -> Model:
     """Return the model of a structure under loads, ``load.0`` the formula of the first one, with declared parameters.
 
-    A load that is a table of the structure has no formula.
+    A load that is a table of the structure has no formula. Without a structure it has one degree of freedom, with the
+    mass and the stiffness 1.
 
     ExpressionError where a formula names something else than t and parameters.
     """
-    own = unit_structure() if structure is None else structure
-    texts = tuple(formulas.get(f"{LOAD}.{i}", "") for i in range(len(own.shapes)))
-    return _structure(own, texts, declared, frozenset())
+    if structure is None:
+        one = Matrix.of(np.eye(1))
+        structure = Structure(one, one, names=("u",))
+    texts = tuple(formulas.get(f"{LOAD}.{i}", "") for i in range(len(structure.shapes)))
+    return _structure(structure, texts, declared, frozenset())
 
 
 @cache
@@ -365,14 +365,6 @@ def _structure(
     loads = tuple(parse(text, known) if text else _TABULATED for text in texts)
     own = Loaded(structure, loads, parameters, terms)
     is_conservative = not own.is_damped and not own.loads
-    states = [
-        State(name, "1", word)
-        for word, names in (
-            ("displacement", structure.names),
-            ("velocity", velocities_of(structure.names)),
-        )
-        for name in names
-    ]
     accelerations = tuple(Name(f"_acceleration_{i}") for i in range(len(structure.names)))
     sides = ["M u''", *(["C u'"] if own.is_damped else []), "K u"]
     right = "p(t)" if own.is_driven else "p" if own.loads else "0"
@@ -381,7 +373,7 @@ def _structure(
         title="Linear structure",
         source="the experiment file",
         equation=f"{' + '.join(sides)} = {right}, {structure.dofs} degrees of freedom",
-        states=tuple(states),
+        states=states_of(structure.names, "displacement"),
         parameters=parameters,
         # of the whole structure, known to those alone who step it
         acceleration=accelerations[0],
@@ -401,12 +393,6 @@ def _structure(
         optional=tuple(row.name for row in RAYLEIGH),
         variant=partial(_structure, structure, texts, declared),
     )
-
-
-def unit_structure() -> Structure:
-    """Return the structure of one degree of freedom, with the mass and the stiffness 1."""
-    one = Matrix.of(np.eye(1))
-    return Structure(one, one, names=("u",))
 
 
 STRUCTURE = replace(written({}, ()), equation="M u'' + C u' + K u = p(t), with matrices M, C, K")

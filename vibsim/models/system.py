@@ -21,10 +21,11 @@ may be written as well (`vibsim.models.shared.crossings`).
 from __future__ import annotations
 
 import keyword
+import operator
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cache, cached_property, partial
+from functools import cache, cached_property, partial, reduce
 from typing import Any
 
 import numpy as np
@@ -41,13 +42,9 @@ from vibsim.formula import (
     derivative,
     has_rule,
     integral,
-    minus,
     names_in,
-    over,
     parse,
-    plus,
     put,
-    times,
     to_formula,
     values,
 )
@@ -101,6 +98,12 @@ SHOWN = 6
 def velocities_of(coordinates: tuple[str, ...]) -> tuple[str, ...]:
     """Name the velocities."""
     return ("v",) if coordinates == ("u",) else tuple(f"v{name}" for name in coordinates)
+
+
+def states_of(coordinates: tuple[str, ...], word: str) -> tuple[State, ...]:
+    """Return the states of coordinates without units; `word` says what they are."""
+    positions = (State(name, "1", word) for name in coordinates)
+    return (*positions, *(State(name, "1", "velocity") for name in velocities_of(coordinates)))
 
 
 def name_fault(name: str, others: tuple[str, ...] = ()) -> str:
@@ -226,28 +229,24 @@ class Written:
         own, motion = self.own_accelerations, self.manufactured
         if motion is None:
             return own
-        return tuple(plus(a, push) for a, push in zip(own, motion.forces(own), strict=True))
+        return tuple(a + push for a, push in zip(own, motion.forces(own), strict=True))
 
     @cached_property
     def kinetic(self) -> Expression:
         """The kinetic energy."""
         if terms := self.terms("kinetic"):
-            return paired(terms, plus)
+            return paired(terms, operator.add)
         return self.inertia.kinetic
 
     @cached_property
     def potential(self) -> Expression:
         """The potential energy, 0 where none is known."""
         if terms := self.terms("potential"):
-            return paired(terms, plus)
-        moving, total = {*self.velocities, "t"}, []
-        forces = []
+            return paired(terms, operator.add)
+        moving, total, forces = {*self.velocities, "t"}, [], []
         for whole in self.forces:
             still = (term for term in terms_of(whole) if moving.isdisjoint(names_in(term)))
-            force: Expression = ZERO
-            for term in still:
-                force = plus(force, term)
-            forces.append(force)
+            forces.append(sum(still, ZERO))
         for i, (name, force) in enumerate(zip(self.coordinates, forces, strict=True)):
             for later in self.coordinates[i + 1 :]:
                 if later in names_in(force):
@@ -255,8 +254,8 @@ class Written:
             if not has_rule(force, name):
                 return ZERO
             work = integral(force, name)
-            total.append(minus(ZERO, work))
-        found: Expression = paired(total, plus)
+            total.append(-work)
+        found: Expression = paired(total, operator.add)
         slopes = (derivative(found, name) for name in self.coordinates)
         sums = ([slope, force] for slope, force in zip(slopes, forces, strict=True))
         return found if all(map(self.vanishes, sums)) else ZERO
@@ -265,11 +264,15 @@ class Written:
     def powers(self) -> tuple[Expression, ...]:
         """The terms of the power ``dE/dt``."""
         found = (
-            times(derivative(energy, name), speed)
+            derivative(energy, name) * speed
             for name, speed in speeds(self.coordinates, self.velocities, self.accelerations)
             for energy in (self.kinetic, self.potential)
         )
         return tuple(term for term in found if term != ZERO)
+
+    def is_constant(self, node: Expression) -> bool:
+        """Tell whether a formula names parameters alone."""
+        return {*self.states, "t"}.isdisjoint(names_in(node))
 
     def vanishes(self, terms: Any) -> bool:
         """Tell whether a sum is 0 wherever it has a value, and that it has one somewhere."""
@@ -297,7 +300,7 @@ class Written:
                     if state in names_in(slope):
                         slope = put(slope, state, ZERO)
                 if slope != ZERO:
-                    found[i, j] = minus(ZERO, slope)
+                    found[i, j] = -slope
         return found
 
     def frequencies(self, parameters: Numbers) -> Floats:
@@ -335,11 +338,11 @@ def terms_of(node: Expression) -> Iterator[Expression]:
         case Negate(operand):
             yield from (Negate(term) for term in terms_of(operand))
         case Binary("/", left, right):
-            yield from (over(term, right) for term in terms_of(left))
+            yield from (term / right for term in terms_of(left))
         case Binary("*", left, right) if len(_sum := list(terms_of(right))) > 1:
-            yield from (times(left, term) for term in _sum)
+            yield from (left * term for term in _sum)
         case Binary("*", left, right) if len(_sum := list(terms_of(left))) > 1:
-            yield from (times(term, right) for term in _sum)
+            yield from (term * right for term in _sum)
         case _:
             yield node
 
@@ -375,17 +378,11 @@ def system(
     more: dict[str, Any] = {}
     is_conservative = motion is None and own.vanishes(own.powers)
     if not is_conservative:
-        power: Expression = paired(own.powers, plus) if own.powers else ZERO
+        power: Expression = paired(own.powers, operator.add) if own.powers else ZERO
         drives = "t" in names_in(power)
-        more = {"driving": power} if drives else {"dissipation": minus(ZERO, power)}
+        more = {"driving": power} if drives else {"dissipation": -power}
     if motion is not None:
         more |= {"exact": motion.exact, "start": motion.start}
-    words = "position", "velocity"
-    states = tuple(
-        State(name, "1", word)
-        for word, names in zip(words, (own.coordinates, own.velocities), strict=True)
-        for name in names
-    )
     outputs = (key.partition(".") for key, _ in formulas)
     if len(coordinates) == 1:
         more |= {"linear": _is_linear(own), "damping": _damping(own)}
@@ -401,7 +398,7 @@ def system(
         title="System of equations",
         source="the experiment file",
         equation=_equation(own),
-        states=states,
+        states=states_of(coordinates, "position"),
         parameters=own.parameters,
         acceleration=first,
         further_accelerations=tuple(rest),
@@ -427,28 +424,22 @@ def _is_linear(own: Written) -> bool:
     """Tell whether the acceleration of the only coordinate is a number times it, beside what does not name it."""
     (a,), (u,) = own.accelerations, own.coordinates
     jumps = (part for part in walk(a) if is_jump(part) and u in names_in(part))
-    return not any(jumps) and {*own.states, "t"}.isdisjoint(names_in(derivative(a, u)))
+    return not any(jumps) and own.is_constant(derivative(a, u))
 
 
 def _has_constant_slopes(own: Written) -> bool:
     """Tell whether the accelerations are linear in all states, with constant coefficients."""
-    varying = {*own.states, "t"}
     slopes = (derivative(a, s) for a in own.accelerations for s in own.states if s in names_in(a))
     jumps = (part for a in own.accelerations for part in walk(a) if is_jump(part))
-    return all(varying.isdisjoint(names_in(part)) for part in (*slopes, *jumps))
+    return all(map(own.is_constant, (*slopes, *jumps)))
 
 
 def _damping(own: Written) -> Damping | None:
     """Return the damping of the only coordinate, where it is linear or quadratic with a constant rate."""
     (a,), (v,) = own.accelerations, own.velocities
-    force: Expression = ZERO
-    for term in terms_of(a):
-        if v in names_in(term):
-            force = minus(force, term)
+    force = reduce(operator.sub, (term for term in terms_of(a) if v in names_in(term)), ZERO)
     found = damping_of(force, v) if force != ZERO else None
-    if found is None or not {*own.states, "t"}.isdisjoint(names_in(found[1])):
-        return None
-    return Damping(*found)
+    return Damping(*found) if found is not None and own.is_constant(found[1]) else None
 
 
 def _equation(own: Written) -> str:
@@ -461,7 +452,7 @@ def _equation(own: Written) -> str:
         if not own.inertia.is_plain:
             left = own.inertia.rest(i)
             for j, side in reversed(list(enumerate(sides))):
-                left = plus(times(own.inertia.of(i, j), side), left)
+                left = own.inertia.of(i, j) * side + left
             a = own.forces[i]
         both = [left, a]
         for velocity, position in speeds.items():

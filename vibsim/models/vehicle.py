@@ -22,9 +22,7 @@ from vibsim.formula import (
     Number,
     derivative,
     parse,
-    plus,
     put,
-    times,
     to_formula,
 )
 from vibsim.models.base import FormulaField, Model, Output, Parameter, declared_parameters
@@ -88,7 +86,7 @@ def vehicle(
         bend, height, table = Name(BEND), Name(HEIGHT), lookup.table
         told = f"h(x) from a table of {table.points} points, {table.spacing:g} m apart"
         more = {"lookup": lookup, "exact": None}
-    push = times(Number(-1.0), times(times(Name("m"), bend), parse("speed**2", known)))
+    push = Number(-1.0) * (Name("m") * bend * parse("speed**2", known))
     damping = parse("b*v", ("v", *known)) if "b" in terms else ZERO
     damper = "b u' + " if "b" in terms else ""
 
@@ -101,7 +99,7 @@ def vehicle(
         equation=f"m u'' + {damper}{to_formula(spring)} = -m h''(speed t) speed^2, {told}",
         outputs=(
             Output("road_height", "m", "height of the road under the wheel", height),
-            Output("absolute_position", "m", "height of the body", plus(Name("u"), height)),
+            Output("absolute_position", "m", "height of the body", Name("u") + height),
         ),
         formulas=FORMULAS,
         written=written,

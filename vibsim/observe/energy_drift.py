@@ -30,7 +30,7 @@ from vibsim.convergence.differences import largest, safe_ratio
 from vibsim.convergence.thresholds import ABOVE_ROUND_OFF
 from vibsim.core.array_types import Codes, Flags, Floats
 from vibsim.core.vocabulary import DRIFTS
-from vibsim.formula import derivative, plus, values
+from vibsim.formula import derivative, values
 from vibsim.models.base import tree
 from vibsim.observe import thresholds as th
 from vibsim.observe.member_block import CENTRED, MemberBlock, energy_at_start, stored_or_nan
@@ -100,12 +100,12 @@ def _conditioned(block: MemberBlock, level: int, size: Floats) -> Floats:
     if not model.conservative:
         return np.broadcast_to(block.magnified, size.shape)
     states = {s.name: np.asarray(record[s.name], dtype=float) for s in model.states}
-    named = {row.name: block.group.parameters[row.key][:, None] for row in model.parameters}
-    energy = plus(tree(model, model.kinetic_energy), tree(model, model.potential_energy))
+    numbers = {**block.group.by_name(model), **states, "t": 0.0}
+    energy = tree(model, model.kinetic_energy) + tree(model, model.potential_energy)
     square = np.zeros(next(iter(states.values())).shape)
     with np.errstate(all="ignore"):
         for name, values_of in states.items():
-            slope = values(derivative(energy, name), {**named, **states, "t": 0.0})
+            slope = values(derivative(energy, name), numbers)
             square = square + (slope * largest(values_of)[..., None]) ** 2
         felt = 0.5 * safe_ratio(np.sqrt(largest(square)), size)
     return np.asarray(np.fmax(felt, 1.0))

@@ -25,7 +25,7 @@ from vibsim.experiment import Experiment
 from vibsim.models import BUDGET, ENERGIES, Model
 from vibsim.observe.common_grid import Grid, check_belonging, common_grid, take
 from vibsim.observe.missed_pulses import Missed, missed_pulses
-from vibsim.observe.sensitivity import in_columns, sensitivity
+from vibsim.observe.sensitivity import sensitivity
 from vibsim.observe.stiffness import Motion, decay_rate, stiffest
 from vibsim.observe.thresholds import FEW_RADIANS
 from vibsim.simulation.members import Members, members
@@ -187,8 +187,7 @@ def block_of(experiment: Experiment, records: Mapping[int, Record]) -> MemberBlo
     elif model.exact is None:
         exact = {}
     else:
-        found = model.exact(t, in_columns(group.initial), in_columns(group.parameters))
-        exact = {name: laid_out(values) for name, values in found.items()}
+        exact = {name: laid_out(values) for name, values in group.exact(model, t).items()}
     motion = Motion(model, grid, finest, group, exact)
     return MemberBlock(
         experiment=experiment,

@@ -37,11 +37,6 @@ def growth_factor(record: Record) -> Floats:
     return np.where(several, safe_ratio(record["last_peak"], record["first_peak"]), np.nan)
 
 
-def amplitude_error(record: Record) -> Floats:
-    """Return the last peak over the first one, less one."""
-    return np.asarray(growth_factor(record) - 1.0)
-
-
 def growth_per_period(block: MemberBlock, level: int) -> Floats:
     """Return the factor by which the amplitude grows in a period.
 

@@ -11,9 +11,10 @@ from typing import Any
 
 import numpy as np
 
-from vibsim import plan, theory
+from vibsim import theory
 from vibsim.apriori.formal_orders import limit_of
 from vibsim.core.array_types import Floats, Integers
+from vibsim.experiment import sweep_columns
 from vibsim.observe.member_block import MemberBlock
 from vibsim.schemes import Options, Scheme
 
@@ -27,7 +28,7 @@ def steppers(block: MemberBlock, scheme: int) -> list[tuple[Options, Integers | 
     """Return the options of one scheme, and the members that have them; empty for one that chooses its own steps."""
     if block.adaptive[scheme]:
         return []
-    groups = plan.option_groups(block.experiment, scheme, block.columns)
+    groups = sweep_columns.option_groups(block.experiment, scheme, block.columns)
     return [(o, where if len(groups) > 1 else slice(None)) for o, where in groups]
 
 

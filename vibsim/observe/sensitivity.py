@@ -16,8 +16,6 @@ tells, gives the response at every time to every disturbance at every other:
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 import numpy as np
 
 from vibsim.convergence.differences import laid_out, largest
@@ -25,7 +23,7 @@ from vibsim.core.array_types import Flags, Floats
 from vibsim.experiment import Experiment
 from vibsim.models import Model
 from vibsim.observe.thresholds import DISTURBANCE, INSTANT, NEAR_REST, PLACES
-from vibsim.simulation.members import Members
+from vibsim.simulation.members import Members, in_columns
 
 States = dict[str, Floats]
 
@@ -57,11 +55,6 @@ def sensitivity(
         rows = ({k: v[doubtful] for k, v in table.items()} for table in (initial, parameters))
         found[doubtful] = _by_trial(model, t[doubtful], *rows)
     return found
-
-
-def in_columns(table: Mapping[str, Floats]) -> States:
-    """Return numbers of members in the shape (case, 1), beside which times stand."""
-    return {name: values[:, None] for name, values in table.items()}
 
 
 def _solve(model: Model, t: Floats, initial: States, parameters: States) -> list[Floats]:

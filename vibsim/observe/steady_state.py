@@ -19,14 +19,12 @@ oscillators; L. N. Trefethen, J. A. C. Weideman, The exponentially convergent tr
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vibsim.convergence.differences import safe_ratio
-from vibsim.core.array_types import Floats
+from vibsim.core.array_types import Complexes, Floats
 from vibsim.observe.common_grid import take
 from vibsim.observe.member_block import MemberBlock
 
-Harmonics = NDArray[np.complex128]
 SAME_STATE = 1e-3
 """How near a state must come to itself to be the same, of the largest value that it has."""
 
@@ -39,7 +37,7 @@ def samples_a_period(block: MemberBlock) -> int:
     return (len(block.grid.t) - 1) // round(time.periods)
 
 
-def harmonic(block: MemberBlock, level: int, quantity: str, back: int = 0) -> Harmonics:
+def harmonic(block: MemberBlock, level: int, quantity: str, back: int = 0) -> Complexes:
     """Return ``A exp(-i phase)`` of the last period but `back`, shape (scheme, case); NaN where there is none."""
     record, n = block.records[level], samples_a_period(block)
     stop = len(block.grid.t) - back * n

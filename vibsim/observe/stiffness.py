@@ -43,14 +43,10 @@ class Motion:
 
     def fall(self, acceleration: Formula, state: str, states: Mapping[str, Floats]) -> Floats:
         """Return minus the derivative of an acceleration by a state along a motion, of the shape of its states."""
-        numbers = {
-            row.name: self.group.parameters[row.key][:, None] for row in self.model.parameters
-        }
         slope = derivative(tree(self.model, acceleration), state)
         times = self.grid.times(self.group.end)
-        return np.broadcast_to(
-            -values(slope, {**numbers, **states, "t": times}), np.shape(states[state])
-        )
+        numbers = {**self.group.by_name(self.model), **states, "t": times}
+        return np.broadcast_to(-values(slope, numbers), np.shape(states[state]))
 
 
 def stiffest(motion: Motion) -> Floats:

@@ -4,17 +4,10 @@ Loading a plan that is cached imports neither numpy nor the validation library: 
 experiments each time it starts.
 """
 
-from typing import TYPE_CHECKING
-
-from vibsim.core.lazy import loader
 from vibsim.plan.cache import load, load_all
 from vibsim.plan.choose import Choice, choose, experiments
 from vibsim.plan.jobs import Batch, LevelJob, Plan, ShardJob
 from vibsim.plan.workflow_names import Names
-
-if TYPE_CHECKING:
-    from vibsim.experiment.storage import sampling
-    from vibsim.experiment.sweep_columns import columns, option_groups
 
 __all__ = [
     "Batch",
@@ -24,19 +17,7 @@ __all__ = [
     "Plan",
     "ShardJob",
     "choose",
-    "columns",
     "experiments",
     "load",
     "load_all",
-    "option_groups",
-    "sampling",
 ]
-
-__getattr__ = loader(
-    __name__,
-    {
-        "columns": "vibsim.experiment.sweep_columns",
-        "option_groups": "vibsim.experiment.sweep_columns",
-        "sampling": "vibsim.experiment.storage",
-    },
-)

@@ -8,7 +8,7 @@ which samples it keeps. The start of a job costs as much as many cheap levels, w
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import cache
 from typing import Any
 
@@ -51,6 +51,7 @@ def build(experiment: Experiment) -> Plan:
     """Return the plan of `experiment`, which has at least one level."""
     content: dict[str, Any] = json.loads(json.dumps(canonical(experiment), allow_nan=False))
     packages = tuple(_offered(experiment.model.kind, _kinds(experiment)))
+    dists = [offers(group)[kind].dist for group, kind, _ in packages]
     values = cache(lambda start, stop: values_digest(experiment, start, stop))
     levels = tuple(_level(experiment, content, level, values) for level in experiment.levels)
     groups, trajectories = _groups(levels), experiment.trajectories
@@ -85,7 +86,8 @@ def build(experiment: Experiment) -> Plan:
         extrapolation=extrapolation,
         report=job_digest("report", content, {"analysis": analysis}, DRAWING),
         content=content,
-        versions={**versions(NUMERICAL), **_versions_of(packages)},
+        # those of packages are for who asks what made a result
+        versions={**versions(NUMERICAL), **{dist.name: dist.version for dist in dists if dist}},
         notes=experiment.notes + forecast.notes(reference, experiment.model.kind),
         inputs=experiment.model.files,
         packages=packages,
@@ -144,12 +146,6 @@ def _offered(model: str, schemes: tuple[str, ...]) -> Iterator[tuple[str, str, s
     for registry, kind in pairs:
         if kind not in registry.built_in:
             yield registry.group, kind, code_digest.of_offer(registry.group, kind)
-
-
-def _versions_of(packages: Iterable[tuple[str, str, str]]) -> dict[str, str]:
-    """Return the versions of the packages that offer models and schemes, for who asks what made a result."""
-    points = (offers(group)[kind] for group, kind, _ in packages)
-    return {point.dist.name: point.dist.version for point in points if point.dist}
 
 
 def _kinds(experiment: Experiment) -> tuple[str, ...]:

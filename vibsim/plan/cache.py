@@ -81,9 +81,8 @@ def _built(choice: Choice, resolve: Resolver | None) -> Plan:
         return solver_plan.build(found if choice.case is None else found.alone(choice.case))
     from vibsim.plan import build
 
-    stem = choice.file.stem
-    experiment = reading.build(Experiment, source, choice.collection, stem, choice.file)
-    return build.build(_resolved(experiment, choice, resolve))
+    spec = reading.build(source, choice.collection, choice.file.stem, choice.file)
+    return build.build(_resolved(Experiment.made_of(spec), choice, resolve))
 
 
 def _resolved(experiment: Experiment, choice: Choice, resolve: Resolver | None) -> Experiment:
@@ -124,7 +123,7 @@ def _key(choice: Choice) -> str:
     libraries = repr(versions(NUMERICAL + DRAWING))
     words = [choice.collection, choice.name, str(choice.case), code_digest.everything(), libraries]
     words.append(json.dumps(choice.settings))
-    return _sha256(b"\0".join([*(word.encode() for word in words), content]))
+    return hashlib.sha256(b"\0".join([*(word.encode() for word in words), content])).hexdigest()
 
 
 def _has_inputs(plan: Plan, choice: Choice) -> bool:
@@ -146,7 +145,3 @@ def _has_inputs(plan: Plan, choice: Choice) -> bool:
         except (OSError, ValueError):
             return False
     return True
-
-
-def _sha256(content: bytes) -> str:
-    return hashlib.sha256(content).hexdigest()

@@ -25,7 +25,8 @@ def extrapolated(content: Mapping[str, Any]) -> dict[str, Any]:
 
 def analysed(content: Mapping[str, Any]) -> dict[str, Any]:
     """Return the part of an experiment in normal form that an analysis depends on and tells of."""
-    return _without(content, "title source output figures units")
+    other = "title source output figures units"
+    return _without(content, "title source solver resources" if "solver" in content else other)
 
 
 def solved(experiment: SolverExperiment, level: int, member: int) -> dict[str, Any]:
@@ -46,11 +47,6 @@ def solved(experiment: SolverExperiment, level: int, member: int) -> dict[str, A
             for name, row in experiment.quantities.items()
         },
     }
-
-
-def solved_and_judged(content: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the part of an experiment with such a solver that its analysis depends on and tells of."""
-    return _without(content, "title source solver resources")
 
 
 def _without(content: Mapping[str, Any], keys: str) -> dict[str, Any]:

@@ -13,8 +13,9 @@ from typing import TYPE_CHECKING
 
 from vibsim.experiment.cost import PLAIN_MEMBER_STEPS, Load, analysis_disk
 from vibsim.experiment.storage import is_bounded
+from vibsim.formula import names_in
 from vibsim.formula.jumps import held
-from vibsim.models import Model, has_solution, tree
+from vibsim.models import has_solution, tree
 
 if TYPE_CHECKING:
     from vibsim.experiment import Experiment
@@ -80,14 +81,15 @@ def reference_seconds(experiment: Experiment) -> float:
     _, switches = held((tree(model, formula) for formula in model.accelerations), moving)
     corners = CORNERS_A_PERIOD * turns * len(switches) if math.isfinite(turns) else 0.0
     others = experiment.members - 1
-    return smooth * (1.0 + MEMBER_PART * others) + CORNER_SECONDS * corners * (
-        1.0 + CORNER_MEMBER_PART * others
-    )
+    cornered = CORNER_SECONDS * corners
+    return smooth * (1.0 + MEMBER_PART * others) + cornered * (1.0 + CORNER_MEMBER_PART * others)
 
 
 def gaps(experiment: Experiment, loads: Sequence[Load]) -> int:
     """Return between how many points of the finest level the force of all members is looked at for a pulse."""
-    is_driven = _is_driven(experiment.model.definition)
+    model = experiment.model.definition
+    forces = () if model.loaded is not None else (tree(model, row) for row in model.accelerations)
+    is_driven = any("t" in names_in(force) for force in forces)
     return min(experiment.members * loads[-1].steps, MOST_GAPS) if is_driven else 0
 
 
@@ -110,14 +112,9 @@ def other_seconds(experiment: Experiment, loads: Sequence[Load]) -> float:
     written = analysis_disk(loads, experiment.members, is_bounded(experiment))
     compared = start + of_byte * written + of_quantity * loads[0].series * len(loads)
     written += sum(load.disk(experiment.members) for load in loads)
-    return (
-        series
-        + compared
-        + BYTE_SECONDS * written
-        + GAP_SECONDS * gaps(experiment, loads)
-        + PAGE_SECONDS
-        + SCHEME_SECONDS * loads[0].schemes
-    )
+    searched = GAP_SECONDS * gaps(experiment, loads)
+    page = PAGE_SECONDS + SCHEME_SECONDS * loads[0].schemes
+    return series + compared + BYTE_SECONDS * written + searched + page
 
 
 def notes(seconds: float, kind: str) -> tuple[tuple[int, str], ...]:
@@ -126,11 +123,3 @@ def notes(seconds: float, kind: str) -> tuple[tuple[int, str], ...]:
         return ()
     text = f"a reference solution of {kind} is computed once, which takes about {seconds:.0f} s"
     return ((0, f"{text}: its exact solution is not known, and true errors need one"),)
-
-
-def _is_driven(model: Model) -> bool:
-    from vibsim.formula import names_in
-
-    if model.loaded is not None:
-        return False
-    return any("t" in names_in(tree(model, formula)) for formula in model.accelerations)

@@ -179,11 +179,13 @@ class Plan:
         return f"{self.key}/report.html"
 
     @property
-    def files(self) -> tuple[str, ...]:
-        """Paths of everything that the jobs exchange, and of the report."""
-        shards = (shard.path for shard in self.shards)
-        best = (self.best,) if self.best else ()
-        return (*shards, *best, self.convergence, self.summary, self.page)
+    def files(self) -> dict[str, str]:
+        """Paths of everything that the jobs exchange, and of the report, with the digest of the job that makes each."""
+        found = {shard.path: shard.digest for shard in self.shards}
+        if self.best is not None:
+            found[self.best] = self.extrapolation
+        analysed = dict.fromkeys((self.convergence, self.summary), self.analysis)
+        return {**found, **analysed, self.page: self.report}
 
     @property
     def shards(self) -> tuple[ShardJob, ...]:

@@ -8,6 +8,7 @@ hours, and vibsim only stores what it wrote.
 from __future__ import annotations
 
 import json
+from functools import partial
 from typing import Any
 
 from vibsim.core import regular_files
@@ -16,13 +17,16 @@ from vibsim.core.vocabulary import FORMAT
 from vibsim.experiment.solver import SolverExperiment
 from vibsim.plan import code_digest
 from vibsim.plan.build import job_digest, told_settings
-from vibsim.plan.digests import digest_of, solved, solved_and_judged
+from vibsim.plan.digests import analysed, digest_of, solved
 from vibsim.plan.jobs import Batch, LevelJob, Plan, ShardJob, shard_path
 from vibsim.plan.versions import DRAWING, NUMERICAL, versions
 
 MEGABYTE = 10**6
 ANALYSIS_MEMORY = 500 * MEGABYTE
 """Bytes that an analysis may hold; the sizes of fields are not known before they are made."""
+
+_level = partial(LevelJob, steps=0, every=1, member_steps=0, bytes=0, seconds=0.0, shared=0.0)
+"""A level that a solver makes, which has neither counts nor costs."""
 
 
 def build(experiment: SolverExperiment) -> Plan:
@@ -34,9 +38,10 @@ def build(experiment: SolverExperiment) -> Plan:
         Where a file or a module that levels depend on cannot be found.
     """
     content: dict[str, Any] = json.loads(json.dumps(experiment.content, allow_nan=False))
-    solver = experiment.solver
+    solver, resources = experiment.solver, experiment.resources
     inputs = {name: _digest(experiment, name) for name in solver.inputs}
-    package = _code(experiment) if solver.kind == "python" else ""
+    module = solver.text.partition(":")[0] if solver.kind == "python" else ""
+    package = _code(experiment, module) if module else ""
     key = f"{experiment.collection}/{experiment.name}"
     files: dict[str, str] = {}
     levels = []
@@ -50,15 +55,15 @@ def build(experiment: SolverExperiment) -> Plan:
             own = {"uses": solved(experiment, level, member), "inputs": inputs, "code": package}
             digest = digest_of({"job": "solve", "format": FORMAT, **own})
             number = None if experiment.sweep is None else member
-            shards.append(
-                ShardJob(member, member, member + 1, shard_path(key, level, number), digest)
-            )
-        levels.append(_level(level, tuple(shards), experiment))
+            place = shard_path(key, level, number)
+            shards.append(ShardJob(member, member, member + 1, place, digest))
+        memory = resources.mem_mb * MEGABYTE
+        levels.append(_level(level=level, memory=memory, shards=tuple(shards)))
     made: dict[str, Any] = {
         "levels": [[shard.digest for shard in level.shards] for level in levels]
     }
     analysis = job_digest(
-        "judge_levels", solved_and_judged(content), made | told_settings(experiment.settings)
+        "judge_levels", analysed(content), made | told_settings(experiment.settings)
     )
     return Plan(
         collection=experiment.collection,
@@ -69,7 +74,18 @@ def build(experiment: SolverExperiment) -> Plan:
         schemes=(),
         levels=tuple(levels),
         batches=tuple(
-            _batch(level, shard, experiment) for level in levels for shard in level.shards
+            Batch(
+                levels=(level.level,),
+                shard=shard.index,
+                digest=shard.digest,
+                seconds=0.0,
+                memory=level.memory,
+                is_divisible=False,
+                threads=resources.threads,
+                runtime=resources.runtime,
+            )
+            for level in levels
+            for shard in level.shards
         ),
         analysis=analysis,
         analysis_memory=ANALYSIS_MEMORY,
@@ -82,34 +98,7 @@ def build(experiment: SolverExperiment) -> Plan:
         content=content,
         versions=versions(NUMERICAL),
         inputs=tuple((files or inputs).items()),
-        packages=((code_digest.MODULE, _module(experiment), package),) if package else (),
-    )
-
-
-def _level(level: int, shards: tuple[ShardJob, ...], experiment: SolverExperiment) -> LevelJob:
-    return LevelJob(
-        level=level,
-        steps=0,
-        every=1,
-        member_steps=0,
-        bytes=0,
-        seconds=0.0,
-        shared=0.0,
-        memory=experiment.resources.mem_mb * MEGABYTE,
-        shards=shards,
-    )
-
-
-def _batch(level: LevelJob, shard: ShardJob, experiment: SolverExperiment) -> Batch:
-    return Batch(
-        levels=(level.level,),
-        shard=shard.index,
-        digest=shard.digest,
-        seconds=0.0,
-        memory=level.memory,
-        is_divisible=False,
-        threads=experiment.resources.threads,
-        runtime=experiment.resources.runtime,
+        packages=((code_digest.MODULE, module, package),) if package else (),
     )
 
 
@@ -122,16 +111,12 @@ def _digest(experiment: SolverExperiment, name: str) -> str:
         raise _refusal(experiment, name, rule) from None
 
 
-def _module(experiment: SolverExperiment) -> str:
-    return experiment.solver.text.partition(":")[0]
-
-
-def _code(experiment: SolverExperiment) -> str:
-    """Return the digest of the package that a function stands in, which is not imported for that."""
-    found = code_digest.of_module(_module(experiment), experiment.folder)
+def _code(experiment: SolverExperiment, module: str) -> str:
+    """Return the digest of the package that a module stands in, which is not imported for that."""
+    found = code_digest.of_module(module, experiment.folder)
     if not found:
         rule = "cannot be found: no installed package and no module beside the file has this name"
-        raise _refusal(experiment, _module(experiment).partition(".")[0], rule)
+        raise _refusal(experiment, module.partition(".")[0], rule)
     return found
 
 

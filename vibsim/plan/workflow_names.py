@@ -13,8 +13,6 @@ from typing import Any
 from vibsim.core.processes import usable_cores
 from vibsim.core.set_option import OPTION
 from vibsim.plan import code_digest
-from vibsim.plan.cache import Resolver, load_all
-from vibsim.plan.choose import choose
 from vibsim.plan.digests import digest_of
 from vibsim.plan.jobs import Batch, Plan
 
@@ -135,23 +133,6 @@ class Names:
     """Cores that a job may use at most."""
     overhead: int = 0
     """Megabytes that a job needs for the processes of its executor, beside its own."""
-
-    @staticmethod
-    def of(
-        experiments: Sequence[str],
-        results: str,
-        root: Path,
-        resolve: Resolver | None = None,
-        allows_commands: bool = False,
-        settings: Sequence[str] = (),
-        **more: int,
-    ) -> Names:
-        """Load the plans of `experiments` (files, names, collections; none means the default), all with `settings`.
-
-        Further fields, such as `cores`, go by their names.
-        """
-        plans = load_all(choose(experiments, root, settings), resolve, cached=True)
-        return Names(plans, Path(results).absolute(), allows_commands, tuple(settings), **more)
 
     def level_flags(self, wildcards: Any, input: Any) -> str:  # noqa: A002
         """Return further options of jobs that make levels, which Snakemake does not compare; see `file`."""

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from vibsim.core.lazy import loader
+from vibsim.core.lazy import lazy
 
 if TYPE_CHECKING:
     from vibsim.report.page.index import write_index
@@ -16,7 +16,4 @@ if TYPE_CHECKING:
 
 __all__ = ["write", "write_index"]
 
-__getattr__ = loader(
-    __name__,
-    {"write": "vibsim.report.page.page", "write_index": "vibsim.report.page.index"},
-)
+__getattr__, __dir__ = lazy(__name__, {".page.page": ("write",), ".page.index": ("write_index",)})

@@ -11,17 +11,10 @@ import numpy as np
 from vibsim.core.record import Record
 from vibsim.core.vocabulary import ORDER_TOLERANCE, SEVERITY, TYPICAL_NORM
 from vibsim.experiment.storage import checked_quantities
-from vibsim.report.data import (
-    Member,
-    basis_of_order,
-    case_name,
-    flags,
-    formal_orders,
-    place_of,
-    swept,
-)
+from vibsim.report import data
+from vibsim.report.data import Member
 from vibsim.report.finest_level import deviation
-from vibsim.report.types import Check, ConvergesCheck, Experiment, Measurement
+from vibsim.report.types import Check, ConvergesCheck, Experiment, Measurement, SchemeSpec
 
 
 def promises(experiment: Experiment, record: Record, quantity: str) -> list[tuple[float, float]]:
@@ -35,9 +28,9 @@ def promises(experiment: Experiment, record: Record, quantity: str) -> list[tupl
         for check in _on_order(experiment, quantity)
         if isinstance(check.order, float)
     }
-    if basis_of_order(record, quantity) == "expected" and asked_for:
+    if data.basis_of_order(record, quantity) == "expected" and asked_for:
         return sorted(asked_for)
-    promised = formal_orders(record, quantity)
+    promised = data.formal_orders(record, quantity)
     found = {
         (float(order), tolerance(experiment, quantity, scheme))
         for s, scheme in enumerate(record.words("scheme"))
@@ -63,6 +56,12 @@ def position(experiment: Experiment) -> str:
     return experiment.model.definition.position
 
 
+def has_swept_options(experiment: Experiment, spec: SchemeSpec) -> bool:
+    """Say whether the sweep varies an option of a scheme."""
+    keys = experiment.sweep.keys if experiment.sweep is not None else ()
+    return any(key.startswith(f"schemes.{spec.name}.") for key in keys)
+
+
 def quantities(experiment: Experiment, record: Record) -> list[str]:
     """Return the quantities to show: the position, those that a check names, and the energy deviation."""
     extra = ["energy_deviation"] if experiment.model.definition.conservative else []
@@ -81,11 +80,10 @@ def members(record: Record, quantity: str) -> list[Member]:
     These are the worst member, judged by the verdicts on `quantity` and then by the distance of the order from the
     promised one (of several schemes the worst decides), and a typical one of those that pass, if any does.
     """
-    schemes = record.words("scheme")
-    if not swept(record) or f"{quantity}_status" not in record:
+    if not data.swept(record) or f"{quantity}_status" not in record:
         # a large sweep has verdicts on what checks ask about alone
-        return [Member(s, 0, name, case_name(record, 0)) for s, name in enumerate(schemes)]
-    status = flags(record, f"{quantity}_status")
+        return data.of_case(record, 0)
+    status = data.flags(record, f"{quantity}_status")
     severity = np.max([(status == word) * rank for word, rank in SEVERITY.items()], axis=(0, 1))
     away = np.abs(deviation(record, quantity))
     ranking = np.lexsort((np.max(np.where(np.isnan(away), np.inf, away), axis=0), severity))
@@ -93,11 +91,8 @@ def members(record: Record, quantity: str) -> list[Member]:
     score = np.sum(status == "PASS", axis=0) * (len(status) + 1) - np.sum(status == "FAIL", axis=0)
     healthy = ranking[score[ranking] == score.max()]
     roles = {int(healthy[healthy.size // 2]): "typical", int(ranking[-1]): "worst"}
-    return [
-        Member(s, case, name, case_name(record, case), role)
-        for case, role in reversed(roles.items())
-        for s, name in enumerate(schemes)
-    ]
+    shown = reversed(roles.items())
+    return [member for case, role in shown for member in data.of_case(record, case, role)]
 
 
 def worst(record: Record, quantity: str) -> Member:
@@ -105,7 +100,7 @@ def worst(record: Record, quantity: str) -> Member:
     found = [member for member in members(record, quantity) if member.role != "typical"]
     if f"{quantity}_status" not in record:
         return found[0]
-    status, away = flags(record, f"{quantity}_status"), np.abs(deviation(record, quantity))
+    status, away = data.flags(record, f"{quantity}_status"), np.abs(deviation(record, quantity))
 
     def badness(member: Member) -> tuple[int, float]:
         place = member.scheme, member.case
@@ -142,6 +137,11 @@ class Lead:
         return {} if self.entry is None else self.entry["results"][0]
 
     @property
+    def facts(self) -> Mapping[str, Any]:
+        """What was measured where the check is decided."""
+        return self.result.get("facts") or {}
+
+    @property
     def is_on_order(self) -> bool:
         """Whether the check asks for an order."""
         return self.measured is not None and self.measured.kind == "converges"
@@ -153,14 +153,15 @@ class Lead:
         return check.norm if check is not None and check.kind == "converges" else TYPICAL_NORM
 
 
+def is_refutation(check: Check | None) -> bool:
+    """Say whether a check expects a statement to be false."""
+    return check is not None and check.kind == "claim" and not check.holds
+
+
 def is_trap(check: Check | None) -> bool:
     """Say whether a check expects a verdict other than PASS, or a statement to be false."""
-    if check is None:
-        return False
-    if check.kind == "claim":
-        return not check.holds
     expected = getattr(check, "expect", None)
-    return expected is not None and expected.status != "PASS"
+    return is_refutation(check) or (expected is not None and expected.status != "PASS")
 
 
 def find_lead(experiment: Experiment, record: Record, summary: Mapping[str, Any]) -> Lead:
@@ -183,18 +184,13 @@ def find_lead(experiment: Experiment, record: Record, summary: Mapping[str, Any]
 
     listed = [entry for entry in summary["checks"] if entry.get("results")]
     if not listed:
-        return Lead(usual, _member(record, {}))
+        return Lead(usual, data.of_case(record, 0)[0])
     entry = min(listed, key=rank)
     check = asserted.get(entry["id"])
     named = str(entry.get("quantity") or usual)
     is_compared = any(f"{named}_{of}_norm" in record for of in ("difference", "error"))
     quantity = named if is_compared else usual
-    return Lead(quantity, _member(record, entry["results"][0]), entry, check)
-
-
-def _member(record: Record, result: Mapping[str, Any]) -> Member:
-    """Return the scheme and the member of a result; the first ones where it names none."""
-    names = record.words("scheme")
-    scheme = names.index(result["scheme"]) if result.get("scheme") in names else 0
-    case = place_of(record, result.get("case", -1)) or 0
-    return Member(scheme, case, names[scheme], case_name(record, case))
+    result = entry["results"][0]
+    every = data.of_case(record, data.place_of(record, result.get("case", -1)) or 0)
+    member = next((one for one in every if one.scheme_name == result.get("scheme")), every[0])
+    return Lead(quantity, member, entry, check)

@@ -95,19 +95,13 @@ def natural_frequency(record: Record, case: int) -> float:
 def omega_dt(record: Record) -> Floats:
     """Return w dt of every member and level, shape (case, level); NaN where the record does not have it."""
     shape = (len(record["case"]), len(record["level"]))
-    if "omega_dt" not in record:
-        return np.full(shape, np.nan)
-    variable = record.variable("omega_dt")
-    values = np.asarray(variable.values, dtype=np.float64)
-    return np.broadcast_to(values if "case" in variable.dims else values[None, :], shape)
+    return np.broadcast_to(known(record, "omega_dt", ("case", "level")), shape)
 
 
 def phase_error(record: Record, who: str) -> Floats:
     """Return the phase error over a period by ``theory`` or as ``measured``, shape (scheme, case, level)."""
-    variable = record.variable("dt")
-    dt = np.asarray(variable.values, dtype=np.float64)
-    by_level = dt.T if variable.dims == ("level", "case") else dt[None, :]
-    periods = omega_dt(record) / (2.0 * np.pi) / by_level
+    # dt has the shape (level, case) or (level,)
+    periods = omega_dt(record) / (2.0 * np.pi) / np.asarray(record["dt"], dtype=np.float64).T
     return known(record, f"{who}_phase_error", OF_LEVEL) * periods
 
 
@@ -119,6 +113,17 @@ def unit(record: Record, name: str) -> str:
 def time_unit(record: Record, name: str = "t") -> str:
     """Return the unit of times, also where `t` is a fraction of the end; empty where times have none."""
     return (unit(record, name) or "s") if has_time_unit(record) else ""
+
+
+def radians_unit(record: Record) -> str:
+    """Return the unit of an angular frequency; empty where times have none."""
+    time = time_unit(record)
+    return f"rad {pretty_unit(f'{time}-1')}" if time else ""
+
+
+def time_text(record: Record, value: float) -> str:
+    """Write a time, such as that of a step, with its unit."""
+    return f"{words.number(float(value), 'step')} {time_unit(record, 'dt')}".rstrip()
 
 
 def time_label(record: Record) -> str:
@@ -138,8 +143,7 @@ def norm_unit(record: Record, quantity: str, norm: str = TYPICAL_NORM) -> str:
     time = time_unit(record)
     extra = {"l1": time, "l2": f"√{time}" if time else ""}.get(norm, "")
     # of a single level there are errors only
-    names = (f"{quantity}_{of}_norm" for of in ("difference", "error"))
-    own = next((unit(record, name) for name in names if name in record), "")
+    own = unit(record, f"{quantity}_difference_norm") or unit(record, f"{quantity}_error_norm")
     return f"{own} {extra}".strip()
 
 
@@ -160,8 +164,9 @@ def steps_of(record: Record, case: int) -> Floats:
 
 
 def ends_of(record: Record) -> Floats:
-    """Return the end time of every member, shape (case,) or (1,)."""
-    return np.atleast_1d(pick(record, "dt", level=0) * float(record["steps"][0]))
+    """Return the end time of every member, shape (case,)."""
+    ends = pick(record, "dt", level=0) * float(record["steps"][0])
+    return np.broadcast_to(ends, len(record["case"]))
 
 
 def flags(record: Record, name: str) -> NDArray[Any]:
@@ -205,12 +210,14 @@ def case_name(record: Record, case: int, of: str | None = None) -> str:
 
 def everyone(record: Record) -> list[Member]:
     """Return every scheme and member, all members of a scheme together."""
-    names = [case_name(record, case) for case in range(len(record["case"]))]
-    return [
-        Member(s, case, scheme, name)
-        for s, scheme in enumerate(record.words("scheme"))
-        for case, name in enumerate(names)
-    ]
+    every = [of_case(record, case) for case in range(len(record["case"]))]
+    return [member for of_scheme in zip(*every, strict=True) for member in of_scheme]
+
+
+def of_case(record: Record, case: int, role: str = "") -> list[Member]:
+    """Return one member by every scheme."""
+    name = case_name(record, case)
+    return [Member(s, case, scheme, name, role) for s, scheme in enumerate(record.words("scheme"))]
 
 
 def place_of(record: Record, case: int) -> int | None:
@@ -253,9 +260,9 @@ def basis_of_order(record: Record, quantity: str) -> str:
 def promised_text(record: Record, quantity: str, scheme: int) -> str:
     """Write the order that is due to a quantity: a number, or whose it is where it depends on the member."""
     found = np.unique(formal_orders(record, quantity)[scheme])
-    return (
-        f"{found[0]:g}".replace("inf", "∞") if found.size == 1 else basis_of_order(record, quantity)
-    )
+    if found.size != 1:
+        return basis_of_order(record, quantity)
+    return f"{found[0]:g}".replace("inf", "∞")
 
 
 def stated_order(
@@ -299,11 +306,8 @@ def coincidence(record: Record, quantity: str, member: Member) -> float:
     name = f"{quantity}_coincidence"
     if name not in record:
         return math.nan
-    found = at(record, name, member)
-    sound = [
-        x for x, good in zip(found, sound_triples(record, quantity, member), strict=True) if good
-    ]
-    return float(sound[-1]) if sound else math.nan
+    sound = at(record, name, member)[sound_triples(record, quantity, member)]
+    return float(sound[-1]) if sound.size else math.nan
 
 
 def floor_norm(record: Record, quantity: str, member: Member, norm: str) -> Floats:

@@ -21,7 +21,7 @@ ENERGIES = ("energy", "kinetic_energy", "potential_energy")
 def numbers_of(
     experiment: Experiment, record: Record, case: int
 ) -> tuple[dict[str, Floats], dict[str, Floats]]:
-    """Return parameters and initial values of a member by its position in the record."""
+    """Return parameters, by their keys in a file, and initial values of a member by its position in the record."""
     index = int(record["case"][case])
     found = members(experiment, index, index + 1)
     parameters, initial = (
@@ -29,6 +29,12 @@ def numbers_of(
         for part in (found.parameters, found.initial)
     )
     return parameters, initial
+
+
+def parameters_of(experiment: Experiment, record: Record, case: int) -> dict[str, Floats]:
+    """Return the parameters of a member by their names in formulas."""
+    found, _ = numbers_of(experiment, record, case)
+    return {row.name: found[row.key] for row in experiment.model.definition.parameters}
 
 
 def on_level(
@@ -72,8 +78,7 @@ def _of_states(
 ) -> Floats | None:
     """Work out an energy or an output of the model."""
     model = experiment.model.definition
-    parameters, _ = numbers_of(experiment, record, member.case)
-    numbers = {**parameters, **states, "t": t}
+    numbers = {**parameters_of(experiment, record, member.case), **states, "t": t}
     found = [
         np.broadcast_to(values(tree(model, formula), numbers), t.shape)
         for formula in _formulas(model, quantity)

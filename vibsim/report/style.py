@@ -52,6 +52,7 @@ MISSING = "#d4d4d4"  # colour of what has no value
 WIDTH = 9.0  # of a figure [inch]
 THINNED_POINTS = 400  # horizontal resolution to which a long series is thinned
 MANY = len(COLOURS)  # schemes above which a figure has one legend for all of its panels
+LOG_RATIO = 30.0  # largest over least value above which a logarithmic axis shows them better
 LARGEST, TINIEST = 1e300, 1e-300  # of logarithmic axes: beyond, a margin would overflow
 LEAST, MOST = 1e-290, 1e290  # what lies beyond is drawn at the edge
 DECADES = (1, 2, 3, 5, 10, 20, 30, 50, 100, 200, 300)  # between ticks of a logarithmic axis
@@ -213,6 +214,12 @@ def positive(values: Floats) -> Floats:
 def no_zeros(values: Floats) -> Floats:
     """Return absolute values; NaN for zero, which a logarithmic axis cannot show."""
     return np.where(values == 0.0, np.nan, np.abs(values))
+
+
+def spans_decades(values: Floats) -> bool:
+    """Say whether values are positive, and the largest of them so large that a logarithmic axis shows them better."""
+    known = finite(values)
+    return bool(known.min() > 0.0 and known.max() > LOG_RATIO * known.min())
 
 
 def of_level(level: int) -> str:

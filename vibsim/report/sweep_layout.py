@@ -16,11 +16,9 @@ from vibsim.core.array_types import Floats
 from vibsim.core.record import Record
 from vibsim.report import words
 from vibsim.report.data import swept, swept_label
-from vibsim.report.style import label
+from vibsim.report.style import LOG_RATIO, label
 
 LARGEST_TO_SCALE = 1e100  # swept values from here on are not drawn to scale
-LOG_RATIO = 30.0
-"""Positive values are drawn on a logarithmic axis only where the largest is so many times the least."""
 FEW, LINES = 5, 6
 """Most lines that the other parameter of a sweep of two may make, and those of one of more; others are no curves."""
 CELLS = 400  # most cells along each side of a map: more than its pixels could show
@@ -168,6 +166,11 @@ def place_in(key: Key, borders: Floats) -> NDArray[np.intp]:
     """Return the bin of every member, shape (case,)."""
     found = np.searchsorted(borders, key.values, side="right") - 1
     return np.clip(found, 0, borders.size - 2)
+
+
+def layout_of(found: list[Key]) -> Along | Grid | None:
+    """Return how members lie that differ in some `keys`; None where they are a cloud, or differ in none."""
+    return along_of(found) or grid_of(found)
 
 
 @dataclass(frozen=True)

@@ -5,15 +5,15 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from jinja2 import Environment
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
     from matplotlib.transforms import Bbox
 
-    from vibsim.experiment import Check, Experiment
-    from vibsim.experiment.data import ArraySpec, SchemeSpec, StructureSpec, TableSpec
+    from vibsim.experiment import Experiment
+    from vibsim.experiment.data import ArraySpec, SchemeSpec, StructureSpec
     from vibsim.experiment.schema.checks import (
         AccurateCheck,
+        Check,
         ConservesCheck,
         ConvergesCheck,
         EqualCheck,
@@ -25,13 +25,13 @@ if TYPE_CHECKING:
     from vibsim.experiment.schema.sweep import Axis
     from vibsim.plan import Plan
 else:
-    Environment = Axes = Figure = Bbox = Check = Experiment = SchemeSpec = TableSpec = object
+    Axes = Figure = Bbox = Check = Experiment = SchemeSpec = object
     AccurateCheck = ConservesCheck = ConvergesCheck = EqualCheck = object
     Measurement = StableCheck = ValueCheck = object
     PublishedRow = PublishedTable = Axis = Plan = ArraySpec = StructureSpec = object
 
 __all__ = [
-    "AccurateCheck", "ArraySpec", "Axes", "Axis", "Bbox", "Check", "ConservesCheck", "ConvergesCheck", "Environment",
-    "EqualCheck", "Experiment", "Figure", "Measurement", "Plan", "PublishedRow", "PublishedTable", "SchemeSpec",
-    "StableCheck", "StructureSpec", "TableSpec", "ValueCheck",
+    "AccurateCheck", "ArraySpec", "Axes", "Axis", "Bbox", "Check", "ConservesCheck", "ConvergesCheck", "EqualCheck",
+    "Experiment", "Figure", "Measurement", "Plan", "PublishedRow", "PublishedTable", "SchemeSpec", "StableCheck",
+    "StructureSpec", "ValueCheck",
 ]  # fmt: skip

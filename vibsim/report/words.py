@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from vibsim.checks.notation import Notation
+from vibsim.core import vocabulary
 from vibsim.core.vocabulary import AMPLITUDE, PHASE, is_error_part, order_interval, whole_of
 from vibsim.experiment.value_names import VALUES
 
@@ -98,8 +99,8 @@ def passed(statuses: Sequence[str], one: str = "check", many: str = "checks") ->
 
 
 BADGES = {"PASS": "passed", "INCONCLUSIVE": "undecided", "FAIL": "failed"}
-TRAP, REFUTED = "trap caught", "refuted"
-"""Words on a check that expected a failure and got it, and on a statement that is false as the experiment expects."""
+TRAP, REFUTED, CLAIMED = "trap caught", "refuted", "as claimed"
+"""Words on a check that expected a failure and got it, and on a statement that is false or true as expected."""
 
 
 def badge(check: Mapping[str, Any]) -> str:
@@ -107,8 +108,18 @@ def badge(check: Mapping[str, Any]) -> str:
     if check["status"] != "PASS":
         return BADGES.get(check["status"], str(check["status"]))
     if check["kind"] == "claim":
-        return REFUTED if is_trap(check) else "as claimed"
+        return REFUTED if is_trap(check) else CLAIMED
     return TRAP if is_trap(check) else BADGES["PASS"]
+
+
+MARKS = TRAP, REFUTED
+"""Words on checks that are told beside a verdict: that something went wrong, as expected."""
+
+
+def marks(checks: Sequence[Mapping[str, Any]]) -> list[tuple[str, int]]:
+    """Return those of `MARKS` that checks have, with the number of checks."""
+    found = [badge(check) for check in checks]
+    return [(mark, found.count(mark)) for mark in MARKS if mark in found]
 
 
 def is_trap(check: Mapping[str, Any]) -> bool:
@@ -136,8 +147,8 @@ PROSE = {"phase", "amplitude", "largest"} | {name.partition("_")[0] for name in 
 """With what the name of a value, or of a part of an error, begins."""
 
 
-RAISE = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
-"""Digits to superscripts."""
+RAISE, LOWER = (str.maketrans("-0123456789", to) for to in ("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "₋₀₁₂₃₄₅₆₇₈₉"))
+"""Digits to superscripts, and to subscripts."""
 
 
 def power(exponent: int) -> str:
@@ -165,12 +176,11 @@ class _Page(Notation):
         mantissa, has_power, exponent = text.partition("e")
         if len(mantissa) > MOST_DIGITS or (mantissa.endswith(".0") and not has_power):
             mantissa = f"{float(mantissa):.10g}"
+        mantissa = mantissa.replace("-", "−")
         if not has_power:
             return mantissa
         ten = power(int(exponent))
-        if abs(float(mantissa)) != 1.0:
-            return f"{mantissa}·{ten}"
-        return f"-{ten}" if mantissa.startswith("-") else ten
+        return mantissa.replace("1", ten) if mantissa in ("1", "−1") else f"{mantissa}·{ten}"
 
     def powers(self, text: str) -> str:
         """Write the powers of ten in a sentence that was made for a terminal."""
@@ -238,7 +248,7 @@ def _significant(value: float, digits: int, fixed: bool) -> str:
 
 def lowered(level: int) -> str:
     """Write a level as a subscript."""
-    return str(level).translate(str.maketrans("-0123456789", "₋₀₁₂₃₄₅₆₇₈₉"))
+    return str(level).translate(LOWER)
 
 
 def raised(exponent: float) -> str:
@@ -263,8 +273,20 @@ def interval(bounds: Sequence[float | None] | None) -> str:
     if len(known) < 2:
         return "–"
     if max(map(abs, known)) >= 1e4:
-        return f"{number(known[0], 'order')} to {number(known[1], 'order')}"
+        return " to ".join(number(end, "order") for end in known)
     return " to ".join(end.replace("-", "−") for end in order_interval(*known))
+
+
+def between(bounds: Sequence[float | None] | None) -> str:
+    """Write the interval of an order as part of a sentence; empty where there is none."""
+    text = interval(bounds)
+    return f"between {text.replace(' to ', ' and ')}" if text != "–" else ""
+
+
+def with_interval(order: float | None, bounds: Sequence[float | None] | None) -> str:
+    """Write an order, and in brackets its interval."""
+    text = interval(bounds)
+    return f"{number(order, 'order')}{f' ({text})' if text != '–' else ''}"
 
 
 def levels(window: Sequence[int] | None) -> str:
@@ -290,3 +312,16 @@ def interval_of(result: Mapping[str, Any]) -> tuple[float, float] | None:
 def levels_of(result: Mapping[str, Any]) -> Sequence[int] | None:
     """Return the first and the last level that the order of a result rests on."""
     return None if fact(result, "order") is None else fact(result, "levels")
+
+
+def number_of(result: Mapping[str, Any]) -> float | None:
+    """Return the number that decides a result."""
+    return vocabulary.decisive_number(result.get("facts") or {})
+
+
+def measured(result: Mapping[str, Any]) -> tuple[Any, ...]:
+    """Return the cells of a result: order, ends of its interval, levels, the number that decides, and `ERROR_FACTS`."""
+    low, high = interval_of(result) or (None, None)
+    window = levels_of(result)
+    of_order = fact(result, "order"), low, high, levels(window) if window else None
+    return (*of_order, number_of(result), *(fact(result, name) for name in vocabulary.ERROR_FACTS))

@@ -70,6 +70,9 @@ class Flag:
 
 AnyOption = Option | NumberOption | Flag
 
+LOW_STARTS = {"first_order": "omits its dt^2 term", "backward": "has twice its dt^2 term"}
+"""Choices of an option `start` that leave order 1, and what is wrong with them in words."""
+
 EVENTS = Option(
     "events",
     TREATMENTS,

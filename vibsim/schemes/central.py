@@ -12,7 +12,10 @@ One scheme written three ways, algebraically equal, with different round-off:
 - ``compensated``: the same with both additions carrying their rounding error along (Knuth's two-sum). Does not grow.
 
 The first step follows from the centred difference ``(u^1 - u^(-1))/(2 dt) = V`` and the scheme at n = 0 (`centred`), or
-from three terms of the Taylor polynomial (`taylor`, B, exercise 5): ``u^1 = u^0 + dt V + dt^2 a^0/2`` either way.
+from three terms of the Taylor polynomial (`taylor`, B, exercise 5): ``u^1 = u^0 + dt V + dt^2 a^0/2`` either way. A
+one-sided difference of the initial velocity leaves order 1 (B, section 7.2): the forward one is ``u^1 = u^0 + dt V``
+(`first_order`), as Euler-Cromer starts with the position first; the backward one, ``u^(-1) = u^0 - dt V``, is
+``u^1 = u^0 + dt V + dt^2 a^0`` (`backward`), as it starts with the velocity first.
 
 Damping. With the increments ``d = u^n - u^(n-1)`` and ``e = u^(n+1) - u^n``, a damping rate c over the mass, and a the
 acceleration without damping at n, every step of ``u'' + D(u') = a(u, t)`` is ``e = d + kick``:
@@ -40,6 +43,7 @@ from vibsim.core.array_types import Floats
 from vibsim.elementary import ELEMENTARY
 from vibsim.models.base import Model
 from vibsim.schemes.base import (
+    LOW_STARTS,
     UNIT_ROUND_OFF,
     VECTOR,
     ZERO,
@@ -54,12 +58,16 @@ from vibsim.schemes.base import (
 from vibsim.schemes.code_generation import written
 from vibsim.schemes.orders import Orders, depends_on_velocity, same_orders
 
+FORWARD_START, BACKWARD_START = 1, 2
+"""Variants of a start with a one-sided difference of the initial velocity."""
+
 
 def start_three_term(
     variant: int, u: float, v: float, dt: float, p: Any, acceleration: Acceleration
 ) -> tuple[float, float]:
-    """Return u^1 and u^0; u^1 by A (11), or without its dt^2 term (the trap of A, section 2.3)."""
-    kick = ZERO if variant else 0.5 * (dt * dt) * acceleration(u, v, 0.0, p)
+    """Return u^1 and u^0; u^1 by A (11), or without its dt^2 term (the trap of A, section 2.3), or with twice that."""
+    share = 1.0 if variant == BACKWARD_START else 0.5
+    kick = ZERO if variant == FORWARD_START else share * (dt * dt) * acceleration(u, v, 0.0, p)
     return u + dt * v + kick, u
 
 
@@ -73,7 +81,8 @@ def start_increment(
     variant: int, u: float, v: float, dt: float, p: Any, acceleration: Acceleration
 ) -> tuple[float, float]:
     """Return u^1 and the increment u^1 - u^0."""
-    kick = ZERO if variant else 0.5 * (dt * dt) * acceleration(u, v, 0.0, p)
+    share = 1.0 if variant == BACKWARD_START else 0.5
+    kick = ZERO if variant == FORWARD_START else share * (dt * dt) * acceleration(u, v, 0.0, p)
     d = dt * v + kick
     return u + d, d
 
@@ -87,7 +96,8 @@ def start_compensated(
     variant: int, u: float, v: float, dt: float, p: Any, acceleration: Acceleration
 ) -> tuple[float, float, float, float]:
     """Return u^1, the increment u^1 - u^0, and the rounding errors that both still have to get."""
-    kick = ZERO if variant else 0.5 * (dt * dt) * acceleration(u, v, 0.0, p)
+    share = 1.0 if variant == BACKWARD_START else 0.5
+    kick = ZERO if variant == FORWARD_START else share * (dt * dt) * acceleration(u, v, 0.0, p)
     push = dt * v
     d = push + kick
     part = d - push
@@ -239,7 +249,9 @@ def stepper(options: Options, treatment: Treatment = UNDAMPED) -> Stepper:
         chosen.start,
         _step(arithmetic, treatment),
         chosen.backward,
-        variant=int(options["start"] == "first_order"),
+        variant={"first_order": FORWARD_START, "backward": BACKWARD_START}.get(
+            str(options["start"]), 0
+        ),
         end=_ENDS[str(options["end_velocity"])],
         own_velocity=False,
         scaling=corrected if options.get("frequency_correction") else None,
@@ -250,7 +262,7 @@ def stepper(options: Options, treatment: Treatment = UNDAMPED) -> Stepper:
 def orders(options: Options) -> Orders:
     """Return 2: scheme, start and velocity are centred; the corrected frequency makes it 4 for positions on a spring.
 
-    That holds for the start `first_order` too: it breaks the promise, and the verdict says so.
+    That holds for the starts of `LOW_STARTS` too: they break the promise, and the verdict says so.
     """
     return same_orders(2, position_linear=4.0 if options.get("frequency_correction") else None)
 
@@ -267,7 +279,7 @@ def even_powers(quantity: str, model: Model, options: Options) -> bool:
     """
     centred_end = quantity in model.positions or options["end_velocity"] == "kick"
     centred_damping = model.damping is None or model.damping.kind == "linear"
-    return options["start"] != "first_order" and centred_end and centred_damping
+    return options["start"] not in LOW_STARTS and centred_end and centred_damping
 
 
 def _damped(quadratic: Treatment) -> tuple[tuple[str, Callable[[Options], Stepper]], ...]:
@@ -289,9 +301,10 @@ def _damped(quadratic: Treatment) -> tuple[tuple[str, Callable[[Options], Steppe
 _OPTIONS = (
     Option(
         "start",
-        ("centred", "taylor", "first_order"),
+        ("centred", "taylor", *LOW_STARTS),
         "formula of the first step: from the centred difference of u'(0), A (11); from a Taylor polynomial, which "
-        "gives the same (B, exercise 5); or without its dt^2 term",
+        "gives the same (B, exercise 5); from the forward difference, without its dt^2 term; or from the backward "
+        "difference, with twice that term (B, section 7.2)",
     ),
     Option(
         "end_velocity",

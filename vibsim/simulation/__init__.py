@@ -10,21 +10,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from vibsim.core.lazy import loader
+from vibsim.core.lazy import lazy
 
 if TYPE_CHECKING:
     from vibsim.simulation.level import simulate, simulate_record
 
 __all__ = ["simulate", "simulate_record"]
 
-__getattr__ = loader(
-    __name__,
-    {
-        "simulate": "vibsim.simulation.level",
-        "simulate_record": "vibsim.simulation.level",
-    },
-)
-
-
-def __dir__() -> list[str]:
-    return __all__
+__getattr__, __dir__ = lazy(__name__, {".level": ("simulate", "simulate_record")})

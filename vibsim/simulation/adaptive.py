@@ -29,7 +29,7 @@ import numpy as np
 
 from vibsim.core.array_types import Floats, Integers
 from vibsim.engine import Trajectories
-from vibsim.engine import integrate as gather_over
+from vibsim.engine import integrate as integrate_steps
 from vibsim.engine.gather import OVERFLOW
 from vibsim.engine.kernel import kernel
 from vibsim.experiment.cost import PLAIN_MEMBER_STEPS
@@ -126,6 +126,37 @@ def along_a_table(coordinates: int) -> Stepper:
     )
 
 
+def gather_over(
+    model: Model,
+    scheme: Scheme,
+    options: Options,
+    parameters: Floats,
+    table: Floats,
+    initial: Floats,
+    dt: Floats,
+    steps: int,
+    every: int,
+    **more: Any,
+) -> Trajectories:
+    """Gather over the points of a table, shape (case, steps + 2, state), as `vibsim.engine.integrate` does over steps.
+
+    See `along_a_table`.
+    """
+    members = len(dt)
+    return integrate_steps(
+        model,
+        replace(scheme, stepper=lambda options: along_a_table(model.coordinates), damped=()),
+        options,
+        np.concatenate([parameters, table.reshape(members, -1)], axis=1),
+        initial,
+        dt,
+        steps,
+        every,
+        lane="plain" if members * steps <= PLAIN_MEMBER_STEPS else "scalar",
+        **more,
+    )
+
+
 def pieces(where: Integers, steps: int) -> Iterator[Integers]:
     """Yield as many members at a time as `integrate` may hold the points of."""
     size = max(POINTS_AT_A_TIME // (steps + 1), 1)
@@ -168,16 +199,7 @@ def integrate(
             table[i, n] = run.at(n * dt[i]).T
         done[:, i] = len(run.pieces), run.force_evaluations
     found = gather_over(
-        model,
-        replace(scheme, stepper=lambda options: along_a_table(model.coordinates), damped=()),
-        options,
-        np.concatenate([parameters, table.reshape(members, -1)], axis=1),
-        initial,
-        dt,
-        steps,
-        every,
-        lane="plain" if members * steps <= PLAIN_MEMBER_STEPS else "scalar",
-        **more,
+        model, scheme, options, parameters, table, initial, dt, steps, every, **more
     )
     assert found.gathered is not None
     counts = replace(found.gathered, accepted_steps=done[0], force_evaluations=done[1])

@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from vibsim import plan
 from vibsim.core.array_types import Floats, Integers
 from vibsim.core.record import Attribute, Record, Variable, attributes
 from vibsim.core.vocabulary import HIGHEST, MEMBER, SERIES
 from vibsim.engine import EventTimes, Extrema, Gathered, Trajectories
+from vibsim.experiment import storage
 from vibsim.experiment.storage import (
     RUNNING,
     asks_for_peaks,
@@ -27,7 +27,7 @@ from vibsim.simulation.derived import derived
 from vibsim.simulation.members import Members, members
 from vibsim.simulation.reference.solve import method, reference
 from vibsim.simulation.scaled import in_scales
-from vibsim.simulation.solution import has_adaptive, solve
+from vibsim.simulation.solution import solve
 
 if TYPE_CHECKING:
     import xarray
@@ -94,7 +94,7 @@ def simulate_record(
         raise ValueError(f"level {level} is none of {list(experiment.levels)}")
     model = experiment.model.definition
     group = members(experiment, start, experiment.members if stop is None else stop)
-    steps, every = experiment.steps(level), plan.sampling(experiment, level)
+    steps, every = experiment.steps(level), storage.sampling(experiment, level)
     is_lean, wanted = is_bounded(experiment), stored_series(experiment)
     kept = extrema_kept(steps, experiment.trajectories)
     of_states = {state.name for state in model.states}.union(ENERGIES)
@@ -131,7 +131,11 @@ def simulate_record(
         **(_extrema(model, found.extrema) if found.extrema else {}),
         **(_table(MEMBER, _events(found.events)) if found.events else {}),
         **(_event_times(found.events) if found.events and event_times(experiment) else {}),
-        **(_table(MEMBER, _own_steps(run)) if has_adaptive(experiment) else {}),
+        **(
+            _table(MEMBER, _own_steps(run))
+            if any(scheme.adaptive for scheme in experiment.schemes)
+            else {}
+        ),
         **_table(("case",), _constants(model, group, steps)),
     }
     attrs: dict[str, Attribute] = {
@@ -246,11 +250,7 @@ def _exact(
         # members that start from others have starts of every level's own
         few = few and experiment.chain == 1
         return _computed(model, group, number / steps) if few else {}
-    exact = model.exact(
-        number * (group.end / steps)[:, None],
-        {name: values[:, None] for name, values in group.initial.items()},
-        {name: values[:, None] for name, values in group.parameters.items()},
-    )
+    exact = group.exact(model, number * (group.end / steps)[:, None])
     rows = (
         (f"{row.name}_exact", exact[row.name], f"exact {row.long_name}", row.unit)
         for row in model.states

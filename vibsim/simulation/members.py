@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from vibsim import plan
 from vibsim.core.array_types import Floats, Integers
+from vibsim.experiment import sweep_columns
 
 if TYPE_CHECKING:
     from vibsim.experiment import Experiment
@@ -34,10 +34,24 @@ class Members:
         found = [self.parameters[row.key] for row in model.parameters]
         return np.stack(found, axis=-1) if found else np.empty((len(self.end), 0))
 
+    def by_name(self, model: Model) -> dict[str, Floats]:
+        """Return the parameters by the names that formulas have for them, shape (case, 1), beside which times stand."""
+        return {row.name: self.parameters[row.key][:, None] for row in model.parameters}
+
+    def exact(self, model: Model, t: Floats) -> dict[str, Floats]:
+        """Return the exact states of a model that has them, at times t, shape (case, t)."""
+        assert model.exact is not None
+        return model.exact(t, in_columns(self.initial), in_columns(self.parameters))
+
+
+def in_columns(table: Mapping[str, Floats]) -> dict[str, Floats]:
+    """Return numbers of members in the shape (case, 1), beside which times stand."""
+    return {name: values[:, None] for name, values in table.items()}
+
 
 def members(experiment: Experiment, start: int, stop: int) -> Members:
     """Work out the numbers of members start..stop-1."""
-    columns = plan.columns(experiment, start, stop)
+    columns = sweep_columns.columns(experiment, start, stop)
     parameters, initial = numbers_of(experiment, columns, stop - start)
     if experiment.chain > 1:
         starts = np.arange(start, stop) % experiment.chain == 0

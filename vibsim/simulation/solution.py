@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from vibsim import plan
 from vibsim.core.array_types import Integers
 from vibsim.engine import Trajectories, integrate
+from vibsim.experiment import sweep_columns
 from vibsim.models import Model
 from vibsim.schemes import Scheme
 from vibsim.simulation import adaptive, structure
@@ -45,7 +45,7 @@ def solve(
     rows = []
     for i, scheme in enumerate(experiment.schemes):
         method, runs, initial = scheme.method, [], given.copy()
-        options_of = plan.option_groups(experiment, i, group.columns)
+        options_of = sweep_columns.option_groups(experiment, i, group.columns)
         for link, (options, alike) in product(range(experiment.chain), options_of):
             members = alike[place[alike] == link]
             if not members.size:
@@ -78,11 +78,6 @@ def of_kind(model: Model, scheme: Scheme) -> Callable[..., Trajectories]:
     if scheme.adaptive:
         return adaptive.integrate
     return integrate if model.loaded is None else structure.integrate
-
-
-def has_adaptive(experiment: Experiment) -> bool:
-    """Tell whether a scheme of `experiment` chooses its own steps."""
-    return any(scheme.adaptive for scheme in experiment.schemes)
 
 
 def _in_order(runs: Sequence[tuple[Trajectories, Integers]]) -> Trajectories:

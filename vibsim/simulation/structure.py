@@ -3,7 +3,7 @@
 A step solves with one symmetric matrix (`vibsim.schemes.newmark`), which SuperLU factors once for each length of step
 and damping. What is kept of every step are the observed displacements and velocities and the energies of the whole
 structure. They are put into a table, over which the loop of every other scheme gathers extrema, norms and periods, with
-the energies as one more coordinate (`vibsim.simulation.adaptive.along_a_table`).
+the energies as one more coordinate (`vibsim.simulation.adaptive.gather_over`).
 
 The last bits depend on the versions of SciPy and of its linear algebra, and on the machine, but on no other member.
 """
@@ -19,15 +19,13 @@ import numpy as np
 from vibsim.core.array_types import Floats
 from vibsim.core.errors import SimulationError
 from vibsim.engine import Trajectories
-from vibsim.engine import integrate as gather_over
 from vibsim.engine.gather import OVERFLOW
-from vibsim.experiment.cost import PLAIN_MEMBER_STEPS
 from vibsim.formula import Name
 from vibsim.models import Model, State
 from vibsim.models.shared.matrices import factored
 from vibsim.models.structure import Loaded
 from vibsim.schemes.base import Options, Scheme, Weights
-from vibsim.simulation.adaptive import along_a_table
+from vibsim.simulation.adaptive import gather_over
 
 KINETIC, POTENTIAL = "_kinetic", "_potential"
 """States that carry the energies along."""
@@ -74,16 +72,7 @@ def integrate(
         loaded=None,
     )
     found = gather_over(
-        wide,
-        replace(scheme, stepper=lambda options: along_a_table(count + 1), damped=()),
-        options,
-        np.concatenate([parameters, table.reshape(len(dt), -1)], axis=1),
-        table[:, 0],
-        dt,
-        steps,
-        every,
-        lane="plain" if len(dt) * steps <= PLAIN_MEMBER_STEPS else "scalar",
-        **more,
+        wide, scheme, options, parameters, table, table[:, 0], dt, steps, every, **more
     )
     return _without_energies(found, count)
 

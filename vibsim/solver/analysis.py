@@ -5,27 +5,24 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from shlex import quote
 from typing import Any
 
 import numpy as np
 
-from vibsim.analysis.summary import WORST
+from vibsim.analysis.summary import WORST, heading
 from vibsim.checks.fields import GROUP, name_of
 from vibsim.checks.outcome import compared_reason
 from vibsim.checks.solver_facts import SOLVER_FACTS
-from vibsim.convergence import LadderVerdict
 from vibsim.convergence.study.labelled import COLUMNS, dataset
-from vibsim.convergence.study.verdict_data import Level
+from vibsim.convergence.study.verdict import LadderVerdict, Level
 from vibsim.core.array_types import Floats
 from vibsim.core.errors import VibsimError
 from vibsim.core.record import Record, Variable, attributes, flags
-from vibsim.core.set_option import set_options
-from vibsim.core.vocabulary import FORMAT, REASON_NAMES, SEVERITY, STATUSES, jsonable, worst
-from vibsim.experiment import citation
+from vibsim.core.vocabulary import REASON_NAMES, SEVERITY, STATUSES, jsonable, worst
 from vibsim.experiment.schema.solver import SolverCheck
 from vibsim.experiment.solver import SolverExperiment
 from vibsim.solver import level_output
+from vibsim.solver.level_output import plain
 from vibsim.solver.verdicts import SolverResult, expected, judge
 
 SCHEME = "solver"
@@ -84,7 +81,8 @@ def judge_members(
             if row and _severity(found) < _severity(row[0]):
                 row[0], found = found, row[0]
             # the worst one is shown with its values
-            row.append(replace(found, verdict=_bare(found.verdict)) if row else found)
+            bare = replace(found.verdict, values=np.empty(0), best_values=None, coords={})
+            row.append(replace(found, verdict=bare) if row else found)
     return [
         CheckResults(check, sorted(row, key=_severity))
         for check, row in zip(experiment.checks, rows, strict=True)
@@ -95,25 +93,14 @@ def _severity(result: SolverResult) -> tuple[int, float, int]:
     return -SEVERITY[result.compared], -result.away, result.member
 
 
-def _bare(verdict: LadderVerdict) -> LadderVerdict:
-    return replace(verdict, values=np.empty(0), best_values=None, coords={})
-
-
 # ---- summary.json
 
 
 def summarise(experiment: SolverExperiment, checks: Sequence[CheckResults]) -> dict[str, Any]:
     """Return the summary of an experiment, as `vibsim.analysis.summary.summarise` does."""
-    given = {"settings": list(experiment.settings)} if experiment.settings else {}
     plain: dict[str, Any] = jsonable(
         {
-            "vibsim_format": FORMAT,
-            "collection": experiment.collection,
-            "experiment": experiment.name,
-            **given,
-            "title": experiment.title,
-            "source": citation.fields(experiment.source),
-            "status": worst(check.status for check in checks),
+            **heading(experiment, worst(check.status for check in checks)),
             "checks": [_check(experiment, check) for check in checks],
             "failures": [],
             "failure_count": 0,
@@ -169,11 +156,10 @@ def _result(experiment: SolverExperiment, result: SolverResult) -> dict[str, Any
     }
     if experiment.sweep is None:
         return found
-    flag = set_options(experiment.settings)
-    flag += "" if experiment.solver.kind == "files" else " --allow-commands"
+    flag = "" if experiment.solver.kind == "files" else " --allow-commands"
     return found | {
         "values": experiment.parameters_of(result.member),
-        "command": f"vibsim run {quote(f'{experiment.word}@{result.member}')}{flag}",
+        "command": experiment.command_of(result.member) + flag,
     }
 
 
@@ -184,17 +170,14 @@ def record(experiment: SolverExperiment, checks: Iterable[CheckResults]) -> Reco
     """Return what is stored of all checks: the table of levels of every member, and the values of the decisive one."""
     members, levels = experiment.members, list(experiment.levels)
     coords = {
-        "level": Variable(
-            ("level",), np.array(levels), attributes("position of the level, the coarsest 0", "1")
-        ),
-        "case": Variable(("case",), np.arange(members), attributes("member of the sweep", "1")),
+        "level": plain(("level",), levels, "position of the level, the coarsest 0"),
+        "case": plain(("case",), np.arange(members), "member of the sweep"),
     }
     for name, sizes in experiment.sizes.items():
-        values = np.array(sizes, dtype=np.float64)
-        coords[name] = Variable(("level",), values, attributes(f"size {name} of the level", "1"))
+        coords[name] = plain(("level",), np.array(sizes, float), f"size {name} of the level")
     for name in experiment.parameters_of(0):
-        column = np.array([experiment.parameters_of(i)[name] for i in range(members)])
-        coords[name] = Variable(("case",), column, attributes(f"parameter {name}", "1"))
+        column = [experiment.parameters_of(i)[name] for i in range(members)]
+        coords[name] = plain(("case",), column, f"parameter {name}")
     variables: dict[str, Variable] = {}
     for found in checks:
         variables |= _of_check(found)
@@ -219,9 +202,8 @@ def _of_check(found: CheckResults) -> dict[str, Variable]:
     for name, meaning in SOLVER_FACTS[found.check.kind].items():
         add(name, ("case",), _floats(result.facts[name] for result in by_member), meaning)
     for name, meaning in COLUMNS.items():
-        rows = [
-            _floats(getattr(row, name) for row in result.verdict.levels) for result in by_member
-        ]
+        tables = (result.verdict.levels for result in by_member)
+        rows = [_floats(getattr(row, name) for row in table) for table in tables]
         add(f"level_{name}", ("case", "level"), rows, meaning)
     add("member", (), np.int64(decides.member), "member that decides")
     shown = dataset(decides.verdict)

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
+from itertools import product
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from vibsim.convergence.study.grid_values import GridValues, plain_coordinate, real
 from vibsim.core import netcdf, regular_files
 from vibsim.core.errors import Fault, InputError, nearest
-from vibsim.solver.level_tables import Study
+from vibsim.solver.level_tables import Study, check_sizes
 
 MAGIC = (b"CDF", b"\x89HDF")
 """With what the files of netCDF 3 and 4 begin."""
@@ -47,7 +47,10 @@ def read(paths: Sequence[Path], size: str, quantities: Sequence[str]) -> list[St
         Where a file cannot be read, or does not have them.
     """
     if not quantities:
-        _refuse(str(paths[0]), "--quantity", "", "must name the variables to be judged")
+        with opened(paths[0]) as dataset:
+            sized = (name for name in dataset.variables if name not in (*dataset.dimensions, size))
+            hint = f"choose from {', '.join(sized)}"
+        _refuse(str(paths[0]), "--quantity", "", "must name the variables to be judged", hint)
     listed = _listed(size)
     if listed is not None and len(listed) != len(paths):
         rule = f"has {len(listed)} step sizes for {len(paths)} files"
@@ -60,8 +63,8 @@ def read(paths: Sequence[Path], size: str, quantities: Sequence[str]) -> list[St
             h.append(listed[i] if listed is not None else _step_size(str(path), dataset, size))
             for name in names:
                 values[name].append(grid_values(str(path), dataset, name, key="--quantity"))
-    _check_sizes(paths, size if listed is None else "h", h)
     files = [str(path) for path in paths]
+    check_sizes(((file, 0) for file in files), size if listed is None else "h", h)
     key = "h" if listed is not None else size.rpartition("/")[2]
     return [Study(name, {key: h}, values[name], files) for name in names]
 
@@ -86,20 +89,6 @@ def opened(path: Path) -> Any:
         return netcdf.foreign(path)
     except (OSError, RuntimeError) as error:
         _refuse(str(path), "", "", f"the netCDF library cannot read it ({error})")
-
-
-def _check_sizes(paths: Sequence[Path], key: str, h: Sequence[float]) -> None:
-    faults, seen = [], dict[float, Path]()
-    for path, size in zip(paths, h, strict=True):
-        if not 0.0 < size < math.inf:
-            rule = "must be a finite number above 0"
-            faults.append(Fault(str(path), 0, key, f"{size:g}", rule))
-        elif size in seen:
-            rule = f"is the step size of {seen[size]}, too; all must differ"
-            faults.append(Fault(str(path), 0, key, f"{size:g}", rule))
-        seen.setdefault(size, path)
-    if faults:
-        raise InputError(faults)
 
 
 def _variable(dataset: Any, name: str) -> Any | None:
@@ -147,58 +136,39 @@ def grid_values(
     if variable is None:
         known = [f"{group}/{n}" if group else n for n, _, group in netcdf.variables(dataset)]
         _refuse(file, key, name, "the file has no such variable", nearest(name, known))
-    array = _array(file, name, variable)
     try:
-        values, epsilon = real(array, name)
+        values, epsilon = real(np.ma.asarray(variable[...]), name)
+    except (OSError, RuntimeError, ValueError) as error:
+        _refuse(file, name, "", f"the netCDF library cannot read it ({error})")
     except InputError as error:
         fault = error.faults[0]
         _refuse(file, name, fault.value, fault.rule, fault.hint)
-    find = _coordinate_of(variable, dataset)
     places = {dim: dim for dim in variable.dimensions}
     for wanted in dims or ():
         along: Sequence[str] = getattr(_variable(dataset, wanted), "dimensions", ())
         if wanted not in places and len(along) == 1 and along[0] in places:
             places[along[0]] = wanted
-    coords = {name: found for dim, name in places.items() if (found := find(dim, name)) is not None}
+    points = {name: _points(variable, dataset, dim, name) for dim, name in places.items()}
+    coords = {name: found for name, found in points.items() if found is not None}
     units = str(getattr(variable, "units", ""))
     return GridValues(values, tuple(places.values()), coords, name, epsilon, units)
 
 
-def _array(file: str, name: str, variable: Any) -> NDArray[Any]:
-    try:
-        return np.ma.asarray(variable[...])
-    except (OSError, RuntimeError, ValueError) as error:
-        _refuse(file, name, "", f"the netCDF library cannot read it ({error})")
-
-
-def _coordinate_of(variable: Any, dataset: Any) -> Callable[[str, str], NDArray[Any] | None]:
-    """Return what finds the coordinate of a dimension.
+def _points(variable: Any, dataset: Any, dim: str, wanted: str) -> NDArray[Any] | None:
+    """Return the coordinate of a dimension of a variable; None where it has none.
 
     It is the variable of a name that is wanted, by default that of the dimension, in the group of the values or in the
     root; else the one along that dimension alone that the attribute ``coordinates`` of the values names (CF
     conventions).
     """
-    scopes: list[Mapping[str, Any]] = [variable.group().variables, dataset.variables]
-    listed = getattr(variable, "coordinates", "")
-    named = str(listed).split()
-
-    def find(dim: str, wanted: str) -> NDArray[Any] | None:
-        for scope in scopes:
-            for name in (wanted, dim, *named):
-                found = scope.get(name)
-                if found is not None and found.dimensions == (dim,):
-                    return _coordinate(found)
-        return None
-
-    return find
-
-
-def _coordinate(variable: Any) -> NDArray[Any]:
-    points = np.ma.asarray(variable[...])
-    if points.dtype.kind in "fiu":
-        return (
-            np.ma.filled(points.astype(points.dtype), np.nan)
-            if points.dtype.kind == "f"
-            else np.asarray(points)
-        )
-    return plain_coordinate(np.asarray(points))
+    named = str(getattr(variable, "coordinates", "")).split()
+    scopes: tuple[Mapping[str, Any], ...] = (variable.group().variables, dataset.variables)
+    for scope, name in product(scopes, (wanted, dim, *named)):
+        found = scope.get(name)
+        if found is not None and found.dimensions == (dim,):
+            points = np.ma.asarray(found[...])
+            is_float = points.dtype.kind == "f"
+            return (
+                np.ma.filled(points, np.nan) if is_float else plain_coordinate(np.asarray(points))
+            )
+    return None

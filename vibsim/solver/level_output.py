@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vibsim.convergence.study.grid_values import GridValues, grid_values
 from vibsim.core.array_types import Floats
@@ -80,11 +79,9 @@ def _on_grid(name: str, table: Mapping[str, Floats], dims: Sequence[str]) -> Gri
     """Return a column as values on the grid of its coordinates; without them a number, or a series over the rows."""
     column = table[name]
     if not dims:
-        return (
-            GridValues(column[0], (), {}, name)
-            if len(column) == 1
-            else GridValues(column, ("row",), {}, name)
-        )
+        if len(column) == 1:
+            return GridValues(column[0], (), {}, name)
+        return GridValues(column, ("row",), {}, name)
     points = [np.unique(table[dim], return_inverse=True) for dim in dims]
     shape = tuple(len(axis) for axis, _ in points)
     flat = np.ravel_multi_index(tuple(place for _, place in points), shape)
@@ -128,12 +125,12 @@ def record(
         Where two quantities have different points under one name.
     """
     coords: dict[str, Variable] = {
-        LEVEL: _variable((), np.int64(level), "position of the level, the coarsest 0")
+        LEVEL: plain((), np.int64(level), "position of the level, the coarsest 0")
     }
     for name, size in experiment.sizes_of(level).items():
-        coords[name] = _variable((), np.float64(size), f"size {name} of the level")
+        coords[name] = plain((), np.float64(size), f"size {name} of the level")
     for name, parameter in experiment.parameters_of(member).items():
-        coords[name] = _variable((), np.asarray(parameter), f"parameter {name}")
+        coords[name] = plain((), parameter, f"parameter {name}")
     lengths: dict[str, int] = {}
     for name, one in values.items():
         for dim, length in zip(one.dims, one.values.shape, strict=True):
@@ -145,19 +142,16 @@ def record(
             if lengths.setdefault(dim, length) != length or is_other:
                 raise VibsimError(f"{name}: has other points along {dim} than another quantity")
             if points is not None and known is None:
-                coords[dim] = _variable((dim,), points, f"coordinate {dim}")
-    variables = {
-        name: Variable(
-            one.dims,
-            one.values,
-            attributes(name, one.units or "1", **{EPSILON: one.epsilon}),
-        )
-        for name, one in values.items()
-    }
+                coords[dim] = plain((dim,), points, f"coordinate {dim}")
+    variables = {}
+    for name, one in values.items():
+        text = attributes(name, one.units or "1", **{EPSILON: one.epsilon})
+        variables[name] = Variable(one.dims, one.values, text)
     return Record(coords, variables)
 
 
-def _variable(dims: tuple[str, ...], values: NDArray[Any] | np.generic, text: str) -> Variable:
+def plain(dims: tuple[str, ...], values: Any, text: str) -> Variable:
+    """Return what is stored of values without a unit."""
     return Variable(dims, np.asarray(values), attributes(text, "1"))
 
 

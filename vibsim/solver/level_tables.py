@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -11,7 +11,7 @@ from typing import Any
 from vibsim.core.array_types import Floats, Integers
 from vibsim.core.errors import Fault, InputError, nearest
 from vibsim.experiment.tables import csv_text
-from vibsim.experiment.yaml.file_content import MOST_BYTES, content_of
+from vibsim.experiment.yaml.file_content import MOST_BYTES, read_bytes
 
 MOST_LEVELS = 1000
 
@@ -55,7 +55,7 @@ def read(path: Path, size: str, quantities: Sequence[str]) -> list[Study]:
     (h, *columns), lines = _read(path, choose, MOST_LEVELS)
     if not len(lines):
         raise InputError([Fault(file, 0, "", "", "has no row below the names of its columns")])
-    _check_sizes(file, size, h.tolist(), lines.tolist())
+    check_sizes(((file, line) for line in lines.tolist()), size, h.tolist())
     table = zip(names, columns, strict=True)
     return [Study(name, {size: h.tolist()}, column.tolist(), [file]) for name, column in table]
 
@@ -93,24 +93,11 @@ def _read(
         return [known.index(name) for name in choose(known, is_table)]
 
     try:
-        return csv_text.read(_content(path), numbers, most)
+        return csv_text.read(read_bytes(path, MOST_BYTES), numbers, most)
     except csv_text.CsvError as error:
         cell = _printable(error.cell) if is_shown or csv_text.is_shown(error.cell) else ""
         fault = Fault(str(path), error.line, error.column, cell, error.rule, error.hint)
         raise InputError([fault]) from None
-
-
-def _content(path: Path) -> bytes:
-    try:
-        content = content_of(path, MOST_BYTES)
-    except (OSError, ValueError) as error:
-        rule = f"cannot be read ({getattr(error, 'strerror', None) or error})"
-        raise InputError([Fault(str(path), 0, "", "", rule)]) from None
-    if len(content) > MOST_BYTES:
-        raise InputError(
-            [Fault(str(path), 0, "", "", f"must not be larger than {MOST_BYTES >> 20} MiB")]
-        )
-    return content
 
 
 def _printable(text: str) -> str:
@@ -121,32 +108,23 @@ def _printable(text: str) -> str:
 def _chosen(file: str, known: list[str], size: str, quantities: Sequence[str]) -> list[str]:
     """Return the names of the columns that are judged; InputError where the table does not have them."""
     chosen = list(dict.fromkeys(quantities)) or [name for name in known if name != size]
-    faults = []
+    found: list[tuple[str, str, str, str]] = []
     for name, option in ((size, "--h"), *((name, "--quantity") for name in chosen)):
         if name not in known:
-            hint = _hint(name, known)
-            faults.append(Fault(file, 0, option, name, "the table has no such column", hint))
+            found.append((option, name, "the table has no such column", _hint(name, known)))
         elif known.count(name) > 1:
-            faults.append(Fault(file, 0, option, name, "the table has more than one such column"))
+            found.append((option, name, "the table has more than one such column", ""))
         elif not name.isprintable():
-            faults.append(Fault(file, 0, option, _printable(name), "must be printable"))
+            found.append((option, _printable(name), "must be printable", ""))
         elif not name:
-            faults.append(
-                Fault(
-                    file,
-                    0,
-                    "",
-                    "",
-                    "has a column without a name",
-                    "name it, or choose with --quantity",
-                )
-            )
+            hint = "name it, or choose with --quantity"
+            found.append(("", "", "has a column without a name", hint))
     if size in quantities:
-        faults.append(Fault(file, 0, "--quantity", size, "holds the step sizes (--h)"))
+        found.append(("--quantity", size, "holds the step sizes (--h)", ""))
     if not chosen:
-        faults.append(Fault(file, 0, "", "", f"has no column beside '{size}'"))
-    if faults:
-        raise InputError(dict.fromkeys(faults))
+        found.append(("", "", f"has no column beside '{size}'", ""))
+    if found:
+        raise InputError(dict.fromkeys(Fault(file, 0, *fault) for fault in found))
     return chosen
 
 
@@ -159,15 +137,23 @@ def _hint(name: str, known: list[str]) -> str:
     return nearest(name, [_printable(other) for other in known])
 
 
-def _check_sizes(file: str, column: str, h: Sequence[float], lines: Sequence[int]) -> None:
-    """Refuse step sizes that are not positive, finite and different, each with its line."""
-    faults, seen = [], dict[float, int]()
-    for size, line in zip(h, lines, strict=True):
+def check_sizes(places: Iterable[tuple[str, int]], key: str, h: Sequence[float]) -> None:
+    """Refuse step sizes that are not positive, finite and different.
+
+    Parameters
+    ----------
+    places
+        Where each stands: the file, and its line, 0 in a file with one step size.
+    key
+        What has the step sizes there.
+    """
+    faults, seen = [], dict[float, str]()
+    for (file, line), size in zip(places, h, strict=True):
         if not 0.0 < size < math.inf:
-            faults.append(Fault(file, line, column, f"{size:g}", "must be a finite number above 0"))
+            faults.append(Fault(file, line, key, f"{size:g}", "must be a finite number above 0"))
         elif size in seen:
-            rule = f"is the step size of line {seen[size]}, too; all must differ"
-            faults.append(Fault(file, line, column, f"{size:g}", rule))
-        seen.setdefault(size, line)
+            rule = f"is the step size of {seen[size]}, too; all must differ"
+            faults.append(Fault(file, line, key, f"{size:g}", rule))
+        seen.setdefault(size, f"line {line}" if line else file)
     if faults:
         raise InputError(faults)

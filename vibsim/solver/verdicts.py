@@ -9,17 +9,18 @@ from typing import Any
 
 import numpy as np
 
-from vibsim.checks.accurate import is_known_order
+from vibsim.checks.accurate import ORDER_KNOWN
 from vibsim.checks.outcome import as_expected
 from vibsim.checks.solver_facts import SOLVER_FACTS
 from vibsim.convergence import LadderVerdict
+from vibsim.convergence.reasons import code
 from vibsim.convergence.study.common_points import common_values
 from vibsim.convergence.study.grid_values import GridValues
 from vibsim.convergence.study.judgement import verdicts
 from vibsim.convergence.study.sentences import at_most, number
 from vibsim.core.array_types import Floats
 from vibsim.core.errors import InputError, VibsimError
-from vibsim.core.vocabulary import REASON_NAMES, REASONS, STATUSES
+from vibsim.core.vocabulary import REASONS, STATUSES
 from vibsim.experiment.schema.checks import Expect
 from vibsim.experiment.schema.solver import (
     QuantitySection,
@@ -79,9 +80,8 @@ def judge(
         found, facts, away = _accuracy(check, found)
     else:
         facts, away = _order(experiment, check, found)
-    code = np.array([REASON_NAMES.index(found.reason)], dtype=np.int8)
-    compared = STATUSES[int(as_expected(check.expect, code)[0])]
-    return SolverResult(member, found, compared, facts, away)
+    (status,) = as_expected(check.expect, np.array([code(found.reason)]))
+    return SolverResult(member, found, STATUSES[status], facts, away)
 
 
 def _exact(
@@ -154,7 +154,7 @@ def _accuracy(
     asked = check.accuracy * (size if check.is_relative else 1.0)
     error = None if found.error is None else abs(found.error)
     bound = found.error_bound
-    is_error_known = found.is_exact_known or is_known_order(found.reason)
+    is_error_known = found.is_exact_known or found.reason in ORDER_KNOWN
     decides = is_error_known and error is not None and bound is not None
     if found.reason == "non_finite":
         reason = "non_finite"

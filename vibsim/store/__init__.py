@@ -9,20 +9,13 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from vibsim.core.lazy import loader
+from vibsim.core.lazy import lazy
 
 if TYPE_CHECKING:
     from vibsim.store.atomic import replacing, write_bytes, write_text
     from vibsim.store.reading import check, join, open_level, read
     from vibsim.store.summary import read_json, write_json
     from vibsim.store.writing import write, write_parts
-
-_NAMES = {
-    "atomic": ("replacing", "write_bytes", "write_text"),
-    "reading": ("check", "join", "open_level", "read"),
-    "summary": ("read_json", "write_json"),
-    "writing": ("write", "write_parts"),
-}
 
 __all__ = [
     "check",
@@ -38,6 +31,12 @@ __all__ = [
     "write_text",
 ]
 
-__getattr__ = loader(
-    __name__, {name: f"vibsim.store.{home}" for home, names in _NAMES.items() for name in names}
+__getattr__, __dir__ = lazy(
+    __name__,
+    {
+        ".atomic": ("replacing", "write_bytes", "write_text"),
+        ".reading": ("check", "join", "open_level", "read"),
+        ".summary": ("read_json", "write_json"),
+        ".writing": ("write", "write_parts"),
+    },
 )

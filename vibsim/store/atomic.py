@@ -29,7 +29,9 @@ def replacing(path: Path) -> Iterator[Path]:
     It is a name of its own in the same folder, so that writers of one target do not meet.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
-    _remove_abandoned(path)
+    for left, target in abandoned(path.parent):
+        if target == path:
+            left.unlink(missing_ok=True)
     pid = os.getpid()
     owner = f"{pid}-{started(pid)}-{secrets.token_hex(4)}"
     temporary = path.with_name(f".{path.name}.{owner}{_SUFFIX}")
@@ -89,9 +91,3 @@ def abandoned(folder: Path) -> Iterator[tuple[Path, Path]]:
         found = _TEMPORARY.fullmatch(entry.name)
         if found and started(int(found["pid"])) != found["started"]:
             yield Path(entry.path), folder / found["target"]
-
-
-def _remove_abandoned(path: Path) -> None:
-    for temporary, target in abandoned(path.parent):
-        if target == path:
-            temporary.unlink(missing_ok=True)

@@ -5,6 +5,7 @@ All files of one level are read as one, whatever members are in which.
 
 from __future__ import annotations
 
+import json
 from bisect import bisect_right
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
@@ -48,6 +49,25 @@ def check(path: Path, *, digest: str | None = None) -> None:
     seal.check(path)
     with _opened(path, digest):
         pass
+
+
+def read_provenance(path: Path) -> dict[str, Any]:
+    """Return what a file says of its making: the settings and the versions that its job used.
+
+    Raises
+    ------
+    DamagedFileError
+        When a single bit differs from what was written, or it says nothing of its making.
+    """
+    seal.check(path)
+    try:
+        with netcdf.opened(path) as dataset:
+            found = json.loads(dataset.getncattr("provenance"))
+    except (OSError, AttributeError, ValueError, RecursionError):
+        found = None
+    if not isinstance(found, dict) or not isinstance(found.get("experiment"), dict):
+        raise DamagedFileError(path, "it does not say what it was made from")
+    return found
 
 
 @contextmanager

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Any
 
 import xarray as xr
 
@@ -60,7 +59,10 @@ def _nodes(folder: Path, chunks: Mapping[str, int] | None) -> Iterator[tuple[str
             for name, dataset in _nodes(part, chunks):
                 yield f"/{part.name}{name}", dataset
         return
-    yield "/", xr.Dataset(attrs=_stated(folder / SUMMARY))
+    summary = folder / SUMMARY
+    # there is none before the analysis
+    content = read_json(summary) if summary.exists() else {}
+    yield "/", xr.Dataset(attrs={name: content[name] for name in STATED if name in content})
     for part in found:
         files = sorted(part.glob("shard_*.nc")) if part.is_dir() else [part]
         if not files:
@@ -77,7 +79,18 @@ def _nodes(folder: Path, chunks: Mapping[str, int] | None) -> Iterator[tuple[str
 
 
 def _joined(parts: list[xr.Dataset]) -> xr.Dataset:
-    """Join the files of a level; what does not depend on the member is the same in all."""
+    """Join the files of a level along the member; what does not depend on it is the same in all."""
+    if all("case" not in part.dims for part in parts):  # a file of a solver holds one member
+        numbered = [part.assign_coords(case=number) for number, part in enumerate(parts)]
+        return xr.concat(
+            numbered,
+            "case",
+            data_vars="all",
+            coords="different",
+            compat="equals",
+            join="outer",
+            combine_attrs="drop_conflicts",
+        )
     return xr.concat(
         parts,
         "case",
@@ -87,9 +100,3 @@ def _joined(parts: list[xr.Dataset]) -> xr.Dataset:
         join="exact",
         combine_attrs="drop_conflicts",
     )
-
-
-def _stated(path: Path) -> dict[str, Any]:
-    """Return what the summary of an experiment states; nothing where it has not been analysed."""
-    content = read_json(path) if path.exists() else {}
-    return {name: content[name] for name in STATED if name in content}

@@ -20,6 +20,7 @@ from typing import Any
 
 from vibsim.elementary import ELEMENTARY
 from vibsim.formula import Binary, Call, Expression, Name, Negate, Number, parse
+from vibsim.formula.tree import OPERATORS
 from vibsim.schemes.base import Stepper, handed
 from vibsim.schemes.code_generation import exact_names
 
@@ -158,11 +159,6 @@ def exact(
         ) from None
 
 
-_OPERATORS: Mapping[str, Callable[[Any, Any], Any]] = MappingProxyType(
-    {"+": operator.add, "-": operator.sub, "*": operator.mul, "/": operator.truediv}
-)
-
-
 def value_of(
     node: Expression,
     number: Callable[[Fraction], Any],
@@ -186,8 +182,8 @@ def value_of(
                 return -value(operand)
             case Binary("**", base, exponent):
                 return power(value(base), value_of(exponent, Fraction, operator.pow, {}))
-            case Binary(sign, left, right) if sign in _OPERATORS:
-                return _OPERATORS[sign](value(left), value(right))
+            case Binary(sign, left, right) if sign in OPERATORS:
+                return OPERATORS[sign](value(left), value(right))
             case Call("sqrt", (operand,)):
                 return power(value(operand), Fraction(1, 2))
             case Call("abs", (operand,)):

@@ -45,7 +45,11 @@ class Field:
 
     def value(self, element: Any) -> float:
         """Return the value of an element, of one with symbols at one point."""
-        return (self.at_point or self._float)(element)
+        return (
+            float(self.domain.to_sympy(element))
+            if self.at_point is None
+            else self.at_point(element)
+        )
 
     def series(self, element: Any, power: int = 0) -> Laurent:
         """Return ``element h^power``, known as far as series are."""
@@ -55,9 +59,6 @@ class Field:
         """Return a number of a step's text; a float is the decimal that it was written as."""
         is_exact = isinstance(number, Fraction)
         return self.series(self.number(Fraction(number if is_exact else repr(float(number)))))
-
-    def _float(self, element: Any) -> float:
-        return float(self.domain.to_sympy(element))
 
 
 @dataclass(frozen=True, eq=False, slots=True)

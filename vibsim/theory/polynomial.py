@@ -27,11 +27,7 @@ from vibsim.formula import (
     Negate,
     Number,
     literal,
-    minus,
     names_in,
-    over,
-    plus,
-    times,
     walk,
 )
 from vibsim.models.base import Model, tree
@@ -58,13 +54,13 @@ def restoring(model: Model) -> Expression:
             case Negate(operand):
                 return Negate(kept(operand))
             case Binary("+" | "-" as sign, left, right):
-                return (plus if sign == "+" else minus)(kept(left), kept(right))
+                return kept(left) + kept(right) if sign == "+" else kept(left) - kept(right)
             case Binary("*", left, right) if is_constant(left):
-                return times(left, kept(right))
+                return left * kept(right)
             case Binary("*", left, right) if is_constant(right):
-                return times(kept(left), right)
+                return kept(left) * right
             case Binary("/", left, right) if is_constant(right):
-                return over(kept(left), right)
+                return kept(left) / right
         return node
 
     return kept(tree(model, model.acceleration))

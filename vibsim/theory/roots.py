@@ -23,13 +23,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from vibsim.core.array_types import Flags, Floats
+from vibsim.core.array_types import Complexes, Flags, Floats
 from vibsim.schemes.base import Options, Scheme, Stepper
 from vibsim.theory.arithmetic import bairstow, characteristic
 from vibsim.theory.basis import UnitSteps, decimal, unit_steps
 from vibsim.theory.doubled import Doubled, doubled, root, stacked
-
-Complexes = NDArray[np.complex128]
 
 GRID = np.concatenate([0.02 * np.arange(1, 401), np.geomspace(8.0, 1000.0, 61)[1:]])
 """Where the principal roots are followed, p = w dt: close enough for each pair to lie next to the one before."""

@@ -1,9 +1,9 @@
-r"""The theory of a scheme as formulas in ``p = w dt``: matrix, characteristic polynomial, series, discrete solution.
+r"""The theory of a scheme as formulas in ``p = w dt``: matrix, series, error at a time, discrete solution.
 
 Exact, for every scheme whose step is polynomial or rational on a linear problem; all of them are. SymPy is imported on
-first use, and every result is one of its expressions in the symbols p, x, n, I, V and w.
+first use, and every result is one of its expressions in the symbols p, n, I, V, w and t.
 
-Source: vibration text (B), equations (18)-(20), sections 5.6 and 7.2, exercises 7 and 17.
+Source: vibration text (B), equations (18)-(20), sections 4.4, 5.6 and 7.2, exercises 7 and 17.
 """
 
 from __future__ import annotations
@@ -17,17 +17,19 @@ from numpy.typing import NDArray
 
 from vibsim.schemes.base import Stepper
 from vibsim.schemes.newton import solved, solved_together
-from vibsim.theory.arithmetic import characteristic as characteristic_of
+from vibsim.theory.arithmetic import characteristic
 from vibsim.theory.basis import unit_steps
 from vibsim.theory.laurent import HALF, Laurent, coefficients
-from vibsim.theory.phase_amplitude import Principal, principal
+from vibsim.theory.phase_amplitude import Principal, principal, principal_mode
 
+POWERS = 9
+"""Power of p from which on errors are not worked out."""
 TERMS = 4
 """Terms of a series, in even powers of p, unless told."""
 
 
 def symbol(name: str) -> Any:
-    """Return one of the symbols of results: p, x, I, V, w real, n a whole number."""
+    """Return one of the symbols of results: p, x, I, V, w, t, dt real, n a whole number."""
     from sympy import Symbol
 
     if name == "n":
@@ -37,20 +39,12 @@ def symbol(name: str) -> Any:
 
 def matrix(stepper: Stepper) -> Any:
     """Return the matrix of a step, `vibsim.theory.Amplification.matrix`, as a function of p."""
-    return _expressions(_matrices(stepper)[0])
+    return _expressions(matrices(stepper)[0])
 
 
 def start(stepper: Stepper) -> Any:
     """Return the matrix of the start, on ``(u_0, v_0 dt)``."""
-    return _expressions(_matrices(stepper)[1])
-
-
-def characteristic(stepper: Stepper) -> Any:
-    """Return the characteristic polynomial in x; its roots are the amplification factors A of B, section 4.1."""
-    result: Any = 1
-    for value in characteristic_of(_matrices(stepper)[0][None])[1:]:
-        result = result * symbol("x") + _expression(value[0])
-    return result.expand()
+    return _expressions(matrices(stepper)[1])
 
 
 def growth_series(stepper: Stepper, terms: int = TERMS) -> Any:
@@ -66,6 +60,42 @@ def frequency_series(stepper: Stepper, terms: int = TERMS) -> Any:
 def phase_error_series(stepper: Stepper, terms: int = TERMS) -> Any:
     """Return ``(P - P~)/P = 1 - w/w~``, the part of a period by which peaks come early in each, likewise."""
     return _polynomial(1.0 - _principal(stepper, terms).square.shifted(-2) ** -HALF, terms)
+
+
+def error_series(stepper: Stepper) -> tuple[Any, Any]:
+    """Return the error ``u(t) - u^n`` at a time t for ``u(0) = 1``, ``u'(0) = 0``: two terms in p, B, section 4.4.
+
+    The other formula is the next power of p. Of a scheme with parasitic roots it is the error once they have died out.
+    """
+    from sympy import cos, ring, sin
+
+    mode, p, angle = principal_mode(stepper, 0.0), symbol("p"), symbol("w") * symbol("t")
+    formulas, turned = ring("turned", mode.rate.field.domain)
+
+    def row(series: Laurent) -> NDArray[Any]:
+        """Return the factors of the powers of p as polynomials in w t."""
+        found = [formulas.ground_new(series.at(k)) for k in range(POWERS)]
+        return np.array(found, dtype=object)
+
+    def product(a: NDArray[Any], b: NDArray[Any]) -> NDArray[Any]:
+        return np.array([sum(a[: k + 1] * b[k::-1]) for k in range(POWERS)], dtype=object)
+
+    # the motion is the real part of B exp(i w t) exp(apart), where apart vanishes with p
+    apart = row(mode.rate) * turned, row(mode.frequency - 1.0) * turned
+    power = total = row(mode.position[0]), -row(mode.slope[0] / mode.frequency)
+    for k in range(1, POWERS):
+        (a, b), (c, d) = power, apart
+        power = (product(a, c) - product(b, d)) / k, (product(a, d) + product(b, c)) / k
+        total = total[0] + power[0], total[1] + power[1]
+    along, beside = total[0] * -1, total[1]
+    along[0] += 1
+    parts = (
+        one.as_expr(angle) * cos(angle) + other.as_expr(angle) * sin(angle)
+        for one, other in zip(along, beside, strict=True)
+    )
+    terms = [(p**k, part) for k, part in enumerate(parts) if part != 0]
+    following = [power for power, _ in terms[2:]]
+    return sum(factor * power for power, factor in terms[:2]), (*following, p**POWERS)[0]
 
 
 @dataclass(frozen=True)
@@ -87,8 +117,8 @@ def two_roots(stepper: Stepper) -> TwoRoots:
     """Return the parts of the solution; ValueError with parasitic roots, or a start that is no step."""
     from sympy import sqrt
 
-    step, first = _matrices(stepper)
-    polynomial = [value[0] for value in characteristic_of(step[None])]
+    step, first, _ = matrices(stepper)
+    polynomial = [value[0] for value in characteristic(step[None])]
     trace, determinant = -polynomial[1], polynomial[2]
     # u^2 - T u^1 + D u^0 for u_0 = 1 and for v_0 dt = 1
     gaps = (step @ first)[0] - first[0] * trace + np.array([1, 0], dtype=object) * determinant
@@ -96,9 +126,9 @@ def two_roots(stepper: Stepper) -> TwoRoots:
         raise ValueError(
             "the scheme has parasitic roots, so that its solution has more than two terms"
         )
-    r = sqrt(_expression(determinant))
-    one, other = map(_expression, first[0])
-    return TwoRoots(r, _expression(trace) / (2 * r), (one, other))
+    r = sqrt(expression(determinant))
+    one, other = map(expression, first[0])
+    return TwoRoots(r, expression(trace) / (2 * r), (one, other))
 
 
 def solution(stepper: Stepper) -> Any:
@@ -113,8 +143,8 @@ def solution(stepper: Stepper) -> Any:
 
 
 @lru_cache(maxsize=64)
-def _matrices(stepper: Stepper) -> tuple[NDArray[Any], NDArray[Any]]:
-    """Return the matrices of step and start, whose entries are functions of p in a field of fractions of SymPy."""
+def matrices(stepper: Stepper) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any]]:
+    """Return step, start and velocity of `vibsim.theory.Amplification` in a field of fractions of SymPy."""
     from sympy import field
 
     domain, elements = coefficients(stepper)
@@ -126,11 +156,11 @@ def _matrices(stepper: Stepper) -> tuple[NDArray[Any], NDArray[Any]]:
         lambda formula: fractions.ground_new(elements[formula]),
         substitutes={solved: _solved, solved_together: _solved_together},
     )
-    step, first = (
-        np.array([[fractions.one * x for x in column] for column in columns], dtype=object).T
-        for columns in (units.step, units.start)
+    step, first, velocity = (
+        (np.array(found, dtype=object) * fractions.one).T
+        for found in (units.step, units.start, units.velocity)
     )
-    return step, first
+    return step, first, velocity
 
 
 def _solved(
@@ -152,14 +182,15 @@ def _solved_together(
     return (one * (1.0 - d) + b * two) / bottom, (two * (1.0 - a) + c * one) / bottom
 
 
-def _expression(element: Any) -> Any:
+def expression(element: Any) -> Any:
+    """Return an element of a field of fractions, or of a ring, as a formula in p."""
     return element.as_expr(symbol("p"))
 
 
 def _expressions(entries: NDArray[Any]) -> Any:
     from sympy import Matrix
 
-    return Matrix([[_expression(entry) for entry in row] for row in entries])
+    return Matrix([[expression(entry) for entry in row] for row in entries])
 
 
 def _principal(stepper: Stepper, terms: int) -> Principal:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from argparse import Namespace
 from collections.abc import Iterable, Sequence
+from itertools import chain
 
 BASH = """\
 # in ~/.bashrc: source <(vibsim completion bash)
@@ -100,25 +101,27 @@ def _of(settings: dict[str, object], name: str, given: Sequence[str]) -> Iterabl
     if isinstance(choices, Iterable):
         return [str(choice) for choice in choices]
     metavar = settings.get("metavar")
-    if metavar in ("EXPERIMENT", "A", "B") or name == "experiments" or name == "like":
+    # an entry of a list is named behind the list
+    what = given[0] if name == "name" and given else name
+    if metavar in ("EXPERIMENT", "A", "B") or what in ("experiments", "like"):
         return _experiments()
     if metavar == "REASON":
         from vibsim.core.vocabulary import REASONS
 
         return REASONS
-    if name == "model" or (name == "name" and given[:1] == ["models"]):
+    if what in ("model", "models"):
         from vibsim.models import MODELS
 
         return MODELS
-    if name == "scheme" or (name == "name" and given[:1] == ["schemes"]):
+    if what in ("scheme", "schemes"):
         from vibsim.schemes import SCHEMES
 
         return SCHEMES
-    if name == "name" and given[:1] == ["checks"]:
+    if what == "checks":
         from vibsim.experiment.value_names import VALUES
 
         return VALUES
-    return _experiments() if name == "name" and given[:1] == ["experiments"] else []
+    return []
 
 
 def _experiments() -> list[str]:
@@ -126,9 +129,5 @@ def _experiments() -> list[str]:
     from vibsim.core.home import home
     from vibsim.plan.choose import experiments
 
-    names = [
-        name
-        for choice in experiments(home())
-        for name in (choice.collection, choice.name, choice.key)
-    ]
-    return list(dict.fromkeys(names))
+    names = ((choice.collection, choice.name, choice.key) for choice in experiments(home()))
+    return list(dict.fromkeys(chain.from_iterable(names)))

@@ -13,7 +13,7 @@ from vibsim.cli.chosen_plans import one_plan_of
 from vibsim.cli.jobs.common import chosen_results
 from vibsim.cli.settings import Change
 from vibsim.cli.terminal import clean, painted
-from vibsim.plan.digests import analysed, solved_and_judged
+from vibsim.plan.digests import analysed
 from vibsim.store import read_json
 
 _DIGITS = 6
@@ -34,19 +34,11 @@ class Side(NamedTuple):
 def diff(options: Namespace) -> int:
     """Show the differences; the exit status is 0 where there is none, and 1 where there are some."""
     results = chosen_results(options)
-    first, second = (_side(word, results) for word in (options.first, options.second))
-    titles = {"title": first.title}, {"title": second.title}
-    parts = {
-        "settings": [
-            *settings.differences(*titles),
-            *settings.differences(first.content, second.content),
-        ]
-    }
-    missing = [
-        word
-        for word, side in ((options.first, first), (options.second, second))
-        if side.summary is None
-    ]
+    words = (options.first, options.second)
+    first, second = sides = [_side(word, results) for word in words]
+    missing = [word for word, side in zip(words, sides, strict=True) if side.summary is None]
+    changes = settings.differences(*({"title": side.title} for side in sides))
+    parts = {"settings": changes + settings.differences(first.content, second.content)}
     if first.summary is not None and second.summary is not None:
         pairs = _pairs(first.summary, second.summary)
         parts["verdicts"] = list(_verdicts(pairs))
@@ -75,18 +67,17 @@ def _side(word: str, results: Path) -> Side:
     path = Path(word)
     folder = path.parent if path.name in _RESULTS else path
     if (folder / "summary.json").exists():
-        from vibsim.store.provenance import read_provenance
+        from vibsim.store.reading import read_provenance
 
         summary = read_json(folder / "summary.json")
         made = read_provenance(folder / "convergence.nc")
         return Side(made["experiment"], str(summary["title"]), summary)
     plan = one_plan_of(word)
-    uses = (solved_and_judged if plan.has_solver else analysed)(plan.content)
     found = None
     if (results / plan.summary).exists():
         found = read_json(results / plan.summary, name=plan.key)
         found = found if found.get("digest") == plan.analysis else None
-    return Side(uses, plan.title, found)
+    return Side(analysed(plan.content), plan.title, found)
 
 
 Pair = tuple[str, Mapping[str, Any] | None, Mapping[str, Any] | None]

@@ -66,11 +66,7 @@ def meanings(word: str) -> Iterator[tuple[str, Reason]]:
 def _paragraphs(found: tuple[str, str], head: str) -> Iterator[str]:
     meaning, needs = found
     width = min(terminal.columns(), _WIDEST)
+    yield ""
     for title, text in (("meaning", f"{head}{meaning}"), ("needed", needs)):
-        indent = " " * 9
-        filled = textwrap.fill(text, width, initial_indent=indent, subsequent_indent=indent)
-        yield (
-            f"{title.ljust(9)}{filled[9:]}"
-            if title == "needed"
-            else f"\n{title.ljust(9)}{filled[9:]}"
-        )
+        label, indent = title.ljust(9), " " * 9
+        yield textwrap.fill(text, width, initial_indent=label, subsequent_indent=indent)

@@ -62,13 +62,12 @@ def _studies(options: Namespace) -> list[Study]:
     first = paths[are_netcdf.index(False)]
     if len(paths) > 1:
         rule = "is no netCDF file, and a table holds all levels itself"
-        raise InputError(
-            [Fault(str(first), 0, "", "", rule, "name one table, or a netCDF file for each level")]
-        )
+        hint = "name one table, or a netCDF file for each level; an experiment file with `solver: {files: ...}` "
+        hint += "takes a CSV file for each level"
+        raise InputError([Fault(str(first), 0, "", "", rule, hint)])
     if options.restrict is not None:
-        _refuse(
-            "--restrict", options.restrict, "is for fields in netCDF files; a table holds numbers"
-        )
+        rule = "is for fields in netCDF files; a table holds numbers"
+        _refuse("--restrict", options.restrict, rule)
     return level_tables.read(first, options.h.strip(), [name.strip() for name in quantities])
 
 

@@ -26,10 +26,23 @@ def list_(options: Namespace) -> int:
     if options.name is not None:
         return _one(options.what, options.name)
     if options.what == "schema":
-        return _schema()
+        import json
+
+        from vibsim.experiment.schema.document import installed_schema
+
+        print(json.dumps(installed_schema(), indent=2, ensure_ascii=False))
+        return 0
     faults: list[Fault] = []
-    if options.what in ("models", "schemes"):
-        rows, faults = _models() if options.what == "models" else _schemes()
+    if options.what == "models":
+        from vibsim.models import MODELS
+
+        models, faults = MODELS.usable()
+        rows = _models(models.values())
+    elif options.what == "schemes":
+        from vibsim.schemes import SCHEMES
+
+        schemes, faults = SCHEMES.usable()
+        rows = _schemes(schemes.values())
     else:
         rows = checks() if options.what == "checks" else _experiments()
     table = [tuple(map(str, row)) for row in rows]
@@ -59,24 +72,7 @@ def _one(what: str, name: str) -> int:
     return 0
 
 
-def _schema() -> int:
-    """Print the JSON Schema of experiment files, with what installed packages offer."""
-    import json
-
-    from vibsim.experiment.schema.document import installed_schema
-
-    print(json.dumps(installed_schema(), indent=2, ensure_ascii=False))
-    return 0
-
-
-def _models() -> tuple[Iterable[tuple[str, str]], list[Fault]]:
-    from vibsim.models import MODELS
-
-    found, faults = MODELS.usable()
-    return _of_models(found.values()), faults
-
-
-def _of_models(models: Iterable[Model]) -> Iterable[tuple[str, str]]:
+def _models(models: Iterable[Model]) -> Iterable[tuple[str, str]]:
     for model in models:
         parameters = ", ".join(f"{p.name} = {p.default:g} {p.unit}" for p in model.parameters)
         shape = "linear" if model.linear else "nonlinear"
@@ -86,14 +82,7 @@ def _of_models(models: Iterable[Model]) -> Iterable[tuple[str, str]]:
         yield model.kind, "; ".join(filter(None, told))
 
 
-def _schemes() -> tuple[Iterable[tuple[str, str]], list[Fault]]:
-    from vibsim.schemes import SCHEMES
-
-    found, faults = SCHEMES.usable()
-    return _of_schemes(found.values()), faults
-
-
-def _of_schemes(schemes: Collection[Scheme]) -> Iterable[tuple[str, str]]:
+def _schemes(schemes: Collection[Scheme]) -> Iterable[tuple[str, str]]:
     """Yield a line of facts for each scheme, then what it is and where it comes from, then its options."""
     head = ("order", "step", "symplectic", "forces/step", "stability limit")
     columns = {scheme.kind: facts(scheme) for scheme in schemes}

@@ -60,10 +60,8 @@ def movie(options: Namespace) -> int:
     if options.frames_to is not None:
         print(f"{options.frames_to}: {said}")
     if film.is_cut:
-        last = f"{film.stop:.5g}"
-        print(
-            f"to t = {last} of {film.end:.5g}; go on with --from {last}, or see all of it with --frames N"
-        )
+        last, rest = f"{film.stop:.5g}", "or see all of it with --frames N"
+        print(f"to t = {last} of {film.end:.5g}; go on with --from {last}, {rest}")
     return 0
 
 
@@ -91,10 +89,9 @@ def _check_numbers(options: Namespace, form: str) -> None:
         rule = f"must be at most {MOST_GIF_FRAMES} of a GIF; MP4 and WebM have no limit"
         raise refusal("--frames", options.frames, rule)
     for key in ("scheme", "level"):
-        if len(getattr(options, key) or ()) > 2:
-            raise refusal(
-                f"--{key}", " ".join(map(str, getattr(options, key))), "must be one or two"
-            )
+        given = getattr(options, key) or ()
+        if len(given) > 2:
+            raise refusal(f"--{key}", " ".join(map(str, given)), "must be one or two")
 
 
 def _fps(options: Namespace, form: str) -> float:
@@ -113,9 +110,8 @@ def _film(plan: Plan, options: Namespace, form: str) -> Film:
     for level in options.level or ():
         level_member.check_level(level, levels)
         if level not in made:
-            raise VibsimError(
-                f"{plan.key}: level {level} is not made yet: vibsim run {options.experiment}"
-            )
+            problem = f"level {level} is not made yet: vibsim run {options.experiment}"
+            raise VibsimError(f"{plan.key}: {problem}")
     asked = options.level or [made[-1]]
     records = {level: level_member.of_level(plan, results, level, case) for level in asked}
     record = records[asked[0]]
@@ -169,13 +165,11 @@ def _check_folder(folder: Path, count: int) -> None:
     """Refuse a folder with frames that would stay beside the new ones."""
     if folder.exists() and not folder.is_dir():
         raise refusal("--frames-to", folder, "must be a folder, this is a file")
-    numbers = (
-        re.fullmatch(r"frame_(\d{4,})\.png", path.name) for path in folder.glob("frame_*.png")
-    )
+    frame = re.compile(r"frame_(\d{4,})\.png")
+    numbers = (frame.fullmatch(path.name) for path in folder.glob("frame_*.png"))
     if any(number is not None and int(number[1]) >= count for number in numbers):
-        raise refusal(
-            "--frames-to", folder, "has more frames than this movie: choose an empty folder"
-        )
+        rule = "has more frames than this movie: choose an empty folder"
+        raise refusal("--frames-to", folder, rule)
 
 
 def _kept(frames: Iterator[Pixels], folder: Path | None) -> Iterator[Pixels]:

@@ -30,11 +30,11 @@ def new(options: Namespace) -> int:
     if not file.parent.is_dir():
         raise refusal("FILE", file, f"there is no folder {file.parent}")
     schema = _schema_of(file)
-    written = _like(options.like, schema) if options.like else {}
-    if not options.like:
-        written[file.name] = _of_model(options.model or "pendulum", schema).encode()
+    if options.like:
+        text, written = _like(options.like, schema)
     else:
-        written[file.name] = written.pop("")
+        text, written = _of_model(options.model or "pendulum", schema), {}
+    written[file.name] = text.encode()
     for name in written:
         if os.path.lexists(file.parent / name):
             raise refusal("FILE", file.parent / name, "is there already, and is not overwritten")
@@ -56,8 +56,8 @@ def _of_model(kind: str, schema: str) -> str:
     return template.of_model(MODELS[kind], schema)
 
 
-def _like(word: str, schema: str) -> dict[str, bytes]:
-    """Return the text of an experiment, under an empty name, and the tables that it names."""
+def _like(word: str, schema: str) -> tuple[str, dict[str, bytes]]:
+    """Return the text of an experiment, and the tables that it names."""
     from vibsim.cli import template
     from vibsim.cli.chosen_plans import one_plan_of
 
@@ -68,12 +68,12 @@ def _like(word: str, schema: str) -> dict[str, bytes]:
     if plan.has_solver:
         rule = "has a solver of its own, whose programs and files are not copied; copy its folder"
         raise refusal("--like", word, rule)
-    found = {"": template.of_text(source.read_text("utf-8"), schema).encode()}
+    found = {}
     for path, _ in plan.inputs:
         if Path(path).name != path:
             raise refusal("--like", word, f"it reads {path}, which is not in its own folder")
         found[path] = (source.parent / path).read_bytes()
-    return found
+    return template.of_text(source.read_text("utf-8"), schema), found
 
 
 def _schema_of(file: Path) -> str:

@@ -15,6 +15,7 @@ from typing import Any
 
 from vibsim.cli import resources
 from vibsim.cli.chosen_plans import plans_of, tell_notes
+from vibsim.cli.failure import from_here
 from vibsim.cli.jobs.common import chosen_results
 from vibsim.cli.resources import amount, duration, size
 from vibsim.core.processes import usable_cores
@@ -34,7 +35,7 @@ def check(options: Namespace) -> int:
     for item in plans_of(options.experiments, options.settings):
         levels = ", ".join(str(level.level) for level in item.levels)
         tell_notes([item])
-        print(f"{item.file}: valid ({_members(item)}, levels {levels})")
+        print(f"{from_here(str(item.file))}: valid ({_members(item)}, levels {levels})")
     return 0
 
 

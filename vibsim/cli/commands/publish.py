@@ -24,7 +24,7 @@ from vibsim.cli.jobs.common import one_plan, read_all, refusal
 from vibsim.core import regular_files
 from vibsim.core.errors import VibsimError
 from vibsim.plan import Plan
-from vibsim.store.provenance import read_provenance
+from vibsim.store.reading import read_provenance
 
 METADATA = "ro-crate-metadata.json"
 INPUT = Path("experiment")
@@ -110,9 +110,8 @@ def metadata(
     Source: RO-Crate Metadata Specification 1.1: the metadata descriptor and the root (section "Root Data Entity"),
     files ("Data Entities"), the licence ("Contextual Entities") and the run that made them ("Provenance of entities").
     """
-    files = [
-        path.relative_to(folder).as_posix() for path in sorted(folder.rglob("*")) if path.is_file()
-    ]
+    paths = filter(Path.is_file, sorted(folder.rglob("*")))
+    files = [path.relative_to(folder).as_posix() for path in paths]
     versions = dict(read_provenance(folder / plan.convergence)["versions"])
     own_version = versions.pop("vibsim")
     is_address = licence is not None and licence.startswith(("https://", "http://"))

@@ -33,9 +33,8 @@ def show(options: Namespace) -> int:
         level_member.check_level(options.level, levels)
     if not options.no_plot:
         level = made[-1] if options.level is None else options.level
-        _draw(
-            level_member.of_level(plan, results, level, case), options, f"{plan.key}, level {level}"
-        )
+        record = level_member.of_level(plan, results, level, case)
+        _draw(record, options, f"{plan.key}, level {level}")
     if len(made) < len(levels):
         one = len(made) == 1
         there = f"level{'' if one else 's'} {settings.shown(made)} {'is' if one else 'are'} there"

@@ -6,9 +6,12 @@ Source: vibration text (B), sections 4.1, 4.3 and 5.6, exercises 7 and 17; the f
 
 from __future__ import annotations
 
+import math
+import re
 from argparse import Namespace
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
+from fractions import Fraction
 from typing import TYPE_CHECKING, Any
 
 from vibsim.cli.entry import Row, choices, laid_out, scheme_named, stable_until
@@ -17,6 +20,8 @@ from vibsim.core.errors import nearest
 
 if TYPE_CHECKING:
     from vibsim.schemes import AnyOption, Options, Scheme
+    from vibsim.schemes.base import Stepper
+    from vibsim.theory.operators import Equation, Term
 
 _LONGEST = 10**6
 """Fractions with larger numbers, and roots, are written as decimals."""
@@ -43,26 +48,22 @@ def theory(options: Namespace) -> int:
 
 def theory_rows(scheme: Scheme, options: Options, terms: int, *, latex: bool) -> Iterator[Row]:
     """Yield the theory of a scheme with equal steps; each series has `terms` terms."""
-    from vibsim.theory import symbolic
+    from vibsim.theory import operators, symbolic
 
     stepper = scheme.stepper(options)
     write = _latex if latex else _plain
-
-    def series(formula: Any) -> str:
-        return f"{write(formula)} + O({write(symbolic.symbol('p') ** (2 * terms))})"
 
     changed = (f"{k} = {v}" for k, v in options.items() if v != scheme.defaults()[k])
     yield "scheme", "; ".join((f"{scheme.kind}: {scheme.title}", *changed))
     yield "problem", "u'' + w^2 u = 0, u(0) = I, u'(0) = V; p = w dt"
     yield "stability limit", stable_until(scheme, options)
-    yield "roots", f"{_characteristic(symbolic.characteristic(stepper), write)} = 0"
-    yield (
-        "amplitude",
-        f"changes by the factor r = {series(symbolic.growth_series(stepper, terms))} in each step",
-    )
-    yield "frequency", f"w~/w = {series(symbolic.frequency_series(stepper, terms))}"
-    early = series(symbolic.phase_error_series(stepper, terms))
-    yield "phase", f"peaks come early by 1 - w/w~ = {early} of a period, in each period"
+    yield "roots", f"{_characteristic(operators.recurrence(stepper), write)} = 0"
+    try:
+        yield from [*_series_rows(scheme, options, terms, write)]
+    except ValueError:
+        reason = "the numerical frequency does not tend to w as dt tends to 0"
+        yield "series", f"not written: {reason}, so the scheme is not one for this equation"
+    yield from _in_operators(stepper, write, latex=latex)
     try:
         parts = symbolic.two_roots(stepper)
     except ValueError as reason:
@@ -74,33 +75,140 @@ def theory_rows(scheme: Scheme, options: Options, terms: int, *, latex: bool) ->
     yield "", f"u_1 = {_sum(zip(parts.first, ('I', 'V dt'), strict=True), write)}"
 
 
-def _characteristic(polynomial: Any, write: Callable[[Any], str]) -> str:
-    """Write the characteristic polynomial by powers of x, without denominators and roots that are 0."""
-    from sympy import Poly, fraction, together
+def _series_rows(
+    scheme: Scheme, options: Options, terms: int, write: Callable[[Any], str]
+) -> Iterator[Row]:
+    """Yield what is known as series in p; ValueError where the frequency does not begin with w."""
+    from vibsim.theory import operators, symbolic
 
+    stepper = scheme.stepper(options)
+
+    def series(formula: Any) -> str:
+        return f"{write(formula)} + O({write(symbolic.symbol('p') ** (2 * terms))})"
+
+    growth = series(symbolic.growth_series(stepper, terms))
+    yield "amplitude", f"changes by the factor r = {growth} in each step"
+    yield "frequency", f"w~/w = {series(symbolic.frequency_series(stepper, terms))}"
+    early = series(symbolic.phase_error_series(stepper, terms))
+    yield "phase", f"peaks come early by 1 - w/w~ = {early} of a period, in each period"
+    error, following = map(write, symbolic.error_series(stepper))
+    has_parasites = len(operators.recurrence(stepper)) > 3
+    late = ", once parasitic roots have died out" if has_parasites else ""
+    yield "error", f"u(t) - u_n = I ({error}) + O({following}) at a time t, for V = 0{late}"
+    yield "limits", _limits(scheme, options, stepper, write)
+
+
+def _limits(scheme: Scheme, options: Options, stepper: Stepper, write: Callable[[Any], str]) -> str:
+    """Say what the frequency tends to for small steps, and where the scheme begins to grow."""
+    from vibsim.theory import roots, stability_limit, symbolic
+
+    small = f"w~/w -> {write(symbolic.frequency_series(stepper, 1))} as p -> 0"
+    limit = stability_limit(scheme, options)
+    if not 0.0 < limit < math.inf:
+        return small
+    angle = float(roots(stepper, limit).angle)
+    # where the roots meet, half of the digits are left
+    angle = next((x for x in (0.0, math.pi) if abs(angle - x) < 1e-6), angle)
+    turned = "pi" if angle == math.pi else f"{angle:.6g}"
+    return f"{small}; w~ dt -> {turned} and w~/w -> {angle / limit:.6g} as p -> {limit:.6g}"
+
+
+def _characteristic(factors: Sequence[Any], write: Callable[[Any], str]) -> str:
+    """Write the characteristic polynomial, without roots that are 0, by powers of x."""
     from vibsim.theory.symbolic import symbol
 
-    x, p = symbol("x"), symbol("p")
-    coefficients = Poly(fraction(together(polynomial))[0], x).all_coeffs()
-    while coefficients[-1] == 0:
-        coefficients.pop()
-    scale = coefficients[0].subs(p, 0)
-    powers = range(len(coefficients) - 1, -1, -1)
-    rows = zip((c / scale for c in coefficients), powers, strict=True)
-    return _sum(((c.expand(), write(x**k) if k else "") for c, k in rows if c != 0), write)
+    powers = [symbol("x") ** k for k in reversed(range(len(factors)))]
+    return _sum(zip(factors, [*map(write, powers[:-1]), ""], strict=True), write)
+
+
+def _in_operators(stepper: Stepper, write: Callable[[Any], str], *, latex: bool) -> Iterator[Row]:
+    """Yield a scheme with and without its velocity, and what the operators mean that were needed."""
+    from vibsim.theory import operators
+
+    def equation(found: operators.Equation) -> str:
+        return _equation(found, write, latex=latex)
+
+    first, *others = operators.recurrence(stepper)
+    times = [_at("u", Fraction(1 - k), latex=latex) for k in range(len(others) + 1)]
+    right = _sum(zip((-factor for factor in others), times[1:], strict=True), write)
+    yield "without v", f"{_sum([(first, times[0])], write)} = {right}"
+    rows = [equation(operators.without_velocity(stepper))]
+    with suppress(ValueError):
+        rows.append(f"with all at one time: {equation(operators.at_one_time(stepper))}")
+    yield from (("", row) for row in rows)
+    with suppress(ValueError):
+        rows.append(", ".join(map(equation, operators.with_velocity(stepper))))
+        yield "with v", rows[-1]
+    told = {
+        _operator(name, latex=latex): re.sub(r"\^\(([^)]*)\)", r"^{\1}", means) if latex else means
+        for name, means in operators.NOTATION.items()
+    }
+    used = [name for name in told if any(f"{name} " in row for row in rows)]
+    yield (
+        "operators",
+        "; ".join(f"{_at(f'[{x} u]', Fraction(0), latex=latex)} = {told[x]}" for x in used),
+    )
+
+
+def _equation(equation: Equation, write: Callable[[Any], str], *, latex: bool) -> str:
+    """Write terms with their operators, in one pair of brackets where they belong to one time."""
+    from vibsim.theory.symbolic import symbol
+
+    places = {term.place for side in equation for term in side}
+
+    def term(one: Term) -> str:
+        names = [_operator(name, latex=latex) for name in one.operators]
+        powers = (("w", one.powers[0]), ("dt", one.powers[1]))
+        scale = [write(symbol(name) ** power) for name, power in powers if power]
+        here = " ".join((*names, one.of))
+        if len(places) > 1:
+            here = _at(f"[{here}]" if names else one.of, one.place, latex=latex)
+        return " ".join((*scale, here))
+
+    left, right = (
+        _sum(((one.factor, term(one)) for one in side), write) or "0" for side in equation
+    )
+    if len(places) > 1:
+        return f"{left} = {right}"
+    return _at(f"[{left} = {right}]", places.pop(), latex=latex)
+
+
+def _operator(name: str, *, latex: bool) -> str:
+    if not latex:
+        return name
+    head, _, index = name.partition("_")
+    if not index:
+        return rf"\mathrm{{{name}}}\,"
+    below = index.rstrip("+-")
+    return f"{head}_{{{below}}}" + (f"^{{{index.removeprefix(below)}}}" if below != index else "")
+
+
+def _at(what: str, place: Fraction, *, latex: bool) -> str:
+    """Write something at the time ``n + place``."""
+    time = "n" + (f"{'+' if place > 0 else '-'}{abs(place)}" if place else "")
+    if latex:
+        return f"{what}^{{{time}}}"
+    return f"{what}^{time if place == 0 else f'({time})'}"
 
 
 def _sum(terms: Iterable[tuple[Any, str]], write: Callable[[Any], str]) -> str:
-    """Write a sum of coefficients times what they are of, which may be nothing."""
-    rows = []
+    """Write a sum of coefficients times what they are of, which may be nothing; those that are 0 are left out."""
+    written = ""
     for factor, of in terms:
+        if factor == 0:
+            continue
         number = write(factor)
+        is_less = number.startswith("-")
+        if is_less:
+            number = write(-factor)
         if of and number == "1":
             number = ""
-        elif " " in number or number.startswith("-"):
+        elif of and not number.isalnum():
             number = f"({number})"
-        rows.append(f"{number} {of}".strip())
-    return " + ".join(rows)
+        sign = "-" if is_less else "+"
+        written += f" {sign} " if written else sign.strip("+")
+        written += f"{number} {of}".strip()
+    return written
 
 
 def _plain(formula: Any) -> str:

@@ -8,8 +8,6 @@ from __future__ import annotations
 
 import os
 import re
-import subprocess
-import sys
 from argparse import Namespace
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -17,7 +15,7 @@ from pathlib import Path
 
 from vibsim.cli import made_files, results_folder, supervise
 from vibsim.cli.chosen_plans import plans_of
-from vibsim.cli.jobs.common import chosen_results
+from vibsim.cli.jobs.common import chosen_results, run_command
 from vibsim.cli.jobs.solve import check_allowed
 from vibsim.cli.made_files import BESIDE, Entry
 from vibsim.cli.run import lock, reasons
@@ -66,9 +64,12 @@ def verify(options: Namespace) -> int:
     results_folder.check(results, filter(None, keys))
     with kept(results), temporary_folder() as folder:
         faults = sum(_tell_files(results, key) for key in keys)
-        status = _run_again(options, folder) if plans else 0
-        if status not in (0, 1):
-            return status
+        if plans:
+            # verdicts are no news here, progress is
+            command = run_command(options, options.experiments, folder)
+            status = supervise.child(command, is_heard=False)
+            if status not in (0, 1):
+                return status
         faults += sum(_tell_recomputed(plan, results, folder) for plan in plans)
     return 1 if faults else 0
 
@@ -109,9 +110,8 @@ def compare(results: Path, key: str) -> tuple[int, dict[str, str]]:
         return 0, {key or "index.html": "there are no results yet: run it first"}
     found = {name: _problem(folder / name, entry) for name, entry in known.items()}
     if is_whole:
-        found |= dict.fromkeys(
-            there - known.keys(), "is not in the manifest: no job that ended made it"
-        )
+        rule = "is not in the manifest: no job that ended made it"
+        found |= dict.fromkeys(there - known.keys(), rule)
         for name in made_files.OVER_ALL if key == made_files.INDEX else LAST:
             found.setdefault(name, "is not made yet: the last run did not end")
     if LAST[-1] not in there:
@@ -163,18 +163,6 @@ def _tell_files(results: Path, key: str) -> int:
     return len(problems)
 
 
-def _run_again(options: Namespace, folder: Path) -> int:
-    """Run the same in another folder; return the exit status."""
-    words = [sys.executable, "-P", "-m", "vibsim", "run", *options.experiments]
-    words += ["--results", str(folder)]
-    words += [word for text in options.settings for word in ("--set", text)]
-    words += ["--cores", str(options.cores)] if options.cores else []
-    words += ["--allow-commands"] * options.allow_commands
-    environment = os.environ | supervise.environment()
-    # verdicts are no news here, progress is
-    return subprocess.run(words, env=environment, stdout=subprocess.DEVNULL, check=False).returncode
-
-
 def _tell_recomputed(plan: Plan, results: Path, folder: Path) -> int:
     """Print which recomputed files differ from those that are there, and why; return how many."""
     causes = differences(plan, results, folder)
@@ -207,7 +195,7 @@ def differences(plan: Plan, results: Path, folder: Path) -> dict[str, list[str]]
 
 def _cause(plan: Plan, results: Path, known: Entry | None, again: Entry, name: str) -> str:
     """Say what differs between the making of a file and of the same file again."""
-    from vibsim.store.provenance import read_provenance
+    from vibsim.store.reading import read_provenance
 
     if known is None:
         return "the manifest does not have it"

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import subprocess
 import sys
 import time
 from argparse import Namespace
@@ -12,7 +10,7 @@ from pathlib import Path
 
 from vibsim.cli import supervise
 from vibsim.cli.chosen_plans import one_plan_of
-from vibsim.cli.jobs.common import refusal
+from vibsim.cli.jobs.common import refusal, run_command
 from vibsim.core.errors import VibsimError
 from vibsim.experiment.collection import ENDINGS
 
@@ -36,23 +34,13 @@ def watch(options: Namespace) -> int:
     while True:
         watched = _files(file, options.settings)
         before = _saved(watched)
-        subprocess.run(_command(options), env=os.environ | supervise.environment(), check=False)
+        command = run_command(options, [str(file)], options.results)
+        if options.detail:
+            command.append({"full": "--verbose", "quiet": "--quiet"}[options.detail])
+        supervise.child(command)
         print(f"watching {file}: save it to run again, Ctrl-C to end", file=sys.stderr, flush=True)
         while _saved(watched) == before or not file.exists():
             time.sleep(PAUSE)
-
-
-def _command(options: Namespace) -> list[str]:
-    words = [sys.executable, "-P", "-m", "vibsim", "run", str(options.file)]
-    if options.results:
-        words += ["--results", str(options.results)]
-    if options.cores:
-        words += ["--cores", str(options.cores)]
-    for text in options.settings:
-        words += ["--set", text]
-    if options.detail:
-        words.append({"full": "--verbose", "quiet": "--quiet"}[options.detail])
-    return words + ["--allow-commands"] * options.allow_commands
 
 
 def _files(file: Path, settings: Sequence[str]) -> list[Path]:

@@ -36,9 +36,8 @@ def analyse(options: Namespace) -> int:
     thin: list[Record] = []
     with on_record(options, results, plan.key, COMPARED, plan.analysis):
         with open_levels(plan, options, results) as levels:
-            parts = keep_for_verdicts(
-                experiment, analyse_parts(experiment, levels, processes=options.threads), thin
-            )
+            compared = analyse_parts(experiment, levels, processes=options.threads)
+            parts = keep_for_verdicts(experiment, compared, thin)
             store.write_parts(
                 folder / "convergence.nc",
                 (titled(part, f"{plan.key}: comparison of levels") for part in parts),

@@ -20,6 +20,7 @@ from vibsim.cli import made_files, results_folder
 from vibsim.cli.chosen_plans import one_plan_of
 from vibsim.core.errors import Fault, FileError, InputError, VibsimError
 from vibsim.core.home import default_results
+from vibsim.core.set_option import OPTION
 from vibsim.plan import Plan
 
 if TYPE_CHECKING:
@@ -36,9 +37,8 @@ def chosen_results(options: Namespace) -> Path:
         is_other = folder.exists() and not folder.is_dir()
     except OSError as error:
         # a name that is too long, a folder on the way that may not be entered
-        raise refusal(
-            "--results", f"{str(folder)[:80]} ...", f"cannot be used: {error.strerror}"
-        ) from None
+        rule = f"cannot be used: {error.strerror}"
+        raise refusal("--results", f"{str(folder)[:80]} ...", rule) from None
     if is_other:
         raise refusal("--results", folder, "must be a folder, this is a file")
     return folder.absolute()
@@ -62,6 +62,15 @@ def check_digest(plan: Plan, wanted: str | None, found: str) -> None:
 def refusal(key: str, value: Any, rule: str, hint: str = "") -> InputError:
     """Return the error of a command line."""
     return InputError([Fault("command line", 0, key, str(value), rule, hint)])
+
+
+def run_command(options: Namespace, experiments: Sequence[str], results: Path | None) -> list[str]:
+    """Return the words of ``vibsim run`` with those options of another command that both have."""
+    words = ["run", *experiments]
+    words += ["--results", str(results)] if results else []
+    words += ["--cores", str(options.cores)] if options.cores else []
+    words += [word for text in options.settings for word in (OPTION, text)]
+    return words + ["--allow-commands"] * options.allow_commands
 
 
 @contextmanager

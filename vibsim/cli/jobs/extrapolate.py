@@ -33,15 +33,10 @@ def extrapolate(options: Namespace) -> int:
         on_record(options, results, plan.key, ["best.nc"], plan.extrapolation),
         open_levels(plan, options, results) as levels,
     ):
+        ranges = ((i, min(i + size, plan.cases)) for i in range(0, plan.cases, size))
         parts = (
-            best_record(
-                plan.experiment,
-                {
-                    level: read(start, min(start + size, plan.cases))
-                    for level, read in levels.items()
-                },
-            )
-            for start in range(0, plan.cases, size)
+            best_record(plan.experiment, {level: read(*cases) for level, read in levels.items()})
+            for cases in ranges
         )
         store.write_parts(
             options.out or results / plan.best,

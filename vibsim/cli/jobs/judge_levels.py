@@ -10,7 +10,7 @@ from vibsim.cli.jobs.common import COMPARED, check_levels, on_record, titled, wi
 from vibsim.core.record import Record
 from vibsim.experiment.solver import restore
 from vibsim.plan import Plan
-from vibsim.plan.digests import solved_and_judged
+from vibsim.plan.digests import analysed
 from vibsim.solver import analysis
 
 
@@ -26,14 +26,9 @@ def judge_levels(plan: Plan, options: Namespace, results: Path) -> int:
     checks = analysis.judge_members(experiment, read)
     folder = options.out or results / plan.key
     record = titled(analysis.record(experiment, checks), f"{plan.key}: comparison of levels")
-    uses = solved_and_judged(plan.content)
+    uses = with_settings(plan, analysed(plan.content))
     summary = analysis.summarise(experiment, checks)
     with on_record(options, results, plan.key, COMPARED, plan.analysis):
-        store.write(
-            folder / "convergence.nc",
-            record,
-            digest=plan.analysis,
-            provenance=with_settings(plan, uses),
-        )
+        store.write(folder / "convergence.nc", record, digest=plan.analysis, provenance=uses)
         store.write_json(folder / "summary.json", summary, digest=plan.analysis)
     return 0

@@ -82,7 +82,6 @@ def _formats(options: Namespace) -> list[str]:
     chosen = (options.formats or "svg").split(",")
     unknown = [name for name in chosen if name not in FORMATS]
     if unknown:
-        raise refusal(
-            "--formats", ",".join(unknown), "unknown format", nearest(unknown[0], FORMATS)
-        )
+        hint = nearest(unknown[0], FORMATS)
+        raise refusal("--formats", ",".join(unknown), "unknown format", hint)
     return chosen

@@ -98,12 +98,8 @@ def _make(plan: Plan, level: int, job: ShardJob, path: Path, threads: int) -> No
     }
     try:
         record = simulate_record(experiment, level, job.start, job.stop, threads=threads)
-        store.write(
-            path,
-            titled(record, f"{plan.key}: level {level}"),
-            digest=job.digest,
-            provenance=provenance(plan, uses),
-        )
+        record = titled(record, f"{plan.key}: level {level}")
+        store.write(path, record, digest=job.digest, provenance=provenance(plan, uses))
     except (VibsimError, MemoryError, OSError) as error:
         raise VibsimError(f"{_named(plan, level, job)}: {sentence(error)}") from error
 

@@ -58,10 +58,8 @@ def make(plan: Plan, level: int, job: ShardJob, path: Path, threads: int) -> Non
         found = run.make(experiment, level, job.start, work, threads)
         record = level_output.record(experiment, level, job.start, found)
         uses = {**solved(experiment, level, job.start), "level": level, "case": job.start}
-        title = f"{plan.key}: level {level}"
-        store.write(
-            path, titled(record, title), digest=job.digest, provenance=provenance(plan, uses)
-        )
+        record = titled(record, f"{plan.key}: level {level}")
+        store.write(path, record, digest=job.digest, provenance=provenance(plan, uses))
     except (VibsimError, MemoryError, OSError) as error:
         # the folder is gone when somebody reads this
         raise VibsimError(f"{name}: {sentence(error).replace(f'{work}/', '')}") from error

@@ -89,11 +89,7 @@ def stale(plans: Sequence[Plan], results: Path) -> list[FileError]:
     """Return the files that another job is on record for; Snakemake misses them where its own record is lost."""
     found: list[FileError] = []
     for plan in plans:
-        jobs = {shard.path: shard.digest for shard in plan.shards}
-        jobs |= {plan.convergence: plan.analysis, plan.summary: plan.analysis}
-        jobs[plan.page] = plan.report
-        if plan.best and plan.extrapolation:
-            jobs[plan.best] = plan.extrapolation
+        jobs = plan.files
         for name, entry in made_files.load(results, plan.key).items():
             path = f"{plan.key}/{name}"
             if entry.job and jobs.get(path, entry.job) != entry.job and (results / path).exists():

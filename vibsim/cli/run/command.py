@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
-import subprocess
 import sys
 from argparse import Namespace
 from collections.abc import Iterator, Sequence
@@ -54,7 +52,8 @@ def _run(options: Namespace) -> int:
     config += ["allow_commands=true"] * options.allow_commands
     if config:
         where = replace(where, arguments=["--config", *config, *where.arguments])
-    if options.detail != "quiet":
+    is_quiet = options.detail == "quiet"
+    if not is_quiet:
         tell_notes(plans)
     if options.dry_run and options.junit:
         raise refusal("--junit", options.junit, "a dry run has no verdicts to write")
@@ -64,7 +63,6 @@ def _run(options: Namespace) -> int:
         junit.check_place(options.junit)
     held = lock.hold(results)
     lock.claim(plans, results)
-    is_quiet = options.detail == "quiet"
     results_folder.deleted(results)
     _clear(plans, results, options)
     if not is_quiet:
@@ -209,10 +207,10 @@ def _show(
     worked: bool,
 ) -> int:
     _check(ended)
-    failures = [
-        outcome.failed_job(str(job), results / job.log, results, job.reason) for job in ended.failed
-    ]
-    has_index = not failures or _write_index(results)
+    failures = [outcome.failed_job(job, results) for job in ended.failed]
+    # the index waits for every report: after a failure it is written from what there is
+    index = ["report", "--results", str(results)]
+    has_index = not failures or supervise.child(index) == 0
     status = outcome.status(summaries, failures)
     if options.junit:
         junit.write(options.junit, summaries, failures)
@@ -230,21 +228,10 @@ def _show(
         for line in outcome_text.of_failures(failures):
             print(line)
         print(f"\n{outcome_text.count(summaries, status)}")
-        for page in _pages(plans, results):
+        # the index links to those of many experiments
+        pages = [results / plan.page for plan in plans] if len(plans) <= _PAGES else []
+        for page in filter(Path.is_file, pages):
             print(f"report: {page}")
         if has_index:
             print(f"all results: {results / 'index.html'}")
     return 0 if status == "PASS" else 1
-
-
-def _pages(plans: Sequence[Plan], results: Path) -> list[Path]:
-    """Return the reports of what was asked for; of many experiments none, since the index links to them."""
-    pages = [results / plan.page for plan in plans]
-    return [page for page in pages if page.is_file()] if len(pages) <= _PAGES else []
-
-
-def _write_index(results: Path) -> bool:
-    """Write the index, which waits for every report, from what there is after a failure; tell whether it is there."""
-    command = [sys.executable, "-P", "-m", "vibsim", "report", "--results", str(results)]
-    ended = subprocess.run(command, check=False, env=os.environ | supervise.environment())
-    return ended.returncode == 0

@@ -12,8 +12,8 @@ from typing import Any
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element, SubElement
 
+from vibsim.cli.jobs.common import refusal
 from vibsim.cli.terminal import clean
-from vibsim.core.errors import Fault, InputError
 from vibsim.store import write_text
 
 Entry = Mapping[str, Any]
@@ -33,7 +33,7 @@ def check_place(path: Path) -> None:
     if path.exists() and not path.is_file():
         rule = "must be a file"
     if rule:
-        raise InputError([Fault("command line", 0, "--junit", str(path), rule)])
+        raise refusal("--junit", path, rule)
     path.unlink(missing_ok=True)
 
 

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from vibsim.cli import resources, results_folder
+from vibsim.cli.run.snakemake import Job
 from vibsim.core.errors import FileError
 from vibsim.core.vocabulary import FORMAT, worst
 from vibsim.plan import Plan
@@ -39,16 +40,17 @@ def collect(plan: Plan, results: Path) -> Entry:
     }
 
 
-def failed_job(job: str, log: Path, results: Path, reason: str = "") -> Entry:
-    """Return a job that failed, with the end of its log and the `reason` of its executor."""
+def failed_job(job: Job, results: Path) -> Entry:
+    """Return a job that failed, with the end of its log and the reason of its executor."""
+    log = results / job.log
     try:
         lines = log.read_text(errors="replace").splitlines()
     except OSError:
         lines = []
     tail = [line for line in lines if line.strip()][-_LOG_LINES:]
-    tail += [reason] * bool(reason)
+    tail += [job.reason] * bool(job.reason)
     # a job on a full disk cannot say so in its log
-    return {"job": job, "log": str(log), "tail": tail or resources.obstacle(results)}
+    return {"job": str(job), "log": str(log), "tail": tail or resources.obstacle(results)}
 
 
 def status(summaries: Sequence[Entry], failures: Sequence[Entry]) -> str:

@@ -16,7 +16,7 @@ from vibsim.cli.run.snakemake import Job
 from vibsim.core.errors import FileError
 from vibsim.core.set_option import set_options
 from vibsim.plan import Plan
-from vibsim.plan.digests import analysed, solved_and_judged
+from vibsim.plan.digests import analysed
 from vibsim.store import read_json
 
 NEW = "not made yet"
@@ -39,7 +39,7 @@ def why(plan: Plan, results: Path) -> str:
         titles = (settings.shown(title) for title in (summary.get("title"), plan.title))
         title = settings.Change("title", *titles)
         return "" if title.old == title.new else str(title)
-    from vibsim.store.provenance import read_provenance
+    from vibsim.store.reading import read_provenance
 
     try:
         made = read_provenance(results / plan.convergence)
@@ -49,8 +49,7 @@ def why(plan: Plan, results: Path) -> str:
 
 
 def _told(plan: Plan, made: Mapping[str, Any]) -> str:
-    uses = (solved_and_judged if plan.has_solver else analysed)(plan.content)
-    found = settings.differences(made["experiment"], uses)
+    found = settings.differences(made["experiment"], analysed(plan.content))
     if not found:
         found = versions(plan, made)
     if not found:
@@ -60,14 +59,12 @@ def _told(plan: Plan, made: Mapping[str, Any]) -> str:
         )
         found = settings.differences(before, now)
     if not found:
-        return (
-            "the solver, its inputs or the code of vibsim changed"
-            if plan.has_solver
-            else "the code of vibsim changed"
-        )
-    more = [f"{len(found) - _SHOWN} more changes"] if len(found) > _SHOWN + 1 else []
-    shown = found[:_SHOWN] if more else found
-    return "; ".join([*map(str, shown), *more])
+        solver = "the solver, its inputs or " if plan.has_solver else ""
+        own = ", ".join(kind for _, kind, _ in plan.packages)
+        return f"{solver}the code of {own + ' or of ' if own else ''}vibsim changed"
+    rest = [f"{len(found) - _SHOWN} more changes"] if len(found) > _SHOWN + 1 else []
+    shown = found[:_SHOWN] if rest else found
+    return "; ".join([*map(str, shown), *rest])
 
 
 def versions(plan: Plan, made: Mapping[str, Any]) -> list[settings.Change]:

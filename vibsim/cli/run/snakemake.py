@@ -292,10 +292,8 @@ def _status(process: subprocess.Popen[bytes]) -> int:
     if number := supervise.ended_by(status):
         raise supervise.Interrupted(number)
     if status < 0:
-        name = signal.Signals(-status).name
-        raise VibsimError(
-            f"the workflow was killed by {name}; run the same command again to continue"
-        )
+        how = f"killed by {signal.Signals(-status).name}"
+        raise VibsimError(f"the workflow was {how}; run the same command again to continue")
     return status
 
 

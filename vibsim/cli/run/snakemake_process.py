@@ -81,7 +81,11 @@ def main() -> None:
             import_module(name)
         ReportPluginRegistry()
     with _absent("pandas"):
-        _run()
+        from snakemake.cli import main as snakemake
+
+        module = sys.modules[__name__]
+        LoggerPluginRegistry().register_plugin("snakemake_logger_plugin_vibsim", module)
+        snakemake()
 
 
 @contextmanager
@@ -94,13 +98,6 @@ def _absent(*names: str) -> Iterator[None]:
     finally:
         for name in names:
             del sys.modules[name]
-
-
-def _run() -> None:
-    from snakemake.cli import main as snakemake
-
-    LoggerPluginRegistry().register_plugin("snakemake_logger_plugin_vibsim", sys.modules[__name__])
-    snakemake()
 
 
 if __name__ == "__main__":

@@ -12,11 +12,13 @@ from vibsim.convergence.study.common_points import CommonValues
 from vibsim.convergence.study.outcomes import FEWEST, Outcome, Question
 from vibsim.convergence.study.refinement import Refinement
 from vibsim.convergence.study.sentences import Setting, describe
-from vibsim.convergence.study.verdict import LadderVerdict
-from vibsim.convergence.study.verdict_data import Level
+from vibsim.convergence.study.verdict import LadderVerdict, Level
 from vibsim.convergence.thresholds import GCI_TRUSTED
 from vibsim.core.array_types import Floats
 from vibsim.core.vocabulary import ORDER_TOLERANCE, REASONS
+
+ROUNDING_SAID = 0.1
+"""The rounding of printed digits is spoken of where it is so large a part of the bound of the error."""
 
 
 def verdict(
@@ -67,7 +69,7 @@ def verdict(
         is_proportional=steps.is_proportional,
         interpolation=(common.kind, common.interpolation_order or 0) if hidden else None,
         notes=common.notes,
-        parts=common.parts,
+        parts=(*common.parts, *_rounding(one)),
     )
     sentence, advice = describe(found, setting)
     return replace(found, sentence=sentence, advice=advice)
@@ -87,6 +89,13 @@ def _hidden(question: Question, common: CommonValues, one: Outcome) -> bool:
     # the error of the values falls at least as fast as that of values and interpolation together
     enough = question.at_least is not None and question.at_least <= least
     return not (enough and one.reason == "asymptotic")
+
+
+def _rounding(one: Outcome) -> tuple[str, ...]:
+    """Say that the digits which the values have make a part of the bounds."""
+    if not one.rounded > ROUNDING_SAID * one.error_bound or one.exact_known:
+        return ()
+    return ("The bounds include the rounding of the values to their last digit.",)
 
 
 def _best_bound(one: Outcome, best: float | None) -> float | None:

@@ -34,7 +34,7 @@ class CommonValues:
     interpolation_order: int | None
     """Order of the error of an interpolation; None where no value was interpolated."""
     notes: tuple[str, ...] = ()
-    """What else may be wrong with the points, for a verdict that does not pass."""
+    """What else may be wrong with the points, for a verdict that does not pass with an expected order above 1."""
     parts: tuple[str, ...] = ()
     """Which part of the points is compared, where it is not all of them."""
 

@@ -7,12 +7,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from vibsim.convergence.study.sentences import number
-from vibsim.convergence.study.verdict_data import VerdictData
 from vibsim.core.array_types import Floats
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+
+    from vibsim.convergence.study.verdict import LadderVerdict
 
 WIDTH, HEIGHT = 9.0, 3.8
 """Of the figure [inch]."""
@@ -26,7 +27,7 @@ LEAST, MOST = 1e-290, 1e290
 """Of a logarithmic axis."""
 
 
-def convergence_figure(verdict: VerdictData) -> Figure:
+def convergence_figure(verdict: LadderVerdict) -> Figure:
     """Return the figure of a verdict; of a series it has a second panel."""
     from matplotlib.figure import Figure
 
@@ -39,18 +40,18 @@ def convergence_figure(verdict: VerdictData) -> Figure:
     return figure
 
 
-def shows_curves(verdict: VerdictData) -> bool:
+def shows_curves(verdict: LadderVerdict) -> bool:
     """Say whether a verdict is of a series, whose differences can be drawn."""
     return len(verdict.dims) == 1 and len(verdict.values) > 1 and verdict.values.shape[1] > 1
 
 
-def slope(verdict: VerdictData) -> float | None:
+def slope(verdict: LadderVerdict) -> float | None:
     """Return the order that a picture shows for comparison: the expected one, else the observed one."""
     found = verdict.expected or verdict.at_least or verdict.order
     return found if found and found > 0.0 else None
 
 
-def _sizes(ax: Axes, verdict: VerdictData) -> None:
+def _sizes(ax: Axes, verdict: LadderVerdict) -> None:
     """Draw errors and differences against the step size."""
     h = np.array([level.h for level in verdict.levels])
     word = "error" if verdict.is_exact_known else "estimated error"
@@ -84,7 +85,7 @@ def _sizes(ax: Axes, verdict: VerdictData) -> None:
     ax.legend(fontsize="small", loc="best")
 
 
-def _reference(ax: Axes, verdict: VerdictData, h: Floats, sizes: Floats) -> None:
+def _reference(ax: Axes, verdict: LadderVerdict, h: Floats, sizes: Floats) -> None:
     """Draw the slope of an order through the finest point."""
     order = slope(verdict)
     known = np.flatnonzero(np.isfinite(sizes))
@@ -127,7 +128,7 @@ def _plain_ticks(ax: Axes, h: Floats) -> None:
         ax.yaxis.set_minor_formatter(plain)
 
 
-def _curves(ax: Axes, verdict: VerdictData) -> None:
+def _curves(ax: Axes, verdict: LadderVerdict) -> None:
     """Draw the differences of successive levels, each rescaled to the error that it predicts for the finest level."""
     dim = verdict.dims[0]
     h = np.array([level.h for level in verdict.levels])

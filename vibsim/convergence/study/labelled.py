@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from vibsim.convergence.study.verdict_data import VerdictData
-
 if TYPE_CHECKING:
     import xarray
+
+    from vibsim.convergence.study.verdict import LadderVerdict
 
 COLUMNS = {
     "value": "value, or norm of the values",
@@ -21,7 +21,7 @@ COLUMNS = {
 """Columns of the table of levels with what they mean."""
 
 
-def dataset(verdict: VerdictData) -> xarray.Dataset:
+def dataset(verdict: LadderVerdict) -> xarray.Dataset:
     """Return a verdict as a dataset over the step sizes; missing numbers are NaN, missing facts left out."""
     import xarray
 

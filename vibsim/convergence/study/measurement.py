@@ -3,30 +3,37 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from decimal import Decimal
 
 import numpy as np
 
 from vibsim.convergence.error_model.posterior import Ladder
-from vibsim.core.array_types import Flags, Floats
+from vibsim.core.array_types import Floats
 
 LARGEST = 1e150
 """Scaled values do not exceed it: their squares are numbers."""
+FURTHEST = 1e100
+"""Distance from the exact solution, over the size of the values, beyond which it is all the same."""
+
+
+FEW_DIGITS = 11
+"""Values with no more decimal digits than these were rounded to them: those of a calculation have 15 and more."""
+BINARY = 2.0**20
+"""Multiples of its inverse that are whole have few digits anyway: 0.125, 3 or 65 may be results as they are."""
+SAMPLED = 64
+"""Values of a level whose digits are counted."""
 
 
 @dataclass(frozen=True)
 class Measurement:
-    """What was measured of the ladders of all members, in units of `scale`."""
+    """What was measured of the ladders of all members."""
 
     ladder: Ladder
-    """With the leading dimension member."""
+    """In units of `scale`, with the leading dimension member."""
     scale: Floats
     """A power of two for each member, so that squares neither overflow nor vanish, shape (member,)."""
-    size: Floats
-    """Root mean square of the values of the finest level, shape (member,)."""
     norms: Floats
-    """The same of every level, but in the units of the values, shape (member, n)."""
-    products: Floats
-    """Inner products of the differences of successive levels, shape (member, n-1, n-1)."""
+    """Root mean square of the values of every level, shape (member, n)."""
 
 
 def scale_of(values: Floats) -> Floats:
@@ -39,9 +46,23 @@ def scale_of(values: Floats) -> Floats:
     return np.asarray(np.ldexp(1.0, np.frexp(np.where(size > 0.0, size, 1.0))[1] - 1))
 
 
-def finite_levels(values: Floats) -> Flags:
-    """Tell which levels hold finite numbers only, shape (member, n)."""
-    return np.asarray(np.all(np.isfinite(values), axis=2))
+def half_last_digit(values: Floats) -> float:
+    """Return half a unit of the last decimal place of finite values, shape (n, points), where they have few digits.
+
+    It is how far each of them is from what it was before it was printed or stored with these digits; else 0.
+    """
+    sampled = values[:, :: -(-values.shape[1] // SAMPLED)]
+    size = Decimal(repr(float(np.max(np.abs(sampled))))).adjusted()
+    last = size
+    for value in sampled[::-1].flat:
+        number = Decimal(repr(float(value))).normalize()
+        if number:
+            last = min(last, int(number.as_tuple().exponent))
+        if size - last >= FEW_DIGITS:
+            return 0.0
+    with np.errstate(over="ignore"):
+        is_binary = np.all(sampled * BINARY == np.rint(sampled * BINARY))
+    return 0.0 if is_binary else float(Decimal(5).scaleb(last - 1))
 
 
 def measurement(
@@ -65,7 +86,7 @@ def measurement(
     scale = scale_of(values)
     scaled = values / scale[:, None, None]
     points = values.shape[2]
-    norms = _rms(scaled)
+    norms = np.sqrt(np.mean(scaled * scaled, axis=-1))
     rows = scaled[:, :-1] - scaled[:, 1:]
     if exact is not None:
         with np.errstate(over="ignore"):
@@ -78,7 +99,6 @@ def measurement(
     floor = 0.5 * epsilon * norms
     if noise is not None:
         floor = np.maximum(floor, noise / scale[:, None])
-    n = len(h)
     ladder = Ladder(
         h=h,
         gram=gram,
@@ -86,14 +106,4 @@ def measurement(
         numbers=np.full(len(values), points == 1),
         exact_known=exact is not None,
     )
-    return Measurement(
-        ladder, scale, norms[:, -1], norms * scale[:, None], gram[:, : n - 1, : n - 1]
-    )
-
-
-FURTHEST = 1e100
-"""Distance from the exact solution, over the size of the values, beyond which it is all the same."""
-
-
-def _rms(values: Floats) -> Floats:
-    return np.asarray(np.sqrt(np.mean(values * values, axis=-1)))
+    return Measurement(ladder, scale, norms * scale[:, None])

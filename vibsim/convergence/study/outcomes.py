@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from vibsim.convergence.assessment import Assessment, assess
+from vibsim.convergence.assessment import Question as Asked
 from vibsim.convergence.differences import order_of_differences
-from vibsim.convergence.study.measurement import Measurement, finite_levels, measurement
-from vibsim.convergence.thresholds import NOISE_FACTOR, STATED_NOISE_FACTOR
+from vibsim.convergence.study.measurement import Measurement, half_last_digit, measurement
+from vibsim.convergence.thresholds import MISSED, NOISE_FACTOR, STATED_NOISE_FACTOR
 from vibsim.core.array_types import Flags, Floats, Integers
-from vibsim.core.vocabulary import ORDER_TOLERANCE, REASON_NAMES
+from vibsim.core.vocabulary import REASON_NAMES
 
 FEWEST = 3
 """Levels that show an order."""
+MOST_ROUNDED = 5e-4
+"""Levels that are all the same may be exact where half of their last digit is a larger part: of up to three digits."""
 
 
 @dataclass(frozen=True)
@@ -27,26 +30,26 @@ class Question:
     noise: float | None
 
 
-@dataclass(frozen=True)
+@dataclass
 class Outcome:
-    """What was measured and decided of one member; arrays over all levels have NaN where a level is not finite."""
+    """What was measured and decided of one member; NaN where nothing is known, and where a level is not finite."""
 
-    reason: str
-    finite: Integers
-    """Positions of the levels that are finite."""
-    is_number: bool
     values: Floats
     """Numbers, or norms of the values, shape (n,)."""
-    differences: Floats
-    """Of successive finite levels, with their sign where they are numbers or of opposite shape, shape (finite - 1,)."""
-    ratios: Floats
-    """With their sign, shape (finite - 2,)."""
     errors: Floats
     """Shape (n,)."""
-    size: float
-    floor: float
-    """Norm and noise of the finest level."""
+    is_number: bool
     exact_known: bool
+    finite: Integers
+    """Positions of the levels that are finite."""
+    reason: str = "non_finite"
+    differences: Floats = field(default_factory=lambda: np.empty(0))
+    """Of successive finite levels, with their sign where they are numbers or of opposite shape, shape (finite - 1,)."""
+    ratios: Floats = field(default_factory=lambda: np.empty(0))
+    """With their sign, shape (finite - 2,)."""
+    size: float = np.nan
+    floor: float = np.nan
+    """Norm and noise of the finest level."""
     order: float = np.nan
     low: float = np.nan
     high: float = np.nan
@@ -58,6 +61,8 @@ class Outcome:
     """Extrapolated values, shape (points,)."""
     best_bound: float = np.nan
     """How far they are from the limit at most, in the norm."""
+    rounded: float = 0.0
+    """How far the extrapolated values are off because those of the levels have few digits; part of the bounds."""
 
 
 def outcomes(
@@ -78,7 +83,7 @@ def outcomes(
     exact
         Exact values, shape (member, points); None where they are not known.
     """
-    finite = finite_levels(values)
+    finite = np.isfinite(values).all(axis=2)
     found: dict[int, Outcome] = {}
     for pattern in np.unique(finite, axis=0):
         members = np.flatnonzero(np.all(finite == pattern, axis=1))
@@ -97,83 +102,52 @@ def _with_finite(
     pattern: Flags,
 ) -> list[Outcome]:
     """Return what was decided of members that have the same finite levels."""
-    finite, n = np.flatnonzero(pattern), len(h)
+    finite, (count, n, points) = np.flatnonzero(pattern), values.shape
+    exact_known = exact is not None and len(finite) > 0
+    found = [
+        Outcome(np.full(n, np.nan), np.full(n, np.nan), points == 1, exact_known, finite)
+        for _ in range(count)
+    ]
     if not len(finite):
-        return [_nothing(n, is_number=values.shape[2] == 1)] * len(values)
+        return found
     part = values[:, finite]
     measured = measurement(part, h[finite], epsilon[finite], question.noise, exact)
     decided = None
     if len(finite) >= FEWEST:
-        decided = assess(
-            measured.ladder,
-            expected=question.order,
-            at_least=question.at_least,
-            tolerance=ORDER_TOLERANCE,
-            noise_factor=STATED_NOISE_FACTOR if question.noise else NOISE_FACTOR,
-        )
-    found = []
-    for k in range(len(values)):
-        one = _measured(measured, k, finite, part[k], None if exact is None else exact[k], n)
+        factor = STATED_NOISE_FACTOR if question.noise else NOISE_FACTOR
+        asked = Asked(question.order, question.at_least, noise_factor=factor)
+        decided = assess(measured.ladder, asked)
+    for k, one in enumerate(found):
+        truth = None if exact is None else exact[k]
+        _measure(one, measured, k, part[k], truth)
         if decided is not None:
-            one = _decided(one, decided, k, measured, part[k])
+            _decide(one, decided, k, measured, part[k], truth)
         if len(finite) < n:
             # levels that are not finite decide, whatever the others say; the error is that of the finest level
-            one = replace(one, reason="non_finite")
+            one.reason = "non_finite"
         if finite[-1] < n - 1:
-            one = replace(one, error=np.nan, error_bound=np.nan)
-        found.append(one)
+            one.error = one.error_bound = np.nan
     return found
 
 
-def _nothing(n: int, *, is_number: bool) -> Outcome:
-    """Return what is known of a member without a finite level."""
-    levels, none = np.full(n, np.nan), np.empty(0)
-    return Outcome(
-        reason="non_finite",
-        finite=np.empty(0, dtype=np.int64),
-        is_number=is_number,
-        values=levels,
-        differences=none,
-        ratios=none,
-        errors=levels,
-        size=np.nan,
-        floor=np.nan,
-        exact_known=False,
-    )
-
-
-def _measured(
-    measured: Measurement, k: int, finite: Integers, part: Floats, truth: Floats | None, n: int
-) -> Outcome:
-    """Return what was measured of one member, whose finite levels are `part`, shape (finite, points)."""
-    is_number = part.shape[1] == 1
-    scale = float(measured.scale[k])
-    products = measured.products[k]
+def _measure(
+    one: Outcome, measured: Measurement, k: int, part: Floats, truth: Floats | None
+) -> None:
+    """Add what was measured of member `k`, whose finite levels are `part`, shape (finite, points)."""
+    scale, rows = float(measured.scale[k]), len(part) - 1
+    products = measured.ladder.gram[k, :rows, :rows]
     sizes = np.sqrt(np.diagonal(products))
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        differences = part[:-1, 0] - part[1:, 0] if is_number else sizes * scale
-        signs = np.sign(np.diagonal(products, 1))
-        ratios = signs * sizes[:-1] / sizes[1:]
-    values = np.full(n, np.nan)
-    values[finite] = part[:, 0] if is_number else measured.norms[k]
-    errors = np.full(n, np.nan)
-    found = Outcome(
-        reason="too_few_levels",
-        finite=finite,
-        is_number=is_number,
-        values=values,
-        differences=differences,
-        ratios=ratios,
-        errors=errors,
-        size=float(measured.size[k]) * scale,
-        floor=float(measured.ladder.floor[k, -1]) * scale,
-        exact_known=truth is not None,
-    )
-    if truth is None:
-        return found
-    errors[finite] = _distances(part, truth, is_number, scale)
-    error = float(errors[finite[-1]])
-    return replace(found, error=error, error_bound=abs(error) + found.floor)
+        one.differences = part[:-1, 0] - part[1:, 0] if one.is_number else sizes * scale
+        one.ratios = np.sign(np.diagonal(products, 1)) * sizes[:-1] / sizes[1:]
+    one.reason = "too_few_levels"
+    one.values[one.finite] = part[:, 0] if one.is_number else measured.norms[k]
+    one.size = float(measured.norms[k, -1])
+    one.floor = float(measured.ladder.floor[k, -1]) * scale
+    if truth is not None:
+        one.errors[one.finite] = _distances(part, truth, one.is_number, scale)
+        one.error = float(one.errors[one.finite[-1]])
+        one.error_bound = abs(one.error) + one.floor
 
 
 def _distances(part: Floats, limit: Floats, is_number: bool, scale: float) -> Floats:
@@ -184,37 +158,43 @@ def _distances(part: Floats, limit: Floats, is_number: bool, scale: float) -> Fl
     return np.asarray(scale * np.sqrt(np.mean(((part - limit) / scale) ** 2, axis=1)))
 
 
-def _decided(
-    one: Outcome, decided: Assessment, k: int, measured: Measurement, part: Floats
-) -> Outcome:
-    """Add what was decided of member `k`."""
+def _decide(
+    one: Outcome,
+    decided: Assessment,
+    k: int,
+    measured: Measurement,
+    part: Floats,
+    truth: Floats | None,
+) -> None:
+    """Add what was decided of member `k`, whose finite levels are `part` and whose exact values are `truth`."""
     scale = float(measured.scale[k])
-    one = replace(one, reason=REASON_NAMES[int(decided.reason[k])])
-    order, used, weights = _estimate(one, measured.ladder.h, decided, k)
-    # added up one by one, so that a member has the same digits alone and among others
-    best: Floats | None = None
+    one.reason = REASON_NAMES[int(decided.reason[k])]
+    one.order, used, weights = _estimate(one, measured.ladder.h, decided, k)
+    one.used = tuple(one.finite[used].tolist())
+    one.low, one.high = float(decided.low[k]), float(decided.high[k])
     if np.isfinite(weights).all():
-        best = sum((w * row for w, row in zip(weights, part, strict=True)), 0.0 * part[0])
-    error, bound, errors = one.error, one.error_bound, one.errors
-    if not one.exact_known:
-        error, bound = float(decided.error[k]) * scale, float(decided.error_bound[k]) * scale
-        if best is not None:
-            errors = one.errors.copy()
-            errors[one.finite] = _distances(part, best, one.is_number, scale)
-            if one.is_number and errors[one.finite[-1]] < 0.0:
-                error = -error
-    return replace(
-        one,
-        order=order,
-        low=float(decided.low[k]),
-        high=float(decided.high[k]),
-        used=tuple(one.finite[used].tolist()),
-        error=error,
-        error_bound=bound,
-        errors=errors,
-        best=best,
-        best_bound=float(decided.best_bound[k]) * scale,
+        # added up one by one, so that a member has the same digits alone and among others
+        one.best = sum((w * row for w, row in zip(weights, part, strict=True)), 0.0 * part[0])
+        one.rounded = half_last_digit(part) * float(np.sum(np.abs(weights)))
+    bound_of_best = float(decided.best_bound[k]) * scale
+    if one.reason == "wrong_limit" and one.rounded and one.best is not None and truth is not None:
+        away = float(np.max(np.abs(_distances(one.best[None], truth, one.is_number, scale))))
+        if away <= MISSED * bound_of_best + one.rounded:
+            # the exact values, with so many digits, may be what was printed
+            one.reason = "round_off"
+    if one.reason == "exact" and one.rounded > MOST_ROUNDED * one.size:
+        one.rounded = 0.0
+    one.best_bound = bound_of_best + one.rounded
+    if one.exact_known:
+        return
+    one.error, one.error_bound = (
+        float(decided.error[k]) * scale,
+        float(decided.error_bound[k]) * scale + one.rounded,
     )
+    if one.best is not None:
+        one.errors[one.finite] = _distances(part, one.best, one.is_number, scale)
+        if one.is_number and one.errors[one.finite[-1]] < 0.0:
+            one.error = -one.error
 
 
 def _estimate(one: Outcome, h: Floats, decided: Assessment, k: int) -> tuple[float, slice, Floats]:

@@ -69,7 +69,7 @@ class Common:
     interpolated: bool = False
     """Whether a value is not one of its level."""
     note: str = ""
-    """What else may be wrong with these points, for a verdict that does not pass."""
+    """What else may be wrong with these points, for a verdict that does not pass with an expected order above 1."""
     part: str = ""
     """Which part of the points is compared, where it is not all of them."""
 

@@ -7,10 +7,12 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from types import MappingProxyType
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from vibsim.convergence.study.verdict_data import VerdictData
 from vibsim.core.vocabulary import ORDER_TOLERANCE
+
+if TYPE_CHECKING:
+    from vibsim.convergence.study.verdict import LadderVerdict
 
 
 @dataclass(frozen=True)
@@ -26,7 +28,7 @@ class Setting:
     interpolation: tuple[str, int] | None = None
     """Kind and order of an interpolation that hides the order."""
     notes: tuple[str, ...] = ()
-    """What else may be wrong, where it does not pass."""
+    """What else may be wrong, where it does not pass with an expected order above 1."""
     parts: tuple[str, ...] = ()
     """Which part of the points is compared."""
 
@@ -39,6 +41,8 @@ NOISE_SEEN = 4.0
 """A difference of two levels that is larger than so many times their noise is hardly noise."""
 BEYOND_ROUND_OFF = 1e-10
 """A difference that is a larger part of the values is no round-off."""
+APART = 1e-3
+"""Differences that grow up to this part of the values are levels that move apart, unless a noise is stated."""
 LOOK_FOR = (
     "Look for a part of lower order, such as the first step, a formula at a boundary, a limiter, or an iteration that "
     "stops too early"
@@ -85,8 +89,8 @@ SENTENCES: Mapping[str, tuple[str, str]] = MappingProxyType(
         ),
         "growing": (
             "The differences of {quantity} grow towards the finer levels{estimate}.",
-            "Check that {size} is a step size, not a number of cells or steps. If it is a step size, add a finer "
-            "level, such as {size} = {finer}.",
+            "Check that {size} is a step size, not a number of cells or steps, and that each level has its own. If so, "
+            "add a finer level, such as {size} = {finer}.",
         ),
         "round_off": (
             "The differences of {quantity} have reached {floor}, so they do not show its order{estimate}.",
@@ -115,21 +119,24 @@ SENTENCES: Mapping[str, tuple[str, str]] = MappingProxyType(
         ),
     }
 )
-"""Reason to the templates of sentence and advice; ``interpolation`` is a case of ``not_applicable``, ``growing`` and
-``noisy`` are cases of ``pre_asymptotic``."""
+"""Reason to the templates of sentence and advice; ``interpolation`` is a case of ``not_applicable``, ``noisy`` is a
+case of ``pre_asymptotic``, ``growing`` of that and of ``round_off``."""
 
 
-def describe(facts: VerdictData, setting: Setting) -> tuple[str, str]:
+def describe(facts: LadderVerdict, setting: Setting) -> tuple[str, str]:
     """Return the sentence on a ladder, and the advice; the advice on one that passed is empty."""
     key = "interpolation" if setting.interpolation else facts.reason
     if key == "pre_asymptotic" and _is_noise_seen(facts, setting):
         key = "noisy"
-    elif key == "pre_asymptotic" and facts.order is not None and facts.order < 0.0:
+    elif facts.order is not None and facts.order < 0.0 and _is_growth(facts, setting):
         key = "growing"
     phrases = _phrases(facts, setting)
     sentence, advice = (template.format_map(phrases) for template in SENTENCES[key])
     more = [
         _higher_part(facts),
+        opposite_part(
+            facts.reason, facts.order, facts.expected if facts.at_least is None else facts.at_least
+        ),
         _interval(facts),
         _error(facts),
         _best(facts),
@@ -139,31 +146,49 @@ def describe(facts: VerdictData, setting: Setting) -> tuple[str, str]:
         _copies(facts),
     ]
     if facts.status == "PASS":
-        return _joined([sentence, *more]), ""
+        # points that are not the same have an error of order 1 of their own
+        confirmed = (facts.expected or 0.0) > 1.0 + ORDER_TOLERANCE
+        return _joined([sentence, *more, *(() if confirmed else setting.notes)]), ""
     return _joined([sentence, *more]), _joined([advice, *setting.notes])
 
 
-def _is_noise_seen(facts: VerdictData, setting: Setting) -> bool:
+def _is_noise_seen(facts: LadderVerdict, setting: Setting) -> bool:
     """Say whether the finest difference may be the stated noise: a finer level would show no more."""
     finest = facts.levels[-2:][0].difference
     return finest is not None and abs(finest) <= NOISE_SEEN * setting.noise
+
+
+def _is_growth(facts: LadderVerdict, setting: Setting) -> bool:
+    """Say whether levels whose differences grow move apart: by more than noise, where that is the reason."""
+    if facts.reason != "round_off":
+        return facts.reason == "pre_asymptotic"
+    finest = facts.levels[-2:][0]
+    size = abs(finest.value or 0.0)
+    return not setting.noise and abs(finest.difference or 0.0) > APART * size > 0.0
 
 
 def _joined(parts: Sequence[str]) -> str:
     return " ".join(part for part in parts if part)
 
 
-def _phrases(facts: VerdictData, setting: Setting) -> dict[str, Any]:
+def _phrases(facts: LadderVerdict, setting: Setting) -> dict[str, Any]:
     kind, own = setting.interpolation or ("", 0)
     h, count = [level.h for level in facts.levels], len(facts.levels)
     finer = h[-1] * (h[-1] / h[-2] if count > 1 else 0.5)
     not_finite = [level.h for level in facts.levels if level.value is None]
+    if facts.expected is not None:
+        wanted, as_expected = f"{facts.expected:g}", ", as expected"
+    elif facts.at_least is not None:
+        wanted = f"at least {facts.at_least:g}"
+        as_expected = f", {wanted} as expected"
+    else:
+        wanted, as_expected = "another one", ""
     points = "Take levels that have the coarsest points in common (restrict: subset)"
     return {
         "quantity": facts.quantity,
         "order": order_with_interval(facts),
-        "as_expected": _as_expected(facts),
-        "wanted": _wanted(facts),
+        "as_expected": as_expected,
+        "wanted": wanted,
         "value": "value" if facts.is_number else "values",
         "noise": "the stated noise" if setting.noise else "round-off",
         "floor": "the stated noise" if setting.noise else "round-off or other noise",
@@ -181,7 +206,7 @@ def _phrases(facts: VerdictData, setting: Setting) -> dict[str, Any]:
     }
 
 
-def order_with_interval(facts: VerdictData) -> str:
+def order_with_interval(facts: LadderVerdict) -> str:
     """Write an order with its interval, ``2.00 (1.97 to 2.03)``."""
     if facts.order is None:
         return "unknown"
@@ -193,12 +218,6 @@ def order_with_interval(facts: VerdictData) -> str:
     )
 
 
-def _as_expected(facts: VerdictData) -> str:
-    if facts.expected is not None:
-        return ", as expected"
-    return f", at least {facts.at_least:g} as expected" if facts.at_least is not None else ""
-
-
 def higher_part(order: float, expected: float, tolerance: float) -> str:
     """Say why the measured order is away from the one that dominates; empty where it is near."""
     if abs(order - expected) <= tolerance:
@@ -207,19 +226,24 @@ def higher_part(order: float, expected: float, tolerance: float) -> str:
     return f"A part of the error of higher order is still seen. It {moves} the measured order."
 
 
-def _higher_part(facts: VerdictData) -> str:
+def opposite_part(reason: str, order: float | None, wanted: float | None) -> str:
+    """Say why an order fails as too low or too high although the measured one is not; empty where it is."""
+    if order is None or wanted is None or not math.isfinite(wanted):
+        return ""
+    if reason == "order_low" and order >= wanted:
+        return "The largest part of the error has a lower order. Another part still raises the measured order."
+    if reason == "order_high" and order <= wanted:
+        return "The largest part of the error has a higher order. Another part still lowers the measured order."
+    return ""
+
+
+def _higher_part(facts: LadderVerdict) -> str:
     if facts.reason != "asymptotic" or facts.expected is None or facts.order is None:
         return ""
     return higher_part(facts.order, facts.expected, ORDER_TOLERANCE)
 
 
-def _wanted(facts: VerdictData) -> str:
-    if facts.expected is not None:
-        return f"{facts.expected:g}"
-    return f"at least {facts.at_least:g}" if facts.at_least is not None else "another one"
-
-
-def _interval(facts: VerdictData) -> str:
+def _interval(facts: LadderVerdict) -> str:
     """Say between which orders the levels leave it open."""
     if facts.reason != "pre_asymptotic" or facts.order_low is None or facts.order_high is None:
         return ""
@@ -228,7 +252,7 @@ def _interval(facts: VerdictData) -> str:
     return f"They are consistent with orders from {facts.order_low:.2f} to {facts.order_high:.2f}."
 
 
-def _finer(facts: VerdictData) -> str:
+def _finer(facts: LadderVerdict) -> str:
     """Say behind which level an order that was decided on is not seen."""
     decided = facts.reason in ("asymptotic", "order_low", "order_high")
     if not decided or not facts.h_used or facts.h_used[-1] == facts.levels[-1].h:
@@ -237,7 +261,7 @@ def _finer(facts: VerdictData) -> str:
     return f"The levels finer than {facts.size_name} = {last} do not show this order."
 
 
-def _copies(facts: VerdictData) -> str:
+def _copies(facts: LadderVerdict) -> str:
     """Doubt neighbouring levels that do not differ at all, where those beside them differ by more than round-off."""
     levels, size = facts.levels, facts.size_name
     sizes = [abs(level.difference or 0.0) for level in levels[:-1]]
@@ -254,7 +278,7 @@ def _copies(facts: VerdictData) -> str:
     return ""
 
 
-def _error(facts: VerdictData) -> str:
+def _error(facts: LadderVerdict) -> str:
     """Say the error of the finest level with its bound."""
     if facts.error is None:
         return ""
@@ -268,7 +292,7 @@ def _error(facts: VerdictData) -> str:
     return f"The error of the finest level is {size}{share}{limit}."
 
 
-def _best(facts: VerdictData) -> str:
+def _best(facts: LadderVerdict) -> str:
     """Say the extrapolated number with its bound."""
     if (
         facts.best is None

@@ -5,9 +5,12 @@ from __future__ import annotations
 import math
 import textwrap
 from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING
 
 from vibsim.convergence.study.sentences import digits_of_values, number
-from vibsim.convergence.study.verdict_data import Level, VerdictData
+
+if TYPE_CHECKING:
+    from vibsim.convergence.study.verdict import LadderVerdict, Level
 
 COLUMNS = 100
 _BAR = 24
@@ -15,12 +18,12 @@ _BAR = 24
 _LEAST = 4
 
 
-def as_text(verdict: VerdictData, columns: int = COLUMNS) -> str:
+def as_text(verdict: LadderVerdict, columns: int = COLUMNS) -> str:
     """Return the text, wrapped to a terminal of so many columns."""
     return "\n".join(_lines(verdict, max(columns, 40)))
 
 
-def _lines(verdict: VerdictData, columns: int) -> Iterator[str]:
+def _lines(verdict: LadderVerdict, columns: int) -> Iterator[str]:
     yield f"{verdict.status}  {verdict.reason}  {verdict.quantity}"
     for text in filter(None, (verdict.sentence, verdict.advice)):
         yield textwrap.indent(textwrap.fill(text, columns - 2), "  ")
@@ -36,7 +39,7 @@ def _lines(verdict: VerdictData, columns: int) -> Iterator[str]:
         yield f"  {cells}  {bar}".rstrip()[:columns]
 
 
-def _head(verdict: VerdictData) -> Sequence[str]:
+def _head(verdict: LadderVerdict) -> Sequence[str]:
     value = "value" if verdict.is_number else "norm"
     error = "error" if verdict.is_exact_known else "estimated error"
     return verdict.size_name, value, error, "difference", "ratio", "order"

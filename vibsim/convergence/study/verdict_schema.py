@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from vibsim.convergence.study.verdict_data import KEYS
-from vibsim.core.vocabulary import FORMAT, REASON_NAMES, STATUSES
+from vibsim.convergence.study.verdict import KEYS
+from vibsim.core.json_schema import DRAFT, REASON, STATUS, TEXT, list_of, object_of, or_null
+from vibsim.core.vocabulary import FORMAT
 
 NUMBERS = {
     "order": "observed order; a number wherever three levels give an estimate, whatever the status",
@@ -28,27 +29,12 @@ TEXTS = {
 def schema() -> dict[str, Any]:
     """Return the JSON Schema (draft 2020-12)."""
     fields: dict[str, Any] = {
-        name: {"type": ["number", "null"], "description": text} for name, text in NUMBERS.items()
+        name: or_null("number") | {"description": text} for name, text in NUMBERS.items()
     }
-    fields |= {name: {"type": "string", "description": text} for name, text in TEXTS.items()}
-    fields["status"] = {"enum": list(STATUSES)}
-    fields["reason"] = {"enum": list(REASON_NAMES)}
+    fields |= {name: TEXT | {"description": text} for name, text in TEXTS.items()}
+    fields["status"], fields["reason"] = STATUS, REASON
     meaning = "step sizes of the levels that the order rests on, the coarsest first"
-    fields["h_used"] = {"type": "array", "items": {"type": "number"}, "description": meaning}
-    verdict = {
-        "type": "object",
-        "properties": {key: fields[key] for key in KEYS},
-        "required": list(KEYS),
-        "additionalProperties": False,
-    }
-    return {
-        "$schema": "https://json-schema.org/draft/2020-12/schema",
-        "title": "verdicts of vibsim judge",
-        "type": "object",
-        "properties": {
-            "vibsim_format": {"const": FORMAT},
-            "verdicts": {"type": "array", "items": verdict},
-        },
-        "required": ["vibsim_format", "verdicts"],
-        "additionalProperties": False,
-    }
+    fields["h_used"] = list_of({"type": "number"}) | {"description": meaning}
+    verdicts = list_of(object_of({key: fields[key] for key in KEYS}))
+    head = DRAFT | {"title": "verdicts of vibsim judge"}
+    return head | object_of({"vibsim_format": {"const": FORMAT}, "verdicts": verdicts})

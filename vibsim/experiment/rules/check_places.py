@@ -79,12 +79,13 @@ class Scope:
         known = [*type(at).model_fields, *setting.sweep.keys]
         unknown = [key for key in at.swept if key not in setting.sweep.keys]
         for key in unknown:
-            hint = nearest(key, known)
+            hint = (
+                nearest(key, known) if known else "`at` names values of a sweep, and there is none"
+            )
             here.at(key).refuse("unknown key", hint, _written(at.swept[key]), at_key=True)
         if case is not None and not unknown:
-            here.at(next(iter(at.swept))).refuse(
-                "must not be given together with case", at_key=True
-            )
+            first = here.at(next(iter(at.swept)))
+            first.refuse("must not be given together with case", at_key=True)
         for axis in setting.sweep.axes:
             wanted = {key: at.swept[key] for key in axis.keys if key in at.swept}
             columns = columns_of([axis], 0, axis.count) if wanted else {}
@@ -121,11 +122,8 @@ class Scope:
     def check_place(self, at: At, row: Value) -> None:
         """Check that `row` is taken where it exists."""
         setting = self.setting
-        given = [
-            name
-            for name in At.model_fields
-            if getattr(at, name) is not None or self.at(name).is_faulty
-        ]
+        names = At.model_fields
+        given = [x for x in names if getattr(at, x) is not None or self.at(x).is_faulty]
         for name in given:
             if name not in row.at:
                 hint = "it takes " + ", ".join(row.at)
@@ -168,11 +166,9 @@ class Scope:
             coarsest = setting.levels[0]
             kept = setting.steps(coarsest) // setting.stride(coarsest) / time.periods
             if kept < FEWEST_IN_A_PERIOD or kept % 1.0:
-                rule = (
-                    f"{row.name} needs at least {FEWEST_IN_A_PERIOD} stored samples in every period"
-                )
+                wanted = f"at least {FEWEST_IN_A_PERIOD} stored samples in every period"
                 hint = "give `samples: common`, and steps_per_period enough for the coarsest level"
-                self.refuse(rule, f"there are {kept:.4g}: {hint}")
+                self.refuse(f"{row.name} needs {wanted}", f"there are {kept:.4g}: {hint}")
 
     def _level(self, at: At, row: Value) -> int | None:
         """Check the level; return that at which times are stored, the finest by default, None where it is not known."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from itertools import count
 from typing import Any
 
@@ -134,9 +134,24 @@ def _check(check: Check, scope: Scope) -> None:
             _quantity_of_schemes(inner.conserves, "conserves", inner.schemes, scope)
             model = scope.setting.model
             if model is not None and not model.conservative:
-                scope.refuse(f"the energy of {model.kind} is not conserved")
+                scope.refuse(
+                    f"the energy of {model.kind} is not conserved", _instead_of_energy(scope)
+                )
         case EqualCheck():
             _equal(inner, scope)
+
+
+def _instead_of_energy(scope: Scope) -> str:
+    """Say what to write where an energy is not conserved, or is not known to be."""
+    section = scope.report.source.data.get("model")
+    if (
+        isinstance(section, Mapping)
+        and section.get("kind") == "system"
+        and "potential" not in section
+    ):
+        return "write its `potential`, if the forces have one that vibsim does not find"
+    has_budget = "energy_budget" in scope.setting.quantities
+    return "the budget of energy and work is: `converges: energy_budget`" if has_budget else ""
 
 
 def _quantity_of_schemes(name: str, key: str, schemes: Sequence[str] | None, scope: Scope) -> None:

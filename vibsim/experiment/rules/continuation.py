@@ -48,10 +48,8 @@ def check_equation(model: Model, numbers: MemberNumbers, report: Report) -> None
         report.add(KEY, f"needs an equation of formulas, and {model.kind} has tables or matrices")
         return
     if model.start is not None:
-        report.add(
-            KEY,
-            "needs members that may start anywhere, and the exact solution says where these start",
-        )
+        rule = "needs members that may start anywhere"
+        report.add(KEY, f"{rule}, and the exact solution says where these start")
         return
     if not why_not_free(model):
         report.add(KEY, "needs a steady state to start from, which a free linear motion has not")
@@ -74,9 +72,8 @@ def _repeats(model: Model, force: Expression, numbers: dict[str, float], end: fl
 
     def at(t: Floats) -> Floats:
         with np.errstate(all="ignore"):
-            return np.asarray(
-                np.broadcast_to(values(force, {**numbers, **states, "t": t}), t.shape)
-            )
+            found = values(force, {**numbers, **states, "t": t})
+            return np.asarray(np.broadcast_to(found, t.shape))
 
     now, later = at(MOMENTS * end), at((1.0 + MOMENTS) * end)
     known = np.isfinite(now) & np.isfinite(later)

@@ -33,9 +33,8 @@ def _figure(figure: Any, scope: Scope) -> None:
                 scope.at(key).refuse("belongs to `shows: over_time`", at_key=True)
         return
     if len(figure.quantities) > 1 and figure.panels is not None:
-        scope.at("panels").refuse(
-            "must be left out where several quantities have panels", at_key=True
-        )
+        rule = "must be left out where several quantities have panels"
+        scope.at("panels").refuse(rule, at_key=True)
     model = scope.setting.model
     if model is not None:
         known = quantities(model, own_velocity=True)

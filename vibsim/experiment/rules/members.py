@@ -44,10 +44,11 @@ OTHERS = "write a solution whose value and slope have no jumps"
 
 @dataclass(frozen=True)
 class MemberNumbers:
-    """The numbers of all members, as far as tables must know them."""
+    """The numbers of all members."""
 
     model: Model
     parameters: Mapping[str, float]
+    initial: Mapping[str, float]
     time: TimeSpec
     axes: Sequence[Axis]
 
@@ -64,6 +65,19 @@ class MemberNumbers:
             found, end = self._part(i, i + 1)
             numbers = self._by_name(found)
             yield {name: float(np.ravel(x)[0]) for name, x in numbers.items()}, float(end[0])
+
+    def starts(self) -> Iterator[tuple[int, dict[str, Any], dict[str, Any]]]:
+        """Yield the number of some members, what formulas name of them at t = 0, and their swept values, for all."""
+        count = math.prod(axis.count for axis in self.axes)
+        for start in range(0, count, CHUNK):
+            stop = min(start + CHUNK, count)
+            swept = columns_of(self.axes, start, stop)
+            begins = self.model.start(self._parameters(swept)) if self.model.start else self.initial
+            numbers: dict[str, Any] = {"t": 0.0, **self._by_name(swept)}
+            for state in self.model.states:
+                value = begins.get(state.name, 0.0)
+                numbers[state.name] = swept.get(f"initial.{state.name}", value)
+            yield stop - start, numbers, swept
 
     def _axes(self) -> list[Axis]:
         return [axis for axis in self.axes if any(map(_matters, axis.keys))]
@@ -123,14 +137,6 @@ def check_ends(numbers: MemberNumbers, report: Report) -> None:
             return
 
 
-def parts(axes: Sequence[Axis]) -> Iterator[tuple[int, dict[str, Any]]]:
-    """Yield the number of some members, and their swept values by key, until all were there."""
-    count = math.prod(axis.count for axis in axes)
-    for start in range(0, count, CHUNK):
-        stop = min(start + CHUNK, count)
-        yield stop - start, columns_of(axes, start, stop)
-
-
 def named(swept: Mapping[str, Any], i: int) -> str:
     """Name a member by its swept numbers."""
     numbers = (f"{key} = {x[i]:.10g}" for key, x in swept.items() if x.dtype.kind != "U")
@@ -179,7 +185,8 @@ def update_tables(experiment: AnyExperiment) -> AnyExperiment:
     if not model.tables:
         return experiment
     axes = experiment.sweep.axes if experiment.sweep else ()
-    numbers = MemberNumbers(model.definition, model.parameters, experiment.time, axes)
+    own, initial = model.parameters, experiment.initial
+    numbers = MemberNumbers(model.definition, own, initial, experiment.time, axes)
     met = {"is_met": _is_met(numbers, experiment.levels[0] if experiment.levels else 0)}
     tables = {name: spec.model_copy(update=met) for name, spec in model.tables.items()}
     model = model.model_copy(update={"tables": FrozenDict(tables)})

@@ -263,7 +263,8 @@ def _check_length(model: Model) -> None:
         formulas += tuple(tree(model, value) for row in rows for _, value in row.then)
     if sum(size(formula, MAX_NODES) for formula in formulas) > MAX_NODES:
         rule = f"the equation that follows, with its slopes and energies, has more than {MAX_NODES} operations"
-        hint = "write a simpler formula, or the energy as `potential` where the model has that"
+        hint = "write a simpler formula, or the energy as `potential` where the model has that; in place of masses "
+        hint += "that depend on each other, write each `acceleration`"
         raise ExpressionError("", 0, rule, hint)
 
 
@@ -317,12 +318,12 @@ def _several(
         return {}
     path: Path_ = ("model", row.name)
     if row.of == "term":
-        terms = written if isinstance(written, tuple) else (written,)
-        places = [(*path, i) if isinstance(written, tuple) else path for i in range(len(terms))]
-        pairs = zip(terms, places, strict=True)
-        sound = [_is_sound(text, row, place, known, report) for text, place in pairs]
-        keys = (f"{row.name}.{i}" for i in range(len(terms)))
-        return {key: text.strip() for key, text, ok in zip(keys, terms, sound, strict=True) if ok}
+        is_list = isinstance(written, tuple)
+        found: dict[str, str] = {}
+        for i, text in enumerate(written if is_list else (written,)):
+            if _is_sound(text, row, (*path, i) if is_list else path, known, report):
+                found[f"{row.name}.{i}"] = text.strip()
+        return found
     if not isinstance(written, Mapping):
         if model.coordinates > 1 and not row.beside:
             rule = f"must have a formula for each of {_some(model.positions)}"
@@ -331,17 +332,8 @@ def _several(
         is_sound = _is_sound(written, row, path, known, report)
         return {f"{row.name}.{name}": written.strip() for name in model.positions if is_sound}
     if row.paired:
-        written = {
-            (name, *inner): text
-            for name, value in written.items()
-            for inner, text in (
-                {(other,): text for other, text in value.items()}
-                if isinstance(value, Mapping)
-                else {(): value}
-            ).items()
-        }
         return _paired(row, written, model, known, report)
-    found: dict[str, str] = {}
+    found = {}
     taken = [*(state.name for state in model.states), *known]
     for name, text in written.items():
         if row.of == "coordinate" and name not in model.positions:
@@ -362,20 +354,26 @@ def _several(
 
 def _paired(
     row: FormulaField,
-    written: Mapping[tuple[str, ...], str],
+    written: Mapping[str, Any],
     model: Model,
     known: Collection[str],
     report: Report,
 ) -> dict[str, str]:
     """Return the formulas of a field that two coordinates may have together, by field and names: ``mass.x.y``."""
+    formulas: dict[tuple[str, ...], str] = {}
+    for name, value in written.items():
+        if isinstance(value, Mapping):
+            formulas |= {(name, other): text for other, text in value.items()}
+        else:
+            formulas[name,] = value
     found: dict[str, str] = {}
-    for names, text in written.items():
+    for names, text in formulas.items():
         path: Path_ = ("model", row.name, *names)
         unknown = [name for name in names if name not in model.positions]
         if unknown:
             hint = nearest(unknown[0], list(model.positions))
             report.add(path, "unknown coordinate", hint, at_key=True)
-        elif names[0] != names[-1] and names[::-1] in written and names > names[::-1]:
+        elif names[0] != names[-1] and names[::-1] in formulas and names > names[::-1]:
             rule = f"is that of {names[1]} and {names[0]}, which stands there already"
             report.add(path, rule, "leave it out", at_key=True)
         elif _is_sound(text, row, path, known, report):
@@ -424,6 +422,11 @@ def _is_sound(
     more = f"; it may name {f'{_some(row.names)} and ' if row.names else ''}parameters"
     is_file = row.table is not None and text.lower().endswith(ENDINGS)
     hint = f"for a table write {{{TABLE}: {text}}}" if is_file else ""
+    is_oscillator = report.source.data.get("model", {}).get("kind") == "oscillator"
+    if is_oscillator and ({"u", "v"} - set(row.names)) & set(_NAME.findall(text)):
+        hint = (
+            "`spring` takes u, `damping` takes v; a force that depends on both takes `kind: system`"
+        )
     read_tree = report.formula(path, text, (*row.names, *known), more, hint)
     if read_tree is None:
         return False

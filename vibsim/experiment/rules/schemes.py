@@ -38,7 +38,6 @@ def finish_schemes(
         found.extend(several)
         if model is not None:
             _check_options(section, i, scheme, model, report)
-            _check_events(section, i, model, report)
             _check_forces(scheme, i, model, report)
         _check_names(several, i, first, report)
     if are_known(sections, report.kinds) and all(spec.adaptive for spec in found):
@@ -87,7 +86,8 @@ def _check_forces(method: Scheme, i: int, model: Model, report: Report) -> None:
     """Refuse a scheme that cannot treat the forces of the model."""
     if method.treats(model):
         return
-    able = [other for other, row in report.kinds.all_schemes().items() if row.treats(model)]
+    rows = map(report.kinds.scheme, report.kinds.names("schemes"))
+    able = [row.kind for row in rows if row is not None and row.treats(model)]
     hint = "choose from " + ", ".join(able) if able else "no scheme can"
     rule = f"cannot treat {model.kind}, whose acceleration depends on {_velocities(model)}"
     unknowns = method.unknowns(model)
@@ -122,7 +122,7 @@ def _velocities(model: Model) -> str:
 
 
 def _check_options(section: Any, i: int, scheme: Scheme, model: Model, report: Report) -> None:
-    """Refuse options without a meaning on this model."""
+    """Refuse options without a meaning on this model, and a treatment of events where there are none."""
     if isinstance(section, str):
         return
     known = scheme.options_on(model)
@@ -130,15 +130,11 @@ def _check_options(section: Any, i: int, scheme: Scheme, model: Model, report: R
         if option not in known and option.name in section.model_fields_set:
             rule = f"has no meaning for {model.kind}, on which the scheme has one form"
             report.add(("schemes", i, option.name), rule, "leave it out", at_key=True)
-
-
-def _check_events(section: Any, i: int, model: Model, report: Report) -> None:
-    """Refuse a treatment of events where there are none."""
-    given = None if isinstance(section, str) else getattr(section, EVENTS.name, None)
-    is_unsure = report.doubts_model
-    if given is None or is_unsure or model.events is not None:
+    given = getattr(section, EVENTS.name, None)
+    if given is None or report.doubts_model or model.events is not None:
         return
-    able = [kind for kind, other in report.kinds.all_models().items() if other.events is not None]
+    rows = map(report.kinds.model, report.kinds.names("model"))
+    able = [row.kind for row in rows if row is not None and row.events is not None]
     hint = f"models with events are {', '.join(able)}, and oscillator with damping: {{coulomb: c}}, events or stop"
     rule = f"{model.kind} has no events here: its motion is smooth"
     report.add(("schemes", i, EVENTS.name), rule, hint, given)

@@ -98,10 +98,9 @@ class Setting:
 
     def load(self, level: int) -> Load:
         """Return what `level` asks of a job."""
-        steps, d2t = self.steps(level), bool(self.own)
+        steps = self.steps(level)
         has_events = self.model is not None and self.model.events is not None
-        if has_events:
-            d2t = False
+        d2t = bool(self.own) and not has_events
         samples = steps // self.stride(level) + 1
         if is_lean(self.samples, self.steps(self.levels[0]), self.trajectories):
             return Load(self.scheme_count, steps, samples, _LEAN, d2t=d2t, chain=self.sweep.chain)
@@ -149,10 +148,8 @@ def check(setting: Setting, report: Report) -> None:
     hint = "store fewer samples, or begin at a lower level"
     # one member, or one chain of them, is the least that a job can make
     least = setting.sweep.chain
-    memory, disk = (
-        max(load.memory(least) for load in loads),
-        sum(load.disk(members) for load in loads),
-    )
+    memory = max(load.memory(least) for load in loads)
+    disk = sum(load.disk(members) for load in loads)
     if memory > MAX_MEMORY:
         what = "one member" if least == 1 else f"the {least} members that follow each other"
         rule = f"{what} at one level must not take more than {MAX_MEMORY} bytes of memory, it takes {memory}"

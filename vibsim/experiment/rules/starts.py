@@ -2,66 +2,38 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
 
 from vibsim.core.array_types import Flags
 from vibsim.experiment.faults import Report
-from vibsim.experiment.rules.members import named, parts
-from vibsim.experiment.schema.sweep import Axis
+from vibsim.experiment.rules.members import MemberNumbers, named
 from vibsim.experiment.yaml.parse import Path_
 from vibsim.formula import values
-from vibsim.models import Model, tree
+from vibsim.models import tree
 from vibsim.models.base import rate
 from vibsim.models.events import Crossings
 from vibsim.models.shared.crossings import STOP
 from vibsim.models.shared.inertia import MASS, inertia
 
 
-@dataclass(frozen=True)
-class Starts:
-    """All members at t = 0."""
-
-    model: Model
-    parameters: Mapping[str, float]
-    initial: Mapping[str, float]
-    axes: Sequence[Axis]
-
-    def chunks(self) -> Iterator[tuple[int, dict[str, Any], Mapping[str, Any]]]:
-        """Yield the number of some members, what formulas name, and which numbers are swept."""
-        for count, swept in parts(self.axes):
-            given = {key: swept.get(f"model.{key}", x) for key, x in self.parameters.items()}
-            begins = self.model.start(given) if self.model.start else self.initial
-            numbers: dict[str, Any] = {"t": 0.0}
-            numbers |= {row.name: given[row.key] for row in self.model.parameters}
-            for state in self.model.states:
-                value = begins.get(state.name, 0.0)
-                numbers[state.name] = swept.get(f"initial.{state.name}", value)
-            yield count, numbers, swept
+def check_starts(members: MemberNumbers, formulas: Mapping[str, str], report: Report) -> None:
+    """Refuse a stop that holds at t = 0 already, and a matrix of masses that is not positive definite there."""
+    model = members.model
 
     def refuse(
-        self,
-        is_wrong: Callable[[Mapping[str, Any]], Flags],
-        path: Path_,
-        rule: str,
-        hint: str,
-        report: Report,
+        is_wrong: Callable[[Mapping[str, Any]], Flags], path: Path_, rule: str, hint: str
     ) -> None:
         """Refuse the first member of which something is wrong; `rule` has a place for its name."""
-        for count, numbers, swept in self.chunks():
+        for count, numbers, swept in members.starts():
             wrong = np.broadcast_to(is_wrong(numbers), (count,))
             if wrong.any():
                 who = named(swept, int(np.argmax(wrong)))
                 report.add(path, rule.format(f" (where {who})" if who else ""), hint)
                 return
 
-
-def check_starts(starts: Starts, formulas: Mapping[str, str], report: Report) -> None:
-    """Refuse a stop that holds at t = 0 already, and a matrix of masses that is not positive definite there."""
-    model = starts.model
     rows = model.events.rows if isinstance(model.events, Crossings) else ()
     for guard in (tree(model, row.guard) for row in rows if row.ends):
         slope = rate(model, guard)
@@ -72,7 +44,7 @@ def check_starts(starts: Starts, formulas: Mapping[str, str], report: Report) ->
             return np.asarray((now < 0.0) | ((now == 0.0) & (ahead < 0.0)))
 
         rule = "holds at the start already{}: nothing would move"
-        starts.refuse(holds, ("model", STOP), rule, "begin outside of it", report)
+        refuse(holds, ("model", STOP), rule, "begin outside of it")
     if any(key.split(".")[0] == MASS for key in formulas) and model.formulas:
         known = tuple(row.name for row in model.parameters)
         masses = inertia(formulas, model.positions, model.velocities, known)
@@ -90,4 +62,4 @@ def check_starts(starts: Starts, formulas: Mapping[str, str], report: Report) ->
 
         rule = "must be positive definite, and is not at the start{}"
         hint = "every motion must have a positive kinetic energy"
-        starts.refuse(is_light, ("model", MASS), rule, hint, report)
+        refuse(is_light, ("model", MASS), rule, hint)

@@ -10,14 +10,16 @@ from vibsim.experiment.data import ArraySpec, StructureSpec
 from vibsim.experiment.faults import MISSING, Report
 from vibsim.experiment.schema.fields import DECLARED, TABLE
 from vibsim.experiment.schema.structure import LoadTable, Mode, ShapedLoad
-from vibsim.experiment.tables.structure import MATRICES, Assembly, assemble, with_digests
+from vibsim.experiment.tables.structure import MATRICES, assemble, with_digests
+from vibsim.experiment.yaml.parse import Path_
 from vibsim.models import Model
 from vibsim.models.structure import HISTORY, LOAD, MOST_OBSERVED, RAYLEIGH
 from vibsim.models.system import name_fault, velocities_of
 
 ROUNDED_END = 1e-9
 """By which a table may end early, relative to its end: a file may have rounded it."""
-Formulas = dict[str, tuple[str, tuple[str | int, ...]]]
+_DOFS = "the keys must be numbers of degrees of freedom, counted from 1"
+Formulas = dict[str, tuple[str, Path_]]
 """By key the text of a formula, and where it stands."""
 
 
@@ -39,20 +41,25 @@ def read_structure(
         value = getattr(section.start, name) if section.start is not None else None
         if value is not None:
             arrays[f"start.{name}"] = _array(value)
-    _check_numbers(arrays, report)
+    for key, row in arrays.items():
+        if any(dof < 1 for dof, _ in row.entries):
+            report.add(_place(key, arrays, report), _DOFS, at_key=True)
+    ratios = section.damping_ratios
     spec = StructureSpec(
         arrays=arrays,
+        ratios=ratios if isinstance(ratios, tuple) else (),
         observe=_observed(section, report),
         is_free=section.observe is None and section.start is None,
     )
     if report.doubts_model:
         return None, formulas
-    ratios = section.damping_ratios
-    every = ratios if isinstance(ratios, float) else None
-    if isinstance(ratios, tuple):
-        spec = spec.model_copy(update={"ratios": ratios})
-    own = assemble(spec, folder, every)
-    _note_faults(own, report)
+    own = assemble(spec, folder, ratios if isinstance(ratios, float) else None)
+    if own.unnamed:
+        rule = f"must be given above {MOST_OBSERVED} degrees of freedom, there are {own.unnamed}"
+        report.add(("model", "observe"), rule, f"e.g. {{tip: {own.unnamed}}}")
+    for key, rule, hint in own.faults:
+        shown = arrays[key].file if key in arrays else None
+        report.add(_place(key, arrays, report), rule, hint, shown)
     return (with_digests(own) if own.structure is not None else None), formulas
 
 
@@ -68,14 +75,6 @@ def _array(value: Any) -> ArraySpec:
     return ArraySpec(rows=tuple(value))
 
 
-def _check_numbers(arrays: Mapping[str, ArraySpec], report: Report) -> None:
-    """Refuse a key that is no number of a degree of freedom."""
-    for key, row in arrays.items():
-        if any(dof < 1 for dof, _ in row.entries):
-            rule = "the keys must be numbers of degrees of freedom, counted from 1"
-            report.add(("model", *_path(key)), rule, at_key=True)
-
-
 def _loads(section: Any, arrays: dict[str, ArraySpec], report: Report) -> Formulas:
     """Return the formulas of the loads, and put their shapes and their tables among the arrays."""
     load = section.load
@@ -83,7 +82,7 @@ def _loads(section: Any, arrays: dict[str, ArraySpec], report: Report) -> Formul
         return {}
     found: Formulas = {}
 
-    def take(number: int, factor: Any, path: tuple[str | int, ...]) -> None:
+    def take(number: int, factor: Any, path: Path_) -> None:
         if isinstance(factor, LoadTable):
             spec = ArraySpec(file=factor.table, columns=(factor.t, factor.p))
             arrays[f"{HISTORY}.{number}"] = spec
@@ -123,48 +122,23 @@ def _observed(
         taken += [name, velocity]
         row = _array(what) if isinstance(what, Mapping) else ArraySpec(entries=((what, 1.0),))
         if any(dof < 1 for dof, _ in row.entries):
-            rule = "the keys must be numbers of degrees of freedom, counted from 1"
-            report.add(("model", "observe", name), rule, at_key=True)
+            report.add(("model", "observe", name), _DOFS, at_key=True)
         found.append((name, row.entries))
     return tuple(found)
 
 
-def _path(key: str) -> tuple[str | int, ...]:
-    """Return where an array stands in the section ``model``."""
+def _place(key: str, arrays: Mapping[str, ArraySpec], report: Report) -> Path_:
+    """Return where an array stands in a file, or a part of it that stands behind its key."""
     head, *rest = key.split(".")
-    return (LOAD, "shape", *rest[1:]) if head == LOAD else (head, *rest)
-
-
-def _note_faults(own: Assembly, report: Report) -> None:
-    """Put the faults of a structure where they belong."""
-    if own.unnamed:
-        rule = f"must be given above {MOST_OBSERVED} degrees of freedom, there are {own.unnamed}"
-        report.add(("model", "observe"), rule, f"e.g. {{tip: {own.unnamed}}}")
-    is_shaped = _has_shape(report)
-    for key, rule, hint in own.faults:
-        path: tuple[str | int, ...] = ("model", *_path(key))
-        row = own.spec.arrays.get(key)
-        shown = row.file if row is not None else None
-        if key.startswith(f"{HISTORY}."):
-            _, number, column = key.split(".")
-            path = (*_table_path(own.spec, number, report), column)
-            shown = None
-        elif key.startswith(f"{LOAD}.") and not is_shaped:
-            # a load of one degree of freedom, under its number
-            path = ("model", LOAD, key.rpartition(".")[2])
-        report.add(path, rule, hint, shown)
-
-
-def _has_shape(report: Report) -> bool:
-    """Tell whether the load is written as a shape and its factor, and not by degree of freedom."""
-    return report.source.place(("model", LOAD, "shape")) is not None
-
-
-def _table_path(spec: StructureSpec, number: str, report: Report) -> tuple[str | int, ...]:
-    """Return where the table of a load stands in a file."""
-    if _has_shape(report):
-        return "model", LOAD, "times"
-    return "model", LOAD, str(spec.arrays[f"{LOAD}.{number}"].entries[0][0])
+    if head not in (LOAD, HISTORY):
+        return "model", head, *rest
+    number, *part = rest
+    if "shape" in report.source.data["model"][LOAD]:
+        return "model", LOAD, "shape" if head == LOAD else "times", *part
+    # written by degree of freedom
+    if head == LOAD:
+        return "model", LOAD, *(part or [number])
+    return "model", LOAD, str(arrays[f"{LOAD}.{number}"].entries[0][0]), *part
 
 
 def check_histories(spec: StructureSpec, end: float, report: Report) -> None:
@@ -172,7 +146,7 @@ def check_histories(spec: StructureSpec, end: float, report: Report) -> None:
     for number, (times, _) in spec.structure.histories:
         if end > times[-1] * (1.0 + ROUNDED_END):
             rule = f"the table ends at {times[-1]:.10g}, but the motion lasts to {end:.10g}"
-            path = (*_table_path(spec, str(number), report), TABLE)
+            path = _place(f"{HISTORY}.{number}.{TABLE}", spec.arrays, report)
             report.add(path, rule, "add the load at the end, 0 if there is none")
 
 

@@ -80,8 +80,11 @@ def _is_wellformed(report: Report) -> bool:
     return not any(path[:1] == ("sweep",) for path in report.faulty)
 
 
-def _is_words(kind: Any) -> bool:
-    return get_origin(kind) is Literal
+def _told(kind: Any) -> str:
+    """Name what a key takes that is no number; empty where it takes numbers."""
+    if kind is StrictBool:
+        return "true and false"
+    return "words" if get_origin(kind) is Literal else ""
 
 
 def _axis(keys: tuple[str, ...], values: tuple[Values, ...] | Draw) -> Axis:
@@ -149,8 +152,7 @@ class SweepReader:
         kind = self._type(key, path)
         if kind is None:
             return False
-        if _is_words(kind) or kind is StrictBool:
-            what = "words" if _is_words(kind) else "true and false"
+        if what := _told(kind):
             rule = f"takes {what}, which cannot be drawn"
             self.report.add(path, rule, "sweep it by a list outside sample", at_key=True)
             return False
@@ -169,9 +171,8 @@ class SweepReader:
             found = self._entries(written, kind, path)
             is_flags = found is not None and kind is StrictBool
             return tuple(FLAGS[flag] for flag in found) if is_flags else found
-        if _is_words(kind) or kind is StrictBool:
-            hint = "choose from " + ", ".join(get_args(kind)) if _is_words(kind) else ""
-            what = "words" if _is_words(kind) else "true and false"
+        if what := _told(kind):
+            hint = "" if kind is StrictBool else "choose from " + ", ".join(get_args(kind))
             self.report.add(path, f"must be a list of {what}", hint)
             return None
         path = (*path, next(iter(type(written).model_fields)))

@@ -85,9 +85,8 @@ def _by_force(
     for name in ("periods", "steps_per_period"):
         value = getattr(section, name)
         if value % 1.0:
-            report.add(
-                ("time", name), "must be a whole number where frequency is given", value=value
-            )
+            rule = "must be a whole number where frequency is given"
+            report.add(("time", name), rule, value=value)
             return None
     key = str(section.frequency).removeprefix("model.")
     if f"model.{key}" != section.frequency or key not in parameters:
@@ -151,8 +150,10 @@ def rising_levels(
         return tuple(range(section.from_, section.to + 1))
     levels = section or ()
     falling = [i for i, (low, high) in enumerate(pairwise(levels), 1) if low >= high]
-    for i in falling:
+    is_reversed = list(levels) == sorted(set(levels), reverse=True)
+    for i in falling[:1] if is_reversed else falling:
         is_same = levels[i] == levels[i - 1]
         word = "must not be repeated" if is_same else "must be in increasing order"
-        report.add((*path, i), f"levels {word}", value=levels[i])
+        hint = f"write {sorted(levels)}: a higher level has smaller steps" if is_reversed else ""
+        report.add((*path, i), f"levels {word}", hint, levels[i])
     return () if falling else levels

@@ -35,6 +35,11 @@ def note_unlikely(checks: Sequence[Check | None], setting: Setting, report: Repo
             case ConvergesCheck(order=float(order)) if inner.tolerance >= order:
                 rule = f"lets every order up to {order + inner.tolerance:g} pass"
                 report.note((*path, "tolerance"), rule, "it is a distance of orders, such as 0.1")
+            case ConvergesCheck() if (
+                len(setting.levels) in (1, 2) and inner.expect.status == "PASS"
+            ):
+                rule = f"{len(setting.levels)} of them decide no order"
+                report.note(("levels",), rule, "three are needed, and four are better")
             case ValueCheck(equals=float(number), rtol=None, atol=None) if inner.take in DIGITS:
                 _digits((*path, "equals"), inner.value, number, report)
 

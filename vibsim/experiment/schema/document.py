@@ -77,8 +77,12 @@ def _any_scheme(schemes: Mapping[str, Scheme]) -> Any:
     return Annotated[tagged({"name": name, **sections}, Discriminator(_kind)), OneOf("schemes")]
 
 
+def _schemes(any_scheme: Any) -> Any:
+    return Annotated[tuple[any_scheme, ...], Field(min_length=1), short(MAX_ENTRIES)]
+
+
 AnyModel: Any = _any_model(MODELS.built_in)
-AnyScheme: Any = _any_scheme(SCHEMES.built_in)
+Schemes: Any = _schemes(_any_scheme(SCHEMES.built_in))
 
 
 def _without(*keys: str) -> dict[str, Any]:
@@ -194,7 +198,7 @@ class Document(Section):
     """Error bound that the extrapolated solution must reach, instead of `levels`: they are then chosen."""
     scaled: StrictBool = False
     """Whether the run is made in the characteristic units of the model, where it has a scaled equation."""
-    schemes: Annotated[tuple[AnyScheme, ...], Field(min_length=1), short(MAX_ENTRIES)]
+    schemes: Schemes
     """The schemes, each a kind or a mapping with its options."""
     sweep: SweepSection | None = None
     """Parameters that vary, by dotted path; several make a grid, the last one fastest."""
@@ -259,18 +263,11 @@ def schema() -> dict[str, Any]:
 
 def installed_schema() -> dict[str, Any]:
     """Return the same with the models and schemes of every package that is installed beside vibsim."""
-    any_scheme: Any = _any_scheme(SCHEMES)
     initial = WithJsonSchema(_initial_schema(MODELS.values()))
-    rows: dict[str, tuple[Any, Any]] = {
+    fields: dict[str, Any] = {
         "model": (_any_model(MODELS), ...),
         "initial": (Annotated[dict[str, Number], initial], {}),
-        "schemes": (
-            Annotated[tuple[any_scheme, ...], Field(min_length=1), short(MAX_ENTRIES)],
-            ...,
-        ),
-    }
-    fields: dict[str, Any] = {
-        name: (kind, Field(default)) for name, (kind, default) in rows.items()
+        "schemes": (_schemes(_any_scheme(SCHEMES)), ...),
     }
     doc = Document.__doc__
     found = json_schema(create_model("Document", __base__=Document, __doc__=doc, **fields))

@@ -162,10 +162,9 @@ def exponent(value: Any) -> int:
     """Return `value` as the number of a level, which is no number of steps."""
     found = whole(value)
     if found > MAX_LEVEL:
-        steps = f"{found} steps are level {found.bit_length() - 1}"
-        meaning = (
-            f"level n has 2^n steps; {steps}" if found.bit_count() == 1 else "level n has 2^n steps"
-        )
+        meaning = "level n has 2^n steps"
+        if found.bit_count() == 1:
+            meaning += f"; {found} steps are level {found.bit_length() - 1}"
         raise refused(f"must be at most {MAX_LEVEL}", f"{meaning} (times `base_steps:` of `time:`)")
     return found
 

@@ -164,9 +164,9 @@ def _formula_type(model: Model, field: FormulaField) -> Any:
         several: Any = _formulas(FormulaText)
         if field.paired:
             several = _formulas(by_form({"mapping": several, "other": FormulaText}))
-        return (
-            several if field.of == "output" else by_form({"mapping": several, "other": FormulaText})
-        )
+        if field.of == "output":
+            return several
+        return by_form({"mapping": several, "other": FormulaText})
     name = f"{_class_name(model.kind)}{_class_name(field.name)}"
     fields: dict[str, Any] = {}
     if field.table is not None:
@@ -230,10 +230,8 @@ def model_section(model: Model) -> type[Section]:
         several = Annotated[tuple[Text, ...], Field(min_length=1), short(MOST)]
         fields[COORDINATES] = (several, Field(default=model.positions, description=words))
         words = "indices with first and last value: every key and entry with {i} in it is written out for each i"
-        fields["repeat"] = (
-            dict[str, tuple[int, int]] | None,
-            Field(default=None, description=words),
-        )
+        indices = Field(default=None, description=words)
+        fields["repeat"] = (dict[str, tuple[int, int]] | None, indices)
     for field in model.formulas:
         names = ", ".join((*field.names, "parameters"))
         if model.named is not None:
@@ -242,10 +240,8 @@ def model_section(model: Model) -> type[Section]:
             names = " and ".join(filter(None, (", ".join(known), "parameters")))
         words = f"{field.description}; a formula in {names}"
         words += f"; {field.default} when left out" if field.default else ""
-        fields[field.name] = (
-            _formula_type(model, field) | None,
-            Field(default=None, description=words),
-        )
+        formula = Field(default=None, description=words)
+        fields[field.name] = (_formula_type(model, field) | None, formula)
     if model.formulas:
         words = "names that the formulas use, with their values"
         fields["parameters"] = (Declared, Field(default={}, description=words))

@@ -191,9 +191,8 @@ def attach(experiment: ExperimentSpec) -> None:
     keys = {row.name: row.table or ("", "") for row in experiment.model.base.formulas}
     for name, spec in experiment.model.tables.items():
         try:
-            table, content = read(
-                experiment.folder / spec.file, keys[name], (spec.place, spec.value)
-            )
+            path, columns = experiment.folder / spec.file, (spec.place, spec.value)
+            table, content = read(path, keys[name], columns)
             if table.digest != spec.numbers:
                 rule = "has other numbers than when the experiment was read"
                 raise TableError(rule, "run the experiment again")

@@ -75,11 +75,8 @@ def _from_numpy(content: bytes) -> Any:
         found = np.load(io.BytesIO(content), allow_pickle=False)
     except (ValueError, OSError, EOFError, MemoryError, SyntaxError, TokenError) as error:
         raise TableError(f"is no array of NumPy ({_first_line(error)})") from None
-    if (
-        not isinstance(found, np.ndarray)
-        or found.dtype.kind not in "fiuc"
-        or found.ndim not in (1, 2)
-    ):
+    is_array = isinstance(found, np.ndarray)
+    if not is_array or found.dtype.kind not in "fiuc" or found.ndim not in (1, 2):
         raise TableError("must hold one array of numbers, of one or two dimensions")
     _check_counts(*found.shape, 1)
     return found if found.dtype.kind == "c" else found.astype(float)

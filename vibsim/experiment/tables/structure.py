@@ -11,7 +11,7 @@ import numpy as np
 
 from vibsim.core.array_types import Floats
 from vibsim.core.errors import Fault, InputError
-from vibsim.experiment.data import ArraySpec, ExperimentSpec, StructureSpec
+from vibsim.experiment.data import ExperimentSpec, StructureSpec
 from vibsim.experiment.tables.content import TableError
 from vibsim.experiment.tables.file import read_history
 from vibsim.experiment.tables.matrix import read, square, vector
@@ -83,14 +83,11 @@ class Assembly:
                 raise TableError("must be a path relative to the folder of the experiment file")
             path = self.folder / row.file
             found, content = read_history(path, row.columns) if row.columns else read(path)
-        elif row.rows and isinstance(row.rows[0], tuple):
+        else:
             lengths = {len(line) for line in row.rows if isinstance(line, tuple)}
             if len(lengths) > 1:
-                raise TableError(
-                    f"must have rows of one length, has {min(lengths)} to {max(lengths)} numbers"
-                )
-            found = np.array(row.rows, dtype=float)
-        else:
+                told = f"{min(lengths)} to {max(lengths)} numbers"
+                raise TableError(f"must have rows of one length, has {told}")
             found = np.array(row.rows, dtype=float)
         self.digests[key] = _digest(found), content
         return found
@@ -119,13 +116,18 @@ class Assembly:
         try:
             given = vector(self._array(key))
             if len(given) != size:
-                raise TableError(
-                    f"must have {size} numbers, as many as degrees of freedom, has {len(given)}"
-                )
+                wanted = f"{size} numbers, as many as degrees of freedom"
+                raise TableError(f"must have {wanted}, has {len(given)}")
         except TableError as error:
             self.add(key, error.rule, error.hint)
             return found
         return given
+
+    @property
+    def files(self) -> tuple[tuple[str, str], ...]:
+        """Path of each file, and the SHA-256 of its bytes."""
+        rows = {key: row.file for key, row in self.spec.arrays.items() if row.file is not None}
+        return tuple(dict.fromkeys((file, self.digests[key][1]) for key, file in rows.items()))
 
 
 def _digest(found: Any) -> str:
@@ -140,6 +142,8 @@ def assemble(spec: StructureSpec, folder: Path, ratio: float | None = None) -> A
 
     `ratio` is the damping ratio of every mode, where there is one. What `spec` leaves out is filled in.
     """
+    from scipy.sparse import eye_array
+
     own = Assembly(spec, folder)
     matrices = own.matrices()
     if "stiffness" in matrices:
@@ -149,7 +153,7 @@ def assemble(spec: StructureSpec, folder: Path, ratio: float | None = None) -> A
         return own
     stiffness = matrices["stiffness"]
     size = stiffness.size
-    mass = matrices.get("mass") or Matrix.of(_identity(size))
+    mass = matrices.get("mass") or Matrix.of(eye_array(size, format="csr"))
     for key, matrix in matrices.items():
         if matrix.size != size:
             rule = f"must have as many rows as the stiffness matrix, {size}, has {matrix.size}"
@@ -194,12 +198,6 @@ def assemble(spec: StructureSpec, folder: Path, ratio: float | None = None) -> A
     return own
 
 
-def _identity(size: int) -> Any:
-    from scipy.sparse import eye_array
-
-    return eye_array(size, format="csr")
-
-
 def _check_stiffness(structure: Structure, own: Assembly) -> None:
     """Refuse a structure that is pushed away from rest, and a large one that is not held."""
     if structure.has_all_modes:
@@ -242,8 +240,7 @@ def with_digests(own: Assembly) -> StructureSpec:
         for key, row in spec.arrays.items()
     }
     found = spec.model_copy(update={"arrays": type(spec.arrays)(rows)})
-    files = [(row.file, own.digests[key][1]) for key, row in rows.items() if row.file is not None]
-    found.hold(own.structure, tuple(dict.fromkeys(files)))
+    found.hold(own.structure, own.files)
     return found
 
 
@@ -261,15 +258,10 @@ def attach(experiment: ExperimentSpec) -> None:
             own.add(key, rule, "run the experiment again")
     if own.faults:
         file = str(experiment.file or experiment.name)
-        shown = {key: _shown(spec.arrays.get(key)) for key, _, _ in own.faults}
-        faults = [
-            Fault(file, 0, f"model.{key}", shown[key], rule, hint) for key, rule, hint in own.faults
-        ]
-        raise InputError(faults)
+        shown = {key: row.file or "" for key, row in spec.arrays.items()}
+        raise InputError(
+            Fault(file, 0, f"model.{key}", shown.get(key, ""), rule, hint)
+            for key, rule, hint in own.faults
+        )
     assert own.structure is not None
-    files = [(row.file, own.digests[key][1]) for key, row in spec.arrays.items() if row.file]
-    spec.hold(own.structure, tuple(dict.fromkeys(files)))
-
-
-def _shown(row: ArraySpec | None) -> str:
-    return row.file if row is not None and row.file is not None else ""
+    spec.hold(own.structure, own.files)

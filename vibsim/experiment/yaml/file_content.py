@@ -13,15 +13,16 @@ MOST_BYTES = 2**26
 """Of a table beside it."""
 
 
-def read_bytes(path: Path) -> bytes:
-    """Return the content of the experiment file at `path`.
+def read_bytes(path: Path, most: int = MAX_BYTES) -> bytes:
+    """Return the content of the file at `path`, by default an experiment file.
 
-    InputError when it cannot be read, is no regular file (a pipe, a device, a folder) or is too large.
+    InputError when it cannot be read, is no regular file (a pipe, a device, a folder) or has more than `most` bytes.
     """
-    rule = f"must not be larger than {MAX_BYTES} bytes"
+    size = f"{most} bytes" if most == MAX_BYTES else f"{most >> 20} MiB"
+    rule = f"must not be larger than {size}"
     try:
-        content = content_of(path, MAX_BYTES)
-        if len(content) <= MAX_BYTES:
+        content = content_of(path, most)
+        if len(content) <= most:
             return content
     except (OSError, ValueError) as error:
         rule = f"cannot be read ({getattr(error, 'strerror', None) or error})"

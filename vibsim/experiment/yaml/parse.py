@@ -47,6 +47,7 @@ _INFINITY = re.compile(r"[-+]?\.(inf|Inf|INF)")
 _NAN = frozenset({".nan", ".NaN", ".NAN"})
 _INVALID = "is not valid YAML"
 _TAB = re.compile(" *\t")
+_TIGHT_COLON = re.compile(r"\s*(- )?\w+:[^\s:/]")
 _INDEX = re.compile(r"\w\{\w+([+-]\d+)?\}")
 """A name with an index of `repeat`, as it stands in an experiment file."""
 _Loader: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
@@ -161,9 +162,32 @@ def _syntax(error: yaml.MarkedYAMLError, text: str, file: str) -> Fault:
     if _TAB.match("".join(text.splitlines()[line - 1 : line])):
         rule = f"{_INVALID}: tabs are not allowed for indentation"
         return Fault(file, line, "", "", rule, "use spaces")
+    opened = error.context_mark.line + 1 if error.context_mark else line
+    if "mapping values" in problem:
+        problem = _stray_colon(text.splitlines(), line)
+    elif opened < line and ("flow" in str(error.context) or "quoted" in str(error.context)):
+        what = "quotation mark" if "quoted" in str(error.context) else "bracket"
+        comma = (
+            "" if "quoted" in str(error.context) else f", or a comma is missing before line {line}"
+        )
+        problem = f"the {what} that opens on line {opened} is not closed{comma}"
     if _INDEX.search("".join(text.splitlines()[line - 1 : line])):
         problem += '; YAML reads braces inside [...] and {...} itself: write "q{i}" there, in quotation marks'
     return Fault(file, line, "", "", _INVALID, problem)
+
+
+def _stray_colon(lines: list[str], line: int) -> str:
+    """Say what is wrong where a key stands that YAML does not expect: the usual slips, the likeliest first."""
+    above = next((k for k in range(line - 1, 0, -1) if lines[k - 1].strip()), 0)
+    if any(_TIGHT_COLON.match(lines[k - 1]) for k in (above, line) if k):
+        number = above if above and _TIGHT_COLON.match(lines[above - 1]) else line
+        return f"a colon needs a blank behind it, on line {number}"
+    indents = [
+        len(row) - len(row.lstrip()) for row in (lines[above - 1] if above else "", lines[line - 1])
+    ]
+    if indents[1] > indents[0]:
+        return f"it is indented further than line {above}: keys of one section begin in the same column"
+    return "a text with a colon and a blank in it needs quotation marks"
 
 
 def resolve(text: str) -> str | int | float | bool | None:

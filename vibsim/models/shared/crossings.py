@@ -16,7 +16,6 @@ from vibsim.formula import (
     Compare,
     Expression,
     ExpressionError,
-    minus,
     names_in,
     parse,
     to_formula,
@@ -48,9 +47,9 @@ def guard_of(condition: Expression) -> Expression:
     """
     match condition:
         case Compare("<" | "<=", left, right):
-            return minus(left, right)
+            return left - right
         case Compare(">" | ">=", left, right):
-            return minus(right, left)
+            return right - left
         case Compare():
             rule = "must not compare by == or !=: a motion meets no value exactly"
             raise ExpressionError("", 0, rule, "write < or >")

@@ -22,13 +22,9 @@ from vibsim.formula import (
     Name,
     Number,
     derivative,
-    minus,
     names_in,
-    over,
     parse,
-    plus,
     tidied,
-    times,
 )
 from vibsim.formula.tree import paired
 
@@ -61,30 +57,29 @@ class Inertia:
         """The kinetic energy."""
         v = self.velocities
         terms = [
-            times(times(Number(0.5), mass), Binary("**", Name(v[i]), Number(2.0)))
+            Number(0.5) * mass * Binary("**", Name(v[i]), Number(2.0))
             if i == j
-            else times(mass, times(Name(v[i]), Name(v[j])))
+            else mass * (Name(v[i]) * Name(v[j]))
             for (i, j), mass in self.entries.items()
         ]
         return paired(terms, partial(Binary, "+"))
 
     def rest(self, i: int) -> Expression:
         """Return ``sum_jk c_ijk q_j' q_k'``; what cancels by symmetry is left out."""
-        found: Expression = ZERO
+        found = ZERO
         count = len(self.positions) if self._slopes else 0
         for j in range(count):
             for k in range(j, count):
                 if j == k:
-                    half = times(Number(0.5), self._slope(j, j, i))
-                    factor = half if i == j else minus(self._slope(i, j, j), half)
+                    half = Number(0.5) * self._slope(j, j, i)
+                    factor = half if i == j else self._slope(i, j, j) - half
                 elif i in (j, k):
                     factor = self._slope(i, i, k if i == j else j)
                 else:
-                    both = plus(self._slope(i, j, k), self._slope(i, k, j))
-                    factor = minus(both, self._slope(j, k, i))
+                    factor = self._slope(i, j, k) + self._slope(i, k, j) - self._slope(j, k, i)
                 if factor != ZERO:
                     speeds = (Name(self.velocities[n]) for n in (j, k))
-                    found = plus(found, times(factor, Binary("*", *speeds)))
+                    found += factor * Binary("*", *speeds)
         return found
 
     def accelerations(self, forces: Sequence[Expression]) -> tuple[Expression, ...]:
@@ -92,7 +87,7 @@ class Inertia:
 
         ExpressionError where too many coordinates have masses in common.
         """
-        right = [minus(force, self.rest(i)) for i, force in enumerate(forces)]
+        right = [force - self.rest(i) for i, force in enumerate(forces)]
         found: list[Expression] = [ZERO] * len(right)
         for group in self.groups:
             if len(group) > MOST_COUPLED:
@@ -102,13 +97,13 @@ class Inertia:
                 raise ExpressionError(MASS, 0, rule, "solve for the accelerations and write these")
             whole = self._minor(group, group)
             for i in group:
-                total: Expression = ZERO
+                total = ZERO
                 for j in group:
                     rows, columns = (tuple(n for n in group if n != out) for out in (j, i))
                     is_odd = (group.index(i) + group.index(j)) % 2
-                    term = times(self._minor(rows, columns), right[j])
-                    total = minus(total, term) if is_odd else plus(total, term)
-                found[i] = over(total, whole)
+                    term = self._minor(rows, columns) * right[j]
+                    total = total - term if is_odd else total + term
+                found[i] = total / whole
         return tuple(found)
 
     @cached_property
@@ -124,11 +119,11 @@ class Inertia:
         """Return the determinant of some rows and columns, by the first row."""
         if not rows:
             return ONE
-        total: Expression = ZERO
+        total = ZERO
         for place, column in enumerate(columns):
             rest = columns[:place] + columns[place + 1 :]
-            term = times(self.of(rows[0], column), self._minor(rows[1:], rest))
-            total = minus(total, term) if place % 2 else plus(total, term)
+            term = self.of(rows[0], column) * self._minor(rows[1:], rest)
+            total = total - term if place % 2 else total + term
         return total
 
     def _slope(self, i: int, j: int, k: int) -> Expression:

@@ -9,13 +9,11 @@ from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from vibsim.core.array_types import Floats
+from vibsim.core.array_types import Complexes, Floats
 from vibsim.formula import Binary, Call, Expression, Negate, derivative, literal, names_in, values
 from vibsim.models.base import Numbers, State
 
-Complex = NDArray[np.complex128]
 Term = tuple[Any, Any]
 """C and s of ``C exp(s t)``, complex numbers or arrays."""
 
@@ -187,7 +185,7 @@ def forced_motion(
     return np.asarray(u), np.asarray(v)
 
 
-def divided(a: Any, b: Any) -> Complex:
+def divided(a: Any, b: Any) -> Complexes:
     """Return the divided difference ``(exp b - exp a)/(b - a)`` of complex numbers, also where they coincide."""
     # from the one that grows more: the other exponential can then only vanish
     is_first = np.real(a) > np.real(b)
@@ -197,7 +195,7 @@ def divided(a: Any, b: Any) -> Complex:
     return np.asarray(np.exp(most) * np.where(is_zero, 1.0, -np.expm1(-safe) / safe))
 
 
-def divided_twice(a: Any, b: Any, c: Any) -> Complex:
+def divided_twice(a: Any, b: Any, c: Any) -> Complexes:
     """Return the second divided difference of the exponential at three complex numbers, which may coincide."""
     a, b, c = np.broadcast_arrays(a, b, c)
     ab, bc, ca = np.abs(a - b), np.abs(b - c), np.abs(c - a)
@@ -212,7 +210,7 @@ def divided_twice(a: Any, b: Any, c: Any) -> Complex:
     return np.asarray(np.where(far > NEAR, apart, _close(a, b, c)))
 
 
-def _close(a: Complex, b: Complex, c: Complex) -> Complex:
+def _close(a: Complexes, b: Complexes, c: Complexes) -> Complexes:
     """Return the second divided difference at points that lie close, by Taylor's series around their mean.
 
     ``[a, b, c] x^(k+2)`` is the complete symmetric polynomial h_k, by the recursion of its generating function.

@@ -34,11 +34,9 @@ from vibsim.formula import (
     is_zero,
     literal,
     names_in,
-    over,
     parse,
     put,
     tidied,
-    times,
     to_formula,
 )
 from vibsim.models.base import Formula, Parameter
@@ -66,21 +64,21 @@ def linear_scales(forces: Forces) -> Scales | None:
     if driven is None:
         # without an initial position the amplitude is V t_c
         u, v = Name(forces.position), Name(forces.velocity)
-        size: Expression = Call("where", (Compare("!=", u, ZERO), _size(u), times(_size(v), T_C)))
+        size: Expression = Call("where", (Compare("!=", u, ZERO), _size(u), _size(v) * T_C))
     else:
-        size = over(_size(driven[0]), k)
+        size = _size(driven[0]) / k
     numbers: dict[str, Formula] = {}
     if forces.known_damping is not None:
         kind, b = forces.known_damping
-        numbers["beta"] = over(times(b, T_C if kind == "linear" else X_C), times(TWO, m))
+        numbers["beta"] = b * (T_C if kind == "linear" else X_C) / (TWO * m)
     if driven is not None:
-        numbers["gamma"] = times(driven[1], T_C)
-    energy = times(k, Binary("**", X_C, TWO))
+        numbers["gamma"] = driven[1] * T_C
+    energy = k * Binary("**", X_C, TWO)
     return Scales(_time_scale(m, k), size, energy, tuple(numbers.items()))
 
 
 def _time_scale(mass: Expression, stiffness: Expression) -> Expression:
-    return Call("sqrt", (over(mass, stiffness),))
+    return Call("sqrt", (mass / stiffness,))
 
 
 def stiffness_at_rest(forces: Forces) -> Expression | None:
@@ -138,7 +136,7 @@ def _exactly(forces: Forces, scales: Scales) -> dict[str, Formula]:
 
 def amplitude_and_frequency(force: Expression) -> tuple[Expression, Expression] | None:
     """Return A and phi of a force ``A sin(phi t)`` or ``A cos(phi t)``; None for any other one."""
-    amplitude: Expression = ONE
+    amplitude = ONE
     frequency: Expression | None = None
     parts = [force]
     while parts:
@@ -149,7 +147,7 @@ def amplitude_and_frequency(force: Expression) -> tuple[Expression, Expression] 
             case Negate(operand):
                 parts[:0] = [operand]
             case _ if "t" not in names_in(part):
-                amplitude = times(amplitude, part)
+                amplitude *= part
             case Call("sin" | "cos", (argument,)) if frequency is None:
                 frequency = derivative(argument, "t")
             case _:
@@ -304,5 +302,5 @@ def over_scales(
         elif size != 1:
             factor = Binary("**", scale, Number(float(size)))
         if exponent:
-            found = (over if exponent > 0 else times)(found, factor)
+            found = found / factor if exponent > 0 else found * factor
     return found

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from vibsim.core.array_types import Floats
-from vibsim.formula import Expression, ExpressionError, derivative, minus, put, size, values
+from vibsim.formula import Expression, ExpressionError, derivative, put, size, values
 from vibsim.models.base import Numbers, Parameter
 
 MAX_NODES = 20_000
@@ -51,7 +51,7 @@ class Manufactured:
     def forces(self, accelerations: Sequence[Expression]) -> tuple[Expression, ...]:
         """Return what must be added to the accelerations so that this is the motion."""
         pairs = zip(self.accelerations, accelerations, strict=True)
-        return tuple(minus(wanted, self.along(given)) for wanted, given in pairs)
+        return tuple(wanted - self.along(given) for wanted, given in pairs)
 
     def exact(self, t: Floats, initial: Numbers, parameters: Numbers) -> dict[str, Floats]:
         """Return the states at times `t`, whatever the initial values: see `Model.exact`."""

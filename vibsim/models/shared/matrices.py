@@ -21,11 +21,9 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from vibsim.core.array_types import Floats, Integers
+from vibsim.core.array_types import Complexes, Floats, Integers
 
-Complex = NDArray[np.complex128]
 SERIES_BELOW = 1.0
 """Size of z below which ``(e^z - 1)/z`` and the like are summed as series."""
 TERMS = 20
@@ -180,7 +178,7 @@ def highest_frequency(mass: Any, stiffness: Any) -> float:
     return float(np.sqrt(max(square, 0.0)))
 
 
-def _series(z: Complex, order: int) -> Complex:
+def _series(z: Complexes, order: int) -> Complexes:
     """Return ``sum z^k/(k + order)!``."""
     total, term = np.zeros_like(z), np.ones_like(z)
     for k in range(order):
@@ -191,7 +189,7 @@ def _series(z: Complex, order: int) -> Complex:
     return total
 
 
-def _driven(r: Complex, drive: complex, t: Complex) -> tuple[Complex, Complex]:
+def _driven(r: Complexes, drive: complex, t: Complexes) -> tuple[Complexes, Complexes]:
     """Return ``g(r) = (e^(i W t) - e^(r t))/(i W - r)`` with ``drive = i W``, and its derivative by r."""
     z = (drive - r) * t
     decay, swing = np.exp(r * t), np.exp(drive * t)
@@ -208,7 +206,7 @@ def mode_motion(
     frequency: Floats,
     decay: Floats,
     start: tuple[Floats, Floats],
-    loads: list[tuple[Complex, float]],
+    loads: list[tuple[Complexes, float]],
 ) -> tuple[Floats, Floats]:
     """Return positions and velocities of modes, shape (mode, time).
 
@@ -236,8 +234,8 @@ def mode_motion(
     # those that are near lie within so small a distance that the other ones may be put in the middle
     half = np.where(is_near, 0.5 * apart, 0.0)
 
-    def divided(at_first: Complex, at_second: Complex, slope: Any) -> Complex:
-        found: Complex = (at_first - at_second) / gap
+    def divided(at_first: Complexes, at_second: Complexes, slope: Any) -> Complexes:
+        found: Complexes = (at_first - at_second) / gap
         if is_near.any():
             near = np.zeros_like(time)
             for x, weight in zip(NODES, WEIGHTS, strict=True):
@@ -245,8 +243,8 @@ def mode_motion(
             found = np.where(is_near, near, found)
         return found
 
-    def decaying(r: Complex) -> Complex:
-        found: Complex = np.exp(r * time)
+    def decaying(r: Complexes) -> Complexes:
+        found: Complexes = np.exp(r * time)
         return found
 
     one = decaying(first)

@@ -6,6 +6,7 @@ everything else that follows from them; it may say more about itself than follow
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -27,10 +28,7 @@ from vibsim.formula import (
     integral,
     is_multiple,
     is_zero,
-    minus,
     names_in,
-    over,
-    times,
     values,
 )
 from vibsim.models.base import Damping, Formula, Model, Numbers, Parameter, State
@@ -91,7 +89,7 @@ class Forces:
         """Return ``(1/m) node``: the quotient of parameters is worked out once."""
         if self.mass == ONE or node == ZERO:
             return node
-        inverse = over(ONE, self.mass)
+        inverse = ONE / self.mass
         if isinstance(node, Negate):
             return Negate(Binary("*", inverse, node.operand))
         return Binary("*", inverse, node)
@@ -146,17 +144,15 @@ def mechanical(
     facts: dict[str, Any] = {
         "states": STATES,
         "parameters": parameters,
-        "acceleration": forces.over_mass(minus(minus(forces.force, forces.damping), forces.spring)),
+        "acceleration": forces.over_mass(forces.force - forces.damping - forces.spring),
         "potential_energy": forces.potential or integral(forces.spring, forces.position),
-        "kinetic_energy": times(
-            times(Number(0.5), forces.mass), Binary("**", velocity, Number(2.0))
-        ),
+        "kinetic_energy": Number(0.5) * forces.mass * Binary("**", velocity, Number(2.0)),
         "energy_unit": "J",
         "linear": forces.is_linear,
         "conservative": is_free,
         "natural_frequency": natural_frequency,
-        "dissipation": times(forces.damping, velocity) if forces.is_damped else None,
-        "driving": times(forces.force, velocity) if forces.is_driven else None,
+        "dissipation": forces.damping * velocity if forces.is_damped else None,
+        "driving": forces.force * velocity if forces.is_driven else None,
         "exact": _linear_motion(forces, numbers),
         "scales": own
         and with_scaled_run(replace(own, outputs=output_scales), forces, parameters, powers or {}),
@@ -204,17 +200,14 @@ def damping_of(
     rest = [factor for factor in factors if factor not in (speed, size)]
     if any(velocity in names_in(factor) for factor in rest):
         return None
-    rate: Expression = ONE
-    for factor in rest:
-        rate = times(rate, factor)
-    return "quadratic", rate
+    return "quadratic", math.prod(rest, start=ONE)
 
 
 def _factors(node: Expression) -> list[Expression]:
     if isinstance(node, Binary) and node.operator == "*":
         return [*_factors(node.left), *_factors(node.right)]
     if isinstance(node, Binary) and node.operator == "/":
-        return [*_factors(node.left), over(ONE, node.right)]
+        return [*_factors(node.left), ONE / node.right]
     if isinstance(node, Negate) and node.operand != ONE:
         return [Negate(ONE), *_factors(node.operand)]
     return [node]

@@ -78,10 +78,8 @@ def picture(
         rate=rate,
     )
     if not frame.usable(found.running).size:
-        nothing = (
-            f"{member.title}: the energy error is 0 at every step, so there is nothing to draw."
-        )
-        return evidence(nothing) if np.any(found.running == 0.0) else None
+        told = "the energy error is 0 at every step, so there is nothing to draw."
+        return evidence(f"{member.title}: {told}") if np.any(found.running == 0.0) else None
     by = " by [D₂ₜu]" if check.conserves.endswith("_d2t") else ""
     label = f"largest energy error so far{' / E(0)' if first else ''}{by}"
     title = style.label(label, "" if first else unit(record, "energy_deviation_max_abs"))
@@ -97,12 +95,10 @@ def _draw(ax: Axes, found: EnergyError) -> None:
     has_bars = found.kind != "none" and not found.is_broken
     ax.set_xlim(float(t[0]), end)
     if found.has_border or found.kind == "exponential" or found.is_broken:
-        late, border = (
-            found.running[t > LEAST * end],
-            found.round_off if found.has_border else np.nan,
-        )
+        border = found.round_off if found.has_border else np.nan
         lowest = 0.1 * np.max(frame.usable(found.running))
-        frame.scale(ax, late, found.means, np.array([border]), np.array([lowest]), is_log=True)
+        around = np.array([border, lowest])
+        frame.scale(ax, found.running[t > LEAST * end], found.means, around, is_log=True)
     else:
         frame.scale(ax, found.running, found.means, np.zeros(1), margin=0.22)
         ax.set_ylim(bottom=0.0)
@@ -143,10 +139,8 @@ def _expected(found: EnergyError, t: Floats) -> Floats:
 def _naming(found: EnergyError) -> str:
     """Say by which number the drift was named."""
     most = float(np.nanmax(found.running))
-    third, second, first = found.means.tolist()
-    numbers = ", ".join(
-        f"{n} = {short(m)}" for n, m in zip(NAMES, found.means.tolist(), strict=True)
-    )
+    third, second, first = means = found.means.tolist()
+    numbers = ", ".join(f"{n} = {short(m)}" for n, m in zip(NAMES, means, strict=True))
     bars = f"the largest energy error so far has the means (bars) {numbers}."
     if found.kind == "none":
         border = brief(found.round_off)

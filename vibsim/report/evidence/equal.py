@@ -41,8 +41,7 @@ def picture(
     figure = style.canvas(1.0)
     ax = frame.panel(figure, title, data.time_label(record), frame.WIDE)
     ax.set_gid(style.TIME)
-    ends = data.ends_of(record)
-    t = np.linspace(0.0, ends[member.case if ends.size > 1 else 0], distance.size)
+    t = np.linspace(0.0, data.ends_of(record)[member.case], distance.size)
     ax.set_xlim(t[0], t[-1])
     usual = seen[seen >= np.percentile(seen, DIPS)]
     frame.scale(ax, usual, np.array([bound, 0.1 * usual.max()]), is_log=True, margin=0.12)
@@ -52,9 +51,9 @@ def picture(
     lowest = ax.get_ylim()[0]
     look: dict[str, Any] = {"color": frame.COLOUR, "linewidth": 0.9, "label": "difference"}
     ax.plot(t, np.where(distance == 0.0, lowest, distance), **look)
-    nearest = int(np.nanargmax(np.where(np.isfinite(distance), distance, np.nan)))
-    largest = float(distance[nearest])
-    frame.points(ax, [t[nearest]], distance[[nearest]], [True])
+    place = int(np.nanargmax(np.where(np.isfinite(distance), distance, np.nan)))
+    largest = float(distance[place])
+    frame.points(ax, [t[place]], distance[[place]], [True])
     # a number that is not finite is the largest of all
     if math.isnan(most):
         told = "; then the run breaks down"
@@ -65,5 +64,5 @@ def picture(
     else:
         times = f"{brief(largest / bound)} times the allowed {short(bound)}"
         told = f", {times} (dashed; grey is below it)"
-    where = f"It is largest at t = {short(float(t[nearest]))}, with {short(largest)} (dot)"
+    where = f"It is largest at t = {short(float(t[place]))}, with {short(largest)} (dot)"
     return evidence(f"{who} less that of {second}. {where}{told}.", title, figure)

@@ -17,7 +17,7 @@ from vibsim.core.array_types import Floats
 from vibsim.core.record import Record
 from vibsim.core.vocabulary import DECISIVE
 from vibsim.report import style, sweep_layout, words
-from vibsim.report.data import Member, case_name, is_lean, pick, place_of, unit
+from vibsim.report.data import Member, is_lean, of_case, pick, place_of, unit
 from vibsim.report.evidence import energy, equal, frame, order, stable, value
 from vibsim.report.evidence.frame import GrowthScale, evidence, usable
 from vibsim.report.style import Picture
@@ -52,11 +52,9 @@ def picture(
 
 
 def _member(record: Record, result: Mapping[str, Any]) -> Member | None:
-    names, case = record.words("scheme"), place_of(record, result.get("case", -1))
-    name = str(result.get("scheme"))
-    if name not in names or case is None:
-        return None
-    return Member(names.index(name), case, name, case_name(record, case))
+    case = place_of(record, result.get("case", -1))
+    every = [] if case is None else of_case(record, case)
+    return next((one for one in every if one.scheme_name == result.get("scheme")), None)
 
 
 def _of_members(
@@ -76,17 +74,16 @@ def _of_members(
     known = usable(values)
     if not known.size:
         return evidence(f"{member.title}: no member has a number to draw.")
+    # members that differ by rounding are alike on the scale
+    around = np.median(known) * 10.0 ** np.array([-0.5, 0.5])
     if check.kind == "stable":
-        up = frame.growth_scale(known)
+        up, around = frame.growth_scale(known), frame.ALIKE
     elif check.kind == "conserves":
         up = GrowthScale("largest energy error / E(0)", is_log=True)
     else:
         measure = unit(record, f"{check.quantity}_difference_norm")
         text = f"largest difference of {words.symbol(check.quantity)}"
         up = GrowthScale(style.label(text, measure), is_log=True)
-    # members that differ by rounding are alike on the scale
-    is_growth = check.kind == "stable"
-    around = frame.ALIKE if is_growth else np.median(known) * 10.0 ** np.array([-0.5, 0.5])
     keys = sweep_layout.keys(record)
     key = keys[0] if len(keys) == 1 and not keys[0].words else None
     x = key.values if key else np.arange(count, dtype=np.float64)

@@ -67,8 +67,12 @@ def scale(ax: Axes, *shown: Floats, is_log: bool = False, margin: float = 0.15) 
     if is_log:
         style.log_axis(ax, "y", *style.log_limits(*shown, margin=margin), most=5)
         return
-    ax.set_ylim(*style.limits(*shown, margin=margin))
+    low, high = style.limits(*shown, margin=margin)
+    ax.set_ylim(low, high)
     round_ticks(ax.yaxis)
+    if words.number(low, "step") == words.number(high, "step"):
+        # several numbers would read alike
+        ax.set_yticks([0.5 * (low + high)])
 
 
 def allowed(ax: Axes, low: float, high: float) -> None:
@@ -86,11 +90,11 @@ def below(ax: Axes, limit: float) -> None:
 def points(ax: Axes, x: Sequence[float], y: Floats, counts: Sequence[bool]) -> None:
     """Draw dots, hollow ones that do not count; those beyond the frame are triangles on its edge."""
     low, high = ax.get_ylim()
-    for is_full in (False, True):
+    for is_full, face in ((False, "white"), (True, COLOUR)):
         of_kind = np.array(counts) == is_full
         place, value = np.asarray(x, dtype=np.float64)[of_kind], y[of_kind]
         inside = (value >= low) & (value <= high)
-        look: dict[str, Any] = {"color": COLOUR, "markerfacecolor": COLOUR if is_full else "white"}
+        look: dict[str, Any] = {"color": COLOUR, "markerfacecolor": face}
         if inside.any():
             dot: Any = {"markersize": 5.0, "clip_on": False, "zorder": 4}
             ax.plot(place[inside], value[inside], "o", **look, **dot)

@@ -11,8 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vibsim.checks.stable import LIMIT_ROUNDING
-from vibsim.convergence.thresholds import BLOWN_UP
+from vibsim.convergence.thresholds import BLOWN_UP, LIMIT_ROUNDING
 from vibsim.core.array_types import Floats
 from vibsim.core.record import Record
 from vibsim.core.vocabulary import HIGHEST

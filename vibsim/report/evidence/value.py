@@ -22,9 +22,6 @@ from vibsim.report.evidence.frame import evidence, measured
 from vibsim.report.style import Picture
 from vibsim.report.types import AccurateCheck, Axes, Experiment, ValueCheck
 
-WIDE = 30.0
-"""Positive numbers of which the largest is more than so many times the least have a logarithmic scale."""
-
 
 def picture(
     experiment: Experiment, record: Record, check: ValueCheck, name: str, member: Member
@@ -65,8 +62,7 @@ def _beside_border(row: ByLevel, check: ValueCheck, title: str, bar: Floats) -> 
     border = check.above if check.below is None else check.below
     if border is None:
         return None
-    known = np.append(style.finite(row.values), border)
-    is_log = bool(known.min() > 0.0 and known.max() > WIDE * known.min())
+    is_log = style.spans_decades(np.append(row.values, border))
     ax = row.panel(title, row.values, np.append(bar, border), is_log=is_log)
     band = (border, math.inf) if check.below is None else (-math.inf, border)
     return row.finish(ax, band, border, bar, "where it should lie")
@@ -164,20 +160,16 @@ def of_error(
     if not (np.isfinite(bound) and error > 0.0 and over > 0.0):
         return None
     shown, most = errors / over, bound / over
-    what = words.symbol(check.accurate)
-    title = f"relative error of {what}"
-    if not check.is_relative:
-        unit = pretty_unit(unit_of_norm(record, check.accurate))
-        title = style.label(f"error of {what}", unit)
-    figure = style.canvas(1.0)
-    ax = frame.panel(figure, title, "level")
-    frame.level_axis(ax, levels)
-    frame.scale(ax, shown, np.array([most, check.accuracy]), is_log=True)
+    title = f"error of {words.symbol(check.accurate)}"
+    measure = pretty_unit(unit_of_norm(record, check.accurate))
+    title = f"relative {title}" if check.is_relative else style.label(title, measure)
+    row = ByLevel(levels, shown, [level == levels[-1] for level in levels], member.title)
+    ax = row.panel(title, shown, np.array([most, check.accuracy]), is_log=True)
     frame.below(ax, check.accuracy)
     ax.plot([levels[-1]] * 2, [shown[-1], most], color=frame.COLOUR, linewidth=1.5)
-    frame.points(ax, levels, shown, [i == len(levels) - 1 for i in range(len(levels))])
     caption = (
         f"{member.title}: the error in the L2 norm over time; filled at the finest level, with a bar up to its bound. "
         "Grey: what the check asks for."
     )
-    return evidence(caption, f"Evidence on the error of {words.name(check.accurate)}", figure)
+    alt = f"Evidence on the error of {words.name(check.accurate)}"
+    return evidence(caption, alt, ax.get_figure(root=True))

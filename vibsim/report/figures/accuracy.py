@@ -17,7 +17,7 @@ from vibsim.report import data, style, words
 from vibsim.report.data import Member, known, omega_dt
 from vibsim.report.figures import panels
 from vibsim.report.style import Picture
-from vibsim.report.types import Experiment
+from vibsim.report.types import Axes, Experiment
 
 POINTS = 240  # of a curve
 SMALL = 0.02  # w dt from which the leading term of a series is taken
@@ -52,20 +52,14 @@ def frequency(experiment: Experiment, record: Record) -> Picture | None:
         limit = float(np.nanmax(limits[s])) if np.isfinite(limits[s]).any() else math.inf
         curve = np.where(grid <= limit, curve, np.nan)
         ax.plot(grid, curve, color=look["color"], label=style.entry(spec.name))
-        found = _leading(start)
-        if found is not None:
+        if (found := _leading(start)) is not None:
             order, text, factor = found
-            series = 1.0 + factor * grid**order
-            ax.plot(grid, series, color=look["color"], linestyle=(0, (4, 2)), label=text)
-            drawn.append(series)
+            drawn.append(1.0 + factor * grid**order)
+            ax.plot(grid, drawn[-1], color=look["color"], linestyle=(0, (4, 2)), label=text)
         mark = {"color": look["color"], "marker": look["marker"], "linestyle": "none"}
         ax.plot(p.ravel(), measured[s].ravel(), **mark, markersize=4, label="_measured")
         drawn += [curve, measured[s].ravel()]
-    ax.set_ylim(*style.limits(*drawn))
-    ax.set_xlim(0.0, 1.03 * float(grid[-1]))
-    ax.set_xlabel("w dt")
-    ax.set_ylabel("numerical over exact frequency")
-    style.beside(ax)
+    _finish(ax, grid, drawn, "w dt", "numerical over exact frequency")
     return Picture(
         "frequency",
         "The numerical frequency against w dt, with its series",
@@ -74,6 +68,12 @@ def frequency(experiment: Experiment, record: Record) -> Picture | None:
         "Numerical over exact frequency of every scheme against w dt, predicted, as a series and measured",
         ax.get_figure(root=True),
     )
+
+
+def _finish(ax: Axes, grid: Floats, drawn: list[Floats], across: str, up: str) -> None:
+    """Give axes over a grid of w dt their ranges, labels and legend."""
+    ax.set(xlim=(0.0, 1.03 * float(grid[-1])), ylim=style.limits(*drawn), xlabel=across, ylabel=up)
+    style.beside(ax)
 
 
 def _leading(start: Floats) -> tuple[int, str, float] | None:
@@ -85,14 +85,12 @@ def _leading(start: Floats) -> tuple[int, str, float] | None:
     # the next term is smaller by the square of w dt
     factor = (4.0 * half / (0.5 * SMALL) ** order - whole / SMALL**order) / 3.0
     near = Fraction(factor).limit_denominator(MOST_DENOMINATOR)
-    is_near = near != 0 and abs(float(near) - factor) <= EXACT * abs(factor)
-    size = words.number(abs(factor), "brief")
-    raised = f"(w dt){words.raised(order)}"
-    term = f"{size} {raised}"
-    if is_near:
+    top, below = f"{words.number(abs(factor), 'brief')} ", ""
+    if near != 0 and abs(float(near) - factor) <= EXACT * abs(factor):
         top = "" if abs(near.numerator) == 1 else f"{abs(near.numerator)} "
-        term = f"{top}{raised}/{near.denominator}" if near.denominator > 1 else f"{top}{raised}"
-    return order, f"1 {'+' if factor > 0 else '−'} {term}", factor
+        below = f"/{near.denominator}" if near.denominator > 1 else ""
+    sign = "+" if factor > 0 else "−"
+    return order, f"1 {sign} {top}(w dt){words.raised(order)}{below}", factor
 
 
 def second_difference(record: Record) -> Picture | None:
@@ -108,11 +106,7 @@ def second_difference(record: Record) -> Picture | None:
     dashed: dict[str, Any] = {"color": style.COLOURS[1], "linestyle": (0, (4, 2))}
     ax.plot(grid, series, **dashed, label="1 − p²/12 + p⁴/360")
     ax.plot(p, found, "o", color=style.COLOURS[0], markersize=4.5, label="measured")
-    ax.set_xlim(0.0, 1.03 * float(grid[-1]))
-    ax.set_ylim(*style.limits(curve, series, found, np.array([0.0, 1.0])))
-    ax.set_xlabel("p = w dt")
-    ax.set_ylabel("E")
-    style.beside(ax)
+    _finish(ax, grid, [curve, series, found, np.array([0.0, 1.0])], "p = w dt", "E")
     return Picture(
         "second_difference",
         "Accuracy of the second difference: E against p = w dt",

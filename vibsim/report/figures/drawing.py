@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import re
+from collections.abc import Sequence
 
 from vibsim.report.style import Picture
 from vibsim.report.types import Bbox, Figure
@@ -47,6 +48,16 @@ def element(picture: Picture) -> str:
     if picture.figure is None:
         return ""
     return inline(svg(picture.figure, picture.name), picture.alt, is_scaled=False)
+
+
+def files(picture: Picture, formats: Sequence[str]) -> dict[str, bytes]:
+    """Return a picture as files by their names: SVG, whatever the formats, and what else is among them."""
+    assert picture.figure is not None
+    found = {f"{picture.name}.svg": svg(picture.figure, picture.name).encode()}
+    for form in formats:
+        if form != "svg":
+            found[f"{picture.name}.{form}"] = binary(picture.figure, form)
+    return found
 
 
 def binary(figure: Figure, form: str) -> bytes:

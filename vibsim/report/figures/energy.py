@@ -38,11 +38,11 @@ def running(record: Record, case: int) -> Picture | None:
     first = np.abs(known(record, "energy_initial", MEMBER)[:, case])
     usable = bool(np.all(first > 0.0))
     # running maxima of the coarsest level, shape (scheme, t), the first time left out
-    both = [
-        np.asarray(pick(record, name, case=case, level=0), np.float64)[:, 1:]
-        for name in (OWN, CENTRED)
-    ]
-    both = [style.no_zeros(part / first[:, None] if usable else part) for part in both]
+    over = first[:, None] if usable else 1.0
+    found = (
+        np.asarray(pick(record, name, case=case, level=0), np.float64) for name in (OWN, CENTRED)
+    )
+    both = [style.no_zeros(part[:, 1:] / over) for part in found]
     # of a body at rest nothing else tells a size
     sizes = [1.0] if usable else [size for part in both for row in part if (size := largest(row))]
     most = frame.UNBOUNDED * min(sizes, default=1.0)
@@ -75,8 +75,7 @@ def running(record: Record, case: int) -> Picture | None:
         title=f"How does the energy error grow with time? Level {level}",
         caption="The largest energy error so far, on the coarsest level: solid with the scheme's own velocity, dashed "
         "with the centred difference [D₂ₜu], where that is another one. Flat is bounded, slope 1 is a linear drift, "
-        "slope 2 a quadratic one."
-        + (f" {frame.LEAVING} They grow without bound." if leaves else ""),
+        "slope 2 a quadratic one." + f" {frame.LEAVING} They grow without bound." * leaves,
         alt="Running maximum of the energy error of every scheme, with two velocities, against time, logarithmic",
         figure=axes[0].get_figure(root=True),
     )

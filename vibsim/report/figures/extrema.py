@@ -13,13 +13,14 @@ import numpy as np
 
 from vibsim.core.array_types import Floats
 from vibsim.core.record import Record
-from vibsim.report import choice, data, frame, style, words
+from vibsim.report import choice, data, frame, style
 from vibsim.report.choice import position
 from vibsim.report.data import Member, at, whole
 from vibsim.report.figures.panels import note, stacked
 from vibsim.report.style import Picture
 from vibsim.report.types import Axes, Experiment
 
+FEWEST = 3  # peaks that show how a period changes
 MOST_CURVES = 6  # most curves; more lie on one another
 MOST_MARKERS = 40  # most numbers of one curve that get a marker each
 MARKED = 60  # most local frequencies of one curve that get a marker each
@@ -32,15 +33,14 @@ Run = tuple[str, Member, int]
 """A curve: its label, the scheme and member, and the position of its level."""
 
 
-def local(experiment: Experiment, record: Record, shown: list[Member]) -> Picture | None:
-    """Draw local periods, amplitudes and the phase error of one member; None where there are fewer than two periods."""
-    if "peak_time" not in record or not shown:
-        return None
-    case = shown[0].case
-    runs = runs_of(record, [member for member in shown if member.case == case])
+def local(
+    experiment: Experiment, record: Record, shown: list[Member], peaks: int = 2
+) -> Picture | None:
+    """Draw local periods, amplitudes and the phase error of one member; None where there are fewer peaks."""
+    runs = runs_of(record, shown, peaks)
     if not runs:
         return None
-    axes = stacked([2.1, 2.1, 2.1])
+    axes, case = stacked([2.1, 2.1, 2.1]), shown[0].case
     exact = float(data.exact_periods(record)[case])
     start = first_peak(experiment, record, case, exact)
     looks = looks_of(runs)
@@ -54,19 +54,17 @@ def local(experiment: Experiment, record: Record, shown: list[Member]) -> Pictur
             ax.axhline(value, label="exact" if ax is axes[0] else "", **style.REFERENCE)
     leaves = _ranges(axes, drawn, (exact, size, math.nan))
     time, measure = data.time_unit(record), data.unit(record, f"{position(experiment)}_finest")
-    for ax, title, text, of in zip(
-        axes,
-        ("Local period", "Local amplitude", "Phase error of the peaks"),
-        ("local period", "local amplitude", "peak early by"),
-        (time, measure, time),
-        strict=True,
-    ):
+    rows = (
+        ("Local period", "local period", time),
+        ("Local amplitude", "local amplitude", measure),
+        ("Phase error of the peaks", "peak early by", time),
+    )
+    for ax, lines, (title, text, of) in zip(axes, drawn, rows, strict=True):
         # amplitudes that hardly differ need long numbers
         ax.yaxis.set_label_coords(-0.115, 0.5)
         ax.set(ylabel=style.label(text, of), title=title)
-    axes[2].set_xlabel("number of the peak")
-    for ax, lines in zip(axes, drawn, strict=True):
         _tell_alike(ax, lines, [label for label, _, _ in runs])
+    axes[2].set_xlabel("number of the peak")
     style.beside(axes[0], fontsize=8)
     reference = "its exact time" if math.isfinite(start) else "its time after the first peak"
     return Picture(
@@ -74,21 +72,26 @@ def local(experiment: Experiment, record: Record, shown: list[Member]) -> Pictur
         title="Local periods and amplitudes, and the phase error from peak to peak",
         caption="Lines with markers: peaks interpolated by a parabola; faint circles: from grid points alone. Dashed: "
         f"exact. Bottom: how much earlier than {reference} each peak comes; straight: the same in every period. "
-        "Wide and pale: a curve with which others coincide."
-        f"{f' {frame.LEAVING}' if leaves else ''}",
+        "Wide and pale: a curve with which others coincide." + f" {frame.LEAVING}" * leaves,
         alt="Local period, local amplitude and phase error against the number of the peak",
         figure=axes[0].get_figure(root=True),
     )
 
 
-def runs_of(record: Record, members: list[Member]) -> list[Run]:
-    """Choose the curves: of one or two schemes several levels, of more schemes the coarsest level."""
+def runs_of(record: Record, members: list[Member], peaks: int = 2) -> list[Run]:
+    """Choose the curves of the first member that have so many peaks.
+
+    Of one or two schemes several levels are drawn, of more the coarsest level.
+    """
+    if "peak_time" not in record:
+        return []
+    members = [member for member in members if member.case == members[0].case]
     levels = whole(record, "level")
     each = max(1, min(len(levels), 4, MOST_CURVES // max(1, len(members))))
     found = []
     for member in members[:MOST_CURVES]:
         for i in range(each):
-            if np.isfinite(at(record, "peak_time", member, level=i)).sum() >= 2:
+            if np.isfinite(at(record, "peak_time", member, level=i)).sum() >= peaks:
                 who = member.scheme_name if len(members) > 1 else ""
                 label = ", ".join(filter(None, [who, f"level {levels[i]}" if each > 1 else ""]))
                 found.append((label or f"level {levels[i]}", member, i))
@@ -113,12 +116,7 @@ def _draw(
 ) -> list[Any]:
     """Draw a run in the three panels and return its lines."""
     label, member, level = run
-    time, grid, peak, trough, trough_time = (
-        at(record, name, member, level=level)
-        for name in ("peak_time", "peak_time_grid", "peak", "trough", "trough_time")
-    )
-    keep = np.isfinite(time)
-    time, grid, peak = time[keep], grid[keep], peak[keep]
+    time, grid, amplitude = _peaks(record, member, level)
     number = np.arange(1, time.size + 1)
     marker = look["marker"] if number.size <= MOST_MARKERS else ""
     line = look | {"linewidth": 1.1, "markersize": 4, "marker": marker}
@@ -128,7 +126,7 @@ def _draw(
     offset = time[0] - exact if math.isnan(start) else start - exact
     return [
         *axes[0].plot(number[:-1], np.diff(time), label=style.entry(label), **line),
-        *axes[1].plot(number, heights(time, peak, trough_time, trough), **line),
+        *axes[1].plot(number, amplitude, **line),
         *axes[2].plot(number, offset + number * exact - time, **line),
     ]
 
@@ -156,14 +154,21 @@ def _heights_of(line: Any) -> Floats:
     return np.asarray(line.get_ydata(), dtype=np.float64)
 
 
+def _peaks(record: Record, member: Member, level: int) -> tuple[Floats, Floats, Floats]:
+    """Return the times of the peaks, interpolated and of grid points, and the amplitudes there."""
+    names = ("peak_time", "peak_time_grid", "peak", "trough_time", "trough")
+    time, grid, peak, *troughs = (at(record, name, member, level=level) for name in names)
+    keep = np.isfinite(time)
+    return time[keep], grid[keep], heights(time[keep], peak[keep], *troughs)
+
+
 def heights(time: Floats, peak: Floats, trough_time: Floats, trough: Floats) -> Floats:
     """Return half the height from every peak to the trough behind it, else to the one before; NaN without one."""
     known = np.isfinite(trough_time)
     if not known.any():
         return np.full(peak.shape, np.nan)
-    times, values = trough_time[known], trough[known]
-    after = np.minimum(np.searchsorted(times, time), times.size - 1)
-    return np.asarray(0.5 * (peak - values[after]))
+    after = np.minimum(np.searchsorted(trough_time[known], time), known.sum() - 1)
+    return np.asarray(0.5 * (peak - trough[known][after]))
 
 
 def first_peak(experiment: Experiment, record: Record, case: int, period: float) -> float:
@@ -178,16 +183,15 @@ def first_peak(experiment: Experiment, record: Record, case: int, period: float)
         return period if u > 0.0 else period / 2.0
     if not experiment.model.definition.linear:
         return math.nan
-    angle = math.atan2(v * period / (2.0 * math.pi), u) % (2.0 * math.pi)
-    return angle / (2.0 * math.pi) * period
+    angle = math.atan2(v * period / math.tau, u) % math.tau
+    return angle / math.tau * period
 
 
 def _start(experiment: Experiment, record: Record, case: int) -> tuple[float, float]:
     """Return the first position and velocity of a member."""
     model, member = experiment.model.definition, Member(0, case, "")
-    u, v = (
-        float(at(record, f"{name}_finest", member)[0]) for name in (model.position, model.velocity)
-    )
+    names = (model.position, model.velocity)
+    u, v = (float(at(record, f"{name}_finest", member)[0]) for name in names)
     return u, v
 
 
@@ -242,44 +246,29 @@ def _grow(ax: Axes, lines: tuple[Any, ...], size: float) -> None:
 
 def frequency(experiment: Experiment, record: Record) -> Picture | None:
     """Draw local angular frequency and amplitude against the number of the peak; None with fewer than two peaks."""
-    if "peak_time" not in record:
-        return None
     everyone = choice.with_levels(experiment, data.everyone(record))
-    case = everyone[0].case
-    runs = runs_of(record, [member for member in everyone if member.case == case])
+    runs = runs_of(record, everyone)
     if not runs:
         return None
-    axes = stacked([2.3, 2.3])
+    axes, case = stacked([2.3, 2.3]), everyone[0].case
     several = len({member.scheme for _, member, _ in runs}) > 1
-    time, step = data.time_unit(record), data.steps_of(record, case)
-    period = float(data.exact_periods(record)[case])
-    size = exact_amplitude(experiment, record, case)
-    exact = (2.0 * math.pi / period, size)
-    drawn: list[list[np.ndarray]] = [[], []]
+    step, period = data.steps_of(record, case), float(data.exact_periods(record)[case])
     for (_, member, level), look in zip(runs, looks_of(runs), strict=True):
-        found = (
-            at(record, name, member, level=level)
-            for name in ("peak_time", "peak", "trough_time", "trough")
-        )
-        t, peak, trough_time, trough = found
-        keep = np.isfinite(t)
-        t, peak = t[keep], peak[keep]
-        dt = f"dt = {words.number(float(step[level]), 'step')} {data.time_unit(record, 'dt')}".rstrip()
+        t, _, amplitude = _peaks(record, member, level)
+        dt = f"dt = {data.time_text(record, step[level])}"
         text = style.entry(f"{member.scheme_name}, {dt}" if several else dt)
         line = look | {"linewidth": 1.1, "markersize": 4, "label": text}
         line["marker"] = look["marker"] if t.size <= MARKED else ""
-        series = 2.0 * np.pi / np.diff(t), heights(t, peak, trough_time, trough)
-        for ax, values, kept in zip(axes, series, drawn, strict=True):
+        for ax, values in zip(axes, (2.0 * np.pi / np.diff(t), amplitude), strict=True):
             ax.plot(np.arange(1, values.size + 1), values, **line)
-            kept.append(values)
-    radians = f"rad {data.pretty_unit(f'{time}-1')}" if time else ""
+    size = exact_amplitude(experiment, record, case)
     measure = data.unit(record, f"{position(experiment)}_finest")
-    rows = (("angular frequency", radians), ("amplitude", measure))
-    for ax, (text, unit), value, kept in zip(axes, rows, exact, drawn, strict=True):
-        known = np.array([value] if math.isfinite(value) else [])
-        if known.size:
+    frequency_row = "angular frequency", data.radians_unit(record), 2.0 * math.pi / period
+    rows = frequency_row, ("amplitude", measure, size)
+    for ax, (text, unit, value) in zip(axes, rows, strict=True):
+        if math.isfinite(value):
             ax.axhline(value, label="exact", **style.REFERENCE)
-        ax.set_ylim(*style.limits(*kept, known))
+        ax.set_ylim(*style.limits(*map(_heights_of, ax.lines)))
         ax.yaxis.set_label_coords(-0.115, 0.5)
         ax.set(ylabel=style.label(text, unit), title=f"Local {text}")
         style.beside(ax)

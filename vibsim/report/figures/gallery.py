@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
+
+import numpy as np
 
 from vibsim.core.record import Record
 from vibsim.core.vocabulary import SEVERITY
@@ -27,6 +29,7 @@ from vibsim.report.figures.sweeps import maps, members, sweep
 from vibsim.report.figures.sweeps.separatrix import with_separatrix
 from vibsim.report.figures.sweeps.view import View
 from vibsim.report.style import Picture
+from vibsim.report.sweep_layout import Along, Grid
 from vibsim.report.types import Experiment
 
 FEW_SCHEMES = 3
@@ -56,14 +59,6 @@ class Gallery:
     """What all members of a sweep share, in words."""
 
 
-def tab(label: str, drawn: Iterable[Picture | None]) -> list[Tab]:
-    """Return one tab with the pictures that there are; none without a picture."""
-    found = tuple(
-        picture for picture in drawn if picture is not None and picture.figure is not None
-    )
-    return [Tab(label, found)] if found else []
-
-
 def pictures(
     experiment: Experiment, record: Record, shown: list[Member], lead: Lead, first: Sequence[str]
 ) -> Gallery:
@@ -73,25 +68,24 @@ def pictures(
     has_series, has_pairs = not data.is_lean(record), bool(data.whole(record, "pair"))
     series = shown if has_series else []
     position = choice.position(experiment)
-    moving: Drawn = [solution.motion(record, position, lead.member)] if has_series else []
+    moving = Drawn()
     if has_series:
         # beside the worst member a typical one
         typical = [member for member in series if member.role == "typical"]
-        moving += [solution.motion(record, position, member) for member in typical[:1]]
+        shown_in_motion = [lead.member, *typical[:1]]
+        moving += [solution.motion(record, position, member) for member in shown_in_motion]
         moving += [long_series.long_series(record, position, lead.member)]
         moving += [plane.path(experiment, record, series)]
     own = [member for member in series if member.role != "typical"]
-    own.sort(
-        key=lambda member: (member.scheme, member.case) != (lead.member.scheme, lead.member.case)
-    )
+    own.sort(key=lambda one: (one.scheme, one.case) != (lead.member.scheme, lead.member.case))
+
+    def tab(label: str, drawn: Drawn) -> list[Tab]:
+        found = tuple(one for one in drawn if one is not None and one.name not in first)
+        return [Tab(label, found)] if found else []
 
     def of(quantity: str) -> list[Tab]:
-        letter, is_lead, drawn, tabs = (
-            words.symbol(quantity),
-            quantity == lead.quantity,
-            Drawn(),
-            list[Tab](),
-        )
+        letter, is_lead = words.symbol(quantity), quantity == lead.quantity
+        drawn, tabs = Drawn(), list[Tab]()
         is_energy = quantity == "energy_deviation" and "energy_deviation_scaled" in record
         if has_pairs:
             # of a sweep the map has the rest
@@ -109,32 +103,29 @@ def pictures(
         return [*tab(f"{letter}, order" if several else letter, drawn), *tabs]
 
     tabs = [one for quantity in found if quantity == lead.quantity for one in of(quantity)]
+    if series:
+        working = tab("work", [work.precision(experiment, record, case) for case in cases[:1]])
+        # where a scheme chooses its own steps, the work compares it with the others
+        has_own_steps = bool(np.isnan(data.formal_orders(record, lead.quantity)).any())
+        tabs[1:1] = working * has_own_steps
     if has_pairs:
         tabs += tab("estimated error", [solution.solution(record, position, m) for m in own[:1]])
     if series:
         if experiment.model.definition.conservative:
             tabs += tab("energy", [energy.running(record, case) for case in cases[:1]])
-        beside: Drawn = [extrema.local(experiment, record, series)]
+        beside: Drawn = [extrema.local(experiment, record, series, extrema.FEWEST)]
         if not data.swept(record) and experiment.model.definition.is_alone:
             beside.append(plane.phase(experiment, record, series))
         tabs += tab("phase and amplitude", beside)
     theories: Drawn = [theory.order_and_stability(experiment, record)]
     theories += [theory.growing(experiment, record)] if has_series else []
     tabs += tab("theory", theories)
-    if series:
-        tabs += tab("work", [work.precision(experiment, record, case) for case in cases[:1]])
+    if series and not has_own_steps:
+        tabs += working
     tabs += [one for quantity in found if quantity != lead.quantity for one in of(quantity)]
-    shown_below = (picture for picture in moving if picture and picture.name not in first)
-    belief = tuple(
-        one for one in (_without(found_tab, first) for found_tab in tabs) if one.pictures
-    )
+    motion = tuple(picture for picture in moving if picture and picture.name not in first)
     views, told = over_members(experiment, record, found, lead)
-    return Gallery(tuple(shown_below), belief, tuple(views), tuple(told))
-
-
-def _without(tab: Tab, names: Sequence[str]) -> Tab:
-    """Return a tab without pictures that stand elsewhere."""
-    return Tab(tab.label, tuple(one for one in tab.pictures if one.name not in names))
+    return Gallery(motion, tuple(tabs), tuple(views), tuple(told))
 
 
 def over_members(
@@ -144,17 +135,17 @@ def over_members(
     keys = sweep_layout.keys(record)
     if not keys:
         return [], []
-    along, grid = sweep_layout.along_of(keys), sweep_layout.grid_of(keys)
+    layout = sweep_layout.layout_of(keys)
     schemes = range(min(len(record["scheme"]), MOST_SHOWN))
 
     @cache
     def worst(quantity: str) -> Member:
         return lead.member if quantity == lead.quantity else choice.worst(record, quantity)
 
-    if along is not None:
-        drawn = sweep.views(experiment, record, along, found, worst)
-    elif grid is not None:
-        grid = with_separatrix(experiment, grid)
+    if isinstance(layout, Along):
+        drawn = sweep.views(experiment, record, layout, found, worst)
+    elif isinstance(layout, Grid):
+        grid = with_separatrix(experiment, layout)
         drawn = maps.views(experiment, record, grid, found, worst, schemes)
     else:
         drawn = members.views(experiment, record, keys, found, worst, schemes)
@@ -173,13 +164,12 @@ def choose(experiment: Experiment, record: Record) -> tuple[list[Member], str]:
     """Return what gets figures of its own, and a sentence saying what was left out."""
     quantity = choice.first(experiment, record)
     everyone = choice.with_levels(experiment, choice.members(record, quantity))
-    severity = [0] * len(everyone)
+    ranked = everyone
     if f"{quantity}_status" in record:
         status = data.flags(record, f"{quantity}_status")
-        severity = [SEVERITY[status[m.scheme, m.case]] for m in everyone]
+        ranked = sorted(everyone, key=lambda one: -SEVERITY[status[one.scheme, one.case]])
     room = MOST_SHOWN if len(record["scheme"]) <= MOST_SHOWN else MOST_SHOWN // 2
-    ranked = sorted(range(len(everyone)), key=lambda i: (-severity[i], i))[:room]
-    shown = [everyone[i] for i in sorted(ranked)]
+    shown = [member for member in everyone if member in ranked[:room]]
     parts, is_swept = [], bool(data.swept(record))
     if data.is_lean(record):
         parts.append(

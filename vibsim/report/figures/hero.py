@@ -20,8 +20,9 @@ from vibsim.report.data import Member
 from vibsim.report.figures import panels, time
 from vibsim.report.figures.sweeps.view import ring
 from vibsim.report.style import Picture
+from vibsim.report.sweep_layout import Along, Grid
 from vibsim.report.text import findings
-from vibsim.report.types import Axes, Experiment, Figure
+from vibsim.report.types import Axes, Experiment
 
 LEFT, RIGHT, HEIGHT = 5.4, 3.9, 2.75
 """Widths of the left picture and of the right one, and their height [inch]."""
@@ -51,12 +52,6 @@ def _name(ax: Axes, title: str) -> None:
     ax.set_title(title, fontweight="normal", fontsize=8.5, color=style.GREY)
 
 
-def _root(ax: Axes) -> Figure:
-    figure = ax.get_figure(root=True)
-    assert figure is not None
-    return figure
-
-
 def _legend(ax: Axes, columns: int, size: float) -> None:
     """Write the legend in a strip of its own above the curves, where it hides none."""
     rows = -(-len(ax.get_legend_handles_labels()[0]) // columns)
@@ -66,7 +61,7 @@ def _legend(ax: Axes, columns: int, size: float) -> None:
     else:
         ax.set_ylim(low, high + STRIP * (high - low) * rows)
     ax.legend(
-        loc="upper left", ncols=columns, fontsize=size, handlelength=1.6, borderaxespad=0.2, columnspacing=1.2
+        loc="upper left", ncols=columns, fontsize=size, handlelength=1.6, borderaxespad=0.2, columnspacing=1.9
     )  # fmt: skip
 
 
@@ -76,29 +71,26 @@ def differences(record: Record, lead: Lead) -> Picture | None:
         return None
     quantity, member = lead.quantity, lead.member
     t, curves = data.times(record, member.case), time.differences(record, quantity, member)
-    shown = [curve for curve in curves if curve.is_whole and curve.sound] or curves
+    shown = [curve for curve in curves if curve.is_readable] or curves
     values = [curve.values for curve in shown]
-    if not style.finite(*values).size or not np.any(style.finite(*values)):
+    if not np.any(style.finite(*values)):
         return None
-    wild = panels.explosive(values)
-    exponent = 0 if wild else style.scale(*values)
+    scale = panels.Scale.of(values)
     letter, measure = words.symbol(quantity), data.unit(record, f"{quantity}_difference")
-    ax = _panel(LEFT, style.label(f"rescaled differences of {letter}", measure, exponent))
+    ax = _panel(LEFT, style.label(f"rescaled differences of {letter}", measure, scale.exponent))
     ax.set_gid(style.TIME)
+    # a name of several words would leave no room for the curves
+    labels = [
+        curve.label.replace(letter, "level") if "_" in letter else curve.label for curve in shown
+    ]
     for i, curve in enumerate(shown):
-        y = style.no_zeros(curve.values) if wild else curve.values / 10.0**exponent
-        look: dict[str, Any] = {
-            "color": style.COLOURS[i % style.MANY],
-            "linewidth": 5.5 - 4.2 * i / max(1, len(shown) - 1),
-        }
-        ax.plot(*style.thin(t, y, 200), label=curve.label, gid=curve.group, **look)
-    if wild:
-        style.log_axis(ax, "y", *panels.decades(values))
-    else:
-        ax.set_ylim(*style.limits(*(part / 10.0**exponent for part in values)))
+        colour, width = style.COLOURS[i % style.MANY], 5.5 - 4.2 * i / max(1, len(shown) - 1)
+        line = style.thin(t, scale.scaled(curve.values), 200)
+        ax.plot(*line, label=labels[i], gid=curve.group, color=colour, linewidth=width)
+    scale.apply(ax)
     ax.set_xlim(float(t[0]), float(t[-1]) if t[-1] > t[0] else 1.0)
     ax.set_xlabel(data.time_label(record))
-    size = 8.0 if max(len(curve.label) for curve in shown) < LONG else 6.0
+    size = 8.0 if max(map(len, labels)) < LONG else 6.0
     _legend(ax, columns=3, size=size)
     return Picture(
         "hero_differences",
@@ -106,7 +98,7 @@ def differences(record: Record, lead: Lead) -> Picture | None:
         "The difference between each level and the next finer one, multiplied so that the curves fall on one another "
         "where the error has the promised order.",
         f"Rescaled differences of {words.name(quantity)} between successive levels against time, {member.title}",
-        _root(ax),
+        ax.get_figure(root=True),
     )
 
 
@@ -130,7 +122,8 @@ def against_step(experiment: Experiment, record: Record, lead: Lead) -> Picture 
     size, part = SIZES[lead.norm]
     names = record.words("scheme")
     others = [s for s in range(len(names)) if s != lead.member.scheme][: MOST_SCHEMES - 1]
-    dt, scale = data.steps_of(record, case), duration(record, case) ** part
+    # an L2 norm over the root of the duration is the root of the mean square
+    dt, scale = data.steps_of(record, case), float(data.ends_of(record)[case]) ** part
     ax = _panel(RIGHT, style.label(f"{size} of {letter}", measure))
     ax.set_gid(style.STEP)
     drawn: list[Floats] = []
@@ -140,13 +133,10 @@ def against_step(experiment: Experiment, record: Record, lead: Lead) -> Picture 
         if not math.isfinite(data.formal_order(record, member, quantity)):
             continue
         estimate, true = (one / scale for one in _errors(record, quantity, member, lead.norm))
-        colour = style.COLOURS[s % style.MANY]
-        is_lead = s == lead.member.scheme
-        shape = style.MARKERS[s % style.MANY]
-        mark: dict[str, Any] = {"color": colour, "linestyle": "none", "marker": shape}
-        alone = len(names) == 1
+        is_lead, alone = s == lead.member.scheme, len(names) == 1
         text = "estimated" if alone else style.entry(names[s])
-        mark["gid"] = None if alone else text
+        mark: dict[str, Any] = {"linestyle": "none", "gid": None if alone else text}
+        mark |= {"color": style.COLOURS[s % style.MANY], "marker": style.MARKERS[s % style.MANY]}
         if style.finite(estimate).size:
             ax.plot(dt, estimate, **mark, markersize=5 if is_lead else 3.5, label=text)
             drawn.append(estimate)
@@ -156,18 +146,12 @@ def against_step(experiment: Experiment, record: Record, lead: Lead) -> Picture 
             ax.plot(dt, true, **ring, label="true" if alone else f"_true, {names[s]}")
             drawn.append(true)
             told["Rings: the true error."] = None
-        has_order = math.isfinite(
-            data.stated_order(record, quantity, member, data.norm_index(record, lead.norm))[0]
-        )
+        norm = data.norm_index(record, lead.norm)
+        has_order = math.isfinite(data.stated_order(record, quantity, member, norm)[0])
         if is_lead and (has_order or lead.is_on_order) and lead.result.get("reason") != "exact":
-            order = data.formal_order(record, member, quantity)
-            _slope(
-                ax,
-                dt,
-                np.where(np.isfinite(true), true, estimate),
-                order,
-                data.basis_of_order(record, quantity),
-            )
+            error = np.where(np.isfinite(true), true, estimate)
+            due = data.basis_of_order(record, quantity)
+            _slope(ax, dt, error, data.formal_order(record, member, quantity), due)
     if sum(style.finite(part).size for part in drawn) < FEWEST:
         return None
     high = max(float(part[np.isfinite(part)].max()) for part in drawn)
@@ -181,7 +165,7 @@ def against_step(experiment: Experiment, record: Record, lead: Lead) -> Picture 
         due = words.fact(lead.result, "expected")
         is_other = lead.result["reason"] != "asymptotic" and due is not None
         missed = f", not by {2.0**due:.2g}" if is_other else ""
-        title = f"The error falls by {found:.2g} a level{missed}"
+        title = f"Each level divides the error by {found:.2g}{missed}"
     return Picture(
         "hero_error",
         title,
@@ -189,7 +173,7 @@ def against_step(experiment: Experiment, record: Record, lead: Lead) -> Picture 
             "Both axes are logarithmic, so an error of order p is a line of slope p.", *told
         ),
         f"Error of {words.name(quantity)} against the time step",
-        _root(ax),
+        ax.get_figure(root=True),
     )
 
 
@@ -204,10 +188,8 @@ def solution(record: Record, quantity: str, member: Member, *, is_left: bool) ->
     has_exact = bool(np.isfinite(exact).any())
     if has_exact:
         ax.plot(*style.thin(t, exact, 200), color=style.PALE, linewidth=4.5, label="exact")
-    steps = words.number(int(record["steps"][-1]), "integer")
-    ax.plot(
-        *style.thin(t, values, 200), color=style.COLOURS[0], linewidth=1.4, label=f"{steps} steps"
-    )
+    text = f"{words.number(int(record['steps'][-1]), 'integer')} steps"
+    ax.plot(*style.thin(t, values, 200), color=style.COLOURS[0], linewidth=1.4, label=text)
     panels.fit_values(ax, [values], exact)
     panels.stop_at_breakdown(ax, t, [values])
     ax.set_xlabel(data.time_label(record))
@@ -215,14 +197,8 @@ def solution(record: Record, quantity: str, member: Member, *, is_left: bool) ->
     return Picture(
         "hero_solution", f"{letter}(t), {member.scheme_name}",
         "The solution of the finest level." + " Wide and grey: the exact solution." * has_exact,
-        f"{words.name(quantity)} against time for {member.title}", _root(ax),
+        f"{words.name(quantity)} against time for {member.title}", ax.get_figure(root=True),
     )  # fmt: skip
-
-
-def duration(record: Record, case: int) -> float:
-    """Return how long a member runs; an L2 norm over its root is the root of the mean square."""
-    ends = data.ends_of(record)
-    return float(ends[case if ends.size > 1 else 0])
 
 
 def _errors(record: Record, quantity: str, member: Member, name: str) -> tuple[Floats, Floats]:
@@ -248,12 +224,13 @@ def _errors(record: Record, quantity: str, member: Member, name: str) -> tuple[F
 
 def _slope(ax: Axes, dt: Floats, error: Floats, order: float, due: str) -> None:
     """Draw the slope of an order through the finest error that is known."""
-    if not math.isfinite(order):
-        return
     for last in np.flatnonzero(np.isfinite(error))[-1:]:
         line = error[last] * (dt / dt[last]) ** order
-        look = style.REFERENCE | {"color": style.GREY}
-        ax.plot(dt, line, **look, label=f"order {order:g}, {due}")
+        # no further than the errors, above which the legend stands
+        line[line > 2.0 * float(np.nanmax(error))] = np.nan
+        ax.plot(
+            dt, line, **style.REFERENCE | {"color": style.GREY}, label=f"order {order:g}, {due}"
+        )
 
 
 def response(experiment: Experiment, record: Record, lead: Lead) -> Picture | None:
@@ -263,11 +240,11 @@ def response(experiment: Experiment, record: Record, lead: Lead) -> Picture | No
     if found is None:
         return None
     name, text, values = found
-    along, grid = sweep_layout.along_of(keys), sweep_layout.grid_of(keys)
-    if along is not None:
-        ax = _curves(record, lead, along, values, text)
-    elif grid is not None:
-        ax = _map(lead, grid, values, text)
+    layout = sweep_layout.layout_of(keys)
+    if isinstance(layout, Along):
+        ax = _curves(lead, layout, values, text)
+    elif isinstance(layout, Grid):
+        ax = _map(lead, layout, values, text)
     else:
         ax = _dots(lead, max(keys, key=lambda key: key.distinct.size), values, text)
     count = words.number(len(record["case"]), "integer")
@@ -278,7 +255,7 @@ def response(experiment: Experiment, record: Record, lead: Lead) -> Picture | No
         "Each member is one run of the sweep, at its finest level."
         + " The ring is the member that decides." * is_marked,
         f"{name} of every member over the swept parameters",
-        _root(ax),
+        ax.get_figure(root=True),
     )
 
 
@@ -300,17 +277,16 @@ def _number(experiment: Experiment, record: Record, lead: Lead) -> tuple[str, st
     error = finest_level.error(record, quantity).best[scheme]
     if not finest_level.varies(error):
         return None
-    label = style.label(f"error of {words.symbol(quantity)}", data.norm_unit(record, quantity))
-    return f"error of {words.symbol(quantity)}", label, error
+    text = f"error of {words.symbol(quantity)}"
+    return text, style.label(text, data.norm_unit(record, quantity)), error
 
 
 def _scaled(ax: Axes, which: str, values: Floats) -> None:
     """Make an axis logarithmic where positive values spread over decades."""
-    known = style.finite(values)
-    if known.min() > 0.0 and known.max() > sweep_layout.LOG_RATIO * known.min():
-        style.log_axis(ax, which, *style.log_limits(known), most=5)
+    if style.spans_decades(values):
+        style.log_axis(ax, which, *style.log_limits(values), most=5)
     else:
-        ax.set(**{f"{which}lim": style.limits(known)})
+        ax.set(**{f"{which}lim": style.limits(values)})
 
 
 def _across(ax: Axes, key: sweep_layout.Key) -> None:
@@ -324,9 +300,7 @@ def _across(ax: Axes, key: sweep_layout.Key) -> None:
     ax.set_xlabel(key.label)
 
 
-def _curves(
-    record: Record, lead: Lead, along: sweep_layout.Along, values: Floats, text: str
-) -> Axes:
+def _curves(lead: Lead, along: Along, values: Floats, text: str) -> Axes:
     ax = _panel(LEFT, text)
     for i, (name, cases) in enumerate(along.lines):
         x, y = along.key.values[cases], values[cases]
@@ -341,12 +315,11 @@ def _curves(
     return ax
 
 
-def _map(lead: Lead, grid: sweep_layout.Grid, values: Floats, text: str) -> Axes:
+def _map(lead: Lead, grid: Grid, values: Floats, text: str) -> Axes:
     from matplotlib.colors import LogNorm, Normalize
 
     ax = _panel(LEFT, text, right=0.95)
-    known = style.finite(values)
-    is_log = known.min() > 0.0 and known.max() > sweep_layout.LOG_RATIO * known.min()
+    known, is_log = style.finite(values), style.spans_decades(values)
     ends = float(known.min()), float(known.max())
     norm = LogNorm(*ends) if is_log else Normalize(*ends)
     table = np.ma.masked_invalid(grid.worst(values))
@@ -360,7 +333,8 @@ def _map(lead: Lead, grid: sweep_layout.Grid, values: Floats, text: str) -> Axes
     ax.set_ylabel(grid.y.label)
     ax.grid(visible=False)
     inside = ax.inset_axes((1.03, 0.0, 0.035, 1.0))
-    bar = _root(ax).colorbar(mesh, cax=inside)
+    bar = ax.figure.colorbar(mesh, cax=inside)
+    inside.grid(visible=False)
     if is_log:
         style.log_ticks(bar.ax.yaxis, *ends, most=5)
     _mark(ax, grid.x.values, grid.y.values, lead, on_map=True)
@@ -368,10 +342,8 @@ def _map(lead: Lead, grid: sweep_layout.Grid, values: Floats, text: str) -> Axes
 
 
 def _dots(lead: Lead, key: sweep_layout.Key, values: Floats, text: str) -> Axes:
-    ax = _panel(LEFT, text)
-    ax.plot(
-        key.values, values, ".", color=style.COLOURS[0], markersize=3, rasterized=values.size > 500
-    )
+    ax, is_many = _panel(LEFT, text), values.size > 500
+    ax.plot(key.values, values, ".", color=style.COLOURS[0], markersize=3, rasterized=is_many)
     _across(ax, key)
     _scaled(ax, "y", values)
     _mark(ax, key.values, values, lead)
@@ -390,7 +362,9 @@ def orders(experiment: Experiment, record: Record, lead: Lead) -> Picture | None
     keys, quantity = sweep_layout.keys(record), lead.quantity
     if not keys or not data.whole(record, "triple"):
         return None
-    order = finest_level.orders(record, quantity, lead.norm)[0][lead.member.scheme]
+    order, low, high = (
+        part[lead.member.scheme] for part in finest_level.orders(record, quantity, lead.norm)
+    )
     promised = data.formal_orders(record, quantity)[lead.member.scheme]
     known = np.isfinite(order)
     if not known.any():
@@ -400,14 +374,12 @@ def orders(experiment: Experiment, record: Record, lead: Lead) -> Picture | None
     due = np.unique(promised[np.isfinite(promised)])
     around = np.concatenate([due - 2 * allowed, due + 2 * allowed]) if due.size else order[known]
     shown = np.clip(order, around.min() - 1.0, around.max() + 1.0)
-    missing = int(np.sum(~known))
     if order.size > FEW:
         ax = _panel(RIGHT, "members (logarithmic)")
         borders = np.linspace(*style.limits(shown[known], around), 41)
-        ax.hist(shown[known], borders.tolist(), color=style.COLOURS[0])
+        ax.hist(shown[known], borders.tolist(), color=style.COLOURS[0], zorder=2)
         for value in due:
             ax.axvspan(value - allowed, value + allowed, **style.ALLOWED)
-        ax.set_yscale("log")
         most = float(np.histogram(shown[known], borders)[0].max())
         style.log_axis(ax, "y", 0.7, 2.0 * most, most=5)
         ax.set_xlabel(f"observed order of {letter}")
@@ -416,23 +388,27 @@ def orders(experiment: Experiment, record: Record, lead: Lead) -> Picture | None
         ax = _panel(RIGHT, f"observed order of {letter}")
         for value in due:
             ax.axhspan(value - allowed, value + allowed, **style.ALLOWED)
+        ends = (np.clip(part, around.min() - 1.0, around.max() + 1.0) for part in (low, high))
+        ax.vlines(key.values, *ends, color=style.COLOURS[0], linewidth=1.6, alpha=0.5)
         ax.plot(key.values, shown, ".", color=style.COLOURS[0], markersize=4)
         _across(ax, key)
         ax.set_ylim(*style.limits(shown[known], around))
         _mark(ax, key.values, shown, lead)
-    inside = known & (np.abs(order - promised) <= allowed)
-    kept, every = (words.number(int(n), "integer") for n in (inside.sum(), order.size))
-    title = (
-        "All members keep their order"
-        if inside.all()
-        else f"{kept} of {every} members have an order in the band"
+    # as in a verdict, the interval counts where there is one
+    inside = (
+        known
+        & (np.fmin(order, low) <= promised + allowed)
+        & (np.fmax(order, high) >= promised - allowed)
     )
-    more = (
-        f" {words.number(missing, 'integer')} members have no order and are left out."
-        if missing
-        else ""
-    )
+    counts = (inside.sum(), order.size, np.sum(~known))
+    kept, every, missing = (words.number(int(count), "integer") for count in counts)
+    title = f"{kept} of {every} members have an order in the band"
+    bars = "" if order.size > FEW else "; the bars are the intervals of the orders"
     return Picture(
-        "hero_orders", title, f"The band is what the tolerance allows around the promised order.{more}",
-        f"Observed orders of {words.name(quantity)} of all members", _root(ax),
-    )  # fmt: skip
+        "hero_orders",
+        "All members keep their order" if inside.all() else title,
+        f"The band is what the tolerance allows around the promised order{bars}."
+        + f" {missing} members have no order and are left out." * (not known.all()),
+        f"Observed orders of {words.name(quantity)} of all members",
+        ax.get_figure(root=True),
+    )

@@ -85,11 +85,8 @@ def long_series(record: Record, quantity: str, member: Member) -> Picture | None
         f"{words.title(quantity)}(t) over {span / period:.0f} periods, {member.case_words or f'a panel for each {of}'}",
         f"A panel for each {of}, with the {'exact solution' if is_known else 'finest level'} in grey. "
         "The strip below has the error of the first panel over the whole time."
-        + (
-            " Dots: the times that all levels share; grey is a spline between them."
-            if is_sparse
-            else ""
-        ),
+        + " Dots: the times that all levels share; grey is a spline between them."
+        * is_sparse,
         f"{words.name(quantity)} against time, a panel for each {of}, over {span / period:.0f} periods",
         axes[0].get_figure(root=True),
     )
@@ -98,21 +95,18 @@ def long_series(record: Record, quantity: str, member: Member) -> Picture | None
 def _rows(record: Record, quantity: str, member: Member, most: int) -> list[Row]:
     levels, schemes = data.whole(record, "level"), record.words("scheme")
     if len(schemes) > 1:
-        chosen = [Member(k, member.case, name) for k, name in enumerate(schemes)]
+        chosen = data.of_case(record, member.case)
         chosen.sort(key=lambda one: one.scheme != member.scheme)
         return [
             Row(f"{one.scheme_name}, level {levels[0]}", data.of_level(record, quantity, one, 0), None)
             for one in chosen[:most]
         ]  # fmt: skip
-    steps = record["steps"]
-    return [
-        Row(
-            f"{words.number(int(steps[i]), 'integer')} steps",
-            data.of_level(record, quantity, member, i),
-            style.of_level(levels[i]),
-        )
-        for i in style.spaced(len(levels), most)
-    ]
+    rows = []
+    for i in style.spaced(len(levels), most):
+        steps = words.number(int(record["steps"][i]), "integer")
+        values = data.of_level(record, quantity, member, i)
+        rows.append(Row(f"{steps} steps", values, style.of_level(levels[i])))
+    return rows
 
 
 def _smooth(t: Floats, x: Floats) -> tuple[Floats, Floats]:
@@ -134,13 +128,10 @@ def _draw(ax: Axes, points: tuple[Floats, Floats], label: str, look: dict[str, A
 
 def _draw_strip(ax: Axes, t: Floats, row: Row, compared: Floats, size: float) -> None:
     ax.set_gid(style.OVERVIEW)
-    error = row.values - compared
-    ax.plot(
-        *style.thin(t, error), color=style.COLOURS[0], linewidth=0.8, label=f"error, {row.label}"
-    )
+    error, most = row.values - compared, UNBOUNDED * size
+    text = f"error, {row.label}"
+    ax.plot(*style.thin(t, error), color=style.COLOURS[0], linewidth=0.8, label=text)
     # one that grows without bound leaves the strip
-    ax.set(
-        xlim=(t[0], t[-1]), ylim=style.limits(np.clip(error, -UNBOUNDED * size, UNBOUNDED * size))
-    )
+    ax.set(xlim=(t[0], t[-1]), ylim=style.limits(np.clip(error, -most, most)))
     ax.set_yticks([])
     style.beside(ax)

@@ -34,27 +34,18 @@ def grids(record: Record) -> Picture | None:
     common = dt[0] * np.arange(count + 1)
     for row, level in enumerate(levels):
         t = dt[row] * np.arange(count * round(dt[0] / dt[row]) + 1)
-        colour, y = style.COLOURS[row % style.MANY], len(levels) - 1.0 - row
-        ax.plot(
-            t, np.full(t.size, y), color=colour, marker="o", markersize=4, gid=style.of_level(level)
-        )
+        colour, y = style.COLOURS[row % style.MANY], np.full(t.size, len(levels) - 1.0 - row)
+        ax.plot(t, y, color=colour, marker="o", markersize=4, gid=style.of_level(level))
     top, bottom = len(levels) - 0.6, -0.4
+    dashed: dict[str, Any] = {"linewidth": 0.8, "linestyle": (0, (2, 2)), "zorder": 1}
     for place in common.tolist():
-        ax.plot(
-            [place, place],
-            [bottom, top],
-            color=style.GREY,
-            linewidth=0.8,
-            linestyle=(0, (2, 2)),
-            zorder=1,
-        )
+        ax.plot([place, place], [bottom, top], color=style.GREY, **dashed)
+    squares: dict[str, Any] = {"marker": "s", "markersize": 8, "linestyle": "none"}
+    squares |= {"markerfacecolor": "none", "color": "black"}
     for row in range(len(levels)):
-        squares: dict[str, Any] = {"marker": "s", "markersize": 8, "linestyle": "none"}
-        squares |= {"markerfacecolor": "none", "color": "black"}
         ax.plot(common, np.full(common.size, len(levels) - 1.0 - row), **squares)
-    unit = data.time_unit(record, "dt")
-    steps = [f"{words.number(float(dt[i]), 'step')} {unit}".rstrip() for i in range(len(levels))]
-    texts = [f"level {level}, dt = {steps[i]}" for i, level in enumerate(levels)]
+    steps = [data.time_text(record, dt[row]) for row in range(len(levels))]
+    texts = [f"level {level}, dt = {step}" for level, step in zip(levels, steps, strict=True)]
     ax.set_yticks(range(len(levels)), texts[::-1])
     ax.set_ylim(bottom, top)
     ax.grid(visible=False)
@@ -77,34 +68,27 @@ def spring(experiment: Experiment, record: Record) -> Picture | None:
     if model.coordinates != 1:
         return None
     position, velocity = model.position, model.velocity
-    reach = max(
-        (
-            data.largest(data.of_level(record, position, member, len(record["level"]) - 1))
-            for member in data.everyone(record)
-            if f"{position}_finest" in record
-        ),
-        default=0.0,
-    )
+    finest = f"{position}_finest"
+    reach = data.largest(np.asarray(record[finest])) if finest in record else 0.0
     if reach == 0.0:
         return None
     u = np.linspace(-reach, reach, POINTS)
     curves: dict[bytes, tuple[str, Floats]] = {}
     for case in range(len(record["case"])):
-        numbers, _ = series.numbers_of(experiment, record, case)
+        numbers = series.parameters_of(experiment, record, case)
         at = {**numbers, velocity: 0.0, "t": 0.0}
         formula = tree(model, model.acceleration)
         pull = values(formula, {**at, position: 0.0}) - values(formula, {**at, position: u})
         force = np.broadcast_to(pull * numbers.get("m", 1.0), u.shape)
-        curves.setdefault(
-            force.tobytes(), (words.swept(data.case_name(record, case)) or "spring", force)
-        )
+        text = words.swept(data.case_name(record, case)) or "spring"
+        curves.setdefault(force.tobytes(), (text, force))
     (ax,) = panels.stacked([2.8])
     for k, (text, force) in enumerate(list(curves.values())[: style.MANY]):
         look = style.look(k)
         ax.plot(u, force, color=look["color"], linestyle=look["linestyle"], label=style.entry(text))
     letter = words.symbol(position)
     ax.set_xlim(-reach, reach)
-    ax.set_xlabel(style.label(letter, data.unit(record, f"{position}_finest")))
+    ax.set_xlabel(style.label(letter, data.unit(record, finest)))
     ax.set_ylabel(f"s({letter})")
     style.beside(ax)
     return Picture(

@@ -8,11 +8,9 @@ from typing import Any
 import numpy as np
 
 from vibsim.core.array_types import Floats
-from vibsim.core.record import Record
 from vibsim.models import Model
 from vibsim.report import data
 from vibsim.report.figures.scenes import Motion
-from vibsim.report.types import Experiment
 
 SECONDS_A_PERIOD = 2.0  # at speed 1
 WINDOW_PERIODS = 6.0  # a series over time is shown whole up to 1.5 times as many
@@ -33,16 +31,6 @@ def motion(
     if model.kind == "bouncing_ball":
         states["h"] = _flight(t, samples, series, states["h"], float(parameters["g"]))
     return Motion(model, t, states, parameters, reach)
-
-
-def parameters(experiment: Experiment, record: Record, case: int) -> Mapping[str, Any]:
-    """Return the parameters of a member by their names in formulas: what is swept has its value."""
-    found: dict[str, Any] = dict(experiment.model.parameters)
-    for name in data.swept(record):
-        section, _, key = data.swept_label(record, name)[0].partition(".")
-        if section == "model":
-            found[key] = data.pick(record, name, case=case).item()
-    return {row.name: found[row.key] for row in experiment.model.definition.parameters}
 
 
 def window(span: float, period: float) -> float:

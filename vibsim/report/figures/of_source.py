@@ -44,19 +44,8 @@ DRAWN: Mapping[str, Draw] = {
     "poincare": lambda e, r, _: spectra.poincare(e, r, data.everyone(r)),
 }
 """What draws each kind, but those over time, which have options, and the player."""
-OF_SERIES = {
-    "over_time",
-    "phase_plane",
-    "path",
-    "peaks",
-    "growth",
-    "differences",
-    "energy_error",
-    "spring",
-    "spectrum",
-    "poincare",
-}
-"""Kinds that need series over time, which a large sweep does not keep."""
+OF_RECORD = ("local_frequency", "frequency", "second_difference", "grids")
+"""Kinds that need no series over time, which a large sweep does not keep."""
 
 
 def pictures(
@@ -65,11 +54,8 @@ def pictures(
     """Return the pictures of every figure that is asked for; none where what it shows is not kept of the run."""
     found, names = [], set[str]()
     for i, asked in enumerate(experiment.figures, 1):
-        drawn = (
-            [] if asked.shows == PLAYER else _drawn(experiment, record, lead, asked, f"source_{i}")
-        )
         named = []
-        for picture in drawn:
+        for picture in _drawn(experiment, record, lead, asked, f"source_{i}"):
             # one that is asked for twice is on the page twice
             name = picture.name if picture.name not in names else f"source_{i}_{picture.name}"
             names.add(name)
@@ -82,12 +68,12 @@ def pictures(
 def _drawn(
     experiment: Experiment, record: Record, lead: Lead, asked: FigureOfSource, name: str
 ) -> list[Picture]:
-    if asked.shows in OF_SERIES and data.is_lean(record):
+    if asked.shows == PLAYER or (asked.shows not in OF_RECORD and data.is_lean(record)):
         return []
     if asked.shows == "over_time":
         return over_time.pictures(experiment, record, asked, name)
     picture = DRAWN[asked.shows](experiment, record, lead)
-    return [picture] if picture is not None and picture.figure is not None else []
+    return [] if picture is None else [picture]
 
 
 def undrawn(

@@ -37,16 +37,16 @@ def against_step(experiment: Experiment, record: Record, quantity: str, case: in
     second = (6.1, 2.7) if many else (5.0, 3.8)
     figure, (left, right) = rows_of(2, [(0.8, 3.3), second], panel, 0.6, 0.5)
     left.set_gid(style.STEP)
-    members = [Member(s, case, scheme) for s, scheme in enumerate(schemes)]
+    members = data.of_case(record, case)
     kinds = _draw_norms(left, experiment, record, quantity, members)
     draw = _draw_each if many else _draw_by_level
     there = _has_order(right, record, quantity, case)
     is_settled = draw(right, experiment, record, quantity, members) if there else None
     legend_above(figure, left)
-    name, letter = words.swept(data.case_name(record, case)), words.symbol(quantity)
+    name = ", ".join(filter(None, [words.symbol(quantity), members[0].case_words]))
     return Picture(
         name=f"order_{quantity}_{case}",
-        title=f"How fast does the error shrink? {letter}{f', {name}' if name else ''}",
+        title=f"How fast does the error shrink? {name}",
         caption=_caption(kinds, is_settled, many, data.basis_of_order(record, quantity)),
         alt=f"Norm of the level differences of {words.name(quantity)} against the step, and local order against level",
         figure=figure,
@@ -109,13 +109,13 @@ def _draw_norms(
         return set()
     orders = list(dict.fromkeys(order for order, _ in promises(experiment, record, quantity)))
     due = data.basis_of_order(record, quantity)
-    slopes = [
-        _reference(ax, dt, seen, order, due, SLOPES[k % len(SLOPES)] if len(orders) > 1 else None)
-        for k, order in enumerate(orders)
-    ]
-    near = _step_limits(ax, dt, seen, kinds["floor"])
     found = {name for name in ("difference", "true") if style.finite(*kinds[name]).size}
-    found |= {"floor"} if near else set()
+    for k, order in enumerate(orders):
+        dashes = SLOPES[k % len(SLOPES)] if len(orders) > 1 else None
+        if _reference(ax, dt, seen, order, due, dashes):
+            found.add("slope")
+    if _step_limits(ax, dt, seen, kinds["floor"]):
+        found.add("floor")
     for kind, (text, mark) in KINDS.items():
         if kind in found:
             ax.plot([], [], color=style.GREY, **mark, label=text)
@@ -123,7 +123,7 @@ def _draw_norms(
     measure = data.norm_unit(record, quantity)
     ax.set_ylabel(style.label(f"{TYPICAL_NORM} norm, {words.symbol(quantity)}", measure))
     _level_axis(ax, dt, data.whole(record, "level"))
-    return found | ({"slope"} if any(slopes) else set())
+    return found
 
 
 def _positive(parts: list[Floats]) -> Floats:

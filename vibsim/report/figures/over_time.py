@@ -63,20 +63,13 @@ def pictures(
 def _divided(
     record: Record, everyone: list[Member], by: str | None
 ) -> list[tuple[str, list[Member]]]:
-    """Divide members by what they have in common, with the words for it."""
+    """Divide members by what they have in common: nothing, the whole member, or a swept key; with the words for it."""
     groups: dict[str, list[Member]] = {}
     for member in everyone:
-        groups.setdefault(_common(record, member, by), []).append(member)
+        key = None if by == MEMBER else by
+        text = "" if by is None else words.swept(data.case_name(record, member.case, key))
+        groups.setdefault(text, []).append(member)
     return list(groups.items())
-
-
-def _common(record: Record, member: Member, by: str | None) -> str:
-    """Return the words of what divides members: nothing, the whole member, or a swept key."""
-    if by is None:
-        return ""
-    return words.swept(
-        member.case_name if by == MEMBER else data.case_name(record, member.case, by)
-    )
 
 
 def _picture(
@@ -89,10 +82,9 @@ def _picture(
     shown = _panels(experiment, record, asked, members)
     tall = 2.2 if len(shown) < 4 else 1.6
     axes = panels.stacked([tall] * len(shown), style.TIME)
-    ends = [
-        float(data.times(record, member.case)[-1]) for panel in shown for _, member in panel.runs
-    ]
-    end = max(ends) if asked.until is None else min(asked.until, max(ends))
+    cases = {member.case for panel in shown for _, member in panel.runs}
+    end = max(float(data.times(record, case)[-1]) for case in cases)
+    end = end if asked.until is None else min(asked.until, end)
     for ax, panel in zip(axes, shown, strict=True):
         if not _draw(ax, experiment, record, asked, panel, end):
             return None
@@ -107,8 +99,7 @@ def _picture(
             f"Wide and grey: the exact solution{'' if is_known else ', or its reference'}, where it is known.",
             f"Markers are steps. What grows beyond {LEAVES_FRAME:g} times the exact solution leaves the frame.",
             f"At most {MOST} figures and {MOST} panels are drawn, and {style.MANY} runs in a panel."
-            if _is_thinned(record, asked, members)
-            else "",
+            * _is_thinned(record, asked, members),
         ),
         f"{letters} against time, {len(shown)} {'panel' if len(shown) == 1 else 'panels'}",
         axes[0].get_figure(root=True),
@@ -132,16 +123,10 @@ def _panels(
     levels = data.whole(record, "level")
     finest = len(levels) - 1
     if asked.panels == LEVEL:
-        dt = data.steps_of(record, members[0].case)
-        unit = data.time_unit(record, "dt")
+        steps = [data.time_text(record, dt) for dt in data.steps_of(record, members[0].case)]
         runs = _named(record, members, asked)
         return [
-            _Panel(
-                f"level {levels[i]}, dt = {words.number(float(dt[i]), 'step')} {unit}".rstrip(),
-                quantities[0],
-                runs,
-                i,
-            )
+            _Panel(f"level {levels[i]}, dt = {steps[i]}", quantities[0], runs, i)
             for i in style.spaced(len(levels), MOST)
         ]
     if asked.panels is not None:
@@ -181,9 +166,8 @@ def _draw(
     if len({member.case for _, member in panel.runs}) == 1:
         fine, best = _exact(experiment, record, panel.quantity, first, end)
         if np.isfinite(best).any():
-            ax.plot(
-                *style.thin(fine, best), color=style.PALE, linewidth=4.5, label="exact", zorder=1
-            )
+            wide: dict[str, Any] = {"color": style.PALE, "linewidth": 4.5, "zorder": 1}
+            ax.plot(*style.thin(fine, best), label="exact", **wide)
             exact.append(best)
     size = max(map(data.largest, exact), default=0.0)
     drawn, jumps = [], isinstance(model.events, Impact | Crossings)
@@ -201,7 +185,7 @@ def _draw(
         ax.plot(*style.thin(t, found), label=style.entry(text), **_look(k, t.size, jumps))
         drawn.append(found)
     fine = np.linspace(float(t[0]), end, SMOOTH)
-    parameters, _ = series.numbers_of(experiment, record, first.case)
+    parameters = series.parameters_of(experiment, record, first.case)
     for k, (text, formula) in enumerate(asked.beside.items()):
         curve = values(parse(formula, ("t", *parameters)), {**parameters, "t": fine})
         curve = np.broadcast_to(curve, fine.shape)

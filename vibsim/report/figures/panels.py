@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from vibsim.core.array_types import Floats
-from vibsim.report import frame, style
+from vibsim.report import data, frame, style
 from vibsim.report.types import Axes, Figure
 
 LOG_RATIO = 1e6
@@ -36,6 +36,11 @@ class Curve:
         """Whether the runs behind it lasted to the end; at the first and last time a centred formula has no value."""
         inner = self.values[1:-1] if self.values.size > 2 else self.values
         return self.lost != frame.BROKE_DOWN and bool(np.isfinite(inner).all())
+
+    @property
+    def is_readable(self) -> bool:
+        """Whether its runs lasted to the end, and it stands above round-off."""
+        return self.sound and self.is_whole
 
     @property
     def fate(self) -> str:
@@ -109,22 +114,17 @@ def draw_curves(ax: Axes, t: Floats, curves: list[Curve], text: str, measure: st
     """
     sound = [curve for curve in curves if curve.sound] or curves
     shown = [curve.values for curve in sound if curve.is_whole] or [curve.values for curve in sound]
-    wild = explosive(shown)
-    exponent = 0 if wild else style.scale(*shown)
+    scale = Scale.of(shown)
     for i, curve in enumerate(curves):
-        values = style.no_zeros(curve.values) if wild else curve.values / 10.0**exponent
-        x, y = style.thin(t, values)
+        x, y = style.thin(t, scale.scaled(curve.values))
         fate = f"\n({curve.fate})" if curve.fate else ""
         look = _look(i, len(curves), x.size)
         if not curve.sound and any(c.sound for c in curves):
             look = {"color": "#a0a0a0", "linewidth": 0.6, "zorder": 1.5}
         ax.plot(x, y, label=curve.label + fate, gid=curve.group, **look)
     stop_at_breakdown(ax, t, [curve.values for curve in curves])
-    if wild:
-        style.log_axis(ax, "y", *decades(shown))
-    else:
-        ax.set_ylim(*style.limits(*(values / 10.0**exponent for values in shown)))
-    words = style.label(f"|{text}|" if wild else text, measure, exponent)
+    scale.apply(ax)
+    words = style.label(f"|{text}|" if scale.is_log else text, measure, scale.exponent)
     # a long label would run into the panel below
     ax.set_ylabel(words.replace(f"{text} [", f"{text}\n[") if len(words) > LONG_LABEL else words)
     style.beside(ax)
@@ -152,12 +152,36 @@ def fit_values(ax: Axes, shown: list[Floats], *others: Floats) -> None:
         ax.set_ylim(*style.limits(*shown, *others))
 
 
+class Scale(NamedTuple):
+    """The vertical scale of series: linear with a power of ten, or logarithmic for what grows without bound."""
+
+    series: list[Floats]
+    is_log: bool
+    exponent: int = 0
+
+    @classmethod
+    def of(cls, series: list[Floats]) -> Scale:
+        """Return the scale on which some series can be read."""
+        is_log = explosive(series)
+        return cls(series, is_log, 0 if is_log else style.scale(*series))
+
+    def scaled(self, values: Floats) -> Floats:
+        """Return what stands for values on the axis."""
+        return style.no_zeros(values) if self.is_log else values / 10.0**self.exponent
+
+    def apply(self, ax: Axes, most: int = 7) -> None:
+        """Give an axis this scale, with about `most` labelled ticks of a logarithmic one."""
+        if self.is_log:
+            style.log_axis(ax, "y", *decades(self.series), most=most)
+        else:
+            ax.set_ylim(*style.limits(*map(self.scaled, self.series)))
+
+
 def explosive(series: list[Floats]) -> bool:
     """Say whether values grow beyond all bounds, so that on a linear scale only the last of them would be seen."""
     sizes = _sizes(series)
-    return bool(sizes) and max(s.max() for s in sizes) > LOG_RATIO * min(
-        np.median(s) for s in sizes
-    )
+    usual = min((np.median(s) for s in sizes), default=np.inf)
+    return bool(max((s.max() for s in sizes), default=0.0) > LOG_RATIO * usual)
 
 
 def decades(series: list[Floats]) -> tuple[float, float]:
@@ -192,31 +216,30 @@ def _look(i: int, count: int, points: int) -> dict[str, Any]:
 
 
 def comparable(curves: list[Curve]) -> bool:
-    """Say whether at least two curves stand above round-off and last to the end, so that a spread has a meaning."""
-    return sum(curve.sound and curve.is_whole for curve in curves) > 1
+    """Say whether at least two curves are readable, so that a spread has a meaning."""
+    return sum(curve.is_readable for curve in curves) > 1
 
 
 def draw_spread(ax: Axes, t: Floats, curves: list[Curve], measure: str) -> None:
     """Draw how far every comparable curve is from the finest of them; logarithmic where they differ much."""
-    sound = [i for i, curve in enumerate(curves) if curve.sound and curve.is_whole]
+    sound = [i for i, curve in enumerate(curves) if curve.is_readable]
     reference = curves[sound[-1]]
     gaps = {i: curves[i].values - reference.values for i in sound[:-1]}
     shown = list(gaps.values())
     # an end point of its own kind does not count
     typical = [float(np.nanquantile(np.abs(gap), 0.9)) for gap in shown]
     sizes = [size for size in typical if size > 0]
-    logarithmic = bool(sizes) and max(sizes) > LOG_SPREAD * min(sizes)
-    exponent = 0 if logarithmic else style.scale(*shown)
+    is_log = bool(sizes) and max(sizes) > LOG_SPREAD * min(sizes)
+    scale = Scale(shown, is_log, 0 if is_log else style.scale(*shown))
     for i, gap in gaps.items():
-        values = style.no_zeros(gap) if logarithmic else gap / 10.0**exponent
-        x, y = style.thin(t, values)
+        x, y = style.thin(t, scale.scaled(gap))
         look = _look(i, len(curves), x.size) | {"linewidth": 1.3, "alpha": 1.0, "markersize": 4.0}
         ax.plot(x, y, label=f"_{curves[i].label}", gid=curves[i].group, **look)
-    if logarithmic:
-        highest = min(max(float(np.nanmax(np.abs(gap))) for gap in shown), style.LARGEST)
+    if is_log:
+        highest = min(max(map(data.largest, shown)), style.LARGEST)
         style.log_axis(ax, "y", max(0.02 * min(sizes), style.TINIEST), 2 * highest)
     else:
         ax.axhline(0.0, color=style.GREY, linewidth=0.7, zorder=1)
-        ax.set_ylim(*style.limits(*(gap / 10.0**exponent for gap in shown)))
-    ax.set_ylabel(style.label("|spread|" if logarithmic else "spread", measure, exponent))
+        scale.apply(ax)
+    ax.set_ylabel(style.label("|spread|" if is_log else "spread", measure, scale.exponent))
     ax.set_title(f"Spread: distance from {reference.label}", fontweight="normal", fontsize=9)

@@ -28,6 +28,8 @@ PERIODS = 3.0  # of a longer motion the first period and the last so many are dr
 FEWEST_SAMPLES = 8  # fewer samples than this in a period do not draw an orbit
 FLATTEST = 0.15  # least height of the frame of a path over its width, or the other way round
 TALLEST = 4.5  # largest height of a panel [inch]
+TICK = 0.8  # room for a number below a panel [inch]
+SEEN = 0.01  # of the size of a path, what is seen of a difference
 
 Points = tuple[Floats, Floats]
 
@@ -53,8 +55,9 @@ def phase(experiment: Experiment, record: Record, shown: list[Member]) -> Pictur
     figure, axes = rows_of(len(chosen), columns, 2.35, 0.5, 0.45)
     size = _draw_orbit(axes, record, model, case, w, t <= 1.02 * period)
     is_long = bool(t[-1] > (PERIODS + 1.0) * period)
-    parts = [(t <= t[0] + period, 0.9), (t >= t[-1] - PERIODS * period, 1.4)]
-    parts = parts if is_long else [(np.ones(t.size, dtype=bool), 1.2)]
+    parts = [(np.ones(t.size, dtype=bool), 1.2)]
+    if is_long:
+        parts = [(t <= t[0] + period, 0.9), (t >= t[-1] - PERIODS * period, 1.4)]
     largest = 0.0
     for ax, i in zip(axes, chosen, strict=True):
         for k, member in enumerate(members):
@@ -77,19 +80,14 @@ def phase(experiment: Experiment, record: Record, shown: list[Member]) -> Pictur
         if n % PANELS_A_ROW == 0:
             ax.set_ylabel(style.label(f"{words.symbol(model.velocity)} / w", measure))
     legend_above(figure, axes[0])
-    told = (
-        f"Of the whole motion the first period (thin) and the last {PERIODS:g} are drawn."
-        if is_long
-        else ""
-    )
+    told = f"Of the whole motion the first period (thin) and the last {PERIODS:g} are drawn. "
     return Picture(
         name=f"phase_plane_{case}",
         title="Phase plane: velocity against position",
-        caption=style.sentences(
-            told,
-            "Black, dashed: the exact orbit. The marker is the end of the motion. A spiral outwards gains energy, one "
-            "inwards loses it; an orbit that closes beside the exact one conserves an energy of its own.",
-        ),
+        caption=told
+        * is_long
+        + "Black, dashed: the exact orbit. The marker is the end of the motion. A spiral outwards gains energy, one "
+        "inwards loses it; an orbit that closes beside the exact one conserves an energy of its own.",
         alt="Velocity over the natural frequency against position for each level, with the exact orbit",
         figure=figure,
     )
@@ -124,6 +122,8 @@ def path(experiment: Experiment, record: Record, shown: list[Member]) -> Picture
 
     None of a model with one coordinate.
     """
+    from matplotlib.ticker import MaxNLocator
+
     model = experiment.model.definition
     if model.coordinates < 2 or not shown:
         return None
@@ -134,9 +134,14 @@ def path(experiment: Experiment, record: Record, shown: list[Member]) -> Picture
         panels = [(found[0].case_words, found, len(levels) - 1) for found in groups]
     else:
         panels = [(f"level {levels[i]}", shown, i) for i in style.spaced(len(levels), PANELS_A_ROW)]
+    curves = [[_points(record, names, m, level) for m in members] for _, members, level in panels]
+    if not data.swept(record):
+        # levels that look like the finest one are left out
+        last = len(curves) - 1
+        kept = [i for i, paths in enumerate(curves) if i == last or _differ(paths, curves[last])]
+        panels, curves = [panels[i] for i in kept], [curves[i] for i in kept]
     references = [_points(record, names, members[0], None) for _, members, _ in panels]
     is_known = [bool(np.isfinite(reference).all()) for reference in references]
-    curves = [[_points(record, names, m, level) for m in members] for _, members, level in panels]
     each = zip(references, is_known, curves, strict=True)
     frame = _frame([points for exact, has, panel in each for points in (*[exact] * has, *panel)])
     if frame is None:
@@ -144,7 +149,8 @@ def path(experiment: Experiment, record: Record, shown: list[Member]) -> Picture
     (left, right), (low, high) = frame
     wide = style.WIDTH - 1.0
     tall = min(wide * (high - low) / (right - left), TALLEST)
-    figure, axes = rows_of(len(panels), [(0.75, wide)], tall, 0.4, 0.3)
+    figure, axes = rows_of(len(panels), [(0.75, wide)], tall, 0.5, 0.3)
+    ticks = max(2, int(tall * (right - left) / (high - low) / TICK))
     labels = [style.label(words.symbol(name), unit(record, f"{name}_finest")) for name in names]
     for i, (title, members, _) in enumerate(panels):
         # from thick to thin, so that no scheme hides another
@@ -156,13 +162,15 @@ def path(experiment: Experiment, record: Record, shown: list[Member]) -> Picture
             dashed = style.REFERENCE | {"zorder": 5, "linewidth": 0.8}
             axes[i].plot(*references[i], **dashed, label="reference")
         axes[i].set_title(title)
+        axes[i].xaxis.set_major_locator(MaxNLocator(ticks, steps=[1, 2, 5, 10]))
         axes[i].set(xlim=frame[0], ylim=frame[1], aspect="equal", ylabel=labels[1])
     axes[-1].set_xlabel(labels[0])
     legend_above(figure, max(axes, key=lambda ax: len(ax.get_lines())))
     return Picture(
         name="path",
         title=f"Path: {names[1]} against {names[0]}",
-        caption="Both axes have the same scale. The marker is the end of the motion; black, dashed: the reference.",
+        caption="Both axes have the same scale. The marker is the end of the motion; black, dashed: the reference. "
+        "Levels that look like the finest one are left out.",
         alt=f"{names[1]} against {names[0]} for each level or member, with the reference",
         figure=figure,
     )
@@ -170,13 +178,17 @@ def path(experiment: Experiment, record: Record, shown: list[Member]) -> Picture
 
 def _points(record: Record, names: tuple[str, ...], member: Member, level: int | None) -> Points:
     """Return the path of a member on a level, or the exact one, which is NaN where it is not known."""
-    x, y = (
-        data.exact_series(record, name, member)
-        if level is None
-        else of_level(record, name, member, level)
-        for name in names
-    )
+    if level is None:
+        x, y = (data.exact_series(record, name, member) for name in names)
+    else:
+        x, y = (of_level(record, name, member, level) for name in names)
     return x, y
+
+
+def _differ(panel: list[Points], finest: list[Points]) -> bool:
+    """Say whether one of the paths of a level looks different from that of the finest level."""
+    apart = [data.largest(np.subtract(a, b)) for a, b in zip(panel, finest, strict=True)]
+    return max(apart) > SEEN * max(data.largest(np.asarray(points)) for points in finest)
 
 
 def _frame(seen: list[Points]) -> tuple[tuple[float, float], tuple[float, float]] | None:

@@ -211,12 +211,8 @@ def bouncing_ball(motion: Motion) -> Scene:
     """Draw a ball above the ground."""
     scale = 170.0 / max(motion.reach["h"], 1e-9)
     y = 195.0 - 10.0 - scale * motion.states["h"]
-    return Scene(
-        (
-            Part("line", "ground", (60.0, 195.0, 260.0, 195.0)),
-            Part("circle", "body", (160.0, y, 10.0)),
-        )
-    )
+    ground = Part("line", "ground", (60.0, 195.0, 260.0, 195.0))
+    return Scene((ground, Part("circle", "body", (160.0, y, 10.0))))
 
 
 def spring_mass(motion: Motion) -> Scene:
@@ -281,17 +277,15 @@ def washing_machine(motion: Motion) -> Scene:
     y = 95.0 - up
     angle = motion.number("speed") * motion.t
     # the force e W^2 cos(W t) points upwards at first
-    return Scene(
-        (
-            Part("line", "ground", (70.0, 205.0, 250.0, 205.0)),
-            Part("spring", "wire", (130.0, 205.0, 130.0, y + 46.0)),
-            Part("spring", "wire", (190.0, 205.0, 190.0, y + 46.0)),
-            Part("box", "body", (160.0, y, 104.0, 92.0)),
-            Part("circle", "wheel", (160.0, y, 34.0)),
-            Part("circle", "mark", (160.0 + 26.0 * np.sin(angle), y - 26.0 * np.cos(angle), 6.0)),
-        ),
-        (("mark", "unbalance"),),
+    parts = (
+        Part("line", "ground", (70.0, 205.0, 250.0, 205.0)),
+        Part("spring", "wire", (130.0, 205.0, 130.0, y + 46.0)),
+        Part("spring", "wire", (190.0, 205.0, 190.0, y + 46.0)),
+        Part("box", "body", (160.0, y, 104.0, 92.0)),
+        Part("circle", "wheel", (160.0, y, 34.0)),
+        Part("circle", "mark", (160.0 + 26.0 * np.sin(angle), y - 26.0 * np.cos(angle), 6.0)),
     )
+    return Scene(parts, (("mark", "unbalance"),))
 
 
 SCENES: Mapping[str, Callable[[Motion], Scene] | None] = {
@@ -329,12 +323,11 @@ def strokes(shape: str, values: Sequence[float]) -> list[list[tuple[float, float
         case "spring", [x0, y0, x1, y1]:
             length = math.hypot(x1 - x0, y1 - y0) or 1.0
             dx, dy = (x1 - x0) / length, (y1 - y0) / length
-            turns = [
-                (length * (0.1 + 0.8 * (i + 0.5) / (2 * COILS)), 5.0 - 10.0 * (i % 2))
-                for i in range(2 * COILS)
-            ]
-            middle = [(x0 + s * dx - side * dy, y0 + s * dy + side * dx) for s, side in turns]
-            return [[(x0, y0), *middle, (x1, y1)]]
+            line = [(x0, y0)]
+            for i in range(2 * COILS):
+                s, side = length * (0.1 + 0.8 * (i + 0.5) / (2 * COILS)), 5.0 - 10.0 * (i % 2)
+                line.append((x0 + s * dx - side * dy, y0 + s * dy + side * dx))
+            return [[*line, (x1, y1)]]
         case "box", [x, y, w, h]:
             left, right, top, bottom = x - w / 2, x + w / 2, y - h / 2, y + h / 2
             return [[(left, top), (right, top), (right, bottom), (left, bottom), (left, top)]]

@@ -44,16 +44,12 @@ def solution(record: Record, quantity: str, member: Member) -> Picture:
     axes[1].set_ylabel(style.label(f"|error of {letter}|", measure))
     axes[1].set_title("Estimated beside true error" if is_known else "Estimated error")
     axes[1].set_xlabel(data.time_label(record))
-    trust = (
-        " (lines), and the true error (dots). Dots on the lines mean that the estimate can be trusted."
-        if is_known
-        else "."
-    )
+    dots = " (lines), and the true error (dots). Dots on the lines mean that the estimate can be trusted"
     return Picture(
         name=f"solution_{quantity}_{member.stem}",
         title=f"Solution with its error: {letter}, {member.title}",
         caption=f"Top: the finest level, and the value extrapolated from the two finest ones with its error bar"
-        f"{thickness}. Bottom: the error that the difference of two levels predicts{trust}",
+        f"{thickness}. Bottom: the error that the difference of two levels predicts{dots * is_known}.",
         alt=f"{words.name(quantity)} against time for {member.title}, and its estimated error on a logarithmic scale",
         figure=axes[0].get_figure(root=True),
     )
@@ -110,15 +106,15 @@ def _draw_errors(
 
     def add(line: Floats, dots: Floats, of: str, true_of: str, **look: Any) -> None:
         """Draw an estimate as a line and a true error as dots, few enough to leave the line visible."""
-        drawn.append(style.no_zeros(line))
-        ax.plot(*style.thin(t, drawn[-1]), label=of, **look)
-        if np.isfinite(style.no_zeros(dots)).any():
-            drawn.append(style.no_zeros(dots))
+        line, dots = style.no_zeros(line), style.no_zeros(dots)
+        drawn.append(line)
+        ax.plot(*style.thin(t, line), label=of, **look)
+        if np.isfinite(dots).any():
+            drawn.append(dots)
             every = slice(None, None, max(1, t.size // 60))
-            mark: dict[str, Any] = {"linestyle": "none", "marker": "o", "markersize": 3.2}
-            mark |= {"color": look["color"], "markerfacecolor": "white", "markeredgewidth": 0.9}
-            mark["gid"] = look.get("gid")
-            ax.plot(t[every], drawn[-1][every], label=true_of, **mark)
+            mark: Look = {"linestyle": "none", "marker": "o", "markersize": 3.2}
+            mark |= {"markerfacecolor": "white", "markeredgewidth": 0.9}
+            ax.plot(t[every], dots[every], label=true_of, **look | mark)
 
     estimates = [
         data.at(record, f"{quantity}_error_estimate", member, pair=i) for i in range(len(pairs))
@@ -153,8 +149,8 @@ def motion(record: Record, quantity: str, member: Member) -> Picture:
     series = {i: data.of_level(record, quantity, member, i) for i in chosen}
     has_errors = bool(np.isfinite(best).any()) and len(levels) > (0 if is_known else 1)
     axes = panels.stacked([2.3, *[1.7] * has_errors], style.TIME)
+    text = "exact" if is_known else "extrapolated"
     if has_errors:
-        text = "exact" if is_known else "extrapolated"
         axes[0].plot(*style.thin(t, best), color=style.PALE, linewidth=5.0, label=text, zorder=1)
     looks = {i: _look(k, record, i) for k, i in enumerate(chosen)}
     _draw_levels(axes[0], t, series, looks, best)
@@ -162,20 +158,16 @@ def motion(record: Record, quantity: str, member: Member) -> Picture:
     if has_errors:
         errors = {i: values - best for i, values in series.items()}
         exponent = _draw_level_errors(axes[1], t, errors, looks)
-        of = "exact" if is_known else "extrapolated"
-        axes[1].set_title(f"Each level minus the {of} solution", fontweight="normal", fontsize=9)
+        axes[1].set_title(f"Each level minus the {text} solution", fontweight="normal", fontsize=9)
         axes[1].set_ylabel(style.label(f"error of {letter}", measure, exponent))
     axes[-1].set_xlabel(data.time_label(record))
-    told = (
-        f"Wide and grey is the {'exact' if is_known else 'extrapolated'} solution, the lines are the levels; "
-        "below it, how far each level is from it."
-    )
+    told = f"Wide and grey is the {text} solution, the lines are the levels; below it, how far each level is from it."
     return Picture(
         f"motion_{quantity}_{member.stem}",
         f"{words.title(quantity)}(t), {member.title}",
         told if has_errors else "Each line is a level.",
         f"{words.name(quantity)} against time on all levels for {member.title}"
-        + (", and the error of each level" if has_errors else ""),
+        + ", and the error of each level" * has_errors,
         axes[0].get_figure(root=True),
     )
 
@@ -211,13 +203,8 @@ def _draw_level_errors(
 ) -> int:
     """Draw errors, on a logarithmic scale where they grow without bound; return the exponent of the axis."""
     shown = [e for e in errors.values() if np.isfinite(e).all()] or list(errors.values())
-    wild = panels.explosive(shown)
-    exponent = 0 if wild else style.scale(*shown)
+    scale = panels.Scale.of(shown)
     for i, values in errors.items():
-        y = style.no_zeros(values) if wild else values / 10.0**exponent
-        ax.plot(*style.thin(t, y), **looks[i])
-    if wild:
-        style.log_axis(ax, "y", *panels.decades(shown), most=5)
-    else:
-        ax.set_ylim(*style.limits(*(e / 10.0**exponent for e in shown)))
-    return exponent
+        ax.plot(*style.thin(t, scale.scaled(values)), **looks[i])
+    scale.apply(ax, most=5)
+    return scale.exponent

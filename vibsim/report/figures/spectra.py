@@ -7,6 +7,7 @@ P. Holmes, A nonlinear oscillator with a strange attractor, Phil. Trans. R. Soc.
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 
@@ -39,24 +40,16 @@ def spectrum(experiment: Experiment, record: Record, member: Member) -> Picture 
     chosen = range(max(len(levels) - MOST_LEVELS, 0), len(levels))
     for k, level in enumerate(chosen):
         found = observed.lines(of_level(record, name, member, level))
-        w_of = w[: found.size]
-        look = style.look(k)
-        ax.plot(
-            w_of,
-            found[: w_of.size],
-            color=look["color"],
-            linewidth=1.0,
-            label=f"level {levels[level]}",
-        )
+        w_of, seen = w[: found.size], found[: w.size]
+        colour, text = style.look(k)["color"], f"level {levels[level]}"
+        ax.plot(w_of, seen, color=colour, linewidth=1.0, label=text)
         top = data.largest(found)
         highest = max(highest, top)
-        last = max(
-            last, float(w_of[np.flatnonzero(found[: w_of.size] > 1e-3 * top)[-1:]].max(initial=0.0))
-        )
+        last = max(last, float(w_of[seen > 1e-3 * top].max(initial=0.0)))
         predicted = _predicted(experiment, record, member, level)
         if math.isfinite(predicted):
-            text = style.entry(f"theory, level {levels[level]}")
-            ax.axvline(predicted, color=look["color"], linestyle=":", linewidth=1.2, label=text)
+            look: Any = {"color": colour, "linestyle": ":", "linewidth": 1.2}
+            ax.axvline(predicted, **look, label=f"theory, {text}")
     if not highest > 0.0:
         return None
     model = experiment.model.definition
@@ -64,24 +57,18 @@ def spectrum(experiment: Experiment, record: Record, member: Member) -> Picture 
     if model.linear and math.isfinite(exact):
         ax.axvline(exact, label="natural", **style.REFERENCE)
     style.log_axis(ax, "y", DECADES * highest, 3.0 * highest)
-    ax.set_xlim(
-        0.0, min(float(w[-1]), max(4.0 * last, 4.0 * exact if math.isfinite(exact) else 0.0))
-    )
-    time = data.time_unit(record)
-    radians = f"rad {data.pretty_unit(f'{time}-1')}" if time else ""
-    ax.set(xlabel=style.label("angular frequency", radians))
+    ax.set_xlim(0.0, min(float(w[-1]), 4.0 * np.fmax(last, exact)))
+    ax.set_xlabel(style.label("angular frequency", data.radians_unit(record)))
     measure = data.unit(record, f"{name}_finest")
     ax.set_ylabel(style.label(f"amplitude of {words.symbol(name)}", measure))
     style.beside(ax)
     return Picture(
         f"spectrum_{member.case}",
-        f"Spectrum of {words.symbol(name)}{f', {member.scheme_name}' if member.scheme_name else ''}",
+        f"Spectrum of {words.symbol(name)}, {member.scheme_name}",
         style.sentences(
             "The amplitudes of the frequencies in the stored series less its mean, with Hann's window.",
             "Dotted: the frequency that the scheme itself has by theory. Its distance from the natural one, dashed, is "
-            "the frequency error of the scheme."
-            if model.linear and model.conservative
-            else "",
+            "the frequency error of the scheme." * (model.linear and model.conservative),
         ),
         "Amplitude against angular frequency at the finest levels, with the frequencies known from theory",
         ax.get_figure(root=True),

@@ -85,6 +85,11 @@ def _numbers(*values: float) -> str:
     return " ".join(map(_number, values))
 
 
+def _place(x: float, y: float, width: float, height: float) -> str:
+    """Write place and size of an element as attributes."""
+    return f'x="{_number(x)}" y="{_number(y)}" width="{_number(width)}" height="{_number(height)}"'
+
+
 class Writer(RendererBase):  # type: ignore[misc, unused-ignore]
     """What matplotlib draws on: elements of SVG, and how far the words among them reach."""
 
@@ -105,7 +110,7 @@ class Writer(RendererBase):  # type: ignore[misc, unused-ignore]
         """Return all that was drawn, with a frame that holds every word."""
         left, top = self._low
         width, height = self._high - self._low
-        place = f'x="{_number(left)}" y="{_number(top)}" width="{_number(width)}" height="{_number(height)}"'
+        place = _place(left, top, width, height)
         defs = "".join(text.replace("#", key, 1) for text, key in self._defs.items())
         return (
             '<svg xmlns="http://www.w3.org/2000/svg" xmlns:xlink="http://www.w3.org/1999/xlink" '
@@ -180,9 +185,8 @@ class Writer(RendererBase):  # type: ignore[misc, unused-ignore]
         """Draw grid, ticks, their numbers and the label of an axis: of x with `i` 0, of y with 1."""
         known, which = axis.get_tick_params("major"), "xy"[i]
         size = float(known.get("labelsize", RC[f"{which}tick.labelsize"]))
-        colour, words = (
-            to_hex(known.get(key, RC[f"{which}tick.color"])) for key in ("color", "labelcolor")
-        )
+        plain = RC[f"{which}tick.color"]
+        colour, words = (to_hex(known.get(key, plain)) for key in ("color", "labelcolor"))
         near, far = (("bottom", "top"), ("left", "right"))[i]
         length, pad = RC[f"{which}tick.major.size"], RC[f"{which}tick.major.pad"]
         box, height = ax.bbox, self._size[1]
@@ -203,16 +207,13 @@ class Writer(RendererBase):  # type: ignore[misc, unused-ignore]
             ends = (start, box.height * -1.0) if i == 0 else (start, box.width)
             self._strokes([at[k] for k in seen], ends, i, look)
         look = f'stroke="{colour}" stroke-width="0.8"'
-        for side, minor in ((near, False), (near, True), (far, False)):
+        for side in (near, far):
             if known.get(side, side == near):
-                where = [at[k] for k in seen]
-                if minor:
-                    if isinstance(axis.get_minor_locator(), NullLocator):
-                        continue
-                    found = self._places(ax, np.asarray(axis.get_minorticklocs(), float), i)
-                    where = [x for x in found if low <= x <= high]
-                start, long = edges[side]
-                self._strokes(where, (start, 0.57 * long if minor else long), i, look)
+                self._strokes([at[k] for k in seen], edges[side], i, look)
+            if side == near and not isinstance(axis.get_minor_locator(), NullLocator):
+                found = self._places(ax, np.asarray(axis.get_minorticklocs(), float), i)
+                start, long = edges[near]
+                self._strokes([x for x in found if low <= x <= high], (start, 0.57 * long), i, look)
         widest = 0.0
         for side in (near, far):
             if not known.get(f"label{side}", side == near):
@@ -230,10 +231,8 @@ class Writer(RendererBase):  # type: ignore[misc, unused-ignore]
         self._body.append("</g>")
         self._label(ax, axis, i, (widest, size) if known.get(f"label{near}", True) else (0.0, 0.0))
         if offset := axis.get_major_formatter().get_offset():
-            x, y = (
-                (box.x1, height - box.y0 + 2.2 * size) if i == 0 else (box.x0, height - box.y1 - 3)
-            )
-            self._write(x, y, offset, size, "right" if i == 0 else "left", words)
+            place = (box.x1, height - box.y0 + 2.2 * size), (box.x0, height - box.y1 - 3)
+            self._write(*place[i], offset, size, ("right", "left")[i], words)
 
     def _places(self, ax: Any, values: Any, i: int) -> Any:
         """Return where values of an axis stand, in points from the left or from below."""
@@ -245,12 +244,11 @@ class Writer(RendererBase):  # type: ignore[misc, unused-ignore]
     def _strokes(self, at: list[float], ends: tuple[float, float], i: int, look: str) -> None:
         """Draw parallel lines across an axis, each from where it starts and of the same length."""
         start, long = (_number(x) for x in ends)
-        height = self._size[1]
-        moves = (
-            f"M{_number(x)} {start}v{long}" if i == 0 else f"M{start} {_number(height - x)}h{long}"
-            for x in at
-        )
-        if path := "".join(moves):
+        if i == 0:
+            path = "".join(f"M{_number(x)} {start}v{long}" for x in at)
+        else:
+            path = "".join(f"M{start} {_number(self._size[1] - y)}h{long}" for y in at)
+        if path:
             self._body.append(f'<path d="{path}" {look}/>')
 
     def _label(self, ax: Any, axis: Any, i: int, numbers: tuple[float, float]) -> None:
@@ -262,9 +260,8 @@ class Writer(RendererBase):  # type: ignore[misc, unused-ignore]
             room = RC[f"{which}tick.major.size"] if axis.get_tick_params().get(near, True) else 0.0
             widest, size = numbers
             if size:
-                room += RC[f"{which}tick.major.pad"] + (
-                    size * (ASCENT + DESCENT) if i == 0 else widest
-                )
+                room += RC[f"{which}tick.major.pad"]
+                room += size * (ASCENT + DESCENT) if i == 0 else widest
             room += axis.labelpad
             axis.label.set(**({"y": ax.bbox.y0 - room} if i == 0 else {"x": ax.bbox.x0 - room}))
         axis.label.draw(self)
@@ -273,17 +270,14 @@ class Writer(RendererBase):  # type: ignore[misc, unused-ignore]
         """Draw a legend, with the key of its curve at every entry."""
         parent = legend.parent
         every = parent.axes if isinstance(parent, Figure) else [parent]
-        lines = [
-            line
-            for ax in every
-            if ax.get_gid()
-            for line in ax.get_lines()
+        lines = [line for ax in every if ax.get_gid() for line in ax.get_lines()]
+        keys = {
+            str(line.get_label()): str(line.get_gid() or line.get_label())
+            for line in lines
             if np.size(line.get_xdata())
-        ]
-        keys = {str(line.get_label()): str(line.get_gid() or line.get_label()) for line in lines}
-        for i, (handle, text) in enumerate(
-            zip(legend.legend_handles, legend.get_texts(), strict=True)
-        ):
+        }
+        entries = zip(legend.legend_handles, legend.get_texts(), strict=True)
+        for i, (handle, text) in enumerate(entries):
             if (key := keys.get(text.get_text())) is not None:
                 tag = f"entry {i}"
                 self._tags[tag] = f' data-entry="{escape(key)}"'
@@ -333,9 +327,8 @@ class Writer(RendererBase):  # type: ignore[misc, unused-ignore]
         wide, _, _ = self.get_text_width_height_descent(s, prop, ismath)
         aligned = mtext.get_horizontalalignment() if mtext is not None and not angle else "left"
         if angle and mtext is not None and mtext.get_rotation_mode() != "anchor":
-            aligned = {"center": "center", "top": "right"}.get(
-                mtext.get_verticalalignment(), "left"
-            )
+            upright = mtext.get_verticalalignment()
+            aligned = {"center": "center", "top": "right"}.get(upright, "left")
         turn = np.deg2rad(angle)
         ahead = ANCHORS.get(aligned, ("", 0.0))[1] * wide
         rgba = gc.get_rgb()
@@ -354,15 +347,10 @@ class Writer(RendererBase):  # type: ignore[misc, unused-ignore]
             return
         wide = self.width(text, size) if wide is None else wide
         anchor, part = ANCHORS.get(aligned, ("", 0.0))
-        turn = np.deg2rad(angle)
-        along, up = (
-            np.array([np.cos(turn), -np.sin(turn)]),
-            np.array([-np.sin(turn), -np.cos(turn)]),
-        )
-        start = np.array([x, y]) - part * wide * along
-        corners = [
-            start + a * wide * along + b * size * up for a in (0, 1) for b in (-DESCENT, ASCENT)
-        ]
+        sine, cosine = np.sin(np.deg2rad(angle)), np.cos(np.deg2rad(angle))
+        along, up = wide * np.array([cosine, -sine]), size * np.array([-sine, -cosine])
+        start = np.array([x, y]) - part * along
+        corners = [start + a * along + b * up for a in (0, 1) for b in (-DESCENT, ASCENT)]
         self._low = np.min([self._low, *(c - MARGIN for c in corners)], axis=0)
         self._high = np.max([self._high, *(c + MARGIN for c in corners)], axis=0)
         if angle:
@@ -405,13 +393,9 @@ class Writer(RendererBase):  # type: ignore[misc, unused-ignore]
         stream = io.BytesIO()
         Image.fromarray(im).save(stream, format="png")
         height, width = im.shape[0] * POINT / RASTER, im.shape[1] * POINT / RASTER
-        place = (
-            f'x="{_number(x)}" y="{_number(self._size[1] - y - height)}" width="{_number(width)}"'
-        )
+        place = _place(x, self._size[1] - y - height, width, height)
         content = base64.b64encode(stream.getvalue()).decode("ascii")
-        self._body.append(
-            f'<image {place} height="{_number(height)}" xlink:href="data:image/png;base64,{content}"/>'
-        )
+        self._body.append(f'<image {place} xlink:href="data:image/png;base64,{content}"/>')
 
     def _image(self, artist: Any) -> None:
         """Draw an artist of very many elements as an image."""
@@ -435,17 +419,12 @@ class Writer(RendererBase):  # type: ignore[misc, unused-ignore]
     def _data(self, path: Any, transform: Any, is_line: bool) -> str:
         """Return the data of a path."""
         simplify = bool(path.should_simplify and is_line)
-        clip = (0.0, 0.0, *self._size) if is_line else None
+        clip = (0.0, -self._size[1], *self._size) if is_line else None  # a legend may stand above
         raw = cast(Any, _path).convert_to_string(
             path, transform, clip, simplify, None, self._decimals, COMMANDS, False
         )
-        return (
-            str(raw.decode("ascii"))
-            .replace(" \n", "")
-            .replace("\n", "")
-            .replace("L ", "L")
-            .replace("M ", "M")
-        )
+        text = str(raw.decode("ascii")).replace(" \n", "").replace("\n", "")
+        return text.replace("L ", "L").replace("M ", "M")
 
     def _look(self, gc: Any, face: Any) -> str:
         """Return what colours and lines an element has, as attributes."""
@@ -469,8 +448,7 @@ class Writer(RendererBase):  # type: ignore[misc, unused-ignore]
                 found += [f'stroke-dashoffset="{_number(offset)}"'] if offset else []
         box = gc.get_clip_rectangle()
         if box is not None:
-            x, y = box.x0, self._size[1] - box.y1
-            place = f'x="{_number(x)}" y="{_number(y)}" width="{_number(box.width)}" height="{_number(box.height)}"'
+            place = _place(box.x0, self._size[1] - box.y1, box.width, box.height)
             key = self._shared(f'<clipPath id="#"><rect {place}/></clipPath>')
             found.append(f'clip-path="url(#{key})"')
         return " " + " ".join(found)

@@ -14,7 +14,7 @@ import numpy as np
 from vibsim.core.array_types import Floats
 from vibsim.core.record import Record
 from vibsim.core.vocabulary import MEMBER, OF_LEVEL
-from vibsim.report import data, frame, style, words
+from vibsim.report import choice, data, frame, style, words
 from vibsim.report.choice import position
 from vibsim.report.data import Member, known, omega_dt
 from vibsim.report.figures.panels import stacked
@@ -47,27 +47,22 @@ def order_and_stability(experiment: Experiment, record: Record) -> Picture | Non
         return None
     growth = [known(record, f"{who}_growth", OF_LEVEL) - 1.0 for who in ("theory", "measured")]
     phase = [data.phase_error(record, who) for who in ("theory", "measured")]
-    # what has no theory, such as an adaptive scheme, has no place over w dt
-    growth, phase = (
-        [told, np.where(np.isnan(told), np.nan, seen)] for told, seen in (growth, phase)
-    )
     axes = stacked([2.9, 2.9])
-    grid = np.geomspace(
-        0.9 * float(np.min(style.finite(p[p > 0.0]))), 1.1 * float(np.nanmax(p)), CURVE_POINTS
-    )
+    lowest, highest = float(np.min(style.finite(p[p > 0.0]))), float(np.nanmax(p))
+    grid = np.geomspace(0.9 * lowest, 1.1 * highest, CURVE_POINTS)
     curves = [_theory(experiment, s, grid) for s in range(len(record["scheme"]))]
     limits = known(record, "stability_limit", MEMBER)[:, 0]
-    for k, (ax, (told, found)) in enumerate(zip(axes, (growth, phase), strict=True)):
+    for k, (ax, (told, seen)) in enumerate(zip(axes, (growth, phase), strict=True)):
+        # what has no theory, such as an adaptive scheme, has no place over w dt
+        found = np.where(np.isnan(told), np.nan, seen)
         for s, name in enumerate(record.words("scheme")):
             if np.isnan(told[s]).all():
                 continue
-            look = style.look(s)
-            curve = curves[s]
+            look, curve = style.look(s), curves[s]
             if curve is None:
                 _dots(ax, p, told[s], look | {"marker": "+"}, "")
             else:
-                y = curve[k]
-                size = np.where(np.abs(y) < SMALLEST, np.nan, np.abs(y))
+                y, size = curve[k], _visible(curve[k])
                 for keep, dashes, width in ((y > 0.0, "-", 1.1), (y < 0.0, (0, (1, 1.3)), 1.5)):
                     line: dict[str, Any] = {"linestyle": dashes, "linewidth": width}
                     ax.plot(grid, np.where(keep, size, np.nan), color=look["color"], **line)
@@ -76,9 +71,8 @@ def order_and_stability(experiment: Experiment, record: Record) -> Picture | Non
     alike = _alike(record.words("scheme"), curves)
     axes[0].set_ylabel("|growth per period − 1|")
     axes[0].set_title("Growth of the amplitude: filled grows, hollow decays")
-    axes[1].set_ylabel("|phase error| / period")
     axes[1].set_title("Phase error per period: filled comes early, hollow late")
-    axes[1].set_xlabel("w dt")
+    axes[1].set(xlabel="w dt", ylabel="|phase error| / period")
     style.beside(axes[0], fontsize=8, handlelength=1.6)
     if not style.crowded(record):
         # in the upper panel below the legend
@@ -105,14 +99,19 @@ def _alike(
 ) -> list[tuple[str, str, str]]:
     """Return which curves lie on an earlier one: what they are of, the scheme, and the earlier scheme."""
     found = []
+    drawn = [(name, curve) for name, curve in zip(names, curves, strict=True) if curve is not None]
     for k, kind in enumerate(KINDS):
-        drawn = [(s, curve[k]) for s, curve in enumerate(curves) if curve is not None]
-        drawn = [(s, np.log(np.where(np.abs(y) < SMALLEST, np.nan, np.abs(y)))) for s, y in drawn]
-        firsts = frame.same_as([y for _, y in drawn], SAME_CURVE / frame.LOOKS_ALIKE)
-        for (s, _), first in zip(drawn, firsts, strict=True):
+        sizes = [np.log(_visible(curve[k])) for _, curve in drawn]
+        firsts = frame.same_as(sizes, SAME_CURVE / frame.LOOKS_ALIKE)
+        for (name, _), first in zip(drawn, firsts, strict=True):
             if first is not None:
-                found.append((kind, names[s], names[drawn[first][0]]))
+                found.append((kind, name, drawn[first][0]))
     return found
+
+
+def _visible(values: Floats) -> Floats:
+    """Return sizes; NaN for those that are round-off."""
+    return np.where(np.abs(values) < SMALLEST, np.nan, np.abs(values))
 
 
 def _sentence(alike: list[tuple[str, str, str]]) -> str:
@@ -135,12 +134,9 @@ def _theory(experiment: Experiment, s: int, grid: Floats) -> tuple[Floats, Float
     from vibsim import theory
 
     spec = experiment.schemes[s]
-    axes = experiment.sweep.axes if experiment.sweep else ()
-    varied = any(key.startswith(f"schemes.{spec.name}.") for axis in axes for key in axis.keys)
-    scheme = spec.method
-    if varied or scheme.adaptive:
+    if spec.adaptive or choice.has_swept_options(experiment, spec):
         return None
-    stepper = scheme.stepper(experiment.schemes[s].options)
+    stepper = spec.method.stepper(spec.options)
     with np.errstate(all="ignore"):
         growth = np.expm1(theory.roots(stepper, grid).log_growth * (2.0 * np.pi / grid))
         phase = theory.phase_error_per_period(stepper, grid)
@@ -149,7 +145,7 @@ def _theory(experiment: Experiment, s: int, grid: Floats) -> tuple[Floats, Float
 
 def _dots(ax: Axes, p: Floats, y: Floats, look: dict[str, Any], text: str) -> None:
     """Draw measured numbers of the shape (case, level): filled where positive, hollow where negative."""
-    size = np.where(np.abs(y) < SMALLEST, np.nan, np.abs(y))
+    size = _visible(y)
     few = np.isfinite(size).sum() <= FEW_DOTS
     mark: dict[str, Any] = {"color": look["color"], "marker": look["marker"], "linestyle": "none"}
     mark |= {"markersize": 4.5 if few else 2.8, "markeredgewidth": 0.9}
@@ -201,9 +197,8 @@ def growing(experiment: Experiment, record: Record) -> Picture | None:
         reference = max(reference, most)
         if k == 0 or np.mean(np.abs(values) <= FULLY_DRAWN * most) >= SEEN:
             within = np.abs(values) <= LEAVES_FRAME * most if most > 0.0 else np.isfinite(values)
-            upper.plot(
-                *style.thin(t, np.where(within, values, np.nan)), color=colour, linewidth=1.2
-            )
+            inner = style.thin(t, np.where(within, values, np.nan))
+            upper.plot(*inner, color=colour, linewidth=1.2)
         # the margin of an axis would overflow beyond
         size = style.no_zeros(values)
         size = np.where(size < LARGEST_DRAWN, size, np.nan)
@@ -227,9 +222,8 @@ def growing(experiment: Experiment, record: Record) -> Picture | None:
     style.log_axis(lower, "y", least, 3.0 * float(found.max()))
     upper.set_ylabel(style.label(letter, measure))
     lower.set_ylabel(style.label(f"|{letter}|", measure))
-    upper.set_title(
-        f"The slowest beside the exact solution (dotted), up to {FULLY_DRAWN:g} times its size"
-    )
+    beside = "The slowest beside the exact solution (dotted)"
+    upper.set_title(f"{beside}, up to {FULLY_DRAWN:g} times its size")
     lower.set_title("Size of the solution, and the predicted growth (dashed)")
     lower.set_xlabel(data.time_label(record))
     # one legend for both panels

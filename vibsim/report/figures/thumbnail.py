@@ -17,6 +17,7 @@ from vibsim.core.record import Record
 from vibsim.core.vocabulary import MEMBER
 from vibsim.report import data, finest_level, frame, style, sweep_layout
 from vibsim.report.data import Member
+from vibsim.report.sweep_layout import Along, Grid
 from vibsim.report.types import Experiment
 
 WIDTH, HEIGHT = 240.0, 96.0
@@ -45,13 +46,11 @@ Lines = list[tuple[Floats, Floats]]
 
 def thumbnail(experiment: Experiment, record: Record, member: Member) -> str:
     """Return the small picture as an SVG document; `member` is the one whose motion is drawn where no sweep is."""
-    keys = sweep_layout.keys(record)
-    along = sweep_layout.along_of(keys) if keys else None
-    grid = sweep_layout.grid_of(keys) if keys and along is None else None
+    layout = sweep_layout.layout_of(sweep_layout.keys(record))
     model = experiment.model.definition
-    if along is not None and (lines := _response(record, along)):
+    if isinstance(layout, Along) and (lines := _response(record, layout)):
         return document(lines)
-    if grid is not None and (cells := _map(record, grid, model.position)):
+    if isinstance(layout, Grid) and (cells := _map(record, layout, model.position)):
         return _document("".join(cells), "map")
     if data.is_lean(record):
         levels = np.array(data.whole(record, "level"), dtype=np.float64)
@@ -62,7 +61,7 @@ def thumbnail(experiment: Experiment, record: Record, member: Member) -> str:
     widest = int(np.argmax(reach))
     if len(series) == 2 and min(reach) > FLAT * reach[widest]:
         return document([(series[0], series[1])], is_equal=True)
-    return document(_solutions(record, positions[widest].name, member, along))
+    return document(_solutions(record, positions[widest].name, member, layout))
 
 
 def _reach(values: Floats) -> float:
@@ -71,14 +70,13 @@ def _reach(values: Floats) -> float:
     return float(np.ptp(there)) if there.size else 0.0
 
 
-def _solutions(
-    record: Record, position: str, member: Member, along: sweep_layout.Along | None
-) -> Lines:
-    """Return the finest level of some members of a sweep, else of each scheme; of one also the coarsest level."""
+def _solutions(record: Record, position: str, member: Member, layout: Along | Grid | None) -> Lines:
+    """Return the finest level of some members along a line, else of each scheme; of one also the coarsest level."""
     t = data.times(record, member.case)
-    cases = along.lines[0][1][:CURVES].tolist() if along else [member.case]
-    schemes = [member.scheme] if along else list(range(min(len(record["scheme"]), CURVES)))
-    of = [Member(scheme, case, "") for case in reversed(cases) for scheme in reversed(schemes)]
+    of = data.of_case(record, member.case)[:CURVES]
+    if isinstance(layout, Along):
+        of = [Member(member.scheme, case, "") for case in layout.lines[0][1][:CURVES].tolist()]
+    of.reverse()
     if len(of) > 1:
         series = [data.at(record, f"{position}_finest", one) for one in of]
     else:
@@ -94,7 +92,7 @@ def _solutions(
     return lines
 
 
-def _response(record: Record, along: sweep_layout.Along) -> Lines:
+def _response(record: Record, along: Along) -> Lines:
     """Return a number over the swept key, a curve for each of the other values; nothing where none varies."""
     key = along.key
     if key.distinct.size < FEWEST:
@@ -109,7 +107,7 @@ def _response(record: Record, along: sweep_layout.Along) -> Lines:
     return []
 
 
-def _map(record: Record, grid: sweep_layout.Grid, position: str) -> list[str]:
+def _map(record: Record, grid: Grid, position: str) -> list[str]:
     """Return the cells of a map in colours; nothing where no number varies over it."""
     found = [np.abs(data.known(record, name, MEMBER, level=-1)[0]) for name in NUMBERS]
     found.append(np.log10(style.no_zeros(finest_level.error(record, position).best[0])))
@@ -176,8 +174,7 @@ def document(lines: Lines, *, is_equal: bool = False) -> str:
 
 def outline(x: Floats, y: Floats) -> str:
     """Return points as the data of a path, in tenths of a pixel; it is interrupted where one is not finite."""
-    parts, before = [], ""
-    pen = "M"
+    parts, before, pen = [], "", "M"
     for across, up in zip(x.tolist(), y.tolist(), strict=True):
         if not (math.isfinite(across) and math.isfinite(up)):
             pen = "M"

@@ -51,29 +51,25 @@ def overlay(record: Record, quantity: str, member: Member) -> Picture:
         _draw_orders(axes[-1], t, record, quantity, member, good)
     axes[-1].set_xlabel(data.time_label(record))
     law = f"dt{words.raised(order)}" if order != 1.0 else "dt"
-    what = (
-        ". The scheme is exact in this quantity, so nothing is rescaled and what is seen is round-off."
-        if math.isinf(data.formal_order(record, member, quantity))
-        else f", {_multiplied(order, levels)}; if the error shrinks as {law}, the curves fall on one another."
-    )
+    what = f", {_multiplied(order, levels)}; if the error shrinks as {law}, the curves fall on one another."
+    if math.isinf(data.formal_order(record, member, quantity)):
+        what = ". The scheme is exact in this quantity, so nothing is rescaled and what is seen is round-off."
     return Picture(
         name=name_of_differences(quantity, member),
         title=f"Do the levels agree? {words.title(quantity)}, {member.title}",
         caption=style.sentences(
             f"{letter}{words.lowered(levels[0])} is {letter} on level {levels[0]}, and so on. Top: the differences "
             f"between successive levels{what}",
-            f"Then {SPREAD}" if spread else "",
+            f"Then {SPREAD}" * spread,
             "Below it: their ratio, which should settle at the dashed line; none near a zero crossing."
-            if ratios
-            else "",
+            * ratios,
             "Last: the order over time, with its interval. Grey dots: uncertain (interval wider than 1). Gaps: "
             "round-off, or nothing differs. Circle: the last time step, judged separately."
-            if orders
-            else "",
+            * orders,
         ),
         alt=f"Rescaled level differences of {words.name(quantity)} against time for {member.title}"
-        + (", with the ratio of successive differences" if ratios else "")
-        + (" and the order over time" if orders else ""),
+        + ", with the ratio of successive differences" * ratios
+        + " and the order over time" * orders,
         figure=axes[0].get_figure(root=True),
     )
 
@@ -184,9 +180,8 @@ def _draw_ratios(
         style.remark(ax, _why_no_ratio(good, lost))
     targets = sorted({float(target_ratio(order, levels[i : i + 3])) for i in _few(good)})
     for k, target in enumerate(targets):
-        ax.axhline(
-            target, **style.REFERENCE, label="" if k else data.basis_of_order(record, quantity)
-        )
+        text = "" if k else data.basis_of_order(record, quantity)
+        ax.axhline(target, **style.REFERENCE, label=text)
     # the target and the middle nine tenths of the ratios, but no wild outlier
     every = style.finite(*drawn)
     every = every if every.size else np.array(targets)

@@ -47,20 +47,16 @@ def precision(experiment: Experiment, record: Record, case: int) -> Picture | No
     for ax in axes[1:]:
         ax.tick_params(labelleft=False)
     legend_above(figure, axes[0])
-    name, is_adaptive = (
-        words.swept(case_name(record, case)),
-        any(line.is_adaptive for line in found),
-    )
+    name = words.swept(case_name(record, case))
     return Picture(
         name=f"work_precision_{case}",
         title=f"Work and precision{f': {name}' if name else ''}",
         caption=style.sentences(
             "Lower left is better: a small error for little work. The slope of a line is minus the order, until "
             "round-off.",
-            "Hollow: adaptive methods over their tolerances." if is_adaptive else "",
-            "Below the dotted line the reference is no better than the solution."
-            if floor > 0.0
-            else "",
+            "Hollow: adaptive methods over their tolerances."
+            * any(line.is_adaptive for line in found),
+            "Below the dotted line the reference is no better than the solution." * (floor > 0.0),
             "Of an implicit scheme the evaluations of one iteration per step are counted. The time is that of the cost "
             "model: one compiled member alone, and SciPy's own pace for adaptive methods.",
         ),
@@ -109,10 +105,8 @@ def _of_levels(experiment: Experiment, record: Record, s: int, case: int) -> Lin
     steps, forces, error = _numbers(record, member)
     keep = np.isfinite(error) & np.isfinite(steps)
     labels = tuple(f"level {level}" for level in np.array(whole(record, "level"))[keep])
-    forces = forces[keep]
-    return Line(
-        member.scheme_name, labels, (steps[keep], forces, forces * ONE_SECONDS), error[keep]
-    )
+    steps, forces, error = steps[keep], forces[keep], error[keep]
+    return Line(member.scheme_name, labels, (steps, forces, forces * ONE_SECONDS), error)
 
 
 def _of_tolerances(
@@ -121,8 +115,7 @@ def _of_tolerances(
     """Return the points of the schemes of one adaptive kind, from the loosest tolerance to the tightest."""
     from vibsim.schemes.adaptive import seconds
 
-    w, ends = natural_frequency(record, case), ends_of(record)
-    periods = w * float(ends[min(case, ends.size - 1)]) / (2.0 * math.pi)
+    periods = natural_frequency(record, case) * float(ends_of(record)[case]) / math.tau
     rows = []
     for s in members:
         tolerance = float(experiment.schemes[s].options["tolerance"])

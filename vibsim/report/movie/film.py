@@ -18,6 +18,7 @@ from vibsim.core.record import Record
 from vibsim.report import data, style, words
 from vibsim.report.figures import moments, scenes
 from vibsim.report.figures.scenes import Scene
+from vibsim.report.series import parameters_of
 from vibsim.report.types import Experiment
 
 MOST_FRAMES = 1500
@@ -31,7 +32,6 @@ class Run:
     """One member by one scheme at one level."""
 
     title: str
-    scheme: str
     t: Floats
     """Times of the samples, shape (sample,)."""
     series: Floats
@@ -77,17 +77,15 @@ def run(experiment: Experiment, record: Record, scheme: str, quantity: str) -> R
     names = [state.name for state in model.states]
     exact = f"{quantity}_exact"
     step = words.number(float(t[-1]) / int(str(record.attrs["steps"])), "brief")
-    parts = [scheme] if len(record.words("scheme")) > 1 else []
-    parts += [f"level {int(record['level'])}, dt = {step} {data.time_unit(record)}".strip()]
-    parts += [name for name in [words.swept(data.case_name(record, 0))] if name]
+    who = scheme if len(record["scheme"]) > 1 else ""
+    text = f"level {int(record['level'])}, dt = {step} {data.time_unit(record)}".strip()
     return Run(
-        title=", ".join(parts),
-        scheme=scheme,
+        title=", ".join(filter(None, [who, text, words.swept(data.case_name(record, 0))])),
         t=t,
         series=np.asarray(record[quantity][place, 0], dtype=np.float64),
         states={name: record[name][place, 0] for name in names if name in record},
         exact=np.asarray(record[exact][0], dtype=np.float64) if exact in record else None,
-        parameters=moments.parameters(experiment, record, 0),
+        parameters=parameters_of(experiment, record, 0),
     )
 
 
@@ -97,10 +95,8 @@ def differs_visibly(other: Run, first: Run) -> float:
         return 0.0
     size = data.largest(first.series)
     apart = data.largest(other.series - np.interp(other.t, first.t, first.series))
-    is_seen = moments.VISIBLE * size < apart
-    return (
-        apart / size if is_seen and data.largest(other.series) < moments.UNBOUNDED * size else 0.0
-    )
+    is_held = data.largest(other.series) < moments.UNBOUNDED * size
+    return apart / size if is_held and moments.VISIBLE * size < apart else 0.0
 
 
 def film(
@@ -140,7 +136,6 @@ def film(
         frames, stop = _as_needed(begin, stop, period, fps, most)
     t, span = np.linspace(begin, stop, frames), stop - begin
     window = moments.window(span, period) if periods is None else min(span, periods * period)
-    unit = data.unit(record, quantity)
     return Film(
         runs=tuple(runs),
         scenes=_scenes(experiment, runs, t),
@@ -148,7 +143,7 @@ def film(
         start=begin,
         stop=stop,
         window=window,
-        label=style.label(words.symbol(quantity), unit),
+        label=style.label(words.symbol(quantity), data.unit(record, quantity)),
         time_unit=data.time_unit(record),
         end=last,
     )
@@ -169,9 +164,6 @@ def _scenes(experiment: Experiment, runs: Sequence[Run], t: Floats) -> tuple[Sce
     is_whole = all(len(one.states) == len(model.states) for one in runs)
     if draw is None or not is_whole or not all(np.isfinite(x).all() for x in every):
         return ()
-    reach = {
-        name: max(float(np.max(np.abs(one.states[name]))) for one in runs)
-        for name in runs[0].states
-    }
+    reach = {name: max(data.largest(one.states[name]) for one in runs) for name in runs[0].states}
     motions = [moments.motion(model, t, one.t, one.states, one.parameters, reach) for one in runs]
     return tuple(draw(motion) for motion in motions)

@@ -2,30 +2,29 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping
 from typing import Any
 
 from vibsim.checks.outcome import Result
 from vibsim.checks.value import unit_of
-from vibsim.checks.verdict_text import Wording, expectation
+from vibsim.checks.verdict_text import Wording
 from vibsim.core.home import called
 from vibsim.core.record import Record
 from vibsim.core.vocabulary import worst
 from vibsim.plan.versions import DRAWING, versions
 from vibsim.report import data, words
-from vibsim.report.choice import is_trap
+from vibsim.report.choice import is_refutation, is_trap
 from vibsim.report.evidence import figure
 from vibsim.report.tables import checks as check_tables
 from vibsim.report.tables import published
 from vibsim.report.tables.table import Column, Table
-from vibsim.report.text import assertions, experiment_file, reasons
-from vibsim.report.types import Check, Experiment, Measurement
+from vibsim.report.text import assertions, experiment_file, findings, reasons
+from vibsim.report.types import Check, Experiment
 
 SAID_BY_THE_LINE = ("value", "equal", "converges")
 """Kinds of checks of which the line says all where they pass."""
-ALIKE = (
-    6  # checks on a number, or on solutions that are equal, from which on their lines are a table
-)
+ALIKE = 6  # checks on a number, or on equal solutions, from which on their lines are a table
 WIDE = 1.0  # an interval that reaches further below its order is worth a sentence
 
 
@@ -58,16 +57,14 @@ def gathered(
             continue
         made = [c for c in made if c not in plain]
         wanted = {c["wanted"] for c in plain}
-        names = ["check", "got"] if len(wanted) == 1 else ["check", "wanted", "got"]
-        rows = tuple(tuple(c["what" if name == "check" else name] for name in names) for c in plain)
+        is_same = len(wanted) == 1
+        keys = ["what", "got"] if is_same else ["what", "wanted", "got"]
+        rows = tuple(tuple(c[key] for key in keys) for c in plain)
+        columns = tuple(map(Column, ["check", *keys[1:]]))
+        table = Table(f"checks_{kind}", "Checks that passed", columns, rows)
+        what = f"{plain[0]['what']}, and {len(plain) - 1} more"
         groups.append(
-            {
-                "what": f"{plain[0]['what']}, and {len(plain) - 1} more",
-                "wanted": wanted.pop() if len(wanted) == 1 else "as listed",
-                "table": Table(
-                    f"checks_{kind}", "Checks that passed", tuple(map(Column, names)), rows
-                ),
-            }
+            {"what": what, "wanted": wanted.pop() if is_same else "as listed", "table": table}
         )
     return made, groups
 
@@ -76,17 +73,17 @@ def card(experiment: Experiment, record: Record, check: Mapping[str, Any]) -> di
     """Return what the page says of one check; an experiment with a tolerance has one that nothing asserts."""
     asserted = next((spec for spec in experiment.checks if spec.id == check["id"]), None)
     measured = asserted.measured if asserted else None
+    kind = measured.kind if measured else check["kind"]
     value = measured if measured and measured.kind == "value" else None
     explained = reasons.reason(
         check["reason"],
-        measured.kind if measured else check["kind"],
+        kind,
         value=value.value if value else "",
         levels=len(data.whole(record, "level")),
-        is_promised=_keeps_promise(record, measured, check),
+        is_promised=findings.keeps_promise(record, measured, check),
     )
     # of a claim that is refuted as expected, what the reason does not say is the point
-    is_false = asserted is not None and asserted.kind == "claim" and not asserted.holds
-    is_refuted = is_false and check["reason"] == "match"
+    is_refuted = is_refutation(asserted) and check["reason"] == "match"
     unit = data.pretty_unit(unit_of(experiment, record, value)) if value else ""
     wording = Wording(experiment, record, asserted, words.PAGE)
     decisive, counts, status = check["results"][0], check["counts"], check["status"]
@@ -96,15 +93,16 @@ def card(experiment: Experiment, record: Record, check: Mapping[str, Any]) -> di
     told = wording.text(result, counts, check["where"])
     if _is_said(asserted, check):
         told = _hardest(record, check)
+    wanted = assertions.wanted(experiment, measured, words.fact(decisive, "expected"))
     results, more = _results(record, check, unit)
     return {
         "id": check["id"],
         "status": status,
-        "measures": measured.kind if measured else check["kind"],
+        "measures": kind,
         "badge": words.badge(check),
-        "what": assertions.about(asserted) if asserted else assertions.OF_TOLERANCE,
-        "source": assertions.source(asserted) if asserted else "",
-        "wanted": _wanted(experiment, asserted, check),
+        "what": assertions.about(asserted),
+        "source": assertions.source(asserted),
+        "wanted": f"not: {wanted}" if is_refutation(asserted) else wanted,
         "got": _got(check, wording, result),
         "note": getattr(asserted, "note", None) or "",
         "reason": check["reason"] or "–",
@@ -126,8 +124,12 @@ def _is_said(asserted: Check | None, check: Mapping[str, Any]) -> bool:
     """Say whether the line of a check tells all of what was measured: it is as asked for, without a doubt."""
     if check["status"] != "PASS" or asserted is None:
         return False
-    order, low = (words.fact(check["results"][0], f"order{end}") for end in ("", "_low"))
+    result = check["results"][0]
+    order, low, wanted = (words.fact(result, name) for name in ("order", "order_low", "expected"))
+    allowed = getattr(asserted.measured, "tolerance", math.inf)
     is_doubtful = order is not None and low is not None and order - low > WIDE
+    # that the interval reaches what is wanted, where the order itself does not, is worth a sentence
+    is_doubtful |= None not in (order, wanted) and abs(order - wanted) > allowed
     is_plain = asserted.measured.kind in SAID_BY_THE_LINE and not is_trap(asserted)
     return is_plain and not is_doubtful
 
@@ -142,28 +144,14 @@ def _hardest(record: Record, check: Mapping[str, Any]) -> str:
     return f"The hardest of {words.number(total, 'integer')}: {place}."
 
 
-def _wanted(experiment: Experiment, asserted: Check | None, check: Mapping[str, Any]) -> str:
-    """Say in a few words what is asked for."""
-    if asserted is None:
-        return expectation(experiment, None, words.PAGE)
-    asked = asserted.measured
-    told = ""
-    if asked.kind == "converges":
-        told = assertions.order_asked(asked, words.fact(check["results"][0], "expected"))
-    elif asked.kind == "conserves":
-        told = assertions.DRIFTS[asked.drift]
-    told = told or words.labelled(expectation(experiment, asked, words.PAGE), None)
-    return told if asserted.kind != "claim" or asserted.holds else f"not: {told}"
-
-
 def _got(check: Mapping[str, Any], wording: Wording, result: Result) -> str:
     """Say in a few words what was measured where it decides."""
-    order, reason = words.fact(check["results"][0], "order"), check["results"][0]["reason"]
-    if order is not None and check["results"][0]["status"] != "INCONCLUSIVE":
-        between = words.interval(words.interval_of(check["results"][0]))
-        return f"order {words.number(order, 'order')}{f' ({between})' if between != '–' else ''}"
-    if check["kind"] == "converges" or "order" in (check["results"][0].get("facts") or {}):
-        return str(reason).replace("_", " ")
+    decisive = check["results"][0]
+    if words.fact(decisive, "order") is not None and result.status != "INCONCLUSIVE":
+        order, bounds = words.fact(decisive, "order"), words.interval_of(decisive)
+        return f"order {words.with_interval(order, bounds)}"
+    if check["kind"] == "converges" or "order" in (decisive.get("facts") or {}):
+        return str(result.reason).replace("_", " ")
     return wording.brief(result)
 
 
@@ -179,25 +167,10 @@ def _results(record: Record, check: Mapping[str, Any], unit: str) -> tuple[Any, 
     return table, f"In all: {told}. Listed are the {listed} worst." if total > listed else ""
 
 
-def _keeps_promise(record: Record, measured: Measurement | None, check: Mapping[str, Any]) -> bool:
-    """Say whether the result that decides has the order of its scheme, and the check asks for another one."""
-    decisive: Mapping[str, Any] = next(iter(check.get("results") or []), {})
-    order, place = words.fact(decisive, "order"), data.place_of(record, decisive.get("case", -1))
-    if measured is None or measured.kind != "converges" or measured.order == "scheme":
-        return False
-    if order is None or place is None:
-        return False
-    promised = data.formal_orders(record, measured.converges)
-    own = promised[record.words("scheme").index(decisive["scheme"]), place]
-    is_due = data.basis_of_order(record, measured.converges) == "promised"
-    return bool(is_due and abs(own - order) <= measured.tolerance)
-
-
 def _alone(check: Mapping[str, Any]) -> str:
     """Return the commands that run the listed members alone, a line for each."""
-    listed = check.get("results") or []
     lines: dict[str, str] = {}
-    for result in listed:
+    for result in check["results"]:
         if result.get("command"):
             # of the schemes of a member the worst comes first
             found = f"{result['status']} {result['reason']}"

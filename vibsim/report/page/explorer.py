@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from vibsim.core.array_types import Floats
 from vibsim.core.home import called
 from vibsim.core.record import Record
 from vibsim.core.set_option import set_options
@@ -34,14 +35,11 @@ def worst(
         if view.worst is not None:
             found.setdefault(view.worst, {})[words.symbol(view.quantity)] = None
     start, end = _around(experiment)
-    return [
-        (
-            ", ".join(letters),
-            words.swept(data.case_name(record, case)),
-            f"{start}{int(record['case'][case])}{end}",
-        )
-        for case, letters in found.items()
-    ]
+    rows = []
+    for case, letters in found.items():
+        command = f"{start}{int(record['case'][case])}{end}"
+        rows.append((", ".join(letters), words.swept(data.case_name(record, case)), command))
+    return rows
 
 
 def _around(experiment: Experiment) -> tuple[str, str]:
@@ -97,10 +95,8 @@ def listed(keys: Sequence[Key], count: int, most: int, marked: Iterable[int]) ->
 
 
 def _view(view: View, cases: NDArray[np.intp]) -> dict[str, Any]:
-    def of(values: Any, digits: int = 5) -> list[Any] | None:
-        return (
-            None if values is None else [_numbers(values[s, cases], digits) for s in view.schemes]
-        )
+    def of(values: Floats | None) -> list[Any] | None:
+        return None if values is None else [_numbers(values[s, cases], 5) for s in view.schemes]
 
     position = None if view.worst is None else int(np.searchsorted(cases, view.worst))
     return {

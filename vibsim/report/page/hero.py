@@ -3,20 +3,21 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from vibsim.checks.outcome import about_members
 from vibsim.checks.value import unit_of
-from vibsim.checks.verdict_text import expectation
 from vibsim.comparison.best_values import WORDS, scalars
 from vibsim.core.home import called
 from vibsim.core.record import Record
 from vibsim.core.vocabulary import decisive_number
 from vibsim.report import choice, data, finest_level, style, words
-from vibsim.report.choice import Lead, is_trap
+from vibsim.report.choice import Lead, is_refutation, is_trap
 from vibsim.report.evidence import figure
 from vibsim.report.figures import hero as drawn
 from vibsim.report.figures import solution
@@ -48,10 +49,25 @@ def context(
     return {
         "finding": findings.title(experiment, record, lead, published.ids(experiment)),
         "counts": words.passed(statuses),
-        "facts": findings.sentence(*_facts(experiment, record)),
+        "marks": words.marks(summary["checks"]),
+        "facts": " · ".join(filter(None, _facts(experiment, record))),
         "numbers": list(numbers(experiment, record, lead))[:NUMBERS],
-        "meaning": findings.paragraph(experiment, record, lead, levels),
+        "meaning": " ".join(
+            [findings.paragraph(experiment, record, lead, levels), *_others(summary, lead)]
+        ),
     }
+
+
+def _others(summary: Mapping[str, Any], lead: Lead) -> Iterator[str]:
+    """Say what came of statements and traps, where the page is about something else."""
+    told = [words.badge(check) for check in summary["checks"] if check is not lead.entry]
+    if count := told.count(words.CLAIMED):
+        yield f"{count} {'statement holds' if count == 1 else 'statements hold'} as claimed."
+    for check in summary["checks"]:
+        order = words.fact(check["results"][0], "order") if check["results"] else None
+        if words.badge(check) == words.TRAP and check is not lead.entry and order is not None:
+            scheme, letter = check["results"][0]["scheme"], words.title(check["quantity"])
+            yield f"As the trap expects, {letter} has order {words.number(order, 'order')} with scheme {scheme}."
 
 
 def _facts(experiment: Experiment, record: Record) -> Iterator[str]:
@@ -63,7 +79,7 @@ def _facts(experiment: Experiment, record: Record) -> Iterator[str]:
         yield f"{words.number(len(record['case']), 'integer')} members"
     steps = [words.number(int(n), "integer") for n in record["steps"]]
     ends = np.unique(data.ends_of(record))
-    over = f" over {words.number(float(ends[0]), 'step')} {data.time_unit(record, 'dt')}".rstrip()
+    over = f" over {data.time_text(record, ends[0])}"
     span = steps[0] if len(steps) == 1 else f"{steps[0]} to {steps[-1]}"
     yield f"{span} steps{over if ends.size == 1 else ''}"
     yield experiment.source or ""
@@ -74,66 +90,52 @@ def numbers(experiment: Experiment, record: Record, lead: Lead) -> Iterator[Numb
     if lead.entry is not None and not lead.is_on_order:
         yield from _measured(experiment, record, lead)
     if data.whole(record, "triple") or lead.is_on_order:
-        yield from _order(record, lead)
+        yield from _order(experiment, record, lead)
     if lead.measured is None or lead.measured.kind != "accurate":
-        yield from _error(record, lead)
+        yield from _error(experiment, record, lead)
     is_of_one = lead.entry is not None and sum(lead.entry["counts"].values()) < 2
     if data.swept(record) and lead.result.get("command") and not is_of_one:
-        text = ", ".join(
-            part.replace(" ", "\N{NO-BREAK SPACE}") for part in lead.member.case_words.split(", ")
-        )
+        text = re.sub(r"(?<!,) ", "\N{NO-BREAK SPACE}", lead.member.case_words)
         command = called(lead.result["command"])
         yield {"label": "Hardest member", "value": text, "note": f"To run it alone: `{command}`"}
     yield from _best(experiment, record, lead)
-    level, dt = data.whole(record, "level")[-1], data.steps_of(record, lead.member.case)
-    step = f"{words.number(float(dt[-1]), 'step')} {data.time_unit(record, 'dt')}".rstrip()
-    largest = data.omega_dt(record)[lead.member.case, -1]
-    note = f"level {level}" + (
-        f"; w dt = {words.number(float(largest), 'step')}" if np.isfinite(largest) else ""
-    )
-    yield {"label": "Finest time step", "value": step, "note": note}
-    yield {
-        "label": "Steps", "value": words.number(int(record["steps"][-1]), "integer"), "note": "at the finest level",
-    }  # fmt: skip
+    note = f"level {data.whole(record, 'level')[-1]}"
+    largest = float(data.omega_dt(record)[lead.member.case, -1])
+    if math.isfinite(largest):
+        note += f"; w dt = {words.number(largest, 'step')}"
+    step = data.steps_of(record, lead.member.case)[-1]
+    yield {"label": "Finest time step", "value": data.time_text(record, step), "note": note}
+    steps = words.number(int(record["steps"][-1]), "integer")
+    yield {"label": "Steps", "value": steps, "note": "at the finest level"}
 
 
 def _measured(experiment: Experiment, record: Record, lead: Lead) -> Iterator[Number]:
     """Yield the number that decides a check on something else than an order."""
-    number = decisive_number(lead.result.get("facts") or {})
-    if number is None or lead.entry is None or not math.isfinite(number):
+    number, check = decisive_number(lead.facts), lead.measured
+    if number is None or not math.isfinite(number):
         return
-    check = lead.measured
     kind = check.kind if check else "tolerance"
     unit, label, form = "", MEASURED.get(kind, ""), "brief"  # a size has two digits
     if check is not None and check.kind == "value":
         unit, form = data.pretty_unit(unit_of(experiment, record, check)), "step"
-        subject = assertions.subject(check)
-        label = words.PAGE.opening(subject)
+        label = words.PAGE.opening(assertions.subject(check))
     if kind in ("equal", "accurate"):
         unit = data.norm_unit(record, lead.quantity, "l2" if kind == "accurate" else "linf")
-    facts = lead.result.get("facts") or {}
     if check is not None and check.kind == "accurate" and check.is_relative:
-        number, unit = (
-            facts.get("relative_error") or number,
-            f"of the size of {words.symbol(lead.quantity)}",
-        )
-    allowed = facts.get("allowed")
-    wanted = expectation(experiment, check, words.PAGE)
-    if check is not None and check.kind == "conserves":
-        wanted = assertions.DRIFTS[check.drift]
-    is_refuted = (
-        lead.asserted is not None and lead.asserted.kind == "claim" and not lead.asserted.holds
-    )
-    note = f"{'the statement' if is_refuted else 'asked for'}: {words.labelled(wanted, None)}"
+        number = lead.facts.get("relative_error") or number
+        unit = f"of the size of {words.symbol(lead.quantity)}"
+    is_refuted = is_refutation(lead.asserted)
+    wanted = assertions.wanted(experiment, check)
+    note = f"{'the statement' if is_refuted else 'asked for'}: {wanted}"
     if is_trap(lead.asserted) and not is_refuted:
         note = "the check expects that it is not as asked"
-    if allowed is not None:
+    if (allowed := lead.facts.get("allowed")) is not None:
         note = f"{words.number(allowed, 'brief')} is allowed"
     value = f"{words.number(number, form)} {unit}".rstrip()
     yield {"label": label, "value": value, "note": note}
 
 
-def _order(record: Record, lead: Lead) -> Iterator[Number]:
+def _order(experiment: Experiment, record: Record, lead: Lead) -> Iterator[Number]:
     """Yield the observed order with its interval, of a sweep the range over its members, and the promised one.
 
     The members are those that the check is about.
@@ -141,18 +143,16 @@ def _order(record: Record, lead: Lead) -> Iterator[Number]:
     quantity, member = lead.quantity, lead.member
     if f"{quantity}_order" not in record:
         return
-    label = f"Observed order of {words.symbol(quantity)}{data.of_several(record, member.scheme)}"
+    label = f"Observed order of {findings.short(experiment, quantity)}{data.of_several(record, member.scheme)}"
     promised = data.promised_text(record, quantity, member.scheme)
     of = data.basis_of_order(record, quantity)
     due = f"the scheme promises {promised}" if of == "promised" else f"{promised} is expected"
     due = f"what is {of} depends on the member" if promised == of else due
-    facts = lead.result.get("facts") or {}
-    norm = data.norm_index(record, lead.norm)
     if lead.is_on_order:
-        order, low, high = (facts.get(f"order{end}") for end in ("", "_low", "_high"))
+        order, low, high = (lead.facts.get(f"order{end}") for end in ("", "_low", "_high"))
     else:
+        norm = data.norm_index(record, lead.norm)
         order, low, high = data.stated_order(record, quantity, member, norm)
-    reason = lead.result.get("reason") if lead.is_on_order else None
     orders = finest_level.orders(record, quantity, lead.norm)[0][member.scheme]
     shown = about_members(record, lead.measured if lead.is_on_order else None)
     if f"{quantity}_status" in record:
@@ -166,38 +166,37 @@ def _order(record: Record, lead: Lead) -> Iterator[Number]:
         value = ends[0] if ends[0] == ends[1] else " to ".join(ends)
         known = words.number(every.size, "integer")
         yield {"label": label, "value": value, "note": f"of {known} members; {due}"}
-    elif reason == "exact":
+    elif lead.is_on_order and lead.result.get("reason") == "exact":
         yield {"label": label, "value": "exact", "note": "the levels differ by round-off only"}
     elif order is None or not math.isfinite(order):
         # beside another number it says nothing that there is none
         if lead.is_on_order or lead.entry is None:
             yield {"label": label, "value": "not known", "note": due}
     else:
-        between = words.interval((low, high))
-        span = f"between {between.replace(' to ', ' and ')}; " if between != "–" else ""
-        yield {"label": label, "value": words.number(float(order), "order"), "note": f"{span}{due}"}
+        note = "; ".join(filter(None, [words.between((low, high)), due]))
+        yield {"label": label, "value": words.number(float(order), "order"), "note": note}
 
 
-def _error(record: Record, lead: Lead) -> Iterator[Number]:
+def _error(experiment: Experiment, record: Record, lead: Lead) -> Iterator[Number]:
     """Yield the root-mean-square error of the finest level, in its unit and over the size of the solution."""
     quantity, member = lead.quantity, lead.member
-    facts = lead.result.get("facts") or {}
-    error, relative = facts.get("error"), facts.get("relative_error")
-    word = "estimated"
+    error, relative = lead.facts.get("error"), lead.facts.get("relative_error")
     true = float(finest_level.true_error(record, quantity)[member.scheme, member.case])
-    if math.isfinite(true):
-        error, word = true if error is None else error, "true"
+    word = "true" if math.isfinite(true) else "estimated"
+    if error is None and math.isfinite(true):
+        error = true
     if error is None or not math.isfinite(error):
         if lead.is_on_order:
             note = "the levels do not tell it"
             yield {"label": "Error of the finest level", "value": "not known", "note": note}
         return
-    mean = error / math.sqrt(drawn.duration(record, member.case))
+    mean = error / math.sqrt(data.ends_of(record)[member.case])
     unit = data.norm_unit(record, quantity, "linf")
-    size = f"{words.share(relative)} of the size of {words.symbol(quantity)}, " if relative else ""
+    what = findings.short(experiment, quantity)
+    size = f"{words.share(relative)} of its size, " if relative else ""
     steps = words.number(int(record["steps"][-1]), "integer")
     yield {
-        "label": f"Error of {words.symbol(quantity)} at {steps} steps{data.of_several(record, member.scheme)}",
+        "label": f"Error of {what} at {steps} steps{data.of_several(record, member.scheme)}",
         "value": f"{words.number(mean, 'brief')} {unit}".rstrip(),
         "note": f"{size}{word}, root mean square{_of_member(record, lead)}",
     }
@@ -243,13 +242,12 @@ def _of_member(record: Record, lead: Lead) -> str:
 
 def pictures(experiment: Experiment, record: Record, lead: Lead) -> list[Picture]:
     """Return the one or two pictures of the first screen, the decisive one first."""
-    left: Picture | None = None
+    left = right = None
     has_order = f"{lead.quantity}_order" in record
     if data.swept(record):
         left = drawn.response(experiment, record, lead)
         right = drawn.orders(experiment, record, lead) if has_order else None
-        if lead.entry is not None and not right:
-            right = _evidence(experiment, record, lead)
+        right = right or _evidence(experiment, record, lead)
     else:
         right = drawn.against_step(experiment, record, lead) if has_order else None
         if lead.entry is not None and not lead.is_on_order:
@@ -272,4 +270,4 @@ def _evidence(experiment: Experiment, record: Record, lead: Lead) -> Picture | N
     found = figure.picture(experiment, record, lead.asserted, lead.entry)
     if found is None or found.figure is None:
         return None
-    return Picture("hero_evidence", "What decides", found.caption, found.alt, found.figure)
+    return replace(found, name="hero_evidence", title="What decides")

@@ -16,15 +16,12 @@ from vibsim.experiment import citation
 from vibsim.experiment.collection import ADHOC, SITE
 from vibsim.report import words
 from vibsim.report.page import history, source_statements
-from vibsim.report.page.templates import digest_of, environment, markup
+from vibsim.report.page.templates import digest_of, environment, source
 from vibsim.report.tables import source_figures
-from vibsim.report.tables.results import error_of, measured_order, number_of
 from vibsim.report.tables.table import Column, Table, to_csv
 
 UNREADABLE = ("DAMAGED", "MISSING")
 """Words for an experiment whose verdict cannot be read: it counts as failed."""
-MARKS = words.TRAP, words.REFUTED
-"""Words on checks that a card has, too: that something went wrong, as expected."""
 FILTERS = (
     ("PASS", "passed"),
     ("INCONCLUSIVE", "undecided"),
@@ -75,7 +72,7 @@ class Row:
     broken: int = 0  # number of runs that broke down
     headline: Headline = field(default_factory=Headline)
     marks: Sequence[tuple[str, int]] = ()
-    """Which of `MARKS` its checks have, with the number of checks."""
+    """Which of `words.MARKS` its checks have, with the number of checks."""
 
     @property
     def key(self) -> str:
@@ -131,21 +128,14 @@ def write_index(results: Path) -> None:
         "statements": source_statements.listed((row.name, row.link, row.checks) for row in rows),
         "site": f"{SITE}/index.html" if (results / SITE / "index.html").is_file() else "",
         "history": history.FILE,
-        "script": markup(_script()),
-        "script_digest": digest_of(_script()),
+        "script": source("index.js"),
+        "script_digest": digest_of(source("index.js")),
     }
     store.write_text(results / "index.html", template.render(context))
     cells = tuple(line for row in rows for line in _lines(row))
     table = Table("summary", "All checks", tuple(map(Column, HEADERS)), cells)
     store.write_text(results / "summary.csv", to_csv(table))
     history.update(results, {row.key: (row.status, str(row.headline)) for row in rows})
-
-
-def _script() -> str:
-    """Return the script of the page as it stands between its tags."""
-    loader = environment().loader
-    assert loader is not None
-    return loader.get_source(environment(), "index.js")[0]
 
 
 def _row(results: Path, folder: Path) -> Row:
@@ -167,7 +157,7 @@ def _row(results: Path, folder: Path) -> Row:
         collection, name, summary["title"], summary["status"], _why(checks),
         sum(check["status"] == "PASS" for check in checks), relative("report.html"),
         relative("figures/thumbnail.svg"), summary.get("source"), checks, words.broken(summary), headline(checks),
-        marks(checks),
+        words.marks(checks),
     )  # fmt: skip
 
 
@@ -204,18 +194,14 @@ def headline(checks: Sequence[Mapping[str, Any]]) -> Headline:
             )
     passed = [] if ranked and ranked[0]["status"] != "PASS" else wanted or found
     for check, result in passed:
-        sentence = str(result.get("sentence") or "")
-        text = words.labelled(sentence.partition("; ")[0].rstrip("."), check["quantity"])
-        text = words.PAGE.powers(text)
+        sentence = str(result.get("sentence") or "").partition("; ")[0].rstrip(".")
+        text = words.PAGE.powers(words.labelled(sentence, check["quantity"]))
+        named, verb, told = text.partition(" is ")
+        if named.isidentifier():
+            text = f"{words.PAGE.value(named)}{verb}{told}"
         if text:
             return Headline(text=f"{text[: LONGEST - 1]}…" if len(text) > LONGEST else text)
     return Headline()
-
-
-def marks(checks: Sequence[Mapping[str, Any]]) -> list[tuple[str, int]]:
-    """Return those of `MARKS` that checks have, with the number of checks."""
-    found = [words.badge(check) for check in checks]
-    return [(mark, found.count(mark)) for mark in MARKS if mark in found]
 
 
 def _heading(rows: Sequence[Row]) -> str:
@@ -239,14 +225,13 @@ def _lines(row: Row) -> Iterator[tuple[Any, ...]]:
     of_check = ("id", "kind", "text", "quantity", "expected", "status", "reason")
     for check in row.checks or [{"status": row.status, "reason": row.why}]:
         decides = _decides(check)
-        measured = (*measured_order(decides), number_of(decides), *error_of(decides))
         yield (
             row.collection, row.name, row.title, *_source(row, check), row.status, *map(check.get, of_check),
-            decides.get("scheme"), decides.get("case"), *measured, check.get("advice"), row.broken,
+            decides.get("scheme"), decides.get("case"), *words.measured(decides), check.get("advice"), row.broken,
         )  # fmt: skip
 
 
 def _source(row: Row, check: Mapping[str, Any]) -> tuple[str | None, ...]:
     """Return where a check stands, by `citation.FIELDS`: its own source, else that of its experiment."""
-    source = check.get("source") or row.source or {}
-    return tuple(source.get(name) for name in citation.FIELDS)
+    found = check.get("source") or row.source or {}
+    return tuple(found.get(name) for name in citation.FIELDS)

@@ -44,9 +44,7 @@ MOST_ROWS = 8  # of a table that the page itself holds; the CSV file holds all
 ROOM = 220  # cells of all tables of numbers together; a table beyond is a file only
 BYTES = 1_000_000  # of all figures behind tabs; figures beyond are files only
 FIGURES = 6  # most figures behind the tabs of a section
-COPIED = (
-    40_000  # letters of a table that a page holds whole, to be copied; a longer one is a file only
-)
+COPIED = 40_000  # letters of a table that a page holds whole, to be copied; a longer one is a file
 LONG_HEADING = 90  # letters of a caption of which a heading has the first words only
 PYTHON = """\
 from vibsim import Experiment, analyse, simulate, verdicts
@@ -102,16 +100,16 @@ def write(
     below = gallery.pictures(experiment, convergence, shown, decisive, names)
     moving = [drawn.add(picture) for picture in below.motion]
     drawings = {"hero": first, "source": sourced, "motion": moving}
-    tabs = {"belief": drawn.tabs(below.belief, FIGURES)}
-    views = drawn.views(below.members)
+    belief, views = drawn.tabs(below.belief), drawn.views(below.members)
     small = thumbnail.thumbnail(experiment, convergence, shown[0])
     replace_files(directory / "figures", {**drawn.files, "thumbnail.svg": small.encode()})
-    listed, others = _tables(experiment, convergence)
+    everyone = members.table(convergence, position)
+    listed, others = _tables(experiment, convergence, everyone, decisive.quantity)
     scales = scales_table(experiment, convergence)
     printed = published.tables(experiment, convergence, summary)
     broken = checks.failures(summary, convergence)
     every = [*printed, *listed, *others, scales, checks.checks(summary), broken]
-    every += [source_figures.table(sources), members.table(convergence, position)]
+    every += [source_figures.table(sources), everyone]
     written = {table.name: texts_of(table) for table in every if table is not None}
     files = files_of(written)
     kept = ("members.csv",) if data.swept(convergence) else ()
@@ -119,11 +117,12 @@ def write(
         members.write_csv(directory / "tables/members.csv", convergence, position)
         files.pop("members.csv", None)
     replace_files(directory / "tables", files, kept)
-    played = player.element(experiment, convergence, environment())
+    played = player.element(experiment, convergence)
     made = cards.cards(experiment, convergence, summary)
-    if "hero_evidence" in names and decisive.entry is not None:
-        made = [c | {"picture": None} if c["id"] == decisive.entry["id"] else c for c in made]
-    alone, alike = cards.gathered(made, decisive.entry["id"] if decisive.entry else None)
+    lead = decisive.entry["id"] if decisive.entry else None
+    if "hero_evidence" in names:
+        made = [c | {"picture": None} if c["id"] == lead else c for c in made]
+    alone, alike = cards.gathered(made, lead)
     failures, more = words.broken(summary), len(summary.get("failures") or [])
     page = environment().get_template("report.html").render(
         hero.context(experiment, convergence, summary, decisive)
@@ -132,10 +131,10 @@ def write(
             "name": experiment.name,
             "title": experiment.title,
             "status": summary["status"],
-            "lead": next((c for c in made if decisive.entry and c["id"] == decisive.entry["id"]), None),
-            "figures": drawings | tabs | {"members": views},
+            "lead": next((c for c in made if c["id"] == lead), None),
+            "figures": drawings | {"belief": belief, "members": views},
             "reading": {name: _captions(group) for name, group in drawings.items()}
-            | {name: _captions(p for _, group in found for p in group) for name, found in tabs.items()}
+            | {"belief": _captions(one for _, group in belief for one in group)}
             | {"members": _readings(view.picture for view, _ in views)},
             "members": explorer.content(experiment, convergence, [view for view, _ in views]),
             "worst": explorer.worst(experiment, convergence, [view for view, _ in views]),
@@ -144,9 +143,7 @@ def write(
             "alike": alike,
             "reading_of_checks": _reading_of_checks(alone),
             "failures": broken and cut(broken),
-            "unlisted": f"In all {failures} runs broke down; listed are the first {more}."
-            if failures > more
-            else "",
+            "unlisted": f"In all {failures} runs broke down; listed are the first {more}." * (failures > more),
             "numbers_shown": [cut(table) for table in listed],
             "tables": {table.name: copied(written[table.name]) for table in (*printed, *listed)},
             "scales": scales,
@@ -174,7 +171,7 @@ class _Drawn:
     """Pictures as markup for the page, and as files beside it."""
 
     def __init__(self, formats: Sequence[str]) -> None:
-        self.formats = [form for form in formats if form != "svg"]
+        self.formats = formats
         self.files: dict[str, bytes] = {}
         self.room = BYTES
         self.left_out: list[str] = []
@@ -182,18 +179,14 @@ class _Drawn:
 
     def add(self, picture: Picture) -> tuple[Picture, str]:
         """Return a picture with its markup, and keep its files."""
-        assert picture.figure is not None
-        text = drawing.svg(picture.figure, picture.name)
-        self.files[f"{picture.name}.svg"] = text.encode()
-        for form in self.formats:
-            self.files[f"{picture.name}.{form}"] = drawing.binary(picture.figure, form)
+        files = drawing.files(picture, self.formats)
+        self.files |= files
+        text = files[f"{picture.name}.svg"].decode()
         return picture, markup(drawing.inline(text, picture.alt))
 
-    def tabs(
-        self, tabs: Sequence[gallery.Tab], most: int
-    ) -> list[tuple[str, list[tuple[Picture, str]]]]:
+    def tabs(self, tabs: Sequence[gallery.Tab]) -> list[tuple[str, list[tuple[Picture, str]]]]:
         """Return the labels of tabs with their pictures, as long as the page has room; the others are files only."""
-        found = []
+        found, most = [], FIGURES
         for tab in tabs:
             added = [self.add(picture) for picture in tab.pictures]
             most -= len(added)
@@ -266,12 +259,11 @@ def texts_of(table: Table) -> dict[str, str]:
 
 def files_of(written: Mapping[str, Mapping[str, str]]) -> dict[str, bytes]:
     """Return the files of tables by their names, from the `texts_of` each table."""
-    ends = {"CSV": "csv", "LaTeX": "tex"}
-    return {
-        f"{name}.{ends[form]}": text.encode()
-        for name, texts in written.items()
-        for form, text in texts.items()
-    }
+    found = {}
+    for name, texts in written.items():
+        found[f"{name}.csv"] = texts["CSV"].encode()
+        found[f"{name}.tex"] = texts["LaTeX"].encode()
+    return found
 
 
 def copied(texts: Mapping[str, str]) -> Mapping[str, str]:
@@ -288,9 +280,15 @@ def replace_files(directory: Path, files: Mapping[str, bytes], others: Sequence[
             path.unlink()
 
 
-def _tables(experiment: Experiment, record: Record) -> tuple[list[Table], list[Table]]:
-    """Return the tables that the page shows, as far as it has room for them, and those that are files only."""
-    found, model = choice.quantities(experiment, record), experiment.model.definition
+def _tables(
+    experiment: Experiment, record: Record, everyone: Table | None, first: str
+) -> tuple[list[Table], list[Table]]:
+    """Return the tables that the page shows, as far as it has room for them, and those that are files only.
+
+    The quantity `first` comes first, if there are tables of it.
+    """
+    model = experiment.model.definition
+    found = sorted(choice.quantities(experiment, record), key=lambda quantity: quantity != first)
     shown = choice.with_levels(experiment, choice.members(record, choice.first(experiment, record)))
     norms = [name for name in record.words("norm") if name != TYPICAL_NORM]
     orders = [levels.orders(record, quantity, shown) for quantity in found]
@@ -301,7 +299,6 @@ def _tables(experiment: Experiment, record: Record) -> tuple[list[Table], list[T
         *((levels.velocities(record), levels.maxima(record, shown)) if model.conservative else ()),
         None if data.is_lean(record) else work.table(experiment, record),
     ]  # fmt: skip
-    everyone = members.table(record, choice.position(experiment))
     if everyone is not None and len(everyone.rows) <= MOST_ROWS:
         wanted.append(everyone)
     listed, room = list[Table](), ROOM

@@ -25,7 +25,9 @@ from vibsim.report.data import Member
 from vibsim.report.figures import moments, scenes
 from vibsim.report.figures.moments import SECONDS_A_PERIOD, UNBOUNDED, VISIBLE
 from vibsim.report.figures.scenes import Motion, Part, Scene
-from vibsim.report.types import Environment, Experiment
+from vibsim.report.page.templates import environment, markup, source
+from vibsim.report.series import parameters_of
+from vibsim.report.types import Experiment
 
 FRAMES_A_PERIOD = 48  # where there is room
 FEWEST_FRAMES_A_PERIOD = 20  # of a longer run the beginning is shown
@@ -50,16 +52,13 @@ class Lane:
     """The last time of the run, of which the beginning may be all that is shown."""
 
 
-def element(experiment: Experiment, record: Record, environment: Environment) -> str:
-    """Return the player as HTML, with its script and its style; empty where the system cannot be drawn.
-
-    `environment` is that of the templates.
-    """
+def element(experiment: Experiment, record: Record) -> str:
+    """Return the player as HTML, with its script and its style; empty where the system cannot be drawn."""
     shown = lanes(experiment, record)
     if not shown:
         return ""
-    files = {name: _source(environment, f"player.{name}") for name in ("js", "css")}
-    return environment.get_template("player.html").render(_context(record, shown) | files)
+    files = {name: source(f"player.{name}") for name in ("js", "css")}
+    return environment().get_template("player.html").render(_context(record, shown) | files)
 
 
 def lanes(experiment: Experiment, record: Record) -> list[Lane]:
@@ -77,18 +76,14 @@ def lanes(experiment: Experiment, record: Record) -> list[Lane]:
     t = _times(samples, period, len(chosen))
     there = samples <= t[-1] * (1.0 + 1e-12)
     reach = {
-        name: max(float(np.max(np.abs(series[name][there]))) for _, _, series in chosen)
-        for name in states
+        name: max(data.largest(series[name][there]) for _, _, series in chosen) for name in states
     }
-    parameters = moments.parameters(experiment, record, first.case)
+    parameters = parameters_of(experiment, record, first.case)
     found = []
     for one, level, series in chosen:
         motion = moments.motion(model, t, samples, series, parameters, reach)
-        found.append(
-            Lane(
-                _title(record, one, level, chosen), motion, draw(motion), period, float(samples[-1])
-            )
-        )
+        title = _title(record, one, level)
+        found.append(Lane(title, motion, draw(motion), period, float(samples[-1])))
     return found
 
 
@@ -96,7 +91,7 @@ def _member(experiment: Experiment, record: Record) -> Member:
     """Return what is shown: the first scheme, and of a sweep a typical member."""
     found = choice.quantities(experiment, record)
     if not found:
-        return Member(0, 0, record.words("scheme")[0], data.case_name(record, 0))
+        return data.of_case(record, 0)[0]
     members = choice.with_levels(experiment, choice.members(record, found[0]))
     return next((member for member in members if member.role == "typical"), members[0])
 
@@ -121,8 +116,7 @@ def _chosen(
     if size == 0.0 or (math.isfinite(known) and size > frame.UNBOUNDED * known):
         return []
     others = []
-    for k, scheme in enumerate(record.words("scheme")):
-        one = Member(k, member.case, scheme, member.case_name)
+    for one in data.of_case(record, member.case):
         found = series(one, 0)
         apart = max(float(np.max(np.abs(found[name] - first[name]))) for name in positions)
         largest = max(float(np.max(np.abs(found[name]))) for name in positions)
@@ -134,17 +128,12 @@ def _chosen(
     return [(member, finest, first), (one, 0, found)]
 
 
-def _title(
-    record: Record, member: Member, level: int, chosen: list[tuple[Member, int, Any]]
-) -> str:
-    """Name a motion by what it differs in from the others, or by its level."""
+def _title(record: Record, member: Member, level: int) -> str:
+    """Name a motion by its level, and by its scheme and member where there are several."""
     step = words.number(float(data.steps_of(record, member.case)[level]), "brief")
     text = f"level {data.whole(record, 'level')[level]}, dt = {step} {data.time_unit(record)}"
-    several = len({one.scheme for one, _, _ in chosen}) > 1 or len(record["scheme"]) > 1
-    parts = [member.scheme_name] if several else []
-    parts += [text.strip()]
-    parts += [member.case_words] if member.case_name else []
-    return ", ".join(parts)
+    scheme = member.scheme_name if len(record["scheme"]) > 1 else ""
+    return ", ".join(filter(None, [scheme, text.strip(), member.case_words]))
 
 
 def _times(t: Floats, period: float, count: int) -> Floats:
@@ -180,7 +169,7 @@ def _context(record: Record, shown: list[Lane]) -> dict[str, Any]:
     unit = data.unit(record, f"{position}_finest")
     return {
         "data": _json(content),
-        "stages": [(lane.title, _markup(_still(lane))) for lane in shown],
+        "stages": [(lane.title, markup(_still(lane))) for lane in shown],
         "legend": shown[0].scene.legend,
         "frames": t.size - 1,
         "width": scenes.WIDTH,
@@ -226,12 +215,10 @@ def _rounded(values: Floats) -> list[int]:
 def _still(lane: Lane) -> str:
     """Return the parts at the start, and behind them fainter bodies at other times of the first period."""
     scene, t = lane.scene, lane.motion.t
-    ghosts = []
-    last = min(t.size - 1, FRAMES_A_PERIOD // 2 if t.size > FRAMES_A_PERIOD else t.size - 1)
-    for k in np.linspace(0, last, POSITIONS).astype(int).tolist()[1:]:
-        ghosts += [
-            _shape(part, k) for part in scene.parts if part.look in ("wire", "body", "wheel")
-        ]
+    last = FRAMES_A_PERIOD // 2 if t.size > FRAMES_A_PERIOD else t.size - 1
+    places = np.linspace(0, last, POSITIONS).astype(int).tolist()[1:]
+    bodies = [part for part in scene.parts if part.look in ("wire", "body", "wheel")]
+    ghosts = [_shape(part, k) for k in places for part in bodies]
     moving = [_shape(part, 0) for part in scene.parts]
     moving += [_label(part) for part in scene.parts if part.label]
     return f'<g class="ghosts">{"".join(ghosts)}</g><g class="now">{"".join(moving)}</g>'
@@ -256,16 +243,4 @@ def _label(part: Part) -> str:
 def _json(content: Any) -> str:
     """Return data for a script element, which no text can end."""
     text = json.dumps(content, separators=(",", ":"))
-    return _markup(text.replace("<", "\\u003c"))
-
-
-def _source(environment: Environment, name: str) -> str:
-    """Return a file of the templates as it is, for a script or a style."""
-    assert environment.loader is not None
-    return _markup(environment.loader.get_source(environment, name)[0])
-
-
-def _markup(text: str) -> str:
-    from markupsafe import Markup
-
-    return Markup(text)
+    return markup(text.replace("<", "\\u003c"))

@@ -45,7 +45,7 @@ def write(
         cards.append(card)
         tables += [table for table in (card["table"], card["members"]) if table]
         figures |= dict(_thumbnail(verdict)) if not figures else {}
-        figures |= dict(_files(card["picture"], formats))
+        figures |= drawing.files(card["picture"], formats)
     replace_files(directory / "figures", figures)
     replace_files(directory / "tables", files_of({table.name: texts_of(table) for table in tables}))
     context = {
@@ -69,10 +69,8 @@ def _card(
     experiment: SolverExperiment, verdict: LadderVerdict, entry: Mapping[str, Any]
 ) -> dict[str, Any]:
     """Return what the page shows of a check."""
-    files = [f"level_{level:02d}.nc" for level in experiment.levels]
-    card = study.card(
-        entry["id"], verdict, entry["expected"], files if not experiment.sweep else ()
-    )
+    files = [] if experiment.sweep else [f"level_{level:02d}.nc" for level in experiment.levels]
+    card = study.card(entry["id"], verdict, entry["expected"], files)
     caption = card["table"].caption
     if experiment.sweep:
         caption = f"Levels of member {entry['results'][0]['case']}{caption.removeprefix('Levels')}"
@@ -88,16 +86,14 @@ def _members(entry: Mapping[str, Any]) -> Table:
     """Return the table of the members that the summary lists, the worst first."""
     results = entry["results"]
     names = list(results[0]["values"])
-    facts = [
-        name for name in ("order", "error", "error_bound", "best") if name in results[0]["facts"]
-    ]
-    forms = {"order": "order", "best": "full"}
+    forms = {"order": "order", "error": "small", "error_bound": "small", "best": "full"}
+    facts = [name for name in forms if name in results[0]["facts"]]
     columns = (
         Column("member", form="integer"),
         *(Column(name, form="text") for name in names),
         Column("measured"),
         Column("reason"),
-        *(Column(name.replace("_", " "), form=forms.get(name, "small")) for name in facts),
+        *(Column(name.replace("_", " "), form=forms[name]) for name in facts),
     )
 
     def cells(result: Mapping[str, Any]) -> Iterator[Cell]:
@@ -111,30 +107,19 @@ def _members(entry: Mapping[str, Any]) -> Table:
     return Table(f"members_{entry['id']}", caption, columns, rows)
 
 
-def _files(picture: style.Picture, formats: Sequence[str]) -> Iterator[tuple[str, bytes]]:
-    """Yield the figure of a check as files."""
-    assert picture.figure is not None
-    yield f"{picture.name}.svg", drawing.svg(picture.figure, picture.name).encode()
-    for form in formats:
-        if form != "svg":
-            yield f"{picture.name}.{form}", drawing.binary(picture.figure, form)
-
-
 def _thumbnail(verdict: LadderVerdict) -> Iterator[tuple[str, bytes]]:
     """Yield the small figure of the index, errors or differences over the levels; nothing without two of them."""
-    found = [abs(level.error or level.difference or 0.0) for level in verdict.levels]
+    found = np.array([abs(level.error or level.difference or 0.0) for level in verdict.levels])
     places = np.flatnonzero(found)
-    if len(places) > 1:
-        sizes = np.log10(np.array(found)[places])
-        yield "thumbnail.svg", thumbnail.document([(places.astype(np.float64), sizes)]).encode()
+    if places.size > 1:
+        line = places.astype(np.float64), np.log10(found[places])
+        yield "thumbnail.svg", thumbnail.document([line]).encode()
 
 
 def _setup(experiment: SolverExperiment) -> Iterator[tuple[str, str]]:
     """Yield what makes the levels."""
-    yield (
-        {"command": "Command", "python": "Function", "files": "Files"}[experiment.solver.kind],
-        experiment.solver.text,
-    )
+    kinds = {"command": "Command", "python": "Function", "files": "Files"}
+    yield kinds[experiment.solver.kind], experiment.solver.text
     yield from not_in_file(experiment.settings)
     if experiment.solver.inputs:
         yield "Inputs", ", ".join(experiment.solver.inputs)

@@ -15,6 +15,7 @@ from vibsim.core.vocabulary import worst
 from vibsim.report import style, words
 from vibsim.report.page.templates import environment, sealed
 from vibsim.report.style import Picture
+from vibsim.report.tables.best import rounded
 from vibsim.report.tables.table import Column, Table, Written
 from vibsim.report.text import findings
 
@@ -81,26 +82,33 @@ def finding(verdicts: Sequence[LadderVerdict]) -> str:
 
 def numbers(verdict: LadderVerdict) -> list[dict[str, str]]:
     """Return the large numbers of a ladder: the order, the error of the finest level, and the best value."""
-    between = words.interval((verdict.order_low, verdict.order_high))
-    asked = verdict.expected or verdict.at_least
-    wanted = (
-        "" if asked is None else f"expected{'' if verdict.expected else ' at least'}: {asked:g}"
-    )
-    span = f"between {between.replace(' to ', ' and ')}" if between != "–" else ""
-    share = verdict.relative_error
+    span = words.between((verdict.order_low, verdict.order_high))
+    asked, wanted = verdict.expected or verdict.at_least, ""
+    if asked is not None:
+        wanted = f"expected{'' if verdict.expected else ' at least'}: {asked:g}"
+    share, bound = verdict.relative_error, verdict.best_bound
+    size = None if verdict.error is None else abs(verdict.error)
+    of_size = f"{words.share(share)} of its size" if share is not None else ""
+    best = NO_BEST[verdict.is_number]
+    if bound is not None:
+        best = f"± {words.number(bound, 'brief')}, extrapolated"
+    of_order = "; ".join(filter(None, [span, wanted]))
     rows = (
-        ("Observed order", words.number(verdict.order, "order"), "; ".join(filter(None, [span, wanted]))),
-        ("Error of the finest level", words.number(abs(verdict.error) if verdict.error is not None else None, "brief"),
-         f"{words.share(share)} of its size" if share is not None else ""),
-        ("Best value", words.number(verdict.best, "value"),
-         NO_BEST[verdict.is_number] if verdict.best_bound is None
-         else f"± {words.number(verdict.best_bound, 'brief')}, extrapolated"),
-    )  # fmt: skip
-    keys = ("label", "value", "note")
+        ("Observed order", words.number(verdict.order, "order"), of_order),
+        ("Error of the finest level", words.number(size, "brief"), of_size),
+        ("Best value", _best(verdict), best),
+    )
     return [
-        dict(zip(keys, row, strict=True)) | {"value": row[1] if row[1] != "–" else "not known"}
-        for row in rows
+        {"label": label, "value": value if value != "–" else "not known", "note": note}
+        for label, value, note in rows
     ]
+
+
+def _best(verdict: LadderVerdict) -> str:
+    """Write the best value with the digits that its bound leaves."""
+    if verdict.best is None or verdict.best_bound is None:
+        return words.number(verdict.best, "value")
+    return rounded(verdict.best, verdict.best_bound).text
 
 
 def _asked(verdict: LadderVerdict) -> str:
@@ -116,7 +124,7 @@ def card(name: str, verdict: LadderVerdict, asked: str, files: Sequence[str]) ->
     """Return what the page shows of a quantity: `asked` is what was expected, and `name` unique on the page."""
     rows = [
         ("Expected", asked),
-        ("Order", _order(verdict)),
+        ("Order", words.with_interval(verdict.order, (verdict.order_low, verdict.order_high))),
         ("Levels used", ", ".join(words.number(h, "step") for h in verdict.h_used) or "–"),
         ("Error of the finest level", words.number(verdict.error, "small")),
         ("Its bound (95 %)", words.number(verdict.error_bound, "small")),
@@ -137,12 +145,6 @@ def card(name: str, verdict: LadderVerdict, asked: str, files: Sequence[str]) ->
         "picture": _picture(name, verdict),
         "doubt": UNSEEN if verdict.status == "PASS" and not verdict.is_exact_known else "",
     }
-
-
-def _order(verdict: LadderVerdict) -> str:
-    text = words.number(verdict.order, "order")
-    interval = words.interval((verdict.order_low, verdict.order_high))
-    return text if interval == "–" else f"{text} ({interval})"
 
 
 def _table(verdict: LadderVerdict) -> Table:

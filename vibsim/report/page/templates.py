@@ -20,6 +20,7 @@ from jinja2.bccache import Bucket, BytecodeCache
 from markupsafe import Markup, escape
 
 from vibsim.core import private_cache
+from vibsim.report import words
 from vibsim.report.text import glossary
 
 if TYPE_CHECKING:
@@ -36,7 +37,12 @@ def environment() -> Environment:
         loader=FileSystemLoader(TEMPLATES), autoescape=True, undefined=StrictUndefined, trim_blocks=True,
         lstrip_blocks=True, optimized=False, bytecode_cache=TemplateCache(),
     )  # fmt: skip
-    made.filters |= {"code": _code, "drawn": _drawn, "explained": glossary.explained}
+    made.filters |= {
+        "code": _code,
+        "drawn": _drawn,
+        "explained": glossary.explained,
+        "swept": words.swept,
+    }
     made.globals |= {"term": glossary.term}
     return made
 
@@ -50,6 +56,13 @@ def _code(text: str) -> str:
         Markup("<code>{}</code>").format(p) if i % 2 else escape(p) for i, p in enumerate(parts)
     ]
     return Markup("").join(pieces)
+
+
+def source(name: str) -> str:
+    """Return a file of the templates as it is, for a script or a style."""
+    loader = environment().loader
+    assert loader is not None
+    return markup(loader.get_source(environment(), name)[0])
 
 
 def markup(text: str) -> str:

@@ -7,7 +7,6 @@ from typing import Any
 
 from vibsim.core.record import Record
 from vibsim.report import data, words
-from vibsim.report.tables.results import error_of, measured_order, number_of
 from vibsim.report.tables.table import Cell, Column, Table, Written
 
 ROUND_OFF = 1e-12  # numbers no larger than this have two digits: more would be noise
@@ -25,13 +24,7 @@ def checks(summary: Mapping[str, Any]) -> Table:
     of_check = ("id", "kind", "quantity", "status", "reason", "expected")
     of_result = ("scheme", "case", "status", "reason")
     rows = tuple(
-        (
-            *map(check.get, of_check),
-            *map(result.get, of_result),
-            *measured_order(result),
-            number_of(result),
-            *error_of(result),
-        )
+        (*map(check.get, of_check), *map(result.get, of_result), *words.measured(result))
         for check in summary["checks"]
         for result in check.get("results") or [{}]
     )
@@ -46,7 +39,7 @@ def results(record: Record, check: Mapping[str, Any], unit: str) -> Table | None
     has_order = check.get("kind") == "converges" or any(
         words.fact(result, "order") is not None for result in listed
     )
-    has_value = any(number_of(result) is not None for result in listed)
+    has_value = any(words.number_of(result) is not None for result in listed)
     columns = [Column("scheme")]
     columns += [Column("case", form="integer"), Column("member")] if data.swept(record) else []
     columns += [Column("measured"), Column("reason")]
@@ -68,7 +61,7 @@ def results(record: Record, check: Mapping[str, Any], unit: str) -> Table | None
             yield words.interval(words.interval_of(result))
             yield words.levels(words.levels_of(result))
         if has_value:
-            value = number_of(result)
+            value = words.number_of(result)
             is_noise = value is not None and 0.0 < abs(value) <= ROUND_OFF
             yield Written(value, words.number(value, "brief")) if is_noise and value else value
 

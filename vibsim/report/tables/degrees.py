@@ -9,6 +9,7 @@ import re
 
 from vibsim import theory
 from vibsim.formula import Binary, Expression, Name, Negate, literal, names_in, parse
+from vibsim.report.choice import has_swept_options
 from vibsim.report.tables.table import Cell, Column, Table
 from vibsim.report.types import Experiment
 from vibsim.theory import Miss, Residual
@@ -39,10 +40,9 @@ def table(experiment: Experiment) -> Table | None:
         Column("scheme"), Column("exact up to degree", form="integer"), Column("first miss at degree", form="integer"),
         Column("first step off by"), Column("a step at t off by"), Column("because of"),
     )  # fmt: skip
-    keys = experiment.sweep.keys if experiment.sweep is not None else ()
     rows: list[tuple[Cell, ...]] = []
     for spec in experiment.schemes:
-        if spec.adaptive or any(key.startswith(f"schemes.{spec.name}.") for key in keys):
+        if spec.adaptive or has_swept_options(experiment, spec):
             continue
         stepper = spec.method.stepper_for(model, spec.options)
         degree = theory.exact_degree(stepper, model)

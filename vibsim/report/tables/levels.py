@@ -15,60 +15,53 @@ import numpy as np
 from vibsim.core.array_types import Flags, Floats
 from vibsim.core.record import Record
 from vibsim.core.vocabulary import MEMBER, OF_LEVEL, TYPICAL_NORM
-from vibsim.report import data, frame, words
-from vibsim.report.data import Member, at, known, time_unit, unit, whole
+from vibsim.report import data, frame, style, words
+from vibsim.report.data import Member, known, time_unit, unit, whole
 from vibsim.report.tables.table import Cell, Column, Table, Written
 
 OWN, CENTRED = "energy_deviation_max_abs", "energy_deviation_d2t_max_abs"
 ROUND_OFF = 1e-13
 """A relative error that is no larger is rounding, and nothing is worth comparing with it."""
-
-
-_Fill = Callable[[Member, int], Cell]
+Fill = Callable[[Member, int], Cell]
 """Returns the cell of a member and the position of a level."""
 
 
-def _key(member: Member) -> str:
-    """Return the name of a scheme, and of a member with its keys as the experiment file has them."""
-    return ", ".join(filter(None, [member.scheme_name, member.case_name]))
-
-
-def _by_level(
+def by_level(
     record: Record,
     name: str,
     caption: str,
     members: Sequence[Member],
-    filled: Sequence[tuple[Column, _Fill] | None],
+    filled: Sequence[tuple[Column, Fill] | None],
     *,
     titled: bool = False,
+    there: Flags | None = None,
 ) -> Table:
-    """Return a table with a row for every member and level.
+    """Return a table with a row for every member and level, or for those that are `there`, shape (scheme, case, level).
 
     `filled` are the columns after scheme, member and level, each with what fills it (None is left out); scheme and
     member share a column where the table is `titled`.
     """
-    several = bool(data.swept(record))
-    names = ["scheme", "member"] if several and not titled else ["scheme"]
+    names = ["scheme", "member"] if data.swept(record) and not titled else ["scheme"]
     shown = [column for column in filled if column is not None]
     columns = (*map(Column, names), Column("level", form="integer"), *(c for c, _ in shown))
-    rows = tuple(
-        (
-            *([_key(m)] if titled else [m.scheme_name, m.case_name])[: len(names)],
-            level,
-            *(fill(m, i) for _, fill in shown),
-        )
-        for m in members
-        for i, level in enumerate(whole(record, "level"))
-    )
-    return Table(name, caption, columns, rows, heads=len(names) * several)
+    rows = []
+    for member in members:
+        # keys as the experiment file has them
+        own = [text for text in (member.scheme_name, member.case_name) if text]
+        own = [", ".join(own)] if titled else own
+        for i, level in enumerate(whole(record, "level")):
+            if there is None or there[member.scheme, member.case, i]:
+                rows.append((*own, level, *(fill(member, i) for _, fill in shown)))
+    heads = len(names) if data.swept(record) else 0
+    return Table(name, caption, columns, tuple(rows), heads)
 
 
-def _cells(values: Floats, kind: type[int] | type[float] = float) -> _Fill:
+def _cells(values: Floats, kind: type[int] | type[float] = float) -> Fill:
     """Return what fills a column with numbers of shape (scheme, case, level)."""
     return lambda member, i: kind(values[member.scheme, member.case, i])
 
 
-def _step_column(record: Record) -> tuple[Column, _Fill]:
+def _step_column(record: Record) -> tuple[Column, Fill]:
     """Return the column of the time steps."""
     column = Column("dt", time_unit(record, "dt"), "step")
     return column, lambda member, i: float(data.steps_of(record, member.case)[i])
@@ -80,20 +73,13 @@ def orders(
     """Return norms, ratios and orders of a quantity, one row per scheme, member and level."""
     measure, n = data.norm_unit(record, quantity, norm), data.norm_index(record, norm)
     letter, pairs = words.symbol(quantity), bool(whole(record, "pair"))
-    triples, count = bool(whole(record, "triple")), len(whole(record, "level"))
+    triples = bool(whole(record, "triple"))
     floors = {member: data.floor_norm(record, quantity, member, norm) for member in shown}
     notes = {member: _notes(record, quantity, member) for member in shown}
 
-    def of(name: str) -> _Fill:
-        name = f"{quantity}_{name}"
-        found = {
-            m: [
-                *(at(record, name, m, norm=n).tolist() if name in record else []),
-                *[math.nan] * count,
-            ]
-            for m in shown
-        }
-        return lambda member, i: found[member][i]
+    def of(name: str) -> Fill:
+        found = known(record, f"{quantity}_{name}", (*MEMBER, "level"), norm=n)
+        return lambda m, i: float(found[m.scheme, m.case, i]) if i < found.shape[2] else math.nan
 
     filled = (
         (Column("steps", form="integer"), lambda member, i: int(record["steps"][i])),
@@ -107,7 +93,7 @@ def orders(
     )
     caption = f"{letter}: {norm} norm of {f'{letter}(level) − {letter}(next level)' if pairs else 'its error'}"
     caption += "; ratio and order from three levels starting here" if triples else ""
-    return _by_level(record, f"orders_{quantity}_{norm}", caption, shown, filled)
+    return by_level(record, f"orders_{quantity}_{norm}", caption, shown, filled)
 
 
 def _notes(record: Record, quantity: str, member: Member) -> list[str]:
@@ -134,23 +120,19 @@ def maxima(record: Record, shown: Sequence[Member]) -> Table | None:
     if OWN not in record:
         return None
     measure, several = unit(record, OWN), len(whole(record, "level")) > 1
-    filled: list[tuple[Column, _Fill] | None] = []
+    filled: list[tuple[Column, Fill]] = []
     for name, text, ratio in (
         (OWN, "max |dE|", "ratio"),
         (f"{OWN}_interior", "max |dE| without the last point", "ratio, without"),
     ):
         # lean records leave the second out
         if name in record:
-            values = np.asarray(record[name], dtype=np.float64)
+            values, is_sound = known(record, name, OF_LEVEL), record["status"] == 0
             filled.append((Column(text, measure, "norm"), _cells(values)))
-            is_sound = np.asarray(record["status"]) == 0
-            filled.append(
-                (Column(ratio, form="order"), _cells(_ratios(values, is_sound)))
-                if several
-                else None
-            )
+            if several:
+                filled.append((Column(ratio, form="order"), _cells(_ratios(values, is_sound))))
     caption = "Largest energy deviation over every step; the last point has its own end formula"
-    return _by_level(record, "energy_maxima", caption, shown, filled, titled=True)
+    return by_level(record, "energy_maxima", caption, shown, filled, titled=True)
 
 
 def _ratios(values: Floats, is_sound: Flags) -> Floats:
@@ -177,15 +159,14 @@ def scalars(record: Record, shown: Sequence[Member]) -> Table | None:
         (Column("amplitude", angle, "full"), _cells(np.abs(record["amplitude"]))),
     )
     caption = "Period (interpolated) and amplitude"
-    return _by_level(record, "scalars", caption, shown, filled, titled=True)
+    return by_level(record, "scalars", caption, shown, filled, titled=True)
 
 
 def velocities(record: Record) -> Table | None:
     """Return the largest relative energy error with both velocities; None where no scheme has one of its own."""
     if CENTRED not in record or not np.isfinite(known(record, CENTRED, OF_LEVEL)).any():
         return None
-    first = np.abs(known(record, "energy_initial", MEMBER))[..., None]
-    first = np.where(first > 0.0, first, np.nan)
+    first = style.positive(np.abs(known(record, "energy_initial", MEMBER)))[..., None]
     own, centred, interior = (
         known(record, name, OF_LEVEL) / first for name in (OWN, CENTRED, f"{OWN}_interior")
     )
@@ -220,7 +201,7 @@ def velocities(record: Record) -> Table | None:
         (Column("second over first", form="norm"), quotient),
         (Column("drift of the energy, own velocity"), drift) if is_named else None,
     )
-    return _by_level(record, "energy_velocities", caption, data.everyone(record), filled)
+    return by_level(record, "energy_velocities", caption, data.everyone(record), filled)
 
 
 def _plain(quotient: float) -> Cell:
@@ -244,7 +225,7 @@ def events(record: Record) -> Table | None:
         "Events (impacts; turns and starts of a body under friction; events of the file): where they are located, "
         "their times move with the level as the error of the scheme does, else by part of a step"
     )
-    seconds = time_unit(record, "first_event_time")
+    seconds, has_rest = time_unit(record, "first_event_time"), np.isfinite(rest).any()
 
     def change(member: Member, i: int) -> Cell:
         """Return by how much the last event is later than on the next finer level; None where it is another event."""
@@ -257,9 +238,7 @@ def events(record: Record) -> Table | None:
         (Column("events", form="integer"), _cells(count, int)),
         (Column("first", seconds, "value"), _cells(first)),
         (Column("last", seconds, "value"), _cells(last)),
-        (Column("at rest from", seconds, "value"), _cells(rest))
-        if np.isfinite(rest).any()
-        else None,
+        (Column("at rest from", seconds, "value"), _cells(rest)) if has_rest else None,
         (Column("last, less that of the next finer level", seconds, "small"), change),
     )
-    return _by_level(record, "events", caption, data.everyone(record), filled)
+    return by_level(record, "events", caption, data.everyone(record), filled)

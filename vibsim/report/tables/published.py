@@ -19,6 +19,7 @@ from vibsim.report.types import Experiment, PublishedRow, PublishedTable
 
 AGREES = "agrees?"
 OWN = "by own velocity"
+PLACES = ("t", "step", "event", "case")  # where a number may be taken, beside swept values
 
 
 def ids(experiment: Experiment) -> frozenset[str]:
@@ -63,18 +64,15 @@ def tables(experiment: Experiment, record: Record, summary: Mapping[str, Any]) -
 
 
 def _columns(record: Record, table: PublishedTable) -> tuple[Column, ...]:
-    at = [
-        key
-        for key in ("t", "step", "event", "case")
-        if any(getattr(row.at, key) is not None for row in table.rows)
-    ]
-    at += dict.fromkeys(key for row in table.rows for key in row.at.swept)
+    rows = table.rows
+    at = [key for key in PLACES if any(getattr(row.at, key) is not None for row in rows)]
+    at += dict.fromkeys(key for row in rows for key in row.at.swept)
     return (
         Column("scheme"), Column("level"), Column("dt", data.time_unit(record, "dt"), "step"),
         *(Column(key, form="step") for key in at),
         Column("printed", form="printed"), Column("ours", form="close"), Column("difference", form="brief"),
         Column(AGREES), *(Column(_beside_header(name, table), form="norm") for name in table.beside),
-        *([Column("why")] if any(row.note for row in table.rows) else []),
+        *([Column("why")] if any(row.note for row in rows) else []),
     )  # fmt: skip
 
 
@@ -87,7 +85,7 @@ def _beside_header(name: str, table: PublishedTable) -> str:
 
 
 def _value_in_words(value: str) -> str:
-    return value.replace("_d2t", " by [D₂ₜu]").replace("_", " ")
+    return value.replace(words.CENTRED, " by [D₂ₜu]").replace("_", " ")
 
 
 def _row(
@@ -103,9 +101,8 @@ def _row(
     case = 0 if row.at.case is None else data.place_of(record, row.at.case) or 0
     if row.at.swept:
         case = int(np.argmax(members_with(columns_of(record), row.at.swept, len(record["case"]))))
-    ours = float(
-        field_values(record, name, "value")[record.words("scheme").index(row.scheme), case]
-    )
+    scheme = record.words("scheme").index(row.scheme)
+    ours = float(field_values(record, name, "value")[scheme, case])
     levels: list[int | str] = [*data.whole(record, "level")]
     level = levels[-1] if row.level is None else row.level
     steps = dict(zip(levels, data.steps_of(record, case).tolist(), strict=True))
@@ -113,7 +110,7 @@ def _row(
     yield str(level)
     # the extrapolated solution has no step
     yield steps.get(level, math.nan)
-    yield from (getattr(row.at, key) for key in ("t", "step", "event", "case") if key in headers)
+    yield from (getattr(row.at, key) for key in PLACES if key in headers)
     yield from (row.at.swept.get(header) for header in headers if "." in header)
     yield row.printed
     yield Written(ours, words.like(ours, row.printed))

@@ -80,11 +80,8 @@ class Table:
         form = self.columns[i].form
         sizes = [abs(row[i]) for row in self.rows if isinstance(row[i], float)]  # type: ignore[arg-type]
         nonzero = [size for size in sizes if 0 < size < math.inf]
-        return (
-            "small"
-            if form == "norm" and nonzero and not 0.1 <= min(nonzero) <= max(nonzero) < 1e4
-            else form
-        )
+        needs_power = nonzero and not 0.1 <= min(nonzero) <= max(nonzero) < 1e4
+        return "small" if form == "norm" and needs_power else form
 
 
 def is_nothing(cell: Cell) -> bool:

@@ -16,7 +16,8 @@ from vibsim.core.array_types import Floats
 from vibsim.core.record import Record
 from vibsim.core.vocabulary import MEMBER, OF_LEVEL, TYPICAL_NORM
 from vibsim.report import choice, data, finest_level, words
-from vibsim.report.data import known, swept, whole
+from vibsim.report.data import Member, known, swept, whole
+from vibsim.report.tables.levels import Fill, by_level
 from vibsim.report.tables.table import Cell, Column, Table, Written
 from vibsim.report.types import Experiment
 
@@ -49,13 +50,13 @@ def schemes(experiment: Experiment, record: Record) -> Table | None:
         if whole(record, "triple"):
             columns.append(Column("measured, ± half its interval", form="order"))
     rows = tuple(tuple(_scheme(experiment, record, s, quantities)) for s in range(len(names)))
-    measured = several = ""
-    if whole(record, "triple"):
-        measured = f", and the order measured in the {TYPICAL_NORM} norm"
-        several = "; in a sweep, that of the member farthest from the stated order"
+    is_measured = bool(whole(record, "triple"))
     caption = (
-        f"Schemes: stated properties (explicit or implicit, s: symplectic){measured} (order ∞: exact, no error "
-        f"to shrink){several if swept(record) else ''}"
+        "Schemes: stated properties (explicit or implicit, s: symplectic)"
+        + f", and the order measured in the {TYPICAL_NORM} norm" * is_measured
+        + " (order ∞: exact, no error to shrink)"
+        + "; in a sweep, that of the member farthest from the stated order"
+        * (is_measured and bool(swept(record)))
     )
     return Table("schemes", caption, tuple(columns), rows)
 
@@ -115,67 +116,68 @@ def predictions(record: Record) -> list[Table]:
     )
     growth = "growth of the amplitude per natural period, predicted by the matrix of one step"
     phase = "frequency, and the time by which the peaks come early (+) or late (−) in each period"
-    shown = {"frequency": ("frequency", rate), "phase_error": ("phase error", time)}
+    alone = {"growth": ("growth per period − 1", "")}
+    both = {"frequency": ("frequency", rate), "phase_error": ("phase error", time)}
     return [
-        _predictions(
-            record, "growth", f"{growth}. {how}", {"growth": ("growth per period − 1", "")}
-        ),
-        _predictions(record, "phase", f"{phase}. {how}", shown),
+        _predictions(record, "growth", f"{growth}. {how}", alone),
+        _predictions(record, "phase", f"{phase}. {how}", both),
     ]
 
 
 def _predictions(
     record: Record, name: str, caption: str, shown: dict[str, tuple[str, str]]
 ) -> Table:
-    columns = [
-        Column("scheme"), *([Column("member")] if swept(record) else []), Column("level", form="integer"),
-        Column("w dt", form="step"), Column("stable"),
-    ]  # fmt: skip
-    for text, measure in shown.values():
-        columns += [
-            Column(f"{text}: predicted", measure, "close"),
-            Column("measured", measure, "close"),
-            Column("difference", measure, "brief"),
+    p, limit = data.omega_dt(record), known(record, "stability_limit", MEMBER)
+    rate = np.abs(known(record, "theory_frequency", OF_LEVEL))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        step = np.where(p > 0.0, math.ulp(1.0) * ROUNDINGS * 2.0 * math.pi / p, 0.0)
+        sizes = {"frequency": rate, "phase_error": np.where(rate > 0.0, 2.0 * math.pi / rate, 1.0)}
+
+    def stable(member: Member, i: int) -> Cell:
+        return is_stable(float(p[member.case, i]), float(limit[member.scheme, member.case]))
+
+    filled: list[tuple[Column, Fill]] = [
+        (Column("w dt", form="step"), lambda member, i: float(p[member.case, i])),
+        (Column("stable"), stable),
+    ]
+    for kind, (text, measure) in shown.items():
+        told, seen = (known(record, f"{who}_{kind}", OF_LEVEL) for who in ("theory", "measured"))
+        noise, less = step * sizes.get(kind, np.fmax(np.abs(told), 1.0)), float(kind == "growth")
+        filled += [
+            (Column(f"{text}: predicted", measure, "close"), _written(told - less, noise)),
+            (Column("measured", measure, "close"), _written(seen - less, noise)),
+            (Column("difference", measure, "brief"), _beyond(seen - told, noise)),
         ]
-    caption, rows = (
+    caption, there = (
         f"Theory beside measurement: {caption}",
-        tuple(_prediction_rows(record, [*shown])),
+        np.isfinite(known(record, "theory_growth", OF_LEVEL)),
     )
-    table = Table(f"theory_{name}", caption, tuple(columns), rows, 2 * bool(swept(record)))
+    table = by_level(record, f"theory_{name}", caption, data.everyone(record), filled, there=there)
     found = table.without_empty(["difference"])
     agree = ". Where no difference is shown, the two agree to round-off"
     return found if found.columns == table.columns else replace(found, caption=caption + agree)
 
 
-def _prediction_rows(record: Record, names: list[str]) -> Iterator[tuple[Cell, ...]]:
-    product, limit = data.omega_dt(record), known(record, "stability_limit", MEMBER)
-    told, seen = (
-        {name: known(record, f"{who}_{name}", OF_LEVEL) for name in {*names, "growth", "frequency"}}
-        for who in ("theory", "measured")
-    )
-    for member in data.everyone(record):
-        for i, level in enumerate(whole(record, "level")):
-            place = member.scheme, member.case, i
-            if not math.isfinite(told["growth"][place]):
-                continue
-            who = [member.scheme_name, *([member.case_name] if swept(record) else [])]
-            p = float(product[member.case, i])
-            step = math.ulp(1.0) * ROUNDINGS * 2.0 * math.pi / p if p > 0.0 else 0.0
-            rate = abs(float(told["frequency"][place]))
-            sizes = {"frequency": rate, "phase_error": 2.0 * math.pi / rate if rate > 0.0 else 1.0}
-            numbers: list[Cell] = []
-            for name in names:
-                a, b = float(told[name][place]), float(seen[name][place])
-                noise = step * sizes.get(name, max(abs(a), 1.0) if math.isfinite(a) else 1.0)
-                for value in (a, b):
-                    shown = value - 1.0 if name == "growth" else value
-                    is_noise = 0.0 < abs(shown) <= noise
-                    numbers.append(
-                        Written(shown, words.number(shown, "brief")) if is_noise else shown
-                    )
-                # nothing where it is round-off
-                numbers.append(None if abs(b - a) <= noise else b - a)
-            yield (*who, level, p, is_stable(p, float(limit[place[:2]])), *numbers)
+def _beyond(values: Floats, noise: Floats) -> Fill:
+    """Return what fills a column with numbers, and leaves out those that are no larger than the noise."""
+
+    def cell(member: Member, i: int) -> Cell:
+        value = float(values[member.scheme, member.case, i])
+        return None if abs(value) <= noise[member.scheme, member.case, i] else value
+
+    return cell
+
+
+def _written(values: Floats, noise: Floats) -> Fill:
+    """Return what fills a column with numbers, two digits of those that are no larger than the noise."""
+
+    def cell(member: Member, i: int) -> Cell:
+        place = member.scheme, member.case, i
+        value = float(values[place])
+        is_noise = 0.0 < abs(value) <= noise[place]
+        return Written(value, words.number(value, "brief")) if is_noise else value
+
+    return cell
 
 
 def is_stable(p: float, limit: float) -> str:

@@ -5,9 +5,10 @@ from __future__ import annotations
 from vibsim.checks.accurate import rule
 from vibsim.checks.reductions import TAKEN
 from vibsim.checks.value import what
+from vibsim.checks.verdict_text import expectation, expected_verdict
 from vibsim.core.vocabulary import TYPICAL_NORM
 from vibsim.report import words
-from vibsim.report.types import Check, ConvergesCheck, Measurement
+from vibsim.report.types import Check, ConvergesCheck, Experiment, Measurement
 
 PLACES = ("t", "step", "level", "scheme", "case")  # where a number may be taken
 STABLE = {
@@ -27,11 +28,12 @@ SOLUTIONS = {"exact": "the exact solution", "discrete": "the exact solution of i
 
 
 OF_TOLERANCE = "Error of the extrapolated solution, in the unit of each state, at every stored time"
-"""What an experiment with a tolerance asserts."""
 
 
-def about(check: Check) -> str:
-    """Return in one line what a check is about: a statement, or what it measures."""
+def about(check: Check | None) -> str:
+    """Return in one line what a check is about: a statement, what it measures, or of no check the tolerance."""
+    if check is None:
+        return OF_TOLERANCE
     if check.kind == "claim":
         return f"“{check.claim}”"
     if check.kind == "converges":
@@ -49,18 +51,21 @@ def _of_norm(check: ConvergesCheck) -> str:
     return f" ({', '.join(parts)})" if parts else ""
 
 
-def order_asked(check: ConvergesCheck, promised: float | None) -> str:
-    """Return which order a check asks for, or which verdict a trap expects; `promised` is that of the scheme."""
+def wanted(experiment: Experiment, check: Measurement | None, promised: float | None = None) -> str:
+    """Say in a few words what is asked for, of no check the tolerance; `promised` is the order of the scheme."""
+    if check is not None and check.kind == "conserves":
+        return DRIFTS[check.drift]
+    if check is None or check.kind != "converges":
+        return words.labelled(expectation(experiment, check, words.PAGE), None)
     order = words.number(promised, "step") if check.order == "scheme" else f"{check.order:g}"
     if check.expect.status != "PASS":
-        why = f" ({check.expect.reason})" if check.expect.reason else ""
-        return f"{check.expect.status}{why} against order {order}"
+        return f"{expected_verdict(check.expect)} against order {order}"
     return f"order {order} ± {check.tolerance:g}{', promised' * (check.order == 'scheme')}"
 
 
-def source(check: Check) -> str:
+def source(check: Check | None) -> str:
     """Return where a claim stands and what measures it; empty for the other kinds."""
-    if check.kind != "claim":
+    if check is None or check.kind != "claim":
         return ""
     stands = f"{check.source}. " if check.source else ""
     return f"{stands}Measured by: {measured(check.that)}."
@@ -75,22 +80,18 @@ def measured(check: Measurement) -> str:
             )
             named = [_listed(check.schemes)] if check.schemes else []
             only = "".join(f", {part}" for part in [*named, *swept_values(check)])
-            why = f" ({check.expect.reason})" if check.expect.reason else ""
-            trap = f", expected to end as {check.expect.status}{why}"
-            return (
-                f"{words.title(check.converges)} converges with {order} ± {check.tolerance:g} ({check.norm} norm{only})"
-                f"{'' if check.expect.status == 'PASS' else trap}"
-            )
+            told = f"converges with {order} ± {check.tolerance:g} ({check.norm} norm{only})"
+            is_trap = check.expect.status != "PASS"
+            trap = f", expected to end as {expected_verdict(check.expect)}" if is_trap else ""
+            return f"{words.title(check.converges)} {told}{trap}"
         case "accurate":
             told = f"{words.title(check.accurate)} is {rule(check, words.PAGE)} at the finest level"
             return f"{told}{_where(check)}"
         case "value":
-            bounds = (
-                ("equals", check.equals),
-                ("is below", check.below),
-                ("is above", check.above),
-            )
-            given = [f" {verb} {words.PAGE.number(x, 15)}" for verb, x in bounds if x is not None]
+            bounds = {"equals": check.equals, "is below": check.below, "is above": check.above}
+            given = [
+                f" {verb} {words.PAGE.number(x, 15)}" for verb, x in bounds.items() if x is not None
+            ]
             near = (("rtol", check.rtol), ("atol", check.atol))
             tolerances = [f"{key} {words.PAGE.number(x)}" for key, x in near if x is not None]
             extra = f" ({', '.join(tolerances)})" if tolerances else ""
@@ -120,7 +121,8 @@ def subject(check: Measurement) -> str:
     where = ", ".join([*parts, *swept_values(check)])
     if check.take is not None:
         told = f"{TAKEN[check.take]} {told} over {check.over}"
-    return f"{told}{(f' ({where})' if is_sampled else f' at {where}') if where else ''}"
+    told = f"{told}{(f' ({where})' if is_sampled else f' at {where}') if where else ''}"
+    return told.replace("level best", "the limit of the levels")
 
 
 def _where(check: Measurement) -> str:

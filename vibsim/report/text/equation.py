@@ -10,18 +10,29 @@ LETTERS = {
 }  # fmt: skip
 """Names of Greek letters; other names stand as they are."""
 _TOKEN = re.compile(
-    r"(?P<name>[A-Za-z]\w*)(?P<primes>'*)|(?P<number>\d+(?:\.\d+)?(?:e-?\d+)?)|(?P<space>\s+)|(?P<sign>->|.)"
+    r"(?P<name>[A-Za-z]\w*)(?P<primes>'*)|(?P<number>\d+(?:\.\d+)?(?:e-?\d+)?)|(?P<space>\s+)|(?P<sign>->|\*\*|.)"
 )
 _SIGNS = {"-": "−", "*": "·", "->": "→"}
 
 
+LONG = 60
+"""Letters of a formula beyond which a page may break it before a sign."""
+
+
 def mathml(text: str) -> str:
-    """Return a formula such as ``u'' + w^2 u = 0`` as an element ``math``, ready for a page."""
+    """Return a formula such as ``u'' + w^2 u = 0`` as elements ``math``, between which a page may break it.
+
+    One for each equation; of a long formula one for each term, also within its outer brackets.
+    """
     from markupsafe import Markup, escape
 
-    pieces: list[str] = []
-    is_power = False
+    parts: list[list[str]] = [[]]
+    depth, is_power = 0, False
     for found in _TOKEN.finditer(text):
+        pieces, sign = parts[-1], found["sign"]
+        depth += {"(": 1, ")": -1}.get(sign, 0)
+        if sign in ("+", "-") and len(text) > LONG and depth < 2 and text[found.end()].isspace():
+            parts.append(pieces := [])
         if found["space"]:
             pieces += ['<mspace width="0.2em"/>'] if pieces else []
             continue
@@ -29,17 +40,18 @@ def mathml(text: str) -> str:
             piece = _name(found["name"], found["primes"])
         elif found["number"]:
             piece = f"<mn>{found['number']}</mn>"
-        elif found["sign"] == "^" and pieces:
+        elif sign in ("^", "**") and pieces:
             is_power = True
             continue
         else:
-            sign = found["sign"]
             is_bracket = ' stretchy="false"' if sign in "()" else ""
             piece = f"<mo{is_bracket}>{escape(_SIGNS.get(sign, sign))}</mo>"
         if is_power:
             piece, is_power = f"<msup>{pieces.pop()}{piece}</msup>", False
         pieces.append(piece)
-    return Markup(f"<math>{''.join(pieces)}</math>")
+        if sign == "," and depth == 0:
+            parts.append([])
+    return Markup(" ".join(f"<math>{''.join(pieces)}</math>" for pieces in parts if pieces))
 
 
 def _name(name: str, primes: str) -> str:

@@ -10,6 +10,7 @@ from typing import Any
 from vibsim.models.shared.crossings import is_crossing, written
 from vibsim.report.text import structure
 from vibsim.report.types import Check, Experiment, Measurement, SchemeSpec
+from vibsim.schemes.base import LOW_STARTS
 
 WIDTH = 100  # characters of a line
 LONG = 160  # words of a file above which a page leaves its checks out
@@ -58,13 +59,10 @@ def _head(experiment: Experiment) -> list[str]:
     named |= {name: {"table": spec.file} for name, spec in model.tables.items()}
     if model.structure is not None:
         named |= structure.as_written(model.structure, model.formulas)
-    lines += [
-        f"model: {_value(named)}",
-        f"initial: {_value(dict((scaling or experiment).initial))}",
-    ]
-    if model.structure is not None and not model.structure.is_free:
-        # the section model says how the motion begins
-        del lines[-1]
+    lines.append(f"model: {_value(named)}")
+    # else the section model says how the motion begins
+    if model.structure is None or model.structure.is_free:
+        lines.append(f"initial: {_value((scaling or experiment).initial)}")
     time = experiment.time.model_dump(exclude_none=True)
     if time.get("periods") is not None:
         steps = time["base_steps"] / time["periods"]
@@ -80,12 +78,13 @@ def _head(experiment: Experiment) -> list[str]:
     lines += [f"time: {_value(time)}", f"levels: {_value(_levels(experiment.levels))}"]
     lines += schemes(experiment)
     if experiment.sweep:
-        axes = [_axis(axis) for axis in experiment.sweep.model_dump(mode="json")["axes"]]
-        lines += ["sweep:", *(f"  {line}" for axis in axes for line in axis)]
+        axes = experiment.sweep.model_dump(mode="json")["axes"]
+        lines += ["sweep:", *(f"  {line}" for axis in axes for line in _axis(axis))]
         lines += [f"  follow: {experiment.sweep.follow}"] if experiment.sweep.follow else []
-    if experiment.samples != "auto":
-        every = experiment.samples
-        lines.append(f"samples: {every if isinstance(every, str) else f'{{every: {every}}}'}")
+    if (samples := experiment.samples) != "auto":
+        lines.append(
+            f"samples: {samples if isinstance(samples, str) else _value({'every': samples})}"
+        )
     if experiment.output != "verdict":
         lines.append(f"output: {experiment.output}")
     if experiment.published:
@@ -114,10 +113,10 @@ def _levels(levels: Sequence[int]) -> Any:
 
 def _scheme(spec: SchemeSpec, changed: Mapping[str, Any]) -> Any:
     usual = {option.name: option.default for option in spec.method.options}
-    options = {k: v for k, v in spec.options.items() if usual.get(k, ...) != v}
-    label = {"label": spec.name} if spec.name != spec.kind else {}
-    options |= changed
-    return {"kind": spec.kind, **label, **options} if label or options else spec.kind
+    found: dict[str, Any] = {"label": spec.name} if spec.name != spec.kind else {}
+    found |= {k: v for k, v in spec.options.items() if usual.get(k, ...) != v}
+    found |= changed
+    return {"kind": spec.kind, **found} if found else spec.kind
 
 
 def _axis(axis: Mapping[str, Any]) -> list[str]:
@@ -131,15 +130,11 @@ def _axis(axis: Mapping[str, Any]) -> list[str]:
 def _check(check: Check) -> dict[str, Any]:
     found = check.model_dump(mode="json")
     if check.kind == "claim":
-        found["that"] = _bare(_check(check.that), "id")
+        found["that"] = _check(check.that)
+        found["that"].pop("id", None)
     if isinstance(found.get("at"), dict):
-        found["at"] = _bare(found["at"])
-    found = {k: v for k, v in found.items() if k not in DEFAULTS or DEFAULTS[k] != v}
-    return {k: v for k, v in _bare(found).items() if v != {}}
-
-
-def _bare(section: Mapping[str, Any], *keys: str) -> dict[str, Any]:
-    return {k: v for k, v in section.items() if v is not None and k not in keys}
+        found["at"] = {k: v for k, v in found["at"].items() if v is not None}
+    return {k: v for k, v in found.items() if v not in (None, {}, DEFAULTS.get(k))}
 
 
 def _listed(name: str, rows: Sequence[Any]) -> list[str]:
@@ -174,7 +169,7 @@ def change(experiment: Experiment, measured: Measurement | None, check: Mapping[
     result = check["results"][0]
     facts, reason = result.get("facts") or {}, result.get("reason")
     spec = next((spec for spec in experiment.schemes if spec.name == result["scheme"]), None)
-    if reason == "order_low" and spec is not None and spec.options.get("start") == "first_order":
+    if reason == "order_low" and spec is not None and spec.options.get("start") in LOW_STARTS:
         return "\n".join(schemes(experiment, spec.name, start="centred"))
     levels = list(experiment.levels)
     if levels != list(range(levels[0], levels[-1] + 1)):

@@ -11,9 +11,9 @@ from vibsim.checks.order_context import COINCIDE
 from vibsim.convergence import LadderVerdict
 from vibsim.core.record import Record
 from vibsim.report import data, words
-from vibsim.report.choice import Lead, is_trap
+from vibsim.report.choice import Lead, is_refutation, is_trap
 from vibsim.report.text import assertions, reasons
-from vibsim.report.types import Experiment
+from vibsim.report.types import Experiment, Measurement
 
 ORDINALS = {1: "first", 2: "second", 3: "third", 4: "fourth", 5: "fifth", 6: "sixth", 8: "eighth"}
 WITH_AN_ORDER = ("asymptotic", "order_low", "order_high")
@@ -69,11 +69,11 @@ OPEN = {
 NO_CHECK = "The motion was computed, and nothing was asked of it"
 BROKE_DOWN = "The run breaks down before its end"
 CLAIMS = {
-    "PASS": "",
-    "PASS, false": "Refuted: ",
-    "FAIL": "Not confirmed: ",
-    "FAIL, false": "Not refuted: ",
-    "INCONCLUSIVE": "Undecided: ",
+    ("PASS", False): "",
+    ("PASS", True): "Refuted: ",
+    ("FAIL", False): "Not confirmed: ",
+    ("FAIL", True): "Not refuted: ",
+    ("INCONCLUSIVE", False): "Undecided: ",
 }
 """Status of a statement, and whether it is expected to be false, to what stands before it in a title."""
 _FORMULA = re.compile(r"\S+ *[=<>≤≥]|\w dt\b|\w+[(^]")
@@ -115,9 +115,8 @@ def _of_some(record: Record, entry: Mapping[str, Any]) -> str:
     count, total = entry["counts"][entry["status"]], sum(entry["counts"].values())
     if not 0 < count < total:
         return ""
-    noun = (
-        "schemes" if not data.swept(record) else "members" if len(record["scheme"]) == 1 else "runs"
-    )
+    noun = "members" if len(record["scheme"]) == 1 else "runs"
+    noun = noun if data.swept(record) else "schemes"
     few, all_of = (words.number(n, "integer") for n in (count, total))
     return f", in {few} of {all_of} {noun}"
 
@@ -134,7 +133,7 @@ def _of_claim(lead: Lead) -> str:
     claim = claim if len(claim) <= LONG_CLAIM else f"{claim[: LONG_CLAIM - 1]}…"
     status = lead.entry["status"]
     is_false = not check.holds and status != "INCONCLUSIVE"
-    return f"{CLAIMS[f'{status}, false' if is_false else status]}{claim}"
+    return f"{CLAIMS[status, is_false]}{claim}"
 
 
 def _is_trap_of_a_number(lead: Lead) -> bool:
@@ -178,8 +177,7 @@ def _by_check(experiment: Experiment, record: Record, lead: Lead) -> str:
 def _phrases(experiment: Experiment, record: Record, lead: Lead) -> dict[str, str]:
     """Return the words that fill a title."""
     measured, what = lead.measured, _named(experiment, lead.quantity)
-    facts = lead.result.get("facts") or {}
-    order, expected = facts.get("order"), facts.get("expected")
+    order, expected = lead.facts.get("order"), lead.facts.get("expected")
     named = _named_schemes(record, lead)
     filled = {
         "what": what, "What": _opened(what), "everywhere": _everywhere(record, lead),
@@ -189,8 +187,6 @@ def _phrases(experiment: Experiment, record: Record, lead: Lead) -> dict[str, st
     }  # fmt: skip
     if measured is None:
         return filled
-    ends = "s" if len(named) == 1 else ""
-    is_are = "is" if len(named) == 1 else "are"
     match measured.kind:
         case "value":
             subject = assertions.subject(measured)
@@ -201,15 +197,16 @@ def _phrases(experiment: Experiment, record: Record, lead: Lead) -> dict[str, st
         case "conserves":
             filled["drift"] = assertions.DRIFTS[measured.drift]
         case "stable":
-            grow = f"make{ends} the amplitude grow"
-            tame, wild = f"{is_are} stable", grow
-            found = (tame, wild) if measured.stable else (wild, tame)
-            filled |= {"stability": found[0], "not_stability": f"{found[1]}, against what is asked"}
-    if each := _of_each(record, lead):
-        schemes = "both schemes promise" if each == 2 else f"each of {each} schemes promises"
-        filled |= {"at": f"at the order that {schemes}", "everywhere": ""}
-    elif _has_own_orders(record, lead):
+            found = ["is stable", "makes the amplitude grow"]
+            if len(named) > 1:
+                found = ["are stable", "make the amplitude grow"]
+            asked, other = found if measured.stable else found[::-1]
+            filled |= {"stability": asked, "not_stability": f"{other}, against what is asked"}
+    if _has_own_orders(record, lead):
         filled["at"] = "at the order that its scheme promises"
+        if (each := len(named)) > 1:
+            schemes = "both schemes promise" if each == 2 else f"each of {each} schemes promises"
+            filled |= {"at": f"at the order that {schemes}", "everywhere": ""}
     return filled
 
 
@@ -220,32 +217,22 @@ def _named_schemes(record: Record, lead: Lead) -> Sequence[str]:
 
 def _has_own_orders(record: Record, lead: Lead) -> bool:
     """Say whether a check asks for the order of the scheme, and its schemes and members have several."""
-    if getattr(lead.measured, "order", None) != "scheme":
-        return False
-    name = lead.quantity
-    if f"{name}_formal_order" not in record:
+    asks = getattr(lead.measured, "order", None) == "scheme"
+    if not asks or f"{lead.quantity}_formal_order" not in record:
         return False
     every = record.words("scheme")
     places = [every.index(scheme) for scheme in _named_schemes(record, lead)]
-    return len(set(data.formal_orders(record, name)[places].flat)) > 1
-
-
-def _of_each(record: Record, lead: Lead) -> int:
-    """Return how many schemes a check asks for the order that each of them promises; 0 where it is one order."""
-    named = _named_schemes(record, lead)
-    return len(named) if len(named) > 1 and _has_own_orders(record, lead) else 0
+    return len(set(data.formal_orders(record, lead.quantity)[places].flat)) > 1
 
 
 def _apart(order: float | None, expected: float | None) -> dict[str, str]:
     """Return the words for a measured order and for another one that was expected."""
     if expected is None or not math.isfinite(expected):
         return {"at_measured": _at(order), "expected_order": "exact"}
-    if order is not None and _at(order) == _at(expected):
-        return {
-            "at_measured": f"with order {order:.2f}",
-            "expected_order": f"with order {expected:g}",
-        }
-    return {"at_measured": _at(order), "expected_order": _at(expected).removesuffix(" order")}
+    measured, other = _at(order), _at(expected).removesuffix(" order")
+    if order is not None and measured == _at(expected):
+        measured, other = f"with order {order:.2f}", f"with order {expected:g}"
+    return {"at_measured": measured, "expected_order": other}
 
 
 def _named(experiment: Experiment, quantity: str) -> str:
@@ -257,6 +244,12 @@ def _named(experiment: Experiment, quantity: str) -> str:
         return told
     # a name of several words is no letter
     return f"the {long[quantity]}" if "_" in quantity else f"the {long[quantity]} {quantity}"
+
+
+def short(experiment: Experiment, quantity: str) -> str:
+    """Return the letter of a quantity; in words where it has none and its name has several."""
+    letter = words.symbol(quantity)
+    return _named(experiment, quantity) if "_" in letter else letter
 
 
 def _everywhere(record: Record, lead: Lead) -> str:
@@ -322,12 +315,8 @@ def paragraph(experiment: Experiment, record: Record, lead: Lead, levels: int) -
     """Return what the finding means, for who meets it for the first time."""
     if lead.entry is None:
         return NOTHING_ASKED.format(position=experiment.model.definition.position)
-    found = factor(lead)
-    if (
-        found is not None
-        and lead.entry["status"] == "PASS"
-        and lead.result["reason"] == "asymptotic"
-    ):
+    found, is_passed = factor(lead), lead.entry["status"] == "PASS"
+    if found is not None and is_passed and lead.result["reason"] == "asymptotic":
         part = _estimate_over_true(record, lead)
         apart = data.coincidence(record, lead.quantity, lead.member)
         is_rough = apart > COINCIDE or (part is not None and part > COINCIDE)
@@ -338,18 +327,27 @@ def paragraph(experiment: Experiment, record: Record, lead: Lead, levels: int) -
             beside="" if part is None else BESIDE.format(part=percent),
             unseen=UNSEEN if part is None else "",
         )
-    claim = lead.asserted
-    if (
-        claim is not None
-        and claim.kind == "claim"
-        and not claim.holds
-        and lead.entry["reason"] == "match"
-    ):
+    if is_refutation(lead.asserted) and lead.entry["reason"] == "match":
         return reasons.REFUTED
     kind = lead.measured.kind if lead.measured else lead.entry["kind"]
     value = getattr(lead.measured, "value", "") if kind == "value" else ""
     word = lead.result.get("reason") if lead.is_on_order else lead.entry["reason"]
-    return reasons.reason(word, kind, value=value, levels=levels).meaning
+    is_promised = keeps_promise(record, lead.measured, lead.entry)
+    return reasons.reason(word, kind, value, levels, is_promised).meaning
+
+
+def keeps_promise(record: Record, measured: Measurement | None, check: Mapping[str, Any]) -> bool:
+    """Say whether the result that decides has the order of its scheme, and the check asks for another one."""
+    decisive: Mapping[str, Any] = next(iter(check.get("results") or []), {})
+    order, place = words.fact(decisive, "order"), data.place_of(record, decisive.get("case", -1))
+    if measured is None or measured.kind != "converges" or measured.order == "scheme":
+        return False
+    if order is None or place is None:
+        return False
+    promised = data.formal_orders(record, measured.converges)
+    own = promised[record.words("scheme").index(decisive["scheme"]), place]
+    is_due = data.basis_of_order(record, measured.converges) == "promised"
+    return bool(is_due and abs(own - order) <= measured.tolerance)
 
 
 def _estimate_over_true(record: Record, lead: Lead) -> float | None:
@@ -362,8 +360,3 @@ def _estimate_over_true(record: Record, lead: Lead) -> float | None:
     if not (math.isfinite(true) and math.isfinite(estimate) and true > 0.0):
         return None
     return abs(estimate / true - 1.0)
-
-
-def sentence(*parts: str) -> str:
-    """Join the facts of the line below the title."""
-    return " · ".join(part for part in parts if part)

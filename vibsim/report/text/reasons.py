@@ -160,15 +160,10 @@ def reason(
     if word == "match" and kind in _BY_KIND:
         return _BY_KIND[kind]
     if word == "match" and kind != "converges":
-        is_of_scheme = value and not VALUES[value].depends_on_level
-        of = (
-            "counted"
-            if value and VALUES[value].is_count_of_work
-            else "scheme"
-            if is_of_scheme
-            else "several"
-            if levels > 1
-            else "one"
-        )
+        of = "several" if levels > 1 else "one"
+        if value and not VALUES[value].depends_on_level:
+            of = "scheme"
+        if value and VALUES[value].is_count_of_work:
+            of = "counted"
         return Reason("The measured number is as expected.", _NUMBERS[of])
     return REASONS.get(word or "", Reason("", ""))

@@ -15,6 +15,7 @@ from vibsim.report.text import structure
 from vibsim.report.types import Axis, Experiment, SchemeSpec
 
 LISTED = 8  # most values of a key that are written out
+NO_LETTERS: Mapping[str, str] = {}
 
 
 def not_in_file(settings: Sequence[str]) -> Iterator[tuple[str, str]]:
@@ -30,14 +31,12 @@ def setup(experiment: Experiment, record: Record) -> Iterator[tuple[str, str]]:
     keys = {key for axis in axes for key in axis.keys}
     sizes = {p.key: data.pretty_unit(p.unit) for p in model.parameters}
     units = {state.name: data.pretty_unit(state.unit) for state in model.states}
+    letters = {p.key: p.name for p in model.parameters}
     yield "Model", model.title
     yield from not_in_file(experiment.settings)
     for name, spec in experiment.model.tables.items():
-        steps = (
-            "no step contains one of its points"
-            if spec.is_met
-            else "steps contain its points, where the force has corners"
-        )
+        steps = "steps contain its points, where the force has corners"
+        steps = "no step contains one of its points" if spec.is_met else steps
         yield "Table", f"{name} from {spec.file}, columns {spec.place} and {spec.value}; {steps}"
     if model.loaded is not None and experiment.model.structure is not None:
         yield from structure.rows(experiment.model.structure, model.loaded)
@@ -47,17 +46,13 @@ def setup(experiment: Experiment, record: Record) -> Iterator[tuple[str, str]]:
         yield "Units of the file", ", ".join(text.rstrip() for text in told)
     if (scaling := experiment.scaling) is not None:
         # everything else on the page is in characteristic units
-        given = (
-            _listing("model", scaling.parameters, sizes),
-            _listing("initial", scaling.initial, units),
-        )
-        yield (
-            "Scaled",
-            f"the file has {'; '.join(given)}; end = {_plain(scaling.end)} s; the run uses the scales of the "
-            "table below, and every other number is dimensionless",
-        )
+        parameters = _listing("model", scaling.parameters, sizes)
+        initial = _listing("initial", scaling.initial, units)
+        rest = "the run uses the scales of the table below, and every other number is dimensionless"
+        given = f"the file has {parameters}; {initial}; end = {_plain(scaling.end)} s"
+        yield "Scaled", f"{given}; {rest}"
         sizes, units = {}, {}
-    yield "Parameters", _listing("model", experiment.model.parameters, sizes, keys)
+    yield "Parameters", _listing("model", experiment.model.parameters, sizes, keys, letters)
     yield "Initial values", _listing("initial", experiment.initial, units, keys)
     yield from _times(experiment, record)
     if experiment.tolerance is not None:
@@ -70,10 +65,8 @@ def setup(experiment: Experiment, record: Record) -> Iterator[tuple[str, str]]:
         count = words.number(len(record["case"]), "integer")
         yield "Sweep", f"{count} members. {'; '.join(map(_axis, axes))}"
     if experiment.chain > 1:
-        yield (
-            "Starts",
-            "along the last key each member starts from the last state of the one before, at its own level",
-        )
+        before = "the last state of the one before, at its own level"
+        yield "Starts", f"along the last key each member starts from {before}"
 
 
 def _scheme(spec: SchemeSpec, swept: set[str]) -> str:
@@ -92,38 +85,40 @@ def _times(experiment: Experiment, record: Record) -> Iterator[tuple[str, str]]:
     levels, time = list(experiment.levels), data.time_unit(record, "dt")
     counts = [words.number(float(experiment.steps(level)), "integer") for level in levels]
     dt, ends = np.asarray(record["dt"], dtype=np.float64), data.ends_of(record)
-    coarsest, finest = (words.number(float(value), "step") for value in (dt.max(), dt.min()))
     extent = [words.number(x, "step") for x in sorted({float(ends.min()), float(ends.max())})]
     differs = " (differs between members)" if "end" in record else ""
     yield "Time", f"0 to {' … '.join(extent)} {time}{differs}"
     run = levels == list(range(levels[0], levels[-1] + 1))
     named = words.levels(levels) if run else ", ".join(map(str, levels))
-    several = len(levels) > 1
-    steps = f"{counts[0]} to {counts[-1]}" if several else counts[0]
-    yield (
-        "Levels",
-        f"{named}: {steps} steps, dt = {coarsest}{f' to {finest}' if several else ''} {time}",
-    )
+    sizes = [words.number(float(value), "step") for value in (dt.max(), dt.min())]
+    # of a single level there is one number of steps, and one step
+    steps, sizes = (ends[: len(levels)] for ends in ([counts[0], counts[-1]], sizes))
+    yield "Levels", f"{named}: {' to '.join(steps)} steps, dt = {' to '.join(sizes)} {time}"
     if "omega_dt" in record:
+        told = 0.0
         for name, term, text in (
             ("omega_dt", "w dt", "natural frequency"),
             (HIGHEST, "Highest w dt", "frequency of the fastest oscillation"),
         ):
             largest = data.largest(np.asarray(record[name], np.float64)) if name in record else 0.0
-            # a ball in free fall has no frequency
-            if largest > 0.0:
+            # a ball in free fall has no frequency, and one oscillation alone is the fastest one, too
+            if largest > 0.0 and largest != told:
+                told = largest
                 yield term, f"at most {words.number(largest)} ({text} times step)"
 
 
 def _listing(
-    section: str, values: Mapping[str, Any], units: Mapping[str, str], swept: Collection[str] = ()
-) -> str:
-    parts = (
-        f"{key} swept"
-        if f"{section}.{key}" in swept
-        else f"{key} = {_plain(value)} {units.get(key, '')}".strip()
-        for key, value in values.items()
-    )
+    section: str, values: Mapping[str, Any], units: Mapping[str, str], swept: Collection[str] = (),
+    letters: Mapping[str, str] = NO_LETTERS,
+) -> str:  # fmt: skip
+    """List values by their keys; those with a letter in the equation by that, and by the key if it is another word."""
+    parts = []
+    for key, value in values.items():
+        name = letters.get(key, key)
+        told = "swept" if f"{section}.{key}" in swept else f"= {_plain(value)} {units.get(key, '')}"
+        parts.append(
+            f"{name} {told.strip()}{'' if key in (name, f'parameters.{name}') else f' ({key})'}"
+        )
     return ", ".join(parts)
 
 

@@ -19,7 +19,7 @@ def as_written(spec: StructureSpec, formulas: Mapping[str, str]) -> dict[str, An
     found: dict[str, Any] = {key: _array(row) for key, row in spec.arrays.items() if "." not in key}
     if spec.ratios:
         is_same = len(set(spec.ratios)) == 1 and len(spec.ratios) > 1
-        found["damping_ratios"] = spec.ratios[0] if is_same else list(spec.ratios)
+        found["damping_ratios"] = spec.ratios[0] if is_same else spec.ratios
     shapes = {key: row for key, row in spec.arrays.items() if key.startswith(f"{LOAD}.")}
     if shapes:
         factors = {key: formulas.get(key) or _table(spec, key) for key in shapes}
@@ -29,13 +29,9 @@ def as_written(spec: StructureSpec, formulas: Mapping[str, str]) -> dict[str, An
         else:
             ((key, row),) = shapes.items()
             found[LOAD] = {"shape": _array(row), "times": factors[key]}
-    start = {
-        key.partition(".")[2]: _array(row)
-        for key, row in spec.arrays.items()
-        if key.startswith("start.")
-    }
-    if start:
-        found["start"] = start
+    for key, row in spec.arrays.items():
+        if key.startswith("start."):
+            found.setdefault("start", {})[key.removeprefix("start.")] = _array(row)
     if not spec.is_free:
         found["observe"] = {name: _entries(entries) for name, entries in spec.observe}
     return found
@@ -55,7 +51,7 @@ def _array(row: ArraySpec) -> Any:
         return {"mode": row.mode, **({"size": row.size} if row.size != 1.0 else {})}
     if row.entries:
         return {str(dof): value for dof, value in row.entries}
-    return [list(line) if isinstance(line, tuple) else line for line in row.rows]
+    return row.rows
 
 
 def _entries(entries: tuple[tuple[int, float], ...]) -> Any:
@@ -66,13 +62,11 @@ def _entries(entries: tuple[tuple[int, float], ...]) -> Any:
 
 def rows(spec: StructureSpec, loaded: Loaded) -> Iterator[tuple[str, str]]:
     """Yield what a page says of a structure."""
-    own = loaded.structure
-    files = [
-        f"{word} from {row.file}"
-        for key, word in WORDS.items()
-        if (row := spec.arrays.get(key)) is not None and row.file is not None
-    ]
-    yield "Structure", ", ".join([f"{own.dofs} degrees of freedom", *files])
+    own, told = loaded.structure, [f"{loaded.structure.dofs} degrees of freedom"]
+    for key, word in WORDS.items():
+        if (row := spec.arrays.get(key)) is not None and row.file is not None:
+            told.append(f"{word} from {row.file}")
+    yield "Structure", ", ".join(told)
     found = own.modes.frequencies
     listed = ", ".join(words.number(float(w)) for w in found[:MOST_SHOWN])
     rest = ", ..." if len(found) > MOST_SHOWN or own.dofs > len(found) else ""

@@ -7,7 +7,7 @@ those of `vibsim.simulation.reference.piecewise_collocation`.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, fields, replace
 from functools import cache
 from typing import Any, TypeVar
@@ -147,14 +147,9 @@ class Solved:
         steps = len(self.position)
         place = fraction * steps
         step = np.minimum(place.astype(np.int64), steps - 1)
-        first, second = integrals(place - step)
-        h = self.end / steps
-        u = self.position[step] + h * (place - step)[:, None, None] * self.velocity[step]
-        v = self.velocity[step].copy()
-        for j in range(STAGES):
-            a = self.acceleration[step, :, j]
-            v += h * (first[:, j, None, None] * a)
-            u += h * h * (second[:, j, None, None] * a)
+        x, h = (place - step)[:, None, None], self.end / steps
+        inner = (self.acceleration[step, :, j] for j in range(STAGES))
+        u, v = _inside(self.position[step], self.velocity[step], h, x, inner)
         return np.moveaxis(np.concatenate([u, v], axis=1), 0, -1)
 
 
@@ -188,15 +183,24 @@ class Pieces:
         begin = self.begin[:known, case]
         step = np.maximum(np.searchsorted(begin, t, side="right") - 1, 0)
         h = self.length[step, case]
-        x = (t - begin[step]) / h
-        once, twice = integrals(x)
-        v = self.velocity[step, :, case].T
-        u = self.position[step, :, case].T + h * x * v
-        for j in range(STAGES):
-            a = self.acceleration[step, :, j, case].T
-            v = v + h * (once[:, j] * a)
-            u = u + h * h * (twice[:, j] * a)
-        return np.concatenate([u, v])
+        u, v = (row[step, :, case].T for row in (self.position, self.velocity))
+        inner = (self.acceleration[step, :, j, case].T for j in range(STAGES))
+        return np.concatenate(_inside(u, v, h, (t - begin[step]) / h, inner))
+
+
+def _inside(
+    u: Floats, v: Floats, h: Floats, x: Floats, inner: Iterable[Floats]
+) -> tuple[Floats, Floats]:
+    """Return positions and velocities after parts x of steps, from those where they begin and the inner accelerations.
+
+    All arrays broadcast against each other.
+    """
+    once, twice = (row.T.reshape(STAGES, *x.shape) for row in integrals(x.ravel()))
+    u = u + h * x * v
+    for j, a in enumerate(inner):
+        v = v + h * (once[j] * a)
+        u = u + h * h * (twice[j] * a)
+    return u, v
 
 
 Solution = TypeVar("Solution", bound=Solved | Pieces)

@@ -87,6 +87,15 @@ class Sides:
         """Return what all switches look at, shape (switch, time, case)."""
         return np.stack([self.quantity(k, modes, u, v, t) for k in range(len(self.switches))])
 
+    def modes(self, u: Floats, v: Floats, t: Floats) -> tuple[Floats, Floats]:
+        """Return what all switches look at, and their modes there, each of shape (switch, *t)."""
+        q, modes = np.zeros((2, len(self.switches), *t.shape))
+        for k, is_whole in enumerate(self.whole):
+            # a switch may look at the modes of those before it
+            q[k] = self.quantity(k, modes, u, v, t)
+            modes[k] = np.floor(q[k]) if is_whole else np.where(q[k] > 0.0, 0.0, -1.0)
+        return q, modes
+
     def numbers(self, modes: Floats, u: Floats, v: Floats, t: Floats) -> dict[str, Any]:
         """Return what the names in the formulas stand for."""
         numbers = {
@@ -144,12 +153,7 @@ def pulses_of_force(
     """
     held = sides(model, {name: x[:, None] for name, x in parameters.items()})
     u, v = np.split(states, 2)
-    middle = 0.5 * (t[:, :-1] + t[:, 1:])
-    modes = np.zeros((len(held.switches), *middle.shape))
-    for k, is_whole in enumerate(held.whole):
-        # a switch may look at the modes of those before it
-        q = held.quantity(k, modes, u, v, middle)
-        modes[k] = np.floor(q) if is_whole else np.where(q > 0.0, 0.0, -1.0)
+    _, modes = held.modes(u, v, 0.5 * (t[:, :-1] + t[:, 1:]))
     numbers = held.numbers(modes, u, v, t[:, :-1])
     del numbers["t"]
     formulas = held.formulas if smooth else tuple(tree(model, row) for row in model.accelerations)

@@ -11,27 +11,10 @@ import numpy as np
 from vibsim.core.array_types import Floats
 from vibsim.core.record import Record
 from vibsim.core.vocabulary import REASONS, SEVERITY, TYPICAL_NORM
-from vibsim.report import finest_level, style, words
+from vibsim.report import data, finest_level, style, words
 from vibsim.report.choice import position, tolerance
-from vibsim.report.data import (
-    basis_of_order,
-    exact_periods,
-    norm_unit,
-    of_several,
-    pick,
-    promised_text,
-    whole,
-)
-from vibsim.report.figures.sweeps.view import (
-    View,
-    Worst,
-    check_words,
-    of_check,
-    ring,
-    shared,
-    shared_verdict,
-    value_checks,
-)  # fmt: skip
+from vibsim.report.figures.sweeps import view
+from vibsim.report.figures.sweeps.view import View, Worst
 from vibsim.report.style import Picture
 from vibsim.report.sweep_layout import Grid
 from vibsim.report.types import Axes, Experiment, Figure
@@ -79,9 +62,11 @@ def views(
 ) -> Iterator[View | str]:  # fmt: skip
     """Yield a map of each quantity of each scheme; of what is the same for all members a sentence."""
     for scheme in schemes:
-        several = of_several(record, scheme)
+        several = data.of_several(record, scheme)
         for each in _maps(experiment, record, found, scheme):
-            text = shared(each.name, each.values, each.unit) if each.told is None else each.told
+            text = each.told
+            if text is None:
+                text = view.shared(each.name, each.values, each.unit)
             if text:
                 yield f"{text}{several}"
             elif np.isfinite(each.values).any():
@@ -89,31 +74,27 @@ def views(
 
 
 def _maps(experiment: Experiment, record: Record, found: list[str], scheme: int) -> Iterator[Map]:
-    yield from _motion(experiment, record, scheme)
+    """Yield the maps of a scheme: of the motion, without friction or force the period first, and of each quantity."""
+    both = [_period, _amplitude]
+    for of_motion in both if experiment.model.definition.conservative else both[::-1]:
+        yield from of_motion(position(experiment), record, scheme)
     for quantity in found:
         yield from _order(experiment, record, quantity, scheme)
         yield from _errors(record, quantity, scheme)
-    for name, check in value_checks(experiment):
-        values = of_check(record, name, check)[scheme]
+    for name, check in view.value_checks(experiment):
+        values = view.of_check(record, name, check)[scheme]
         yield Map(
-            f"check_{name}", name, position(experiment), values, check_words(check), badness=np.abs(values),
+            f"check_{name}", name, position(experiment), values, view.check_words(check), badness=np.abs(values),
             caption="The number that the check of this name asks for.",
         )  # fmt: skip
 
 
-def _motion(experiment: Experiment, record: Record, scheme: int) -> Iterator[Map]:
-    """Yield period and amplitude with their errors; without friction or force the period first."""
-    both = [_period, _amplitude]
-    for found in both if experiment.model.definition.conservative else both[::-1]:
-        yield from found(position(experiment), record, scheme)
-
-
 def _period(of: str, record: Record, scheme: int) -> Iterator[Map]:
-    time, known = finest_level.measured(record, "period", of), exact_periods(record)
+    time, known = finest_level.measured(record, "period", of), data.exact_periods(record)
     value, exact = time.value[scheme], np.where(np.isfinite(known), known, np.nan)
     if not np.isfinite(value).any():
         return
-    label, at = style.label("period", time.unit), f"Of level {whole(record, 'level')[-1]}."
+    label, at = style.label("period", time.unit), f"Of level {data.whole(record, 'level')[-1]}."
     with np.errstate(invalid="ignore", divide="ignore"):
         bar = time.error[scheme] / value
     error = finest_level.period_error(record, -1)[scheme]
@@ -131,7 +112,7 @@ def _amplitude(of: str, record: Record, scheme: int) -> Iterator[Map]:
     value, bar = size.value[scheme], size.error[scheme]
     if not np.isfinite(value).any():
         return
-    label, at = style.label("amplitude", size.unit), f"Of level {whole(record, 'level')[-1]}."
+    label, at = style.label("amplitude", size.unit), f"Of level {data.whole(record, 'level')[-1]}."
     yield Map("amplitude", "amplitude", of, value, label, size.unit, at)
     text = style.label("estimated error", size.unit)
     yield Map("amplitude_bar", "error bar of the amplitude", of, bar, text, size.unit)
@@ -142,16 +123,16 @@ def _order(experiment: Experiment, record: Record, quantity: str, scheme: int) -
     letter = words.symbol(quantity)
     if f"{quantity}_reason" in record:
         yield _reasons(record, quantity, scheme)
-    if not whole(record, "triple"):
+    if not data.whole(record, "triple"):
         return
     allowed = tolerance(experiment, quantity, record.words("scheme")[scheme])
     away = finest_level.deviation(record, quantity)[scheme]
     order, low, high = (part[scheme] for part in finest_level.orders(record, quantity))
     yield Map(
         f"{quantity}_order", f"order of {letter}", quantity, away,
-        f"order of {letter} − {promised_text(record, quantity, scheme)}", badness=np.abs(away), kind="distance",
-        tolerance=allowed, number=order, told=shared(f"order of {letter}", np.round(order, 3), form="order"),
-        caption=f"Pale colours are orders within ± {allowed:g} of the {basis_of_order(record, quantity)} one, "
+        f"order of {letter} − {data.promised_text(record, quantity, scheme)}", badness=np.abs(away), kind="distance",
+        tolerance=allowed, number=order, told=view.shared(f"order of {letter}", np.round(order, 3), form="order"),
+        caption=f"Pale colours are orders within ± {allowed:g} of the {data.basis_of_order(record, quantity)} one, "
         "where the scale jumps.",
     )  # fmt: skip
     text = "width of the interval"
@@ -162,7 +143,7 @@ def _order(experiment: Experiment, record: Record, quantity: str, scheme: int) -
 def _errors(record: Record, quantity: str, scheme: int) -> Iterator[Map]:
     """Yield the error of the finest level, and how far its estimate can be trusted."""
     found, letter = finest_level.error(record, quantity), words.symbol(quantity)
-    unit, level = norm_unit(record, quantity), whole(record, "level")[-1]
+    unit, level = data.norm_unit(record, quantity), data.whole(record, "level")[-1]
     text = style.label(f"{found.kind} error of {letter} ({TYPICAL_NORM})", unit)
     best, estimate = style.positive(found.best[scheme]), found.estimate[scheme]
     yield Map(
@@ -198,17 +179,17 @@ def _coded(
 
 def _reasons(record: Record, quantity: str, scheme: int) -> Map:
     """Return the map of the reasons of the verdicts; of several members in a cell the worst."""
-    reason = pick(record, f"{quantity}_reason", scheme=scheme)
+    reason = data.pick(record, f"{quantity}_reason", scheme=scheme)
     meanings = record.meanings(f"{quantity}_reason")
-    counted = [
-        (-int(n), int(code)) for code, n in zip(*np.unique(reason, return_counts=True), strict=True)
-    ]
+    found, counts = (part.tolist() for part in np.unique(reason, return_counts=True))
+    named = [(code, meanings[code], count) for code, count in zip(found, counts, strict=True)]
     # the milder first, of equal ones the rarer last
-    ranked = sorted(counted, key=lambda row: (SEVERITY[REASONS[meanings[row[1]]]], row[0]))
-    named = [(code, meanings[code]) for _, code in ranked]
-    codes = [(code, f"{REASONS[word]}: {word}", style.REASON_COLOURS[word]) for code, word in named]
+    named.sort(key=lambda row: (SEVERITY[REASONS[row[1]]], -row[2]))
+    codes = [
+        (code, f"{REASONS[word]}: {word}", style.REASON_COLOURS[word]) for code, word, _ in named
+    ]
     name = f"verdict on {words.symbol(quantity)}"
-    told = shared_verdict(record, quantity, scheme)
+    told = view.shared_verdict(record, quantity, scheme)
     return _coded(f"{quantity}_verdict", name, quantity, reason, codes, told=told)
 
 
@@ -217,16 +198,16 @@ def _window(record: Record, quantity: str, scheme: int) -> Map:
     from matplotlib import colormaps
     from matplotlib.colors import to_hex
 
-    first = pick(record, f"{quantity}_window_first", scheme=scheme)
-    levels = whole(record, "level")
-    shades = zip(levels, np.linspace(1.0, 0.0, len(levels)), strict=True)
+    first = data.pick(record, f"{quantity}_window_first", scheme=scheme)
+    levels = data.whole(record, "level")
+    shades = colormaps["viridis"](np.linspace(1.0, 0.0, len(levels)))
     codes = [
-        (level, f"from level {level} on", to_hex(colormaps["viridis"](shade)))
-        for level, shade in shades
+        (level, f"from level {level} on", to_hex(shade))
+        for level, shade in zip(levels, shades, strict=True)
         if np.any(first == level)
     ]
     name = f"levels used for the order of {words.symbol(quantity)}"
-    told = f"{name} {codes[0][1]}" if len(codes) == 1 and np.all(first == codes[0][0]) else ""
+    told = f"{name} {codes[0][1]}" if codes and np.all(first == codes[0][0]) else ""
     texts = tuple(text for _, text, _ in codes)
     return _coded(f"{quantity}_levels", name, quantity, first, codes, told=told, texts=texts)
 
@@ -235,19 +216,18 @@ def _view(record: Record, grid: Grid, each: Map, scheme: int, worst: int) -> Vie
     """Draw a map, and explain what is grey, dotted or gathered in blocks; nothing that is not there."""
     table = grid.worst(each.values, each.badness)
     figure = draw(grid, each, table)
-    ax, several = figure.axes[0], of_several(record, scheme)
-    is_ringed = ring(ax, float(grid.x.values[worst]), float(grid.y.values[worst]), on_map=True)
+    ax, several = figure.axes[0], data.of_several(record, scheme)
+    is_ringed = view.ring(ax, float(grid.x.values[worst]), float(grid.y.values[worst]), on_map=True)
     title = f"{each.name[:1].upper()}{each.name[1:]}{several}"
     text = style.sentences(
         each.caption,
-        "Grey hatched cells have no such number." if not np.isfinite(table).all() else "",
-        "The dotted line is the separatrix, where the exact period is infinite." if grid.separatrix[0].size else "",
+        "Grey hatched cells have no such number." * (not np.isfinite(table).all()),
+        "The dotted line is the separatrix, where the exact period is infinite."
+        * bool(grid.separatrix[0].size),
         grid.note,
-    )  # fmt: skip
-    values = None
-    if each.kind != "code" or each.texts:
-        values = np.full((len(record["scheme"]), each.values.size), np.nan)
-        values[scheme] = each.values if each.number is None else each.number
+    )
+    own, is_told = each.values if each.number is None else each.number, each.kind != "code"
+    values = view.by_scheme(record, scheme, own) if is_told or each.texts else None
     return View(
         each.name, Picture(f"map_{each.stem}_{scheme}", title, text, f"{title} over two swept parameters", figure),
         each.quantity, values, None, each.unit, each.texts, (scheme,), several.removeprefix(", "), ((0, 1),),

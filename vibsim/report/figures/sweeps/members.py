@@ -19,7 +19,7 @@ from vibsim.report import finest_level, style, words
 from vibsim.report.choice import position, tolerance
 from vibsim.report.data import basis_of_order, flags, norm_unit, of_several, promised_text, whole
 from vibsim.report.figures.panels import rows_of
-from vibsim.report.figures.sweeps.view import View, Worst, key_axis, ring, shared
+from vibsim.report.figures.sweeps.view import View, Worst, by_scheme, key_axis, ring, shared
 from vibsim.report.style import Picture
 from vibsim.report.sweep_layout import Key, bins, place_in
 from vibsim.report.types import Axes, Experiment
@@ -65,7 +65,9 @@ def histograms(experiment: Experiment, record: Record, quantity: str) -> Picture
             ax.set_title(title, fontsize=9)
             ax.set_xlabel(label, fontsize=8.5, labelpad=2)
             missing += _histogram(ax, values, status[s], band)
-    _explain(axes[0], status)
+    counts = {word: int(np.sum(status == word)) for word in SEVERITY}
+    texts = {word: f"{word} ({words.number(n, 'integer')})" for word, n in counts.items() if n}
+    _legend(axes[0], texts, handlelength=1.0, loc="upper left", borderaxespad=0.2)
     return Picture(
         name=f"spread_{quantity}",
         title=f"How the members are spread: {letter}",
@@ -77,27 +79,12 @@ def histograms(experiment: Experiment, record: Record, quantity: str) -> Picture
     )
 
 
-def _legend(ax: Axes, masks: Masks) -> None:
-    """Say above a panel which colour is which verdict."""
+def _legend(ax: Axes, texts: dict[str, str], **place: Any) -> None:
+    """Say which colour is which verdict, with the text for each."""
     from matplotlib.patches import Patch
 
-    handles = [
-        Patch(color=style.STATUS_COLOURS[word], label=word) for word in masks if masks[word].any()
-    ]
-    place: Any = {"loc": "lower left", "bbox_to_anchor": (0.0, 0.99), "borderaxespad": 0.1}
-    ax.legend(handles=handles, ncols=3, fontsize=7, handlelength=0.9, columnspacing=0.8, **place)
-
-
-def _explain(ax: Axes, status: NDArray[Any]) -> None:
-    from matplotlib.patches import Patch
-
-    counts = {word: int(np.sum(status == word)) for word in SEVERITY}
-    handles = [
-        Patch(color=style.STATUS_COLOURS[word], label=f"{word} ({words.number(n, 'integer')})")
-        for word, n in counts.items()
-        if n
-    ]
-    ax.legend(handles=handles, fontsize=7, handlelength=1.0, loc="upper left", borderaxespad=0.2)
+    handles = [Patch(color=style.STATUS_COLOURS[word], label=text) for word, text in texts.items()]
+    ax.legend(handles=handles, fontsize=7, **place)
 
 
 def _histogram(
@@ -110,9 +97,8 @@ def _histogram(
         style.remark(ax, "no such number")
         return values.size
     if band is None:
-        low, high = float(values[usable].min()), float(values[usable].max())
-        low, high = max(low, high * 1e-18, style.TINIEST), min(high, style.LARGEST)
-        borders = np.geomspace(low / 1.2, high * 1.2, BARS + 1)
+        low, high = float(values[usable].min()), min(float(values[usable].max()), style.LARGEST)
+        borders = np.geomspace(max(low, high * 1e-18, style.TINIEST) / 1.2, high * 1.2, BARS + 1)
         style.log_axis(ax, "x", float(borders[0]), float(borders[-1]))
     else:
         borders = np.linspace(*style.limits(values[usable], np.array(band)), BARS + 1)
@@ -124,7 +110,6 @@ def _histogram(
             colour = style.STATUS_COLOURS[word]
             ax.stairs(base + count, borders, baseline=base, fill=True, color=colour)
         base = base + count
-    ax.set_yscale("log")
     style.log_axis(ax, "y", 0.7, 2.0 * max(float(base.max()), 1.0))
     return int(np.sum(~usable))
 
@@ -162,11 +147,8 @@ class _Projection:
 
     def order(self, allowed: float) -> Iterator[View | str]:
         """Yield the stated order, less the one that is due."""
-        record, quantity, name = (
-            self.record,
-            self.quantity,
-            f"order of {words.symbol(self.quantity)}",
-        )
+        record, quantity = self.record, self.quantity
+        name = f"order of {words.symbol(quantity)}"
         order = finest_level.orders(record, quantity)[0]
         away = finest_level.deviation(record, quantity)[self.scheme]
         if not np.isfinite(away).any():
@@ -179,24 +161,20 @@ class _Projection:
             ax.axhspan(-allowed, allowed, **style.ALLOWED)
             _draw_members(ax, key, away, self.masks, (-ORDER_FRAME, ORDER_FRAME))
         label = f"{name} − {promised_text(record, quantity, self.scheme)}"
-        beyond = (
-            "Orders beyond the frame are drawn at its edge, members without an order at the lower edge."
-            if np.any(~(np.abs(away) < ORDER_FRAME))
-            else ""
-        )
+        beyond = "Orders beyond the frame are drawn at its edge, members without an order at the lower edge."
+        is_beyond = not np.all(np.abs(away) < ORDER_FRAME)
         band = f"Grey: the tolerance around the {basis_of_order(record, quantity)} order."
         places = np.clip(np.nan_to_num(away, nan=-ORDER_FRAME), -ORDER_FRAME, ORDER_FRAME)
-        yield self._view("order", name, label, axes, f"{band} {beyond}".rstrip(), order, places)
+        told = style.sentences(band, beyond * is_beyond)
+        yield self._view("order", name, label, axes, told, order, places)
 
     def error(self) -> Iterator[View | str]:
         """Yield the error of the finest level."""
         from matplotlib.ticker import FuncFormatter, MaxNLocator
 
-        error, name = (
-            finest_level.error(self.record, self.quantity),
-            f"error of {words.symbol(self.quantity)}",
-        )
+        error = finest_level.error(self.record, self.quantity)
         unit = norm_unit(self.record, self.quantity)
+        name = f"error of {words.symbol(self.quantity)}"
         size = np.log10(style.positive(error.best[self.scheme]))
         if not np.isfinite(size).any():
             return
@@ -236,7 +214,10 @@ class _Projection:
             ax.set_xlabel(key.label, fontsize=8.5, labelpad=2)
             ax.tick_params(labelsize=7.5)
             if i == 0:
-                _legend(ax, self.masks)
+                texts = {word: word for word, chosen in self.masks.items() if chosen.any()}
+                above: Any = {"loc": "lower left", "bbox_to_anchor": (0.0, 0.99), "ncols": 3}
+                above |= {"borderaxespad": 0.1, "handlelength": 0.9, "columnspacing": 0.8}
+                _legend(ax, texts, **above)
             if i % 3 == 0:
                 ax.set_ylabel(label, fontsize=8.5)
             if place is not None:
@@ -247,16 +228,12 @@ class _Projection:
             "Each panel shows all members against one swept key, whatever the others are.",
             told,
             "Darker cells hold more members; FAIL lies over INCONCLUSIVE over PASS."
-            if len(record["case"]) > MOST_POINTS and place is not None
-            else "",
-            f"{more} more keys are not shown; the table of members has them." if more > 0 else "",
+            * (len(record["case"]) > MOST_POINTS and place is not None),
+            f"{more} more keys are not shown; the table of members has them." * (more > 0),
         )
         title, figure = f"{name[:1].upper()}{name[1:]}{several}", axes[0].get_figure(root=True)
         stem = f"projections_{self.quantity}_{kind}_{self.scheme}"
-        places = None
-        if place is not None:
-            places = np.full((len(record["scheme"]), place.size), np.nan)
-            places[self.scheme] = place
+        places = None if place is None else by_scheme(record, self.scheme, place)
         return View(
             name, Picture(stem, title, text, f"{title} against every swept key", figure), self.quantity, values,
             places, unit, schemes=(self.scheme,), of=several.removeprefix(", "),

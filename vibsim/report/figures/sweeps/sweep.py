@@ -12,22 +12,11 @@ from numpy.typing import NDArray
 from vibsim.core.array_types import Floats
 from vibsim.core.record import Record
 from vibsim.core.vocabulary import SEVERITY, TYPICAL_NORM
-from vibsim.report import finest_level, frame, style, sweep_layout, words
+from vibsim.report import data, finest_level, frame, style, sweep_layout, words
 from vibsim.report.choice import position, promises
-from vibsim.report.data import basis_of_order, exact_periods, flags, norm_unit, whole
 from vibsim.report.figures.panels import explosive, stacked
-from vibsim.report.figures.sweeps import separatrix
-from vibsim.report.figures.sweeps.view import (
-    View,
-    Worst,
-    check_words,
-    key_axis,
-    of_check,
-    ring,
-    shared,
-    shared_verdict,
-    value_checks,
-)  # fmt: skip
+from vibsim.report.figures.sweeps import separatrix, view
+from vibsim.report.figures.sweeps.view import View, Worst
 from vibsim.report.finest_level import Measured
 from vibsim.report.style import Picture
 from vibsim.report.sweep_layout import Along
@@ -50,11 +39,11 @@ def views(
     for draw_one in both if experiment.model.definition.conservative else both[::-1]:
         yield from draw_one()
     for quantity in found:
-        if whole(record, "triple"):
+        if data.whole(record, "triple"):
             yield from draw.order(quantity)
         yield from draw.error(quantity)
         yield from draw.verdict(quantity)
-    for name, check in value_checks(experiment):
+    for name, check in view.value_checks(experiment):
         yield from draw.number(name, check)
 
 
@@ -76,13 +65,14 @@ class _Drawing:
         `draw` draws them, and returns a sentence where they leave the frame.
         """
         # an order is read with three decimals
-        if text := shared(name, np.round(values, 3) if form == "order" else values, unit, form):
+        told = np.round(values, 3) if form == "order" else values
+        if text := view.shared(name, told, unit, form):
             yield text
         elif np.isfinite(values).any():
             tall = max(TALL, ENTRY * len(self.record["scheme"]) * len(self.along.lines))
             (ax,) = stacked([tall])
-            told = style.sentences(caption, draw(ax))
-            yield self._finished(ax, stem, name, told, quantity, values, values, unit)
+            caption = style.sentences(caption, draw(ax))
+            yield self._finished(ax, stem, name, caption, quantity, values, values, unit)
 
     def _finished(
         self, ax: Axes, stem: str, name: str, caption: str, quantity: str, values: Floats | None, places: Floats,
@@ -92,7 +82,9 @@ class _Drawing:
         key, worst = self.along.key, self.worst(quantity)
         marked = _finish(ax, self.experiment, self.along)
         ax.set_gid(style.MEMBER)
-        is_ringed = ring(ax, float(key.values[worst.case]), float(places[worst.scheme, worst.case]))
+        is_ringed = view.ring(
+            ax, float(key.values[worst.case]), float(places[worst.scheme, worst.case])
+        )
         title = f"{name[:1].upper()}{name[1:]}"
         alt = f"{title} of every member against {key.name}"
         keys = [one.key for one in sweep_layout.keys(self.record)]
@@ -105,10 +97,10 @@ class _Drawing:
     def period(self) -> Iterator[View | str]:
         """Yield the period with its error bar, and its relative error on several levels."""
         record, along, of = self.record, self.along, position(self.experiment)
-        found, exact = finest_level.measured(record, "period", of), exact_periods(record)
+        found, exact = finest_level.measured(record, "period", of), data.exact_periods(record)
         if not np.isfinite(found.value).any():
             return
-        is_known, several = bool(np.isfinite(exact).any()), bool(whole(record, "pair"))
+        is_known, several = bool(np.isfinite(exact).any()), bool(data.whole(record, "pair"))
         bars = ", with its error bar from the two finest levels" * several
         yield from self._view(
             "period", "period", of, found.value, f"On the finest level{bars}{'; and the exact one' * is_known}.",
@@ -136,19 +128,16 @@ class _Drawing:
             bounded = np.isfinite(found.value)
         # what is beyond the frame has no bar across it
         barred = bounded & frame.is_bounded(found.error, size)
-        within = replace(
-            found,
-            value=np.where(bounded, found.value, np.nan),
-            error=np.where(barred, found.error, np.nan),
-        )
-        height = "Half the height between the last peak and the last trough, on the finest level."
-        turn = self.experiment.model.definition.turn
-        over = "Members that go over the top have none." if turn else ""
+        value, error = np.where(bounded, found.value, np.nan), np.where(barred, found.error, np.nan)
+        within = replace(found, value=value, error=error)
+        told = "Half the height between the last peak and the last trough, on the finest level."
+        turns = bool(self.experiment.model.definition.turn)
+        told += " Members that go over the top have none." * turns
         yield from self._view(
-            "amplitude", "amplitude", of, found.value, style.sentences(height, over),
+            "amplitude", "amplitude", of, found.value, told,
             lambda ax: _draw_amplitudes(ax, record, along, found, within, size), found.unit,
         )  # fmt: skip
-        if whole(record, "pair"):
+        if data.whole(record, "pair"):
             yield from self._view(
                 "amplitude_error", "error bar of the amplitude", of, found.error,
                 "Estimated from the two finest levels.",
@@ -157,7 +146,7 @@ class _Drawing:
 
     def order(self, quantity: str) -> Iterator[View | str]:
         """Yield the stated order of every member with its interval."""
-        band = f"Grey: an order that is {basis_of_order(self.record, quantity)}, with the tolerance of its check."
+        band = f"Grey: an order that is {data.basis_of_order(self.record, quantity)}, with the tolerance of its check."
         yield from self._view(
             f"sweep_order_{quantity}", f"order of {words.symbol(quantity)}", quantity,
             finest_level.orders(self.record, quantity)[0],
@@ -171,10 +160,12 @@ class _Drawing:
         told = "At the finest level, estimated from two levels"
         if found.kind == "true":
             told = "At the finest level: true (dots), and what two levels alone say of it (lines)"
-        told = f"{told}, with the interval of the order." if whole(self.record, "pair") else "True."
+        has_pairs = bool(data.whole(self.record, "pair"))
+        told = f"{told}, with the interval of the order." if has_pairs else "True."
+        unit = data.norm_unit(self.record, quantity)
         yield from self._view(
             f"sweep_error_{quantity}", f"error of {words.symbol(quantity)}", quantity, found.best, told,
-            lambda ax: _draw_errors(ax, self.record, self.along, quantity), norm_unit(self.record, quantity), "norm",
+            lambda ax: _draw_errors(ax, self.record, self.along, quantity), unit, "norm",
         )  # fmt: skip
 
     def verdict(self, quantity: str) -> Iterator[View | str]:
@@ -182,8 +173,8 @@ class _Drawing:
         name = f"verdict on {words.symbol(quantity)}"
         if f"{quantity}_status" not in self.record:
             return
-        status = flags(self.record, f"{quantity}_status")
-        if text := shared_verdict(self.record, quantity):
+        status = data.flags(self.record, f"{quantity}_status")
+        if text := view.shared_verdict(self.record, quantity):
             yield text
             return
         row = 0.17 if style.crowded(self.record) else 0.3
@@ -196,8 +187,8 @@ class _Drawing:
 
     def number(self, name: str, check: ValueCheck) -> Iterator[View | str]:
         """Yield the number that a check asks for of every member."""
-        values = of_check(self.record, name, check)
-        found = Measured(check_words(check), "", values, np.full(values.shape, np.nan))
+        values = view.of_check(self.record, name, check)
+        found = Measured(view.check_words(check), "", values, np.full(values.shape, np.nan))
         yield from self._view(
             f"sweep_check_{name}", name, position(self.experiment), values, "",
             lambda ax: _draw_numbers(ax, self.record, self.along, found, None, name),
@@ -207,7 +198,7 @@ class _Drawing:
 def _finish(ax: Axes, experiment: Experiment, along: Along) -> str:
     """Give the axis of the key its scale, label and separatrix; return the sentence on the latter."""
     key = along.key
-    key_axis(ax, key, 0.03)
+    view.key_axis(ax, key, 0.03)
     ax.set_xlabel(key.label)
     is_alone = len(along.lines) == 1 and not along.follows
     found = separatrix.on_line(experiment, key).tolist() if is_alone else []
@@ -235,13 +226,11 @@ class _Curve:
 def _curves(record: Record, along: Along, *, by_line: bool = False) -> list[_Curve]:
     """Return the curves of every scheme and line; `by_line` those of a line together."""
     names, count = record.words("scheme"), len(along.lines)
-    found = [
-        _Curve(
-            s, s * count + k, along.key.values[at], at, _text(name if len(names) > 1 else "", line)
-        )
-        for s, name in enumerate(names)
-        for k, (line, at) in enumerate(along.lines)
-    ]
+    found = []
+    for s, name in enumerate(names):
+        who = name if len(names) > 1 else ""
+        for k, (line, at) in enumerate(along.lines):
+            found.append(_Curve(s, s * count + k, along.key.values[at], at, _text(who, line)))
     return sorted(found, key=lambda curve: curve.number % count) if by_line else found
 
 
@@ -252,7 +241,7 @@ def _draw_orders(
     promised = promises(experiment, record, quantity)
     for order, tolerance in promised:
         ax.axhspan(order - tolerance, order + tolerance, **style.ALLOWED)
-        text = f"{basis_of_order(record, quantity)}, {order:g} ± {tolerance:g}"
+        text = f"{data.basis_of_order(record, quantity)}, {order:g} ± {tolerance:g}"
         ax.axhline(order, **style.REFERENCE, label=text)
     value, low, high = finest_level.orders(record, quantity)
     for curve in _curves(record, along):
@@ -272,16 +261,13 @@ def _draw_orders(
 def _draw_errors(ax: Axes, record: Record, along: Along, quantity: str) -> str:
     """Draw the error of the finest level; return the sentence on what leaves the frame."""
     found, size = finest_level.error(record, quantity), frame.sizes(record, quantity)
-    bounded = [
-        np.where(frame.is_bounded(part, size), part, np.nan)
-        for part in (found.true, found.estimate)
-    ]
-    # what is beyond the frame has no bar across it
-    low, high = (
-        np.where(np.isfinite(bounded[1]), style.no_zeros(part), np.nan)
-        for part in (found.low, found.high)
+    both = np.stack([found.true, found.estimate])
+    bounded = np.where(frame.is_bounded(both, size), both, np.nan)
+    true, estimate, low, high = map(
+        style.no_zeros, (found.true, found.estimate, found.low, found.high)
     )
-    true, estimate = style.no_zeros(found.true), style.no_zeros(found.estimate)
+    # what is beyond the frame has no bar across it
+    low, high = (np.where(np.isfinite(bounded[1]), end, np.nan) for end in (low, high))
     for curve in _curves(record, along):
         x, look = curve.x, style.look(curve.number)
         _interval(ax, x, curve.of(low), curve.of(high), look["color"])
@@ -292,17 +278,16 @@ def _draw_errors(ax: Axes, record: Record, along: Along, quantity: str) -> str:
             text = f"_true, {curve.text}" if has_entry else curve.text or "true"
             dots = look | {"linestyle": "none", "markersize": 4, "markerfacecolor": "white"}
             _line(ax, x, curve.of(true), label=text, **dots)
-    leaving = ""
-    # where nothing is bounded all of it makes the range
-    for values in (bounded, [found.true, found.estimate]):
-        if style.fit_log_axis(ax, "y", np.concatenate(values, axis=None), below=0.005, least=DEEP):
-            leaving = _leaving(ax, along, found.best)
-            break
     text = f"error of {words.symbol(quantity)} ({TYPICAL_NORM})"
-    ax.set_ylabel(style.label(text, norm_unit(record, quantity)))
+    ax.set_ylabel(style.label(text, data.norm_unit(record, quantity)))
     if not style.crowded(record):
         _beside(ax, along)
-    return leaving
+    # where nothing is bounded all of it makes the range
+    fitted = any(
+        style.fit_log_axis(ax, "y", np.ravel(values), below=0.005, least=DEEP)
+        for values in (bounded, both)
+    )
+    return _leaving(ax, along, found.best) if fitted else ""
 
 
 def _draw_verdicts(ax: Axes, along: Along, status: NDArray[Any], schemes: list[str]) -> None:
@@ -310,13 +295,12 @@ def _draw_verdicts(ax: Axes, along: Along, status: NDArray[Any], schemes: list[s
     order = np.argsort(along.key.values, kind="stable")
     x, many = along.key.values[order], len(schemes) > style.MANY
     for i, word in enumerate(SEVERITY):
-        xs, ys = [np.empty(0)], [np.empty(0)]
+        places = []
         for s in range(len(schemes)):
             found = x[status[s][order] == word]
-            thinned = style.thin(found, np.full(found.size, s + RISE * i))
-            xs, ys = [*xs, thinned[0]], [*ys, thinned[1]]
+            places.append(style.thin(found, np.full(found.size, s + RISE * i)))
         ax.plot(
-            np.concatenate(xs), np.concatenate(ys), linestyle="none", marker=style.STATUS_MARKERS[word],
+            *np.hstack(places), linestyle="none", marker=style.STATUS_MARKERS[word],
             markersize=3.5 if many else 5, color=style.STATUS_COLOURS[word], markeredgecolor="black",
             markeredgewidth=0.3, label=f"{word} ({int((status == word).sum())})", clip_on=False,
         )  # fmt: skip
@@ -336,7 +320,7 @@ def _draw_numbers(
     ax: Axes, record: Record, along: Along, found: Measured, exact: Floats | None, title: str = ""
 ) -> str:
     """Draw a number of the finest level with its error bars, and the exact number where it is known."""
-    count, level = len(record["scheme"]), whole(record, "level")[-1]
+    count, level = len(record["scheme"]), data.whole(record, "level")[-1]
     for curve in _curves(record, along, by_line=True):
         if exact is not None and curve.scheme == 0:
             values = np.where(np.isfinite(exact), exact, np.nan)[curve.members]
@@ -386,7 +370,7 @@ def _room(found: Measured, exact: Floats | None) -> tuple[float, float]:
 
 def _draw_period_errors(ax: Axes, record: Record, along: Along, found: Measured) -> str:
     """Draw the relative error of the period on several levels, and what the two finest predict."""
-    levels, schemes = whole(record, "level"), len(record["scheme"])
+    levels, schemes = data.whole(record, "level"), len(record["scheme"])
     several = len(along.lines) > 1 or style.crowded(record)
     count = 1 if several else 6 if schemes == 1 else 3
     spaced = np.linspace(len(levels) - 1, 0, min(len(levels), count)).round().astype(int)
@@ -474,7 +458,6 @@ def _beside(ax: Axes, along: Along, **options: Any) -> None:
 def _mark(scheme: int, colour: int, count: int) -> dict[str, Any]:
     """Return a marker of a scheme; of several the first is large and hollow, so that all stay visible."""
     look = {"marker": style.look(scheme)["marker"], "color": style.look(colour)["color"]}
-    is_hollow = count > 1 and scheme == 0
-    return look | (
-        {"markerfacecolor": "none", "markersize": 8} if is_hollow else {"markersize": 4.5}
-    )
+    if count > 1 and scheme == 0:
+        return look | {"markerfacecolor": "none", "markersize": 8}
+    return look | {"markersize": 4.5}

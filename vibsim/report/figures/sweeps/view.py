@@ -65,6 +65,13 @@ def of_check(record: Record, name: str, check: ValueCheck) -> Floats:
     return np.where(schemes[:, None], field_values(record, name, "value"), np.nan)
 
 
+def by_scheme(record: Record, scheme: int, values: Floats) -> Floats:
+    """Return numbers of the members of one scheme as those of every scheme, shape (scheme, case); NaN of the others."""
+    found = np.full((len(record["scheme"]), values.size), np.nan)
+    found[scheme] = values
+    return found
+
+
 def check_words(check: ValueCheck) -> str:
     """Name the number that a check asks for."""
     of = f" of {words.symbol(check.quantity)}" if check.quantity else ""
@@ -108,12 +115,7 @@ def ring(ax: Axes, x: float, y: float, *, on_map: bool = False) -> bool:
     limits = ax.get_xlim(), ax.get_ylim()
     if not all(low <= at <= high for at, (low, high) in zip((x, y), limits, strict=True)):
         return False
-    look: dict[str, Any] = {
-        "linestyle": "none",
-        "markerfacecolor": "none",
-        "zorder": 6,
-        "clip_on": False,
-    }
+    look: dict[str, Any] = {"markerfacecolor": "none", "zorder": 6, "clip_on": False}
     if on_map:
         ax.plot([x], [y], "o", color="white", markersize=11, markeredgewidth=3.0, **look)
     ax.plot([x], [y], "o", color="black", markersize=9, markeredgewidth=1.8, **look)
