@@ -126,7 +126,7 @@ def test_every_row_has_a_place_in_a_text() -> None:
 )
 def test_every_section_leads_to_what_shows_it(text: str, section: str) -> None:
     part = PAGE.partition(f"## {text.capitalize()}\n")[2].partition("\n## ")[0]
-    lines = part.partition(f"### Section {section}\n")[2].partition("\n### ")[0]
+    lines = part.partition(f"\n### {section} ")[2].partition("\n### ")[0]
     assert re.search(r"\| (CONFIRMED|CORRECTED|OPEN|PROVIDED) \|", lines)
 
 

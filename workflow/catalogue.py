@@ -184,7 +184,12 @@ def page(listed: dict[str, Any], known: dict[str, Experiment]) -> str:
     for text, parts in found.items():
         lines.append(f"## {text.capitalize()}\n")
         for section in sorted(parts, key=_order):
-            lines.append(f"### {section if section == EXERCISES else f'Section {section}'}\n")
+            title = (
+                section
+                if section == EXERCISES
+                else f"{section} {listed['sections'][text][section]}"
+            )
+            lines.append(f"### {title}\n")
             lines.append(
                 "| no. | place | what it says | shown by | badge | decided by, or what is true |"
             )
