@@ -94,3 +94,11 @@ def test_what_a_run_keeps_of_its_parts_tells_the_same(changes):
     whole, left = (list(verdicts(experiment, row)) for row in (record, join_parts(thin)))
     assert [(v.text, v.advice) for v in left] == [(v.text, v.advice) for v in whole]
     assert "rad s-1" in whole[2].text
+
+
+def test_a_counted_number_at_its_border_fails_and_no_finer_level_is_advised():
+    ball = {"kind": "bouncing_ball", "g": 2.0, "restitution": 0.5, "eps_v": 0.3}
+    given = {"model": ball, "initial": {"h": 1.0}, "time": {"end": 4.0}, "schemes": ["rk4"]}
+    (verdict,) = verdicts(*run({"value": "event_count", "above": 3}, **given))
+    assert (verdict.status, verdict.results[0].reason) == ("FAIL", "mismatch")
+    assert "Finer levels will not help" in verdict.advice

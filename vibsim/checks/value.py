@@ -139,7 +139,7 @@ def _prospects(
         with np.errstate(all="ignore"):
             last = _last_change(numbers)
             code[away[..., -1] <= REACH * last] = MOVING
-            code[away[..., -1] > REACH * last] = SETTLED
+            code[(away[..., -1] > REACH * last) | (last == 0.0)] = SETTLED
     return np.where(fulfilled, UNKNOWN, code), np.where(fulfilled, -1, first)
 
 
