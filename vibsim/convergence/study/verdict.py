@@ -91,9 +91,9 @@ class LadderVerdict:
     coords: Mapping[str, NDArray[Any]] = field(default_factory=dict, repr=False, compare=False)
     """The common points of the levels."""
     values: Floats = field(default_factory=lambda: np.empty(0), repr=False, compare=False)
-    """What was compared: values of all levels at the common points, the coarsest first, shape (n, *points)."""
+    """What was compared: values of all levels at the common points, the coarsest first, shape ``(n, *points)``."""
     best_values: Floats | None = field(default=None, repr=False, compare=False)
-    """The values extrapolated over the levels, shape (*points)."""
+    """The values extrapolated over the levels, shape ``(*points)``."""
 
     @property
     def id(self) -> str:
