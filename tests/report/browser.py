@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from PIL import Image
 
 from vibsim.report.page.templates import digest_of
 
@@ -42,7 +43,28 @@ OPTIONS = ("--headless=new", "--no-sandbox", "--disable-gpu")
 
 
 def dumped(address: str, profile: Path, *options: str) -> str:
-    """Return the document that a browser makes of a page; without a browser the test is skipped, or fails if needed."""
+    """Return the document that a browser makes of a page."""
+    return _opened(address, profile, *options, "--dump-dom")
+
+
+def printed(page: Path, folder: Path) -> int:
+    """Print a page, and return how many sheets that takes."""
+    path = folder / "page.pdf"
+    _opened(page.as_uri(), folder / "profile", f"--print-to-pdf={path}", "--no-pdf-header-footer")
+    return len(re.findall(rb"/Type */Page\b", path.read_bytes()))
+
+
+def picture(page: Path, size: tuple[int, int], folder: Path, *options: str) -> Image.Image:
+    """Return the picture of the first screen of a page, of so many pixels."""
+    path, window = folder / "page.png", "--window-size={},{}".format(*size)
+    shot = (f"--screenshot={path}", window, "--hide-scrollbars", *options)
+    _opened(page.as_uri(), folder / "profile", *shot)
+    with Image.open(path) as found:
+        return found.convert("L")
+
+
+def _opened(address: str, profile: Path, *options: str) -> str:
+    """Return what a browser prints of a page; without a browser the test is skipped, or fails if needed."""
     found = _program()
     if not found.startswith("/"):
         (pytest.fail if os.environ.get("VIBSIM_NEEDS_BROWSER") else pytest.skip)(found)
@@ -57,7 +79,7 @@ def _program() -> str:
         return MISSING
     with tempfile.TemporaryDirectory() as folder:
         try:
-            _started(found, "about:blank", Path(folder))
+            _started(found, "about:blank", Path(folder), "--dump-dom")
         except subprocess.SubprocessError as error:
             told = (getattr(error, "stderr", "") or "").strip().splitlines()[-3:]
             return (
@@ -67,7 +89,7 @@ def _program() -> str:
 
 
 def _started(program: str, address: str, profile: Path, *options: str) -> str:
-    command = [program, *OPTIONS, f"--user-data-dir={profile}", *options, "--dump-dom", address]
+    command = [program, *OPTIONS, f"--user-data-dir={profile}", *options, address]
     # its socket lies in the temporary folder, and the name of a socket has a hundred letters at most
     environment = {**os.environ, "TMPDIR": "/tmp"}
     ended = subprocess.run(

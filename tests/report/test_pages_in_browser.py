@@ -1,6 +1,7 @@
 """Pages in a real browser, on a telephone, a tablet and a desk, light and dark: accessible, and nothing is in the way.
 
-Boxes are compared and no pixels: another font moves every letter, but no box over another one.
+Boxes are compared: another font moves every letter, but no box over another one. One picture is compared with the one
+that the README shows, so coarsely that fonts do not matter.
 """
 
 from __future__ import annotations
@@ -15,21 +16,30 @@ from pathlib import Path
 from typing import Any
 
 import browser
+import numpy as np
 import pytest
 import samples
+from PIL import Image
 
 from vibsim import report, store
 from vibsim.cli import main
 
 pytestmark = pytest.mark.slow
 
-HEAT = Path(__file__).parents[2] / "examples/heat"
+ROOT = Path(__file__).parents[2]
+HEAT = ROOT / "examples/heat"
 WIDTHS = (390, 768, 1400)
 HEIGHT = 900
 STUDY = "h, y\n0.1, 1.717566086\n0.05, 1.718102854\n0.025, 1.718237082\n0.0125, 1.718270642\n"
 PAGES = ("plain", "failed", "swept", "index", "judge", "solver")
 FIRST_FIGURE = 620
 """Where the first figure of a report begins at the latest, on a desk [pixel]."""
+MOST_SHEETS = 4
+"""Sheets of paper that a page takes at most."""
+COARSE = (70, 38)
+"""Fields of a picture that are compared, of 20 x 20 pixels each."""
+ALIKE = 0.85
+"""Correlation of pictures that are the same: with letters of one width it is 0.93, without the plots 0.66."""
 OUTSIDE = 6.0
 """How far words of a plot may leave it, where the font is another one [pixel]."""
 
@@ -209,3 +219,51 @@ def test_a_page_is_accessible_and_nothing_sticks_out_or_covers_anything(
 def test_a_fault_of_a_page_is_found(pages: dict[str, Path], added: str, key: str) -> None:
     text = pages["index"].read_text(encoding="utf-8").replace("</main>", f"{added}</main>")
     assert all(found[key] for found in audited(text))
+
+
+@pytest.mark.parametrize("name", PAGES)
+def test_a_page_is_printed_on_a_few_sheets(
+    pages: dict[str, Path], name: str, tmp_path: Path
+) -> None:
+    assert 1 <= browser.printed(pages[name], tmp_path) <= MOST_SHEETS
+
+
+def test_a_page_that_is_too_long_is_seen_in_print(pages: dict[str, Path], tmp_path: Path) -> None:
+    longer = '<p style="height: 7000px">much room</p></main>'
+    page = tmp_path / "longer.html"
+    page.write_text(pages["index"].read_text("utf-8").replace("</main>", longer), "utf-8")
+    assert browser.printed(page, tmp_path) > MOST_SHEETS
+
+
+@pytest.fixture(scope="module")
+def pendulum(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Make the page that the README shows."""
+    results = tmp_path_factory.mktemp("pendulum")
+    file = str(ROOT / "configs/pendulum_lab/theta_convergence.yaml")
+    common = ("--results", str(results))
+    assert main(["simulate", file, "--level", "6", "7", "8", "9", *common]) == 0
+    assert main(["analyse", file, *common]) == 0
+    assert main(["report", file, *common]) == 0
+    return results / "pendulum_lab/theta_convergence/report.html"
+
+
+@pytest.mark.parametrize(
+    ("removed", "options", "is_alike"),
+    [
+        ("", (), True),
+        ("", ("--force-dark-mode",), False),
+        (r"<style.*?</style>", (), False),
+        (r"<svg.*?</svg>", (), False),
+    ],
+    ids=["as it is", "dark", "without its style", "without its plots"],
+)
+def test_the_picture_of_the_readme_is_that_of_the_page(
+    pendulum: Path, removed: str, options: tuple[str, ...], is_alike: bool, tmp_path: Path
+) -> None:
+    page = tmp_path / "report.html"
+    page.write_text(re.sub(removed, "", pendulum.read_text("utf-8"), flags=re.DOTALL), "utf-8")
+    with Image.open(ROOT / "docs/images/report.png") as kept:
+        pictures = (browser.picture(page, kept.size, tmp_path, *options), kept.convert("L"))
+    fields = [np.asarray(one.resize(COARSE, Image.Resampling.BOX), float) for one in pictures]
+    likeness = np.corrcoef(*(part.ravel() for part in fields))[0, 1]
+    assert (likeness > ALIKE) == is_alike
