@@ -102,8 +102,9 @@ def _has_event(finest: Record, t: Floats, schemes: int) -> Flags:
     if "event_time" not in finest:
         return found
     times = np.asarray(finest["event_time"], dtype=float)
-    for k, case, event in np.argwhere(np.isfinite(times)):
-        place = int(np.searchsorted(t[case], times[k, case, event])) - 1
+    happens = np.isfinite(times)
+    for k, case in np.argwhere(happens.any(axis=-1)):
+        place = np.searchsorted(t[case], times[k, case, happens[k, case]]) - 1
         found[k, case, np.clip(place, 0, samples - 2)] = True
     return found
 
