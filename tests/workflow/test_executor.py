@@ -170,8 +170,8 @@ def test_jobs_that_wait_are_told_with_the_reason(
     (tmp_path / "squeue").chmod(0o755)
     monkeypatch.setenv("PATH", str(tmp_path), prepend=":")
     found = pending.reasons(Path("/re sults"))
-    assert pending.in_words(found) == "3 jobs are pending: 2 Priority, 1 Resources"
-    assert pending.in_words(pending.reasons(Path("/x"))) == "1 job is pending: 1 a"
+    assert pending.in_words(found) == "3 jobs are pending: Priority (2); Resources (1)"
+    assert pending.in_words(pending.reasons(Path("/x"))) == "1 job is pending: a (1)"
     assert pending.in_words(pending.reasons(Path("/other"))) == ""
 
 

@@ -60,7 +60,7 @@ def reasons(results: Path) -> Counter[str]:
 
 
 def in_words(found: Counter[str]) -> str:
-    """Say how many jobs wait: ``3 jobs are pending: 2 Priority, 1 Resources``."""
-    which = ", ".join(f"{number} {reason}" for reason, number in found.most_common())
+    """Say how many jobs wait: ``3 jobs are pending: Priority (2); Resources (1)``."""
+    which = "; ".join(f"{reason} ({number})" for reason, number in found.most_common())
     number = found.total()
     return f"{number} job{'s are' if number > 1 else ' is'} pending: {which}" if number else ""
