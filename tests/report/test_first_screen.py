@@ -248,14 +248,19 @@ def test_a_trap_has_its_mark_and_its_order_beside_the_finding():
     )
 
 
-def test_statements_are_counted_beside_the_finding_but_not_where_one_is_the_finding():
+def test_statements_stand_beside_the_finding_but_not_the_one_that_is_the_finding():
     claim = {"claim": "it takes longer", "that": {"value": "period", "above": 6.0}}
     order = {"converges": "theta", "order": 2}
-    assert (
-        "1 statement holds as claimed."
-        in first(samples.experiment(checks=[order, claim]))["meaning"]
-    )
-    assert "statement" not in first(samples.experiment(checks=[claim]))["meaning"]
+    wrong = claim | {"claim": "it takes a minute", "that": {"value": "period", "above": 60.0}}
+    shown = first(samples.experiment(checks=[order, claim, wrong | {"holds": False}]))
+    assert shown["statements"] == [
+        {"status": "PASS", "badge": words.CLAIMED, "claim": "it takes longer"},
+        {"status": "PASS", "badge": words.REFUTED, "claim": "it takes a minute"},
+    ]
+    assert shown["more_statements"] == 0
+    assert first(samples.experiment(checks=[claim]))["statements"] == []
+    several = [claim | {"id": f"claim_{k}"} for k in range(5)]
+    assert first(samples.experiment(checks=[order, *several]))["more_statements"] == 2
 
 
 @pytest.mark.parametrize(

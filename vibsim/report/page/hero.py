@@ -29,6 +29,7 @@ from vibsim.report.types import Experiment
 
 NUMBERS = 3  # large numbers on the first screen
 NAMED = 3  # schemes that are named
+STATEMENTS = 3  # statements that are read beside the finding
 MOST_LETTERS = 14  # of a best value; tables have every digit
 MEASURED = {
     "stable": "Growth per period", "conserves": "Largest energy error over E(0)", "equal": "Largest difference",
@@ -46,6 +47,7 @@ def context(
     """Return the words of the first screen by the names that its template uses."""
     statuses = [check["status"] for check in summary["checks"]]
     levels = len(data.whole(record, "level"))
+    claims = _statements(experiment, summary, lead)
     return {
         "finding": findings.title(experiment, record, lead, published.ids(experiment)),
         "counts": words.passed(statuses),
@@ -53,16 +55,27 @@ def context(
         "facts": " · ".join(filter(None, _facts(experiment, record))),
         "numbers": list(numbers(experiment, record, lead))[:NUMBERS],
         "meaning": " ".join(
-            [findings.paragraph(experiment, record, lead, levels), *_others(summary, lead)]
+            [findings.paragraph(experiment, record, lead, levels), *_traps(summary, lead)]
         ),
+        "statements": claims[:STATEMENTS],
+        "more_statements": max(0, len(claims) - STATEMENTS),
     }
 
 
-def _others(summary: Mapping[str, Any], lead: Lead) -> Iterator[str]:
-    """Say what came of statements and traps, where the page is about something else."""
-    told = [words.badge(check) for check in summary["checks"] if check is not lead.entry]
-    if count := told.count(words.CLAIMED):
-        yield f"{count} {'statement holds' if count == 1 else 'statements hold'} as claimed."
+def _statements(
+    experiment: Experiment, summary: Mapping[str, Any], lead: Lead
+) -> list[dict[str, str]]:
+    """Return the statements that the title does not tell, and what came of each."""
+    claims = {check.id: check.claim for check in experiment.checks if check.kind == "claim"}
+    return [
+        {"status": entry["status"], "badge": words.badge(entry), "claim": claims[entry["id"]]}
+        for entry in summary["checks"]
+        if entry["id"] in claims and entry is not lead.entry
+    ]
+
+
+def _traps(summary: Mapping[str, Any], lead: Lead) -> Iterator[str]:
+    """Say which order the traps found, where the page is about something else."""
     for check in summary["checks"]:
         order = words.fact(check["results"][0], "order") if check["results"] else None
         if words.badge(check) == words.TRAP and check is not lead.entry and order is not None:
