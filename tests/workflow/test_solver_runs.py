@@ -366,6 +366,17 @@ def test_a_function_that_is_not_there_is_named_with_the_nearest(study: Study) ->
     assert "Traceback" not in ended.stdout
 
 
+def test_a_function_with_other_arguments_is_told_what_it_is_called_with(study: Study) -> None:
+    module = study.folder / "my files/writes_a_file.py"
+    module.write_text("def solve(h, output):\n    return None\n")
+    study.write("writes", FUNCTION.replace("solver_in_a_module", "writes_a_file"))
+    options = ("--level", 1, "--results", study.results, "--allow-commands")
+    ended = here("simulate", study.file("writes"), *options)
+    assert ended.returncode == 1
+    assert "is called with h, but takes (h, output) (missing a required argument" in ended.stderr
+    assert "Traceback" not in ended.stdout
+
+
 def analysed(study: Study, name: str) -> tuple[int, str]:
     for level in range(3):
         assert study.make(name, level)[0] == 0

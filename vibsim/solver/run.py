@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import importlib
+import inspect
 import os
 import signal
 import subprocess
 import sys
 import traceback
+from collections.abc import Callable
 from contextlib import chdir
 from functools import partial
 from pathlib import Path
@@ -99,9 +101,26 @@ def _called(experiment: SolverExperiment, level: int, member: int) -> Any:
             found = importlib.import_module(module)
             if not callable(getattr(found, name, None)):
                 raise VibsimError(f"{module} has no function {name}: {nearest(name, dir(found))}")
-            return getattr(found, name)(**arguments)
+            function = getattr(found, name)
+            _check_arguments(text, function, arguments)
+            return function(**arguments)
         except VibsimError:
             raise
         except (Exception, SystemExit) as error:
             traceback.print_exc(file=sys.stdout)
             raise VibsimError(f"{text} raised {type(error).__name__}: {error}") from None
+
+
+def _check_arguments(text: str, function: Callable[..., Any], arguments: dict[str, Any]) -> None:
+    """Refuse a function that cannot be called with the sizes and parameters of the experiment."""
+    try:
+        takes = inspect.signature(function)
+    except (TypeError, ValueError):
+        return  # functions of extension modules may not tell
+    try:
+        takes.bind(**arguments)
+    except TypeError as error:
+        rule = "it gets sizes and parameters by name, and returns an xarray.Dataset"
+        raise VibsimError(
+            f"{text} is called with {', '.join(arguments)}, but takes {takes} ({error}): {rule}"
+        ) from None
