@@ -47,6 +47,16 @@ def test_a_name_that_names_nothing_comes_with_the_nearest(root: Path, word: str,
         choose([word], root)
 
 
+def test_an_experiment_of_ones_own_is_named_by_its_file(
+    root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("mine.yaml").touch()
+    for word in ("mine", "adhoc/mine", "adhoc/elsewhere"):
+        with pytest.raises(InputError, match=rf"by its file, such as {Path(word).name}\.yaml"):
+            choose([word], root)
+
+
 def test_two_files_with_one_name_are_refused(root: Path, tmp_path: Path) -> None:
     files = [str(tmp_path / folder / "x.yaml") for folder in ("a", "b")]
     with pytest.raises(InputError, match="cannot share a name"):

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from vibsim.core.errors import MOST_CHOICES, Fault, InputError, listed, nearest
-from vibsim.experiment.collection import ENDINGS, collection_of
+from vibsim.experiment.collection import ADHOC, ENDINGS, collection_of
 
 DEFAULT = ("pendulum_lab", "showcase")
 MAX_DIGITS = 18
@@ -104,6 +104,9 @@ def _find(word: str, known: list[Choice], root: Path) -> Found:
     hint = nearest(word, names) if known else ""
     if len(names) > MOST_CHOICES and not hint.startswith("did you mean"):
         hint = "`vibsim list experiments` shows all"
+    own = f"{word.removeprefix(f'{ADHOC}/')}{ENDINGS[0]}"
+    if word.startswith(f"{ADHOC}/") or Path(own).is_file():
+        hint = f"an experiment of your own is named by its file, such as {own}"
     return [], (rule, hint)
 
 
