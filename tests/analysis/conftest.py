@@ -21,7 +21,7 @@ def all_hypotheses() -> Iterator[None]:
 def without_series(monkeypatch: pytest.MonkeyPatch) -> None:
     """Keep what a large sweep keeps, where verdicts alone are looked at: they take half of the work.
 
-    Numbers and verdicts are the same as with series of the same points (`test_analysis_parts`); more points of few
+    Numbers and verdicts are the same as with series of the same points (`test_parts`); more points of few
     members are kept with them alone.
     """
     monkeypatch.setattr("vibsim.experiment.storage.LEAN", 0)

@@ -1,7 +1,7 @@
 """Every number of this room that decides something: its value, its meaning, and where it comes from.
 
 The origin stands in brackets: *derived* from the expansion of the error or the grid; *checked*, which
-is chosen and confirmed on real runs (``tests/analysis/test_analysis_real.py``); or a *convention*, a size that was
+is chosen and confirmed on real runs (``tests/analysis/test_real_ladders.py``); or a *convention*, a size that was
 chosen.
 """
 

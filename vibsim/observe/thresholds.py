@@ -1,7 +1,7 @@
 """Every number of this room that decides something: its value, its meaning, and where it comes from.
 
 The origin stands in brackets: *derived* from the motion or the arithmetic; *checked*, which is chosen and confirmed on
-runs of every scheme (``tests/analysis/test_drift_of_real_runs.py``, ``test_analysis_recurrence.py``,
+runs of every scheme (``tests/analysis/checks/test_drift_of_real_runs.py``, ``test_recurrence.py``,
 ``test_shift.py``); or a *convention*, a size that was chosen.
 """
 

@@ -226,7 +226,7 @@ def test_the_times_of_all_events_are_stored_of_every_level() -> None:
         np.testing.assert_array_equal(record["event_time"][0, 0, i, :kept], times)
 
 
-BEADS = Path(__file__).parents[2] / "configs" / "showcase" / "two_beads.yaml"
+BEADS = Path(__file__).parents[3] / "configs" / "showcase" / "two_beads.yaml"
 
 
 def impact(number: int) -> float:

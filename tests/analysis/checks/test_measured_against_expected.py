@@ -131,7 +131,7 @@ def test_values(check: dict[str, Any], value: float) -> None:
 
 
 def test_without_every_step_the_frequency_is_that_of_the_period() -> None:
-    """That of the recurrence is tested in `test_analysis_recurrence`."""
+    """That of the recurrence is tested in `test_recurrence`."""
     exp = experiment()
     block = block_of(exp, level_records(exp, every={4: 2}))
     place = values.Place(block, {}, "", 4, None, None)

@@ -10,7 +10,7 @@ import pytest
 
 from vibsim.core.vocabulary import NORMS, ORDER_TOLERANCE, REASONS, STATUSES, TYPICAL_NORM, worst
 
-PAGE = Path(__file__).parents[1] / "docs" / "verdicts.md"
+PAGE = Path(__file__).parents[2] / "docs" / "verdicts.md"
 
 
 def test_the_page_explains_every_status_and_every_reason_as_they_are() -> None:

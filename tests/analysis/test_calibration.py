@@ -1,7 +1,7 @@
 """Verdicts on thousands of ladders with known truth, of which no number was used to set the verdict.
 
 Its numbers were set on other seeds (`TUNED`). The table of the whole held-out half stands in ``docs/method.md``; the
-command ``python tests/analysis/test_analysis_calibration.py`` prints it, in two minutes.
+command ``python tests/analysis/test_calibration.py`` prints it, in two minutes.
 """
 
 from __future__ import annotations
