@@ -150,7 +150,7 @@ def test_every_section_is_linked_at_the_head_of_its_text(text: str) -> None:
 def test_a_statement_is_understood_alone() -> None:
     """The page puts statements of an experiment under several sections, so none may go on with the one before."""
     started = re.compile(
-        r"(and|nor|so|but|while|it|they|that of|those of|the same|there is|these|then)\b"
+        r"(and|nor|so|but|while|its?|they|their|that of|those of|the same|there is|these|then)\b"
     )
     found = [
         f"{name}#{check.id}"
