@@ -192,7 +192,8 @@ def page(listed: dict[str, Any], known: dict[str, Experiment]) -> str:
             lines += _equations(listed["equations"][text].get(section))
             if section not in parts:
                 below = [s for s in sections if s.startswith(f"{section}.")]
-                lines.append(f"Shown in sections {below[0]} to {below[-1]}.\n")
+                ends = " to ".join(_jump(end, titles) for end in (below[0], below[-1]))
+                lines.append(f"Shown in sections {ends}.\n")
                 continue
             lines.append(
                 "| no. | place | what it says | shown by | badge | decided by, or what is true |"
