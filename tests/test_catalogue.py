@@ -130,9 +130,40 @@ def test_every_section_leads_to_what_shows_it(text: str, section: str) -> None:
     assert re.search(r"\| (CONFIRMED|CORRECTED|OPEN|PROVIDED) \|", lines)
 
 
+@pytest.mark.parametrize(("text", "count"), [("pendulum lecture", 15), ("vibration text", 118)])
+def test_every_equation_stands_under_one_section(text: str, count: int) -> None:
+    part = PAGE.partition(f"## {text.capitalize()}\n")[2].partition("\n## ")[0]
+    named = re.findall(r"^Equations? (.*)\.$", part, re.MULTILINE)
+    assert [int(n) for line in named for n in re.findall(r"\((\d+)\)", line)] == [
+        *range(1, count + 1)
+    ]
+
+
+@pytest.mark.parametrize("text", SECTIONS)
+def test_every_section_is_linked_at_the_head_of_its_text(text: str) -> None:
+    part = PAGE.partition(f"## {text.capitalize()}\n")[2].partition("\n## ")[0]
+    (head,) = re.findall(r"^Sections: (.*)$", part, re.MULTILINE)
+    headings = re.findall(r"^### ([\d.]+|Exercises)", part, re.MULTILINE)
+    assert re.findall(r"\[([\w.]+)\]\(#", head) == headings
+
+
+def test_a_statement_is_understood_alone() -> None:
+    """The page puts statements of an experiment under several sections, so none may go on with the one before."""
+    started = re.compile(
+        r"(and|nor|so|but|while|its?|they|their|that of|those of|the same|there is|these|then)\b"
+    )
+    found = [
+        f"{name}#{check.id}"
+        for name, experiment in known().items()
+        for check in experiment.checks
+        if check.kind == "claim" and started.match(check.claim)
+    ]
+    assert found == []
+
+
 @pytest.mark.parametrize("number", range(1, 24))
 def test_every_exercise_leads_to_what_answers_it(number: int) -> None:
-    part = PAGE.rpartition("### Exercises\n")[2]
+    part = PAGE.rpartition("### Exercises (sections 9 and 11)\n")[2]
     assert re.search(
         rf"\| exercise {number} \|[^|]*\|[^|]*(configs|python\.md)[^|]*\| (CONFIRMED|PROVIDED) \|",
         part,

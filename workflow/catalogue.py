@@ -28,7 +28,8 @@ WAYS = {"things": ("shown_by", "see", "open"), "errata": ("shown_by", "not_run")
 """What a row of each list has at least one of."""
 HEAD = """# The two source texts, section by section
 
-What the pendulum lecture and the vibration text describe, and which experiment shows it. Exercises follow the sections.
+What the pendulum lecture and the vibration text describe, and which experiment shows it. To find an equation, a
+figure or an exercise, search this page for `(42)`, `figure 6` or `exercise 12`.
 `.venv/bin/vibsim run NAME` runs an experiment. Its page has the measured numbers, and `results/index.html` has those
 of every statement.
 
@@ -182,14 +183,18 @@ def page(listed: dict[str, Any], known: dict[str, Experiment]) -> str:
             found[text].setdefault(section, []).append(row)
     lines = [HEAD.format(things=len(listed["things"]), errata=len(listed["errata"]))]
     for text, parts in found.items():
+        titles = listed["sections"][text]
+        sections = sorted({*parts, *titles}, key=_order)
         lines.append(f"## {text.capitalize()}\n")
-        for section in sorted(parts, key=_order):
-            title = (
-                section
-                if section == EXERCISES
-                else f"{section} {listed['sections'][text][section]}"
-            )
-            lines.append(f"### {title}\n")
+        lines.append(f"Sections: {', '.join(_jump(section, titles) for section in sections)}\n")
+        for section in sections:
+            lines.append(f"### {_title(section, titles)}\n")
+            lines += _equations(listed["equations"][text].get(section))
+            if section not in parts:
+                below = [s for s in sections if s.startswith(f"{section}.")]
+                ends = " to ".join(_jump(end, titles) for end in (below[0], below[-1]))
+                lines.append(f"Shown in sections {ends}.\n")
+                continue
             lines.append(
                 "| no. | place | what it says | shown by | badge | decided by, or what is true |"
             )
@@ -199,6 +204,26 @@ def page(listed: dict[str, Any], known: dict[str, Experiment]) -> str:
             )
             lines += [*map(_line, ordered), ""]
     return "\n".join(lines)
+
+
+def _title(section: str, titles: dict[str, str]) -> str:
+    return (
+        "Exercises (sections 9 and 11)" if section == EXERCISES else f"{section} {titles[section]}"
+    )
+
+
+def _jump(section: str, titles: dict[str, str]) -> str:
+    """Return a link to the heading of a section."""
+    anchor = re.sub(r"[^\w -]", "", _title(section, titles)).lower().replace(" ", "-")
+    return f"[{section}](#{anchor})"
+
+
+def _equations(ends: list[int] | None) -> list[str]:
+    """Return the line that names each equation of a section, so that a search for its number finds the section."""
+    if ends is None:
+        return []
+    named = ", ".join(f"({number})" for number in range(ends[0], ends[1] + 1))
+    return [f"Equation{'s' if ends[1] > ends[0] else ''} {named}.\n"]
 
 
 def _exercise(row: Row) -> list[int]:

@@ -112,6 +112,19 @@ def test_levels_schemes_and_the_exact_solution_share_panels() -> None:
     assert coarse > 3.0 * fine
 
 
+def test_small_numbers_have_their_power_of_ten_beside_the_unit() -> None:
+    figure = {"source": "x", "shows": "over_time", "quantities": ["theta", "energy_deviation"]}
+    ((_, (picture,)),), _ = drawn(
+        samples.experiment(levels=[10, 11], schemes=["central"], figures=[figure])
+    )
+    angle, energy = picture.figure.axes
+    assert angle.get_ylabel() == "θ [rad]"
+    assert energy.get_ylabel() == "dE [10⁻⁵ J]"
+    ticks = energy.yaxis.get_major_formatter()
+    assert not ticks.get_offset()
+    assert max(abs(float(text.replace("−", "-"))) for text in map(ticks, energy.get_yticks())) >= 1
+
+
 def test_what_is_not_stored_follows_from_the_states() -> None:
     names = ["u", "kinetic_energy", "potential_energy", "energy"]
     ((_, [picture]),), _ = drawn(spring({"shows": "over_time", "quantities": names}, levels=[7, 8]))

@@ -297,6 +297,30 @@ def test_levels_of_the_phase_plane_are_those_that_were_computed(text):
 
 
 @pytest.mark.parametrize(
+    ("model", "end", "closes"),
+    [
+        ({"kind": "pendulum"}, 20.0, True),
+        ({"kind": "system", "acceleration": "(1 - u**2)*v - u"}, 20.0, False),
+        ({"kind": "system", "acceleration": "(1 - u**2)*v - u"}, 60.0, False),
+    ],
+)
+def test_an_exact_orbit_that_does_not_close_is_drawn_as_far_as_the_levels(model, end, closes):
+    u = "theta" if closes else "u"
+    exp = samples.experiment(
+        model=model,
+        initial={u: 1.0},
+        time={"end": end, "base_steps": 400},
+        levels=[0, 1],
+        schemes=["rk4"],
+    )
+    rec = samples.record(exp)
+    picture = figures_plane.phase(exp, rec, choice.members(rec, u))
+    exact, *levels = picture.figure.axes[0].get_lines()
+    ends = [line.get_xdata()[-1] for line in (exact, levels[-1])]
+    assert (abs(ends[0] - ends[1]) < 0.01) == (not closes)
+
+
+@pytest.mark.parametrize(
     ("printed", "shown"),
     [
         ("1.120e8", "1.120·10⁸"),

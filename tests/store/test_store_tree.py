@@ -67,8 +67,13 @@ def test_every_file_is_a_node_with_what_was_computed(made: Path) -> None:
 
 
 def test_of_a_folder_above_all_experiments_are_in_the_tree(made: Path) -> None:
+    # the documentation lies there as well, with copies of experiment files
+    other = made / "docs" / "_downloads" / "level_30.yaml"
+    other.parent.mkdir(parents=True)
+    other.write_text("title: no data")
     with vibsim.open(made) as tree:
         assert tree["adhoc/four/level_06"].sizes["t"] == 65
+        assert list(tree.children) == ["adhoc"]
 
 
 def test_xarray_puts_levels_side_by_side(made: Path) -> None:

@@ -348,7 +348,8 @@ class _Phrases(OrderContext):
             return f" {moved}"
         if self.apart <= COINCIDE:
             return " The rescaled differences coincide."
-        if self.apart > COINCIDE:
+        # the last point, which this norm leaves out, is part of the differences
+        if self.apart > COINCIDE and self.norm != "linf_interior":
             return " The rescaled differences do not coincide yet."
         return ""
 

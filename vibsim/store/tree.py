@@ -53,7 +53,9 @@ def open(  # noqa: A001
 
 def _nodes(folder: Path, chunks: Mapping[str, int] | None) -> Iterator[tuple[str, xr.Dataset]]:
     """Yield the nodes below a folder by their paths; nothing where no results are."""
-    found = sorted(part for name in FILES for part in folder.glob(name))
+    named = [part for name in FILES for part in folder.glob(name)]
+    # level_30.yaml, for one, is an experiment file
+    found = sorted(part for part in named if part.is_dir() or part.suffix == ".nc")
     if not found:
         for part in sorted(part for part in folder.iterdir() if part.is_dir()):
             for name, dataset in _nodes(part, chunks):

@@ -195,7 +195,12 @@ def _draw(
     panels.fit_values(ax, drawn, *exact)
     ax.set_xlim(float(t[0]), end if end > t[0] else float(t[0]) + 1.0)
     unit = series.unit_of(experiment, record, panel.quantity)
-    ax.set_ylabel(style.label(words.symbol(panel.quantity), unit))
+    exponent = style.scale(np.array(ax.get_ylim())) if ax.get_yscale() == "linear" else 0
+    if exponent:
+        ax.yaxis.set_major_formatter(
+            lambda value, _: f"{value / 10.0**exponent:g}".replace("-", "−")
+        )
+    ax.set_ylabel(style.label(words.symbol(panel.quantity), unit, exponent))
     # values that hardly differ need long numbers
     ax.yaxis.set_label_coords(-0.115, 0.5)
     ax.set_title(panel.title)

@@ -53,11 +53,14 @@ def phase(experiment: Experiment, record: Record, shown: list[Member]) -> Pictur
     chosen = style.spaced(len(levels), MOST_PANELS)
     columns = [(0.62 + 2.75 * i, 2.35) for i in range(PANELS_A_ROW)]
     figure, axes = rows_of(len(chosen), columns, 2.35, 0.5, 0.45)
-    size = _draw_orbit(axes, record, model, case, w, t <= 1.02 * period)
     is_long = bool(t[-1] > (PERIODS + 1.0) * period)
     parts = [(np.ones(t.size, dtype=bool), 1.2)]
     if is_long:
         parts = [(t <= t[0] + period, 0.9), (t >= t[-1] - PERIODS * period, 1.4)]
+    # an orbit that closes is drawn once, any other as far as the levels are
+    closes = math.isfinite(exact)
+    orbit = t <= 1.02 * period if closes else np.any([keep for keep, _ in parts], axis=0)
+    size = _draw_orbit(axes, record, model, case, w, orbit)
     largest = 0.0
     for ax, i in zip(axes, chosen, strict=True):
         for k, member in enumerate(members):
@@ -94,20 +97,21 @@ def phase(experiment: Experiment, record: Record, shown: list[Member]) -> Pictur
 
 
 def _draw_orbit(
-    axes: list[Axes], record: Record, model: Model, case: int, w: float, first: Flags
+    axes: list[Axes], record: Record, model: Model, case: int, w: float, drawn: Flags
 ) -> float:
     """Draw the exact orbit, and return its size; 0 where it is not known."""
     names = f"{model.position}_exact", f"{model.velocity}_exact"
     if any(name not in record for name in names):
         return 0.0
-    u, v = (np.asarray(data.pick(record, name, case=case), np.float64)[first] for name in names)
+    series = (np.asarray(data.pick(record, name, case=case), np.float64) for name in names)
+    u, v = (np.where(drawn, values, np.nan) for values in series)
     if model.linear:
         angle = np.linspace(0.0, 2.0 * np.pi, 121)
         radius = float(np.hypot(u[0], v[0] / w))
         u, v = radius * np.cos(angle), radius * w * np.sin(angle)
     for ax in axes:
         ax.plot(u, v / w, **style.REFERENCE | {"zorder": 5}, label="exact")
-    return float(np.max(np.hypot(u, v / w)))
+    return float(np.nanmax(np.hypot(u, v / w)))
 
 
 def _draw_end(ax: Axes, points: Points, k: int, width: float, name: str) -> None:
