@@ -15,9 +15,11 @@ from made_once import change
 from torture.laboratory import processes, words
 
 from vibsim.cli.arguments import parsed
+from vibsim.cli.chosen_plans import plans_of
 from vibsim.cli.run import executor, pending
 from vibsim.cli.workflow import names_of
 from vibsim.core.errors import InputError
+from vibsim.plan.workflow_names import together
 
 from .conftest import Place, here
 
@@ -58,9 +60,9 @@ def test_jobs_of_a_scheduler_give_the_same_bytes(place: Place, tmp_path: Path) -
     assert other.jobs() == []
     rows = (tmp_path / "scheduler/properties").read_text().splitlines()
     jobs = [json.loads(row.removeprefix("# properties = ")) for row in rows]
-    # simulations, analysis and report; the index is made here
+    # simulations, and analysis with page; the index is made here
     names = [job.get("groupid") or job["rule"] for job in jobs]
-    assert names == ["simulate", "simulate", "analyse", "report"]
+    assert names == ["simulate", "simulate", "analyse"]
     needs = [[job["resources"][key] for key in ("mem_mb", "runtime", "disk_mb")] for job in jobs]
     assert all(memory > 500 and minutes > 2 and disk > 0 for memory, minutes, disk in needs)
     # what was lost may have needed more
@@ -116,6 +118,37 @@ def test_jobs_are_grouped_to_minutes_and_long_ones_are_not(place: Place) -> None
     assert made("[6, 7]") == [("simulate", 3)]
     # 52 s at 12 ns a step, and four times as long on a slow machine
     assert made("[6, 32]") == [("simulate", 3), (None, 6)]
+
+
+def test_short_simulations_are_divided_among_jobs_as_long_as_that_saves_time() -> None:
+    # two starts would take longer than the work
+    assert together([1.0, 1.0], 16) == 2
+    # two jobs that start in 4 s each and work for 6 s are done sooner than one, and than three
+    assert together([2.5] * 5, 16) == 3
+    # jobs of a minute each, and no more in one than a profile allows
+    assert together([4.0] * 225, 16) == 15
+    assert together([4.0] * 734, 16) == 16
+    assert together([4.0] * 734, 1) == 1
+    assert together([], 16) == 16
+
+
+def test_a_profile_says_how_many_share_a_job_at_most(place: Place, tmp_path: Path) -> None:
+    def grouped(profile: str, levels: str) -> list[str]:
+        (tmp_path / "config.yaml").write_text(f"executor: cluster-generic\n{profile}")
+        change(place.file, "levels: [6, 7, 8, 9]", f"levels: {levels}")
+        plans = plans_of([str(place.file)])
+        change(place.file, f"levels: {levels}", "levels: [6, 7, 8, 9]")
+        options = parsed(["run", str(place.file), "--profile", str(tmp_path)])
+        words = [*executor.chosen(options, plans, place.results).arguments]
+        return words[words.index("--group-components") + 1 :] if "group" in " ".join(words) else []
+
+    ours = "group-components: {simulate: 16, analyse: 4}"
+    # levels 6 to 27 in one job, then 28, 29 and 30, of 3 to 13 s
+    assert grouped(ours, "{from: 6, to: 30}") == ["simulate=2", "analyse=4"]
+    assert grouped("group-components: [simulate=1]", "{from: 6, to: 30}") == ["simulate=1"]
+    assert grouped("", "{from: 6, to: 30}") == []
+    with pytest.raises(InputError, match="`group-components` must be whole numbers"):
+        grouped("group-components: {simulate: many}", "[6, 7]")
 
 
 def test_a_profile_configures_cores_and_memory_of_the_executor(

@@ -34,6 +34,19 @@ GROUP = "simulate"
 """The group of short jobs, several of which an executor may be given as one (``--group-components``)."""
 GROUPED_SECONDS = 10.0
 """Seconds of one core that such a job takes at most: more than a shard holds."""
+START_SECONDS = 4.0
+"""Seconds that each job of an executor takes to start and to end."""
+
+
+def together(seconds: Sequence[float], most: int) -> int:
+    """Return how many simulations that take so many seconds share a job of an executor, `most` at most.
+
+    So many jobs are made that their starts, one after the other, and the work of one, all at the same time, take the
+    least time together. Long ones, which have a job of their own, do not count.
+    """
+    short = [one for one in seconds if 0.0 < one <= GROUPED_SECONDS]
+    jobs = math.ceil(math.sqrt(sum(short) / START_SECONDS))
+    return min(most, math.ceil(len(short) / jobs)) if jobs else most
 
 
 @dataclass(frozen=True)

@@ -55,6 +55,8 @@ rule report:
         "{experiment}/logs/report.log",
     benchmark:
         "{experiment}/benchmarks/report.tsv"
+    group:
+        "analyse"
     resources:
         mem_mb=names.memory(names.page_memory),
         runtime=names.runtime(names.page_minutes),
