@@ -21,7 +21,7 @@ from vibsim.cli.workflow import names_of
 from vibsim.core.errors import InputError
 from vibsim.plan.workflow_names import together
 
-from .conftest import Place, here
+from .conftest import ROOT, Place, here
 
 SCRIPTS = {
     "submit": """\
@@ -49,10 +49,14 @@ def scheduler(folder: Path, *, loses: bool = False) -> list[str]:
     return [*options, "--seconds-between-status-checks", "1"]
 
 
-def test_jobs_of_a_scheduler_give_the_same_bytes(place: Place, tmp_path: Path) -> None:
+@pytest.mark.parametrize("here", [20, 0])
+def test_jobs_of_a_scheduler_give_the_same_bytes(place: Place, tmp_path: Path, here: int) -> None:
     wanted = place.content()
     other = Place(place.folder, elsewhere=tmp_path / "shared results")
-    ended = other.run(*scheduler(tmp_path / "scheduler", loses=True))
+    text = (ROOT / "workflow/profiles/generic/config.yaml").read_text()
+    (tmp_path / "config.yaml").write_text(text.replace("here: 20", f"here: {here}"))
+    profile = ["--profile", str(tmp_path)]
+    ended = other.run(*profile, *scheduler(tmp_path / "scheduler", loses=True))
     assert ended.returncode == 0, ended.stdout + ended.stderr
     found = other.content()
     assert found.keys() == wanted.keys()
@@ -60,9 +64,9 @@ def test_jobs_of_a_scheduler_give_the_same_bytes(place: Place, tmp_path: Path) -
     assert other.jobs() == []
     rows = (tmp_path / "scheduler/properties").read_text().splitlines()
     jobs = [json.loads(row.removeprefix("# properties = ")) for row in rows]
-    # simulations, and analysis with page; the index is made here
+    # simulations, and analysis with page if they are not made here; the index is
     names = [job.get("groupid") or job["rule"] for job in jobs]
-    assert names == ["simulate", "simulate", "analyse"]
+    assert names == ["simulate", "simulate", *["analyse"] * (not here)]
     needs = [[job["resources"][key] for key in ("mem_mb", "runtime", "disk_mb")] for job in jobs]
     assert all(memory > 500 and minutes > 2 and disk > 0 for memory, minutes, disk in needs)
     # what was lost may have needed more
@@ -120,6 +124,18 @@ def test_jobs_are_grouped_to_minutes_and_long_ones_are_not(place: Place) -> None
     assert made("[6, 32]") == [("simulate", 3), (None, 6)]
 
 
+def test_what_takes_seconds_is_finished_here(place: Place) -> None:
+    def groups(here: int, *names: str) -> tuple[bool, str | None]:
+        config = {"experiments": [str(place.file), *names], "here": here}
+        found = names_of(config | {"results": str(place.results)}, {})
+        return found.finishes_here, found.analysis_group
+
+    assert groups(20) == (True, None)
+    # each has a page, and Python starts for it
+    assert groups(20, "vibration_text") == (False, "analyse")
+    assert groups(0) == (False, "analyse")
+
+
 def test_short_simulations_are_divided_among_jobs_as_long_as_that_saves_time() -> None:
     # two starts would take longer than the work
     assert together([1.0, 1.0], 16) == 2
@@ -161,9 +177,9 @@ def test_a_profile_configures_cores_and_memory_of_the_executor(
         chosen = executor.chosen(parsed([*options]), [], place.results)
         return [f"{key}={value}" for key, value in chosen.config.items()]
 
-    assert words("") == ["cores=1", "overhead=500"]
-    assert words("config: {overhead: 700}") == ["cores=1", "overhead=700"]
-    assert words("config: [cores=3]", "--cores", "2") == ["cores=2", "overhead=500"]
+    assert words("") == ["cores=1", "overhead=500", "here=20"]
+    assert words("config: {overhead: 700, here: 0}") == ["cores=1", "overhead=700", "here=0"]
+    assert words("config: [cores=3]", "--cores", "2") == ["cores=2", "overhead=500", "here=20"]
     with pytest.raises(InputError, match="must be whole numbers"):
         words("config: {overhead: much}")
 

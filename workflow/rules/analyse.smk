@@ -9,9 +9,9 @@ rule analyse:
         "{experiment}/logs/analyse.log",
     benchmark:
         "{experiment}/benchmarks/analyse.tsv"
-    # its page is made by the same job of an executor
     group:
-        "analyse"
+        names.analysis_group
+    localrule: names.finishes_here
     threads: names.analysis_threads
     resources:
         mem_mb=names.analysis_memory,

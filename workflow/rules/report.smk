@@ -56,7 +56,8 @@ rule report:
     benchmark:
         "{experiment}/benchmarks/report.tsv"
     group:
-        "analyse"
+        names.analysis_group
+    localrule: names.finishes_here
     resources:
         mem_mb=names.memory(names.page_memory),
         runtime=names.runtime(names.page_minutes),

@@ -22,8 +22,9 @@ PROFILES = ("config.yaml", "config.v8+.yaml", "config.v9+.yaml")
 """Names that the file of a profile may have."""
 SHIPPED = ("slurm", "generic")
 """The profiles in ``workflow/profiles``: one for the executor of its name, and one for any other."""
-CONFIGURED = ("cores", "overhead")
-"""What a profile configures of vibsim: the cores of a job, and the megabytes of the executor's processes beside it."""
+CONFIGURED = ("cores", "overhead", "here")
+"""What a profile configures of vibsim: the cores of a job, the megabytes of the executor's processes beside it, and the
+seconds of work that are no jobs but done here."""
 
 
 @dataclass(frozen=True)
