@@ -29,16 +29,11 @@ sweep:
 checks:
   - {{converges: theta, order: 2}}
 """
-# this cluster keeps no accounts, so its jobs are followed by squeue
+FOLLOWED = ("--slurm-status-command", "squeue")
+"""How jobs are followed in a cluster that keeps no accounts."""
 WAYS = {
     "vibsim run --cores 2": ("--cores", "2"),
-    "vibsim run --executor slurm": (
-        "--executor",
-        "slurm",
-        "--",
-        "--slurm-status-command",
-        "squeue",
-    ),
+    "vibsim run --executor slurm": ("--executor", "slurm", "--", *FOLLOWED),
 }
 ROUNDS = 3
 

@@ -202,7 +202,7 @@ class Names:
 
     @property
     def analysis_group(self) -> str | None:
-        """The group of Snakemake of an analysis and its page, which one job of an executor makes; None for jobs here."""
+        """The group of Snakemake of an analysis and its page, which share a job of an executor; None for jobs here."""
         return None if self.finishes_here else "analyse"
 
     analysis_digest = _of_plan("analysis")
