@@ -84,7 +84,7 @@ def test_an_experiment_without_a_summary_is_as_its_schema_says(tmp_path: Path) -
     (plan,) = plans_of(["theta_convergence"], cached=True)
     summaries = [outcome.collect(plan, tmp_path)]
     job = Job("analyse", ("a/x/convergence.nc",), "none.log", "lost")
-    failures = [outcome.failed_job(job, tmp_path)]
+    failures = outcome.failed_jobs([job], [], tmp_path)
     assert failures[0]["tail"] == ["lost"]
     content = json.loads(outcome.as_json(summaries, failures, tmp_path))
     assert content["experiments"][0]["error"]

@@ -33,13 +33,7 @@ checks:
   - {converges: theta, order: 2}
 """
 # this cluster keeps no accounts, and its jobs take seconds
-OPTIONS = """
---executor slurm --
---group-components simulate=1
---slurm-status-command squeue
---slurm-init-seconds-before-status-checks 2
---seconds-between-status-checks 2
-"""
+OPTIONS = "-- --group-components simulate=1 --slurm-status-command squeue"
 KINDS = (".nc", ".json", ".html", ".csv", ".tex", ".svg")
 PATIENCE = 300.0
 """Seconds for anything that is waited for; a busy machine takes its time."""
@@ -61,6 +55,18 @@ def file(tmp_path: Path) -> Path:
     path = tmp_path / "pendulums.yaml"
     path.write_text(SWEEP)
     return path
+
+
+@pytest.fixture
+def options(tmp_path: Path) -> str:
+    """Return the options of a run all of whose jobs go to SLURM, also those that take little."""
+    shipped = Path(__file__).parents[2] / "workflow/profiles/slurm/config.yaml"
+    profile = tmp_path / "profile"
+    profile.mkdir()
+    text = shipped.read_text()
+    assert "here: 20" in text
+    (profile / "config.yaml").write_text(text.replace("here: 20", "here: 0"))
+    return f"--profile {profile} {OPTIONS}"
 
 
 def content(results: Path) -> dict[str, bytes]:
@@ -107,13 +113,13 @@ def all_told(driver: subprocess.Popen[str]) -> str:
 
 
 def test_a_killed_driver_job_and_node_lose_nothing(
-    nodes: Cluster, file: Path, tmp_path: Path
+    nodes: Cluster, file: Path, tmp_path: Path, options: str
 ) -> None:
     with run(nodes, file, tmp_path / "here") as driver:
         text = all_told(driver)
         assert driver.returncode == 0, text
     results = tmp_path / "shared results"
-    with run(nodes, file, results, OPTIONS) as driver:
+    with run(nodes, file, results, options) as driver:
         wait(lambda: nodes.jobs("RUNNING"), driver)
 
     known = set(nodes.jobs("all"))
@@ -121,7 +127,7 @@ def test_a_killed_driver_job_and_node_lose_nothing(
     def new() -> list[str]:
         return [job for job in nodes.jobs("RUNNING") if job not in known]
 
-    with run(nodes, file, results, OPTIONS) as driver:
+    with run(nodes, file, results, options) as driver:
         cancelled, *_ = wait(new, driver)
         nodes.ask("scancel", cancelled)
         known.add(cancelled)
@@ -140,11 +146,11 @@ def test_a_killed_driver_job_and_node_lose_nothing(
 
 
 def test_an_interrupt_cancels_what_runs_and_what_waits(
-    nodes: Cluster, file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    nodes: Cluster, file: Path, tmp_path: Path, options: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     nodes.ask("scontrol", "update", "nodename=ALL", "state=drain", "reason=test")
     monkeypatch.setenv("SLURM_CONF", nodes.environment["SLURM_CONF"])
-    with run(nodes, file, tmp_path, OPTIONS) as driver:
+    with run(nodes, file, tmp_path, options) as driver:
         wait(lambda: nodes.jobs("PENDING")[1:], driver)
         # which of its sentences about drained nodes SLURM gives, and to which job, depends on the moment
         wait(lambda: [reason for reason in pending.reasons(tmp_path) if "Node" in reason], driver)

@@ -15,11 +15,13 @@ from made_once import change
 from torture.laboratory import processes, words
 
 from vibsim.cli.arguments import parsed
+from vibsim.cli.chosen_plans import plans_of
 from vibsim.cli.run import executor, pending
 from vibsim.cli.workflow import names_of
 from vibsim.core.errors import InputError
+from vibsim.plan.workflow_names import together
 
-from .conftest import Place, here
+from .conftest import ROOT, Place, here
 
 SCRIPTS = {
     "submit": """\
@@ -47,10 +49,14 @@ def scheduler(folder: Path, *, loses: bool = False) -> list[str]:
     return [*options, "--seconds-between-status-checks", "1"]
 
 
-def test_jobs_of_a_scheduler_give_the_same_bytes(place: Place, tmp_path: Path) -> None:
+@pytest.mark.parametrize("here", [20, 0])
+def test_jobs_of_a_scheduler_give_the_same_bytes(place: Place, tmp_path: Path, here: int) -> None:
     wanted = place.content()
     other = Place(place.folder, elsewhere=tmp_path / "shared results")
-    ended = other.run(*scheduler(tmp_path / "scheduler", loses=True))
+    text = (ROOT / "workflow/profiles/generic/config.yaml").read_text()
+    (tmp_path / "config.yaml").write_text(text.replace("here: 20", f"here: {here}"))
+    profile = ["--profile", str(tmp_path)]
+    ended = other.run(*profile, *scheduler(tmp_path / "scheduler", loses=True))
     assert ended.returncode == 0, ended.stdout + ended.stderr
     found = other.content()
     assert found.keys() == wanted.keys()
@@ -58,9 +64,9 @@ def test_jobs_of_a_scheduler_give_the_same_bytes(place: Place, tmp_path: Path) -
     assert other.jobs() == []
     rows = (tmp_path / "scheduler/properties").read_text().splitlines()
     jobs = [json.loads(row.removeprefix("# properties = ")) for row in rows]
-    # simulations, analysis and report; the index is made here
+    # simulations, and analysis with page if they are not made here; the index is
     names = [job.get("groupid") or job["rule"] for job in jobs]
-    assert names == ["simulate", "simulate", "analyse", "report"]
+    assert names == ["simulate", "simulate", *["analyse"] * (not here)]
     needs = [[job["resources"][key] for key in ("mem_mb", "runtime", "disk_mb")] for job in jobs]
     assert all(memory > 500 and minutes > 2 and disk > 0 for memory, minutes, disk in needs)
     # what was lost may have needed more
@@ -118,6 +124,49 @@ def test_jobs_are_grouped_to_minutes_and_long_ones_are_not(place: Place) -> None
     assert made("[6, 32]") == [("simulate", 3), (None, 6)]
 
 
+def test_what_takes_seconds_is_finished_here(place: Place) -> None:
+    def groups(here: int, *names: str) -> tuple[bool, str | None]:
+        config = {"experiments": [str(place.file), *names], "here": here}
+        found = names_of(config | {"results": str(place.results)}, {})
+        return found.finishes_here, found.analysis_group
+
+    assert groups(20) == (True, None)
+    # each has a page, and Python starts for it
+    assert groups(20, "vibration_text") == (False, "analyse")
+    assert groups(0) == (False, "analyse")
+
+
+def test_short_simulations_are_divided_among_jobs_as_long_as_that_saves_time() -> None:
+    # two starts would take longer than the work
+    assert together([1.0, 1.0], 16) == 2
+    # two jobs that start in 4 s each and work for 6 s are done sooner than one, and than three
+    assert together([2.5] * 5, 16) == 3
+    # jobs of a minute each, and no more in one than a profile allows
+    assert together([4.0] * 225, 16) == 15
+    assert together([4.0] * 734, 16) == 16
+    assert together([4.0] * 734, 1) == 1
+    assert together([], 16) == 16
+
+
+def test_a_profile_says_how_many_share_a_job_at_most(place: Place, tmp_path: Path) -> None:
+    def grouped(profile: str, levels: str) -> list[str]:
+        (tmp_path / "config.yaml").write_text(f"executor: cluster-generic\n{profile}")
+        change(place.file, "levels: [6, 7, 8, 9]", f"levels: {levels}")
+        plans = plans_of([str(place.file)])
+        change(place.file, f"levels: {levels}", "levels: [6, 7, 8, 9]")
+        options = parsed(["run", str(place.file), "--profile", str(tmp_path)])
+        words = [*executor.chosen(options, plans, place.results).arguments]
+        return words[words.index("--group-components") + 1 :] if "group" in " ".join(words) else []
+
+    ours = "group-components: {simulate: 16, analyse: 4}"
+    # levels 6 to 27 in one job, then 28, 29 and 30, of 3 to 13 s
+    assert grouped(ours, "{from: 6, to: 30}") == ["simulate=2", "analyse=4"]
+    assert grouped("group-components: [simulate=1]", "{from: 6, to: 30}") == ["simulate=1"]
+    assert grouped("", "{from: 6, to: 30}") == []
+    with pytest.raises(InputError, match="`group-components` must be whole numbers"):
+        grouped("group-components: {simulate: many}", "[6, 7]")
+
+
 def test_a_profile_configures_cores_and_memory_of_the_executor(
     place: Place, tmp_path: Path
 ) -> None:
@@ -128,9 +177,9 @@ def test_a_profile_configures_cores_and_memory_of_the_executor(
         chosen = executor.chosen(parsed([*options]), [], place.results)
         return [f"{key}={value}" for key, value in chosen.config.items()]
 
-    assert words("") == ["cores=1", "overhead=500"]
-    assert words("config: {overhead: 700}") == ["cores=1", "overhead=700"]
-    assert words("config: [cores=3]", "--cores", "2") == ["cores=2", "overhead=500"]
+    assert words("") == ["cores=1", "overhead=500", "here=20"]
+    assert words("config: {overhead: 700, here: 0}") == ["cores=1", "overhead=700", "here=0"]
+    assert words("config: [cores=3]", "--cores", "2") == ["cores=2", "overhead=500", "here=20"]
     with pytest.raises(InputError, match="must be whole numbers"):
         words("config: {overhead: much}")
 

@@ -52,7 +52,7 @@ def named(place: Place, tmp_path: Path) -> tuple[object, ...]:
 def test_one_experiment_is_named_as_text(named: tuple[object, ...], tmp_path: Path) -> None:
     text = snakemake(tmp_path, "--dry-run", *named, "--forcerun", "report")
     # everything else is up to date
-    found = set(re.findall(r"^(?:local)?rule (\w+):", text, re.MULTILINE))
+    found = set(re.findall(r"^ *(?:local)?rule (\w+):", text, re.MULTILINE))
     assert found == {"report", "index", "default"}
 
 

@@ -21,7 +21,8 @@ def names_of(config: Mapping[str, Any], command_line: Mapping[str, Any]) -> Name
     config
         The ``experiments`` (files, names, collections) with the ``settings`` of all of them, one as text or several in
         a list, and the ``results`` folder; without any the default experiments as they are, and
-        `vibsim.core.home.default_results`. ``cores`` and ``overhead`` (megabytes) of a job, where it runs elsewhere.
+        `vibsim.core.home.default_results`. ``cores`` and ``overhead`` (megabytes) of a job that runs elsewhere, and the
+        seconds of work that is done ``here``.
     command_line
         What ``--config`` says on the command line: ``allow_commands=true`` lets programs of users run.
 
@@ -37,7 +38,7 @@ def names_of(config: Mapping[str, Any], command_line: Mapping[str, Any]) -> Name
     )
     plans = {plan.key: plan for plan in plans_of(experiments, settings, cached=True)}
     results = Path(config.get("results", default_results())).absolute()
-    more = {key: int(config[key]) for key in ("cores", "overhead") if key in config}
+    more = {key: int(config[key]) for key in ("cores", "overhead", "here") if key in config}
     names = Names(plans, results, is_allowed, tuple(settings), **more)
     results_folder.check(names.results, names.plans)
     check_allowed(names.plans.values(), is_allowed)

@@ -26,6 +26,8 @@ PAGE_SECONDS = 30.0
 """Seconds of such a job: several times of what those of the default run take."""
 ANALYSED_SECONDS = 20e-9
 """Seconds of one core that an analysis takes for each byte of level files."""
+FINISHED_SECONDS = 4.0
+"""Seconds of one core that the start of an analysis and a page take, as in the default run."""
 START_MINUTES = 2
 """Minutes that a job of an executor may take to start and to end."""
 SLOWNESS = 4.0
@@ -34,6 +36,19 @@ GROUP = "simulate"
 """The group of short jobs, several of which an executor may be given as one (``--group-components``)."""
 GROUPED_SECONDS = 10.0
 """Seconds of one core that such a job takes at most: more than a shard holds."""
+START_SECONDS = 4.0
+"""Seconds that each job of an executor takes to start and to end."""
+
+
+def together(seconds: Sequence[float], most: int) -> int:
+    """Return how many simulations that take so many seconds share a job of an executor, `most` at most.
+
+    So many jobs are made that their starts, one after the other, and the work of one, all at the same time, take the
+    least time together. Long ones, which have a job of their own, do not count.
+    """
+    short = [one for one in seconds if 0.0 < one <= GROUPED_SECONDS]
+    jobs = math.ceil(math.sqrt(sum(short) / START_SECONDS))
+    return min(most, math.ceil(len(short) / jobs)) if jobs else most
 
 
 @dataclass(frozen=True)
@@ -133,6 +148,8 @@ class Names:
     """Cores that a job may use at most."""
     overhead: int = 0
     """Megabytes that a job needs for the processes of its executor, beside its own."""
+    here: float = 0.0
+    """Seconds of analyses and pages that are no jobs of an executor, but made where the workflow runs."""
 
     def level_flags(self, wildcards: Any, input: Any) -> str:  # noqa: A002
         """Return further options of jobs that make levels, which Snakemake does not compare; see `file`."""
@@ -176,6 +193,17 @@ class Names:
     def best_pattern(self) -> str:
         """Regular expression for the experiments with an extrapolated solution; it may match nothing."""
         return "|".join(re.escape(key) for key, plan in self.plans.items() if plan.best) or "(?!)"
+
+    @property
+    def finishes_here(self) -> bool:
+        """Whether analyses, extrapolations and pages are made where the workflow runs: together they take little."""
+        readings = sum(plan.bytes * (1 if plan.best is None else 2) for plan in self.plans.values())
+        return ANALYSED_SECONDS * readings + FINISHED_SECONDS * len(self.plans) <= self.here
+
+    @property
+    def analysis_group(self) -> str | None:
+        """The group of Snakemake of an analysis and its page, which share a job of an executor; None for jobs here."""
+        return None if self.finishes_here else "analyse"
 
     analysis_digest = _of_plan("analysis")
     extrapolation_digest = _of_plan("extrapolation")

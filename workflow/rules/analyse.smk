@@ -9,6 +9,9 @@ rule analyse:
         "{experiment}/logs/analyse.log",
     benchmark:
         "{experiment}/benchmarks/analyse.tsv"
+    group:
+        names.analysis_group
+    localrule: names.finishes_here
     threads: names.analysis_threads
     resources:
         mem_mb=names.analysis_memory,

@@ -10,6 +10,7 @@ rule extrapolate:
         "{experiment}/benchmarks/extrapolate.tsv"
     wildcard_constraints:
         experiment=names.best_pattern,
+    localrule: names.finishes_here
     resources:
         mem_mb=names.analysis_memory,
         runtime=names.analysis_minutes,

@@ -55,6 +55,9 @@ rule report:
         "{experiment}/logs/report.log",
     benchmark:
         "{experiment}/benchmarks/report.tsv"
+    group:
+        names.analysis_group
+    localrule: names.finishes_here
     resources:
         mem_mb=names.memory(names.page_memory),
         runtime=names.runtime(names.page_minutes),

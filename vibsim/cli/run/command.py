@@ -207,7 +207,7 @@ def _show(
     worked: bool,
 ) -> int:
     _check(ended)
-    failures = [outcome.failed_job(job, results) for job in ended.failed]
+    failures = outcome.failed_jobs(ended.failed, plans, results)
     # the index waits for every report: after a failure it is written from what there is
     index = ["report", "--results", str(results)]
     has_index = not failures or supervise.child(index) == 0

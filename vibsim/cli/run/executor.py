@@ -15,14 +15,16 @@ from vibsim.core.errors import nearest
 from vibsim.core.home import home
 from vibsim.core.processes import usable_cores
 from vibsim.plan import Plan
+from vibsim.plan.workflow_names import GROUP, together
 
 PLUG_IN = "snakemake_executor_plugin_"
 PROFILES = ("config.yaml", "config.v8+.yaml", "config.v9+.yaml")
 """Names that the file of a profile may have."""
 SHIPPED = ("slurm", "generic")
 """The profiles in ``workflow/profiles``: one for the executor of its name, and one for any other."""
-CONFIGURED = ("cores", "overhead")
-"""What a profile configures of vibsim: the cores of a job, and the megabytes of the executor's processes beside it."""
+CONFIGURED = ("cores", "overhead", "here")
+"""What a profile configures of vibsim: the cores of a job, the megabytes of the executor's processes beside it, and the
+seconds of work that are no jobs but done here."""
 
 
 @dataclass(frozen=True)
@@ -63,7 +65,11 @@ def chosen(options: Namespace, plans: Sequence[Plan], results: Path) -> Executor
     arguments += ["--profile", str(folder)]
     if options.jobs:
         arguments += ["--jobs", str(options.jobs)]
-    config = _configured(shipped / "generic") | _configured(folder)
+    config = _numbers(shipped / "generic", "config") | _numbers(folder, "config")
+    if GROUP in (groups := _numbers(folder, "group-components")):
+        seconds = [batch.seconds for plan in plans for batch in plan.batches]
+        groups[GROUP] = together(seconds, groups[GROUP])
+        arguments += ["--group-components", *(f"{name}={many}" for name, many in groups.items())]
     if options.cores:
         arguments += ["--cores", str(options.cores)]
         config["cores"] = options.cores
@@ -80,17 +86,19 @@ def _folder(profile: Path, shipped: Path) -> Path:
     raise refusal("--profile", profile, rule)
 
 
-def _configured(folder: Path) -> dict[str, int]:
-    """Return what the profile in a folder configures of vibsim, as a mapping or as ``KEY=VALUE``."""
+def _numbers(folder: Path, option: str) -> dict[str, int]:
+    """Return what the profile in a folder says of an option of Snakemake, as a mapping or as ``KEY=VALUE``."""
     import yaml
 
     file = next(folder / name for name in PROFILES if (folder / name).is_file())
     try:
-        found = (yaml.safe_load(file.read_text()) or {}).get("config") or {}
+        found = (yaml.safe_load(file.read_text()) or {}).get(option) or {}
         pairs = found.items() if isinstance(found, dict) else (row.split("=", 1) for row in found)
-        return {key: int(value) for key, value in pairs if key in CONFIGURED}
+        # others of `config` are no concern of vibsim, and may be of any type
+        return {key: int(value) for key, value in pairs if option != "config" or key in CONFIGURED}
     except (OSError, ValueError, AttributeError, TypeError, yaml.YAMLError) as error:
-        rule = f"cannot be read: {' and '.join(CONFIGURED)} in `config` must be whole numbers"
+        keys = f"{' and '.join(CONFIGURED)} in `config`" if option == "config" else f"`{option}`"
+        rule = f"cannot be read: {keys} must be whole numbers"
         raise refusal("--profile", file, rule, str(error).splitlines()[0]) from None
 
 

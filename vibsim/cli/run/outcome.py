@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from vibsim.cli import resources, results_folder
+from vibsim.cli import made_files, resources, results_folder
 from vibsim.cli.run.snakemake import Job
 from vibsim.core.errors import FileError
 from vibsim.core.vocabulary import FORMAT, worst
@@ -40,8 +40,27 @@ def collect(plan: Plan, results: Path) -> Entry:
     }
 
 
-def failed_job(job: Job, results: Path) -> Entry:
-    """Return a job that failed, with the end of its log and the reason of its executor."""
+def failed_jobs(jobs: Sequence[Job], plans: Sequence[Plan], results: Path) -> list[Entry]:
+    """Return the jobs that failed; of a group of jobs, which fails as a whole, those that did not make their files."""
+    wanted = {path: digest for plan in plans for path, digest in plan.files.items()}
+    made = {
+        f"{plan.key}/{name}": entry.job
+        for plan in plans
+        for name, entry in made_files.load(results, plan.key).items()
+    }
+    bad = [
+        job
+        for job in jobs
+        if any(
+            not (results / path).exists() or made.get(path) != wanted.get(path)
+            for path in job.outputs
+        )
+    ]
+    return [_failed_job(job, results) for job in bad or jobs]
+
+
+def _failed_job(job: Job, results: Path) -> Entry:
+    """Return a job that failed, with the end of its log, the reason of its executor and where that has its own log."""
     log = results / job.log
     try:
         lines = log.read_text(errors="replace").splitlines()
@@ -49,8 +68,11 @@ def failed_job(job: Job, results: Path) -> Entry:
         lines = []
     tail = [line for line in lines if line.strip()][-_LOG_LINES:]
     tail += [job.reason] * bool(job.reason)
+    tail += [f"log of the executor: {job.executor_log}"] * (results / job.executor_log).is_file()
     # a job on a full disk cannot say so in its log
-    return {"job": str(job), "log": str(log), "tail": tail or resources.obstacle(results)}
+    tail = tail or [*resources.obstacle(results)]
+    tail = tail or ["it left no message: it did not start, or was killed"]
+    return {"job": str(job), "log": str(log), "tail": tail}
 
 
 def status(summaries: Sequence[Entry], failures: Sequence[Entry]) -> str:

@@ -47,6 +47,8 @@ class Job:
     log: str
     reason: str
     """Why it is to run; of one that failed, what its executor says of that, if anything."""
+    executor_log: str = ""
+    """Path of what its executor wrote, of one that failed; empty where there is none."""
 
     @property
     def simulates(self) -> bool:
@@ -271,8 +273,9 @@ def _take(event: dict[str, Any], found: Outcome, progress: Progress | None) -> N
         case {"rule_name": rule} if rule != "all":
             outputs = tuple(path.removesuffix(" (update)") for path in event["output"])
             # behind its own log stands that of its executor
-            log = "".join(event["log"][:1])
-            job = Job(rule, outputs, log, event.get("reason") or event.get("rule_msg") or "")
+            log, executor_log = (*event["log"], "", "")[:2]
+            reason = event.get("reason") or event.get("rule_msg") or ""
+            job = Job(rule, outputs, log, reason, executor_log)
             failed = [one for one in found.failed if one.outputs == job.outputs]
             if event["event"] == "job_error":
                 found.failed.append(job)

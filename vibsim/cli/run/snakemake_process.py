@@ -23,6 +23,7 @@ from snakemake_interface_logger_plugins.settings import LogHandlerSettingsBase
 from snakemake_interface_report_plugins.registry import ReportPluginRegistry
 
 from vibsim.cli import YOUNG_OBJECTS, supervise
+from vibsim.cli.run import remote
 from vibsim.core.processes import end_with
 
 FIELDS = {
@@ -72,6 +73,8 @@ def main() -> None:
     # Snakemake imports every executor that is installed. That for SLURM takes half a second and needs pandas.
     if where == "remote":
         ExecutorPluginRegistry()
+        remote.ask_by_age()
+        remote.tell_reasons()
     else:
         ExecutorPluginRegistry.module_prefix = "none of them"
     # It starts in half the time without what no run of vibsim uses: numbers of NumPy in a profile, addresses in the
