@@ -227,8 +227,12 @@ def _range(deviation: Floats) -> Floats:
 
 def _last_rise(values: Floats) -> Floats:
     """Return m1 - m2 as the mean over the last eighth and that over the eighth before give it where k is 1."""
-    n = values.shape[-1] - 1
-    before, last = (values[..., a * n // 8 : (a + 1) * n // 8] for a in (6, 7))
+    n = max(values.shape[-1] - 1, 1)
+    width = max(n // 8, 1)
+    last, before = (
+        values[..., n - width : n],
+        values[..., max(n - 2 * width, 0) : max(n - width, 1)],
+    )
     return np.asarray(3.0 * (np.mean(last, axis=-1) - np.mean(before, axis=-1)))
 
 
