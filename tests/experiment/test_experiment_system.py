@@ -1,6 +1,8 @@
 """Experiments with equations of a user: what they take, what they refuse, and all faults at once."""
 
+import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 
 from vibsim import Experiment, InputError, analyse, simulate, verdicts
 from vibsim.experiment.experiment import canonical
@@ -39,6 +41,42 @@ def refused(model, **changes):
 def judged(experiment):
     levels = [simulate(experiment, level) for level in experiment.levels]
     return [(v.status, v.reason) for v in verdicts(experiment, analyse(experiment, levels))]
+
+
+TRIPLE = {
+    "coordinates": ["a", "b", "c"],
+    "mass": {
+        "a": {"a": "(m + 2)*l**2", "b": "(m + 1)*l*cos(a - b)", "c": "l*cos(a - c)"},
+        "b": {"b": "m + 1", "c": "cos(b - c)"},
+        "c": 1,
+    },
+    "force": {"a": "-(m + 2)*l*sin(a)", "b": "-(m + 1)*sin(b)", "c": "-sin(c)"},
+    "parameters": {"m": 1.5, "l": 1.2},
+}
+"""A triple pendulum: written out, its equation with its slopes has more than 10 000 operations."""
+
+
+def triple(_, state):
+    """Lagrange's equations of `TRIPLE`, solved at every place."""
+    q, v = state[:3], state[3:]
+    rod, body = np.array([1.2, 1.0, 1.0]), np.array([3.5, 2.5, 1.0])
+    below = np.minimum.outer(body, body)
+    apart = np.subtract.outer(q, q)
+    lengths = below * np.outer(rod, rod)
+    right = -lengths * np.sin(apart) @ v**2 - body * rod * np.sin(q)
+    return *v, *np.linalg.solve(lengths * np.cos(apart), right)
+
+
+@pytest.mark.parametrize("scheme", ["rk4", "crank_nicolson"])
+def test_masses_of_three_coordinates_make_a_triple_pendulum(scheme):
+    start = [0.5, -0.3, 0.8]
+    experiment = read(
+        TRIPLE, initial=dict(zip("abc", start, strict=True)), schemes=[scheme], levels=[9, 10, 11]
+    )
+    known = solve_ivp(triple, (0, 2), [*start, 0, 0, 0], method="DOP853", rtol=1e-12, atol=1e-12)
+    level = simulate(experiment, 11)
+    ends = [float(level[name][0, 0, -1]) for name in "abc"]
+    assert ends == pytest.approx(known.y[:3, -1], abs=1e-9 if scheme == "rk4" else 1e-5)
 
 
 def test_one_equation_needs_no_names():

@@ -161,6 +161,18 @@ REFUSED = {
         {"checks": [{"value": "steady_change", "quantity": "theta", "below": 1}]},
         "checks[0].value: steady_change: is of the last period of a force",
     ),
+    "schemes of a number": (
+        {"checks": [{"value": "period", "schemes": ["central"], "below": 7}]},
+        "checks[0].schemes: ['central']: unknown key: write at: {scheme: ...}",
+    ),
+    "level of a number": (
+        {"checks": [{"value": "period", "level": 6, "below": 7}]},
+        "checks[0].level: 6: unknown key: write at: {level: ...}",
+    ),
+    "limit of a number": (
+        {"checks": [{"value": "period", "at_least": 7}]},
+        "checks[0].at_least: 7: unknown key: did you mean 'above'?",
+    ),
     "one scheme": ({"schemes": "rk4"}, "must be a list: write [rk4]"),
     "comma": ({"initial": {"theta": "1,5"}}, "must have a decimal point: write 1.5"),
 }

@@ -87,6 +87,14 @@ def test_what_cannot_be_repeated_is_refused(changes, told):
         assert words in str(caught.value)
 
 
+def test_of_a_faulty_index_nothing_else_is_told():
+    chain = content({**CHAIN, "repeat": {"i": 8}}, initial={"q{i}": "sin({i})"})
+    with pytest.raises(InputError) as caught:
+        Experiment.from_dict(chain)
+    (fault,) = caught.value.faults
+    assert (fault.key, fault.hint) == ("model.repeat.i", "e.g. [1, 64]")
+
+
 def test_braces_without_repeat_are_no_formula():
     with pytest.raises(InputError, match="is not allowed in a formula"):
         Experiment.from_dict(content({"acceleration": "-u{i}"}))

@@ -19,6 +19,7 @@ from vibsim.formula import (
     Name,
     Negate,
     Number,
+    Parts,
     constant,
     derivative,
     evaluate,
@@ -329,6 +330,26 @@ def test_source_for_the_engine(text: str, source: str) -> None:
 def test_statements_work_out_a_factor_once() -> None:
     lines = to_statements(parse("2*m*sin(x)**2", ["m", "x"]), "energy")
     assert lines == ["_1 = sin(x)", "energy = ((2.0 * m) * (_1 * _1))"]
+
+
+def test_what_formulas_have_in_common_is_worked_out_once_and_has_the_same_bits() -> None:
+    names = ("x", "y")
+    quotient = parse("(sin(x - y)*y + x**3)/(2 - cos(x - y)**2)", names)
+    formulas = {f"_slope_{name}": derivative(quotient, name) for name in names}
+    parts = Parts(formulas.values())
+    alone = [line for result, tree in formulas.items() for line in to_statements(tree, result)]
+    together = [
+        line for result, tree in formulas.items() for line in to_statements(tree, result, parts)
+    ]
+    assert "\n".join(alone).count("(x - y)") > 5
+    assert "\n".join(together).count("(x - y)") == 1
+    assert "\n".join(together).count("sin(") == 1
+    found = []
+    for lines in (alone, together):
+        scope = {**FUNCTIONS, "x": 0.7, "y": -0.3}
+        exec("\n".join(lines), scope)
+        found.append([scope[result] for result in formulas])
+    assert found[0] == found[1]
 
 
 def test_powers_of_powers_do_not_explode() -> None:

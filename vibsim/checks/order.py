@@ -30,6 +30,7 @@ from vibsim.comparison.order_evidence import (
     judgement,
     order_of,
 )
+from vibsim.comparison.parting import parting
 from vibsim.comparison.quantity_comparison import Compared, Comparison
 from vibsim.convergence.circumstances import pick
 from vibsim.convergence.differences import largest, safe_ratio
@@ -72,6 +73,8 @@ FIELDS = {
         none=-1,
     ),
     "cause": Field("why the order is another one, as far as it is known", np.int8, CAUSES),
+    "parting_time": Field("up to when the finest two levels of a chaotic motion agree"),
+    "parting_rate": Field("rate at which they part"),
     **ERROR,
 }
 BESIDE = {
@@ -92,6 +95,8 @@ def measure(block: MemberBlock, compared: Compared, check: ConvergesCheck) -> Me
     """Return what a check measures, with what would settle a verdict that is open, or explain it."""
     quantity, norm = compared[check.converges], check.norm
     judged, order = judge_check(quantity, check), order_of(quantity, check.order)
+    is_state = check.converges in (state.name for state in block.model.states)
+    parts = parting(quantity, is_state & (judged.reason == code("pre_asymptotic")))
     return {
         "status": judged.status,
         "reason": judged.reason,
@@ -106,6 +111,8 @@ def measure(block: MemberBlock, compared: Compared, check: ConvergesCheck) -> Me
             quantity, judged, norm, order, "compensated"
         ),
         "cause": causes(quantity, compared, judged, norm, order, check.tolerance),
+        "parting_time": parts[..., 0],
+        "parting_rate": parts[..., 1],
         **known_error(quantity),
     }
 

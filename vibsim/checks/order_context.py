@@ -49,6 +49,9 @@ class Corner(NamedTuple):
 class OrderContext:
     """What a sentence on a convergence verdict needs to know; numbers are NaN, levels -1 where they are not known."""
 
+    parts_at = parting_rate = math.nan
+    """When the finest levels of a chaotic motion part, and how fast."""
+
     def __init__(self, f: Found, check: ConvergesCheck) -> None:
         experiment, record, scheme, case = f.experiment, f.record, f.scheme, f.case
         model, quantity, columns = f.model, check.converges, columns_of(record)
@@ -126,6 +129,9 @@ class OrderContext:
         self.decay = stored("decay_rate", scheme, case)
         """The largest rate at which damping takes a velocity away."""
         self.shortest = record.step(-1, case)
+        self.parts_at = float(f.fact("parting_time"))
+        self.parting_rate = float(f.fact("parting_rate"))
+        self.end = self.shortest * experiment.steps(self.levels[-1])
 
     @property
     def what(self) -> str:

@@ -18,10 +18,12 @@ from vibsim.checks.sentences import (
     Template,
     add_levels,
 )
+from vibsim.comparison.parting import levels_to_the_end
 from vibsim.convergence.study.sentences import higher_part, opposite_part
 from vibsim.convergence.thresholds import HALF_SPACING
 from vibsim.core.vocabulary import order_interval
 from vibsim.experiment.schema.checks import ConvergesCheck
+from vibsim.experiment.schema.fields import MAX_LEVEL
 from vibsim.schemes.base import is_on_the_mesh
 
 HIGHEST = 12.0
@@ -170,6 +172,11 @@ DIAGNOSES: Words = {
         "{subject} is at rest at every common time, while the exact solution moves. The step is still too coarse.",
         "{more_levels}",
     ),
+    "pre_asymptotic, parting": (
+        "The finest two levels of {what} agree to 1 % of its size up to t = {parts_at:3} only, of {end:4}. "
+        "This motion makes every error ten times larger in a time of about {tenfold:2}, so the levels part.",
+        "End the time interval (`time: end`) before t = {parts_at:3}{or_finer}.",
+    ),
     "pre_asymptotic, growing": (
         "The differences of {what} grow from level to level ({measured}). The step is still too coarse to show an "
         "order, or level {last} differs in kind from those before it.{parts}",
@@ -287,6 +294,7 @@ def _diagnosis(s: OrderContext) -> str:
         },
         "pre_asymptotic": {
             s.cause: by_cause in DIAGNOSES,
+            "parting": not math.isnan(s.parts_at),
             "growing": s.order <= 0.0,
             "steep": s.order > HIGHEST,
         },
@@ -438,6 +446,17 @@ class _Phrases(OrderContext):
             return f"{self.add()}{kick}; the number needed is not known yet."
         verb = "is" if self.more == 1 else "are"
         return f"{self.add(self.more)}{kick}; {self.more} more {verb} probably needed."
+
+    def tenfold(self) -> float:
+        return math.log(10.0) / self.parting_rate
+
+    def or_finer(self) -> str:
+        """Say what finer levels do for a motion that magnifies errors."""
+        order = self.expected if math.isfinite(self.expected) else self.promised
+        count = levels_to_the_end(self.parts_at, self.parting_rate, self.end, order) + 1
+        if self.levels[-1] + count > MAX_LEVEL:
+            return ". Finer levels part later, but none reaches the end, because rounding errors grow alike"
+        return f", or a{add_levels(self.levels[-1], int(count), self.cost)}"
 
     def level_of_pulse(self) -> int:
         steps = math.ceil(math.log2(self.shortest / self.pulse[1]))

@@ -17,6 +17,7 @@ from functools import partial
 import numpy as np
 
 from vibsim.apriori.roundoff_floor import SPACING_AT_ONE, norm_of_floor
+from vibsim.comparison.parting import FAR_APART
 from vibsim.comparison.quantity_comparison import Compared, Comparison
 from vibsim.comparison.thresholds import STRAIGHT, THEORY_ROUNDING, VANISHING_RATE
 from vibsim.convergence.circumstances import Evidence, at_rest, floor_of_pairs, pick, unresolved
@@ -39,8 +40,6 @@ CAUSES = (
 """What was found; files hold a position here."""
 NONE, LAST_POINT, ONE_QUANTITY, EVERYTHING, SPECIAL_TIMES, ONE_NORM, THEORY = range(7)
 STORED, STILL, PULSE, NOISE, DECAY, PARTED, ZERO = range(7, len(CAUSES))
-FAR_APART = 0.01
-"""Levels that do not come closer have parted where they differ by this part of the quantity. [convention]"""
 
 UNSEEN = ("pre_asymptotic", "not_applicable")
 """What is said of a motion that lies still wherever levels are compared."""

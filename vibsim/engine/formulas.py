@@ -21,6 +21,8 @@ from vibsim.schemes.base import Stepper
 
 MOST_INLINE = 64
 """Calls of functions up to which each becomes part of the formula: each then takes 0.1 s to compile, and 3 MB."""
+LONG = 2000
+"""Operations and names of a function above which parts of it that are alike are worked out once."""
 _MODE = "mode"
 _TUPLES = ("guards", "guard_rates")
 """Functions that return a tuple, however many results they have."""
@@ -98,8 +100,12 @@ def put_formulas(
             "_driving": put(model.driving or "0.0"),
         }
     trees = (formula for results in formulas.values() for formula in results.values())
-    nodes = (node for formula in trees for node in expression.walk(formula))
-    is_rare = is_rare or sum(isinstance(node, Call) for node in nodes) > MOST_INLINE
+    nodes = [node for formula in trees for node in expression.walk(formula)]
+    calls = [node for node in nodes if isinstance(node, Call)]
+    if len(calls) > MOST_INLINE and len(nodes) > LONG:
+        # what is worked out once is compiled once
+        calls = list(set(calls))
+    is_rare = is_rare or len(calls) > MOST_INLINE
     is_scaled = stepper.scaling is not None
     scaled = ("acceleration", "slopes") if is_scaled else ()
     put_functions(module, model, suffix, formulas, is_rare=is_rare, scaled=scaled)
@@ -163,9 +169,13 @@ def put_functions(
         if model.events is not None and function in ("acceleration", "slopes"):
             lines += [f"{_MODE} = p[{len(names)}]", f"t = t + p[{len(names) + 1}]"]
         lines += _looking_up(module, model, results.values())
-        for result, formula in results.items():
-            ready = _with_functions(module, formula, suffix, is_rare)
-            lines += expression.to_statements(ready, result)
+        ready = {
+            result: _with_functions(module, formula, suffix, is_rare)
+            for result, formula in results.items()
+        }
+        parts = expression.Parts(ready.values()) if _is_long(ready.values()) else None
+        for result, formula in ready.items():
+            lines += expression.to_statements(formula, result, parts)
             if function in scaled:
                 lines.append(f"{result} = {result} * p[{len(names) + n_between(model)}]")
         returned = ", ".join(results)
@@ -181,6 +191,10 @@ def put_functions(
             )
         lines.append(f"return {returned}")
         module.define(f"{function}{suffix}({arguments})", *lines)
+
+
+def _is_long(formulas: Iterable[Expression]) -> bool:
+    return sum(expression.size(formula, LONG) for formula in formulas) > LONG
 
 
 def _looking_up(module: Module, model: Model, formulas: Iterable[Expression]) -> list[str]:

@@ -53,8 +53,12 @@ _EXAMPLES: Mapping[Path_, str] = {
 }
 """How a list or a mapping is written, where the rule alone would help nobody."""
 
-_MEANT = {"tolerance": "atol", "tol": "atol"}
-"""A key that other programs have, and the one that has its meaning here."""
+_MEANT = {"tolerance": "atol", "tol": "atol", "at_least": "above", "at_most": "below"}
+"""A key that other programs or other checks have, and the one that has its meaning here."""
+_PLACES = {"schemes": "scheme", "levels": "level", "cases": "case"} | {
+    name: name for name in ("t", "step", "event", "case", "level", "best", "scheme")
+}
+"""Keys that stand in the section `at` of a check of a number."""
 
 
 class Report:
@@ -125,6 +129,8 @@ class Report:
             meant = _MEANT.get(str(path[-1]), "")
             written = meant if meant in known else path[-1]
             rule, hint = "unknown key", nearest(written, list(_FORMS) if is_rule else known)
+            if "take" in known and path[-1] in _PLACES:
+                hint = f"write at: {{{_PLACES[str(path[-1])]}: ...}}"
         self.add_malformed(path, rule, hint, value, at_key=True)
 
     def add_invalid(self, error: ValidationError, path: Path_) -> list[Path_]:

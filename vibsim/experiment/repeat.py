@@ -33,6 +33,14 @@ def with_repeats(source: Source, report: Report) -> Source:
         return source
     indices = _indices(section[REPEAT], report)
     if not indices:
+        # what holds an index is no formula then
+        starts = data.get("initial")
+        held = (
+            [key for key in starts if _BRACE.search(str(key))]
+            if isinstance(starts, Mapping)
+            else []
+        )
+        report.faulty.update(("initial", key) for key in held)
         return source
     writer = _Writer(indices, report)
     model = {key: value for key, value in section.items() if key != REPEAT}
@@ -59,6 +67,7 @@ def _indices(written: Any, report: Report) -> dict[str, range]:
         else:
             found[name] = range(ends[0], ends[1] + 1)
     if len(found) < len(written):
+        report.faulty.add(("model", REPEAT))
         return {}
     count = prod(map(len, found.values()))
     if count > MOST_VALUES:

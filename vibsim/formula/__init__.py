@@ -24,6 +24,7 @@ from vibsim.formula.tree import (
     Name,
     Negate,
     Number,
+    Parts,
     literal,
     names_in,
     put,
@@ -34,7 +35,7 @@ from vibsim.formula.tree import (
 
 __all__ = [
     "CONSTANTS", "FUNCTIONS", "MAX_CHARACTERS", "MAX_DEPTH", "ONE", "ZERO", "Binary", "Call",
-    "Compare", "Expression", "ExpressionError", "Name", "Negate", "Number", "Pulses", "Switch",
+    "Compare", "Expression", "ExpressionError", "Name", "Negate", "Number", "Parts", "Pulses", "Switch",
     "bounds", "constant", "derivative", "evaluate", "first_jump", "has_rule", "held", "hidden_pulses", "integral",
     "is_multiple", "is_zero", "literal", "names_in", "parse", "put",
     "rebuilt", "size", "tidied", "to_formula", "to_statements", "values", "walk",

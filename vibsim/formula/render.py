@@ -22,6 +22,7 @@ from vibsim.formula.tree import (
     Name,
     Negate,
     Number,
+    Parts,
     literal,
 )
 
@@ -149,8 +150,10 @@ def _within(node: Expression, least: int) -> str:
     return text if binding >= least else f"({text})"
 
 
-def to_statements(expression: Expression, result: str) -> list[str]:
+def to_statements(expression: Expression, result: str, parts: Parts | None = None) -> list[str]:
     """Write `expression` as assignments of Python for the engine, the last one to `result`.
+
+    With the `parts` of all formulas of a function, what several of them use is worked out once.
 
     Every operation has its parentheses, so that their order is the formula's. There are numbers, names, ``+ - * /``,
     comparisons, and calls of `FUNCTIONS`, and of ``power(base, exponent)`` where an exponent is not a whole number. A
@@ -158,12 +161,13 @@ def to_statements(expression: Expression, result: str) -> list[str]:
     ``sin(x)**2`` becomes ``_1 = sin(x)`` and ``result = (_1 * _1)``. No name of a formula begins with ``_``.
     """
     lines: list[str] = []
+    before = parts.lines if parts else 0
 
     def named(source: str) -> str:
         if source.isidentifier() or source.replace(".", "", 1).isdigit():
             return source
-        lines.append(f"_{len(lines) + 1} = {source}")
-        return f"_{len(lines)}"
+        lines.append(f"_{before + len(lines) + 1} = {source}")
+        return f"_{before + len(lines)}"
 
     def power(base: Expression, exponent: Expression) -> str:
         whole = literal(exponent)
@@ -180,6 +184,14 @@ def to_statements(expression: Expression, result: str) -> list[str]:
         return found if whole > 0.0 else f"(1.0 / {found})"
 
     def source(node: Expression) -> str:
+        part = parts.number(node) if parts else -1
+        if parts is None or parts.uses[part] < 2:
+            return written(node)
+        if part not in parts.names:
+            parts.names[part] = named(written(node))
+        return parts.names[part]
+
+    def written(node: Expression) -> str:
         match node:
             case Number(value):
                 found = repr(value)
@@ -197,6 +209,8 @@ def to_statements(expression: Expression, result: str) -> list[str]:
         return named(found) if is_deep else found
 
     last = source(expression)
+    if parts:
+        parts.lines += len(lines)
     return [*lines, f"{result} = {last}"]
 
 

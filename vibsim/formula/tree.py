@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import operator
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import islice
 from typing import Any
@@ -164,6 +164,33 @@ def walk(node: Expression) -> Iterator[Expression]:
 def size(node: Expression, most: int) -> int:
     """Return how many nodes a formula has when it is written out; beyond `most`, `most` and one more."""
     return sum(1 for _ in islice(walk(node), most + 1))
+
+
+class Parts:
+    """The distinct parts of some formulas, each with a number: parts that read alike are one."""
+
+    def __init__(self, formulas: Iterable[Expression]) -> None:
+        self.uses: list[int] = []
+        """By the number of a part: how many distinct parts and formulas use it."""
+        self.names: dict[int, str] = {}
+        """By the number of a part, how a text that has worked it out calls it."""
+        self.lines = 0
+        """How many lines such a text has."""
+        self._numbers: dict[tuple[Any, ...], int] = {}
+        for formula in formulas:
+            self.uses[self.number(formula)] += 1
+
+    def number(self, node: Expression) -> int:
+        """Return the number of a part."""
+        inner = tuple(self.number(child) for child in children(node))
+        own = (x for x in vars(node).values() if not isinstance(x, Expression | tuple))
+        key = (type(node), *own, inner)
+        if key not in self._numbers:
+            self._numbers[key] = len(self.uses)
+            self.uses.append(0)
+            for part in inner:
+                self.uses[part] += 1
+        return self._numbers[key]
 
 
 def names_in(expression: Expression) -> tuple[str, ...]:

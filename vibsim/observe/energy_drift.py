@@ -13,7 +13,8 @@ smooths the stairs in which a drift climbs under an oscillation, and the oscilla
 - ``bounded``: m1 is above m2 by less than `STILL` of M(T), or it creeps only: k below `CREEP`, m1 above m2 by less
   than `STILL_CREEPS` (finer sampling of the same maximum); and so does the range of the deviation so far, which a drift
   widens from the start on, where M stands until the drift has overtaken an oscillation to the other side;
-- ``linear``, ``quadratic``: k, of M or of that range, within `NEAR_POWER` of 1 or 2;
+- ``linear``, ``quadratic``: k, of M or of that range, within `NEAR_POWER` of 1 or 2; the range must still widen in the
+  last T/8, by `STILL_WIDENS` of what a drift would: an oscillation whose middle moves slowly widens it for a while;
 - else ``unclear``.
 
 A drift so slow that a run shows less than `STILL` of it is called bounded: a longer run decides.
@@ -160,13 +161,15 @@ def drift_of(
         gone = (left < th.SMALLEST_NORMAL) & (np.abs(energy) > th.SMALLEST_NORMAL)
     size = np.where(np.isfinite(end) & (end > 0), end, 1.0)
     allowed = np.broadcast_to(ABOVE_ROUND_OFF * floor, end.shape)
-    still = _is_still(rise, k, size)
+    still, has_stopped = _is_still(rise, k, size), np.zeros(end.shape, dtype=bool)
     if deviation is not None:
         # M stands still until a drift has overtaken an oscillation to the other side, and is of no power then
         widens = still | ~(_is_near(k, 1) | _is_near(k, 2))
         widens &= samples >= th.LEAST_PER_PERIOD * periods
-        of_range = _means(_range(deviation))
+        so_far = _range(deviation)
+        of_range = _means(so_far)
         widens &= ~_is_still(*_rise(of_range), size)
+        has_stopped = widens & (_last_rise(so_far) < th.STILL_WIDENS * _rise(of_range)[0])
         means = np.where(widens[..., None], of_range, means)
         rise, k = _rise(means)
         still &= ~widens
@@ -181,6 +184,7 @@ def drift_of(
         (exponential, EXPONENTIAL),
         (gone, UNCLEAR),
         (still, BOUNDED),
+        (has_stopped, UNCLEAR),
         (_is_near(k, 1), LINEAR),
         (_is_near(k, 2), QUADRATIC),
     ]
@@ -219,6 +223,17 @@ def _range(deviation: Floats) -> Floats:
     inner[..., 0], inner[..., -1] = 0.0, inner[..., -2]
     highest, lowest = (f.accumulate(inner, axis=-1) for f in (np.maximum, np.minimum))
     return np.asarray(highest - lowest)
+
+
+def _last_rise(values: Floats) -> Floats:
+    """Return m1 - m2 as the mean over the last eighth and that over the eighth before give it where k is 1."""
+    n = max(values.shape[-1] - 1, 1)
+    width = max(n // 8, 1)
+    last, before = (
+        values[..., n - width : n],
+        values[..., max(n - 2 * width, 0) : max(n - width, 1)],
+    )
+    return np.asarray(3.0 * (np.mean(last, axis=-1) - np.mean(before, axis=-1)))
 
 
 def _decay(change: Floats, is_normal: Flags) -> tuple[float, float]:

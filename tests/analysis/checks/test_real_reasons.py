@@ -12,6 +12,15 @@ from vibsim import Experiment, Verdict, analyse, simulate, verdicts
 
 PENDULUM: dict[str, Any] = {"model": {"kind": "pendulum"}, "initial": {"theta": 1.0}}
 SPRING: dict[str, Any] = {"model": {"kind": "oscillator"}, "initial": {"u": 1.0}}
+DOUBLE_PENDULUM: dict[str, Any] = {
+    "model": {
+        "kind": "system",
+        "coordinates": ["a", "b"],
+        "mass": {"a": {"a": 2, "b": "cos(a - b)"}, "b": 1},
+        "force": {"a": "-2*sin(a)", "b": "-sin(b)"},
+    },
+    "initial": {"a": 2.5, "b": 2.0},
+}
 BOX: dict[str, Any] = {
     "model": {"kind": "oscillator", "damping": {"coulomb": 0.06}},
     "initial": {"u": 1.0, "v": 0.25},
@@ -136,6 +145,30 @@ LADDERS = {
         ("INCONCLUSIVE", "round_off"),
         ("theta have parted", "more than 1 % of its size"),
     ),
+    "a chaotic motion, longer than double precision reaches": Ladder(
+        {**DOUBLE_PENDULUM, "time": {"end": 60.0}},
+        "rk4",
+        (9, 10, 11, 12),
+        {"converges": "a", "order": 4},
+        ("INCONCLUSIVE", "pre_asymptotic"),
+        ("up to t = 20.7 only, of 60", "none reaches the end, because rounding errors grow alike"),
+    ),
+    "a chaotic motion, whose end finer levels reach": Ladder(
+        {**DOUBLE_PENDULUM, "time": {"end": 30.0}},
+        "rk4",
+        (9, 10, 11, 12),
+        {"converges": "a", "order": 4},
+        ("INCONCLUSIVE", "pre_asymptotic"),
+        ("up to t = 24.4 only, of 30", "add levels 13 to 15"),
+    ),
+    "levels that are too coarse, and errors that grow like a power of the time": Ladder(
+        {**PENDULUM, "time": {"end": 200.0}},
+        "rk4",
+        (7, 8, 9),
+        {"converges": "theta", "order": 4},
+        ("INCONCLUSIVE", "pre_asymptotic"),
+        ("The step is still too coarse",),
+    ),
     "a coordinate that stays at 0 but for round-off": Ladder(
         {
             "model": {
@@ -198,5 +231,5 @@ def test_the_reason_is_the_right_one(name: str) -> None:
     verdict = judged(LADDERS[name])
     assert (verdict.status, verdict.reason) == LADDERS[name].verdict, verdict.text
     for words in LADDERS[name].says:
-        assert words in verdict.text
+        assert words in f"{verdict.text} {verdict.advice}"
     assert bool(verdict.advice) == (verdict.status != "PASS")

@@ -147,6 +147,17 @@ def test_what_cannot_be_named_is_unclear() -> None:
     assert kind_of(broken)[0] == "unclear"
 
 
+@pytest.mark.parametrize(("stops", "kind"), [(0.8, "unclear"), (1.0, "linear")])
+def test_a_range_that_stops_widening_shows_no_drift(stops: float, kind: str) -> None:
+    """The energy error of a chain goes to another middle with its modes: the largest error stands still meanwhile."""
+    deviation = 1e-9 * (np.minimum(S / stops, 1.0) * 0.6 - np.sin(2 * np.pi * PERIODS * S) ** 2)
+    running = np.maximum.accumulate(np.abs(deviation))[None, None]
+    one, periods = np.ones((1, 1)), np.array([PERIODS])
+    ratio = 1.0 + deviation[None, None]
+    found = drift_of(running, ratio, one, 1e-15 * one, periods, deviation[None, None])
+    assert DRIFTS[int(found.kind[0, 0])] == kind
+
+
 def test_an_overflow_of_one_member_is_no_warning() -> None:
     running = np.stack([1e-3 * S, np.where(S > 0.5, np.inf, 1e-3 * S)])[None]
     ones = np.ones((1, 2))

@@ -27,6 +27,7 @@ from vibsim.formula import (
     ONE,
     Binary,
     ExpressionError,
+    Parts,
     derivative,
     evaluate,
     is_zero,
@@ -53,6 +54,8 @@ MOST_NAMED = 8
 """Most names of a list in a message."""
 MAX_NODES = 5000
 """Operations and names of an equation with its slopes and energies: compiling takes about 3 ms of each."""
+MAX_WRITTEN = 100_000
+"""The same written out, of several coordinates, where parts that are alike are worked out once."""
 
 
 @dataclass(frozen=True)
@@ -261,7 +264,11 @@ def _check_length(model: Model) -> None:
         guards = [tree(model, row.guard) for row in rows]
         formulas += (*guards, *(rate(model, guard) for guard in guards))
         formulas += tuple(tree(model, value) for row in rows for _, value in row.then)
-    if sum(size(formula, MAX_NODES) for formula in formulas) > MAX_NODES:
+    length = sum(size(formula, MAX_WRITTEN) for formula in formulas)
+    if MAX_NODES < length <= MAX_WRITTEN and model.coordinates > 1:
+        # equations that are solved for the accelerations have long parts in common, which are worked out once
+        length = len(Parts(formulas).uses)
+    if length > MAX_NODES:
         rule = f"the equation that follows, with its slopes and energies, has more than {MAX_NODES} operations"
         hint = "write a simpler formula, or the energy as `potential` where the model has that; in place of masses "
         hint += "that depend on each other, write each `acceleration`"

@@ -1,0 +1,58 @@
+"""Levels that agree for a while and then part: the difference of the finest two grows with time like an exponential.
+
+Every error of a chaotic motion does that, whatever made it. A finer level of order p puts the parting off by
+``p ln(2)/rate``, and rounding errors grow alike. Source: E. Hairer, S. P. Norsett, G. Wanner, Solving Ordinary
+Differential Equations I, sections I.10 and I.16.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from vibsim.comparison.quantity_comparison import Comparison
+from vibsim.convergence.differences import largest
+from vibsim.core.array_types import Flags, Floats
+from vibsim.schemes.base import UNIT_ROUND_OFF
+
+FAR_APART = 0.01
+"""Levels have parted where they differ by this part of the quantity. [convention]"""
+HIGHEST_POWER = 8.0
+"""What grows faster than this power of the time grows like an exponential. [convention]"""
+
+
+def parting(q: Comparison, where: Flags) -> Floats:
+    """Return up to when the finest two levels of a quantity agree, and the rate at which they part.
+
+    The rate is that of the logarithm of their difference, in the second half of that time.
+
+    Returns
+    -------
+    numpy.ndarray
+        Shape (scheme, case, 2); NaN where nothing is asked, and where levels agree to the end, do not agree at the
+        beginning, or part like a power of the time.
+    """
+    found = np.full((*where.shape, 2), np.nan)
+    if not np.any(where) or not q.differences:
+        return found
+    part = np.asarray(q.block.grid.t) / q.block.grid.t[-1]
+    size = largest(q.values[-1])
+    for scheme, case in zip(*np.nonzero(where), strict=True):
+        apart = np.maximum.accumulate(np.abs(q.differences[-1][scheme, case]))
+        far = np.flatnonzero(apart >= FAR_APART * size[scheme, case])
+        if not len(far):
+            continue
+        half = apart[np.searchsorted(part, part[far[0]] / 2.0)]
+        time = part[far[0]] * np.ravel(q.block.group.end)[case]
+        growth = math.log(apart[far[0]] / half) if 0.0 < half < math.inf else 0.0
+        if growth > HIGHEST_POWER * math.log(2.0):
+            found[scheme, case] = time, 2.0 * growth / time
+    return found
+
+
+def levels_to_the_end(time: float, rate: float, end: float, order: float) -> float:
+    """Return how many finer levels of an order agree to the end; infinite where rounding makes every level part."""
+    if rate * end > math.log(FAR_APART / UNIT_ROUND_OFF):
+        return math.inf
+    return math.ceil(rate * (end - time) / (order * math.log(2.0)))
