@@ -176,6 +176,21 @@ def test_averages_of_cells_taken_for_points_are_told_of_in_a_pass() -> None:
     assert told not in judge(h, around, order=2).sentence
 
 
+@pytest.mark.parametrize("kind", ["linear", "cubic"])
+def test_averages_of_cells_interpolated_as_points_from_end_to_end_are_told_of(kind: str) -> None:
+    """Values of cells of a method of order 2 have an order of 1 there, which must not be blamed on the method."""
+    counts, told = [8, 16, 32, 64], "taken for points from end to end"
+    cells = [np.sin(np.pi * (np.arange(n) + 0.5) / n) * (1.0 + 1.0 / n**2) for n in counts]
+    h = [1 / n for n in counts]
+    verdict = judge(h, cells, order=2, restrict=kind)
+    assert verdict.status != "PASS"
+    assert told in verdict.advice
+    assert judge(h, cells, order=2, restrict="mean").status == "PASS"
+    points = [np.sin(np.linspace(0.0, np.pi, n)) * (1.0 + 1.0 / n**2) for n in (9, 14, 21, 31)]
+    whole = judge([1 / 8, 1 / 13, 1 / 20, 1 / 30], points, order=2, restrict=kind)
+    assert told not in whole.sentence + whole.advice
+
+
 def test_a_low_order_behind_a_higher_one_is_explained() -> None:
     """Two shapes: -12 times the part of order 4 is of order 2 at the finest level, and the estimate is above 4."""
     h, x = [0.2 * 0.5**k for k in range(6)], np.linspace(0.0, 1.0, 20)

@@ -288,7 +288,14 @@ def _interpolations(
     part = ""
     if not inside.all():
         part = f"Of the {len(coarse)} points of the coarsest level along {dim}, {inside.sum()} lie within all levels."
-    return Common(tuple(found), targets if has_points else None, interpolated, part=part)
+    note, lengths = "", [len(p) for p in points]
+    if not has_points and interpolated and all(n % lengths[0] == 0 for n in lengths):
+        counts = ", ".join(map(str, lengths))
+        note = (
+            f"The levels have {counts} values{_along(dim)}, which were taken for points from end to end. For averages "
+            "of cells use restrict: mean, or give their coordinates."
+        )
+    return Common(tuple(found), targets if has_points else None, interpolated, note, part)
 
 
 def _polynomials(
