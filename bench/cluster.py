@@ -29,11 +29,9 @@ sweep:
 checks:
   - {{converges: theta, order: 2}}
 """
-FOLLOWED = ("--slurm-status-command", "squeue")
-"""How jobs are followed in a cluster that keeps no accounts."""
 WAYS = {
     "vibsim run --cores 2": ("--cores", "2"),
-    "vibsim run --executor slurm": ("--executor", "slurm", "--", *FOLLOWED),
+    "vibsim run --executor slurm": ("--executor", "slurm"),
 }
 ROUNDS = 3
 

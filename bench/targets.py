@@ -171,7 +171,6 @@ TARGETS = (
         "10^5 members: wall time on two nodes of SLURM over a local run on the same cores",
         "cluster.ratio",
         1.5,
-        note="40 s of waiting: three jobs follow each other, and the executor looks for their end ever more rarely",
     ),
 )
 

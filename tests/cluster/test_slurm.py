@@ -32,8 +32,8 @@ sweep:
 checks:
   - {converges: theta, order: 2}
 """
-# this cluster keeps no accounts, and its jobs take seconds
-OPTIONS = "-- --group-components simulate=1 --slurm-status-command squeue"
+# its jobs take seconds
+OPTIONS = "-- --group-components simulate=1"
 KINDS = (".nc", ".json", ".html", ".csv", ".tex", ".svg")
 PATIENCE = 300.0
 """Seconds for anything that is waited for; a busy machine takes its time."""

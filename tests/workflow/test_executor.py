@@ -182,6 +182,29 @@ def test_a_profile_configures_cores_and_memory_of_the_executor(
     assert words("config: [cores=3]", "--cores", "2") == ["cores=2", "overhead=500", "here=20"]
     with pytest.raises(InputError, match="must be whole numbers"):
         words("config: {overhead: much}")
+    with pytest.raises(InputError, match="it must be YAML"):
+        words("config: {overhead: 1")
+
+
+def test_a_slurm_without_accounts_is_asked_by_squeue(
+    place: Place, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def arguments(status: int, *options: str) -> list[str]:
+        (tmp_path / "sacct").write_text(f"#!/bin/sh\nexit {status}\n")
+        (tmp_path / "sacct").chmod(0o755)
+        options = ("run", str(place.file), *options)
+        return [*executor.chosen(parsed([*options]), [], place.results).arguments]
+
+    monkeypatch.setenv("PATH", str(tmp_path), prepend=":")
+    followed = ["--slurm-status-command", "squeue"]
+    for options in (["--executor", "slurm"], ["--profile", "slurm"]):
+        assert "squeue" not in arguments(0, *options)
+        words = arguments(1, *options)
+        assert words[words.index(followed[0]) :][:2] == followed
+    # what somebody asks for comes last, and wins
+    words = arguments(1, "--executor", "slurm", "--", "--slurm-status-command", "sacct")
+    assert words[-1] == "sacct"
+    assert "squeue" not in arguments(1, "--executor", "cluster-generic")
 
 
 @pytest.mark.parametrize("name", executor.SHIPPED)

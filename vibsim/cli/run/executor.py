@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+import subprocess
 from argparse import Namespace
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from importlib.util import find_spec
 from pathlib import Path
 from pkgutil import iter_modules
+from typing import Any
 
 from vibsim.cli import resources
 from vibsim.cli.jobs.common import refusal
-from vibsim.core.errors import nearest
+from vibsim.core.errors import InputError, nearest
 from vibsim.core.home import home
 from vibsim.core.processes import usable_cores
 from vibsim.plan import Plan
@@ -65,6 +67,8 @@ def chosen(options: Namespace, plans: Sequence[Plan], results: Path) -> Executor
     arguments += ["--profile", str(folder)]
     if options.jobs:
         arguments += ["--jobs", str(options.jobs)]
+    if (name or _read(folder).get("executor")) == "slurm":
+        arguments += _status_command()
     config = _numbers(shipped / "generic", "config") | _numbers(folder, "config")
     if GROUP in (groups := _numbers(folder, "group-components")):
         seconds = [batch.seconds for plan in plans for batch in plan.batches]
@@ -88,18 +92,45 @@ def _folder(profile: Path, shipped: Path) -> Path:
 
 def _numbers(folder: Path, option: str) -> dict[str, int]:
     """Return what the profile in a folder says of an option of Snakemake, as a mapping or as ``KEY=VALUE``."""
-    import yaml
-
-    file = next(folder / name for name in PROFILES if (folder / name).is_file())
+    found = _read(folder).get(option) or {}
     try:
-        found = (yaml.safe_load(file.read_text()) or {}).get(option) or {}
         pairs = found.items() if isinstance(found, dict) else (row.split("=", 1) for row in found)
         # others of `config` are no concern of vibsim, and may be of any type
         return {key: int(value) for key, value in pairs if option != "config" or key in CONFIGURED}
-    except (OSError, ValueError, AttributeError, TypeError, yaml.YAMLError) as error:
+    except (ValueError, AttributeError, TypeError) as error:
         keys = f"{' and '.join(CONFIGURED)} in `config`" if option == "config" else f"`{option}`"
-        rule = f"cannot be read: {keys} must be whole numbers"
-        raise refusal("--profile", file, rule, str(error).splitlines()[0]) from None
+        raise _unreadable(folder, f"{keys} must be whole numbers", error) from None
+
+
+def _read(folder: Path) -> dict[str, Any]:
+    """Return the profile in a folder."""
+    import yaml
+
+    try:
+        found = yaml.safe_load(_file(folder).read_text()) or {}
+    except (OSError, ValueError, yaml.YAMLError) as error:
+        raise _unreadable(folder, "it must be YAML", error) from None
+    if not isinstance(found, dict):
+        raise _unreadable(folder, "it must be a mapping", type(found).__name__)
+    return found
+
+
+def _file(folder: Path) -> Path:
+    return next(folder / name for name in PROFILES if (folder / name).is_file())
+
+
+def _unreadable(folder: Path, rule: str, why: object) -> InputError:
+    return refusal("--profile", _file(folder), f"cannot be read: {rule}", str(why).splitlines()[0])
+
+
+def _status_command() -> list[str]:
+    """Return what has jobs of SLURM followed by squeue where sacct has no accounts, and would be asked for ever."""
+    try:
+        words = ["sacct", "--noheader", "--allocations", "--starttime", "now"]
+        ended = subprocess.run(words, capture_output=True, check=False, timeout=60)
+    except (OSError, subprocess.TimeoutExpired):
+        return []
+    return ["--slurm-status-command", "squeue"] if ended.returncode else []
 
 
 def _check_name(name: str) -> None:
