@@ -30,7 +30,18 @@ def check(**keys: Any) -> list[str]:
     return notes(checks=[keys])
 
 
+CART: dict[str, Any] = {
+    "kind": "system",
+    "coordinates": ["x", "th"],
+    "mass": {"x": {"x": 3, "th": "cos(th)"}, "th": 1},
+    "force": {"x": "-x", "th": "-sin(th)"},
+}
+"""A pendulum on a cart, whose states have no units."""
 TOLD = {
+    "angle of a system": (
+        {"model": CART, "initial": {"th": 40}, "schemes": ["rk4"]},
+        "initial.th: 40 rad are 6.4 turns: 40 degrees are written `40 degree`",
+    ),
     "angle": (
         {"initial": {"theta": 60}},
         "initial.theta: 60 rad are 9.5 turns: 60 degrees are written `60 degree`",
@@ -89,6 +100,7 @@ MEANT = {
     "count of a rule": {"sweep": {"initial.theta": {"linspace": [0.1, 3, 50]}}},
     "velocity": {"initial": {"omega": 60}},
     "displacement": {"model": {"kind": "spring"}, "initial": {"u": 60}},
+    "place of a system": {"model": CART, "initial": {"x": 40}, "schemes": ["rk4"]},
     "tolerance": {"checks": [{"value": "period", "equals": 6.7, "atol": 0.1}]},
     "many digits": {"checks": [{"value": "period", "equals": 6.70024879}]},
     "zero": {"checks": [{"value": "end", "quantity": "theta", "equals": 0}]},

@@ -20,7 +20,7 @@ from typing import Any
 
 from vibsim.core.errors import nearest
 from vibsim.experiment.faults import Report
-from vibsim.experiment.schema.fields import DECLARED, FORMULA_NOTE, MAX_FORMULAS, TABLE
+from vibsim.experiment.schema.fields import AT, DECLARED, FORMULA_NOTE, MAX_FORMULAS, TABLE
 from vibsim.experiment.schema.unit_text import NAME, UnitError, factors, split
 from vibsim.experiment.yaml.parse import Path_
 from vibsim.formula import CONSTANTS, FUNCTIONS, ExpressionError, constant
@@ -187,7 +187,7 @@ def _wanted_units(model: Model | None) -> tuple[dict[str, str], set[str]]:
     for row in model.formulas:
         key = f"model.{row.name}"
         units |= {f"{key}.{word}": unit for word, unit in row.term_units.items()}
-        texts |= {key, *(f"{key}.{name}" for name in (TABLE, *(row.table or ())))}
+        texts |= {key, *(f"{key}.{name}" for name in (TABLE, AT, *(row.table or ())))}
         texts |= {f"{key}.*"} if row.of else set()
     return units, texts
 

@@ -108,6 +108,8 @@ class FormulaField:
     """The unit of b in each of them."""
     table: tuple[str, str] | None = None
     """Names that the place and the value have in a table, where one may stand instead; None where not."""
+    tabled: bool = False
+    """Whether a table always stands there, which a user looks up at a place of his own, under the key `AT`."""
     derivatives: int = 0
     """How many times the equation differentiates it: it and all of its derivatives but the last must not jump."""
     along: str = "t"

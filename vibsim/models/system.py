@@ -68,6 +68,7 @@ from vibsim.models.shared.crossings import crossings, described
 from vibsim.models.shared.inertia import MASS, Inertia, inertia
 from vibsim.models.shared.manufactured import Manufactured
 from vibsim.models.shared.mechanical import damping_of
+from vibsim.models.table import HEIGHT, Lookup, Table
 
 MOST = 64
 """Coordinates, at most."""
@@ -140,6 +141,9 @@ MASSES = "mass of each coordinate, or of all, beside its force; 1 when left out;
 POTENTIAL = "potential energy, or its terms, where it cannot be found"
 KINETIC = "kinetic energy, or its terms, where it is not that of the masses"
 OUTPUTS = "further series, each with a name of your own"
+TABLED = "series of a table, which accelerations, forces and outputs may name"
+INPUT = "input"
+"""What formulas call the present value of the table."""
 EXACT = "exact solution of each coordinate, for which forces are then added"
 
 
@@ -157,6 +161,7 @@ def fields(coordinates: tuple[str, ...]) -> tuple[FormulaField, ...]:
         FormulaField("potential", states, "", POTENTIAL, of="term"),
         FormulaField("kinetic", states, "", KINETIC, of="term"),
         FormulaField("outputs", known, "", OUTPUTS, of="output"),
+        FormulaField(INPUT, ("t",), "", TABLED, table=("x", "h"), tabled=True),
         FormulaField("exact", ("t",), "", EXACT, derivatives=2, **of_each),
     )
 
@@ -168,6 +173,7 @@ class Written:
     coordinates: tuple[str, ...]
     formulas: Mapping[str, str]
     declared: tuple[str, ...]
+    lookup: Lookup | None = None
 
     @cached_property
     def velocities(self) -> tuple[str, ...]:
@@ -186,7 +192,10 @@ class Written:
 
     def read(self, key: str, default: str = "") -> Expression:
         """Return a formula by its key; `default` where it is not written."""
-        return parse(self.formulas.get(key, default), (*self.states, "t", *self.declared))
+        known = (*self.states, "t", *self.declared)
+        if self.lookup is None:
+            return parse(self.formulas.get(key, default), known)
+        return put(parse(self.formulas.get(key, default), (*known, INPUT)), INPUT, Name(HEIGHT))
 
     def terms(self, name: str) -> list[Expression]:
         """Return the terms of a sum that is written, in their order; none where it is not."""
@@ -243,7 +252,7 @@ class Written:
         """The potential energy, 0 where none is known."""
         if terms := self.terms("potential"):
             return paired(terms, operator.add)
-        moving, total, forces = {*self.velocities, "t"}, [], []
+        moving, total, forces = {*self.velocities, "t", HEIGHT}, [], []
         for whole in self.forces:
             still = (term for term in terms_of(whole) if moving.isdisjoint(names_in(term)))
             forces.append(sum(still, ZERO))
@@ -272,13 +281,13 @@ class Written:
 
     def is_constant(self, node: Expression) -> bool:
         """Tell whether a formula names parameters alone."""
-        return {*self.states, "t"}.isdisjoint(names_in(node))
+        return {*self.states, "t", HEIGHT}.isdisjoint(names_in(node))
 
     def vanishes(self, terms: Any) -> bool:
         """Tell whether a sum is 0 wherever it has a value, and that it has one somewhere."""
         rng = np.random.default_rng(21)
         numbers = {name: rng.uniform(-1.0, 1.0, TESTS) for name in self.states}
-        numbers |= {name: rng.uniform(0.3, 1.7, TESTS) for name in ("t", *self.declared)}
+        numbers |= {name: rng.uniform(0.3, 1.7, TESTS) for name in ("t", HEIGHT, *self.declared)}
         found = [np.broadcast_to(values(term, numbers), TESTS) for term in terms]
         if not found:
             return True
@@ -296,7 +305,7 @@ class Written:
                 if name not in named:
                     continue
                 slope = derivative(a, name)
-                for state in (*self.states, "t"):
+                for state in (*self.states, "t", HEIGHT):
                     if state in names_in(slope):
                         slope = put(slope, state, ZERO)
                 if slope != ZERO:
@@ -353,7 +362,11 @@ def named(coordinates: tuple[str, ...]) -> Model:
 
 
 def written(
-    coordinates: tuple[str, ...], formulas: Mapping[str, str], declared: tuple[str, ...]
+    coordinates: tuple[str, ...],
+    formulas: Mapping[str, str],
+    declared: tuple[str, ...],
+    table: Table | None = None,
+    is_met: bool = False,
 ) -> Model:
     """Return the system of formulas, with declared parameters.
 
@@ -365,21 +378,27 @@ def written(
     formulas
         By the names of `fields`; those of coordinates and outputs as ``acceleration.x``.
     """
-    return system(coordinates, tuple(sorted(formulas.items())), declared)
+    lookup = None
+    if table is not None:
+        lookup = Lookup(table, parse(formulas[INPUT], ("t", *declared)), is_met)
+    return system(coordinates, tuple(sorted(formulas.items())), declared, lookup)
 
 
 @cache
 def system(
-    coordinates: tuple[str, ...], formulas: tuple[tuple[str, str], ...], declared: tuple[str, ...]
+    coordinates: tuple[str, ...],
+    formulas: tuple[tuple[str, str], ...],
+    declared: tuple[str, ...],
+    lookup: Lookup | None = None,
 ) -> Model:
     """Return the system of formulas; see `written`."""
-    own = Written(coordinates, dict(formulas), declared)
+    own = Written(coordinates, dict(formulas), declared, lookup)
     motion = own.manufactured
     more: dict[str, Any] = {}
     is_conservative = motion is None and own.vanishes(own.powers)
     if not is_conservative:
         power: Expression = paired(own.powers, operator.add) if own.powers else ZERO
-        drives = "t" in names_in(power)
+        drives = bool({"t", HEIGHT} & set(names_in(power)))
         more = {"driving": power} if drives else {"dissipation": -power}
     if motion is not None:
         more |= {"exact": motion.exact, "start": motion.start}
@@ -415,6 +434,7 @@ def system(
         formulas=fields(coordinates),
         takes_events=True,
         written=partial(written, coordinates),
+        lookup=lookup,
         named=named,
         **more,
     )
@@ -457,10 +477,16 @@ def _equation(own: Written) -> str:
         both = [left, a]
         for velocity, position in speeds.items():
             both = [put(side, velocity, Name(f"{position}'")) for side in both]
+        both = [put(side, HEIGHT, Name(INPUT)) for side in both]
         lines.append(" = ".join(map(to_formula, both)))
     if len(lines) > SHOWN:
         lines = [*lines[: SHOWN // 2], "...", lines[-1]]
     told = ", ".join(lines)
+    if own.lookup is not None:
+        table, place = own.lookup.table, own.formulas[INPUT]
+        told += (
+            f", {INPUT} from a table of {table.points} points, {table.spacing:g} apart, at {place}"
+        )
     if own.crossings is not None:
         told += described(own.crossings, own.formulas)
     if own.manufactured is None:

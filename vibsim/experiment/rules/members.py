@@ -155,7 +155,10 @@ def check_length(numbers: MemberNumbers, name: str, report: Report) -> None:
             who = named(found, i)
     if most > table.last + SLACK * table.spacing:
         count = int(np.ceil((most - table.first) / table.spacing - SLACK)) + 1
-        rule = f"the table ends at {table.last:.10g} m, but the motion comes to {most:.10g} m"
+        unit = "" if numbers.model.dimensionless else " m"
+        rule = (
+            f"the table ends at {table.last:.10g}{unit}, but the motion comes to {most:.10g}{unit}"
+        )
         hint = f"it must have at least {count} points, not {table.points}"
         report.add(("model", name, TABLE), f"{rule}{f' ({who})' if who else ''}", hint)
 

@@ -18,7 +18,7 @@ from vibsim.experiment.kinds import COORDINATES
 from vibsim.experiment.rules.crossings import read_crossings
 from vibsim.experiment.rules.potential import check_potential
 from vibsim.experiment.rules.structure import read_structure, terms_of_damping
-from vibsim.experiment.schema.fields import DECLARED, TABLE, Section
+from vibsim.experiment.schema.fields import AT, DECLARED, TABLE, Section
 from vibsim.experiment.tables.content import TableError
 from vibsim.experiment.tables.file import ENDINGS, read
 from vibsim.experiment.yaml.parse import Path_
@@ -30,6 +30,7 @@ from vibsim.formula import (
     Parts,
     derivative,
     evaluate,
+    is_multiple,
     is_zero,
     names_in,
     parse,
@@ -150,13 +151,21 @@ def _written(
     known = (*(own.name for own in model.parameters), *declared)
     texts: dict[str, str] = {}
     tables: dict[str, TableSpec] = {}
+    looked_up = {row.name for row in model.formulas if row.tabled and getattr(section, row.name)}
+    for name in looked_up & {*(state.name for state in model.states), *declared}:
+        rule = "a table is looked up under that name, which is another's already"
+        report.add(("model", name), rule, "rename the state or the parameter", at_key=True)
     for row in model.formulas:
         value = getattr(section, row.name)
         if row.of:
-            texts |= _several(row, value, model, known, report)
+            names = (*known, *looked_up) if "t" in row.names else known
+            texts |= _several(row, value, model, names, report)
         elif isinstance(value, Section) and row.table is not None:
             table = _table(row, row.table, value, folder, report)
             tables |= {row.name: table} if table is not None else {}
+            at: str = getattr(value, AT, "")
+            if row.tabled and _is_place(at, ("model", row.name, AT), known, report):
+                texts[row.name] = at.strip()
         elif isinstance(value, Section):
             texts |= _term(row, value, parameters, report)
         elif value is None and row.name in section.model_fields_set:
@@ -203,6 +212,18 @@ def _written(
     return Equation(found, parameters, texts, tables)
 
 
+def _is_place(text: str, path: Path_, known: Collection[str], report: Report) -> bool:
+    """Tell whether a table is looked up at a constant speed, from the place 0 on; note what is wrong otherwise."""
+    if not _is_sound(text, FormulaField(AT, ("t",), "", ""), path, known, report):
+        return False
+    place = parse(text, ("t", *known))
+    speed = derivative(place, "t")
+    if is_zero(speed) or not is_multiple(place, speed, "t"):
+        report.add(path, "must be a number times t, from the place 0 on", "e.g. speed*t", text)
+        return False
+    return True
+
+
 def _check_together(
     section: Any, texts: Mapping[str, str], exact: str, has_friction: bool, report: Report
 ) -> None:
@@ -211,10 +232,14 @@ def _check_together(
     has_events = any(map(is_crossing, texts))
     has_force = is_followed and section.force is not None
     leaves = "the motion leaves the exact solution at an event"
+    tabled = [name for name in texts if isinstance(getattr(section, name, None), Section)]
+    tabled = [name for name in tabled if hasattr(getattr(section, name), AT)]
+    other = "an exact solution" if exact else EVENTS
     pairs = (
         ("force", has_force, "exact, from which it follows", ""),
         ("exact", is_followed and has_friction, HOLDS, ""),
         ("exact", has_events and exact, EVENTS, leaves),
+        *((name, exact or has_events, other, "") for name in tabled),
         (friction, has_events and has_friction, EVENTS, "friction has events of its own"),
     )
     for key, are_together, other, why in pairs:

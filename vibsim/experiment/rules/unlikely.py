@@ -12,6 +12,9 @@ from vibsim.experiment.rules.size_limits import Setting
 from vibsim.experiment.schema.checks import AccurateCheck, Check, ConvergesCheck, ValueCheck
 from vibsim.experiment.value_names import VALUES
 from vibsim.experiment.yaml.parse import Path_
+from vibsim.formula import Binary, Call, Name, walk
+from vibsim.formula.tree import children
+from vibsim.models import Model, tree
 
 TURN = 2.0 * math.pi
 DIGITS = (None, "largest", "smallest", "mean")
@@ -49,14 +52,27 @@ def _angles(setting: Setting, report: Report) -> None:
     model = setting.model
     if model is None:
         return
+    turned = set(_turned(model)) if model.dimensionless else set()
     for state in model.states:
-        if state.unit != "rad":
+        if state.unit != "rad" and state.name not in turned:
             continue
         for path, values in _plain(report.source.data, state.name):
             largest = max(map(abs, values), default=0.0)
             if largest > TURN:
                 rule = f"{largest:g} rad are {largest / TURN:.2g} turns"
                 report.note(path, rule, f"{largest:g} degrees are written `{largest:g} degree`")
+
+
+def _turned(model: Model) -> Iterator[str]:
+    """Yield the coordinates that are angles where none has a unit: a sine or a cosine of them, or of two, is taken."""
+    for formula in model.accelerations:
+        for part in walk(tree(model, formula)):
+            if isinstance(part, Call) and part.function in ("sin", "cos"):
+                (angle,) = part.arguments
+                sides = (
+                    children(angle) if isinstance(angle, Binary) and angle.operator in "+-" else ()
+                )
+                yield from (side.name for side in sides or (angle,) if isinstance(side, Name))
 
 
 def _plain(data: Mapping[str, Any], name: str) -> Iterator[tuple[Path_, list[float]]]:

@@ -44,6 +44,8 @@ DECLARED = "parameters"
 """The key of the section ``model`` under which a file declares the names of its formulas."""
 TABLE = "table"
 """The key of the path of a table."""
+AT = "at"
+"""The key of the place at which a table is looked up."""
 FORMULA_NOTE = "a number, or a constant formula such as 2*pi/30"
 
 

@@ -17,6 +17,7 @@ from pydantic_core import PydanticCustomError
 
 from vibsim.experiment.kinds import COORDINATES
 from vibsim.experiment.schema.fields import (
+    AT,
     FORMULA,
     FORMULA_NOTE,
     TABLE,
@@ -177,12 +178,17 @@ def _formula_type(model: Model, field: FormulaField) -> Any:
         for key, what in zip(field.table, ("places", "values"), strict=True):
             words = f"name of the column of {what} in the table, or of the variable"
             fields[key] = (Text, Field(default=key, description=words))
+    if field.tabled:
+        words = "where the table is looked up: a formula in t and parameters, a number times t; t when left out"
+        fields[AT] = (FormulaText, Field(default="t", description=words))
     for word, text in () if field.table else field.terms.items():
         value = Annotated[float, FORMULA, BeforeValidator(_coefficient(field, word))] | None
         fields[word] = (value, Field(default=None, description=f"b of {text}"))
     if not fields:
         return FormulaText
     own = create_model(name, __base__=Section, **fields)
+    if field.tabled:
+        return own
     return by_form({"mapping": own, "other": FormulaText})
 
 

@@ -56,7 +56,11 @@ def _head(experiment: Experiment) -> list[str]:
         if isinstance(terms, dict):
             named[key] = [terms[str(i)] for i in range(len(terms))]
     named |= written(model.formulas)
-    named |= {name: {"table": spec.file} for name, spec in model.tables.items()}
+    named |= {
+        name: {"table": spec.file}
+        | ({"at": model.formulas[name]} if name in model.formulas else {})
+        for name, spec in model.tables.items()
+    }
     if model.structure is not None:
         named |= structure.as_written(model.structure, model.formulas)
     lines.append(f"model: {_value(named)}")

@@ -26,7 +26,7 @@ from vibsim.formula import (
     values,
 )
 from vibsim.models import Model, tree
-from vibsim.models.table import BEND
+from vibsim.models.table import BEND, HEIGHT
 from vibsim.simulation.reference.collocation import Force
 
 TABLE = "_mode_of_table"
@@ -109,13 +109,14 @@ class Sides:
         if lookup is None:
             return numbers
         place = values(tree(self.model, lookup.place), numbers)
-        return {**numbers, BEND: lookup.table.read(place, numbers[TABLE])[1]}
+        height, bend = lookup.table.read(place, numbers[TABLE])
+        return {**numbers, HEIGHT: height, BEND: bend}
 
 
 @cache
 def _held(model: Model) -> tuple[tuple[Expression, ...], tuple[Switch, ...]]:
     """Return the accelerations with modes held, and their switches, that of the table of the model first."""
-    moving = (*(state.name for state in model.states), "t", BEND)
+    moving = (*(state.name for state in model.states), "t", HEIGHT, BEND)
     formulas, found = held((tree(model, formula) for formula in model.accelerations), moving)
     if model.lookup is None:
         return formulas, found
