@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from vibsim.analysis import Verdict, analyse_parts, analyse_records, join_parts, verdicts
+from vibsim.comparison.best_solution import best_record
 from vibsim.comparison.best_values import scalars
 from vibsim.convergence.gci import CLASSES
 from vibsim.core.record import Record
@@ -77,6 +78,74 @@ def test_numbers_of_the_spring() -> None:
             value, bound = best(record, name)
             assert abs(value - number) <= bound, (scheme, name)
             assert bound < 0.01 * max(abs(number), 1.0)
+
+
+def test_a_jump_of_the_force_that_no_level_shows_is_part_of_every_bound() -> None:
+    """Just behind a point of all levels it comes too early on each, by the same; u = 0.4 cos t + F (1 - cos(t - s))."""
+    start, end, strength = 1.2501, 2.5, 1.3
+    model = {"kind": "oscillator", "force": f"{strength}*heaviside(t - {start})"}
+    exact = {
+        "u_end": 0.4 * math.cos(end) + strength * (1.0 - math.cos(end - start)),
+        "v_end": -0.4 * math.sin(end) + strength * math.sin(end - start),
+    }
+    data = {"model": model, "initial": {"u": 0.4}, "time": {"end": end}, "levels": [3, 4, 5, 6, 7]}
+    for scheme in ("gauss4", "central", "heun"):
+        _, record = analysed(**data, schemes=[scheme])
+        for name, number in exact.items():
+            value, bound = best(record, name)
+            assert abs(value - number) <= bound < 0.06, (scheme, name)
+            assert abs(value - number) > 1e-5
+    # at a point of all levels there is nothing of the kind
+    data["model"] = model | {"force": f"{strength}*heaviside(t - 1.25)"}
+    _, record = analysed(**data, schemes=["gauss4"])
+    assert best(record, "u_end")[1] < 1e-5
+
+
+def test_a_jump_of_the_force_that_no_level_shows_is_part_of_the_bound_of_the_best_solution() -> (
+    None
+):
+    start, end, strength = 1.2501, 2.5, 1.3
+    model = {"kind": "oscillator", "force": f"{strength}*heaviside(t - {start})"}
+    data = {"title": "t", "model": model, "time": {"end": end}, "levels": [5, 6, 7]}
+    experiment = Experiment.from_dict({**data, "initial": {"u": 0.4}, "schemes": ["gauss4"]})
+    levels = {level: simulate_record(experiment, level) for level in experiment.levels}
+    record = best_record(experiment, levels)
+    t = np.asarray(record["t"])
+    exact = 0.4 * np.cos(t) + strength * np.where(t > start, 1.0 - np.cos(t - start), 0.0)
+    away = np.abs(record["u"][0, 0] - exact)
+    assert np.all(away <= record["u_error"][0, 0])
+    assert np.max(away) > 1e-5
+
+
+def test_an_extremum_at_an_impact_lies_up_to_a_step_away() -> None:
+    model = {
+        "kind": "oscillator",
+        "spring": "2.29*u",
+        "damping": {"linear": 0.0415},
+        "force": "0.893*cos(1.02*t)",
+        "events": [{"when": "u - 0.185", "rising": True, "then": {"v": "-0.837*v"}}],
+    }
+    data = {"model": model, "initial": {"u": -1.15, "v": -0.586}, "schemes": ["rk3"]}
+    _, record = analysed(**data, time={"end": 7.42}, levels=[6, 7, 8, 9, 10])
+    value, bound = best(record, "u_max")
+    assert 1e-3 < 0.185 - value <= bound < 0.03
+
+
+@pytest.mark.parametrize(("sign", "name"), [(-1.0, "u_min"), (1.0, "u_max")])
+def test_an_extremum_before_the_first_point_is_not_taken_for_the_start(
+    sign: float, name: str
+) -> None:
+    decay, u, v = 0.2, 0.5, 0.03
+    w, t = math.sqrt(1.0 - decay**2), np.linspace(0.0, 1.0, 100_001)
+    motion = np.exp(-decay * t) * (u * np.cos(w * t) + (v + decay * u) / w * np.sin(w * t))
+    model = {"kind": "oscillator", "damping": {"linear": 2.0 * decay}}
+    data = {"model": model, "time": {"end": 8.3}, "levels": [4, 5, 6], "schemes": ["rk4"]}
+    _, record = analysed(**data, initial={"u": sign * u, "v": sign * v})
+    value, bound = best(record, name)
+    assert value == sign * u
+    assert abs(value - sign * np.max(motion)) <= bound < 2e-3
+    _, record = analysed(**data, initial={"u": sign * u})
+    assert best(record, name)[1] < 1e-13
 
 
 def test_numbers_of_the_circuit() -> None:

@@ -154,6 +154,27 @@ def test_the_budget_of_a_driven_body_that_sticks_now_and_then(schemes: list[str]
     assert_order_of_budget(schemes, coarse, fine, 1e-12, 0.35)
 
 
+def test_the_budget_of_a_damped_and_driven_body_that_strikes_a_stop() -> None:
+    """Damping and force between the impacts are summed piece by piece, from event to event."""
+    content = {
+        "model": {
+            "kind": "oscillator",
+            "m": 1.3,
+            "spring": "2*u",
+            "damping": "0.1*v + 0.2*v**3",
+            "force": "0.9*cos(0.7*t)",
+            "events": [{"when": "u - 0.4", "rising": True, "then": {"v": "-0.8*v"}}],
+        },
+        "initial": {"u": -0.7},
+        "time": {"end": 18.0},
+        "schemes": ["rk4", "heun"],
+    }
+    coarse, _, fine = largest(content, "energy_budget")
+    assert np.all(largest(content, "event_count")[0] >= 3)
+    assert np.all(largest(content, "dissipated_energy")[2] > 0.1)
+    assert_order_of_budget(["rk4", "heun"], coarse, fine, 1e-12, 0.35)
+
+
 def test_the_work_of_a_force_beside_friction_against_a_fine_sum() -> None:
     content = {
         "title": "t",

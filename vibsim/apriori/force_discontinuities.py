@@ -11,7 +11,7 @@ two formulas on either side.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from typing import Any
@@ -35,6 +35,8 @@ FAR, NEAR = 1.0 / 16.0, 1.0 / 128.0
 [convention]"""
 HALVINGS = 40
 """Halvings of a step that find the place of a corner. [convention]"""
+ROUGH = 2.0
+"""Power that a corner of the force itself leaves: one of its slope leaves less than most schemes do. [convention]"""
 MOST_SMOOTH = 8
 """A jump of a higher derivative than this one is none. [convention]"""
 
@@ -48,6 +50,24 @@ class Corners:
     time: Floats
     switch: Integers
     """Index into `switches_of`, -1 for none."""
+
+    def unseen(self, end: Floats, steps: Sequence[int], omega_dt: Floats) -> Floats:
+        """Return which part of its size a quantity may be off by at a jump or corner of the force, (scheme, case).
+
+        Beside a point that all levels share they make the same error there, which no level shows. Within a step of the
+        finest level it is ``(w dt)^(k+1)`` at most, or that part of the time since, where that is shorter.
+
+        Parameters
+        ----------
+        end, omega_dt
+            The end of every member, and w dt of the finest level, shape (case,).
+        steps
+            Of every level, the coarsest first.
+        """
+        with np.errstate(invalid="ignore", divide="ignore"):
+            inside = ~is_on_a_point(self.time, end / steps[0]) & (self.power <= ROUGH)
+            part = np.fmax(omega_dt, end / steps[-1] / (end - self.time))
+            return np.where(inside, np.minimum(part, 1.0) ** self.power, 0.0)
 
 
 @cache

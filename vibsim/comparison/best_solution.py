@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from vibsim.apriori.force_discontinuities import corners_of, switches_of
 from vibsim.comparison.extrapolate_members import (
     Extrapolated,
     Method,
@@ -17,7 +19,7 @@ from vibsim.comparison.extrapolate_members import (
     noise_of,
 )
 from vibsim.convergence.state_extrapolation import Pair
-from vibsim.core.array_types import Integers
+from vibsim.core.array_types import Floats, Integers
 from vibsim.core.record import Attribute, Record, Variable, flags
 from vibsim.core.vocabulary import MEMBER, SERIES
 from vibsim.experiment import Experiment, sweep_columns
@@ -78,7 +80,21 @@ def extrapolated(
             noise = noise_of(method, start, grid.steps, every, pairs)
             parts.append((extrapolate_members(method, start, grid.steps, t, pairs, noise), where))
         rows.append(in_order(parts))
-    return rows
+    model = experiment.model.definition
+    if not switches_of(model):
+        return rows
+    corners = corners_of(model, finest, group, grid.dt[0])
+    unseen = corners.unseen(group.end, grid.steps, np.asarray(finest["omega_dt"]))
+    return [_beside(row, unseen[i]) for row, i in zip(rows, experiment.ladder, strict=True)]
+
+
+def _beside(row: Extrapolated, part: Floats) -> Extrapolated:
+    """Add to the bounds of a scheme a part of the size of each state, shape (case,)."""
+    return replace(
+        row,
+        position_error=row.position_error + part * np.max(np.abs(row.position), axis=0),
+        velocity_error=row.velocity_error + part * np.max(np.abs(row.velocity), axis=0),
+    )
 
 
 def starts(

@@ -30,6 +30,7 @@ from vibsim.core.record import Variable, flags
 from vibsim.core.vocabulary import MEMBER
 from vibsim.experiment.value_names import VALUES
 from vibsim.models import Model
+from vibsim.models.events import Crossings, Impact
 from vibsim.observe import oscillation
 from vibsim.observe.member_block import MemberBlock
 
@@ -66,7 +67,7 @@ class _Ladder:
     even: Flags
     floor: Floats
     size: Floats  # that such a number has: of the solution, or of the number itself
-    missed: Floats  # what the points of the finest grid may miss of an extremum
+    missed: Floats  # what no level shows: of an extremum between points, of a corner of the force
     safety: Floats  # on the bound; NaN where none can be trusted
 
     def limit(self) -> Limit:
@@ -91,9 +92,9 @@ def _ladder(name: str, place: value_numbers.Place) -> _Ladder:
         if row.measured_by == "roots" and oscillation.has_recurrence(block, place.levels[-1]):
             relative = relative / np.minimum(block.omega_dt, 1.0) ** 2
         floor = np.broadcast_to(relative * size[..., None], values.shape)
-    missed = np.zeros(size.shape)
+    missed = block.unseen_at_corner() * size
     if row.measured_by == "points":
-        missed = _missed(block, values, floor, size)
+        missed = missed + _missed(name, place, values, floor, size)
     safety = np.full(size.shape, 1.0 if block.model.events is None else IRREGULAR)
     if row.needs_events:
         # an event on the mesh is late by an accident
@@ -107,17 +108,30 @@ def _stacked(rows: Sequence[_Ladder]) -> _Ladder:
     return _Ladder(rows[0].levels, *(np.stack([getattr(r, name) for r in rows]) for name in names))
 
 
-def _missed(block: MemberBlock, values: Floats, floor: Floats, size: Floats) -> Floats:
+def _missed(
+    name: str, place: value_numbers.Place, values: Floats, floor: Floats, size: Floats
+) -> Floats:
     """Return how much of an extremum lies between grid points: ``w^2 dt^2/8`` of its size at most.
 
-    How much differs from level to level by accident, which no extrapolation takes away. Nothing is missed where the
-    levels have the same number.
+    Where impacts change a velocity, a state turns without rest, and ``w dt`` may be missed. How much differs from level
+    to level by accident, which no extrapolation takes away. Nothing is missed where the levels have the same number,
+    unless it is that of a start from which the position moves on beyond it.
     """
-    p = np.minimum(block.omega_dt[:, -1], 1.0)
+    model, data, near = place.block.model, place.block.finest, ORDER_ABOVE_ROUND_OFF * floor
+    p = np.minimum(place.block.omega_dt[:, -1], 1.0)
     apart = np.abs(np.diff(values[..., -3:], axis=-1))
     with np.errstate(invalid="ignore"):
-        same = np.all(apart <= ORDER_ABOVE_ROUND_OFF * floor[..., -1:], axis=-1)
-    return np.where(same, 0.0, MISSED_EXTREMUM * p**2 * size)
+        same = np.all(apart <= near[..., -1:], axis=-1)
+        states = dict(zip(model.positions, model.velocities, strict=True))
+        speed = states.get(place.quantity, "")
+        if name in ("min", "max") and speed in data and place.quantity in data:
+            start, slope = (np.asarray(data[q][..., 0]) for q in (place.quantity, speed))
+            at_start = np.abs(values[..., -1] - start) <= near[..., -1]
+            same &= ~(at_start & (slope > 0.0 if name == "max" else slope < 0.0))
+    part = MISSED_EXTREMUM * p**2
+    if isinstance(model.events, Impact | Crossings):
+        part = np.where(place.block.eventless, part, p)
+    return np.where(same, 0.0, part * size)
 
 
 def _promised(name: str, place: value_numbers.Place) -> tuple[Floats, Flags]:

@@ -86,7 +86,8 @@ class Comparison:
         )
         if block.model.events is not None:
             bound = th.IRREGULAR * bound
-        return value, bound + ROUND_OFF_SAFETY * self.floor[..., -1:]
+        unseen = (block.unseen_at_corner() * self.scale)[..., None]
+        return value, bound + ROUND_OFF_SAFETY * self.floor[..., -1:] + unseen
 
     @property
     def largest_bound(self) -> Floats:

@@ -150,6 +150,10 @@ class MemberBlock:
         position = self.model.positions[self.model.velocities.index(plain)]
         return np.asarray(np.maximum(own, sizes[position] * rate))
 
+    def unseen_at_corner(self) -> Floats:
+        """Return which part of its size a quantity may be off by at a corner of the force, shape (s, c)."""
+        return self.corners.unseen(self.group.end, self.grid.steps, self.omega_dt[:, -1])
+
     def floor_of(self, name: str, size: Floats) -> Floats:
         """Return the predicted round-off of a quantity of a size, shape (s, c, l), or what its storing leaves of it.
 

@@ -97,8 +97,10 @@ def test_classes_of_convergence(values: tuple[float, ...], word: str) -> None:
     assert kind(*values) == word
 
 
-def test_gaps_between_levels_do_not_make_a_class() -> None:
-    u = [1 + 0.3 * 2.0**-level for level in (4, 5, 7)]
+@pytest.mark.parametrize("order", [0.5, 1.0])
+def test_gaps_between_levels_do_not_make_a_class(order: float) -> None:
+    """Of order 1/2 the difference of levels 5 and 7 is larger than that of 4 and 5."""
+    u = [1 + 0.3 * 2.0 ** (-order * level) for level in (4, 5, 7)]
     assert kind(*u, levels=(4, 5, 7)) == "monotone"
 
 
