@@ -16,8 +16,8 @@ A power *dominates* where no other one has more than a tenth of it. The table of
 | anything else | INCONCLUSIVE ``pre_asymptotic`` |
 
 *Surely* is a probability above ``1 - RISK``. Where it rests on three levels and coarser ones do not fit them, it is one
-above ``1 - RISK_OF_THREE`` for a FAIL, and for a PASS that theory promises and no exact solution confirms: three levels
-may fall like a power by accident, and what theory promises must not decide alone.
+above ``1 - RISK_OF_THREE`` for a FAIL, and for a PASS that no exact solution confirms: three levels may fall like a
+power by accident.
 
 Noise that is predicted to grow may not do so. Where it ends the window, and the finest differences show that it may be
 far less, the ladder is judged with less noise as well (`_with_less_noise`). Then a verdict is sure that is sure with
@@ -131,7 +131,7 @@ class _Evaluation:
     exact: Flags
     away: Flags  # only noise, and not the exact solution
     by_three: Flags  # whether three levels decide behind others that do not fit
-    by_theory: bool  # whether theory promises the expected order, and no exact solution is known
+    is_confirmed: bool  # whether an exact solution is known
     cut_short: Flags  # whether noise that may be far less than predicted ends the window: nothing is decided
 
     def some(self, rows: Integers) -> _Evaluation:
@@ -182,8 +182,7 @@ def _evaluate(ladder: Ladder, question: Question, left_out: float) -> _Evaluatio
         noise = question.noise_factor * ladder.floor[:, -1]
         away = exact & (np.sqrt(ladder.gram[:, -1, -1]) > noise)
     by_three, cut_short = rests_on_three(believed), _is_cut_short(ladder, believed)
-    by_theory = question.by_theory and not ladder.exact_known
-    return _Evaluation(believed, of_sides, exact, away, by_three, by_theory, cut_short)
+    return _Evaluation(believed, of_sides, exact, away, by_three, ladder.exact_known, cut_short)
 
 
 def _is_sure(ladder: Ladder, found: _Evaluation, question: Question) -> Flags:
@@ -210,7 +209,7 @@ def _is_sure(ladder: Ladder, found: _Evaluation, question: Question) -> Flags:
     if window.shape[1] > 1:
         margins.append(window[:, -1] - window[:, -2])
     sure: Flags = np.all(np.abs(margins) > ROUGHLY, axis=0) & ~found.cut_short
-    sure &= ~((fails | found.by_theory) & found.by_three)
+    sure &= ~(found.by_three & (fails | (not found.is_confirmed)))
     if ladder.exact_known:
         open_still = np.flatnonzero(sure & ~_meets(ladder, p))
         if len(open_still):
@@ -277,7 +276,7 @@ def _reasons(found: _Evaluation, missed: Flags) -> Codes:
     cases = [
         (missed, "wrong_limit"),
         (found.exact, "exact"),
-        ((right > 1.0 - (risk if found.by_theory else RISK)) & ~found.cut_short, "asymptotic"),
+        ((right > 1.0 - (RISK if found.is_confirmed else risk)) & ~found.cut_short, "asymptotic"),
         (another & (lower > higher), "order_low"),
         (another, "order_high"),
         (p.noise > np.maximum(1.0 - p.noise - p.alternating, p.alternating), "round_off"),
