@@ -101,6 +101,20 @@ def test_a_jump_of_the_force_that_no_level_shows_is_part_of_every_bound() -> Non
     assert best(record, "u_end")[1] < 1e-5
 
 
+def test_a_jump_behind_a_corner_of_the_force_is_part_of_the_bound() -> None:
+    """The corner, at u = 0.2, comes first and leaves less; the reference has the end."""
+    model = {
+        "kind": "oscillator",
+        "spring": "u + max(u - 0.2, 0)",
+        "force": "heaviside(t - 4.9269)",
+    }
+    data = {"model": model, "initial": {"u": 0.5, "v": 0.2}, "time": {"end": 7.5}}
+    experiment, record = analysed(**data, levels=[6, 7, 8], schemes=["gauss4"])
+    exact = float(simulate_record(experiment, 8)["u_exact"][0, -1])
+    value, bound = best(record, "u_end")
+    assert 1e-3 < abs(value - exact) <= bound < 0.05
+
+
 def test_a_jump_of_the_force_that_no_level_shows_is_part_of_the_bound_of_the_best_solution() -> (
     None
 ):

@@ -281,6 +281,17 @@ def test_no_parameters_keep_a_run_from_its_end(kind, events):
             assert good == 6
 
 
+@pytest.mark.parametrize("near", [0.0, 0.3])
+def test_on_the_mesh_a_ball_bounces_at_the_first_point_below_the_height_that_is_near(near):
+    """B, section 10.9. Free flight is exact: h = 1 - t^2/2."""
+    numbers = {"g": 1.0, "restitution": 0.5, "eps_h": near}, (1.0, 0.0), 2.0, 40
+    run = runs_of.run(BALL, "rk4", *numbers, events="mesh")
+    t = 0.05 * np.arange(41)
+    first = np.flatnonzero(1.0 - t**2 / 2.0 < near)[0]
+    assert run.events.first_event_time[0] == pytest.approx(t[first], abs=1e-12)
+    assert run.velocity[0, first] == pytest.approx(0.5 * t[first], rel=1e-12)
+
+
 def test_a_box_at_the_edge_of_sticking_sticks_and_one_beyond_it_does_not():
     edge = 0.25
     for u, moves in ((edge, False), (-edge, False), (math.nextafter(edge, 1.0), True)):

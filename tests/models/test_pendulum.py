@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from vibsim import Experiment
+from vibsim import Experiment, simulate
 from vibsim.models import MODELS
 from vibsim.models.shared.elliptic import agm_quarter_period, carlson_rf, jacobi
 
@@ -195,3 +195,13 @@ def test_the_periods_of_the_centred_scheme_are_those_of_its_modified_energy(clai
     with mpmath.workdps(30):
         wanted = period((mpmath.mpf(50) / steps) ** 2) / period(mpmath.mpf(0)) - 1
     assert check.that.equals == pytest.approx(float(wanted), rel=2e-3)
+
+
+@pytest.mark.parametrize("omega", [2.4, -2.4])
+def test_the_period_over_the_top_is_that_between_passes_of_the_top(omega):
+    """The acceleration vanishes there, so the interpolated times are as accurate as dt^3."""
+    start = {"theta": math.copysign(0.3, omega), "omega": omega}
+    made = {"title": "t", "model": {"kind": "pendulum"}, "initial": start, "schemes": ["rk4"]}
+    experiment = Experiment.from_dict({**made, "time": {"end": 23.0}, "levels": [10]})
+    data = simulate(experiment, 10)
+    assert float(data.period.squeeze()) == pytest.approx(float(data.exact_period[0]), abs=2e-7)

@@ -50,6 +50,9 @@ class Corners:
     time: Floats
     switch: Integers
     """Index into `switches_of`, -1 for none."""
+    least: Floats
+    """The lowest power that any corner within a step leaves, at its first passage."""
+    least_time: Floats
 
     def unseen(self, end: Floats, steps: Sequence[int], omega_dt: Floats) -> Floats:
         """Return which part of its size a quantity may be off by at a jump or corner of the force, (scheme, case).
@@ -62,12 +65,11 @@ class Corners:
         end, omega_dt
             The end of every member, and w dt of the finest level, shape (case,).
         steps
-            Of every level, the coarsest first.
+            Of every level, the finest last.
         """
         with np.errstate(invalid="ignore", divide="ignore"):
-            inside = ~is_on_a_point(self.time, end / steps[0]) & (self.power <= ROUGH)
-            part = np.fmax(omega_dt, end / steps[-1] / (end - self.time))
-            return np.where(inside, np.minimum(part, 1.0) ** self.power, 0.0)
+            part = np.fmax(omega_dt, end / steps[-1] / (end - self.least_time))
+            return np.where(self.least <= ROUGH, np.minimum(part, 1.0) ** self.least, 0.0)
 
 
 @cache
@@ -103,7 +105,7 @@ def corners_of(model: Model, finest: Record, group: Members, dt: Floats) -> Corn
     _, schemes, cases, samples = states.shape
     none = np.full((schemes, cases), np.nan)
     if not switches_of(model) or samples < 2:
-        return Corners(none, none, np.full(none.shape, -1))
+        return Corners(none, none, np.full(none.shape, -1), none, none)
     number = np.arange(samples) * int(np.asarray(finest.attrs["every"]).item())
     t = number * (group.end / int(np.asarray(finest.attrs["steps"]).item()))[:, None]
     numbers = {row.name: group.parameters[row.key] for row in model.parameters}
@@ -111,8 +113,10 @@ def corners_of(model: Model, finest: Record, group: Members, dt: Floats) -> Corn
     with np.errstate(all="ignore"):
         changed = _has_event(finest, t, schemes)
         rows = [_of_scheme(held, states[:, k], t, numbers, dt, changed[k]) for k in range(schemes)]
-    power, time, switch = (np.stack(column) for column in zip(*rows, strict=True))
-    return Corners(power, time, switch)
+    power, time, switch, least, least_time = (
+        np.stack(column) for column in zip(*rows, strict=True)
+    )
+    return Corners(power, time, switch, least, least_time)
 
 
 def _has_event(finest: Record, t: Floats, schemes: int) -> Flags:
@@ -136,8 +140,8 @@ def _of_scheme(
     numbers: Mapping[str, Floats],
     dt: Floats,
     has_event: Flags,
-) -> tuple[Floats, Floats, Integers]:
-    """Return power, time and switch of the first corner of every member, each of shape (case,)."""
+) -> tuple[Floats, Floats, Integers, Floats, Floats]:
+    """Return what `Corners` holds of every member, each of shape (case,)."""
     cases, samples = t.shape
     u, v = np.split(states.reshape(len(states), -1), 2)
     q, modes = held.modes(u, v, t.ravel())
@@ -180,7 +184,14 @@ def _of_scheme(
     on_point = first(np.where(passed & of_time & ~is_within, at, np.inf))
     is_first = (on_point[0] == 1.0) & ~(within[1] <= on_point[1])
     power, time, switch = (np.where(is_first, *pair) for pair in zip(on_point, within, strict=True))
-    return power, time, np.asarray(switch, dtype=np.int64)
+    # of every switch, its first passage
+    single = np.eye(len(q), dtype=bool)[:, :, None, None]
+    each = [first(np.where(passed & is_within & one, at, np.inf)) for one in single]
+    powers, times = (np.stack([row[k] for row in each]) for k in (0, 1))
+    own = np.arange(cases)
+    which = np.argmin(np.where(np.isnan(powers), np.inf, powers), axis=0)
+    least, least_time = powers[which, own], times[which, own]
+    return power, time, np.asarray(switch, dtype=np.int64), least, least_time
 
 
 def is_on_a_point(t: Floats, dt: Floats) -> Flags:
