@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import sys
 from itertools import pairwise
 from pathlib import Path
 from threading import Lock
@@ -118,3 +119,26 @@ def test_the_log_of_an_executor_is_named_where_there_is_one(tmp_path: Path) -> N
     (tmp_path / "7.log").touch()
     (failure,) = outcome.failed_jobs([job], [], tmp_path)
     assert failure["tail"] == ["lost", f"log of the executor: {tmp_path}/7.log"]
+
+
+def test_a_group_that_slurm_does_not_take_fails_with_the_reason(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    told: list[str] = []
+
+    class Executor:
+        def run_job(self, job: Any) -> None:
+            try:
+                raise ValueError("invalid account")
+            except ValueError:
+                # as the executor for SLURM does, though a group has no rule
+                print(job.rule.name)
+
+        def report_job_error(self, info: Any, msg: str) -> None:
+            told.append(f"{info.job.name}: {msg}")
+
+    plug_in = SimpleNamespace(Executor=Executor)
+    monkeypatch.setitem(sys.modules, "snakemake_executor_plugin_slurm", plug_in)
+    remote.report_submissions()
+    Executor().run_job(SimpleNamespace(name="simulate"))
+    assert told == ["simulate: it could not be submitted: invalid account"]

@@ -11,6 +11,7 @@ Why a job failed is lost in Snakemake where it is one of a group; here each of t
 from __future__ import annotations
 
 import asyncio
+import sys
 import time
 from collections.abc import Sequence
 from statistics import mean
@@ -18,6 +19,7 @@ from typing import Any
 
 from snakemake_interface_executor_plugins.executors.base import SubmittedJobInfo
 from snakemake_interface_executor_plugins.executors.remote import RemoteExecutor
+from snakemake_interface_executor_plugins.jobs import JobExecutorInterface
 
 SHARE = 0.2
 """Pause over the mean age of the jobs."""
@@ -62,3 +64,23 @@ def tell_reasons() -> None:
             job.log_error(msg, **more)
 
     RemoteExecutor.print_job_error = print_job_error
+
+
+def report_submissions() -> None:
+    """Have a group of jobs that SLURM does not take fail with the reason.
+
+    The executor for SLURM stumbles over its own message there, in a thread that nobody asks, and waits for ever.
+    """
+    module = sys.modules.get("snakemake_executor_plugin_slurm")
+    if module is None:
+        return
+    submit = module.Executor.run_job
+
+    def run_job(self: RemoteExecutor, job: JobExecutorInterface) -> None:
+        try:
+            submit(self, job)
+        except Exception as error:
+            why = error.__context__ or error
+            self.report_job_error(SubmittedJobInfo(job), msg=f"it could not be submitted: {why}")
+
+    module.Executor.run_job = run_job

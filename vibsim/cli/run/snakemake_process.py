@@ -75,6 +75,7 @@ def main() -> None:
         ExecutorPluginRegistry()
         remote.ask_by_age()
         remote.tell_reasons()
+        remote.report_submissions()
     else:
         ExecutorPluginRegistry.module_prefix = "none of them"
     # It starts in half the time without what no run of vibsim uses: numbers of NumPy in a profile, addresses in the
