@@ -92,7 +92,7 @@ def _ladder(name: str, place: value_numbers.Place) -> _Ladder:
         if row.measured_by == "roots" and oscillation.has_recurrence(block, place.levels[-1]):
             relative = relative / np.minimum(block.omega_dt, 1.0) ** 2
         floor = np.broadcast_to(relative * size[..., None], values.shape)
-    missed = block.unseen_at_corner() * size
+    missed = block.unseen_at_corner(size)
     if row.measured_by == "points":
         missed = missed + _missed(name, place, values, floor, size)
     safety = np.full(size.shape, 1.0 if block.model.events is None else IRREGULAR)

@@ -86,7 +86,7 @@ class Comparison:
         )
         if block.model.events is not None:
             bound = th.IRREGULAR * bound
-        unseen = (block.unseen_at_corner() * self.scale)[..., None]
+        unseen = block.unseen_at_corner(self.scale)[..., None]
         return value, bound + ROUND_OFF_SAFETY * self.floor[..., -1:] + unseen
 
     @property

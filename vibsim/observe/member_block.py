@@ -150,9 +150,10 @@ class MemberBlock:
         position = self.model.positions[self.model.velocities.index(plain)]
         return np.asarray(np.maximum(own, sizes[position] * rate))
 
-    def unseen_at_corner(self) -> Floats:
-        """Return which part of its size a quantity may be off by at a corner of the force, shape (s, c)."""
-        return self.corners.unseen(self.group.end, self.grid.steps, self.omega_dt[:, -1])
+    def unseen_at_corner(self, size: Floats) -> Floats:
+        """Return how far a quantity of a size may be off at a corner of the force, shape (s, c); 0 without a corner."""
+        part = self.corners.unseen(self.group.end, self.grid.steps, self.omega_dt[:, -1])
+        return np.multiply(part, size, out=np.zeros(self.shape), where=part > 0.0)
 
     def floor_of(self, name: str, size: Floats) -> Floats:
         """Return the predicted round-off of a quantity of a size, shape (s, c, l), or what its storing leaves of it.
