@@ -49,7 +49,7 @@ def scheduler(folder: Path, *, loses: bool = False) -> list[str]:
     return [*options, "--seconds-between-status-checks", "1"]
 
 
-@pytest.mark.parametrize("here", [20, 0])
+@pytest.mark.parametrize("here", [20, pytest.param(0, marks=pytest.mark.slow)])
 def test_jobs_of_a_scheduler_give_the_same_bytes(place: Place, tmp_path: Path, here: int) -> None:
     wanted = place.content()
     other = Place(place.folder, elsewhere=tmp_path / "shared results")
