@@ -7,6 +7,7 @@ import json
 import os
 import shutil
 import signal
+import subprocess
 import time
 from dataclasses import dataclass
 from pathlib import Path
@@ -335,45 +336,44 @@ def test_a_program_that_is_not_there_is_named(study: Study) -> None:
     assert "./no_such_program: the program cannot be started (No such file or dir" in error
 
 
-def test_a_function_that_raises_is_named_with_its_traceback(
-    study: Study, capfd: pytest.CaptureFixture[str]
-) -> None:
-    module = study.folder / "my files/raises_in_a_module.py"
-    module.write_text("def solve(h, rate=1):\n    raise ArithmeticError('no step')\n")
-    study.write("raises", FUNCTION.replace("solver_in_a", "raises_in_a"))
-    ended = here(
-        "simulate",
-        study.file("raises"),
-        "--level",
-        1,
-        "--results",
-        study.results,
-        "--allow-commands",
-    )
+def made_by(study: Study, module: str, text: str) -> subprocess.CompletedProcess[str]:
+    """Make a level by a function of a module with this text."""
+    (study.folder / f"my files/{module}.py").write_text(text)
+    study.write(module, FUNCTION.replace("solver_in_a_module", module))
+    options = ("--level", 1, "--results", study.results, "--allow-commands")
+    return here("simulate", study.file(module), *options)
+
+
+def test_a_function_that_raises_is_named_with_its_traceback(study: Study) -> None:
+    text = "def solve(h, rate=1):\n    raise ArithmeticError('no step')\n"
+    ended = made_by(study, "raises_in_a_module", text)
     assert ended.returncode == 1
     assert ended.stderr.endswith("raises_in_a_module:solve raised ArithmeticError: no step\n")
     assert "Traceback" in ended.stdout
 
 
-def test_a_function_that_is_not_there_is_named_with_the_nearest(study: Study) -> None:
-    module = study.folder / "my files/has_another.py"
-    module.write_text("def solved(h, rate=1):\n    return None\n")
-    study.write("misspelt", FUNCTION.replace("solver_in_a_module", "has_another"))
-    options = ("--level", 1, "--results", study.results, "--allow-commands")
-    ended = here("simulate", study.file("misspelt"), *options)
+@pytest.mark.parametrize(
+    ("module", "text", "told"),
+    [
+        (
+            "has_another",
+            "def solved(h, rate=1):\n    return None\n",
+            "has_another has no function solve: did you mean 'solved'?\n",
+        ),
+        (
+            "writes_a_file",
+            "def solve(h, output):\n    return None\n",
+            "writes_a_file:solve is called with h, but takes (h, output) (missing a required argument: "
+            "'output'): it gets sizes and parameters by name, and returns an xarray.Dataset\n",
+        ),
+    ],
+)
+def test_a_function_that_cannot_be_called_is_told_without_a_traceback(
+    study: Study, module: str, text: str, told: str
+) -> None:
+    ended = made_by(study, module, text)
     assert ended.returncode == 1
-    assert ended.stderr.endswith("has_another has no function solve: did you mean 'solved'?\n")
-    assert "Traceback" not in ended.stdout
-
-
-def test_a_function_with_other_arguments_is_told_what_it_is_called_with(study: Study) -> None:
-    module = study.folder / "my files/writes_a_file.py"
-    module.write_text("def solve(h, output):\n    return None\n")
-    study.write("writes", FUNCTION.replace("solver_in_a_module", "writes_a_file"))
-    options = ("--level", 1, "--results", study.results, "--allow-commands")
-    ended = here("simulate", study.file("writes"), *options)
-    assert ended.returncode == 1
-    assert "is called with h, but takes (h, output) (missing a required argument" in ended.stderr
+    assert ended.stderr.endswith(told)
     assert "Traceback" not in ended.stdout
 
 

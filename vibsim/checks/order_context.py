@@ -49,9 +49,6 @@ class Corner(NamedTuple):
 class OrderContext:
     """What a sentence on a convergence verdict needs to know; numbers are NaN, levels -1 where they are not known."""
 
-    parts_at = parting_rate = math.nan
-    """When the finest levels of a chaotic motion part, and how fast."""
-
     def __init__(self, f: Found, check: ConvergesCheck) -> None:
         experiment, record, scheme, case = f.experiment, f.record, f.scheme, f.case
         model, quantity, columns = f.model, check.converges, columns_of(record)
@@ -131,6 +128,7 @@ class OrderContext:
         self.shortest = record.step(-1, case)
         self.parts_at = float(f.fact("parting_time"))
         self.parting_rate = float(f.fact("parting_rate"))
+        """When the finest levels of a chaotic motion part, and how fast."""
         self.end = self.shortest * experiment.steps(self.levels[-1])
 
     @property

@@ -207,6 +207,7 @@ def story(**changes: Any) -> _Phrases:
         "pulse": (1.3, 1e-4),
         "shortest": 0.1,
         "decay": 1e3,
+        "parts_at": math.nan,
         "special": math.nan,
         "centred": math.nan,
         "has_promise": True,
