@@ -106,6 +106,9 @@ def numbers(text):
     return [float(number) for number in re.findall(r"-?\d+(?:\.\d+)?", text)]
 
 
+# A browser that is not told the encoding guesses it from as much of the file as it has read.
+HEAD = '<!DOCTYPE html><meta charset="utf-8"><title></title>'
+
 GO = """
 <script>
 const slider = document.querySelector(".player input");
@@ -124,7 +127,7 @@ def test_the_script_draws_what_the_still_picture_draws(tmp_path, name):
     lanes = player.lanes(exp, record)
     path, frame = tmp_path / "page.html", 37
     go = GO.replace("FRAME", str(frame))
-    path.write_text(f"<!DOCTYPE html><body>{player.element(exp, record)}{go}</body>")
+    path.write_text(f"{HEAD}<body>{player.element(exp, record)}{go}</body>", encoding="utf-8")
     page = shown(path)
     found = paths(page)
     assert len(found) == len(lanes)
@@ -176,7 +179,7 @@ const wait = setInterval(() => {
 def test_the_player_plays_pauses_and_steps_by_keys(tmp_path):
     exp, record = made()
     text, path = player.element(exp, record), tmp_path / "page.html"
-    path.write_text(f"<!DOCTYPE html><head><title></title>{CLOCK}</head><body>{text}{KEYS}</body>")
+    path.write_text(f"{HEAD}{CLOCK}<body>{text}{KEYS}</body>", encoding="utf-8")
     told = re.search(r"<title>([^<]*)</title>", shown(path, wait=6000))
     assert told is not None
     on, back, last, first, played, is_paused = told.group(1).split()

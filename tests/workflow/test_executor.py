@@ -35,15 +35,21 @@ if kill -0 "$1" 2> /dev/null; then echo running; else echo success; fi""",
 }
 
 
-def scheduler(folder: Path, *, loses: bool = False) -> list[str]:
-    """Return the options of a run whose jobs go to a scheduler in `folder`, which may lose the first one."""
+def scheduler(folder: Path, *, loses: bool = False, answers_after: int = 0) -> list[str]:
+    """Return the options of a run whose jobs go to a scheduler in `folder`.
+
+    It may lose the first job, and may answer questions after some seconds.
+    """
     folder.mkdir()
     if not loses:
         (folder / "lost").touch()
     options = ["--executor", "cluster-generic", "--jobs", "4", "--"]
     for name, text in SCRIPTS.items():
         script = folder / name
-        script.write_text(f"#!/bin/sh\ncd {quote(str(folder))}\necho >> {name}.calls\n{text}\n")
+        wait = f"sleep {answers_after}\n" if name == "status" else ""
+        script.write_text(
+            f"#!/bin/sh\ncd {quote(str(folder))}\necho >> {name}.calls\n{wait}{text}\n"
+        )
         script.chmod(0o755)
         options += [f"--cluster-generic-{name}-cmd", str(script)]
     return [*options, "--seconds-between-status-checks", "1"]
@@ -75,17 +81,24 @@ def test_jobs_of_a_scheduler_give_the_same_bytes(place: Place, tmp_path: Path, h
 
 
 @pytest.mark.slow
-def test_an_interrupt_cancels_what_was_submitted(place: Place, tmp_path: Path) -> None:
+@pytest.mark.parametrize("is_asking", [False, True])
+def test_an_interrupt_cancels_what_was_submitted(
+    place: Place, tmp_path: Path, is_asking: bool
+) -> None:
     change(place.file, "[6, 7, 8, 9]", "[27, 28]")
     change(place.file, "schemes:", "samples: common\nschemes:")
     results = tmp_path / "results"
     command = [sys.executable, "-m", "vibsim", "run", str(place.file), "--results", str(results)]
-    command += scheduler(tmp_path / "scheduler")
+    command += scheduler(tmp_path / "scheduler", answers_after=5 if is_asking else 0)
+    asked = tmp_path / "scheduler/status.calls"
     with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as process:
         deadline = time.monotonic() + 60
         while not computing(results) and time.monotonic() < deadline:
             time.sleep(0.1)
         assert computing(results)
+        while is_asking and not asked.exists() and time.monotonic() < deadline:
+            time.sleep(0.1)
+        assert asked.exists() or not is_asking
         process.send_signal(signal.SIGTERM)
         _, told = process.communicate(timeout=60)
     assert process.returncode == 128 + signal.SIGTERM

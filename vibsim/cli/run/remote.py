@@ -6,6 +6,8 @@ and with nothing else. A job is missed for a fifth of its time at most, and a sc
 jobs that take long.
 
 Why a job failed is lost in Snakemake where it is one of a group; here each of the group is told with the reason.
+
+An interrupt cancels all jobs under way. The interface of Snakemake leaves out those whose states it is just asking for.
 """
 
 from __future__ import annotations
@@ -50,6 +52,42 @@ def ask_by_age() -> None:
         await asyncio.sleep(pause([now - then for then in first.values()], shortest))
 
     RemoteExecutor.sleep = sleep
+
+
+def cancel_all() -> None:
+    """Have an interrupt cancel every job that was submitted and has not ended, as far as is known.
+
+    Jobs are no longer in the list of `RemoteExecutor` while it asks for their states.
+    """
+    under_way: dict[JobExecutorInterface, SubmittedJobInfo] = {}
+    submitted = RemoteExecutor.report_job_submission
+    succeeded, failed = RemoteExecutor.report_job_success, RemoteExecutor.report_job_error
+
+    def report_job_submission(
+        self: RemoteExecutor, job_info: SubmittedJobInfo, *args: Any, **more: Any
+    ) -> None:
+        under_way[job_info.job] = job_info
+        submitted(self, job_info, *args, **more)
+
+    def report_job_success(self: RemoteExecutor, job_info: SubmittedJobInfo) -> None:
+        under_way.pop(job_info.job, None)
+        succeeded(self, job_info)
+
+    def report_job_error(
+        self: RemoteExecutor, job_info: SubmittedJobInfo, *args: Any, **more: Any
+    ) -> None:
+        under_way.pop(job_info.job, None)
+        failed(self, job_info, *args, **more)
+
+    def cancel(self: RemoteExecutor) -> None:
+        if jobs := list(under_way.values()):
+            self.cancel_jobs(jobs)
+        self.shutdown()
+
+    RemoteExecutor.report_job_submission = report_job_submission
+    RemoteExecutor.report_job_success = report_job_success
+    RemoteExecutor.report_job_error = report_job_error
+    RemoteExecutor.cancel = cancel
 
 
 def tell_reasons() -> None:

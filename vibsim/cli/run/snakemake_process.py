@@ -74,6 +74,7 @@ def main() -> None:
     if where == "remote":
         ExecutorPluginRegistry()
         remote.ask_by_age()
+        remote.cancel_all()
         remote.tell_reasons()
         remote.report_submissions()
     else:
