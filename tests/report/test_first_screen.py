@@ -286,11 +286,15 @@ def test_a_large_number_is_not_rounded_before_its_point():
     assert cards.card(exp, record, summary["checks"][0])["got"] == "66996 s"
 
 
-def test_an_order_beside_the_band_whose_interval_reaches_it_counts_as_kept(monkeypatch):
+def test_an_order_beside_the_band_whose_interval_reaches_it_is_told_as_such(monkeypatch):
     exp = samples.experiment(sweep={"initial.theta": [0.5, 1.0]}, checks=[{"converges": "theta"}])
     record, _, decisive = found(exp)
-    for low, title in (2.05, "All members keep"), (2.15, "1 of 2 members have"):
-        ends = (np.array([row]) for row in ([2.0, 2.3], [2.0, low], [2.0, 2.3]))
+    for order, low, title in (
+        (2.05, 2.0, "All members keep"),
+        (2.3, 2.05, "All intervals reach the band"),
+        (2.3, 2.15, "1 of 2 members have"),
+    ):
+        ends = (np.array([row]) for row in ([2.0, order], [2.0, low], [2.0, order]))
         monkeypatch.setattr(drawn.finest_level, "orders", lambda *_, ends=tuple(ends): ends)
         with style.applied():
             assert drawn.orders(exp, record, decisive).title.startswith(title)
@@ -304,12 +308,16 @@ def test_an_order_that_its_scheme_promises_is_not_said_to_be_less_than_that():
     assert "promises here, which is lower than the expected one" in shown["meaning"]
 
 
-def test_the_promised_slope_goes_no_further_than_the_errors():
-    dt, errors = 0.5 ** np.arange(5), np.array([1e-9, 3e-9, 1e-9, 4e-9, 8e-9])
+def test_the_promised_slope_goes_no_further_than_the_errors_and_needs_two_levels():
+    dt, errors = 0.5 ** np.arange(5), np.array([8e-9, 4e-9, 1e-9, 3e-9, 1e-9])
     with style.applied():
         ax = style.canvas(2.0).add_subplot()
         drawn._slope(ax, dt, errors, 2.0, "promised")
-    assert np.nanmax(ax.lines[0].get_ydata()) <= 2.0 * errors.max()
+        (line,) = ax.lines
+        assert np.nanmax(line.get_ydata()) <= 2.0 * errors.max()
+        line.remove()
+        drawn._slope(ax, dt, errors[::-1], 2.0, "promised")
+        assert not ax.lines
 
 
 def test_a_quantity_with_a_long_name_is_told_in_words_and_leaves_the_legend_small():

@@ -228,9 +228,9 @@ def _slope(ax: Axes, dt: Floats, error: Floats, order: float, due: str) -> None:
         line = error[last] * (dt / dt[last]) ** order
         # no further than the errors, above which the legend stands
         line[line > 2.0 * float(np.nanmax(error))] = np.nan
-        ax.plot(
-            dt, line, **style.REFERENCE | {"color": style.GREY}, label=f"order {order:g}, {due}"
-        )
+        if style.finite(line).size > 1:
+            look = style.REFERENCE | {"color": style.GREY}
+            ax.plot(dt, line, **look, label=f"order {order:g}, {due}")
 
 
 def response(experiment: Experiment, record: Record, lead: Lead) -> Picture | None:
@@ -403,10 +403,13 @@ def orders(experiment: Experiment, record: Record, lead: Lead) -> Picture | None
     counts = (inside.sum(), order.size, np.sum(~known))
     kept, every, missing = (words.number(int(count), "integer") for count in counts)
     title = f"{kept} of {every} members have an order in the band"
+    if inside.all():
+        measured = np.abs(order - promised) <= allowed
+        title = "All members keep their order" if measured.all() else "All intervals reach the band"
     bars = "" if order.size > FEW else "; the bars are the intervals of the orders"
     return Picture(
         "hero_orders",
-        "All members keep their order" if inside.all() else title,
+        title,
         f"The band is what the tolerance allows around the promised order{bars}."
         + f" {missing} members have no order and are left out." * (not known.all()),
         f"Observed orders of {words.name(quantity)} of all members",
