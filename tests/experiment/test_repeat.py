@@ -98,3 +98,36 @@ def test_of_a_faulty_index_nothing_else_is_told():
 def test_braces_without_repeat_are_no_formula():
     with pytest.raises(InputError, match="is not allowed in a formula"):
         Experiment.from_dict(content({"acceleration": "-u{i}"}))
+
+
+FAULTY = """\
+title: t
+model:
+  kind: system
+  repeat: {i: [1, 12]}
+  coordinates: ["q{i}"]
+  acceleration:
+    q{i}: p{i+1} - 2*q{i} + q{i-1}
+  potential:
+    - (q{i} - q{i-1})**2/2 + alpa*q{i}
+    - (q14 - q12)**2/2
+  parameters: {q0: 0, q13: 0}
+time: {end: 1}
+levels: [4, 5, 6]
+schemes: [rk4]
+"""
+
+
+def test_a_fault_of_a_repeated_formula_is_told_once_with_its_line(tmp_path):
+    path = tmp_path / "chain.yaml"
+    path.write_text(FAULTY)
+    with pytest.raises(InputError) as caught:
+        Experiment.from_yaml(path)
+    told = [(fault.line, fault.key, fault.rule[:18]) for fault in caught.value.faults]
+    assert told == [
+        (7, "model.acceleration.q1", "unknown name 'p2' "),
+        (9, "model.potential[0]", "unknown name 'alpa"),
+        (10, "model.potential[1]", "unknown name 'q14'"),
+    ]
+    # the character that is named is one of what is written out
+    assert caught.value.faults[0].value == "p2 - 2*q1 + q0"

@@ -72,6 +72,8 @@ class Report:
         """What is allowed, and probably not meant."""
         self.faulty: set[Path_] = set()
         """Places of malformed values; nothing more is said about them."""
+        self._repeated: set[Path_] = set()
+        """Places with an index of `repeat`; a fault is told for the first of its values."""
 
     def add(
         self, path: Path_, rule: str, hint: str = "", value: object = None, at_key: bool = False
@@ -80,8 +82,11 @@ class Report:
 
         InputError where there are `MAX_FAULTS` already: nobody reads more of them.
         """
-        if path in self.faulty:
+        origin = self.source.origin(path)
+        if path in self.faulty or origin in self._repeated:
             return
+        if origin is not None:
+            self._repeated.add(origin)
         self.faults.add(self._fault(path, rule, hint, value, at_key))
         if len(self.faults) == MAX_FAULTS:
             self.faults.add(Fault(self.source.file, 0, "", "", "has more faults than are listed"))
@@ -100,8 +105,12 @@ class Report:
         file, line = self._above(path)
         if place and not (at_key or nested or place.setting):
             line = place.line
-        written = place.text if place and place.text else "" if value is None else str(value)
-        return Fault(file, line, dotted(path), shorten(written), rule, hint)
+        written, origin = "" if value is None else str(value), self.source.origin(path)
+        if place and place.text and not (written and origin):
+            written = place.text
+        # the positions of a list are those of the file
+        shown = origin if origin and isinstance(origin[-1], int) else path
+        return Fault(file, line, dotted(shown), shorten(written), rule, hint)
 
     def add_malformed(
         self, path: Path_, rule: str, hint: str = "", value: object = None, at_key: bool = False

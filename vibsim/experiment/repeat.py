@@ -26,7 +26,10 @@ _BRACE = re.compile(r"[{}]")
 
 
 def with_repeats(source: Source, report: Report) -> Source:
-    """Return the content with every repeated key written out; what is wrong with an index is noted."""
+    """Return the content with every repeated key written out, of which `report` then speaks.
+
+    What is wrong with an index is noted.
+    """
     data = source.data
     section = data.get("model") if isinstance(data, Mapping) else None
     if not isinstance(section, Mapping) or section.get(REPEAT) is None:
@@ -44,10 +47,11 @@ def with_repeats(source: Source, report: Report) -> Source:
         return source
     writer = _Writer(indices, report)
     model = {key: value for key, value in section.items() if key != REPEAT}
-    found = {**data, "model": writer.mapping(("model",), model)}
+    found = {**data, "model": writer.mapping(("model",), model, ("model",))}
     if isinstance(data.get("initial"), Mapping):
-        found["initial"] = writer.mapping(("initial",), data["initial"])
-    return replace(source, data=found)
+        found["initial"] = writer.mapping(("initial",), data["initial"], ("initial",))
+    report.source = replace(source, data=found, origins=writer.origins)
+    return report.source
 
 
 def _indices(written: Any, report: Report) -> dict[str, range]:
@@ -82,27 +86,35 @@ class _Writer:
 
     def __init__(self, indices: Mapping[str, range], report: Report) -> None:
         self.indices, self.report = indices, report
+        self.origins: dict[Path_, Path_] = {}
+        """Where what was written out stands in the file."""
 
-    def mapping(self, path: Path_, written: Mapping[str, Any]) -> dict[str, Any]:
-        """Return a mapping with its keys written out, in their order; those without an index take precedence."""
+    def mapping(self, path: Path_, written: Mapping[str, Any], out: Path_) -> dict[str, Any]:
+        """Return a mapping with its keys written out, in their order; those without an index take precedence.
+
+        It stands at `path` in the file, and at `out` in what is written out.
+        """
         found: dict[str, Any] = {}
         for key, value in written.items():
             for values in self._values(str(key)):
                 own = self._put((*path, key), str(key), values)
                 if own == key or own not in written:
-                    found[own] = self._value((*path, key), value, values)
+                    if values:
+                        self.origins[*out, own] = (*path, key)
+                    found[own] = self._value((*path, key), value, values, (*out, own))
         return found
 
-    def _value(self, path: Path_, value: Any, values: Mapping[str, int]) -> Any:
+    def _value(self, path: Path_, value: Any, values: Mapping[str, int], out: Path_) -> Any:
         if isinstance(value, Mapping):
-            return self.mapping(path, value)
-        if isinstance(value, list | tuple):
-            return [
-                self._put((*path, i), item, own) if isinstance(item, str) else item
-                for i, item in enumerate(value)
-                for own in (self._values(item) if isinstance(item, str) else [{}])
-            ]
-        return self._put(path, value, values) if isinstance(value, str) else value
+            return self.mapping(path, value, out)
+        if not isinstance(value, list | tuple):
+            return self._put(path, value, values) if isinstance(value, str) else value
+        found: list[Any] = []
+        for i, item in enumerate(value):
+            for own in self._values(item) if isinstance(item, str) else [{}]:
+                self.origins[*out, len(found)] = (*path, i)
+                found.append(self._put((*path, i), item, own) if isinstance(item, str) else item)
+        return found
 
     def _values(self, text: str) -> Iterator[dict[str, int]]:
         """Yield the values of the indices in a text, the last one fastest; once nothing where it has none."""

@@ -11,8 +11,8 @@ Source: YAML 1.2.2 (2021), section 10.3.2.
 from __future__ import annotations
 
 import re
-from collections.abc import Collection
-from dataclasses import dataclass, replace
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -94,12 +94,21 @@ class Source:
     """What is wrong with the file although it could be read: duplicate keys and tags."""
     settings: tuple[str, ...] = ()
     """What a command line gave in place of values of the file, as ``KEY=VALUE``."""
+    origins: Mapping[Path_, Path_] = field(default_factory=dict)
+    """Where in the file stands what `repeat` has written out, by its place in the data."""
+
+    def origin(self, path: Path_) -> Path_ | None:
+        """Return where in the file the value at `path` was written for `repeat`, None where it was not."""
+        for length in range(len(path), 0, -1):
+            if path[:length] in self.origins:
+                return self.origins[path[:length]] + path[length:]
+        return None
 
     def place(self, path: Path_) -> Place | None:
         """Return where the value at `path` stands, None where nothing stands there."""
         node = self.top
         key_line, setting = 0, ""
-        for key in path:
+        for key in self.origin(path) or path:
             if node is None or node.children is None or key not in node.children:
                 return None
             parent, node = node, node.children[key]
