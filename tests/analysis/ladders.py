@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from vibsim.apriori.roundoff_floor import norm_of_floor
 from vibsim.convergence import differences
-from vibsim.convergence.circumstances import Evidence
+from vibsim.convergence.evidence import Evidence
 from vibsim.core.vocabulary import ORDER_TOLERANCE
 
 Floats = NDArray[np.float64]

@@ -32,8 +32,8 @@ from vibsim.comparison.order_evidence import (
 )
 from vibsim.comparison.parting import parting
 from vibsim.comparison.quantity_comparison import Compared, Comparison
-from vibsim.convergence.circumstances import pick
 from vibsim.convergence.differences import largest, safe_ratio
+from vibsim.convergence.evidence import pick
 from vibsim.convergence.reasons import code
 from vibsim.convergence.thresholds import (
     HALF_SPACING,

@@ -20,8 +20,8 @@ from vibsim.apriori.roundoff_floor import SPACING_AT_ONE, norm_of_floor
 from vibsim.comparison.parting import FAR_APART
 from vibsim.comparison.quantity_comparison import Compared, Comparison
 from vibsim.comparison.thresholds import STRAIGHT, THEORY_ROUNDING, VANISHING_RATE
-from vibsim.convergence.circumstances import Evidence, at_rest, floor_of_pairs, pick, unresolved
 from vibsim.convergence.differences import largest, safe_ratio
+from vibsim.convergence.evidence import Evidence, at_rest, floor_of_pairs, pick, unresolved
 from vibsim.convergence.ladder_blocks import batches
 from vibsim.convergence.reasons import is_one_of
 from vibsim.convergence.thresholds import ABOVE_ROUND_OFF, HALF_SPACING, ROUND_OFF_SAFETY

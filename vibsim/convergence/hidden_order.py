@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from vibsim.convergence.circumstances import Evidence, floor_of_pairs, pick
+from vibsim.convergence.evidence import Evidence, floor_of_pairs, pick
 from vibsim.convergence.thresholds import EXCLUDED, HALF_SPACING, HIGHER_POWERS
 from vibsim.core.array_types import Flags, Floats, Integers
 

@@ -43,7 +43,9 @@ import numpy as np
 
 from vibsim.convergence import thresholds as th
 from vibsim.convergence.assessment import Decision, Question, decide
-from vibsim.convergence.circumstances import (
+from vibsim.convergence.differences import order_of_ratio, safe_ratio
+from vibsim.convergence.error_model.posterior import Ladder
+from vibsim.convergence.evidence import (
     Evidence,
     at_rest,
     at_round_off,
@@ -56,8 +58,6 @@ from vibsim.convergence.circumstances import (
     truly_exact,
     unresolved,
 )
-from vibsim.convergence.differences import order_of_ratio, safe_ratio
-from vibsim.convergence.error_model.posterior import Ladder
 from vibsim.convergence.hidden_order import is_promise_hidden
 from vibsim.convergence.reasons import (
     INCONCLUSIVE,

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 from ladders import T, Truth, evidence_of, random_truth, shape_in_time
 
-from vibsim.convergence import circumstances, verdict
+from vibsim.convergence import verdict
+from vibsim.convergence.evidence import Evidence
 from vibsim.convergence.ladder_blocks import LADDERS, batches
 from vibsim.convergence.verdict import judge, judge_together
 from vibsim.core.vocabulary import NORMS, REASON_NAMES, STATUSES
@@ -254,10 +255,10 @@ def test_no_nan_among_the_evidence_passes(place: str) -> None:
     values = np.array(getattr(evidence, place), dtype=float)
     values[..., -1] = np.nan
     fields = {**vars(evidence), place: values}
-    assert STATUSES[int(judge(circumstances.Evidence(**fields)).status[0])] != "PASS"
+    assert STATUSES[int(judge(Evidence(**fields)).status[0])] != "PASS"
 
 
-def stacked(rows: list[circumstances.Evidence], shape: tuple[int, ...]) -> circumstances.Evidence:
+def stacked(rows: list[Evidence], shape: tuple[int, ...]) -> Evidence:
     """Return the evidence of many ladders of the same levels."""
     arrays = {
         name: np.concatenate([getattr(row, name) for row in rows]).reshape(*shape, *one.shape[1:])
@@ -285,7 +286,7 @@ def test_many_ladders_at_once_are_judged_as_one_by_one() -> None:
 def test_random_ladders_have_no_false_pass() -> None:
     rng = np.random.default_rng(2026)
     false_pass, hidden, false_fail, right, passed, widths = [], [], [], 0, 0, []
-    of_levels: dict[tuple[int, ...], list[tuple[Truth, float, circumstances.Evidence]]] = {}
+    of_levels: dict[tuple[int, ...], list[tuple[Truth, float, Evidence]]] = {}
     for _ in range(700):
         truth = random_truth(rng)
         p, q = truth.orders
