@@ -17,7 +17,7 @@ from vibsim.convergence.reasons import code
 from vibsim.convergence.study.common_points import common_values
 from vibsim.convergence.study.grid_values import GridValues
 from vibsim.convergence.study.judgement import verdicts
-from vibsim.convergence.study.sentences import at_most, number
+from vibsim.convergence.study.notation import at_most, number
 from vibsim.core.array_types import Floats
 from vibsim.core.errors import InputError, VibsimError
 from vibsim.core.vocabulary import REASONS, STATUSES

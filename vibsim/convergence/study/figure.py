@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from vibsim.convergence.study.sentences import number
+from vibsim.convergence.study.notation import number
 from vibsim.core.array_types import Floats
 
 if TYPE_CHECKING:

@@ -12,7 +12,7 @@ from vibsim.convergence.study.common_points import common_values, exact_values
 from vibsim.convergence.study.grid_values import GridValues, grid_values
 from vibsim.convergence.study.outcomes import Question, outcomes
 from vibsim.convergence.study.refinement import refinement
-from vibsim.convergence.study.refusal import chosen, number, refused
+from vibsim.convergence.study.refusal import chosen, finite_number, refused
 from vibsim.convergence.study.verdict import LadderVerdict
 from vibsim.core.vocabulary import RESTRICTIONS
 
@@ -186,9 +186,9 @@ def verdicts(
     """Return the verdict on each member, or on the one ladder; `quantity` is its name in words, the rest as `judge`."""
     if order is not None and at_least is not None:
         raise refused("order", order, "must not be given together with at_least")
-    order = None if order is None else number("order", order, above=0.0)
-    at_least = None if at_least is None else number("at_least", at_least, above=0.0)
-    noise = None if noise is None else number("noise", noise, least=0.0)
+    order = None if order is None else finite_number("order", order, above=0.0)
+    at_least = None if at_least is None else finite_number("at_least", at_least, above=0.0)
+    noise = None if noise is None else finite_number("noise", noise, least=0.0)
     kind = chosen("restrict", restrict, RESTRICTIONS)
     levels = _levels(values, members)
     steps = refinement(h, len(levels))

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from vibsim.convergence.study.refusal import number, refused
+from vibsim.convergence.study.refusal import finite_number, refused
 from vibsim.core.array_types import Floats
 
 PROPORTIONAL = 1e-3
@@ -76,7 +76,7 @@ def _sizes(key: str, h: Any, count: int) -> Floats:
     if len(entries) != count:
         rule = f"has {len(entries)} step sizes for {count} levels"
         raise refused(key, h, rule, "give one for each level")
-    sizes = np.array([number(f"{key}[{i}]", x, above=0.0) for i, x in enumerate(entries)])
+    sizes = np.array([finite_number(f"{key}[{i}]", x, above=0.0) for i, x in enumerate(entries)])
     for i, size in enumerate(sizes.tolist()):
         if size in sizes[:i]:
             twin = int(np.flatnonzero(sizes[:i] == size)[0])

@@ -24,7 +24,7 @@ def chosen(key: str, value: Any, choices: Sequence[str]) -> str:
     return value
 
 
-def number(
+def finite_number(
     key: str, value: Any, *, above: float | None = None, least: float | None = None
 ) -> float:
     """Return a finite number; InputError where it is none, or not within its bounds."""

@@ -3,12 +3,19 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
+from vibsim.convergence.study.notation import (
+    at_most,
+    listed,
+    listed_words,
+    number,
+    percent,
+    with_bound,
+)
 from vibsim.core.vocabulary import ORDER_TOLERANCE
 
 if TYPE_CHECKING:
@@ -33,10 +40,6 @@ class Setting:
     """Which part of the points is compared."""
 
 
-PLAIN_DIGITS = 5
-"""Whole numbers of so many digits are written without a power of ten."""
-MOST_DIGITS = 12
-"""Of an extrapolated number in a sentence."""
 NOISE_SEEN = 4.0
 """A difference of two levels that is larger than so many times their noise is hardly noise."""
 BEYOND_ROUND_OFF = 1e-10
@@ -313,67 +316,3 @@ def _together(setting: Setting) -> str:
     first, *others = setting.sizes
     verb = "is" if len(others) == 1 else "are"
     return f"The order counts powers of {first}; {listed_words(others)} {verb} refined with it, not in proportion."
-
-
-def number(value: float | None, digits: int) -> str:
-    """Write a number with so many significant digits, ``3.1e-4``."""
-    if value is None:
-        return "-"
-    text = f"{value:.{digits}g}"
-    mantissa, has_power, exponent = text.partition("e")
-    if has_power and 0 <= int(exponent) < PLAIN_DIGITS:
-        return f"{float(text):.0f}"
-    if not has_power and value and abs(value) < 1e-3:
-        mantissa, has_power, exponent = f"{value:.{digits - 1}e}".partition("e")
-        mantissa = mantissa.rstrip("0").rstrip(".") if "." in mantissa else mantissa
-    return f"{mantissa}e{int(exponent)}" if has_power else mantissa
-
-
-def digits_of_values(values: Iterable[float | None]) -> int:
-    """Return how many significant digits show the smallest difference of neighbouring values, 8 at least."""
-    known = [value for value in values if value is not None]
-    steps = [abs(a - b) for a, b in pairwise(known) if a != b]
-    if not steps:
-        return 8
-    digits = 2 + math.log10(max(map(abs, known))) - math.log10(min(steps))
-    return math.ceil(min(max(8, digits), 17))
-
-
-def at_most(bound: float) -> str:
-    """Write a bound with two digits, rounded up."""
-    if not 0.0 < bound < math.inf:
-        return number(bound, 2)
-    text = number(bound, 2)
-    if float(text) >= bound:
-        return text
-    power = math.floor(math.log10(bound)) - 1
-    return number((round(bound / 10.0**power) + 1) * 10.0**power, 2)
-
-
-def percent(share: float | None) -> str:
-    """Write a share in percent; empty where an error is as large as what it belongs to."""
-    return f"{number(100.0 * share, 2)} %" if share and share < 1.0 else ""
-
-
-def with_bound(value: float, bound: float) -> str:
-    """Write a number as far as its bound allows, with the bound: ``0.97130, within 2.1e-5``."""
-    if not 0.0 < bound < math.inf:
-        return number(value, 10)
-    places = max(1 - math.floor(math.log10(bound)), 0)
-    largest = max(abs(value), bound)
-    if 1e-3 <= largest < 1e7 and places <= MOST_DIGITS:
-        return f"{value:.{places}f}, within {at_most(bound)}"
-    digits = 2 + max(math.floor(math.log10(largest)) - math.floor(math.log10(bound)), 0)
-    return f"{number(value, min(digits, MOST_DIGITS))}, within {at_most(bound)}"
-
-
-def listed(sizes: Sequence[float]) -> str:
-    """Write step sizes as a list."""
-    return listed_words([number(size, 6) for size in sizes])
-
-
-def listed_words(words: Sequence[str]) -> str:
-    """Write words as a list with ``and``."""
-    if len(words) < 2:
-        return "".join(words)
-    return f"{', '.join(words[:-1])} and {words[-1]}"

@@ -7,7 +7,7 @@ import textwrap
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
-from vibsim.convergence.study.sentences import digits_of_values, number
+from vibsim.convergence.study.notation import digits_of_values, number
 
 if TYPE_CHECKING:
     from vibsim.convergence.study.verdict import LadderVerdict, Level

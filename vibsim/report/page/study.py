@@ -10,7 +10,7 @@ from typing import Any
 from vibsim import store
 from vibsim.convergence import LadderVerdict
 from vibsim.convergence.study.figure import convergence_figure, shows_curves
-from vibsim.convergence.study.sentences import digits_of_values, number
+from vibsim.convergence.study.notation import digits_of_values, number
 from vibsim.core.vocabulary import worst
 from vibsim.report import style, words
 from vibsim.report.page.templates import environment, sealed
