@@ -6,8 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from vibsim.convergence.assessment import Assessment, assess
-from vibsim.convergence.assessment import Question as Asked
+from vibsim.convergence.assessment import Assessment, Question, assess
 from vibsim.convergence.differences import order_of_differences
 from vibsim.convergence.study.measurement import Measurement, half_last_digit, measurement
 from vibsim.convergence.thresholds import MISSED, NOISE_FACTOR, STATED_NOISE_FACTOR
@@ -21,8 +20,8 @@ MOST_ROUNDED = 5e-4
 
 
 @dataclass(frozen=True)
-class Question:
-    """What is asked of a ladder."""
+class Asked:
+    """What a user asks of a ladder."""
 
     quantity: str
     order: float | None
@@ -66,13 +65,13 @@ class Outcome:
 
 
 def outcomes(
-    question: Question, h: Floats, values: Floats, epsilon: Floats, exact: Floats | None
+    asked: Asked, h: Floats, values: Floats, epsilon: Floats, exact: Floats | None
 ) -> list[Outcome]:
     """Return what was decided of each member.
 
     Parameters
     ----------
-    question
+    asked
         What is asked of all of them.
     h
         Step sizes, strictly decreasing, shape (n,).
@@ -88,13 +87,13 @@ def outcomes(
     for pattern in np.unique(finite, axis=0):
         members = np.flatnonzero(np.all(finite == pattern, axis=1))
         truth = None if exact is None else exact[members]
-        some = _with_finite(question, h, values[members], epsilon, truth, pattern)
+        some = _with_finite(asked, h, values[members], epsilon, truth, pattern)
         found |= dict(zip(members.tolist(), some, strict=True))
     return [found[i] for i in range(len(values))]
 
 
 def _with_finite(
-    question: Question,
+    asked: Asked,
     h: Floats,
     values: Floats,
     epsilon: Floats,
@@ -111,12 +110,12 @@ def _with_finite(
     if not len(finite):
         return found
     part = values[:, finite]
-    measured = measurement(part, h[finite], epsilon[finite], question.noise, exact)
+    measured = measurement(part, h[finite], epsilon[finite], asked.noise, exact)
     decided = None
     if len(finite) >= FEWEST:
-        factor = STATED_NOISE_FACTOR if question.noise else NOISE_FACTOR
-        asked = Asked(question.order, question.at_least, noise_factor=factor)
-        decided = assess(measured.ladder, asked)
+        factor = STATED_NOISE_FACTOR if asked.noise else NOISE_FACTOR
+        question = Question(asked.order, asked.at_least, noise_factor=factor)
+        decided = assess(measured.ladder, question)
     for k, one in enumerate(found):
         truth = None if exact is None else exact[k]
         _measure(one, measured, k, part[k], truth)
