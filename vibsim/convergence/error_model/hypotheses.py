@@ -45,9 +45,8 @@ class Table:
     # the limit; the limit less the finest level, as weights of the rows; shape (hypothesis, 5 + w)
     columns: Floats
     pair: Integers  # position of its pair of powers, shape (hypothesis,)
-    groups: (
-        Integers  # first hypothesis of every group, and the end of the last one, shape (group + 1,)
-    )
+    # first hypothesis of every group, and the end of the last one, shape (group + 1,)
+    groups: Integers
     # The evidence of a group is at most ``(root/tr(M G))^(N w/2)``: its root for one point and for two, and the form of
     # M; shape (2 + packed, group).
     bounds: Floats
@@ -63,9 +62,8 @@ class Promise(NamedTuple):
     """An order that is expected."""
 
     order: float
-    by_theory: bool = (
-        False  # whether theory promises it, and so knows the other powers too, or a user expects it
-    )
+    # whether theory promises it, and so knows the other powers too, or a user expects it
+    by_theory: bool = False
 
 
 @lru_cache

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 NEGLIGIBLE = 1e-9
 """Weights that are a smaller part of the largest one are left out."""
 KINDS = "f2 f2 i1 i2 f1 f2 f2 f3 f2 f2 f2 i1 i1 f2 i i1 f1 f1 f1 f2"
+"""Types of the arguments of `kernel`, as `vibsim.native.machine.machine_code` has them."""
 
 
 @cache

@@ -9,11 +9,7 @@ from itertools import combinations
 import numpy as np
 
 from vibsim.convergence.error_model import priors
-from vibsim.convergence.error_model.hypotheses import (
-    Table,
-    outer,
-    packed,
-)
+from vibsim.convergence.error_model.hypotheses import Table, outer, packed
 from vibsim.convergence.error_model.kernel import weigh
 from vibsim.core.array_types import Floats
 
@@ -33,7 +29,7 @@ def _log_gammas(count: int) -> Floats:
 
 
 def scale_free(trace: Floats, log_det: Floats | float, points: Floats, rows: int) -> Floats:
-    """Return the evidence of rows of any size; see the head of this module."""
+    """Return the evidence of rows of any size; see `vibsim.convergence.error_model`."""
     n = points * rows
     return np.asarray(
         math.log(0.5) + log_gamma(n) - 0.5 * n * np.log(np.pi * trace) - 0.5 * points * log_det

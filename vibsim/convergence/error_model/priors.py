@@ -16,14 +16,12 @@ HIGHEST = 8.0  # power that is looked for [chosen]
 BIN = 0.05  # distance of the powers among which such a power is counted [chosen]
 OTHER_PRIOR = 0.1  # of a single power of any other value up to `HIGHEST` [chosen]
 # It is looked for at these distances from the measured order. [chosen]
-AROUND = np.array(
-    [s * 3e-4 * 2.0**k for s, ks in ((-1, range(8, -1, -1)), (0, (0,)), (1, range(9))) for k in ks]
-)
+_BESIDE = 3e-4 * 2.0 ** np.arange(9)
+AROUND = np.concatenate([-_BESIDE[::-1], [0.0], _BESIDE])
 EXPECTED = 0.5  # prior of the whole order that a user expects, beside that of every power [chosen]
 THEORY = 0.9  # the same of the order that the theory of a scheme promises [chosen]
-BETWEEN = (
-    0.01  # beside 1: prior of a power that is not a whole number away from that of theory [chosen]
-)
+# Prior of a power that is not a whole number away from that of theory, beside 1. [chosen]
+BETWEEN = 0.01
 DISTANCES = (0.5, 1.0, 2.0)  # from the first power to the second [expansion]
 PURE_PRIOR = 0.3  # that there is no second power in sight [chosen]
 # Size of the second power over the first, at the finest level of a window. [chosen]
@@ -33,12 +31,9 @@ LEAST = 0.1  # square of the size that both powers together have at least, over 
 TAIL = 40.0  # degrees of freedom of the misfit of shapes that are one: nearly normal [chosen]
 JITTER_PRIOR = 0.15  # of levels that are off by a factor each [calibrated]
 JITTERS, JITTER_PRIORS = (5e-3, 2.5e-2, 0.1), (0.5, 0.3, 0.2)  # size of factors less 1 [calibrated]
-OWN_SHAPE = (
-    0.4  # that the second power has a shape beside a multiple of the first, too, [calibrated]
-)
-JITTER_OF_SHAPES = (
-    5e-3  # and the size then: with more, a third power looks like factors [calibrated]
-)
+# That the second power has a shape beside a multiple of the first, too, and the size of factors less 1 then: with more,
+# a third power looks like factors. [calibrated]
+OWN_SHAPE, JITTER_OF_SHAPES = 0.4, 5e-3
 FINEST_NOISE = (0.0, 0.1)  # noise of the finest level of a window, over its error [chosen]
 UNEXPECTED = 0.03  # prior of noise that nothing predicts [chosen]
 PREDICTION = 10.0  # noise is predicted within this factor [arithmetic]
@@ -49,6 +44,5 @@ ALTERNATING = 0.02  # prior of errors that change their sign at every level [cho
 LONGEST_WINDOW = 5  # rows: more add nothing [chosen]
 DOMINATES = 0.1  # a power dominates where no other one has more than this part of it [chosen]
 ROUNDING = 0.1  # square of the noise that a level has at least, over its prediction [chosen]
-EPSILON = (
-    2.0**-53
-)  # the least noise of a level, over the largest difference from there on [arithmetic]
+# The least noise of a level, over the largest difference from there on. [arithmetic]
+EPSILON = 2.0**-53
