@@ -14,7 +14,7 @@ from vibsim.comparison import thresholds as th
 from vibsim.convergence import differences
 from vibsim.convergence.extrapolation import extrapolate_series
 from vibsim.convergence.thresholds import ROUND_OFF_SAFETY
-from vibsim.convergence.verdict import Judgement, local_orders
+from vibsim.convergence.verdict import Judgement
 from vibsim.core.array_types import Flags, Floats
 from vibsim.observe.member_block import MemberBlock, by_level
 
@@ -165,7 +165,7 @@ class Comparison:
 
     def observed_orders(self, kind: str) -> Floats:
         """Return the order of every triple in a norm, shape (scheme, case, triple)."""
-        return local_orders(self.in_norm(kind).difference, self.block.grid.levels)
+        return differences.local_orders(self.ratios(kind), self.block.grid.levels)
 
 
 Compared = Mapping[str, Comparison]

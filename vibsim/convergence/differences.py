@@ -140,9 +140,16 @@ def order_of_ratio(ratio: Floats, levels: Sequence[float]) -> Floats:
     return np.asarray(np.where(usable, 0.5 * (low + high), np.nan))
 
 
-def order_of_differences(ratio: Floats, h: Floats) -> Floats:
-    """Return the order of two differences with such a ratio, of three levels with step sizes `h`, shape (3,)."""
-    return order_of_ratio(ratio, (-np.log2(h)).tolist())
+def local_orders(ratios: Floats, levels: Sequence[float]) -> Floats:
+    """Return the order of every three successive of n levels, shape (..., n-2), from the ratios of the differences."""
+    triples = [levels[i : i + 3] for i in range(len(levels) - 2)]
+    orders = [order_of_ratio(ratios[..., i], triple) for i, triple in enumerate(triples)]
+    return np.stack(orders, axis=-1) if orders else np.empty((*ratios.shape[:-1], 0))
+
+
+def orders_of_steps(ratios: Floats, h: Floats) -> Floats:
+    """Return `local_orders` of levels with the step sizes `h`, shape (n,)."""
+    return local_orders(ratios, (-np.log2(h)).tolist())
 
 
 def safe_ratio(top: Floats, bottom: Floats) -> Floats:

@@ -43,7 +43,7 @@ import numpy as np
 
 from vibsim.convergence import thresholds as th
 from vibsim.convergence.assessment import Decision, Question, decide
-from vibsim.convergence.differences import order_of_ratio, safe_ratio
+from vibsim.convergence.differences import local_orders, safe_ratio
 from vibsim.convergence.error_model.posterior import Ladder
 from vibsim.convergence.evidence import (
     Evidence,
@@ -88,7 +88,7 @@ class Judgement:
 def judge(e: Evidence) -> Judgement:
     """Decide on every ladder; see the head of this module."""
     shape, levels = e.difference.shape[:-1], np.array(e.levels, dtype=np.int64)
-    orders = local_orders(e.difference, e.levels)
+    orders = local_orders(safe_ratio(e.difference[..., :-1], e.difference[..., 1:]), e.levels)
     broken, beyond, growing = breakdown(e)
     culprits = broken | beyond
     fails = np.any(culprits, axis=-1)
@@ -261,12 +261,3 @@ def judge_together(rows: Sequence[Evidence]) -> list[Judgement]:
     # what is kept of one does not keep the others
     parts = [{name: of[i].copy() for name, of in found.items()} for i in range(len(rows))]
     return [Judgement(**part) for part in parts]
-
-
-def local_orders(difference: Floats, levels: tuple[int, ...]) -> Floats:
-    """Return the local order of every triple, shape (..., n-2), from norms of differences (..., n-1)."""
-    orders = [
-        order_of_ratio(safe_ratio(difference[..., i], difference[..., i + 1]), levels[i : i + 3])
-        for i in range(len(levels) - 2)
-    ]
-    return np.stack(orders, axis=-1) if orders else np.empty((*difference.shape[:-1], 0))

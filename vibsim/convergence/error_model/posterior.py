@@ -8,7 +8,7 @@ from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
-from vibsim.convergence.differences import order_of_differences, safe_ratio
+from vibsim.convergence.differences import orders_of_steps, safe_ratio
 from vibsim.convergence.error_model import priors
 from vibsim.convergence.error_model.hypotheses import (
     Promise,
@@ -75,7 +75,7 @@ class Posterior:
 
     powers: Floats  # the powers that are looked at, increasing, shape (power,)
     grid: Floats  # the same, and those that only other ladders have
-    orders: Floats  # of every three successive levels, shape (ladder, n-2); see `local_orders`
+    orders: Floats  # of every three successive levels, shape (ladder, n-2); see `orders_of`
     windows: list[tuple[int, int]]  # coarsest and finest level
     alone: Floats  # that this power dominates, shape (ladder, power)
     lowest: Floats  # that this is the lowest power of weight, shape (ladder, power)
@@ -118,19 +118,16 @@ class Posterior:
         return [name for name in names if name not in ("powers", "grid", "windows", "pairs")]
 
 
-def local_orders(ladder: Ladder) -> Floats:
+def orders_of(ladder: Ladder) -> Floats:
     """Return the order of every three successive levels, shape (ladder, n-2); NaN where there is none.
 
     It solves ``(h_0^p - h_1^p)/(h_1^p - h_2^p) = d_0/d_1``. Differences that turn their sign have none.
     """
     n = len(ladder.h)
     sizes = np.sqrt(np.diagonal(ladder.gram, axis1=1, axis2=2))[:, : n - 1]
-    found = []
-    for i in range(n - 2):
-        same = ladder.gram[:, i, i + 1] > 0.0
-        ratio = np.where(same, safe_ratio(sizes[:, i], sizes[:, i + 1]), np.nan)
-        found.append(order_of_differences(ratio, ladder.h[i : i + 3]))
-    return np.stack(found, axis=-1)
+    same = np.diagonal(ladder.gram, 1, 1, 2)[:, : n - 2] > 0.0
+    ratios = np.where(same, safe_ratio(sizes[:, :-1], sizes[:, 1:]), np.nan)
+    return orders_of_steps(ratios, ladder.h)
 
 
 Rows = slice | Integers
@@ -147,7 +144,7 @@ class _Fit:
         every = np.unique(
             np.concatenate([usual, np.arange(priors.BIN, priors.HIGHEST, priors.BIN)])
         )
-        self.orders = local_orders(ladder)
+        self.orders = orders_of(ladder)
         # of the powers between the usual ones, those that are nearest to some order
         nearest = np.searchsorted(0.5 * (every[1:] + every[:-1]), self.orders)
         # and the ends, which are the interval of an order that nothing is known of

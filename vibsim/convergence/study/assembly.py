@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from vibsim.convergence.differences import order_of_differences
+from vibsim.convergence.differences import orders_of_steps
 from vibsim.convergence.study.common_points import CommonValues
 from vibsim.convergence.study.outcomes import FEWEST, Asked, Outcome
 from vibsim.convergence.study.refinement import Refinement
@@ -126,9 +126,7 @@ def _gci(one: Outcome, h: Floats) -> float:
 def _table(one: Outcome, h: Floats) -> Iterator[Level]:
     """Yield the rows of the table of levels."""
     places = {int(position): k for k, position in enumerate(one.finite)}
-    steps = h[one.finite]
-    ratios = enumerate(one.ratios)
-    orders = np.array([float(order_of_differences(r, steps[k : k + 3])) for k, r in ratios])
+    orders = orders_of_steps(one.ratios, h[one.finite])
 
     def at(entries: Floats, i: int) -> float | None:
         k = places.get(i)

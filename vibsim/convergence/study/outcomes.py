@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from vibsim.convergence.assessment import Assessment, Question, assess
-from vibsim.convergence.differences import order_of_differences
+from vibsim.convergence.differences import orders_of_steps
 from vibsim.convergence.study.measurement import Measurement, half_last_digit, measurement
 from vibsim.convergence.thresholds import MISSED, NOISE_FACTOR, STATED_NOISE_FACTOR
 from vibsim.core.array_types import Flags, Floats, Integers
@@ -207,11 +207,11 @@ def _estimate(one: Outcome, h: Floats, decided: Assessment, k: int) -> tuple[flo
     if one.reason == "exact":
         return order, slice(first, last + 1), weights
     if not np.isfinite(order):
-        for i in range(len(one.ratios) - 1, -1, -1):
-            order = float(order_of_differences(one.ratios[i], h[i : i + 3]))
-            if np.isfinite(order):
-                first, last = i, i + 2
-                break
+        orders = orders_of_steps(one.ratios, h)
+        known = np.flatnonzero(np.isfinite(orders))
+        if len(known):
+            first = int(known[-1])
+            order, last = float(orders[first]), first + 2
     if not np.isfinite(weights).all() and order > 0.0:
         fine = last if last > 0 else len(h) - 1
         part = 1.0 / np.expm1(order * np.log(h[fine - 1] / h[fine]))
