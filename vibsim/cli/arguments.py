@@ -58,6 +58,49 @@ def _perform(module: str, name: str, options: argparse.Namespace) -> int:
     return status
 
 
+def _number(bound: str, least: float) -> Callable[[str], float]:
+    """Return what reads a finite number of at least so much, as `bound` says in words."""
+
+    def read(text: str) -> float:
+        try:
+            found = float(text)
+        except ValueError:
+            found = math.nan
+        if not (math.isfinite(found) and found >= least):
+            raise argparse.ArgumentTypeError(f"'{text}' is not a finite number {bound}".rstrip())
+        return found
+
+    return read
+
+
+def _whole(least: int) -> Callable[[str], int]:
+    """Return what reads a whole number of at least so much."""
+
+    def read(text: str) -> int:
+        if not text.isdecimal() or int(text) < least:
+            raise argparse.ArgumentTypeError(f"'{text}' is not a whole number from {least}")
+        return int(text)
+
+    return read
+
+
+_finite = _number("", -math.inf)
+_from_zero = _number("from 0", 0.0)
+_above_zero = _number("above 0", math.ulp(0.0))
+_index, _positive = _whole(0), _whole(1)
+
+
+def _path(text: str) -> Path:
+    """Return a path; an empty one would be the current folder, which nobody named."""
+    return Path(_word(text))
+
+
+def _word(text: str) -> str:
+    if not text.strip():
+        raise argparse.ArgumentTypeError("must not be empty")
+    return text
+
+
 def _row(name: str, kind: Callable[[str], Any], metavar: str, text: str, **more: Any) -> _Row:
     return name, {"type": kind, "metavar": metavar, "help": text, **more}
 
@@ -66,124 +109,162 @@ def _flag(name: str, text: str) -> _Row:
     return name, {"action": "store_true", "help": text}
 
 
+RESULTS = _row(
+    "--results",
+    _path,
+    "DIR",
+    "results folder (default: results/ of the checkout, or where vibsim is installed ./results)",
+)
+SETTINGS = _row(
+    "--set",
+    _word,
+    "KEY=VALUE",
+    "a value in place of one of the file, such as model.g=1.62; may be repeated",
+    dest="settings",
+    action="append",
+    default=[],
+)
+FILES = _row("experiments", _word, "FILE", _NAMES, nargs="+")
+CORES = _row("--cores", _positive, "N", "jobs at once (default: all cores)")
+ALLOW = _flag(
+    "--allow-commands",
+    "run commands and functions that experiment files name (`solver:`); trust the files first",
+)
+THREADS = _row(
+    "--threads", _positive, "N", "threads to use (default: 1); no number depends on it", default=1
+)
+ONE = _row("experiment", _word, "EXPERIMENT", "experiment or FILE.yaml")
+FOLDER = _row("--out", _path, "DIR", "folder to write to")
+_CHANGED = "refuse when the experiment or the code is not the one with this digest"
+_DISCARDED = "delete a damaged or outdated input, so that the next run makes it again"
+OF_JOBS = (
+    *(RESULTS, SETTINGS),
+    *(_row("--digest", _word, "SHA256", _CHANGED), _flag("--discard", _DISCARDED)),
+)
+"""What every job of the workflow takes."""
+
+
 def commands() -> Iterator[Command]:
-    """Yield all commands."""
-    text = (
-        "results folder (default: results/ of the checkout, or where vibsim is installed ./results)"
-    )
-    results = _row("--results", _path, "DIR", text)
-    text = "a value in place of one of the file, such as model.g=1.62; may be repeated"
-    settings = _row("--set", _word, "KEY=VALUE", text, dest="settings", action="append", default=[])
-    files = _row("experiments", _word, "FILE", _NAMES, nargs="+")
-    verify = (
-        "compare every result with its digest, also where size, time and inode are as they were"
-    )
-    text = (
-        "run commands and functions that experiment files name (`solver:`); trust the files first"
-    )
-    allow = _flag("--allow-commands", text)
-    cores = _row("--cores", _positive, "N", "jobs at once (default: all cores)")
-    options: tuple[_Row, ...] = (
-        results,
-        _row("experiments", _word, "EXPERIMENT", _NAMES, nargs="*"),
-        settings,
-        cores,
-        _row("--executor", _word, "NAME", "where jobs run: an executor plug-in of Snakemake"),
-        _row("--jobs", _positive, "N", "jobs that an executor has at once"),
-        _row("--profile", _path, "DIR", "a profile of Snakemake: slurm, generic, or a folder"),
-        _flag("--dry-run", "show what would run and why"),
-        _flag("--verify", verify),
-        allow,
-        _flag("--json", "print the outcome as JSON"),
-        _row("--junit", _path, "FILE", "write the verdicts as a JUnit report (XML)"),
-        *_detail(),
-    )
-    yield "run", "run.command", "Run experiments and show every verdict.", options
-    text = "experiment, collection or FILE.yaml (default: compare the files of all, recompute none)"
-    named = _row("experiments", _word, "EXPERIMENT", text, nargs="*")
-    text = "compare files with the manifest, and recompute nothing"
-    only = _flag("--files", text)
+    """Yield all commands: those for users, and then the jobs of the workflow."""
+    yield "run", "run.command", "Run experiments and show every verdict.", tuple(_run())
     text = "Compare every file with the manifest of its run; recompute, and compare bit for bit."
-    yield "verify", "commands.verify", text, (results, named, settings, only, cores, allow)
-    file = _row("file", _path, "FILE", "experiment file")
+    yield "verify", "commands.verify", text, tuple(_verify())
     text = "Run an experiment file, and again whenever it is saved."
-    yield "watch", "commands.watch", text, (results, file, settings, cores, allow, *_detail())
+    file = _row("file", _path, "FILE", "experiment file")
+    yield "watch", "commands.watch", text, (RESULTS, file, SETTINGS, CORES, ALLOW, *_detail())
     text = "Validate experiment files, without running them."
-    yield "check", "commands.plan", text, (files, settings)
+    yield "check", "commands.plan", text, (FILES, SETTINGS)
     text = "Show members, jobs, steps, memory, disk space and time of experiments before they run."
     as_json = _flag("--json", "print the plans as JSON")
-    yield "plan", "commands.plan", text, (results, files, settings, as_json)
+    yield "plan", "commands.plan", text, (RESULTS, FILES, SETTINGS, as_json)
     text = "Show verdicts, and the solution of the finest level down the screen."
-    yield "show", "commands.show", text, (results, settings, *_show())
+    yield "show", "commands.show", text, (RESULTS, SETTINGS, *_show())
     text = "Judge whether the results of any solver converge."
     yield "judge", "commands.judge", text, tuple(_judge())
-    what: _Row = "what", {"choices": LISTS}
-    entry = _row("name", _word, "NAME", "one entry, in full", nargs="?")
     text = "List what there is to choose from, or print the JSON Schema of experiment files."
-    yield "list", "commands.listing", text, (what, entry)
+    yield "list", "commands.listing", text, tuple(_list())
     text = "Write a commented experiment file to begin with, and the JSON Schema for editors."
     yield "new", "commands.new", text, tuple(_new())
-    text = "experiment, FILE.yaml, or a folder of results"
-    sides = (_row("first", _word, "A", text), _row("second", _word, "B", text))
     text = "Show which settings, verdicts and numbers of two experiments or two results differ."
-    yield "diff", "commands.diff", text, (results, *sides)
-    text = "the reason of a verdict, such as order_low (default: list all of them)"
-    reason = _row("reason", _word, "REASON", text, nargs="?")
+    yield "diff", "commands.diff", text, (RESULTS, *_diff())
     text = "Explain the reason of a verdict: what it means and what would settle the question."
-    yield "explain", "commands.explain", text, (reason,)
+    yield "explain", "commands.explain", text, tuple(_explain())
     text = "Print the theory of a scheme on u'' + w^2 u = 0 as formulas in w dt."
     yield "theory", "commands.theory", text, tuple(_theory())
-    text = "experiment whose report is opened (default: the index over all results)"
-    page = _row("experiment", _word, "EXPERIMENT", text, nargs="?")
     text = "Open a report in the browser; print its path where there is none."
-    yield "open", "commands.open", text, (results, page)
-
+    yield "open", "commands.open", text, (RESULTS, *_open())
     text = "Write the movie of an experiment that has been run: MP4, WebM or GIF, or numbered PNG frames."
-    yield "movie", "commands.movie", text, (results, settings, *_movie())
-
-    shell: _Row = "shell", {"choices": SHELLS, "help": "the shell; `words` is what its script asks"}
+    yield "movie", "commands.movie", text, (RESULTS, SETTINGS, *_movie())
     text = "Print what a shell needs to complete commands, options and names."
-    asked = _row("words", str, "WORD", "the command line so far", nargs="*")
-    yield "completion", "commands.completion", text, (shell, asked)
-
-    digest = "refuse when the experiment or the code is not the one with this digest"
-    discard = "delete a damaged or outdated input, so that the next run makes it again"
-    job = (
-        results,
-        settings,
-        _row("--digest", _word, "SHA256", digest),
-        _flag("--discard", discard),
-    )
-    text = "threads to use (default: 1); no number depends on it"
-    threads = _row("--threads", _positive, "N", text, default=1)
-    one = _row("experiment", _word, "EXPERIMENT", "experiment or FILE.yaml")
-    perhaps = _row("experiment", _word, "EXPERIMENT", "experiment or FILE.yaml", nargs="?")
-    folder = _row("--out", _path, "DIR", "folder to write to")
-    several = "one level, or several to the places of the plan"
-    place = "netCDF file to write (default: the place of the plan, unless it is made already)"
-    options = (
-        one,
-        threads,
-        *job,
-        _row("--level", int, "L", several, nargs="+", required=True),
-        _row("--shard", int, "K", "range of members (from 0)", default=0),
-        _row("--out", _path, "FILE", place),
-        allow,
-    )
-    yield "simulate", "jobs.simulate", "Simulate levels of an experiment.", options
+    yield "completion", "commands.completion", text, tuple(_completion())
+    text = "Simulate levels of an experiment."
+    yield "simulate", "jobs.simulate", text, (ONE, THREADS, *OF_JOBS, *_simulate(), ALLOW)
     text = "Compare the levels of an experiment: convergence.nc and summary.json."
-    yield "analyse", "jobs.analyse", text, (one, threads, *job, folder)
+    yield "analyse", "jobs.analyse", text, (ONE, THREADS, *OF_JOBS, FOLDER)
     text = "Extrapolate the solution of an experiment over all its levels: best.nc."
     best = _row("--out", _path, "FILE", "netCDF file to write")
-    yield "extrapolate", "jobs.extrapolate", text, (one, *job, best)
+    yield "extrapolate", "jobs.extrapolate", text, (ONE, *OF_JOBS, best)
     text = "Write the report of an experiment; without one, the index over all results."
-    formats = "formats of the figure files: svg, png, pdf; several with commas (default: svg)"
-    formats_row = _row("--formats", _word, "LIST", formats)
-    publish = "copy pages, data, experiment file and metadata (RO-Crate) to a new folder"
-    publish_row = _row("--publish", _path, "DIR", publish)
-    licence = "licence of what is published: its address, or a sentence"
-    publish_rows = (publish_row, _row("--license", _word, "TEXT", licence))
-    yield "report", "commands.report", text, (*job, perhaps, folder, formats_row, *publish_rows)
+    yield "report", "commands.report", text, (*OF_JOBS, *_report())
+
+
+def _run() -> Iterator[_Row]:
+    """Yield the options of ``vibsim run``."""
+    yield RESULTS
+    yield _row("experiments", _word, "EXPERIMENT", _NAMES, nargs="*")
+    yield from (SETTINGS, CORES)
+    yield _row("--executor", _word, "NAME", "where jobs run: an executor plug-in of Snakemake")
+    yield _row("--jobs", _positive, "N", "jobs that an executor has at once")
+    yield _row("--profile", _path, "DIR", "a profile of Snakemake: slurm, generic, or a folder")
+    yield _flag("--dry-run", "show what would run and why")
+    text = "compare every result with its digest, also where size, time and inode are as they were"
+    yield _flag("--verify", text)
+    yield ALLOW
+    yield _flag("--json", "print the outcome as JSON")
+    yield _row("--junit", _path, "FILE", "write the verdicts as a JUnit report (XML)")
+    yield from _detail()
+
+
+def _verify() -> Iterator[_Row]:
+    """Yield the options of ``vibsim verify``."""
+    yield RESULTS
+    text = "experiment, collection or FILE.yaml (default: compare the files of all, recompute none)"
+    yield _row("experiments", _word, "EXPERIMENT", text, nargs="*")
+    yield SETTINGS
+    yield _flag("--files", "compare files with the manifest, and recompute nothing")
+    yield from (CORES, ALLOW)
+
+
+def _list() -> Iterator[_Row]:
+    """Yield the options of ``vibsim list``."""
+    yield "what", {"choices": LISTS}
+    yield _row("name", _word, "NAME", "one entry, in full", nargs="?")
+
+
+def _diff() -> Iterator[_Row]:
+    """Yield the options of ``vibsim diff``."""
+    text = "experiment, FILE.yaml, or a folder of results"
+    yield from (_row("first", _word, "A", text), _row("second", _word, "B", text))
+
+
+def _explain() -> Iterator[_Row]:
+    """Yield the options of ``vibsim explain``."""
+    text = "the reason of a verdict, such as order_low (default: list all of them)"
+    yield _row("reason", _word, "REASON", text, nargs="?")
+
+
+def _open() -> Iterator[_Row]:
+    """Yield the options of ``vibsim open``."""
+    text = "experiment whose report is opened (default: the index over all results)"
+    yield _row("experiment", _word, "EXPERIMENT", text, nargs="?")
+
+
+def _completion() -> Iterator[_Row]:
+    """Yield the options of ``vibsim completion``."""
+    yield "shell", {"choices": SHELLS, "help": "the shell; `words` is what its script asks"}
+    yield _row("words", str, "WORD", "the command line so far", nargs="*")
+
+
+def _simulate() -> Iterator[_Row]:
+    """Yield the options of ``vibsim simulate``."""
+    text = "one level, or several to the places of the plan"
+    yield _row("--level", int, "L", text, nargs="+", required=True)
+    yield _row("--shard", int, "K", "range of members (from 0)", default=0)
+    text = "netCDF file to write (default: the place of the plan, unless it is made already)"
+    yield _row("--out", _path, "FILE", text)
+
+
+def _report() -> Iterator[_Row]:
+    """Yield the options of ``vibsim report``."""
+    yield _row("experiment", _word, "EXPERIMENT", "experiment or FILE.yaml", nargs="?")
+    yield FOLDER
+    text = "formats of the figure files: svg, png, pdf; several with commas (default: svg)"
+    yield _row("--formats", _word, "LIST", text)
+    text = "copy pages, data, experiment file and metadata (RO-Crate) to a new folder"
+    yield _row("--publish", _path, "DIR", text)
+    yield _row(
+        "--license", _word, "TEXT", "licence of what is published: its address, or a sentence"
+    )
 
 
 def _detail() -> Iterator[_Row]:
@@ -265,46 +346,3 @@ def _judge() -> Iterator[_Row]:
     yield _row("--noise", _from_zero, "X", text)
     yield _row("--report", _path, "DIR", "write report.html and verdict.json to this folder")
     yield _flag("--json", "print the verdicts as JSON, and nothing else")
-
-
-def _number(bound: str, least: float) -> Callable[[str], float]:
-    """Return what reads a finite number of at least so much, as `bound` says in words."""
-
-    def read(text: str) -> float:
-        try:
-            found = float(text)
-        except ValueError:
-            found = math.nan
-        if not (math.isfinite(found) and found >= least):
-            raise argparse.ArgumentTypeError(f"'{text}' is not a finite number {bound}".rstrip())
-        return found
-
-    return read
-
-
-def _whole(least: int) -> Callable[[str], int]:
-    """Return what reads a whole number of at least so much."""
-
-    def read(text: str) -> int:
-        if not text.isdecimal() or int(text) < least:
-            raise argparse.ArgumentTypeError(f"'{text}' is not a whole number from {least}")
-        return int(text)
-
-    return read
-
-
-_finite = _number("", -math.inf)
-_from_zero = _number("from 0", 0.0)
-_above_zero = _number("above 0", math.ulp(0.0))
-_index, _positive = _whole(0), _whole(1)
-
-
-def _path(text: str) -> Path:
-    """Return a path; an empty one would be the current folder, which nobody named."""
-    return Path(_word(text))
-
-
-def _word(text: str) -> str:
-    if not text.strip():
-        raise argparse.ArgumentTypeError("must not be empty")
-    return text
