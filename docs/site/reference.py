@@ -21,7 +21,7 @@ from vibsim.cli.arguments import commands
 from vibsim.cli.commands.explain import meanings
 from vibsim.cli.commands.listing import checks as listed_checks
 from vibsim.cli.commands.theory import theory_rows
-from vibsim.cli.entry import Row, model_rows, scheme_rows
+from vibsim.cli.list_entry import Row, model_rows, scheme_rows
 from vibsim.convergence.study import verdict_schema
 from vibsim.core.vocabulary import REASONS
 from vibsim.experiment.schema import document, solver

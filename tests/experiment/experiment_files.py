@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from vibsim.cli.entry import needed
+from vibsim.cli.list_entry import needed
 from vibsim.core.errors import Fault, InputError
 from vibsim.experiment import Experiment
 from vibsim.models import MODELS

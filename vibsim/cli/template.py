@@ -6,7 +6,7 @@ import textwrap
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
-from vibsim.cli.entry import COORDINATES, needed, parameter_text, unit_text
+from vibsim.cli.list_entry import COORDINATES, needed, parameter_text, unit_text
 
 if TYPE_CHECKING:
     from vibsim.models import Model

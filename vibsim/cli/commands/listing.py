@@ -6,8 +6,8 @@ from argparse import Namespace
 from collections.abc import Collection, Iterable
 from typing import TYPE_CHECKING
 
-from vibsim.cli.entry import choices, facts, in_full
 from vibsim.cli.jobs.common import refusal
+from vibsim.cli.list_entry import choices, facts, in_full
 from vibsim.core.errors import Fault, InputError, nearest
 
 if TYPE_CHECKING:

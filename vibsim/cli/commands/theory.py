@@ -14,8 +14,8 @@ from contextlib import suppress
 from fractions import Fraction
 from typing import TYPE_CHECKING, Any
 
-from vibsim.cli.entry import Row, choices, laid_out, scheme_named, stable_until
 from vibsim.cli.jobs.common import refusal
+from vibsim.cli.list_entry import Row, choices, laid_out, scheme_named, stable_until
 from vibsim.core.errors import nearest
 
 if TYPE_CHECKING:
