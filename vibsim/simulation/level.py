@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from vibsim.core.array_types import Floats, Integers
-from vibsim.core.record import Attribute, Record, Variable, attributes
+from vibsim.core.record import Attribute, Record, Variable, attributes, flags
 from vibsim.core.vocabulary import HIGHEST, MEMBER, SERIES
 from vibsim.engine import EventTimes, Extrema, Gathered, Trajectories
 from vibsim.experiment import storage
@@ -118,26 +118,21 @@ def simulate_record(
         rows.append((name, run.deviation_d2t, words, model.energy_unit))
     outcomes = _table(MEMBER, rows)
     status = outcomes["status"]
-    flags: dict[str, Any] = {
-        "flag_values": np.arange(len(STATUS), dtype=np.int8),
-        "flag_meanings": " ".join(STATUS),
-    }
-    outcomes["status"] = replace(status, attrs={**status.attrs, **flags})
-    number = np.arange(0, steps + 1, every, dtype=np.int64)
-    variables = {
-        **_series(model, group, found, steps, every, wanted),
-        **({} if is_lean else _exact(experiment, group, number, steps)),
-        **outcomes,
-        **(_extrema(model, found.extrema) if found.extrema else {}),
-        **(_table(MEMBER, _events(found.events)) if found.events else {}),
-        **(_event_times(found.events) if found.events and event_times(experiment) else {}),
-        **(
-            _table(MEMBER, _own_steps(run))
-            if any(scheme.adaptive for scheme in experiment.schemes)
-            else {}
-        ),
-        **_table(("case",), _constants(model, group, steps)),
-    }
+    outcomes["status"] = replace(status, attrs={**status.attrs, **flags(STATUS)})
+    variables = _series(model, group, found, steps, every, wanted)
+    if not is_lean:
+        number = np.arange(0, steps + 1, every, dtype=np.int64)
+        variables |= _exact(experiment, group, number, steps)
+    variables |= outcomes
+    if found.extrema:
+        variables |= _extrema(model, found.extrema)
+    if found.events:
+        variables |= _table(MEMBER, _events(found.events))
+        if event_times(experiment):
+            variables |= _event_times(found.events)
+    if any(scheme.adaptive for scheme in experiment.schemes):
+        variables |= _table(MEMBER, _own_steps(run))
+    variables |= _table(("case",), _constants(model, group, steps))
     attrs: dict[str, Attribute] = {
         "model": model.kind,
         "level": level,
@@ -150,9 +145,9 @@ def simulate_record(
     coords |= _table((), [("level", np.array(level, dtype=np.int16), "level", "1")])
     if found.extrema:
         # levels keep different numbers of them; with their numbers xarray can put levels side by side
-        number = np.arange(found.extrema.peak.shape[-1], dtype=np.int32)
+        places = np.arange(found.extrema.peak.shape[-1], dtype=np.int32)
         words = "number of the peak or trough, from 0"
-        coords |= _table(("extremum",), [("extremum", number, words, "1")])
+        coords |= _table(("extremum",), [("extremum", places, words, "1")])
     return in_scales(Record(coords, variables, attrs), experiment)
 
 
