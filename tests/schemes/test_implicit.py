@@ -399,9 +399,9 @@ def test_a_jump_without_a_solution_is_no_solution():
 
 
 def test_implicit_steps_stay_out_of_the_blocks():
-    assert lane_for(2**10, 2**9, implicit=True) == "scalar"
+    assert lane_for(2**10, 2**9, alone=True) == "scalar"
     assert lane_for(2**10, 2**9) == "blocks"
-    assert lane_for(1, 2, implicit=True) == "plain"
+    assert lane_for(1, 2, alone=True) == "plain"
 
 
 @pytest.mark.parametrize("lane", ["plain", "scalar"])

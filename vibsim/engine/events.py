@@ -20,10 +20,8 @@ from vibsim.engine.kernel_stubs import P, State, called, unbound
 
 # bound by the kernel (`vibsim.engine.kernel_stubs`)
 GATHER = LOCATED = WORK = True
-first_mode = first_of = followed = guard = guard_on_mesh = held = landed = lost = mode_of = (
-    powers
-) = unbound
-settled = spent = start = start_of = step = turning = with_mode = unbound
+first_mode = first_of = followed = guard = guard_on_mesh = held = landed = lost = unbound
+mode_of = powers = settled = spent = start = start_of = step = turning = with_mode = unbound
 
 # Columns of `stats` behind those of `vibsim.engine.gather`. HALTED and HALTED_GRID: the mode before the body came to
 # rest, and the grid point behind, since it may leave the other way, which is a turn. LOST: what sliding or impacts have

@@ -105,8 +105,7 @@ def kernel(
             ("has several coordinates", model.coordinates > 1),
         ):
             if holds:
-                which = "has them" if "has" in reason else "does"
-                raise SimulationError(f"{model.kind} {reason}: no block of members {which}")
+                raise SimulationError(f"{model.kind} {reason}: it is not stepped in blocks")
     module = _written(model, stepper, lane, with_gathered, with_series, with_peaks)
     return _in_lane(module, lane, _STEPPING)
 
@@ -223,13 +222,13 @@ def _put_events(module: Module, model: Model, stepper: Stepper) -> None:
     module.define("mode_of(p)", f"return p[{first}]")
     module.define("start_of(p)", f"return p[{first + 1}]")
     module.define("with_mode(p, mode, start)", f"return ({', '.join(places)},)")
-    collect(module, stepper.step, "step", {})
     if isinstance(model.events, Crossings):
         crossings.put_rows(module, model.events, is_located=stepper.events != "mesh")
     kind = _OF_EVENTS[type(model.events)]
-    for name in ("first_mode", "guard", "guard_on_mesh", "landed", "settled", "followed", "held"):
-        collect(module, getattr(kind, name), name, {})
-    for name in ("turning", "spent", "lost"):
+    for name in (
+        *("first_mode", "guard", "guard_on_mesh", "landed", "settled", "followed", "held"),
+        *("turning", "spent", "lost"),
+    ):
         collect(module, getattr(kind, name), name, {})
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from vibsim.core.array_types import Floats, Integers
-from vibsim.engine import gather
+from vibsim.engine import events, extrema, gather
 
 
 @dataclass(frozen=True)
@@ -158,6 +158,23 @@ def gathered_of(stats: Floats, counts: Integers, dt: Floats, coordinates: int) -
         deviation_d2t=_storable(stats[:, gather.DEVIATION_D2T]),
         accepted_steps=np.full(len(stats), np.nan),
         force_evaluations=np.full(len(stats), np.nan),
+    )
+
+
+def extrema_of(kept: Floats, counts: Integers) -> Extrema:
+    """Name the extrema that a kernel kept: rows and columns of `vibsim.engine.extrema`."""
+    return Extrema(*kept, *counts[:, [extrema.PEAK_COUNT, extrema.TROUGH_COUNT]].T)
+
+
+def event_times_of(stats: Floats, coordinates: int) -> EventTimes:
+    """Name what a kernel noted of events: shape (case, column of `vibsim.engine.events`)."""
+    columns = events.columns(coordinates)
+    return EventTimes(
+        event_count=stats[:, columns["EVENT_COUNT"]],
+        first_event_time=stats[:, columns["FIRST_EVENT"]],
+        last_event_time=stats[:, columns["LAST_EVENT"]],
+        rest_time=stats[:, columns["REST_TIME"]],
+        event_time=stats[:, columns["N_STATS_EVENTS"] :],
     )
 
 

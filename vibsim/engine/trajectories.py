@@ -21,16 +21,16 @@ TASK = 16 * block_loop.LANES
 """Members that a thread takes at a time."""
 
 
-def lane_for(members: int, steps: int, *, implicit: bool = False) -> str:
+def lane_for(members: int, steps: int, *, alone: bool = False) -> str:
     """Choose the lane from the size of the work; the bits are the same in every lane.
 
-    An implicit step iterates as often as its member needs, which no vector instruction can; nor can it a step that an
-    event of the member divides, the step of several coordinates, or a table looked up at a place of the member, for
-    which `implicit` stands as well.
+    Members are stepped each `alone` where no vector instruction can step them together: an implicit step iterates as
+    often as its member needs, an event of a member divides its step, it has several coordinates, or it looks a table up
+    at a place of its own.
     """
     if members * steps <= PLAIN_MEMBER_STEPS:
         return "plain"
-    return "blocks" if members > 1 and not implicit else "scalar"
+    return "blocks" if members > 1 and not alone else "scalar"
 
 
 def integrate(
@@ -87,20 +87,16 @@ def integrate(
     stepper = scheme.stepper_for(model, options)
     has_events, has_work = model.events is not None, has_budget(model)
     alone = stepper.implicit or has_events or count > 1 or model.lookup is not None
-    lane = lane or lane_for(members, steps, implicit=alone)
+    lane = lane or lane_for(members, steps, alone=alone)
     run = kernel(model, stepper, lane, with_gathered, with_series, n_extrema > 0)
 
-    # what a kernel fills; numbers are NaN until they are known
-    rows = gather.sample_rows(count)
-    last_row = "RUNNING_D2T_ROW" if stepper.own_velocity else "RUNNING_ROW"
-    if has_work:
-        last_row = "LOST_ROW" if has_events else "DRIVEN_ROW"
-    n_rows = rows[last_row] + 1 if with_series else 2 * count
-    of_events = events.columns(count)
-    columns = of_events["N_STATS_EVENTS"] + n_events if has_events else count * gather.N_STATS
-    samples = np.full((n_rows, members, steps // every + 1), np.nan)
-    stats = np.full((members, columns if with_gathered else 0), np.nan)
+    # what the kernel fills; numbers are NaN until they are known
+    n_rows = _n_rows(model, stepper) if with_series else 2 * count
+    n_columns = events.columns(count)["N_STATS_EVENTS"] + n_events
+    n_columns = n_columns if has_events else count * gather.N_STATS
     n_counts = extrema.N_COUNTS_KEPT if n_extrema else gather.N_COUNTS
+    samples = np.full((n_rows, members, steps // every + 1), np.nan)
+    stats = np.full((members, n_columns if with_gathered else 0), np.nan)
     counts = np.zeros((members, n_counts), dtype=np.int64)
     kept = np.full((extrema.N_KEPT, members if n_extrema else 0, n_extrema), np.nan)
 
@@ -123,19 +119,22 @@ def integrate(
         # kernels let go of the interpreter
         with ThreadPoolExecutor(threads) as pool:
             list(pool.map(task, range(0, members, TASK)))
-    found = counts[:, [extrema.PEAK_COUNT, extrema.TROUGH_COUNT]].T if n_extrema else ()
-    numbers_of_events = stats[:, of_events["EVENT_COUNT"] : of_events["REST_TIME"] + 1].T
-    event_times = stats[:, of_events["N_STATS_EVENTS"] :]
     return Trajectories(
         states=samples[: 2 * count],
         last_step=counts[:, gather.LAST_STEP],
         gathered=results.gathered_of(stats, counts, numbers[3], count) if with_gathered else None,
         series=results.series_of(samples, count, has_work, has_events) if with_series else None,
-        extrema=results.Extrema(*kept, *found) if n_extrema else None,
-        events=results.EventTimes(*(*numbers_of_events, event_times))
-        if has_events and with_gathered
-        else None,
+        extrema=results.extrema_of(kept, counts) if n_extrema else None,
+        events=results.event_times_of(stats, count) if has_events and with_gathered else None,
     )
+
+
+def _n_rows(model: Model, stepper: Stepper) -> int:
+    """Return how many rows samples have, up to the last one that the kernel has a use for."""
+    last = "RUNNING_D2T_ROW" if stepper.own_velocity else "RUNNING_ROW"
+    if has_budget(model):
+        last = "DRIVEN_ROW" if model.events is None else "LOST_ROW"
+    return gather.sample_rows(model.coordinates)[last] + 1
 
 
 def extrema_of(u: Floats, dt: float) -> results.Extrema:
@@ -148,8 +147,8 @@ def extrema_of(u: Floats, dt: float) -> results.Extrema:
     for n, near in enumerate(zip(*(u[i:].tolist() for i in range(3)), strict=False), 1):
         if extrema.is_turned(*near):
             extrema.note_turned(kept, counts, 0, n, dt, *near)
-    found = counts[:, [extrema.PEAK_COUNT, extrema.TROUGH_COUNT]].T
-    return results.Extrema(*kept[:, :, : found.max()], *found)
+    most = counts[0, [extrema.PEAK_COUNT, extrema.TROUGH_COUNT]].max()
+    return results.extrema_of(kept[:, :, :most], counts)
 
 
 def _check_shapes(model: Model, parameters: Floats, initial: Floats, members: int) -> None:
