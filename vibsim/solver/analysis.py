@@ -15,7 +15,6 @@ from vibsim.checks.outcome import compared_reason
 from vibsim.checks.solver_facts import SOLVER_FACTS
 from vibsim.convergence.study.labelled import COLUMNS, dataset
 from vibsim.convergence.study.verdict import LadderVerdict, Level
-from vibsim.core.array_types import Floats
 from vibsim.core.errors import VibsimError
 from vibsim.core.record import Record, Variable, attributes, flags
 from vibsim.core.vocabulary import REASON_NAMES, SEVERITY, STATUSES, jsonable, worst
@@ -197,14 +196,14 @@ def _of_check(found: CheckResults) -> dict[str, Variable]:
     for name, words in (("status", STATUSES), ("reason", REASON_NAMES)):
         codes = [words.index(getattr(result.verdict, name)) for result in by_member]
         add(name, ("case",), np.array(codes, dtype=np.int8), f"measured {name}", **flags(words))
-    orders = (result.verdict.order for result in by_member)
-    add(ORDER, ("case",), _floats(orders), SOLVER_FACTS["converges"][ORDER])
+    # of numbers None becomes NaN
+    orders = np.array([result.verdict.order for result in by_member], float)
+    add(ORDER, ("case",), orders, SOLVER_FACTS["converges"][ORDER])
     for name, meaning in SOLVER_FACTS[found.check.kind].items():
-        add(name, ("case",), _floats(result.facts[name] for result in by_member), meaning)
+        add(name, ("case",), np.array([r.facts[name] for r in by_member], float), meaning)
     for name, meaning in COLUMNS.items():
-        tables = (result.verdict.levels for result in by_member)
-        rows = [_floats(getattr(row, name) for row in table) for table in tables]
-        add(f"level_{name}", ("case", "level"), rows, meaning)
+        rows = [[getattr(row, name) for row in result.verdict.levels] for result in by_member]
+        add(f"level_{name}", ("case", "level"), np.array(rows, float), meaning)
     add("member", (), np.int64(decides.member), "member that decides")
     shown = dataset(decides.verdict)
     for name in SHOWN:
@@ -214,10 +213,6 @@ def _of_check(found: CheckResults) -> dict[str, Variable]:
     for dim, points in decides.verdict.coords.items():
         add(f"at_{dim}", (_dim(id_, dim),), points, f"common points along {dim}")
     return table
-
-
-def _floats(entries: Iterable[float | None]) -> Floats:
-    return np.array([np.nan if x is None else x for x in entries], dtype=np.float64)
 
 
 def _known(value: float) -> float | None:

@@ -25,8 +25,13 @@ def dataset(verdict: LadderVerdict) -> xarray.Dataset:
     """Return a verdict as a dataset over the step sizes; missing numbers are NaN, missing facts left out."""
     import xarray
 
+    # None becomes NaN
     table: dict[str, Any] = {
-        name: ("h", _floats([getattr(row, name) for row in verdict.levels]), {"long_name": text})
+        name: (
+            "h",
+            np.array([getattr(row, name) for row in verdict.levels], float),
+            {"long_name": text},
+        )
         for name, text in COLUMNS.items()
     }
     dims = tuple(f"{dim}_" if dim == "h" else dim for dim in verdict.dims)
@@ -46,7 +51,3 @@ def dataset(verdict: LadderVerdict) -> xarray.Dataset:
             table["best_values"] = (dims, verdict.best_values, meaning)
     facts = {key: value for key, value in verdict.to_dict().items() if value is not None}
     return xarray.Dataset(table, coords, facts)
-
-
-def _floats(entries: list[float | None]) -> Any:
-    return np.array([np.nan if x is None else x for x in entries], dtype=np.float64)
