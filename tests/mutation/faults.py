@@ -260,14 +260,14 @@ FAULTS = (
         "first step without its half",
         "start",
         "schemes/central.py",
-        "acceleration(u, v, 0.0, p)\n    push = dt * v",
-        "2.0 * acceleration(u, v, 0.0, p)\n    push = dt * v",
+        "kick = first_kick(variant, u, v, dt, p, acceleration)\n    push = dt * v",
+        "kick = 2.0 * first_kick(variant, u, v, dt, p, acceleration)\n    push = dt * v",
     ),
     Fault(
         "first step of first order",
         "start",
         "schemes/central.py",
-        "kick = ZERO if variant == FORWARD_START else share * (dt * dt) * acceleration(u, v, 0.0, p)\n    push",
+        "kick = first_kick(variant, u, v, dt, p, acceleration)\n    push",
         "kick = 0.0\n    push",
     ),
     Fault(

@@ -62,13 +62,19 @@ FORWARD_START, BACKWARD_START = 1, 2
 """Variants of a start with a one-sided difference of the initial velocity."""
 
 
+def first_kick(
+    variant: int, u: float, v: float, dt: float, p: Any, acceleration: Acceleration
+) -> float:
+    """Return the dt^2 term of u^1, by A (11): half of ``dt^2 a``, none (the trap of A, section 2.3) or all of it."""
+    share = 1.0 if variant == BACKWARD_START else 0.5
+    return ZERO if variant == FORWARD_START else share * (dt * dt) * acceleration(u, v, 0.0, p)
+
+
 def start_three_term(
     variant: int, u: float, v: float, dt: float, p: Any, acceleration: Acceleration
 ) -> tuple[float, float]:
-    """Return u^1 and u^0; u^1 by A (11), or without its dt^2 term (the trap of A, section 2.3), or with twice that."""
-    share = 1.0 if variant == BACKWARD_START else 0.5
-    kick = ZERO if variant == FORWARD_START else share * (dt * dt) * acceleration(u, v, 0.0, p)
-    return u + dt * v + kick, u
+    """Return u^1 and u^0."""
+    return u + dt * v + first_kick(variant, u, v, dt, p, acceleration), u
 
 
 def backward_three_term(state: tuple[float, float], dt: float) -> float:
@@ -81,9 +87,7 @@ def start_increment(
     variant: int, u: float, v: float, dt: float, p: Any, acceleration: Acceleration
 ) -> tuple[float, float]:
     """Return u^1 and the increment u^1 - u^0."""
-    share = 1.0 if variant == BACKWARD_START else 0.5
-    kick = ZERO if variant == FORWARD_START else share * (dt * dt) * acceleration(u, v, 0.0, p)
-    d = dt * v + kick
+    d = dt * v + first_kick(variant, u, v, dt, p, acceleration)
     return u + d, d
 
 
@@ -96,8 +100,7 @@ def start_compensated(
     variant: int, u: float, v: float, dt: float, p: Any, acceleration: Acceleration
 ) -> tuple[float, float, float, float]:
     """Return u^1, the increment u^1 - u^0, and the rounding errors that both still have to get."""
-    share = 1.0 if variant == BACKWARD_START else 0.5
-    kick = ZERO if variant == FORWARD_START else share * (dt * dt) * acceleration(u, v, 0.0, p)
+    kick = first_kick(variant, u, v, dt, p, acceleration)
     push = dt * v
     d = push + kick
     part = d - push

@@ -113,25 +113,24 @@ def step_gauss(state, t, dt, p, acceleration, slopes):
     return (u + dt * (v + dt * (D_1 * a_1 + D_2 * a_2)), v + dt * (0.5 * (a_1 + a_2))), v
 """
 
-_GAUSS = written(_GAUSS_STEP, _GAUSS_FORMULAS, {"solved_together": solved_together})
-_STEPPERS = {
-    "backward_euler": self_starting(step_backward_euler, implicit=True),
-    "crank_nicolson": self_starting(step_crank_nicolson, implicit=True),
-    "bdf2": Stepper(
-        start_bdf2,
-        step_bdf2,
-        implicit=True,
-        carried=lambda u, v, a, t, dt: (u(t), v(t), u(t - dt), v(t - dt)),
-    ),
-    "gauss4": self_starting(_GAUSS, implicit=True),
-}
+_BACKWARD_EULER = self_starting(step_backward_euler, implicit=True)
+_CRANK_NICOLSON = self_starting(step_crank_nicolson, implicit=True)
+_BDF2 = Stepper(
+    start_bdf2,
+    step_bdf2,
+    implicit=True,
+    carried=lambda u, v, a, t, dt: (u(t), v(t), u(t - dt), v(t - dt)),
+)
+_GAUSS = self_starting(
+    written(_GAUSS_STEP, _GAUSS_FORMULAS, {"solved_together": solved_together}), implicit=True
+)
 
 BACKWARD_EULER = Scheme(
     kind="backward_euler",
     title="Backward Euler",
     source="vibration text, sections 5.2 and 5.6",
     family="implicit one-step",
-    stepper=lambda options: _STEPPERS["backward_euler"],
+    stepper=lambda options: _BACKWARD_EULER,
     orders=lambda options: same_orders(1),
     explicit=False,
 )
@@ -140,7 +139,7 @@ CRANK_NICOLSON = Scheme(
     title="Crank-Nicolson (trapezoidal rule)",
     source="vibration text, section 5.3, equations (33)-(42)",
     family="implicit one-step",
-    stepper=lambda options: _STEPPERS["crank_nicolson"],
+    stepper=lambda options: _CRANK_NICOLSON,
     orders=lambda options: same_orders(2, energy_linear=math.inf, energy_d2t_linear=2),
     even_powers=True,
     explicit=False,
@@ -151,7 +150,7 @@ BDF2 = Scheme(
     title="Backward differentiation formula of order 2",
     source="vibration text, exercise 12 (Backward2Step); Hairer and Wanner II, section V.1",
     family="multistep",
-    stepper=lambda options: _STEPPERS["bdf2"],
+    stepper=lambda options: _BDF2,
     orders=lambda options: same_orders(2, energy_linear=3, energy_d2t_linear=2),
     start="u^1 and v^1, by one step of Crank-Nicolson",
     explicit=False,
@@ -161,7 +160,7 @@ GAUSS4 = Scheme(
     title="Gauss method with two stages (order 4)",
     source="Hairer, Lubich and Wanner, sections II.1.3 and IV.2.1",
     family="implicit Runge-Kutta",
-    stepper=lambda options: _STEPPERS["gauss4"],
+    stepper=lambda options: _GAUSS,
     orders=lambda options: same_orders(4, energy_linear=math.inf, energy_d2t_linear=2),
     even_powers=True,
     force_evaluations=2,

@@ -66,7 +66,7 @@ def _sizes(ax: Axes, verdict: LadderVerdict) -> None:
             "s",
         ),
     ):
-        sizes = np.array([np.nan if x is None else abs(x) for x in entries])
+        sizes = np.abs(np.array(entries, float))
         sizes = np.where((sizes > LEAST) & (sizes < MOST), sizes, np.nan)
         if np.isfinite(sizes).any():
             ax.plot(h, sizes, color=colour, marker=marker, markersize=5, label=text)
