@@ -1,6 +1,6 @@
-"""Comparison of levels: differences, orders, error estimates, and the verdict on whether to believe them.
+"""From the levels of an experiment to what they say together: the comparison, the verdicts, and the summary.
 
-Pure: arrays in, arrays out.
+It reads and writes no file.
 """
 
 from __future__ import annotations

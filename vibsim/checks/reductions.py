@@ -227,7 +227,7 @@ def describe(f: Found, check: ValueCheck) -> Description:
     if f.reason == "match":
         return Description(f"{told}{holds}.", "", told)
     if f.reason == "mismatch":
-        key = next(k for k in ("equals", "below", "above") if getattr(check, k) is not None)
+        key, _ = value.border(check)
         return Description(f"{told}{not_so}.", f"Change `{key}:`, `model:` or `sweep:`.", told)
     places = about[np.flatnonzero(one.open)]
     more = " and others" if len(places) > 1 else ""

@@ -253,7 +253,7 @@ def what(check: ValueCheck, notation: Notation = PLAIN) -> str:
     return f"{value} of {quantity}" if quantity else value
 
 
-def _border(check: ValueCheck) -> tuple[str, float]:
+def border(check: ValueCheck) -> tuple[str, float]:
     """Return the key that holds the number that the check asks for, and the number."""
     wanted = {key: getattr(check, key) for key in ("equals", "below", "above")}
     return next((key, number) for key, number in wanted.items() if number is not None)
@@ -261,7 +261,7 @@ def _border(check: ValueCheck) -> tuple[str, float]:
 
 def rule(check: ValueCheck, notation: Notation = PLAIN) -> str:
     """Say what a number should be."""
-    key, wanted = _border(check)
+    key, wanted = border(check)
     if check.take == "monotone":
         return DIRECTION_ASKED[wanted]
     if key != "equals":
@@ -311,7 +311,7 @@ def describe(f: Found, check: ValueCheck) -> Description:
 
 def _digits(f: Found, check: ValueCheck) -> int:
     """Return how many digits of a number tell it from what a check asks for, and one more."""
-    found, (key, wanted) = f.fact("value"), _border(check)
+    found, (key, wanted) = f.fact("value"), border(check)
     room = check.allowed if key == "equals" else abs(found - wanted)
     if not (math.isfinite(found) and found != 0.0 and room > 0.0):
         return MOST_DIGITS
@@ -357,7 +357,7 @@ def finer_levels(f: Found) -> tuple[list[int], str]:
 def _on_mismatch(f: Found, check: ValueCheck) -> str:
     """Say what to change where a number is another one; finer levels only where they change it enough."""
     is_printed = f.id.startswith("published_")
-    change = f"hange `{'printed' if is_printed else _border(check)[0]}:`"
+    change = f"hange `{'printed' if is_printed else border(check)[0]}:`"
     if check.number.is_count_of_work or not check.number.depends_on_level:
         return f"C{change}."
     if _is_on_the_mesh(f, check):

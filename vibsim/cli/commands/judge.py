@@ -9,7 +9,7 @@ import sys
 from argparse import Namespace
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NoReturn
 
 from vibsim.core.errors import Fault, InputError, nearest
 from vibsim.core.vocabulary import FORMAT, worst
@@ -46,7 +46,7 @@ def as_json(verdicts: Sequence[LadderVerdict]) -> dict[str, Any]:
     return {"vibsim_format": FORMAT, "verdicts": [verdict.to_dict() for verdict in verdicts]}
 
 
-def _refuse(key: str, value: str, rule: str, hint: str = "") -> None:
+def _refuse(key: str, value: str, rule: str, hint: str = "") -> NoReturn:
     raise InputError([Fault(_COMMAND, 0, key, value, rule, hint)])
 
 
