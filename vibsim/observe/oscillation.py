@@ -43,11 +43,11 @@ def growth_per_period(block: MemberBlock, level: int) -> Floats:
     The period is the natural one where the model is linear, so that it can be compared with theory even where the
     scheme's own period is far from it; else it is the measured one.
     """
-    found, motion = growth_over_run(block, block.records[level]), _recurrence(block, level)
-    if motion is None:
+    found, fitted = growth_over_run(block, block.records[level]), _recurrence(block, level)
+    if fitted is None:
         return found
     with np.errstate(over="ignore"):
-        own = np.exp(motion.log_growth * (2.0 * np.pi / _step(block, level)))
+        own = np.exp(fitted.log_growth * (2.0 * np.pi / _step(block, level)))
     return np.where(np.isfinite(own), own, found)
 
 
@@ -82,7 +82,7 @@ def has_recurrence(block: MemberBlock, level: int) -> bool:
     return is_simple(block) and int(np.asarray(block.records[level].attrs["every"])) == 1
 
 
-def _recurrence(block: MemberBlock, level: int) -> Motion | None:
+def _recurrence(block: MemberBlock, level: int) -> Recurrence | None:
     if not has_recurrence(block, level):
         return None
     return fit_recurrence(np.asarray(block.records[level][block.model.position], dtype=float))
@@ -96,10 +96,10 @@ def _step(block: MemberBlock, level: int) -> Floats:
 def frequency(block: MemberBlock, level: int) -> Floats:
     """Return the angular frequency: 2 pi over the period."""
     by_peaks = _turns(np.asarray(block.records[level]["period"], dtype=float))
-    motion = _recurrence(block, level)
-    if motion is None:
+    fitted = _recurrence(block, level)
+    if fitted is None:
         return by_peaks
-    own = motion.angle * (natural_frequency(block) / _step(block, level))
+    own = fitted.angle * (natural_frequency(block) / _step(block, level))
     return np.where(own > 0, own, by_peaks)
 
 
@@ -192,19 +192,19 @@ def period_scale(block: MemberBlock) -> Floats:
 
 
 @dataclass(frozen=True)
-class Motion:
-    """What was found; arrays of shape (...), NaN where a run is no such recurrence."""
+class Recurrence:
+    """Growth and frequency by the recurrence of a run; arrays of shape (...), NaN where it satisfies none."""
 
     log_growth: Floats  # logarithm of the growth factor of the amplitude per step
     angle: Floats  # numerical frequency times dt, from 0 to pi
 
 
-def fit_recurrence(position: Floats) -> Motion:
+def fit_recurrence(position: Floats) -> Recurrence:
     """Fit the recurrence to positions at every step, shape (..., N+1)."""
     steps = position.shape[-1] - 1
     if steps < th.LEAST_STEPS:
         missing = np.full(position.shape[:-1], np.nan)
-        return Motion(missing, missing)
+        return Recurrence(missing, missing)
     half = position[..., steps // 2 :]
     behind, here, ahead = half[..., :-2], half[..., 1:-1], half[..., 2:]
     with np.errstate(all="ignore"):
@@ -231,7 +231,7 @@ def fit_recurrence(position: Floats) -> Motion:
         log_growth = np.where(alone, np.log(np.abs(factor)), log_growth)
         angle = np.where(alone, np.where(factor < 0, np.pi, 0.0), angle)
     sound = both | alone
-    return Motion(np.where(sound, log_growth, np.nan), np.where(sound, angle, np.nan))
+    return Recurrence(np.where(sound, log_growth, np.nan), np.where(sound, angle, np.nan))
 
 
 def _is_small(left: Floats) -> Flags:
