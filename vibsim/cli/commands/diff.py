@@ -8,10 +8,9 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from vibsim.cli import settings
 from vibsim.cli.chosen_plans import one_plan_of
 from vibsim.cli.jobs.common import chosen_results
-from vibsim.cli.settings import Change
+from vibsim.cli.setting_changes import Change, differences
 from vibsim.cli.terminal import clean, painted
 from vibsim.plan.digests import analysed
 from vibsim.store import read_json
@@ -37,8 +36,8 @@ def diff(options: Namespace) -> int:
     words = (options.first, options.second)
     first, second = sides = [_side(word, results) for word in words]
     missing = [word for word, side in zip(words, sides, strict=True) if side.summary is None]
-    changes = settings.differences(*({"title": side.title} for side in sides))
-    parts = {"settings": changes + settings.differences(first.content, second.content)}
+    changes = differences(*({"title": side.title} for side in sides))
+    parts = {"settings": changes + differences(first.content, second.content)}
     if first.summary is not None and second.summary is not None:
         pairs = _pairs(first.summary, second.summary)
         parts["verdicts"] = list(_verdicts(pairs))

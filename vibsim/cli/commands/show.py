@@ -7,9 +7,10 @@ from argparse import Namespace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from vibsim.cli import level_member, outcome_text, settings, terminal
+from vibsim.cli import level_member, outcome_text, terminal
 from vibsim.cli.chosen_plans import one_plan_of
 from vibsim.cli.jobs.common import chosen_results
+from vibsim.cli.setting_changes import shown
 from vibsim.cli.terminal import clean
 from vibsim.plan import Plan
 from vibsim.store import read_json
@@ -37,8 +38,8 @@ def show(options: Namespace) -> int:
         _draw(record, options, f"{plan.key}, level {level}")
     if len(made) < len(levels):
         one = len(made) == 1
-        there = f"level{'' if one else 's'} {settings.shown(made)} {'is' if one else 'are'} there"
-        print(f"{there}, of levels {settings.shown(levels)}; the others are not made yet")
+        there = f"level{'' if one else 's'} {shown(made)} {'is' if one else 'are'} there"
+        print(f"{there}, of levels {shown(levels)}; the others are not made yet")
     _verdicts(plan, results)
     return 0
 

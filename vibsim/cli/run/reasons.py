@@ -10,9 +10,9 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from vibsim.cli import settings
 from vibsim.cli.jobs.common import provenance
 from vibsim.cli.run.snakemake import Job
+from vibsim.cli.setting_changes import Change, differences, shown
 from vibsim.core.errors import FileError
 from vibsim.core.set_option import set_options
 from vibsim.plan import Plan
@@ -36,8 +36,8 @@ def why(plan: Plan, results: Path) -> str:
     except FileError:
         return "not finished yet"
     if summary.get("digest") == plan.analysis:
-        titles = (settings.shown(title) for title in (summary.get("title"), plan.title))
-        title = settings.Change("title", *titles)
+        titles = (shown(title) for title in (summary.get("title"), plan.title))
+        title = Change("title", *titles)
         return "" if title.old == title.new else str(title)
     from vibsim.store.reading import read_provenance
 
@@ -49,7 +49,7 @@ def why(plan: Plan, results: Path) -> str:
 
 
 def _told(plan: Plan, made: Mapping[str, Any]) -> str:
-    found = settings.differences(made["experiment"], analysed(plan.content))
+    found = differences(made["experiment"], analysed(plan.content))
     if not found:
         found = versions(plan, made)
     if not found:
@@ -57,23 +57,23 @@ def _told(plan: Plan, made: Mapping[str, Any]) -> str:
             {set_options([text]).strip(): "given" for text in texts}
             for texts in (made.get("settings", ()), plan.settings)
         )
-        found = settings.differences(before, now)
+        found = differences(before, now)
     if not found:
         solver = "the solver, its inputs or " if plan.has_solver else ""
         own = ", ".join(kind for _, kind, _ in plan.packages)
         return f"{solver}the code of {own + ' or of ' if own else ''}vibsim changed"
     rest = [f"{len(found) - _SHOWN} more changes"] if len(found) > _SHOWN + 1 else []
-    shown = found[:_SHOWN] if rest else found
-    return "; ".join([*map(str, shown), *rest])
+    named = found[:_SHOWN] if rest else found
+    return "; ".join([*map(str, named), *rest])
 
 
-def versions(plan: Plan, made: Mapping[str, Any]) -> list[settings.Change]:
+def versions(plan: Plan, made: Mapping[str, Any]) -> list[Change]:
     """Return the versions that are others now than those that a result was made with (its provenance)."""
     # an unknown version says nothing, and no record of it is no change
     now = provenance(plan, {})["versions"]
     match made.get("versions"):
         case dict() as before:
-            return settings.differences(before, {key: now.get(key, before[key]) for key in before})
+            return differences(before, {key: now.get(key, before[key]) for key in before})
     return []
 
 
@@ -99,5 +99,5 @@ def what(jobs: Sequence[Job]) -> list[str]:
         }
     )
     others = dict.fromkeys(_DONE.get(job.rule, job.rule) for job in jobs if not job.simulates)
-    head = f"level{'s' if len(levels) > 1 else ''} {settings.shown(levels)}"
+    head = f"level{'s' if len(levels) > 1 else ''} {shown(levels)}"
     return [head, *others] if levels else list(others)

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import settings as hypothesis_settings
 from hypothesis import strategies as st
 
-from vibsim.cli.settings import Change, differences
+from vibsim.cli.setting_changes import Change, differences
 from vibsim.experiment import Experiment, canonical
 
 CONTENT: dict[str, Any] = {
