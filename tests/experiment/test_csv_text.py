@@ -91,6 +91,7 @@ def test_a_table_is_read_with_any_clear_separator_and_mark(tmp_path: Path, text:
         ("x\th\n0\t0\n1\t1,234\n2\t0\n", "line 3: the comma may be a decimal mark", "points"),
         ('x,h\n0,0\n1,"12,345"\n2,0\n', "line 3: the comma may be a decimal mark", "points"),
         ("x,h\nm,m\n0,0\n1,0\n2,0\n", "line 2: the cell is no number", "units must begin with #"),
+        ("x,h\n1.0D-1,0\n1,0\n2,0\n", "line 2: the cell is no number", "write 1.0e-1"),
         ("x,h\n0,0\n1,\n2,0\n", "line 3: the cell is empty, in column 'h'", ""),
         ("x,h\n0,0\n1,1_0\n2,0\n", "line 3: the cell is no number, in column 'h'", ""),
         ("x,h\n0,0\n1,\u0661\n2,0\n", "line 3: the cell is no number, in column 'h'", ""),
@@ -177,3 +178,8 @@ def test_a_large_table_takes_two_calls_a_line_and_300_mb_at_most(
     # a million lines need two million
     assert int(calls) < 3_000_000
     assert int(kilobytes) < 300_000
+
+
+@pytest.mark.parametrize("cell", ["0.1 m", "5%", "1_0"])
+def test_a_number_with_more_in_its_cell_is_no_row_of_units(tmp_path: Path, cell: str) -> None:
+    assert fault(tmp_path, f"x,h\n{cell},0\n1,0\n2,0\n").hint == ""

@@ -60,7 +60,14 @@ CASES: list[tuple[dict[str, Any], str, str, str]] = [
     ({"checks": {}}, "checks", "must be a list", ""),
     ({"sweep": {}}, "sweep", "must not be empty", ""),
     # model
-    ({"model": "pendulum"}, "model", "must be a mapping with the key kind", "e.g. {kind:"),
+    (
+        {"model": "pendulum"},
+        "model",
+        "must be a mapping with the key kind",
+        "write {kind: pendulum}",
+    ),
+    ({"model": "a"}, "model", "must be a mapping with the key kind", "e.g. {kind:"),
+    ({"time": {"end": 2, 5: None}}, "time.5", "unknown key", "between braces a comma ends a value"),
     (
         {"model": {}},
         "model.kind",

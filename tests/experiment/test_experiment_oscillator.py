@@ -165,7 +165,7 @@ FAULTY: list[tuple[str, int, str, str, str]] = [
     ("spring: '  '", 0, "spring", "", "is empty"),
     ("spring: true", 0, "spring", "true", "must be a formula, or a number"),
     ("spring: [1]", 0, "spring", "[1]", "must be a formula, or a number"),
-    ("spring: {linear: 1}", 0, "spring", "{'linear': 1}", "must be a formula, or a number"),
+    ("spring: {linear: 1}", 0, "spring", "{linear: 1}", "must be a formula, or a number"),
     ("m: 0", 0, "m", "0", "must be greater than 0"),
     ("exact: cos(t)\nforce: sin(t)", 1, "force", "sin(t)", "not be given together with exact"),
     ("exact: cos(t)\nforce: 0", 1, "force", "0", "not be given together with exact"),

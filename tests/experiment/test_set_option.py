@@ -89,7 +89,7 @@ def test_the_last_of_several_counts_and_an_alias_elsewhere_stays(file: Path) -> 
 
 FAULTS = {
     "unknown key": ("model.gg=1", "model.gg: 1: unknown key: did you mean 'g'?"),
-    "unknown section": ("modell.g=1", "modell: {'g': 1}: unknown key: did you mean 'model'?"),
+    "unknown section": ("modell.g=1", "modell: {g: 1}: unknown key: did you mean 'model'?"),
     "value": ("model.g=heavy", "model.g: heavy: "),
     "nested value": ("time={end: -1}", "time.end: -1: must be greater than 0"),
     "missing": ("model={g: 1}", "model.kind: required key is missing"),

@@ -188,6 +188,8 @@ def test_a_tab_is_named(tmp_path: Path) -> None:
     [
         ("model:\n  kind:spring\n  w: 1\n", 3, "a colon needs a blank behind it, on line 2"),
         ("model:\n  kind: spring\n    w: 1\n", 3, "it is indented further than line 2"),
+        ("model:\n  kind: spring\n title: a\n", 3, "line 3 begins in another column"),
+        ("checks:\n  - {a: 1}\n  b: 1\n", 3, "line 3 is in a list: begin it with `- `"),
         ("title: Sheet 1: a start\n", 1, "a text with a colon and a blank in it needs quotation"),
         ("initial: {u: 1\ntime: {end: 2}\n", 2, "the bracket that opens on line 1 is not closed"),
         ("title: 'a\ntime: {end: 2}\n", 3, "the quotation mark that opens on line 1 is not"),

@@ -105,7 +105,7 @@ class Report:
         file, line = self._above(path)
         if place and not (at_key or nested or place.setting):
             line = place.line
-        written, origin = "" if value is None else str(value), self.source.origin(path)
+        written, origin = "" if value is None else _written(value), self.source.origin(path)
         if place and place.text and not (written and origin):
             written = place.text
         # the positions of a list are those of the file
@@ -140,6 +140,8 @@ class Report:
             rule, hint = "unknown key", nearest(written, list(_FORMS) if is_rule else known)
             if "take" in known and path[-1] in _PLACES:
                 hint = f"write at: {{{_PLACES[str(path[-1])]}: ...}}"
+            if value is None and str(path[-1])[0:1].isdigit():
+                hint = "between braces a comma ends a value: write numbers with a decimal point"
         self.add_malformed(path, rule, hint, value, at_key=True)
 
     def add_invalid(self, error: ValidationError, path: Path_) -> list[Path_]:
@@ -187,7 +189,7 @@ class Report:
         """Note that a model or a scheme has no kind that exists."""
         kinds = sorted(self.kinds.names(path[0]))
         if not isinstance(value, dict):
-            hint = f"e.g. {{kind: {kinds[0]}}}"
+            hint = f"write {{kind: {value}}}" if value in kinds else f"e.g. {{kind: {kinds[0]}}}"
             self.add(path, "must be a mapping with the key kind", hint, value)
             return
         rule = f"unknown {path[0]}".rstrip("s") if "kind" in value else MISSING
@@ -230,6 +232,17 @@ class Report:
         """Raise `InputError` with every fault, if there is one."""
         if self.faults:
             raise InputError(self.faults)
+
+
+def _written(value: object) -> str:
+    """Return a value as a file has it."""
+    if isinstance(value, dict):
+        return "{" + ", ".join(f"{key}: {_written(inner)}" for key, inner in value.items()) + "}"
+    if isinstance(value, list):
+        return "[" + ", ".join(map(_written, value)) + "]"
+    if isinstance(value, bool):
+        return str(value).lower()
+    return "null" if value is None else str(value)
 
 
 def _shipped(name: str) -> str:

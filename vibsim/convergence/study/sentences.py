@@ -201,7 +201,7 @@ def _phrases(facts: LadderVerdict, setting: Setting) -> dict[str, Any]:
         if facts.order is not None
         else "",
         "size": facts.size_name,
-        "finer": number(finer, 3),
+        "finer": number(finer, 6),
         "count": "One level is" if count == 1 else f"{count} levels are",
         "kind": kind,
         "own": own,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from decimal import Decimal
 from typing import Any
@@ -26,6 +27,7 @@ EXACT_DIGITS = 9
 def note_unlikely(checks: Sequence[Check | None], setting: Setting, report: Report) -> None:
     """Note what a file says and probably does not mean; `checks` as written, None for a malformed one."""
     _angles(setting, report)
+    _repeated(report)
     for i, check in enumerate(checks):
         if check is None:
             continue
@@ -61,6 +63,21 @@ def _angles(setting: Setting, report: Report) -> None:
             if largest > TURN:
                 rule = f"{largest:g} rad are {largest / TURN:.2g} turns"
                 report.note(path, rule, f"{largest:g} degrees are written `{largest:g} degree`")
+
+
+def _repeated(report: Report) -> None:
+    """Note a value that the list of a swept key has twice: its members are the same, or a decimal comma is meant."""
+    section = report.source.data.get("sweep")
+    if not isinstance(section, Mapping) or "follow" in section:
+        # a member that begins where another one ended is not the same again
+        return
+    for key, values in section.items():
+        numbers = (
+            [x for x in values if isinstance(x, int | float)] if isinstance(values, list) else []
+        )
+        if twice := [str(x) for x, count in Counter(numbers).items() if count > 1]:
+            hint = "a number with a decimal comma becomes two: write 0.5"
+            report.note(("sweep", key), f"has {twice[0]} more than once", hint)
 
 
 def _turned(model: Model) -> Iterator[str]:

@@ -29,6 +29,7 @@ SEPARATORS = {";": "semicolons", "\t": "tabs", ",": "commas"}
 _QUOTED = re.compile(r'"[^"]*"')
 _DECIMAL_COMMA = re.compile(r"[+-]?([0-9]+,[0-9]*|,[0-9]+)([eE][+-]?[0-9]+)?")
 _THOUSANDS = re.compile(r"[+-]?[1-9][0-9]{0,2}(,[0-9]{3})+")
+_FORTRAN = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)[dD][+-]?[0-9]+")
 _GROUPED = re.compile(r"[+-]?[0-9]{1,3}([.,' \u00a0\u202f][0-9]{3})+([.,][0-9]*)?")
 _NUMERIC = re.compile(r"[-+0-9.,eE' \u00a0\u202f]{1,40}")
 _POINTS = "write all numbers with points"
@@ -179,7 +180,9 @@ class _Marks:
             rule, hint = "is no number" if text else "is empty", ""
             if _GROUPED.fullmatch(text):
                 hint = "write it without separators of thousands"
-            elif text and is_first:
+            elif _FORTRAN.fullmatch(text):
+                hint = f"write {re.sub('[dD]', 'e', text)}"
+            elif is_first and text and not text[0].isdigit():
                 hint = "a row of units must begin with #"
             raise CsvError(rule, hint, line, column, text)
         if self.points and self.commas:

@@ -172,7 +172,13 @@ def _syntax(error: yaml.MarkedYAMLError, text: str, file: str) -> Fault:
         rule = f"{_INVALID}: tabs are not allowed for indentation"
         return Fault(file, line, "", "", rule, "use spaces")
     opened = error.context_mark.line + 1 if error.context_mark else line
-    if "mapping values" in problem:
+    if "expected key" in problem:
+        problem = f"line {line} begins in another column than the lines of its section"
+    elif "'-' indicator" in problem:
+        problem = (
+            f"line {line} is in a list: begin it with `- `, in the column of the entries above"
+        )
+    elif "mapping values" in problem:
         problem = _stray_colon(text.splitlines(), line)
     elif opened < line and ("flow" in str(error.context) or "quoted" in str(error.context)):
         what = "quotation mark" if "quoted" in str(error.context) else "bracket"
