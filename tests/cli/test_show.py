@@ -145,10 +145,11 @@ def test_a_run_in_progress_shows_what_there_is(made: Made, capsys: Capture) -> N
 
 
 def test_no_results_yet_a_collection_and_an_unknown_name(made: Made, capsys: Capture) -> None:
-    other = made.file.with_name("other.yaml")
+    other = made.file.with_name("my other.d") / "other.yaml"
+    other.parent.mkdir()
     other.write_text(made.file.read_text())
     assert made.vibsim("show", other) == 1
-    assert f"there are no results yet: vibsim run {other}" in capsys.readouterr().err
+    assert f"there are no results yet: vibsim run '{other}'" in capsys.readouterr().err
     assert made.vibsim("show", "pendulum_lab") == 2
     assert made.vibsim("show", "theta_convergense") == 2
     assert "did you mean 'theta_convergence'?" in capsys.readouterr().err

@@ -133,7 +133,9 @@ def test_tables_of_an_experiment_keep_their_places(tmp_path: Path) -> None:
     }
 
 
-@pytest.mark.parametrize("kind", ["full", "file", "damaged", "edited", "mixed", "nameless"])
+@pytest.mark.parametrize(
+    "kind", ["full", "file", "damaged", "edited", "missing", "mixed", "nameless"]
+)
 def test_what_is_not_whole_or_would_be_overwritten_is_refused(place: Place, kind: str) -> None:
     target = place.folder / "crate"
     words: list[object] = [place.file]
@@ -149,6 +151,9 @@ def test_what_is_not_whole_or_would_be_overwritten_is_refused(place: Place, kind
         case "edited":
             place.change("theta: 1.0", "theta: 1.1")
             status, told = 1, "level_06.nc: it belongs to job "
+        case "missing":
+            shutil.rmtree(place.tiny)
+            status, told = 1, f"only whole results are published: vibsim run '{place.file}'"
         case "mixed":
             words += ["--formats", "png"]
             told = "does not go with --publish"

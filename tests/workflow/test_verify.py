@@ -265,3 +265,11 @@ def test_the_cause_of_a_difference_is_named(place: Place, finished: Place, cause
     told = verify.differences(plan, place.results, finished.results)
     assert [words for words in told if words.startswith(cause)], told
     assert page.name in next(iter(told.values()))
+
+
+def test_what_was_never_run_is_not_recomputed(place: Place) -> None:
+    shutil.rmtree(place.results)
+    place.results.mkdir()
+    ended = vibsim("verify", place.file, "--results", place.results)
+    assert ended.stdout == "adhoc/tiny: there are no results yet: run it first\n"
+    assert ended.returncode == 1

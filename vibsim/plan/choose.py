@@ -36,6 +36,11 @@ class Choice:
         """The name of the experiment over all collections."""
         return f"{self.collection}/{self.name}"
 
+    @property
+    def word(self) -> str:
+        """What names it on a command line."""
+        return str(self.file) if self.case is None else f"{self.file}@{self.case}"
+
 
 def experiments(root: Path) -> list[Choice]:
     """Return every experiment in the collections of the folder `root` (`vibsim.core.home.home`), in order."""

@@ -6,6 +6,7 @@ import math
 from argparse import Namespace
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
+from shlex import quote
 from typing import Any, NamedTuple
 
 from vibsim.cli.chosen_plans import one_plan_of
@@ -47,7 +48,7 @@ def diff(options: Namespace) -> int:
             print(painted(name, "bold"))
             print(*(f"  {change}" for change in changes), sep="\n")
     for word in missing:
-        print(f"{word}: there are no verdicts of these settings yet: vibsim run {word}")
+        print(f"{word}: there are no verdicts of these settings yet: vibsim run {quote(word)}")
     if any(parts.values()):
         return 1
     if not missing:

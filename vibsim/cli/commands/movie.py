@@ -7,6 +7,7 @@ import sys
 from argparse import Namespace
 from collections.abc import Iterator, Sequence
 from pathlib import Path
+from shlex import quote
 from typing import TYPE_CHECKING
 
 from vibsim.cli import level_member
@@ -110,14 +111,14 @@ def _film(plan: Plan, options: Namespace, form: str) -> Film:
     for level in options.level or ():
         level_member.check_level(level, levels)
         if level not in made:
-            problem = f"level {level} is not made yet: vibsim run {options.experiment}"
+            problem = f"level {level} is not made yet: vibsim run {quote(options.experiment)}"
             raise VibsimError(f"{plan.key}: {problem}")
     asked = options.level or [made[-1]]
     records = {level: level_member.of_level(plan, results, level, case) for level in asked}
     record = records[asked[0]]
     names = level_member.series(record)
     if not names:
-        rest = f"run one member alone: vibsim run {options.experiment}@{case}"
+        rest = f"run one member alone: vibsim run {quote(f'{options.experiment}@{case}')}"
         raise VibsimError(f"{plan.key}: there are no series over time to be shown; {rest}")
     schemes = [chosen("--scheme", s, record.words("scheme")) for s in options.scheme or [None]]
     position = plan.experiment.model.definition.position

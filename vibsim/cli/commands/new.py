@@ -7,6 +7,7 @@ import os
 import re
 from argparse import Namespace
 from pathlib import Path
+from shlex import quote
 
 from vibsim.cli.jobs.common import refusal
 from vibsim.core.errors import nearest
@@ -43,7 +44,8 @@ def new(options: Namespace) -> int:
     for name, content in written.items():
         write_bytes(file.parent / name, content)
         print(f"wrote {file.parent / name}")
-    print(f"check it: vibsim check {file}\nrun it:   vibsim run {file}")
+    word = quote(str(file))
+    print(f"check it: vibsim check {word}\nrun it:   vibsim run {word}")
     return 0
 
 

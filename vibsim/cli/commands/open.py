@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import webbrowser
 from argparse import Namespace
+from shlex import quote
 
 from vibsim.cli.chosen_plans import one_plan_of
 from vibsim.cli.jobs.common import chosen_results
@@ -22,7 +23,7 @@ def open_(options: Namespace) -> int:
     word = options.experiment
     page = results / ("index.html" if word is None else one_plan_of(word).page)
     if not page.is_file():
-        rest = "" if word is None else f" {word}"
+        rest = "" if word is None else f" {quote(word)}"
         raise VibsimError(f"{page}: there is no report yet: vibsim run{rest}")
     try:
         is_open = webbrowser.open(page.as_uri())

@@ -8,6 +8,7 @@ from __future__ import annotations
 import json
 import mimetypes
 import os
+import shlex
 import shutil
 from argparse import Namespace
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -66,7 +67,9 @@ def _check(plan: Plan, options: Namespace, results: Path) -> None:
     _, problems = verify.compare(results, plan.key)
     if problems:
         text = "\n".join(f"{path}: {problem}" for path, problem in problems.items())
-        raise VibsimError(f"{text}\nonly whole results are published: vibsim run {plan.file}")
+        raise VibsimError(
+            f"{text}\nonly whole results are published: vibsim run {shlex.quote(str(plan.file))}"
+        )
     current: dict[str, Callable[[Path], Any]] = {
         shard.path: partial(store.check, digest=shard.digest) for shard in plan.shards
     }

@@ -57,16 +57,18 @@ def verify(options: Namespace) -> int:
         check_allowed(plans, options.allow_commands)
     if not results.is_dir():
         raise VibsimError(f"{results}: there are no results yet")
-    if words:
-        keys = [choice.key for choice in choose(words, home(), options.settings)]
-    else:
-        keys = [made_files.INDEX, *experiments(results)]
+    choices = choose(words, home(), options.settings) if words else []
+    keys = [choice.key for choice in choices] or [made_files.INDEX, *experiments(results)]
     results_folder.check(results, filter(None, keys))
     with kept(results), temporary_folder() as folder:
         faults = sum(_tell_files(results, key) for key in keys)
+        # what was never run has nothing to compare with
+        known = experiments(results)
+        plans = [plan for plan in plans if plan.key in known]
         if plans:
             # verdicts are no news here, progress is
-            command = run_command(options, options.experiments, folder)
+            run = [choice.word for choice in choices if choice.key in known]
+            command = run_command(options, run, folder)
             status = supervise.child(command, is_heard=False)
             if status not in (0, 1):
                 return status
