@@ -300,6 +300,15 @@ def test_an_order_beside_the_band_whose_interval_reaches_it_is_told_as_such(monk
             assert drawn.orders(exp, record, decisive).title.startswith(title)
 
 
+def test_a_curve_over_the_sweep_counts_the_members_that_have_the_number():
+    exp = samples.swept(16)
+    record, _, decisive = found(exp)
+    with style.applied():
+        shown = drawn.response(exp, record, decisive)
+    assert shown.title == "Period of 15 of 16 members"
+    assert "The others have no period." in shown.caption
+
+
 def test_an_order_that_its_scheme_promises_is_not_said_to_be_less_than_that():
     checks = [{"converges": "theta", "order": 3}]
     exp = samples.experiment(checks=checks)

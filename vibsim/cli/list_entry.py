@@ -139,7 +139,7 @@ def model_rows(model: Model) -> Iterator[Row]:
     yield "model", f"{model.kind}: {model.title}"
     yield "equation", model.equation
     yield "source", model.source
-    if not model.formulas:
+    if model.written is None:
         shape = "linear" if model.linear else "nonlinear"
         yield "is", f"{shape}, {'conservative' if model.conservative else 'not conservative'}"
     if model.named is not None:
@@ -155,7 +155,7 @@ def model_rows(model: Model) -> Iterator[Row]:
         )
         yield "events", text
     yield from _under("also stored", map(_quantity, model.outputs))
-    if not model.formulas:
+    if model.written is None:
         yield "exact solution", "known" if model.exact is not None else "not known"
     required = "".join(f", {field.name}: {field.default}" for field in needed(model))
     yield "write", f"model: {{kind: {model.kind}{required}}}"

@@ -74,8 +74,13 @@ def _one(what: str, name: str) -> int:
 
 def _models(models: Iterable[Model]) -> Iterable[tuple[str, str]]:
     for model in models:
-        parameters = ", ".join(f"{p.name} = {p.default:g} {p.unit}" for p in model.parameters)
+        parameters = ", ".join(
+            f"{p.name} = {p.default:g}" + f" {p.unit}" * (p.unit != "1") for p in model.parameters
+        )
         shape = "linear" if model.linear else "nonlinear"
+        if model.written is not None:
+            # the file decides
+            shape = ""
         if model.formulas:
             shape = f"formulas {', '.join(row.name for row in model.formulas)}"
         told = (f"{model.title}: {model.equation}", parameters, shape)

@@ -247,12 +247,16 @@ def response(experiment: Experiment, record: Record, lead: Lead) -> Picture | No
         ax = _map(lead, layout, values, text)
     else:
         ax = _dots(lead, max(keys, key=lambda key: key.distinct.size), values, text)
-    count = words.number(len(record["case"]), "integer")
+    known, every = int(np.isfinite(values).sum()), len(record["case"])
+    count = words.number(every, "integer")
+    if known < every:
+        count = f"{words.number(known, 'integer')} of {count}"
     is_marked = math.isfinite(values[lead.member.case])
     return Picture(
         "hero_response",
         f"{name[:1].upper()}{name[1:]} of {count} members",
         "Each member is one run of the sweep, at its finest level."
+        + f" The others have no {name}." * (known < every)
         + " The ring is the member that decides." * is_marked,
         f"{name} of every member over the swept parameters",
         ax.get_figure(root=True),

@@ -6,7 +6,7 @@ It is written as SVG of its own, some kilobytes, with colours for light and dark
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -31,7 +31,7 @@ WIDE = 1e3  # a number whose largest value exceeds its median by this factor is 
 BEYOND = 1.5
 """What leaves the smallest of several solutions by more than this factor is cut off."""
 NUMBERS = ("amplitude", "period", "growth_per_period")
-"""What is drawn over swept parameters: the first that varies."""
+"""What is drawn over swept parameters: the first that varies. Of a motion that keeps its energy the period is first."""
 
 _STYLE = (
     ":root{color-scheme:light dark}path{fill:none;stroke-width:1.8;stroke-linejoin:round;stroke-linecap:round}"
@@ -48,9 +48,10 @@ def thumbnail(experiment: Experiment, record: Record, member: Member) -> str:
     """Return the small picture as an SVG document; `member` is the one whose motion is drawn where no sweep is."""
     layout = sweep_layout.layout_of(sweep_layout.keys(record))
     model = experiment.model.definition
-    if isinstance(layout, Along) and (lines := _response(record, layout)):
+    names = sorted(NUMBERS, key="period".__ne__) if model.conservative else NUMBERS
+    if isinstance(layout, Along) and (lines := _response(record, layout, names)):
         return document(lines)
-    if isinstance(layout, Grid) and (cells := _map(record, layout, model.position)):
+    if isinstance(layout, Grid) and (cells := _map(record, layout, names, model.position)):
         return _document("".join(cells), "map")
     if data.is_lean(record):
         levels = np.array(data.whole(record, "level"), dtype=np.float64)
@@ -92,12 +93,12 @@ def _solutions(record: Record, position: str, member: Member, layout: Along | Gr
     return lines
 
 
-def _response(record: Record, along: Along) -> Lines:
+def _response(record: Record, along: Along, names: Sequence[str]) -> Lines:
     """Return a number over the swept key, a curve for each of the other values; nothing where none varies."""
     key = along.key
     if key.distinct.size < FEWEST:
         return []
-    for name in NUMBERS:
+    for name in names:
         values = np.abs(data.known(record, name, MEMBER, level=-1)[0])
         if is_telling(values):
             if data.largest(values) > WIDE * np.median(style.finite(values)):
@@ -107,9 +108,9 @@ def _response(record: Record, along: Along) -> Lines:
     return []
 
 
-def _map(record: Record, grid: Grid, position: str) -> list[str]:
+def _map(record: Record, grid: Grid, names: Sequence[str], position: str) -> list[str]:
     """Return the cells of a map in colours; nothing where no number varies over it."""
-    found = [np.abs(data.known(record, name, MEMBER, level=-1)[0]) for name in NUMBERS]
+    found = [np.abs(data.known(record, name, MEMBER, level=-1)[0]) for name in names]
     found.append(np.log10(style.no_zeros(finest_level.error(record, position).best[0])))
     values = next((values for values in found if is_telling(values)), None)
     if values is None:
