@@ -149,6 +149,16 @@ def test_unreadable_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Non
         Experiment.from_yaml(path)
 
 
+def test_a_file_that_is_not_there_has_the_nearest_name_beside_it(tmp_path: Path) -> None:
+    for name in ("pendulum.yaml", "pendulun.csv", "x.yaml"):
+        (tmp_path / name).touch()
+    for name, hint in (("pendulm", "did you mean 'pendulum.yaml'?"), ("road", ""), ("no/x", "")):
+        with pytest.raises(InputError) as caught:
+            Experiment.from_yaml(tmp_path / f"{name}.yaml")
+        (fault,) = caught.value.faults
+        assert (fault.rule, fault.hint) == ("cannot be read (No such file or directory)", hint)
+
+
 def test_what_is_no_file_is_refused_without_reading_it(tmp_path: Path) -> None:
     (tmp_path / "endless.yaml").symlink_to("/dev/zero")
     (tmp_path / "circle.yaml").symlink_to("circle.yaml")

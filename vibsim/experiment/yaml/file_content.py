@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from vibsim.core import regular_files
-from vibsim.core.errors import Fault, InputError
+from vibsim.core.errors import Fault, InputError, nearest
 
 MAX_BYTES = 2**20
 """Of an experiment file."""
@@ -19,14 +19,26 @@ def read_bytes(path: Path, most: int = MAX_BYTES) -> bytes:
     InputError when it cannot be read, is no regular file (a pipe, a device, a folder) or has more than `most` bytes.
     """
     size = f"{most} bytes" if most == MAX_BYTES else f"{most >> 20} MiB"
-    rule = f"must not be larger than {size}"
+    rule, hint = f"must not be larger than {size}", ""
     try:
         content = content_of(path, most)
         if len(content) <= most:
             return content
     except (OSError, ValueError) as error:
         rule = f"cannot be read ({getattr(error, 'strerror', None) or error})"
-    raise InputError([Fault(str(path), 0, "", "", rule)])
+        hint = _alike(path) if isinstance(error, FileNotFoundError) else ""
+    raise InputError([Fault(str(path), 0, "", "", rule, hint)])
+
+
+def _alike(path: Path) -> str:
+    """Name a file of the same kind beside one that is not there, if its name is near; empty else."""
+    try:
+        stems = sorted(file.stem for file in path.parent.iterdir() if file.suffix == path.suffix)
+    except OSError:
+        return ""
+    # an ending that both have makes no names alike
+    hint = nearest(path.stem, stems)
+    return f"{hint[:-2]}{path.suffix}'?" if hint.startswith("did you mean") else ""
 
 
 def content_of(path: Path, most: int) -> bytes:
