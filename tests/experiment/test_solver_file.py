@@ -123,6 +123,14 @@ REFUSED = [
 ]
 
 
+def test_without_sizes_no_placeholder_is_called_unknown(
+    heat: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    found = faults(changed(heat, ("refine:", "refin:")), capsys)
+    assert [line.partition(": ")[2].split(":")[0] for line in found] == ["refine", "refin"]
+    assert found[1].endswith("unknown key: did you mean 'refine'?")
+
+
 @pytest.mark.parametrize(("old", "new", "wanted"), REFUSED, ids=[row[1][:30] for row in REFUSED])
 def test_a_fault_is_named_with_its_line(
     heat: Path, old: str, new: str, wanted: Faults, capsys: pytest.CaptureFixture[str]

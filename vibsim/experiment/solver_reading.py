@@ -265,7 +265,8 @@ def _check_template(
         report.add(path, f"must end with {' or '.join(ENDINGS)}", value=text)
     known = [*of_level, *swept]
     known += [*OUTPUTS, "threads"] if kind == "command" else []
-    unknown = [name for name in dict.fromkeys(used) if name not in known]
+    # without sizes, which is a fault of its own, no name is known
+    unknown = [name for name in dict.fromkeys(used) if of_level and name not in known]
     for name in unknown:
         report.add(path, f"unknown placeholder {{{name}}}", nearest(name, known), text)
     if not set(used) & set(of_level) and of_level and not unknown:
