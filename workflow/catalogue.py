@@ -36,7 +36,7 @@ of every statement.
 | badge | meaning |
 |---|---|
 | CONFIRMED | an experiment shows it; a statement is decided by the check that is named |
-| CORRECTED | the text says something else than what is true; the row says what is |
+| CORRECTED | the text is wrong here; `Correct:` says what is right, `Refuted:` what a check did not find |
 | OPEN | something is missing, and the row says what |
 | PROVIDED | a command or a page does what the text asks for; nothing is measured |
 
@@ -105,9 +105,9 @@ def rows(listed: dict[str, Any], known: dict[str, Experiment]) -> Iterator[Row]:
         shown = ", ".join(_places(thing))
         yield Row(thing["source"], str(number), thing["says"], shown, badge, thing.get("open", ""))
     for number, row in listed["errata"].items():
-        told = f"True is: {row['truth']}"
+        told = f"Correct: {row['truth']}"
         if "not_run" in row:
-            told += f". Nothing is run: {row['not_run']}"
+            told += f". Not run: {row['not_run']}"
         shown = ", ".join(_places(row))
         yield Row(row["source"], f"E{number}", row["says"], shown, CORRECTED, told)
     for name, experiment in known.items():
@@ -120,9 +120,9 @@ def rows(listed: dict[str, Any], known: dict[str, Experiment]) -> Iterator[Row]:
             decides = assertions.measured(check.that)
             badge, told = CONFIRMED, decides
             if not check.holds:
-                badge, told = CORRECTED, f"True is: {check.note}. Asked and not found: {decides}"
+                badge, told = CORRECTED, f"Correct: {check.note}. Refuted: {decides}"
             elif source != check.source:
-                badge, told = CORRECTED, f"This is what is true, not what the text says: {decides}"
+                badge, told = CORRECTED, f"Correct: {decides}"
             yield Row(source, "", check.claim, _link(f"{name}#{check.id}"), badge, told)
 
 
@@ -196,7 +196,7 @@ def page(listed: dict[str, Any], known: dict[str, Experiment]) -> str:
                 lines.append(f"Shown in sections {ends}.\n")
                 continue
             lines.append(
-                "| no. | place | what it says | shown by | badge | decided by, or what is true |"
+                "| no. | place | what it says | shown by | badge | decided by, or what is right |"
             )
             lines.append("|---|---|---|---|---|---|")
             ordered = (
