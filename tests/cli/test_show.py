@@ -90,7 +90,7 @@ def test_the_plot_is_followed_by_the_verdicts(made: Made, capsys: Capture) -> No
     assert lines[2].endswith("0.00")
     assert lines[7].startswith("  to t = 1.25 of 20; see more with --from 1.25")
     assert lines[9] == "adhoc/small  FAIL"
-    assert lines[10].startswith("  PASS  asymptotic  order  All 2 results passed.")
+    assert lines[10].startswith("  PASS  asymptotic  order  Both results passed.")
 
 
 def test_what_is_drawn_can_be_chosen(made: Made, capsys: Capture) -> None:

@@ -201,7 +201,7 @@ def test_a_summary_states_facts_of_every_result(made: Study) -> None:
     assert enough["results"][0]["facts"]["relative_error"] < 1e-3
     (check,) = made.summary("command")["checks"]
     assert check["counts"] == {"PASS": 2, "FAIL": 0, "INCONCLUSIVE": 0}
-    assert check["text"].startswith("All 2 members passed. The hardest is member 1 (rate = 1.0).")
+    assert check["text"].startswith("Both members passed. The hardest is member 1 (rate = 1.0).")
     worst = check["results"][0]
     assert (worst["case"], worst["values"]) == (1, {"rate": 1.0})
     assert worst["command"] == "vibsim run command.yaml@1 --allow-commands"

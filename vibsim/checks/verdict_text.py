@@ -121,7 +121,8 @@ class Wording:
         if total > 1:
             head = f"{status} in {counts[status]} of {total} results"
             if status == "PASS":
-                head = f"All {total} results{asked and f' with {asked}'} passed"
+                whole = "Both" if total == 2 else f"All {total}"
+                head = f"{whole} results{asked and f' with {asked}'} passed"
             elif status in where:
                 head = where[status]["text"]
             is_of_all = check is not None and check.kind == "value" and check.take is not None

@@ -138,7 +138,7 @@ def _text(experiment: SolverExperiment, found: CheckResults) -> str:
         return told
     head = f"{status} in {found.counts[status]} of {total} members"
     if status == "PASS":
-        head = f"All {total} members passed"
+        head = f"{'Both' if total == 2 else f'All {total}'} members passed"
     place = ", ".join(f"{k} = {v}" for k, v in experiment.parameters_of(decides.member).items())
     return f"{head}. The hardest is member {decides.member} ({place}). {told}"
 

@@ -224,7 +224,7 @@ def test_claims_and_schemes_have_a_result_each() -> None:
     found = judged(claim, wrong, schemes=["rk4", "heun"])
     assert [verdict.status for verdict in found] == ["PASS", "PASS"]
     assert [sum(verdict.counts.values()) for verdict in found] == [2, 2]
-    assert "All 2 results passed. The hardest is scheme" in found[0].text
+    assert "Both results passed. The hardest is scheme" in found[0].text
     assert "case" not in found[0].text
 
 

@@ -15,7 +15,6 @@ from vibsim.models import Model
 from vibsim.report import style, words
 from vibsim.report.data import Member, at, exact_periods, exact_series, flags, swept, unit, whole
 from vibsim.report.tables.table import Cell, Column, Table, Written
-from vibsim.report.words import power
 
 CLASSES = {
     "unknown": "–",
@@ -94,8 +93,7 @@ def error_size(size: float) -> Written | None:
     """Write the size of an error with two digits; nothing where there is none."""
     if not math.isfinite(size):
         return None
-    mantissa, exponent = f"{size:.1e}".split("e")
-    return Written(size, f"{mantissa}·{power(int(exponent))}" if size else "0")
+    return Written(size, words.number(size, "brief"))
 
 
 def rounded(value: float, error: float) -> Written:
