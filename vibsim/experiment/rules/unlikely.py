@@ -72,10 +72,9 @@ def _repeated(report: Report) -> None:
         # a member that begins where another one ended is not the same again
         return
     for key, values in section.items():
-        numbers = (
-            [x for x in values if isinstance(x, int | float)] if isinstance(values, list) else []
-        )
-        if twice := [str(x) for x, count in Counter(numbers).items() if count > 1]:
+        listed = values if isinstance(values, list) else []
+        numbers = Counter(x for x in listed if type(x) in (int, float))
+        if twice := [x for x, count in numbers.items() if count > 1]:
             hint = "a number with a decimal comma becomes two: write 0.5"
             report.note(("sweep", key), f"has {twice[0]} more than once", hint)
 
