@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import doctest
 import inspect
+import math
 import subprocess
 import sys
+from collections.abc import Callable
 from dataclasses import FrozenInstanceError, replace
 from pathlib import Path
 from typing import Any
@@ -400,3 +402,53 @@ def test_many_members_are_judged_one_by_one() -> None:
     assert len(found) == 100
     for member in (0, 15, 16, 99):
         assert found[member] == judge(H, [float(x[member]) for x in values], order=2)
+
+
+def gauss(n: int) -> float:
+    """Return the integral of exp(-x^2) from 0 to 1 by Gauss's rule of five points on n intervals."""
+    nodes, weights = np.polynomial.legendre.leggauss(5)
+    x = (np.arange(n)[:, None] + (nodes + 1.0) / 2.0) / n
+    return float(np.sum(np.exp(-x * x) * weights / 2.0) / n)
+
+
+def simpson(n: int) -> float:
+    x = np.linspace(0.0, 1.0, 2 * n + 1)
+    return float(np.exp(-x * x) @ [1, *[4, 2] * (n - 1), 4, 1]) / (6 * n)
+
+
+ERF = 0.5 * math.sqrt(math.pi) * math.erf(1.0)
+
+
+@pytest.mark.parametrize("digits", [4, 6, 8, 10, 12, 14])
+@pytest.mark.parametrize(("rule", "reason"), [(gauss, "exact"), (simpson, "asymptotic")])
+def test_an_exact_value_that_is_written_with_few_digits_is_no_wrong_limit(
+    rule: Callable[[int], float], reason: str, digits: int
+) -> None:
+    cells = [8, 16, 32, 64]
+    values = [rule(n) for n in cells]
+    exact = float(f"{ERF:.{digits}g}")
+    verdict = judge([1 / n for n in cells], values, exact=exact, order=4)
+    assert (verdict.status, verdict.reason) == ("PASS", reason)
+    said = "agree with all digits of the exact value" in verdict.sentence
+    assert said >= (abs(values[-1] - ERF) < abs(exact - ERF))
+    assert abs(values[-1] - (ERF if said else exact)) <= verdict.error_bound
+
+
+@pytest.mark.parametrize("exact", [0.7469, 0.746825, 0.74682414, 0.7, 0.75])
+def test_an_exact_value_that_differs_in_its_last_digit_is_a_wrong_limit(exact: float) -> None:
+    cells = [8, 16, 32, 64]
+    verdict = judge([1 / n for n in cells], [simpson(n) for n in cells], exact=exact)
+    assert verdict.reason == "wrong_limit"
+
+
+@pytest.mark.parametrize(("p", "q"), [(4 / 3, 2.0), (2 / 3, 4 / 3), (5 / 3, 2.0), (1.25, 2.25)])
+@pytest.mark.parametrize("part", [-0.2, -0.1, 0.05, 0.3])
+@pytest.mark.parametrize("count", [4, 5, 6])
+def test_the_interval_of_an_order_that_is_no_multiple_of_a_half_holds_it(
+    p: float, q: float, part: float, count: int
+) -> None:
+    # as at the corners of a domain: a second power behind the first moves the measured order
+    h = 0.1 * 0.5 ** np.arange(count)
+    verdict = judge(h, 1.0 + 0.7 * h**p + part * h**q)
+    if verdict.status == "PASS":
+        assert verdict.order_low <= p <= verdict.order_high

@@ -88,8 +88,9 @@ def finest_order(orders: Floats, last: Integers) -> Floats:
 def interval(believed: Posterior, order: Floats) -> tuple[Floats, Floats]:
     """Return the range of powers that holds `ORDER_INTERVAL` of what is believed, and the measured order."""
     below, above = tails(believed)
-    low = believed.powers[np.argmax(below > OUTSIDE, axis=-1)]
-    high = believed.powers[::-1][np.argmax(above > OUTSIDE, axis=-1)]
+    least, most = believed.reach
+    low = least[np.argmax(below > OUTSIDE, axis=-1)]
+    high = most[::-1][np.argmax(above > OUTSIDE, axis=-1)]
     return np.fmin(low, order), np.fmax(high, order)
 
 

@@ -75,6 +75,9 @@ class Posterior:
 
     powers: Floats  # the powers that are looked at, increasing, shape (power,)
     grid: Floats  # the same, and those that only other ladders have
+    # what each of `powers` may be: one of an expansion is itself, another one lies between its neighbours on the grid,
+    # since a second power behind it moves the measured order; shape (2, power)
+    reach: Floats
     orders: Floats  # of every three successive levels, shape (ladder, n-2); see `orders_of`
     windows: list[tuple[int, int]]  # coarsest and finest level
     alone: Floats  # that this power dominates, shape (ladder, power)
@@ -115,7 +118,9 @@ class Posterior:
     def of_ladders(self) -> list[str]:
         """Name what has a row for each ladder."""
         names = [one.name for one in fields(self)]
-        return [name for name in names if name not in ("powers", "grid", "windows", "pairs")]
+        return [
+            name for name in names if name not in ("powers", "grid", "reach", "windows", "pairs")
+        ]
 
 
 def orders_of(ladder: Ladder) -> Floats:
@@ -151,6 +156,8 @@ class _Fit:
         ends = np.array([0, len(every) - 1])
         used = np.unique(np.concatenate([np.searchsorted(every, usual), nearest.ravel(), ends]))
         self.grid, self.powers, self.nearest = every, every[used], np.searchsorted(used, nearest)
+        neighbours = np.stack([np.append(every[0], every[:-1]), np.append(every[1:], every[-1])])
+        self.reach = np.where(np.isin(every, usual), every, neighbours)[:, used]
         count, n = len(ladder.gram), len(ladder.h)
         self.windows = [
             (last - rows, last)
@@ -407,6 +414,7 @@ class _Fit:
         return Posterior(
             powers=self.powers,
             grid=self.grid,
+            reach=self.reach,
             orders=self.orders,
             windows=self.windows,
             alone=alone,

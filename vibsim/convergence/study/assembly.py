@@ -92,7 +92,11 @@ def _hidden(asked: Asked, common: CommonValues, one: Outcome) -> bool:
 
 
 def _rounding(one: Outcome) -> tuple[str, ...]:
-    """Say that the digits which the values have make a part of the bounds."""
+    """Say what the digits of the exact values leave open, and that those of the values make a part of the bounds."""
+    if one.agrees_to_digits:
+        return (
+            "The levels agree with all digits of the exact value, which are too few to tell the error.",
+        )
     if not one.rounded > ROUNDING_SAID * one.error_bound or one.exact_known:
         return ()
     return ("The bounds include the rounding of the values to their last digit.",)

@@ -46,8 +46,8 @@ def scale_of(values: Floats) -> Floats:
     return np.asarray(np.ldexp(1.0, np.frexp(np.where(size > 0.0, size, 1.0))[1] - 1))
 
 
-def half_last_digit(values: Floats) -> float:
-    """Return half a unit of the last decimal place of finite values, shape (n, points), where they have few digits.
+def half_last_digit(values: Floats, few: int = FEW_DIGITS) -> float:
+    """Return half a unit of the last decimal place of finite values, shape (n, points), of no more than `few` digits.
 
     It is how far each of them is from what it was before it was printed or stored with these digits; else 0.
     """
@@ -58,7 +58,7 @@ def half_last_digit(values: Floats) -> float:
         number = Decimal(repr(float(value))).normalize()
         if number:
             last = min(last, int(number.as_tuple().exponent))
-        if size - last >= FEW_DIGITS:
+        if size - last >= few:
             return 0.0
     with np.errstate(over="ignore"):
         is_binary = np.all(sampled * BINARY == np.rint(sampled * BINARY))

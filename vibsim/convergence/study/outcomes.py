@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from vibsim.convergence.assessment import Assessment, Question, assess
+from vibsim.convergence.assessment import DECIDED, Assessment, Question, assess
 from vibsim.convergence.differences import orders_of_steps
 from vibsim.convergence.study.measurement import Measurement, half_last_digit, measurement
 from vibsim.convergence.thresholds import MISSED, NOISE_FACTOR, STATED_NOISE_FACTOR
@@ -16,7 +16,12 @@ from vibsim.core.vocabulary import REASON_NAMES
 FEWEST = 3
 """Levels that show an order."""
 MOST_ROUNDED = 5e-4
-"""Levels that are all the same may be exact where half of their last digit is a larger part: of up to three digits."""
+"""Levels that are all the same may be exact where half of their last digit is a larger part: of up to three digits.
+Exact values of more than three digits may be rounded to them."""
+EXACT_DIGITS = 16
+"""Exact values with no more decimal digits than these may be rounded to them: whoever writes them down stops there."""
+SEEN = 0.1
+"""The rounding of exact values is seen where it is so large a part of the error of the finest level."""
 
 
 @dataclass(frozen=True)
@@ -60,6 +65,8 @@ class Outcome:
     """Extrapolated values, shape (points,)."""
     best_bound: float = np.nan
     """How far they are from the limit at most, in the norm."""
+    agrees_to_digits: bool = False
+    """Whether the levels were judged without the exact values, which have too few digits to tell their error."""
     rounded: float = 0.0
     """How far the extrapolated values are off because those of the levels have few digits; part of the bounds."""
 
@@ -82,14 +89,41 @@ def outcomes(
     exact
         Exact values, shape (member, points); None where they are not known.
     """
-    finite = np.isfinite(values).all(axis=2)
+    finite: Flags = np.asarray(np.isfinite(values).all(axis=2))
     found: dict[int, Outcome] = {}
     for pattern in np.unique(finite, axis=0):
         members = np.flatnonzero(np.all(finite == pattern, axis=1))
         truth = None if exact is None else exact[members]
         some = _with_finite(asked, h, values[members], epsilon, truth, pattern)
         found |= dict(zip(members.tolist(), some, strict=True))
+    if exact is not None:
+        for i, one in found.items():
+            half = _rounding_of_exact(one, exact[i])
+            if half:
+                levels = _with_finite(asked, h, values[i : i + 1], epsilon, None, finite[i])[0]
+                if _agrees(levels, exact[i], half) and (
+                    one.reason == "wrong_limit" or levels.reason in (*DECIDED, "exact")
+                ):
+                    levels.agrees_to_digits = True
+                    found[i] = levels
     return [found[i] for i in range(len(values))]
+
+
+def _rounding_of_exact(one: Outcome, exact: Floats) -> float:
+    """Return half a unit of the last digit of exact values, if that may be why nothing else was decided; else 0."""
+    if one.reason not in ("wrong_limit", "pre_asymptotic", "round_off", "oscillating"):
+        return 0.0
+    half = half_last_digit(exact[None], EXACT_DIGITS)
+    at_most = MOST_ROUNDED * float(np.max(np.abs(exact)))
+    return half if SEEN * abs(one.error) <= half <= at_most else 0.0
+
+
+def _agrees(levels: Outcome, exact: Floats, half: float) -> bool:
+    """Say whether exact values may be the limit of the levels, but for a rounding of up to `half`."""
+    if levels.best is None:
+        return False
+    away = np.sqrt(np.mean((levels.best - exact) ** 2))
+    return bool(away <= levels.best_bound + half)
 
 
 def _with_finite(
