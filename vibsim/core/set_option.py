@@ -13,6 +13,11 @@ def set_options(settings: Sequence[str]) -> str:
     return "".join(f" {OPTION} {quote(str(text))}" for text in settings)
 
 
+def command_to_run(word: str, settings: Sequence[str] = ()) -> str:
+    """Return the command that runs what a command line names by a word."""
+    return f"vibsim run {quote(word)}{set_options(settings)}"
+
+
 def set_in(file: str, setting: str) -> str:
     """Return what a message names as the place of a value that is given in place of one of a file."""
     return f"{file}, {OPTION} {setting}"

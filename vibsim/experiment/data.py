@@ -8,13 +8,12 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from shlex import quote
 from typing import Annotated, Any, Literal, TypeVar
 
 from pydantic import AfterValidator, Field, PrivateAttr, StrictBool
 
 from vibsim.core.errors import Fault, InputError, VibsimError
-from vibsim.core.set_option import set_options
+from vibsim.core.set_option import command_to_run
 from vibsim.experiment.collection import ADHOC
 from vibsim.experiment.schema.checks import Check, ConservesCheck, EqualCheck, ValueCheck
 from vibsim.experiment.schema.fields import (
@@ -315,7 +314,7 @@ class ReadExperiment(Section):
 
     def command_of(self, case: int) -> str:
         """Return the command that runs one member of the sweep alone."""
-        return f"vibsim run {quote(f'{self.word}@{case}')}{set_options(self.settings)}"
+        return command_to_run(f"{self.word}@{case}", self.settings)
 
 
 class ExperimentSpec(ReadExperiment):

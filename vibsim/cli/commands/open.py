@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import webbrowser
 from argparse import Namespace
-from shlex import quote
 
 from vibsim.cli.chosen_plans import one_plan_of
 from vibsim.cli.jobs.common import chosen_results
 from vibsim.core.errors import VibsimError
+from vibsim.core.set_option import command_to_run
 
 
 def open_(options: Namespace) -> int:
@@ -23,8 +23,8 @@ def open_(options: Namespace) -> int:
     word = options.experiment
     page = results / ("index.html" if word is None else one_plan_of(word).page)
     if not page.is_file():
-        rest = "" if word is None else f" {quote(word)}"
-        raise VibsimError(f"{page}: there is no report yet: vibsim run{rest}")
+        command = "vibsim run" if word is None else command_to_run(word)
+        raise VibsimError(f"{page}: there is no report yet: {command}")
     try:
         is_open = webbrowser.open(page.as_uri())
     except webbrowser.Error:

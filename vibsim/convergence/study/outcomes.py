@@ -99,13 +99,13 @@ def outcomes(
     if exact is not None:
         for i, one in found.items():
             half = _rounding_of_exact(one, exact[i])
-            if half:
-                levels = _with_finite(asked, h, values[i : i + 1], epsilon, None, finite[i])[0]
-                if _agrees(levels, exact[i], half) and (
-                    one.reason == "wrong_limit" or levels.reason in (*DECIDED, "exact")
-                ):
-                    levels.agrees_to_digits = True
-                    found[i] = levels
+            if not half:
+                continue
+            (levels,) = _with_finite(asked, h, values[i : i + 1], epsilon, None, finite[i])
+            is_better = one.reason == "wrong_limit" or levels.reason in (*DECIDED, "exact")
+            if is_better and _agrees(levels, exact[i], half):
+                levels.agrees_to_digits = True
+                found[i] = levels
     return [found[i] for i in range(len(values))]
 
 

@@ -7,14 +7,13 @@ import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from shlex import quote
 from typing import Any
 
 from vibsim import store
 from vibsim.core.errors import VibsimError, nearest
 from vibsim.core.home import called, home, is_installed
 from vibsim.core.record import Record
-from vibsim.core.set_option import set_options
+from vibsim.core.set_option import command_to_run
 from vibsim.core.vocabulary import TYPICAL_NORM
 from vibsim.experiment.collection import ADHOC, ENDINGS
 from vibsim.report import choice, data, style, words
@@ -160,7 +159,7 @@ def write(
             "experiment_file": experiment_file.text(experiment),
             "experiment_shown": experiment_file.shown(experiment),
             "provenance": list(cards.provenance_rows(provenance)),
-            "command": called(f"vibsim run {quote(experiment.word)}") + set_options(experiment.settings),
+            "command": called(command_to_run(experiment.word, experiment.settings)),
             "python": _python(experiment),
         }
     )  # fmt: skip
