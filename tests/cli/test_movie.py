@@ -153,7 +153,7 @@ def test_without_results_a_movie_says_what_to_run(made: Made, capsys: Capture) -
         path.unlink()
     assert made.vibsim("movie", made.file) == 1
     told = capsys.readouterr().err
-    assert "there are no results yet: vibsim run" in told
+    assert "there are no results yet: .venv/bin/vibsim run" in told
     assert "looked in " in told
 
 

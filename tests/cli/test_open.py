@@ -58,7 +58,7 @@ def test_without_a_report_nothing_is_opened(
     made: Made, tmp_path: Path, capsys: Capture, opened: list[str]
 ) -> None:
     assert made.vibsim("open", made.file) == 1
-    assert f"there is no report yet: vibsim run {made.file}" in capsys.readouterr().err
+    assert f"there is no report yet: .venv/bin/vibsim run {made.file}" in capsys.readouterr().err
     assert main(["open", "--results", str(tmp_path)]) == 1
     assert made.vibsim("open", "theta_convergense") == 2
     assert "did you mean 'theta_convergence'?" in capsys.readouterr().err

@@ -149,7 +149,7 @@ def test_no_results_yet_a_collection_and_an_unknown_name(made: Made, capsys: Cap
     other.parent.mkdir()
     other.write_text(made.file.read_text())
     assert made.vibsim("show", other) == 1
-    assert f"there are no results yet: vibsim run '{other}'" in capsys.readouterr().err
+    assert f"there are no results yet: .venv/bin/vibsim run '{other}'" in capsys.readouterr().err
     assert made.vibsim("show", "pendulum_lab") == 2
     assert made.vibsim("show", "theta_convergense") == 2
     assert "did you mean 'theta_convergence'?" in capsys.readouterr().err

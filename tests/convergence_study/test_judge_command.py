@@ -151,7 +151,8 @@ def test_what_is_not_finite_is_data(word: str, table: Callable[..., str], capsys
         ("dt,u\n0.1,1\n0.2,1\n0.1,2\n", [], "study.csv:4: dt: 0.1: is the step size of line 2, too"),
         ("dtt,u\n0.1,1\n", [], "study.csv: --h: dt: the table has no such column: did you mean 'dtt'?"),
         ("a,u\n0.1,1\n", [], "the table has no such column: choose from a, u"),
-        ("0.1,1\n0.2,2\n", [], "the first line must hold the names of the columns"),
+        ("0.1,1\n0.2,2\n", [], "study.csv:1: 0.1,1: must be the names of the columns"),
+        ("0.1,1\n0.2,2\n", ["--h", "0.1"], "study.csv:1: 0.1,1: must be the names of the columns"),
         ("dt u\n0.1 1\n", [], "separate cells by commas, semicolons or tabs"),
         ("dt,dt,u\n0.1,1,2\n", [], "--h: dt: the table has more than one such column"),
         ("dt,u,u\n0.1,1,2\n", [], "--quantity: u: the table has more than one such column"),
@@ -237,6 +238,19 @@ def test_exact_values_and_noise(table: Callable[..., str], capsys: Capture) -> N
     assert main(["judge", path, "--h", "dt", "--quantity", "u", "--noise", "1", "--json"]) == 0
     (verdict,) = entries(capsys)
     assert verdict["reason"] == "exact"
+
+
+def test_a_report_that_cannot_be_written_hides_no_verdict(
+    table: Callable[..., str], tmp_path: Path, capsys: Capture
+) -> None:
+    (tmp_path / "taken").write_text("a file")
+    folder = tmp_path / "taken/report"
+    command = ["judge", table(TABLE), "--h", "dt", "--quantity", "u", "--report", str(folder)]
+    assert main(command) == 1
+    captured = capsys.readouterr()
+    assert "1 quantity, 1 passed: PASS" in captured.out
+    assert str(tmp_path / "taken") in captured.err
+    assert "report:" not in captured.out
 
 
 def test_the_report_is_one_page_with_the_verdicts_beside_it(

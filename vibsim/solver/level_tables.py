@@ -107,6 +107,8 @@ def _printable(text: str) -> str:
 
 def _chosen(file: str, known: list[str], size: str, quantities: Sequence[str]) -> list[str]:
     """Return the names of the columns that are judged; InputError where the table does not have them."""
+    if all(csv_text.is_shown(name) for name in known):
+        raise InputError([Fault(file, 1, "", ",".join(known), "must be the names of the columns")])
     chosen = list(dict.fromkeys(quantities)) or [name for name in known if name != size]
     found: list[tuple[str, str, str, str]] = []
     for name, option in ((size, "--h"), *((name, "--quantity") for name in chosen)):

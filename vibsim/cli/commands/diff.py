@@ -12,6 +12,7 @@ from vibsim.cli.chosen_plans import one_plan_of
 from vibsim.cli.jobs.common import chosen_results
 from vibsim.cli.setting_changes import Change, differences
 from vibsim.cli.terminal import clean, painted
+from vibsim.core.home import called
 from vibsim.core.set_option import command_to_run
 from vibsim.plan.digests import analysed
 from vibsim.store import read_json
@@ -48,7 +49,7 @@ def diff(options: Namespace) -> int:
             print(painted(name, "bold"))
             print(*(f"  {change}" for change in changes), sep="\n")
     for word in missing:
-        print(f"{word}: there are no verdicts of these settings yet: {command_to_run(word)}")
+        print(f"{word}: there are no verdicts of these settings yet: {called(command_to_run(word))}")
     if any(parts.values()):
         return 1
     if not missing:

@@ -30,14 +30,16 @@ def judge(options: Namespace) -> int:
     exact = _exact(options.exact, [study.quantity for study in studies])
     verdicts = [_judged(study, options, exact.get(study.quantity)) for study in studies]
     content = as_json(verdicts)
+    if options.json:
+        print(json.dumps(content, indent=1, ensure_ascii=False))
+    else:
+        print(*_text(verdicts), sep="\n")
     if options.report:
         from vibsim.report.page import study
 
         study.write(verdicts, [study.files for study in studies], options.report, content)
-    if options.json:
-        print(json.dumps(content, indent=1, ensure_ascii=False))
-    else:
-        print(*_text(verdicts, options.report), sep="\n")
+        if not options.json:
+            print(f"report: {options.report / 'report.html'}")
     return 0 if all(verdict.status == "PASS" for verdict in verdicts) else 1
 
 
@@ -118,7 +120,7 @@ def _judged(study: Study, options: Namespace, exact: float | None) -> LadderVerd
     return found
 
 
-def _text(verdicts: Sequence[LadderVerdict], report: Path | None) -> list[str]:
+def _text(verdicts: Sequence[LadderVerdict]) -> list[str]:
     """Return the lines for a terminal."""
     from vibsim.convergence.study.terminal import COLUMNS, as_text
 
@@ -128,6 +130,4 @@ def _text(verdicts: Sequence[LadderVerdict], report: Path | None) -> list[str]:
     statuses = [verdict.status for verdict in verdicts]
     counted = "1 quantity" if len(verdicts) == 1 else f"{len(verdicts)} quantities"
     lines.append(f"{counted}, {statuses.count('PASS')} passed: {worst(statuses)}")
-    if report:
-        lines.append(f"report: {report / 'report.html'}")
     return lines

@@ -14,6 +14,7 @@ from vibsim.cli.chosen_plans import one_plan_of
 from vibsim.cli.jobs.common import chosen_results, refusal
 from vibsim.cli.level_member import chosen
 from vibsim.core.errors import VibsimError
+from vibsim.core.home import called
 from vibsim.core.set_option import command_to_run
 from vibsim.plan import Plan
 from vibsim.store import write_bytes
@@ -111,14 +112,14 @@ def _film(plan: Plan, options: Namespace, form: str) -> Film:
     for level in options.level or ():
         level_member.check_level(level, levels)
         if level not in made:
-            problem = f"level {level} is not made yet: {command_to_run(options.experiment)}"
+            problem = f"level {level} is not made yet: {called(command_to_run(options.experiment))}"
             raise VibsimError(f"{plan.key}: {problem}")
     asked = options.level or [made[-1]]
     records = {level: level_member.of_level(plan, results, level, case) for level in asked}
     record = records[asked[0]]
     names = level_member.series(record)
     if not names:
-        rest = f"run one member alone: {command_to_run(f'{options.experiment}@{case}')}"
+        rest = f"run one member alone: {called(command_to_run(f'{options.experiment}@{case}'))}"
         raise VibsimError(f"{plan.key}: there are no series over time to be shown; {rest}")
     schemes = [chosen("--scheme", s, record.words("scheme")) for s in options.scheme or [None]]
     position = plan.experiment.model.definition.position

@@ -11,7 +11,7 @@ from shlex import quote
 
 from vibsim.cli.jobs.common import refusal
 from vibsim.core.errors import nearest
-from vibsim.core.home import home
+from vibsim.core.home import called, home
 from vibsim.experiment.collection import ENDINGS
 from vibsim.store import write_bytes, write_text
 
@@ -45,7 +45,7 @@ def new(options: Namespace) -> int:
         write_bytes(file.parent / name, content)
         print(f"wrote {file.parent / name}")
     word = quote(str(file))
-    print(f"check it: vibsim check {word}\nrun it:   vibsim run {word}")
+    print(f"check it: {called(f'vibsim check {word}')}\nrun it:   {called(f'vibsim run {word}')}")
     return 0
 
 

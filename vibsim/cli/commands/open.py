@@ -8,6 +8,7 @@ from argparse import Namespace
 from vibsim.cli.chosen_plans import one_plan_of
 from vibsim.cli.jobs.common import chosen_results
 from vibsim.core.errors import VibsimError
+from vibsim.core.home import called
 from vibsim.core.set_option import command_to_run
 
 
@@ -23,7 +24,7 @@ def open_(options: Namespace) -> int:
     word = options.experiment
     page = results / ("index.html" if word is None else one_plan_of(word).page)
     if not page.is_file():
-        command = "vibsim run" if word is None else command_to_run(word)
+        command = called("vibsim run" if word is None else command_to_run(word))
         raise VibsimError(f"{page}: there is no report yet: {command}")
     try:
         is_open = webbrowser.open(page.as_uri())
