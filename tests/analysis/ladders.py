@@ -100,6 +100,7 @@ def evidence_with(**known: Any) -> Evidence:
         "straight": no,
         "left_to_the_mesh": unknown,
         "corner": unknown,
+        "near_a_point": no,
         "missed": no,
         "jumps": no,
         "decay": np.zeros(shape),

@@ -8,6 +8,7 @@ right, so a verdict FAIL on the order that it promises is wrong, and so is a PAS
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,6 +16,7 @@ import numpy as np
 
 from vibsim import Experiment, analyse, simulate, verdicts
 from vibsim.core.vocabulary import NORMS, ORDER_TOLERANCE
+from vibsim.models import Model
 from vibsim.schemes import FIXED_STEP, NumberOption, Option
 
 MEMBERS = 8
@@ -54,6 +56,48 @@ FORCES = (
     "F*max(t - 1.7, 0)",
     "F*t",
 )
+SYSTEMS: tuple[Content, ...] = (
+    {"acceleration": "q*(1 - u**2)*v - u"},  # van der Pol
+    {"acceleration": "-(k + c*cos(p*t))*u - d*v"},  # Mathieu
+    {"acceleration": "F*cos(p*t) - d*v*abs(v) - k*sin(u)"},
+    {"coordinates": ["x", "y"], "acceleration": {"x": "-k*x + c*(y - x)", "y": "-y + c*(x - y)"}},
+    {
+        "coordinates": ["x", "y"],
+        "acceleration": {"x": "-k*x - c*x*y**2", "y": "-y - c*x**2*y + F*cos(p*t)"},
+    },
+    # Foucault's pendulum
+    {"coordinates": ["x", "y"], "acceleration": {"x": "2*c*vy - k*x", "y": "-2*c*vx - k*y"}},
+    # a corner of the force
+    {
+        "coordinates": ["x", "y"],
+        "acceleration": {"x": "-k*x + c*max(y - x, 0)", "y": "-y - c*max(y - x, 0)"},
+    },
+    # a double pendulum
+    {
+        "coordinates": ["x", "y"],
+        "mass": {"x": {"x": "1 + k", "y": "cos(x - y)"}, "y": "1"},
+        "force": {"x": "-(1 + k)*sin(x) - sin(x - y)*vy**2", "y": "-sin(y) + sin(x - y)*vx**2"},
+    },
+    # a chain between walls
+    {
+        "repeat": {"i": [1, 4]},
+        "coordinates": ["q{i}"],
+        "acceleration": {"q{i}": "q{i+1} - 2*q{i} + q{i-1} + c*((q{i+1} - q{i})**3 - (q{i} - q{i-1})**3)"},
+        "parameters": {"q0": 0.0, "q5": 0.0},
+    },
+    # beads that swap their velocities
+    {
+        "coordinates": ["x", "y"],
+        "acceleration": {"x": "-k*x", "y": "-c*(y - 1)"},
+        "events": [{"when": "y - x", "falling": True, "then": {"vx": "vy", "vy": "vx"}}],
+    },
+)  # fmt: skip
+EVENTS: tuple[Content, ...] = (
+    {"events": [{"when": "u - 0.3", "rising": True, "then": {"v": "-d*v"}}]},
+    {"events": [{"when": "u", "then": {"v": "0.9*v + 0.1"}}]},
+    {"events": [{"when": "sin(p*t)", "then": {"v": "v + 0.2"}}]},
+    {"stop": "u < -0.2 and v < 0"},
+)
 DRIVES = {"washing_machine": "speed", "vehicle": "speed", "circuit": "parameters.p"}
 
 
@@ -80,15 +124,47 @@ def own_oscillator(rng: Rng) -> tuple[Content, list[str]]:
     force = FORCES[rng.integers(len(FORCES))]
     if force is not None and "exact" not in model:
         model["force"] = force
-    text = " ".join(str(value) for value in model.values())
-    names = [
-        name for name in "kcdFp" if f"{name}*" in text.replace("**", "^") or f"({name}" in text
-    ]
-    model["parameters"] = dict.fromkeys(names, 1.0)
-    swept = [f"parameters.{name}" for name in names]
+    if "exact" not in model and "coulomb" not in str(model) and rng.random() < 0.15:
+        model |= EVENTS[rng.integers(len(EVENTS))]
+    swept = with_parameters(model)
     if isinstance(damping, dict) and "damping" in model:
         swept += [f"damping.{next(iter(damping))}"]
     return model, swept or ["m"]
+
+
+def with_parameters(model: Content) -> list[str]:
+    """Give a model the parameters that its formulas name, and return what members vary."""
+    formulas = {key: value for key, value in model.items() if key not in ("kind", "repeat")}
+    names = sorted(set(re.findall(r"\b[kcdqFp]\b", str(formulas))))
+    model["parameters"] = {**model.get("parameters", {}), **dict.fromkeys(names, 1.0)}
+    return [f"parameters.{name}" for name in names]
+
+
+def own_system(rng: Rng) -> tuple[Content, list[str]]:
+    """Return coupled equations, and the parameters that members vary."""
+    model: Content = {"kind": "system", **SYSTEMS[rng.integers(len(SYSTEMS))]}
+    return model, with_parameters(model)
+
+
+def own_structure(rng: Rng) -> tuple[Content, list[str]]:
+    """Return masses between springs, alone or driven, and the parameters that members vary."""
+    count = int(rng.integers(1, 6))
+    springs = rng.uniform(0.2, 4.0, count + 1)
+    stiffness = np.diag(springs[:-1] + springs[1:])
+    between = np.arange(count - 1)
+    stiffness[between, between + 1] = stiffness[between + 1, between] = -springs[1:-1]
+    model: Content = {
+        "kind": "structure",
+        "mass": rng.uniform(0.5, 2.0, count).round(3).tolist(),
+        "stiffness": stiffness.round(3).tolist(),
+    }
+    if rng.random() < 0.5:
+        model["rayleigh"] = {"alpha": 0.05, "beta": 0.01}
+    force = FORCES[rng.integers(len(FORCES))]
+    if force is not None:
+        model["load"] = {int(rng.integers(1, count + 1)): force}
+    swept = with_parameters(model)
+    return model, swept + ["rayleigh.alpha"] * ("rayleigh" in model or not swept)
 
 
 def drawn_model(rng: Rng) -> tuple[Content, list[str]]:
@@ -101,14 +177,17 @@ def drawn_model(rng: Rng) -> tuple[Content, list[str]]:
         "sliding_box",
         "washing_machine",
     ]
-    kinds += ["vehicle", "bouncing_ball", "circuit", "duffing", "elastic_pendulum"] + [
-        "oscillator"
-    ] * 6
+    kinds += ["vehicle", "bouncing_ball", "circuit", "duffing", "elastic_pendulum"]
+    kinds += [*["oscillator"] * 6, *["system"] * 4, *["structure"] * 2]
     kind = str(rng.choice(kinds))
     optional = rng.random() < 0.4
     match kind:
         case "oscillator":
             return own_oscillator(rng)
+        case "system":
+            return own_system(rng)
+        case "structure":
+            return own_structure(rng)
         case "spring":
             return {"kind": kind}, ["w"]
         case "pendulum" | "physical_pendulum":
@@ -167,11 +246,12 @@ def drawn_start(rng: Rng, states: list[str]) -> dict[str, list[float]]:
     }
 
 
-def drawn_scheme(rng: Rng, kind: str, label: str, has_events: bool) -> Content:
+def drawn_scheme(rng: Rng, kind: str, label: str, model: Model) -> Content:
     """Return a scheme with random options, but for those that break its promise on purpose."""
     found: Content = {"kind": kind, "label": label}
-    for option in FIXED_STEP[kind].options:
-        if rng.random() < 0.5:
+    has_events = model.events is not None
+    for option in FIXED_STEP[kind].options_on(model):
+        if option.name == "events" or rng.random() < 0.5:
             continue
         if isinstance(option, NumberOption):
             found[option.name] = float(f"{rng.uniform(option.least, option.most):.3g}")
@@ -210,7 +290,7 @@ def drawn_experiment(rng: Rng) -> Content:
         "title": "t",
         "time": {"end": 1.0},
         "levels": [4],
-        "schemes": ["backward_euler"],
+        "schemes": ["newmark" if model["kind"] == "structure" else "backward_euler"],
     }
     plain = Experiment.from_dict(
         {**bare, "model": model, "sweep": {"zip": zipped}}
@@ -228,8 +308,7 @@ def drawn_experiment(rng: Rng) -> Content:
     treated = [kind for kind, scheme in FIXED_STEP.items() if scheme.treats(plain)]
     kinds = rng.choice(treated, size=min(2, len(treated)), replace=False)
     schemes = [
-        drawn_scheme(rng, str(kind), f"s{i}", plain.events is not None)
-        for i, kind in enumerate(kinds)
+        drawn_scheme(rng, str(kind), f"s{i}", plain) for i, kind in enumerate(kinds)
     ]
     quantities = [*plain.positions[:1], *plain.velocities[:1], "energy_deviation"]
     if plain.events is not None:
@@ -303,8 +382,10 @@ def member(content: Content, scheme: str, case: int, check: Content) -> Content:
             time[name] = value
         elif name.startswith("parameters."):
             model["parameters"][name.partition(".")[2]] = value
-        elif name.startswith("damping."):
-            model["damping"] = {name.partition(".")[2]: value}
+        elif (part := name.partition("."))[1]:
+            # damping or rayleigh
+            own = model.get(part[0])
+            model[part[0]] = {**(own if isinstance(own, dict) else {}), part[2]: value}
         else:
             model[name] = value
     if not model["parameters"]:

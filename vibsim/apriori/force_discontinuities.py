@@ -1,4 +1,4 @@
-"""Where the force of a model has its first corner within a step, and which power of dt that leaves of errors.
+"""Where the force of a model has its roughest corner within a step, and which power of dt that leaves of errors.
 
 A step across a jump of the k-th derivative of the force has an error of dt^(k+1) that depends on where in the step the
 jump lies: another place at each level. So no order above k + 1 is regular, wherever the motion meets such a place: 1
@@ -43,7 +43,7 @@ MOST_SMOOTH = 8
 
 @dataclass(frozen=True)
 class Corners:
-    """The first corner that steps feel of every scheme and member, shape (scheme, case)."""
+    """The roughest corner that steps feel of every scheme and member, at its first passage; shape (scheme, case)."""
 
     power: Floats
     """The highest power of dt that stays regular, k + 1; NaN where there is no corner."""
@@ -53,6 +53,8 @@ class Corners:
     least: Floats
     """The lowest power that any corner within a step leaves, at its first passage."""
     least_time: Floats
+    near_a_point: Flags
+    """Whether the roughest corner lies within a step of the finest level beside a point that all levels share."""
 
     def unseen(self, end: Floats, steps: Sequence[int], omega_dt: Floats) -> Floats:
         """Return which part of its size a quantity may be off by at a jump or corner of the force, (scheme, case).
@@ -96,7 +98,7 @@ def words_of(model: Model, index: int) -> str:
 
 
 def corners_of(model: Model, finest: Record, group: Members, dt: Floats) -> Corners:
-    """Find the first corner that lies within a step, or jump of the force in time that lies at a grid point.
+    """Find the roughest corner that lies within a step, or jump of the force in time that lies at a grid point.
 
     In the Record of the finest level with its members; dt is the step of the coarsest one, of which every other one is
     a part, shape (case,).
@@ -105,7 +107,8 @@ def corners_of(model: Model, finest: Record, group: Members, dt: Floats) -> Corn
     _, schemes, cases, samples = states.shape
     none = np.full((schemes, cases), np.nan)
     if not switches_of(model) or samples < 2:
-        return Corners(none, none, np.full(none.shape, -1), none, none)
+        nowhere = np.zeros(none.shape, dtype=bool)
+        return Corners(none, none, np.full(none.shape, -1), none, none, nowhere)
     number = np.arange(samples) * int(np.asarray(finest.attrs["every"]).item())
     t = number * (group.end / int(np.asarray(finest.attrs["steps"]).item()))[:, None]
     numbers = {row.name: group.parameters[row.key] for row in model.parameters}
@@ -116,7 +119,9 @@ def corners_of(model: Model, finest: Record, group: Members, dt: Floats) -> Corn
     power, time, switch, least, least_time = (
         np.stack(column) for column in zip(*rows, strict=True)
     )
-    return Corners(power, time, switch, least, least_time)
+    away = np.abs(time - np.round(time / dt) * dt)
+    near = away < group.end / int(np.asarray(finest.attrs["steps"]).item())
+    return Corners(power, time, switch, least, least_time, near)
 
 
 def _has_event(finest: Record, t: Floats, schemes: int) -> Flags:
@@ -180,17 +185,20 @@ def _of_scheme(
             np.where(exists, switch - len(held.switches) + len(switches_of(held.model)), -1),
         )
 
-    within = first(np.where(passed & is_within, at, np.inf))
-    on_point = first(np.where(passed & of_time & ~is_within, at, np.inf))
-    is_first = (on_point[0] == 1.0) & ~(within[1] <= on_point[1])
-    power, time, switch = (np.where(is_first, *pair) for pair in zip(on_point, within, strict=True))
-    # of every switch, its first passage
+    jump = first(np.where(passed & of_time & ~is_within, at, np.inf))
+    # of every switch, its first passage within a step
     single = np.eye(len(q), dtype=bool)[:, :, None, None]
     each = [first(np.where(passed & is_within & one, at, np.inf)) for one in single]
-    powers, times = (np.stack([row[k] for row in each]) for k in (0, 1))
+    powers, times, switches = (np.stack(column) for column in zip(*each, strict=True))
     own = np.arange(cases)
-    which = np.argmin(np.where(np.isnan(powers), np.inf, powers), axis=0)
-    least, least_time = powers[which, own], times[which, own]
+    # the roughest one, of several the first
+    which = np.lexsort((times, powers), axis=0)[0]
+    least, least_time, switch = powers[which, own], times[which, own], switches[which, own]
+    is_jump = (jump[0] == 1.0) & ~((least <= 1.0) & (least_time <= jump[1]))
+    power, time, switch = (
+        np.where(is_jump, *pair)
+        for pair in zip(jump, (least, least_time, switch), strict=True)
+    )
     return power, time, np.asarray(switch, dtype=np.int64), least, least_time
 
 

@@ -172,6 +172,7 @@ def evidence(q: Comparison, norm: str, order: Floats, tolerance: float) -> Evide
         straight=straight,
         left_to_the_mesh=all_cases(block.left_to_the_mesh),
         corner=block.corners.power,
+        near_a_point=block.corners.near_a_point,
         missed=np.isfinite(block.missed.time) | unseen,
         jumps=block.missed.jumps | unseen,
         decay=block.decay * block.group.end / grid.steps[-1],

@@ -47,6 +47,7 @@ class Evidence:
     # the one power of an error without an expansion, where events or corners of the force are left to the mesh, or NaN
     left_to_the_mesh: Floats
     corner: Floats  # the highest power that a corner of the force within a step leaves; else NaN
+    near_a_point: Flags  # whether that lies within a step of the finest level beside a point that all levels share
     missed: Flags  # whether the force has a pulse, or a corner in the last step, that no level sees
     jumps: Flags  # whether it jumps there
     decay: Floats  # the largest rate at which damping takes a velocity away, times the finest step

@@ -217,6 +217,9 @@ def _cases(
     kinked = ~np.isnan(e.corner) & (p >= e.corner) & (below | alternating | noise)
     # three levels beside a corner may have any order: the powers that are believed tell
     deeper = b.high < e.corner - np.maximum(tol, th.HALF_SPACING)
+    # beside a point that all levels share a corner leaves one power less, until steps are shorter than that distance
+    one_less = np.abs(b.order - (e.corner - 1.0)) <= np.maximum(tol, th.HALF_SPACING)
+    for_now = e.near_a_point & one_less & (e.promised >= e.corner)
     # finer levels show the power of the corner, not p: those that do not yet are no reason to add some
     limited = e.corner < p - tol
     far = far_from_exact(e)
@@ -242,9 +245,9 @@ def _cases(
             (exactly | (noise & (at_round_off(e) | ~(rough | kinked))), "round_off"),
             (alternating & ~rough & ~kinked, "oscillating"),
             (missed, "wrong_limit"),
-            (right & regular & ~hidden, "asymptotic"),
-            (low & regular & (~kinked | deeper), "order_low"),
-            (kinked, "non_smooth"),
+            (right & regular & ~hidden & ~for_now, "asymptotic"),
+            (low & regular & (~kinked | deeper) & ~for_now, "order_low"),
+            (kinked | for_now, "non_smooth"),
             (high & ~rough & ~hidden, "order_high"),
             (e.missed & e.jumps, "non_smooth"),
             (e.missed, "pre_asymptotic"),

@@ -238,6 +238,11 @@ class Model:
         return (self.acceleration, *self.further_accelerations)
 
     @property
+    def forces(self) -> tuple[Formula, ...]:
+        """Formulas of what acts: the accelerations, or of a structure the loads that are no tables."""
+        return self.accelerations if self.loaded is None else self.loaded.formulas
+
+    @property
     def positions(self) -> tuple[str, ...]:
         """Names of the positions."""
         return tuple(state.name for state in self.states[: self.coordinates])

@@ -234,6 +234,11 @@ class Loaded:
     """Names of the parameters of `RAYLEIGH` that are in the equation."""
 
     @property
+    def formulas(self) -> tuple[Expression, ...]:
+        """The loads that are no tables."""
+        return tuple(load for load in self.loads if load != _TABULATED)
+
+    @property
     def is_damped(self) -> bool:
         """Whether anything damps the motion."""
         own = self.structure

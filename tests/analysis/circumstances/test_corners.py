@@ -316,3 +316,45 @@ def test_a_jump_beside_a_point_of_all_levels_makes_no_wrong_limit() -> None:
     )
     (found,) = judged(made)
     assert (found.status, found.reason) == ("INCONCLUSIVE", "non_smooth"), found.text
+
+
+def test_a_corner_beside_a_point_of_all_levels_is_no_lower_order() -> None:
+    """It lies 0.003 behind a point of every level, so errors fall like 0.003 dt until steps are as short as that."""
+    model = {"kind": "oscillator", "force": "5*max(t - 1.003, 0)"}
+    checks = [{"id": str(p), "converges": "u", "order": p} for p in ("scheme", 1)]
+    made = experiment(
+        ["rk4"], model=model, time={"end": 8.0}, levels=[6, 7, 8, 9, 10], checks=checks
+    )
+    for verdict in judged(made):
+        assert (verdict.status, verdict.reason) == ("INCONCLUSIVE", "non_smooth"), verdict.text
+        (row,) = verdict.results
+        assert row.order == pytest.approx(1.0, abs=0.2)
+
+
+def test_the_roughest_corner_counts_not_the_first() -> None:
+    """Quadratic damping has a corner at each turn from t = 3.2 on, which leaves order 3; the force jumps at t = 7.3."""
+    model = {**QUADRATIC, "force": "heaviside(t - 7.3)"}
+    made = experiment(["heun", "rk4"], model=model, levels=[7, 8, 9, 10])
+    record = analyse(made, [simulate(made, level) for level in made.levels])
+    assert np.asarray(record["corner_power"]).ravel().tolist() == [1.0, 1.0]
+    assert np.asarray(record["corner_time"]).ravel() == pytest.approx([7.3, 7.3])
+    for verdict in verdicts(made, record):
+        assert (verdict.status, verdict.reason) == ("INCONCLUSIVE", "non_smooth"), verdict.text
+
+
+@pytest.mark.parametrize(("load", "power"), [("heaviside(t - 1.7)", 1.0), ("max(t - 1.7, 0)", 2.0)])
+def test_corners_of_the_load_of_a_structure_are_known(load: str, power: float) -> None:
+    model = {"kind": "structure", "stiffness": [[2, -1], [-1, 2]], "load": {2: load}}
+    made = experiment(["newmark"], model=model, initial={}, checks=[{"converges": "u1"}])
+    record = analyse(made, [simulate(made, level) for level in made.levels])
+    assert np.asarray(record["corner_power"]).item() == power
+    assert np.asarray(record["corner_time"]).item() == pytest.approx(1.7)
+
+
+def test_a_pulse_of_the_load_of_a_structure_that_no_level_sees_is_known() -> None:
+    model = {"kind": "structure", "stiffness": [[2, -1], [-1, 2]], "load": {1: "1e4*exp(-((t - 7.3)/1e-5)**2)"}}
+    checks = [{"converges": "u1"}]
+    made = experiment(["newmark"], model=model, initial={}, levels=[7, 8, 9], checks=checks)
+    (verdict,) = judged(made)
+    assert (verdict.status, verdict.reason) == ("INCONCLUSIVE", "pre_asymptotic"), verdict.text
+    assert "pulse" in verdict.text

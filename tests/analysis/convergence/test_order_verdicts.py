@@ -551,6 +551,7 @@ def test_ladders_judged_together_are_judged_as_alone() -> None:
                 exact=truth.exact if i % 3 else None,
                 promised=np.array([max(truth.orders[0] - 1.0, 1.0)]),
                 corner=np.array([1.0 if i % 5 == 0 else np.nan]),
+                near_a_point=np.array([i % 10 == 0]),
                 special=np.array([9.0]),
                 combined=lambda which, pair, weights, part=part: np.full(which.sum(), part),
             )

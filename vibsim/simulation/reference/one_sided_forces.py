@@ -39,7 +39,7 @@ class Sides:
 
     model: Model
     formulas: tuple[Expression, ...]
-    """The accelerations."""
+    """Those of `Model.forces`."""
     switches: tuple[Switch, ...]
     parameters: Mapping[str, Floats]
 
@@ -69,7 +69,7 @@ class Sides:
         return replace(self, parameters={n: x[members] for n, x in self.parameters.items()})
 
     def force(self, modes: Floats) -> Force:
-        """Return the accelerations in modes of shape (switch, case)."""
+        """Return the values of the formulas in modes of shape (switch, case)."""
 
         def found(u: Floats, v: Floats, t: Floats) -> Floats:
             numbers = self.numbers(modes, u, v, t)
@@ -115,9 +115,9 @@ class Sides:
 
 @cache
 def _held(model: Model) -> tuple[tuple[Expression, ...], tuple[Switch, ...]]:
-    """Return the accelerations with modes held, and their switches, that of the table of the model first."""
+    """Return the forces with modes held, and their switches, that of the table of the model first."""
     moving = (*(state.name for state in model.states), "t", HEIGHT, BEND)
-    formulas, found = held((tree(model, formula) for formula in model.accelerations), moving)
+    formulas, found = held((tree(model, formula) for formula in model.forces), moving)
     if model.lookup is None:
         return formulas, found
     place, table = tree(model, model.lookup.place), model.lookup.table
@@ -127,13 +127,13 @@ def _held(model: Model) -> tuple[tuple[Expression, ...], tuple[Switch, ...]]:
 
 
 def sides(model: Model, parameters: Mapping[str, Floats]) -> Sides:
-    """Return a model with the modes of its switches held; it has none where its accelerations are smooth."""
+    """Return a model with the modes of its switches held; it has none where its forces are smooth."""
     return Sides(model, *_held(model), parameters)
 
 
 def varies_in_time(model: Model) -> bool:
     """Tell whether the force of a model depends on time otherwise than by a table."""
-    return any("t" in names_in(tree(model, row)) for row in model.accelerations)
+    return any("t" in names_in(tree(model, row)) for row in model.forces)
 
 
 def pulses_of_force(
@@ -157,7 +157,7 @@ def pulses_of_force(
     _, modes = held.modes(u, v, 0.5 * (t[:, :-1] + t[:, 1:]))
     numbers = held.numbers(modes, u, v, t[:, :-1])
     del numbers["t"]
-    formulas = held.formulas if smooth else tuple(tree(model, row) for row in model.accelerations)
+    formulas = held.formulas if smooth else tuple(tree(model, row) for row in model.forces)
     nothing = np.full(len(t), np.nan)
     found = Pulses(nothing, nothing)
     for formula in formulas:
