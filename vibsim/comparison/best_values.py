@@ -20,7 +20,13 @@ from vibsim.apriori.formal_orders import even_powers, formal_orders
 from vibsim.comparison import value_numbers
 from vibsim.comparison.comparison_variables import Table
 from vibsim.comparison.quantity_comparison import Compared
-from vibsim.comparison.thresholds import IRREGULAR, MISSED_EXTREMUM, OF_GRID, OF_PARABOLA
+from vibsim.comparison.thresholds import (
+    IRREGULAR,
+    MISSED_EXTREMUM,
+    OF_A_CROSSING,
+    OF_GRID,
+    OF_PARABOLA,
+)
 from vibsim.convergence import gci
 from vibsim.convergence.ladder_blocks import batches
 from vibsim.convergence.number_extrapolation import Limit, limit, observed_order
@@ -33,6 +39,12 @@ from vibsim.models import Model
 from vibsim.models.events import Crossings, Impact
 from vibsim.observe import oscillation
 from vibsim.observe.member_block import MemberBlock
+from vibsim.schemes.orders import depends_on_velocity, is_autonomous
+
+OF_PEAK_TIMES = (
+    "period", "period_error", "frequency", "error_of_frequency", "phase_error_per_period"
+)  # fmt: skip
+"""Numbers that are worked out from the times of peaks, but for those of a recurrence."""
 
 
 @dataclass(frozen=True)
@@ -95,6 +107,8 @@ def _ladder(name: str, place: value_numbers.Place) -> _Ladder:
     missed = block.unseen_at_corner(size)
     if row.measured_by == "points":
         missed = missed + _missed(name, place, values, floor, size)
+    if name in OF_PEAK_TIMES:
+        missed = missed + _off_between_points(place) * size
     safety = np.full(size.shape, 1.0 if block.model.events is None else IRREGULAR)
     if row.needs_events:
         # an event on the mesh is late by an accident
@@ -132,6 +146,26 @@ def _missed(
     if isinstance(model.events, Impact | Crossings):
         part = np.where(place.block.eventless, part, p)
     return np.where(same, 0.0, part * size)
+
+
+def _off_between_points(place: value_numbers.Place) -> Floats:
+    """Return the relative error of a period that is the mean time between peaks, shape (scheme, case).
+
+    A peak is where the straight line between two velocities is 0, which is off by ``dt^2/8 |u'''/u''|`` at most. That
+    vanishes with the velocity where a force of the position alone acts; else the rate of the damping and the frequency
+    bound the quotient.
+    """
+    block, model = place.block, place.block.model
+    if model.is_alone and is_autonomous(model) and not depends_on_velocity(model):
+        return np.zeros(block.shape)
+    if oscillation.has_recurrence(block, place.levels[-1]):
+        return np.zeros(block.shape)
+    period, count = (np.asarray(block.finest[name]) for name in ("period", "period_count"))
+    dt = block.group.end / block.grid.steps[-1]
+    with np.errstate(invalid="ignore", divide="ignore"):
+        rate = block.decay + 2.0 * np.pi / period
+        off = rate * OF_A_CROSSING * dt**2
+        return np.asarray(2.0 * off / (count * period))
 
 
 def _promised(name: str, place: value_numbers.Place) -> tuple[Floats, Flags]:

@@ -35,6 +35,8 @@ OF_PARABOLA = 3.0
 OF_GRID = 2.0  # order of an extremum over the points of the grid [derived]
 # An extremum lies half a step from the next grid point at most: the part of w^2 dt^2 that is missed. [derived]
 MISSED_EXTREMUM = 0.125
+# A straight line between two points is off by this part of dt^2 times the second derivative, at most. [derived]
+OF_A_CROSSING = 0.125
 
 # ---- Extrapolated members
 
