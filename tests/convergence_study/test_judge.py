@@ -82,6 +82,22 @@ def test_a_pure_power_passes_with_its_order(order: float) -> None:
     assert verdict.relative_error == pytest.approx(verdict.error / numbers(order)[-1])
 
 
+@pytest.mark.parametrize(
+    ("order", "intervals"),
+    [(1, [64, 128, 256, 512]), (1, [32, 64, 128, 256, 512]), (2, [8, 16, 32, 64])],
+)
+def test_a_field_whose_errors_have_one_shape_is_judged_like_a_number(
+    order: int, intervals: list[int]
+) -> None:
+    """A mode that decays too fast, by ``exp(-9.9 h^p)``: ratios such as 1.88 and 1.94, and nothing beside the mode."""
+    h = [1.0 / n for n in intervals]
+    sizes = [math.exp(-9.9 * size**order) for size in h]
+    mode = np.sin(np.linspace(0.0, 2.0 * np.pi, 25))
+    for values in (sizes, [size * mode for size in sizes]):
+        assert judge(h, values, order=order).reason == "asymptotic"
+        assert judge(h, values, order=order + 1).reason == "order_low"
+
+
 def test_another_order_fails() -> None:
     low = judge(H, numbers(1.0), order=2)
     assert (low.status, low.reason) == ("FAIL", "order_low")

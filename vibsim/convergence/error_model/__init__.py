@@ -13,13 +13,15 @@ size. They integrate out, and the rows X have the evidence
 
 for w rows and N independent points, with the Gram matrix ``G_kl = <d_k, d_l>`` of the rows and the covariance K that
 the hypothesis gives them. G is all that is read of the data. Without logarithms, and but for what all hypotheses on w
-rows share, this is a power of one ratio (see `hypotheses.Table`). Three kinds of hypotheses compete:
+rows share, this is a power of one ratio (see `hypotheses.Table`). Four kinds of hypotheses compete:
 
 - *two shapes*: A and B are unrelated. ``K = c(p) c(p)^T + s^2 c(q) c(q)^T + noise``;
+- *one shape*: B is any multiple of A of that size. The rows are read along the last one only, as numbers, with the
+  same K; what they have across it follows Student's t with `TAIL` degrees of freedom and the size that `MISFIT` gives
+  it;
 - *off by factors*: the error of every level is off by a factor of its own (`JITTERS`), as where events fall between
-  grid points. B is a multiple of A, or has beside that a shape of its own. The rows are read along the last one only,
-  as numbers; what they have across it follows Student's t with `TAIL` degrees of freedom and the size that `MISFIT`
-  and the shape of B give it;
+  grid points. B is a multiple of A of a given size and sign, or has beside that a shape of its own. The rows are read
+  as those of one shape, across the last one with the shape of B as well;
 - *no expansion*: every row has a size of its own, all of them or up to one behind which all rows are noise.
 
 Rows before a window are coarse levels that the expansion does not reach: each has a size of its own, for the price

@@ -328,12 +328,7 @@ def _off_by_factors(
     first, second, squares = _sizes(terms, sizes)
     powers = between(first), between(second)
     c = powers[0] + terms.share[:, None] * powers[1]
-    noise = noise_of_rows(squares)
-    # what the other rows are beside a multiple of the last one
-    part = c[:, :-1] / c[:, -1:]
-    across = noise[:, :-1, :-1] + outer(part, part) * noise[:, -1:, -1:]
-    mixed = outer(part, noise[:, -1, :-1])
-    across = priors.MISFIT**2 * (across - mixed - np.swapaxes(mixed, 1, 2))
+    part, across = _beside_last(c, squares)
     if own_shape:
         beside_last = terms.share[:, None] * (powers[1][:, :-1] - part * powers[1][:, -1:])
         across = across + outer(beside_last, beside_last)
@@ -343,10 +338,36 @@ def _off_by_factors(
     return _table(terms, outer(c, c), jitter**2 * squares, powers, prior, beside)
 
 
+def _one_shape(sizes: Floats, terms: Terms) -> Table:
+    """Return the hypotheses that both powers have one shape: the second is any multiple of the first, of its share."""
+    first, second, squares = _sizes(terms, sizes)
+    c = between(first), between(second)
+    square = terms.share**2
+    signal = outer(c[0], c[0]) + square[:, None, None] * outer(c[1], c[1])
+    size = np.sqrt(c[0] ** 2 + square[:, None] * c[1] ** 2)
+    _, across = _beside_last(size, squares)
+    beside = priors.TAIL * across / size[:, -1, None, None] ** 2
+    prior = np.ones_like(square), np.zeros_like(square), square
+    return _table(terms, signal, priors.MISFIT**2 * squares, c, prior, beside)
+
+
+def _beside_last(c: Floats, squares: Floats) -> tuple[Floats, Floats]:
+    """Return the size of the other rows over that of the last one, and the covariance that the misfit gives them beside.
+
+    That is what they are beside multiples of the last row, if all have one shape and the sizes `c`.
+    """
+    noise = noise_of_rows(squares)
+    part = c[:, :-1] / c[:, -1:]
+    across = noise[:, :-1, :-1] + outer(part, part) * noise[:, -1:, -1:]
+    mixed = outer(part, noise[:, -1, :-1])
+    return part, priors.MISFIT**2 * (across - mixed - np.swapaxes(mixed, 1, 2))
+
+
 class Hypotheses(NamedTuple):
     """All hypotheses on the rows of a window."""
 
     two_shapes: list[Table]
+    one_shape: Table
     # levels are off by factors: the second power is a multiple of the first, or has a shape of its own as well
     factors: list[Table]
     factors_with_shape: Table
@@ -358,9 +379,10 @@ class Hypotheses(NamedTuple):
 def hypotheses_of(sizes: tuple[float, ...], promise: Promise | None) -> Hypotheses:
     """Return the hypotheses for levels of these sizes; windows of ladders of one ratio share them."""
     relative = np.array(sizes)
-    terms = two_powers((1.0, -1.0), promise)
+    of_any_sign, terms = two_powers((1.0,), promise), two_powers((1.0, -1.0), promise)
     return Hypotheses(
-        _two_shapes(relative, two_powers((1.0,), promise)),
+        _two_shapes(relative, of_any_sign),
+        _one_shape(relative, of_any_sign),
         [_off_by_factors(relative, terms, jitter) for jitter in priors.JITTERS],
         _off_by_factors(relative, terms, priors.JITTER_OF_SHAPES, own_shape=True),
         _two_shapes(relative, pure(priors.POWERS), alternating=True),

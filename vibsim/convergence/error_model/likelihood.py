@@ -61,8 +61,21 @@ def _last(gram: Floats) -> Floats:
 
 def highest(table: Table, gram: Floats, points: Floats) -> Floats:
     """Return what the log evidence of all hypotheses of a table on w rows is at most, shape (ladder,)."""
-    limit = np.where(points > 1.0, table.limit[1], table.limit[0])
-    return np.asarray(_whole(table, _last(gram), points, gram.shape[-1]) + limit)
+    w, last = gram.shape[-1], _last(gram)
+    found = _whole(table, last, points, w) + np.where(points > 1.0, *table.limit[::-1])
+    if table.beside_bounds is not None:
+        # what the other rows have across the last one
+        own = np.diagonal(gram, axis1=1, axis2=2)[:, :-1]
+        across = np.maximum(own / last[:, None] - (gram[:, -1, :-1] / last[:, None]) ** 2, 0.0)
+        least = np.sum(across * np.min(table.beside_bounds, axis=0), axis=-1) * points
+        found -= 0.5 * _across_power(points, w) * np.log1p(least)
+    return np.asarray(found)
+
+
+def _across_power(points: Floats, w: int) -> Floats:
+    """Return the power, twice, of the evidence of what w rows have across the last one: numbers have nothing."""
+    free = (points - 1.0) * (w - 1)
+    return np.asarray((free + priors.TAIL) * (free > 0.0))
 
 
 def weights(
@@ -99,8 +112,7 @@ def weights(
         across = packed((relative - along)[:, :-1, :-1])
         # numbers have nothing across
         read, dimensions = np.where(points[:, None, None] > 1.0, along, relative), np.ones(count)
-        free = (points - 1.0) * (w - 1)
-        powers = np.stack([dimensions * w, (free + priors.TAIL) * (free > 0.0)], axis=-1)
+        powers = np.stack([dimensions * w, _across_power(points, w)], axis=-1)
         across = across * points[:, None]
     pairs, size = int(table.pair[-1]) + 1, len(table.pair)
     found = np.empty((count, 3 + w + 3 * pairs))

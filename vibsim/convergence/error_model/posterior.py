@@ -33,7 +33,7 @@ from vibsim.core.array_types import Flags, Floats, Integers
 
 LEFT_OUT = 1e-11
 """Part of all evidence that may be left out: bounds of errors change by less than a digit, probabilities not at all."""
-TABLES, MOST_HYPOTHESES = 9, 6500
+TABLES, MOST_HYPOTHESES = 10, 7300
 """There are no more of them on a window."""
 LARGEST_LOG = 600.0
 """Of evidence over that of no expansion at all: more says no more."""
@@ -212,15 +212,17 @@ class _Fit:
         # with a few digits less windows of one ratio are the same
         of_window = hypotheses_of(tuple(np.round(sizes, 12)), self.promise)
         tables = [(table, noisy[i]) for i, table in enumerate(of_window.two_shapes)]
-        # numbers have no shape of their own
-        own = np.where(self.points > 1.0, priors.OWN_SHAPE, 0.0)
+        # numbers have no shape
+        shapes = self.points > 1.0
+        own = np.where(shapes, priors.OWN_SHAPE, 0.0)
         with np.errstate(divide="ignore"):
             one, several = (noisy[0] + np.log(priors.JITTER_PRIOR * x) for x in (1.0 - own, own))
+            alike = noisy[0] + np.log(priors.ONE_SHAPE * shapes)
         tables += [
             (table, one + math.log(p))
             for table, p in zip(of_window.factors, priors.JITTER_PRIORS, strict=True)
         ]
-        tables += [(of_window.factors_with_shape, several)]
+        tables += [(of_window.factors_with_shape, several), (of_window.one_shape, alike)]
         for table, prior in tables:
             self.add_table(index, table, prior, inside, behind)
         self.add_any_power(index, sizes, inside, behind, noisy[0], of_window.any_power)
