@@ -49,7 +49,7 @@ class Assembly:
         update: dict[str, Any] = {} if ratio is None else {"ratios": (ratio,) * size}
         if not self.spec.observe:
             self.unnamed = size if size > MOST_OBSERVED else 0
-            names = ("u",) if size == 1 else tuple(f"u{i}" for i in range(1, size + 1))
+            names = tuple(f"u{i}" for i in range(1, size + 1))
             each = (((i, 1.0),) for i in range(1, size + 1))
             update["observe"] = tuple(zip(names, each, strict=True))[:MOST_OBSERVED]
         self.spec = self.spec.model_copy(update=update)
