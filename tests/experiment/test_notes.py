@@ -56,6 +56,14 @@ TOLD = {
         {"sweep": {"zip": {"initial.theta": [10, 20], "model.L": [1, 2]}}},
         "sweep.zip.initial.theta: 20 rad are",
     ),
+    "sample": (
+        {
+            "sweep": {
+                "sample": {"method": "sobol", "n": 4, "seed": 1, "over": {"initial.theta": [0, 90]}}
+            }
+        },
+        "sweep.sample.over.initial.theta: 90 rad are",
+    ),
     "decimal commas": (
         {"sweep": {"initial.theta": [0, 1, 0, 2]}},
         "sweep.initial.theta: has 0 more than once: a number with a decimal comma becomes two",

@@ -162,6 +162,11 @@ def test_a_sweep_of_the_load_has_the_response_of_each_frequency():
         ({"load": {"3": "1"}}, "model.load", "2 degrees of freedom"),
         ({"load": {"1": "cos(q*t)"}}, "model.load.1", "unknown name"),
         ({"observe": {"x": 7}}, "model.observe.x", "2 degrees of freedom"),
+        ({"observe": {"x": {"1": 0}}}, "model.observe.x", "a factor that is not 0"),
+        ({"mass": 5}, "model.mass", "must be the name of a file, rows"),
+        ({"damping": {"1": 2}}, "model.damping", "must be the name of a file, rows"),
+        ({"start": {"velocity": 3}}, "model.start.velocity", "must be the name of a file, a list"),
+        ({"damping_ratios": "x"}, "model.damping_ratios", "must be a number"),
     ],
 )
 def test_what_is_no_structure_is_refused(changed, key, rule):

@@ -97,6 +97,7 @@ def _plain(data: Mapping[str, Any], name: str) -> Iterator[tuple[Path_, list[flo
         ("initial", name),
         ("sweep", f"initial.{name}"),
         ("sweep", "zip", f"initial.{name}"),
+        ("sweep", "sample", "over", f"initial.{name}"),
     ):
         found: Any = data
         for key in path:
