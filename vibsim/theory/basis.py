@@ -180,7 +180,8 @@ def value_of(
 
     `number` makes such a number of a fraction (a decimal of the formula stands for itself, or for the fraction that it
     was rounded from, not for the nearest float), `power` raises one to a power, which is a constant of the formula,
-    `names` are numbers for the names of the formula. ValueError where it has more in it than ``+ - * / **``, ``sqrt`` and ``abs``.
+    `names` are numbers for the names of the formula. ValueError where it has more in it than ``+ - * / **``, ``sqrt``
+    and ``abs``.
     """
 
     def value(node: Expression) -> Any:

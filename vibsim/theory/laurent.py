@@ -57,8 +57,8 @@ class Field:
 
     def constant(self, number: float | Fraction) -> Laurent:
         """Return a number of a step's text; a float is the fraction or the decimal that it was written as."""
-        is_exact = isinstance(number, Fraction)
-        return self.series(self.number(number if is_exact else fraction_of(float(number))))
+        fraction = number if isinstance(number, Fraction) else fraction_of(float(number))
+        return self.series(self.number(fraction))
 
 
 @dataclass(frozen=True, eq=False, slots=True)
