@@ -315,3 +315,19 @@ def test_bounds_of_numbers_by_peaks_know_nothing_of_the_rounding_of_roots() -> N
     _, record = analysed(**(PENDULUM | {"levels": [13, 14, 15, 16], "samples": "common"}))
     assert best(record, "growth_per_period")[1] < 1e-6
     assert best(record, "frequency")[1] < 1e-9
+
+
+def test_a_number_that_has_not_settled_does_not_pass_by_chance() -> None:
+    """With 2 to 8 steps a period the ends differ by their size, and nothing bounds the error of the finest one."""
+    given = {"model": {"kind": "spring", "w": 20.0}, "initial": {"u": 1.0}, "time": {"end": 5.0}}
+    at = {"quantity": "u", "at": {"level": "best"}}
+    near = {"value": "end", "equals": 0.3, "atol": 0.3} | at
+    wide = {"value": "end", "equals": 0.3, "atol": 30} | at
+    found = judged(near, wide, **given, levels=[5, 6, 7], schemes=["newmark"])
+    assert math.cos(100.0) > 0.8
+    assert "u at the end is 0.4658" in found[0].text
+    assert "unknown error" in found[0].text
+    assert [(v.status, v.reason) for v in found] == [
+        ("INCONCLUSIVE", "pre_asymptotic"),
+        ("PASS", "match"),
+    ]

@@ -64,6 +64,12 @@ def test_what_is_printed_is_the_theory_of_the_scheme(kind: str, capsys: Capture)
         assert abs(value(polynomial, p=P, x=complex(root))) < 1e-7
 
 
+def test_an_option_that_is_a_fraction_leaves_no_rest_where_terms_cancel(capsys: Capture) -> None:
+    found = rows(["newmark", "beta=1/12"], capsys)
+    assert found["frequency"].startswith("w~/w = 1 + p^4/480 + ")
+    assert found["error"].startswith("u(t) - u_n = I (p^4 t w sin(t w)/480 + ")
+
+
 @pytest.mark.parametrize("words", [["rk4"], ["newmark", "beta=1/6"], ["central"]], ids=" ".join)
 def test_the_solution_that_is_printed_is_the_discrete_one(
     words: list[str], capsys: Capture

@@ -205,6 +205,29 @@ def test_simultaneous_events_happen_one_after_another():
     assert found.position.min() > -1e-6
 
 
+@pytest.mark.parametrize("lane", ["plain", "scalar"])
+@pytest.mark.parametrize("kind", ["rk4", "gauss4", "central"])
+def test_an_event_that_turns_back_the_motion_is_no_second_event_of_another_one(kind, lane):
+    texts = {"events.1.when": "u", "events.1.then.v": "v/2"}
+    texts |= {"events.2.when": "2*u", "events.2.then.v": "v + 1"}
+    way = go(written(texts, ()), kind, {}, (1.0, 0.0), 8.0, 200, n_events=8, lane=lane)
+    # it comes to 0 with -1, -1/2 and -3/4, of which a half and 1 more are left
+    assert way.events.event_count[0] == 6
+    times = np.repeat([0.5, 1.5, 2.5], 2) * math.pi
+    np.testing.assert_allclose(way.events.event_time[0, :6], times, atol=2e-3)
+    wanted = rotated(0.0, 0.625, 8.0 - 2.5 * math.pi)
+    np.testing.assert_allclose(way.states[:, 0, -1], wanted, atol=2e-3)
+
+
+@pytest.mark.parametrize("events", TREATMENTS)
+def test_a_jump_to_where_the_motion_stops_ends_it(events):
+    texts = {"events.1.falling": "u", "events.1.then.u": "-3", "stop": "u < -2"}
+    way = go(written(texts, ()), "rk4", {}, (1.0, 0.0), 8.0, 200, n_events=4, events=events)
+    assert way.events.event_count[0] == 1
+    assert way.events.rest_time[0] == pytest.approx(math.pi / 2, abs=0.05)
+    assert way.states[0, 0, -1] == -3.0
+
+
 def test_a_ball_that_does_not_bounce_stays_on_the_ground():
     way = go(FALLING, "rk4", {"g": 1.0, "e": 0.0}, (1.0, 0.0), 5.0, 50)
     assert way.events.rest_time[0] == pytest.approx(math.sqrt(2.0), rel=1e-12)

@@ -109,6 +109,8 @@ def test_events_and_a_stop_are_read_and_written_back(tmp_path: Path) -> None:
         (with_event(when="u + abs(sign(v))"), "model.events[0].when", "must not jump, as sign"),
         (with_event(when="u*(v > 0)"), "model.events[0].when", "as a comparison by > does"),
         (with_event(when="gap"), "model.events[0].when", "never changes: it names neither t nor"),
+        (with_event(when="gap**2 + abs(u)"), "model.events[0].when", "never crosses 0: it has one"),
+        (with_event(when="cos(t) - 1"), "model.events[0].when", "or touches 0 and turns back"),
         (with_event(then={"w": "0"}), "model.events[0].then.w", "unknown state"),
         (with_event(then={"v": "-w"}), "model.events[0].then.v", "unknown name 'w'"),
         (with_event(falling=False), "model.events[0].falling", "the event would never happen"),

@@ -516,6 +516,24 @@ def test_nothing_is_compared_with_an_exact_value_that_is_not_known(
     assert f"of {kind} is not known" in fault.rule
 
 
+@pytest.mark.parametrize(
+    ("model", "why"),
+    [
+        ({"kind": "oscillator", "stop": "u < -3"}, "not known, as of every motion with events of"),
+        (
+            {"kind": "structure", "stiffness": [2], "load": {"1": "exp(-t)"}},
+            "not known: it is where damping does not couple the modes, and loads are sums of",
+        ),
+    ],
+)
+def test_why_an_exact_value_is_not_known_is_said(model: dict[str, Any], why: str) -> None:
+    position = "u1" if model["kind"] == "structure" else "u"
+    checks = [{"value": "error_linf", "quantity": position, "below": 1}]
+    schemes = ["newmark"]
+    fault = only_fault(model=model, initial={position: 1.0}, checks=checks, schemes=schemes)
+    assert why in fault.rule
+
+
 def test_the_energy_is_known_exactly_where_it_is_conserved(monkeypatch: pytest.MonkeyPatch) -> None:
     changes = value(value="error_l2", quantity="energy")
     monkeypatch.setattr(check_rules, "has_solution", lambda model: model.exact is not None)

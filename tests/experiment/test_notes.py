@@ -56,6 +56,14 @@ TOLD = {
         {"sweep": {"zip": {"initial.theta": [10, 20], "model.L": [1, 2]}}},
         "sweep.zip.initial.theta: 20 rad are",
     ),
+    "sample": (
+        {
+            "sweep": {
+                "sample": {"method": "sobol", "n": 4, "seed": 1, "over": {"initial.theta": [0, 90]}}
+            }
+        },
+        "sweep.sample.over.initial.theta: 90 rad are",
+    ),
     "decimal commas": (
         {"sweep": {"initial.theta": [0, 1, 0, 2]}},
         "sweep.initial.theta: has 0 more than once: a number with a decimal comma becomes two",
@@ -213,3 +221,25 @@ def test_a_slip_names_what_was_meant(changes: dict[str, Any], told: str) -> None
 def test_the_nearest_choice_is_that_of_the_same_letters() -> None:
     assert nearest("g", ["G", "L", "g"]) == "did you mean 'g'?"
     assert nearest("two", ["scheme"]) == "choose from scheme"
+
+
+@pytest.mark.parametrize(
+    ("sweep", "setting", "told"),
+    [
+        ("{model.L: [1, 2]}", "model.L=3", "model.L: 3: has no effect, because it is swept"),
+        ("{zip: {model.L: [1, 2]}}", "model.L=3", "model.L: 3: has no effect"),
+        ("{model.L: [1, 2]}", "model.g=3", ""),
+        ("{model.L: [1, 2]}", "sweep.model.L=[3, 4]", ""),
+    ],
+)
+def test_a_setting_that_a_sweep_overrides_has_a_note(
+    tmp_path: Path, sweep: str, setting: str, told: str
+) -> None:
+    file = tmp_path / "swept.yaml"
+    file.write_text(
+        "title: T\nmodel: {kind: pendulum}\ninitial: {theta: 1}\ntime: {end: 20}\n"
+        f"levels: [5, 6, 7]\nschemes: [central]\nsweep: {sweep}\n"
+    )
+    found = [text for _, text in Experiment.from_yaml(file, settings=[setting]).notes]
+    assert len(found) == bool(told)
+    assert all(told in text for text in found)

@@ -162,6 +162,11 @@ def test_a_sweep_of_the_load_has_the_response_of_each_frequency():
         ({"load": {"3": "1"}}, "model.load", "2 degrees of freedom"),
         ({"load": {"1": "cos(q*t)"}}, "model.load.1", "unknown name"),
         ({"observe": {"x": 7}}, "model.observe.x", "2 degrees of freedom"),
+        ({"observe": {"x": {"1": 0}}}, "model.observe.x", "a factor that is not 0"),
+        ({"mass": 5}, "model.mass", "must be the name of a file, rows"),
+        ({"damping": {"1": 2}}, "model.damping", "must be the name of a file, rows"),
+        ({"start": {"velocity": 3}}, "model.start.velocity", "must be the name of a file, a list"),
+        ({"damping_ratios": "x"}, "model.damping_ratios", "must be a number"),
     ],
 )
 def test_what_is_no_structure_is_refused(changed, key, rule):
@@ -200,7 +205,7 @@ def test_a_load_from_a_table_is_straight_between_its_points(tmp_path: Path, load
         t = data["t"]
         late = np.maximum(t - 1.0, 0.0)
         wanted = 2.0 * (t - np.sin(t)) - 2.0 * (late - np.sin(late))
-        errors.append(float(abs(data["u"][0, 0] - wanted).max()))
+        errors.append(float(abs(data["u1"][0, 0] - wanted).max()))
     assert errors[1] < 1e-3
     assert np.log2(errors[0] / errors[1]) == pytest.approx(2.0, abs=0.1)
 
@@ -305,3 +310,12 @@ def test_a_beam_of_a_thousand_degrees_of_freedom_is_of_second_order(tmp_path: Pa
     orders = np.log2(np.array(errors[:-1]) / errors[1:])
     np.testing.assert_allclose(orders, 2.0, atol=0.05)
     assert time.monotonic() - begin < 60.0
+
+
+def test_one_degree_of_freedom_is_counted_like_several():
+    model = {"kind": "structure", "mass": [2], "stiffness": [[8]], "load": {"1": "1"}}
+    own = of(model, initial={"u1": 0.5, "vu1": -0.25})
+    data = simulate(own, own.levels[-1])
+    t = data["t"]
+    exact = 0.125 + 0.375 * np.cos(2 * t) - 0.125 * np.sin(2 * t)
+    np.testing.assert_allclose(data["u1_exact"][0, :], exact, atol=1e-12)

@@ -125,6 +125,16 @@ def test_small_numbers_have_their_power_of_ten_beside_the_unit() -> None:
     assert max(abs(float(text.replace("−", "-"))) for text in map(ticks, energy.get_yticks())) >= 1
 
 
+def test_the_energy_of_a_structure_is_drawn_without_an_exact_one() -> None:
+    """It is that of all degrees of freedom, and an exact solution has those that are observed."""
+    model = {"kind": "structure", "stiffness": [[2, -1], [-1, 1]], "load": {"2": "cos(t)"}}
+    changes = {"model": model, "initial": {"u1": 1.0}, "schemes": ["newmark"], "levels": [6, 7]}
+    figure = {"shows": "over_time", "quantities": ["u2", "energy"]}
+    ((_, [picture]),), _ = drawn(spring(figure, **changes))
+    position, energy = lines(picture)
+    assert len(position) == len(energy) + 1
+
+
 def test_what_is_not_stored_follows_from_the_states() -> None:
     names = ["u", "kinetic_energy", "potential_energy", "energy"]
     ((_, [picture]),), _ = drawn(spring({"shows": "over_time", "quantities": names}, levels=[7, 8]))

@@ -78,7 +78,8 @@ def measure(block: MemberBlock, compared: Compared, check: ValueCheck) -> Measur
     value, bound = (np.broadcast_to(one, block.shape) for one in best_values.value(name, place))
     fulfilled, _ = compare(check, value)
     numbers = np.full((*block.shape, len(levels)), np.nan)
-    if "level" in row.at and not (block.lean and np.all(fulfilled) and not check.take):
+    is_open = np.isnan(bound) & row.has_limit(at.level)
+    if "level" in row.at and not (block.lean and np.all(fulfilled & ~is_open) and not check.take):
         numbers = _by_level(name, place)
     if check.take is not None and row.has_limit(at.level):
         # every member has a part in the number of all
@@ -86,6 +87,7 @@ def measure(block: MemberBlock, compared: Compared, check: ValueCheck) -> Measur
     own = row.own_levels(levels) or tuple(levels)
     level = place.level if place.level in own else own[-1]
     needed, first = _prospects(check, numbers[..., : len(own)], own, int(level), fulfilled)
+    needed = np.where(fulfilled & ~is_open, UNKNOWN, needed)
     return {
         "value": value,
         "error_bound": bound,
@@ -128,8 +130,8 @@ def _prospects(
 ) -> tuple[Any, Any]:
     """Return what finer levels than `level` do to a number, and the first at which it is as asked, -1 for none.
 
-    The first is `SETTLED`, `MOVING` or `UNKNOWN`, as where it is `fulfilled`. `numbers` are of every level, shape
-    (scheme, case, level).
+    The first is `SETTLED`, `MOVING` or `UNKNOWN`; of a number that is `fulfilled`, `MOVING` where finer levels may move
+    it out again, else `UNKNOWN`. `numbers` are of every level, shape (scheme, case, level).
     """
     holds, away = compare(check, numbers)
     helps = holds & (np.array(levels) > level)
@@ -140,14 +142,16 @@ def _prospects(
             last = _last_change(numbers)
             code[away[..., -1] <= REACH * last] = MOVING
             code[(away[..., -1] > REACH * last) | (last == 0.0)] = SETTLED
-    return np.where(fulfilled, UNKNOWN, code), np.where(fulfilled, -1, first)
+            code[fulfilled] = np.where(REACH * last > -away[..., -1], MOVING, UNKNOWN)[fulfilled]
+    return code, np.where(fulfilled, -1, first)
 
 
 def judge(experiment: Experiment, record: Record, check: ValueCheck, found: Measured) -> Judged:
     """Compare a measured number with what the check asks of it.
 
     A limit of several levels that misses what is asked by less than its bound may be right: nothing is decided then.
-    Nor is it where the time of an event meets what is asked, but may be further away.
+    Nor is it where the time of an event meets what is asked, but may be further away, or where any number does whose
+    bound is unknown and that finer levels may still move out.
     """
     name, number, bound = check.value, found["value"], found["error_bound"]
     row, is_limit = check.number, check.number.has_limit(check.at.level)
@@ -160,6 +164,8 @@ def judge(experiment: Experiment, record: Record, check: ValueCheck, found: Meas
     if is_limit and row.needs_events:
         # a time that the levels leave open agrees by chance, perhaps of another event
         holds &= bound <= np.maximum(-away, 0.0 if check.equals is None else check.allowed)
+    elif is_limit:
+        holds &= ~(np.isnan(bound) & (found["levels_needed"] == MOVING))
     cases = [
         ((_failed(record, check) & ~survives) | infinite, "non_finite"),
         (

@@ -20,8 +20,11 @@ from vibsim.engine.text import Module, collect
 from vibsim.models.events import Crossings
 
 # bound by the kernel (`vibsim.engine.kernel_stubs`)
-crossed = energies = first_crossed = guard_rates = guards = is_end = mode_of = unbound
+crossed = energies = first_crossed = guard_rates = guards = is_end = is_ended_by = mode_of = unbound
 nearest_watched = sides_behind = sides_followed = sides_of = unbound
+
+AT_ONCE = 2.0**-50
+"""Within this part of the time two events are at the same time."""
 
 
 def put_rows(module: Module, events: Crossings, *, is_located: bool) -> None:
@@ -30,7 +33,7 @@ def put_rows(module: Module, events: Crossings, *, is_located: bool) -> None:
     On the mesh a guard that is noticed late may have turned back: an event happens where it still goes its way, and the
     motion ends whatever it does.
     """
-    for text in (side_of, is_watched, nearer, free_side, side_behind, on_its_side):
+    for text in (side_of, is_watched, nearer, free_side, has_just_left, side_behind, on_its_side):
         collect(module, text, text.__name__, {})
     rows = [(k, row, f"{2.0**k}", f"{float(row.direction)}") for k, row in enumerate(events.rows)]
 
@@ -61,9 +64,10 @@ def put_rows(module: Module, events: Crossings, *, is_located: bool) -> None:
         "return -1.0",
     )
     module.define(
-        "sides_behind(mode, fired, g, h, r)",
+        "sides_behind(mode, fired, g, b, h, r, t)",
         total(
-            "{place} * side_behind(side_of(mode, {place}), fired == {k}.0, g[{k}], h[{k}], r[{k}], {direction})"
+            "{place} * side_behind(side_of(mode, {place}), fired == {k}.0 or "
+            "has_just_left(side_of(mode, {place}), g[{k}], b[{k}], t), g[{k}], h[{k}], r[{k}], {direction})"
         ),
     )
     module.define(
@@ -72,6 +76,8 @@ def put_rows(module: Module, events: Crossings, *, is_located: bool) -> None:
     )
     ends = [f"k == {k}.0" for k, row, *_ in rows if row.ends]
     module.define("is_end(k)", f"return {' or '.join(ends) or 'k != k'}")
+    jumped = [f"(h[{k}] < 0.0 and h[{k}] != g[{k}])" for k, row, *_ in rows if row.ends]
+    module.define("is_ended_by(g, h)", f"return {' or '.join(jumped) or 'False'}")
     module.define(
         "crossed(k, u, v, t, p)",
         *(
@@ -111,6 +117,11 @@ def free_side(value: float, rate: float, side: float, direction: float) -> float
     return 1.0 if value > 0.0 else 0.0
 
 
+def has_just_left(side: float, value: float, rate: float, t: float) -> bool:
+    """Tell whether a guard was 0 at the same time: its own event was the one before."""
+    return side * rate > 0.0 and side * value >= 0.0 and abs(value) <= AT_ONCE * (abs(rate) * t)
+
+
 def side_behind(
     side: float, fired: bool, value: float, ahead: float, rate: float, direction: float
 ) -> float:
@@ -121,7 +132,7 @@ def side_behind(
     side
         The one before.
     fired
-        Whether the event is its own.
+        Whether the event is its own, or its own was at the same time.
     value, ahead, rate
         The guard before the event; the guard and its rate behind it.
     """
@@ -180,12 +191,15 @@ def settled(u: float, v: float, t: float, before: float, p: P) -> tuple[float, f
     """Return position, velocity and mode behind an event."""
     mode = mode_of(p)
     g = guards(u, v, t, p)
-    fired = first_crossed(mode, g, guard_rates(u, v, t, p))
+    b = guard_rates(u, v, t, p)
+    fired = first_crossed(mode, g, b)
     if is_end(fired):
         return u, v, 0.0
     ahead, own = crossed(fired, u, v, t, p)
     h, r = guards(ahead, own, t, p), guard_rates(ahead, own, t, p)
-    return ahead, own, sides_behind(mode, fired, g, h, r)
+    if is_ended_by(g, h):
+        return ahead, own, 0.0
+    return ahead, own, sides_behind(mode, fired, g, b, h, r, t)
 
 
 def spent(u: float, ahead: float) -> float:

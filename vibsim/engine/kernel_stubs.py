@@ -60,6 +60,7 @@ velocity are vectors (`vibsim.engine.coordinates`); q and w are either:
 ``guards(u, v, t, p)``, ``guard_rates``                         the formulas of `vibsim.models.events.Crossings`, and
                                                                 how fast they change
 ``crossed(k, u, v, t, p)``, ``is_end(k)``                       the state behind event k, and whether it ends the motion
+``is_ended_by(g, h)``                                           whether a jump of the guards from g to h ends the motion
 ==============================================================  =======================================================
 """
 

@@ -280,7 +280,8 @@ def _initial(
         near = math.isclose(found[name], value, rel_tol=SAME_START, abs_tol=SAME_START * size)
         if name in given and not near:
             rule = f"must be {value:.15g}, where the motion starts, or be left out"
-            report.add(("initial", name), rule)
+            hint = "with `observe` or `start`, model.start gives the start"
+            report.add(("initial", name), rule, hint if model.kind == "structure" else "")
         found[name] = float(value)
     return found
 

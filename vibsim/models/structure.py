@@ -356,7 +356,7 @@ def written(
     """
     if structure is None:
         one = Matrix.of(np.eye(1))
-        structure = Structure(one, one, names=("u",))
+        structure = Structure(one, one, names=("u1",))
     texts = tuple(formulas.get(f"{LOAD}.{i}", "") for i in range(len(structure.shapes)))
     return _structure(structure, texts, declared, frozenset())
 

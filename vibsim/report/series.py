@@ -89,6 +89,9 @@ def _of_states(
 def _formulas(model: Model, quantity: str) -> list[Formula]:
     """Return the formulas whose sum is a quantity; none where it has no formula in the states."""
     energies = {"kinetic_energy": model.kinetic_energy, "potential_energy": model.potential_energy}
+    if model.loaded is not None:
+        # those of a structure are of all its degrees of freedom, which no record holds
+        energies = {}
     if quantity == "energy":
         return list(energies.values())
     of_outputs = {row.name: row.formula for row in model.outputs}

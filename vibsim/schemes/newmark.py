@@ -36,7 +36,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 
 from vibsim.formula import constant
@@ -118,6 +118,10 @@ class _Family:
         return Weights(*map(constant, self.parameters(options)))
 
 
+NUMEROV = 1 / 12
+"""The beta of Numerov's method, also named after Fox and Goodwin: its frequency is of fourth order."""
+
+
 def _is_centred(options: Options) -> bool:
     """Tell whether the velocity of `newmark` is advanced by the trapezoidal rule."""
     return options["gamma"] == 0.5
@@ -126,7 +130,11 @@ def _is_centred(options: Options) -> bool:
 def _newmark_orders(options: Options) -> Orders:
     if not _is_centred(options):
         return same_orders(1)
-    return _second_order(math.inf if options["beta"] == 0.25 else 2.0)
+    orders = _second_order(math.inf if options["beta"] == 0.25 else 2.0)
+    if options["beta"] == NUMEROV:
+        # the error of the velocity drives no motion that begins without one
+        return replace(orders, from_rest=replace(orders, position_linear=4.0))
+    return orders
 
 
 def _damps(options: Options) -> bool:

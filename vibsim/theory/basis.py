@@ -24,6 +24,8 @@ from vibsim.formula.tree import OPERATORS
 from vibsim.schemes.base import Stepper, handed
 from vibsim.schemes.code_generation import exact_names
 
+LARGEST = 1000
+"""The largest denominator of a fraction that a float is taken for."""
 Reader = Callable[[str], Any]
 """Makes a number of the formula of a coefficient."""
 Substitutes = Mapping[Callable[..., Any], Callable[..., Any]]
@@ -147,6 +149,15 @@ def decimal(formula: str) -> Decimal:
         return +value
 
 
+def fraction_of(number: float) -> Fraction:
+    """Return the number that a float was written as: the fraction of small numbers that it is, or else its decimal.
+
+    An option `1/12` reaches a step as a float. As a decimal it would leave a rest of 1e-18 where terms cancel.
+    """
+    small = Fraction(number).limit_denominator(LARGEST)
+    return small if float(small) == number else Fraction(repr(number))
+
+
 def exact(
     formula: str, number: Callable[[Fraction], Any], power: Callable[[Any, Fraction], Any]
 ) -> Any:
@@ -167,15 +178,16 @@ def value_of(
 ) -> Any:
     """Return the value of a formula in numbers of any kind.
 
-    `number` makes such a number of a fraction (a decimal of the formula stands for itself, not for the nearest float),
-    `power` raises one to a power, which is a constant of the formula, `names` are numbers for the names of the formula.
-    ValueError where it has more in it than ``+ - * / **``, ``sqrt`` and ``abs``.
+    `number` makes such a number of a fraction (a decimal of the formula stands for itself, or for the fraction that it
+    was rounded from, not for the nearest float), `power` raises one to a power, which is a constant of the formula,
+    `names` are numbers for the names of the formula. ValueError where it has more in it than ``+ - * / **``, ``sqrt``
+    and ``abs``.
     """
 
     def value(node: Expression) -> Any:
         match node:
             case Number(constant):
-                return number(Fraction(repr(float(constant))))
+                return number(fraction_of(float(constant)))
             case Name(name) if name in names:
                 return names[name]
             case Negate(operand):

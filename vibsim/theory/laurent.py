@@ -23,7 +23,7 @@ from vibsim.elementary import ELEMENTARY
 from vibsim.schemes.base import Stepper
 from vibsim.schemes.newton import solved, solved_together
 from vibsim.theory.arithmetic import Arithmetic
-from vibsim.theory.basis import exact, reads
+from vibsim.theory.basis import exact, fraction_of, reads
 
 HALF = Fraction(1, 2)
 
@@ -56,9 +56,9 @@ class Field:
         return Laurent(self, power, [element, *[self.domain.zero] * (self.known - power - 1)])
 
     def constant(self, number: float | Fraction) -> Laurent:
-        """Return a number of a step's text; a float is the decimal that it was written as."""
-        is_exact = isinstance(number, Fraction)
-        return self.series(self.number(Fraction(number if is_exact else repr(float(number)))))
+        """Return a number of a step's text; a float is the fraction or the decimal that it was written as."""
+        fraction = number if isinstance(number, Fraction) else fraction_of(float(number))
+        return self.series(self.number(fraction))
 
 
 @dataclass(frozen=True, eq=False, slots=True)

@@ -109,6 +109,19 @@ def test_euler_cromer_gains_an_order_from_rest_and_where_no_force_acts(
     assert [np.broadcast_to(row, len(STARTS)).tolist() for row in found] == orders
 
 
+def test_numerovs_method_gains_two_orders_from_rest() -> None:
+    """The series of its frequency has no second power, that of the velocity has one."""
+    kind = {"kind": "newmark", "beta": "1/12"}
+    e = every_start(FREE["spring"], kind, "u_phase_error")
+    columns = sweep_columns.columns(e, 0, len(STARTS))
+    orders = [formal_orders(e, name, columns)[0].tolist() for name in ("u", "v")]
+    assert orders == [[2.0, 4.0, 2.0], [2.0, 2.0, 2.0]]
+    position, _, phase = judged(e)
+    assert [position.status, phase.status] == ["PASS", "PASS"]
+    uneven = every_start(FREE["uneven"], kind)
+    assert np.all(formal_orders(uneven, "u", columns) == 2.0)
+
+
 @pytest.mark.parametrize("start", ["first_order", "centred"])
 def test_a_swept_start_has_the_orders_of_every_choice(start: str) -> None:
     """Whatever is written where the sweep puts its own."""

@@ -27,8 +27,10 @@ from vibsim.experiment.schema.published import row_at, row_id
 from vibsim.experiment.value_names import VALUES, Value
 from vibsim.experiment.yaml.parse import Path_
 from vibsim.models import BUDGET, centred, has_budget, has_solution
-from vibsim.models.base import error_parts, has_error_parts
+from vibsim.models.base import Model, error_parts, has_error_parts
+from vibsim.models.events import Crossings
 from vibsim.models.shared.free import why_not_free
+from vibsim.models.structure import MOST_MODES
 
 ENERGIES = ("energy", "energy_deviation")
 """The energies that are known exactly where they are conserved."""
@@ -410,7 +412,23 @@ def _known_exactly(quantity: str | None, value: str, scope: Scope) -> None:
         of = (*(ENERGIES if model.conservative else ()), *((budget,) if has_budget(model) else ()))
         hint = f"{' and '.join(of)} {'is' if len(of) == 1 else 'are'}" if of else ""
         rule = f"the exact {quantity or 'solution'} of {model.kind} is not known"
-        scope.refuse(rule, hint, value)
+        scope.refuse(f"{rule}{_why_unsolved(model)}", hint, value)
+
+
+def _why_unsolved(model: Model) -> str:
+    """Say why there is neither an exact solution nor a reference, where one cause is sure."""
+    if has_solution(model):
+        return ""
+    if isinstance(model.events, Crossings):
+        return ", as of every motion with events of formulas or a stop"
+    if model.loaded is None:
+        return ""
+    if not model.loaded.structure.has_all_modes:
+        return f", as of every structure of more than {MOST_MODES} degrees of freedom"
+    return (
+        ": it is where damping does not couple the modes, and loads are sums of constants, sines and "
+        "cosines"
+    )
 
 
 def _known_of_followers(value: str, scope: Scope) -> None:

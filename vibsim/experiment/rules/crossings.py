@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection
 from typing import Any
 
 from vibsim.core.errors import nearest
 from vibsim.experiment.faults import Report
-from vibsim.formula import Call, Compare, Expression, ExpressionError
+from vibsim.formula import Call, Compare, Expression, ExpressionError, bounds
 from vibsim.formula.tree import STEPS, children
 from vibsim.models import Model
 from vibsim.models.shared.crossings import STOP, guard_name, guard_of, is_constant
@@ -44,6 +45,9 @@ def read_crossings(
         elif guard is not None and is_constant(guard, states):
             rule = "never changes: it names neither t nor a state"
             report.add((*path, "when"), rule, value=event.when)
+        elif guard is not None and _has_one_sign(guard, names):
+            rule = "never crosses 0: it has one sign throughout, or touches 0 and turns back"
+            report.add((*path, "when"), rule, "write u, not abs(u) or u**2", event.when)
         name = guard_name(i + 1, bool(event.falling), bool(event.rising))
         texts[name] = event.when.strip()
         for state, text in event.then.items():
@@ -62,6 +66,12 @@ def read_crossings(
         except ExpressionError as error:
             report.add(("model", STOP), error.rule, error.hint, section.stop)
     return texts
+
+
+def _has_one_sign(guard: Expression, names: Collection[str]) -> bool:
+    """Tell whether a formula has values of one sign only, whatever its names are."""
+    low, high = bounds(guard, dict.fromkeys(names, (-math.inf, math.inf)))
+    return bool(low >= 0.0 or high <= 0.0)
 
 
 def _jumps(node: Expression) -> str:

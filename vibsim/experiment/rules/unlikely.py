@@ -28,6 +28,7 @@ def note_unlikely(checks: Sequence[Check | None], setting: Setting, report: Repo
     """Note what a file says and probably does not mean; `checks` as written, None for a malformed one."""
     _angles(setting, report)
     _repeated(report)
+    _set_and_swept(report)
     for i, check in enumerate(checks):
         if check is None:
             continue
@@ -79,6 +80,22 @@ def _repeated(report: Report) -> None:
             report.note(("sweep", key), f"has {twice[0]} more than once", hint)
 
 
+def _set_and_swept(report: Report) -> None:
+    """Note a value of the command line that no member has, because the file sweeps its key."""
+    found: Any = report.source.data.get("sweep")
+    keys: set[str] = set()
+    for part in ((), ("zip",), ("sample", "over")):
+        section = found
+        for key in part:
+            section = section.get(key) if isinstance(section, Mapping) else None
+        keys |= set(section) if isinstance(section, Mapping) else set()
+    for text in report.source.settings:
+        key = text.partition("=")[0].strip()
+        if key in keys:
+            hint = f"leave the sweep out by `--set sweep=`, or set `sweep.{key}`"
+            report.note(tuple(key.split(".")), "has no effect, because it is swept", hint)
+
+
 def _turned(model: Model) -> Iterator[str]:
     """Yield the coordinates that are angles where none has a unit: a sine or a cosine of them, or of two, is taken."""
     for formula in model.accelerations:
@@ -97,6 +114,7 @@ def _plain(data: Mapping[str, Any], name: str) -> Iterator[tuple[Path_, list[flo
         ("initial", name),
         ("sweep", f"initial.{name}"),
         ("sweep", "zip", f"initial.{name}"),
+        ("sweep", "sample", "over", f"initial.{name}"),
     ):
         found: Any = data
         for key in path:

@@ -24,7 +24,11 @@ Row = Annotated[tuple[Number, ...], Field(min_length=1), short(MOST_ROWS)]
 
 
 _Rows = Annotated[tuple[Row, ...], Field(min_length=1), short(MOST_ROWS)]
-MatrixText: Any = by_form({"text": Text, "rows": _Rows, "row": Row})
+MatrixText: Any = by_form(
+    {"text": Text, "rows": _Rows, "row": Row},
+    custom_error_type="form",
+    custom_error_message="must be the name of a file, rows such as [[2, -1], [-1, 1]], or a diagonal such as [2, 1]",
+)
 """A file, rows of numbers, or the diagonal alone."""
 Entries = Annotated[dict[str, Number], Field(min_length=1)]
 """Values by degree of freedom, counted from 1."""
@@ -39,9 +43,18 @@ class Mode(Section):
     """largest entry of its shape"""
 
 
-VectorText: Any = by_form({"text": Text, "row": Row, "mapping": Entries})
+_VECTOR = "must be the name of a file, a list such as [0, 1], or numbers by degree of freedom such as {2: 1}"
+VectorText: Any = by_form(
+    {"text": Text, "row": Row, "mapping": Entries},
+    custom_error_type="form",
+    custom_error_message=_VECTOR,
+)
 """A file, a list of numbers, or numbers by degree of freedom."""
-StartText: Any = by_form({"text": Text, "row": Row, "mapping": Entries, "mode": Mode})
+StartText: Any = by_form(
+    {"text": Text, "row": Row, "mapping": Entries, "mode": Mode},
+    custom_error_type="form",
+    custom_error_message=f"{_VECTOR}, or {{mode: 1, size: 1}}",
+)
 
 
 class Start(Section):
@@ -89,7 +102,7 @@ Load: Any = by_form(
     {"other": Annotated[dict[str, Factor], Field(min_length=1)], "shape": ShapedLoad}
 )
 _Ratios = Annotated[tuple[NonNegative, ...], Field(min_length=1), short(MOST_ROWS)]
-RatiosText: Any = by_form({"number": NonNegative, "row": _Ratios})
+RatiosText: Any = by_form({"other": NonNegative, "row": _Ratios})
 Observed: Any = by_form({"other": Annotated[Index, Field(ge=1)], "mapping": Entries})
 
 

@@ -49,7 +49,7 @@ class Assembly:
         update: dict[str, Any] = {} if ratio is None else {"ratios": (ratio,) * size}
         if not self.spec.observe:
             self.unnamed = size if size > MOST_OBSERVED else 0
-            names = ("u",) if size == 1 else tuple(f"u{i}" for i in range(1, size + 1))
+            names = tuple(f"u{i}" for i in range(1, size + 1))
             each = (((i, 1.0),) for i in range(1, size + 1))
             update["observe"] = tuple(zip(names, each, strict=True))[:MOST_OBSERVED]
         self.spec = self.spec.model_copy(update=update)
@@ -168,6 +168,8 @@ def assemble(spec: StructureSpec, folder: Path, ratio: float | None = None) -> A
     _check_stiffness(structure, own)
     observed = np.zeros((len(spec.observe), size))
     for i, (name, entries) in enumerate(spec.observe):
+        if not any(factor for _, factor in entries):
+            own.add(f"observe.{name}", "must have a factor that is not 0")
         for dof, factor in entries:
             if dof > size:
                 own.add(f"observe.{name}", f"there are {size} degrees of freedom, not {dof}")
@@ -202,8 +204,9 @@ def _check_stiffness(structure: Structure, own: Assembly) -> None:
     """Refuse a structure that is pushed away from rest, and a large one that is not held."""
     if structure.has_all_modes:
         if not np.isfinite(structure.modes.frequencies).all():
-            rule = f"must not have a negative eigenvalue: below -{RIGID:g} of the largest one it pushes away"
-            own.add("stiffness", rule)
+            rule = "must not have a negative eigenvalue: in that direction it pushes away from rest"
+            hint = f"down to -{RIGID:g} of the largest eigenvalue of M^-1 K one counts as rounding"
+            own.add("stiffness", rule, hint)
     elif factored(structure.stiffness.sparse) is None:
         rule = f"must be positive definite above {MOST_MODES} degrees of freedom"
         own.add("stiffness", rule, "hold the structure, so that it cannot move as a rigid body")
