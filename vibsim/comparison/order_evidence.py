@@ -27,11 +27,11 @@ from vibsim.convergence.reasons import is_one_of
 from vibsim.convergence.thresholds import ABOVE_ROUND_OFF, HALF_SPACING, ROUND_OFF_SAFETY
 from vibsim.convergence.verdict import Judgement, judge, judge_together
 from vibsim.core.array_types import Codes, Flags, Floats
-from vibsim.core.vocabulary import NORMS, ORDER_TOLERANCE, TYPICAL_NORM, is_error_part
+from vibsim.core.vocabulary import NORMS, ORDER_TOLERANCE, TYPICAL_NORM, is_error_part, plain_name
 from vibsim.experiment.schema.checks import ConvergesCheck
 from vibsim.models import ENERGIES
 from vibsim.observe import predicted_oscillation
-from vibsim.observe.member_block import plain_name, stored_or_nan
+from vibsim.observe.member_block import stored_or_nan
 
 CAUSES = (
     *("none", "last_point", "one_quantity", "everything", "special_times", "one_norm", "theory"),

@@ -115,6 +115,15 @@ PHASE, AMPLITUDE = "_phase_error", "_amplitude_error"
 """What follows the name of the position in the names of the parts of its error."""
 
 
+CENTRED = "_d2t"
+"""Ends the name of a velocity or an energy that is made with the centred difference ``[D_2t u]`` of the position."""
+
+
+def plain_name(name: str) -> str:
+    """Return the name of a quantity without the mark of the velocity that it is made with."""
+    return name.removesuffix(CENTRED)
+
+
 def is_error_part(name: str) -> bool:
     """Tell whether a quantity is a part of a position's error."""
     return name.endswith((PHASE, AMPLITUDE))
