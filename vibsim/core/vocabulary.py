@@ -115,6 +115,7 @@ PHASE, AMPLITUDE = "_phase_error", "_amplitude_error"
 """What follows the name of the position in the names of the parts of its error."""
 
 
+FIGURE_FORMATS = ("svg", "png", "pdf")
 CENTRED = "_d2t"
 """Ends the name of a velocity or an energy that is made with the centred difference ``[D_2t u]`` of the position."""
 

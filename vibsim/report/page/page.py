@@ -12,10 +12,11 @@ from vibsim.core.errors import VibsimError, nearest
 from vibsim.core.home import called, home, is_installed
 from vibsim.core.record import Record
 from vibsim.core.set_option import command_to_run
+from vibsim.core.vocabulary import FIGURE_FORMATS
 from vibsim.experiment.collection import ADHOC, ENDINGS
 from vibsim.report import choice, data, style
 from vibsim.report.choice import Lead
-from vibsim.report.figures import drawing, of_source
+from vibsim.report.figures import of_source
 from vibsim.report.page import cards, hero, page_figures, page_tables, player
 from vibsim.report.page.templates import environment, markup, sealed
 from vibsim.report.tables import members
@@ -63,9 +64,9 @@ def write(
     VibsimError
         For a format that does not exist.
     """
-    unknown = [form for form in formats if form not in drawing.FORMATS]
+    unknown = [form for form in formats if form not in FIGURE_FORMATS]
     if unknown:
-        raise VibsimError(f"figure format '{unknown[0]}': {nearest(unknown[0], drawing.FORMATS)}")
+        raise VibsimError(f"figure format '{unknown[0]}': {nearest(unknown[0], FIGURE_FORMATS)}")
     experiment = plan.experiment
     lead = choice.find_lead(experiment, convergence, summary)
     figures = page_figures.draw(experiment, convergence, lead, formats)
