@@ -109,7 +109,7 @@ class OrderContext:
         record = self._found.record
         return float(record[name][place]) if name in record else math.nan
 
-    @property
+    @cached_property
     def apart(self) -> float:
         """How far the finest two rescaled differences of the levels that decide are apart, over the finer one."""
         for i, finest in enumerate(self.levels[2:]):
