@@ -306,13 +306,6 @@ def test_unknown_formats_are_refused_first(file: Path, tmp_path: Path, capsys: C
     assert "gif: unknown format: choose from svg, png, pdf" in capsys.readouterr().err
 
 
-def test_the_formats_are_those_of_the_report() -> None:
-    from vibsim.cli.jobs.report import FORMATS
-    from vibsim.report.figures import drawing
-
-    assert FORMATS == drawing.FORMATS
-
-
 def test_a_dry_run_makes_no_folder(file: Path, tmp_path: Path, capsys: Capture) -> None:
     new = tmp_path / "new"
     assert main(["run", str(file), "--results", str(new), "--dry-run", "--cores", "1"]) == 0

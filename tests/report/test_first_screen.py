@@ -158,7 +158,7 @@ def test_the_error_over_the_step_is_in_the_norm_of_the_check(norm):
     exp = samples.experiment(checks=checks)
     record, _, decisive = found(exp)
     with style.applied():
-        ax = drawn.against_step(exp, record, decisive).figure.axes[0]
+        ax = drawn.against_step(record, decisive).figure.axes[0]
     lines = {line.get_label(): np.asarray(line.get_ydata()) for line in ax.lines}
     here = {"scheme": 0, "case": 0, "norm": data.norm_index(record, norm)}
     true = data.pick(record, "theta_error_norm", **here)
@@ -399,7 +399,7 @@ def test_the_schemes_of_the_first_screen_have_markers_of_their_own_and_legends_h
     )
     record, _, decisive = found(exp)
     with style.applied():
-        steps = drawn.against_step(exp, record, decisive).figure.axes[0]
+        steps = drawn.against_step(record, decisive).figure.axes[0]
         curves = drawn.differences(record, decisive).figure.axes[0]
     named = [line for line in steps.lines if line.get_label() in record.words("scheme")]
     assert len({line.get_marker() for line in named}) == len(named) == 3

@@ -24,7 +24,7 @@ from vibsim.report.data import Member
 from vibsim.report.figures import order as figures_order
 from vibsim.report.figures import time
 from vibsim.report.page import cards
-from vibsim.report.page.page import cut
+from vibsim.report.page.page_tables import cut
 from vibsim.report.page.templates import TEMPLATES
 from vibsim.report.tables import checks as check_tables
 from vibsim.report.tables.table import Column, Table

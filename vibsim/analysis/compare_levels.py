@@ -23,6 +23,7 @@ from vibsim.convergence import differences
 from vibsim.core.errors import VibsimError
 from vibsim.core.record import Record, Variable, flags
 from vibsim.core.vocabulary import (
+    CENTRED,
     HIGHEST,
     MEMBER,
     OF_LEVEL,
@@ -36,7 +37,7 @@ from vibsim.experiment.storage import RUNNING, checked_quantities, lean_series
 from vibsim.models import centred
 from vibsim.models.events import TREATMENTS
 from vibsim.observe.common_grid import SAME_AT_EVERY_LEVEL
-from vibsim.observe.member_block import CENTRED, MemberBlock, block_of
+from vibsim.observe.member_block import MemberBlock, block_of
 from vibsim.observe.missed_pulses import missed_variables
 from vibsim.observe.stiffness import applies as motion_decides
 from vibsim.observe.stiffness import is_damped

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from decimal import ROUND_CEILING, Context
 
 import numpy as np
 
@@ -15,6 +14,7 @@ from vibsim.comparison.quantity_comparison import Compared
 from vibsim.comparison.solution_distance import solution_distance
 from vibsim.convergence.reasons import first_reason
 from vibsim.core.array_types import Floats
+from vibsim.core.decimals import round_outward
 from vibsim.core.record import Record
 from vibsim.experiment import Experiment
 from vibsim.experiment.schema.checks import SOLUTIONS, EqualCheck
@@ -110,7 +110,7 @@ def describe(f: Found, check: EqualCheck) -> Description:
     both = f"{what} of scheme {check.first} and {other}"
     apart = f"at most {number(distance, 4)} apart"
     brief = f"{apart}; {number(allowed, 4)} is allowed"
-    enough = f"above {_rounded_up(distance)} if that is close enough"
+    enough = f"above {round_outward(distance, 2):.2g} if that is close enough"
     match f.reason:
         case "match":
             told, advice = f"{what} of scheme {check.first} equals {other}. They are {brief}.", ""
@@ -134,12 +134,3 @@ def describe(f: Found, check: EqualCheck) -> Description:
                 ways = ", take a finer `level:`,"
             advice = f"Correct `equal:`{ways} or give `atol:` {enough}."
     return Description(told, advice, brief)
-
-
-def _rounded_up(distance: float) -> str:
-    """Write a number with two digits that is no smaller than a distance: one that is asked for must suffice."""
-    if not 0.0 < distance < math.inf:
-        return f"{distance:.2g}"
-    return (
-        f"{float(Context(prec=2, rounding=ROUND_CEILING).create_decimal_from_float(distance)):.2g}"
-    )

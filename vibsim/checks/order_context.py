@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from functools import partial
+from functools import cached_property, partial
 from typing import NamedTuple
 
 import numpy as np
@@ -28,7 +28,7 @@ from vibsim.core.record import Record
 from vibsim.core.vocabulary import is_error_part, whole_of
 from vibsim.experiment.schema.checks import ConvergesCheck
 from vibsim.observe.member_block import fastest
-from vibsim.schemes.base import LOW_STARTS
+from vibsim.schemes.base import LOW_STARTS, Scheme
 
 COINCIDE = 0.1
 """Rescaled differences that are further apart, over the finer one, do not coincide."""
@@ -51,13 +51,10 @@ class OrderContext:
 
     def __init__(self, f: Found, check: ConvergesCheck) -> None:
         experiment, record, scheme, case = f.experiment, f.record, f.scheme, f.case
-        model, quantity, columns = f.model, check.converges, columns_of(record)
-
-        def stored(name: str, *place: int) -> float:
-            return float(record[name][place]) if name in record else math.nan
-
+        quantity = check.converges
+        self._found, self._columns = f, columns_of(record)
         self.quantity, self.norm, self.tolerance = quantity, check.norm, check.tolerance
-        self.is_position = quantity in model.positions
+        self.is_position = quantity in f.model.positions
         self.notation, self.reason = f.notation, f.reason
         self.cause = f.word("cause")
         """Why the order is another one, one of `vibsim.comparison.order_evidence.CAUSES`."""
@@ -68,11 +65,6 @@ class OrderContext:
         self.levels = tuple(int(level) for level in record["level"])
         self.orders = _orders(record, check, scheme, case)
         """Of successive levels in the norm of the check, the coarsest first."""
-        sound = [i for i, finest in enumerate(self.levels[2:]) if finest == self.last]
-        self.apart = (
-            stored(f"{quantity}_coincidence", scheme, case, sound[0]) if sound else math.nan
-        )
-        """How far the finest two rescaled differences of the levels that decide are apart, over the finer one."""
         self.more: int = f.fact("levels_needed")
         """Finer levels that are probably needed."""
         self.readable: int = f.fact("readable_level")
@@ -85,17 +77,11 @@ class OrderContext:
         """How large the error of the finest level is; empty where it is not known."""
 
         self.scheme, self.kind = f.scheme_name, experiment.schemes[scheme].kind
-        method = experiment.schemes[scheme].method
-        self.options = options_of(experiment, columns, scheme, case)
+        self.options = options_of(experiment, self._columns, scheme, case)
         self.promised = f.of_member(orders_in(experiment, record, quantity))
         """The order that the scheme promises, ..."""
-        self.special = f.of_member(special_orders(experiment, quantity, columns))
-        """... has at most, in a special case of motion, model or options, ..."""
-        self.centred = math.nan
-        """... and would promise with `start: centred`, where it has another start."""
-        if self.options.get("start") in LOW_STARTS:
-            centred = {**self.options, "start": "centred"}
-            self.centred = float(method.formal_order(whole_of(quantity), model, centred))
+        self.special = f.of_member(special_orders(experiment, quantity, self._columns))
+        """... and has at most, in a special case of motion, model or options."""
         self.expected = self.promised if check.order == "scheme" else float(check.order)
         """The order that was expected; infinite where the quantity was to be exact."""
         self.parts = parts_in_words(f, quantity, self.expected)
@@ -104,32 +90,70 @@ class OrderContext:
 
         self.culprit: int = f.fact("failed_level")
         """Level that failed or is beyond the stability limit."""
-        at = self.levels.index(self.culprit) if self.culprit >= 0 else None
-        self.omega_dt = math.nan if at is None else float(fastest(record)[case, at])
-        self.limit = math.nan
-        """The largest stable w dt of the scheme, infinite for none; sought only where a level failed."""
-        if at is not None:
-            self.limit = f.of_member(stability_limits(experiment, columns))
-        self.growth_in_words = ""
-        """How the solution grows at the culprit."""
-        if not math.isnan(self.omega_dt) and not method.adaptive:
-            predicted = float(theory.dominant(method.stepper(self.options), self.omega_dt)[0])
-            measured = stored("measured_growth", scheme, case, self.levels.index(self.culprit))
-            self.growth_in_words = growth_in_words(f, predicted, measured)
         self.failures = _failures(record, scheme, case)
 
-        self.has_corners = has_corners(model)
+        self.has_corners = has_corners(f.model)
         """Whether steps have corners of a force from a table inside."""
         self.corner = _corner(f)
-        self.pulse = stored("pulse_time", case), stored("pulse_width", case)
+        self.pulse = self._stored("pulse_time", case), self._stored("pulse_width", case)
         """Time and length of a pulse of the force that no level sees."""
-        self.decay = stored("decay_rate", scheme, case)
+        self.decay = self._stored("decay_rate", scheme, case)
         """The largest rate at which damping takes a velocity away."""
         self.shortest = record.step(-1, case)
         self.parts_at = float(f.fact("parting_time"))
         self.parting_rate = float(f.fact("parting_rate"))
         """When the finest levels of a chaotic motion part, and how fast."""
         self.end = self.shortest * experiment.steps(self.levels[-1])
+
+    def _stored(self, name: str, *place: int) -> float:
+        record = self._found.record
+        return float(record[name][place]) if name in record else math.nan
+
+    @cached_property
+    def apart(self) -> float:
+        """How far the finest two rescaled differences of the levels that decide are apart, over the finer one."""
+        for i, finest in enumerate(self.levels[2:]):
+            if finest == self.last:
+                place = self._found.scheme, self._found.case, i
+                return self._stored(f"{self.quantity}_coincidence", *place)
+        return math.nan
+
+    @cached_property
+    def centred(self) -> float:
+        """The order that the scheme would promise with `start: centred`; NaN where it has no other start."""
+        if self.options.get("start") not in LOW_STARTS:
+            return math.nan
+        options = {**self.options, "start": "centred"}
+        model = self._found.model
+        return float(self._method.formal_order(whole_of(self.quantity), model, options))
+
+    @property
+    def _method(self) -> Scheme:
+        return self._found.experiment.schemes[self._found.scheme].method
+
+    @cached_property
+    def omega_dt(self) -> float:
+        """The step of the culprit times the fastest frequency; NaN where no level failed."""
+        if self.culprit < 0:
+            return math.nan
+        place = self._found.case, self.levels.index(self.culprit)
+        return float(fastest(self._found.record)[place])
+
+    @cached_property
+    def limit(self) -> float:
+        """The largest stable w dt of the scheme, infinite for none; sought only where a level failed."""
+        if self.culprit < 0:
+            return math.nan
+        return self._found.of_member(stability_limits(self._found.experiment, self._columns))
+
+    @cached_property
+    def growth_in_words(self) -> str:
+        """How the solution grows at the culprit."""
+        if math.isnan(self.omega_dt) or self._method.adaptive:
+            return ""
+        predicted = float(theory.dominant(self._method.stepper(self.options), self.omega_dt)[0])
+        place = self._found.scheme, self._found.case, self.levels.index(self.culprit)
+        return growth_in_words(self._found, predicted, self._stored("measured_growth", *place))
 
     @property
     def what(self) -> str:

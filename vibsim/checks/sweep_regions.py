@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from decimal import ROUND_CEILING, ROUND_FLOOR, Context
 from typing import Any
 
 import numpy as np
@@ -15,6 +14,7 @@ from vibsim.checks.notation import PLAIN
 from vibsim.checks.outcome import Outcome
 from vibsim.convergence.reasons import PASS
 from vibsim.core.array_types import Integers
+from vibsim.core.decimals import round_outward
 from vibsim.core.record import Record
 from vibsim.core.vocabulary import STATUSES
 
@@ -142,7 +142,7 @@ def _interval(key: str, values: Column, low: float, high: float) -> str:
     if low == high:
         return f"{key} equal to {PLAIN.number(low)}"
     # rounded outward, so that what is said is true
-    least, most = (_rounded(end, way) for end, way in ((low, ROUND_FLOOR), (high, ROUND_CEILING)))
+    least, most = _rounded(low, up=False), _rounded(high, up=True)
     if high >= np.max(values):
         return f"{key} of {least} or more"
     if low <= np.min(values):
@@ -150,9 +150,9 @@ def _interval(key: str, values: Column, low: float, high: float) -> str:
     return f"{key} from {least} to {most}"
 
 
-def _rounded(value: float, way: str) -> str:
+def _rounded(value: float, *, up: bool) -> str:
     """Write a number with up to 6 significant digits, rounded one way where it has more.
 
     What it has are its 15 decimal digits: those of 1.9 are no 1.8999999999999999.
     """
-    return PLAIN.number(float(Context(prec=6, rounding=way).create_decimal(f"{value:.15g}")))
+    return PLAIN.number(round_outward(float(f"{value:.15g}"), 6, up=up))

@@ -19,6 +19,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from vibsim.core import regular_files
+from vibsim.plan.jobs import DIGEST
 from vibsim.store import seal
 from vibsim.store.atomic import write_text
 
@@ -32,7 +33,6 @@ _NAME = re.compile(
     r"level_\d{2,}\.nc|level_\d{2,}/shard_\d{4,}\.nc|convergence\.nc|best\.nc|summary\.(?:json|csv)"
     r"|(?:report|index)\.html|(?:figures|tables)/[^/\0.][^/\0]*"
 )
-_DIGEST = re.compile(r"[0-9a-f]{64}")
 _MACHINE = re.compile(r"[\x20-\x7e]{0,200}")
 CHANGED = "its bytes are not those that were written"
 
@@ -196,6 +196,6 @@ def _is_entry(name: str, values: Any) -> bool:
             return _NAME.fullmatch(name) is not None
         case [int(), int(), int(), str(digest), str(job), str(machine)]:
             known = all(type(number) is int and 0 <= number < 2**63 for number in values[:3])
-            texts = _DIGEST.fullmatch(digest) and (not job or _DIGEST.fullmatch(job))
+            texts = DIGEST.fullmatch(digest) and (not job or DIGEST.fullmatch(job))
             return bool(known and texts and _MACHINE.fullmatch(machine) and _NAME.fullmatch(name))
     return False

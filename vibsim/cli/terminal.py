@@ -16,9 +16,9 @@ UNCUT = 10_000
 _COLOURS = {"PASS": "32", "FAIL": "31", "INCONCLUSIVE": "33", "faint": "2", "bold": "1"}
 
 
-def columns(stream: TextIO | None = None) -> int:
+def columns() -> int:
     """Return how many characters a line of the output may have."""
-    return shutil.get_terminal_size().columns if (stream or sys.stdout).isatty() else UNCUT
+    return shutil.get_terminal_size().columns if sys.stdout.isatty() else UNCUT
 
 
 def has_colours(stream: TextIO) -> bool:

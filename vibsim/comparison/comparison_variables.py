@@ -18,9 +18,17 @@ from vibsim.convergence.local_order import local_order, window_points
 from vibsim.convergence.thresholds import ORDINARY_ORDER
 from vibsim.core.array_types import Floats
 from vibsim.core.record import Record, Variable
-from vibsim.core.vocabulary import MEMBER, OF_LEVEL, SERIES, TYPICAL_NORM, is_error_part
+from vibsim.core.vocabulary import (
+    CENTRED,
+    MEMBER,
+    OF_LEVEL,
+    SERIES,
+    TYPICAL_NORM,
+    is_error_part,
+    plain_name,
+)
 from vibsim.models import ENERGIES
-from vibsim.observe.member_block import CENTRED, by_level, plain_name
+from vibsim.observe.member_block import by_level
 from vibsim.observe.oscillation import period_scale
 
 Table = dict[str, Variable]

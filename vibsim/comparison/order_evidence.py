@@ -27,11 +27,11 @@ from vibsim.convergence.reasons import is_one_of
 from vibsim.convergence.thresholds import ABOVE_ROUND_OFF, HALF_SPACING, ROUND_OFF_SAFETY
 from vibsim.convergence.verdict import Judgement, judge, judge_together
 from vibsim.core.array_types import Codes, Flags, Floats
-from vibsim.core.vocabulary import NORMS, ORDER_TOLERANCE, TYPICAL_NORM, is_error_part
+from vibsim.core.vocabulary import NORMS, ORDER_TOLERANCE, TYPICAL_NORM, is_error_part, plain_name
 from vibsim.experiment.schema.checks import ConvergesCheck
 from vibsim.models import ENERGIES
 from vibsim.observe import predicted_oscillation
-from vibsim.observe.member_block import plain_name, stored_or_nan
+from vibsim.observe.member_block import stored_or_nan
 
 CAUSES = (
     *("none", "last_point", "one_quantity", "everything", "special_times", "one_norm", "theory"),
@@ -215,23 +215,8 @@ def causes(
     norm, order, tolerance
         The norm, the expected order (which broadcasts against (scheme, case)) and its tolerance.
     """
-    shape = judged.reason.shape
-    found = np.full(shape, NONE, dtype=np.int8)
-
-    has = partial(is_one_of, judged.reason)
-    low, high, lost, unseen = has("order_low"), has("order_high"), has("round_off"), has(*UNSEEN)
-    coarse = has("pre_asymptotic")
-    if np.any(lost | unseen | coarse):
-        e = evidence(q, norm, order, tolerance)
-        found[lost & (e.difference[..., -1] > ABOVE_ROUND_OFF * floor_of_pairs(e)[..., -1])] = NOISE
-        if q.block.stored_floor[-1] > 0.0:
-            found[lost] = STORED
-        if q.name in (state.name for state in q.block.model.states):
-            found[lost & (e.difference[..., -1] >= FAR_APART * e.size)] = PARTED
-            found[lost & (e.size <= ROUND_OFF_SAFETY * e.relative_floor * e.scale)] = ZERO
-        found[unseen & at_rest(e)] = STILL
-        found[coarse & unresolved(e) & (found == NONE)] = DECAY
-    found[has(*ROUGH) & np.isfinite(q.block.missed.time)] = PULSE
+    found, shape = _causes_unseen(q, judged, norm, order, tolerance), judged.reason.shape
+    low, high = (is_one_of(judged.reason, reason) for reason in ("order_low", "order_high"))
     if not np.any(low | high):
         return found
     wanted, model = np.broadcast_to(order, shape), q.block.model
@@ -269,6 +254,27 @@ def causes(
         ]
         found = np.where(high, _first(kinds, shape), found)
     return found.astype(np.int8)
+
+
+def _causes_unseen(
+    q: Comparison, judged: Judgement, norm: str, order: Floats, tolerance: float
+) -> Codes:
+    """Return why no order is seen, as positions in `CAUSES`; arguments as for `causes`."""
+    found = np.full(judged.reason.shape, NONE, dtype=np.int8)
+    has = partial(is_one_of, judged.reason)
+    lost, unseen, coarse = has("round_off"), has(*UNSEEN), has("pre_asymptotic")
+    if np.any(lost | unseen | coarse):
+        e = evidence(q, norm, order, tolerance)
+        found[lost & (e.difference[..., -1] > ABOVE_ROUND_OFF * floor_of_pairs(e)[..., -1])] = NOISE
+        if q.block.stored_floor[-1] > 0.0:
+            found[lost] = STORED
+        if q.name in (state.name for state in q.block.model.states):
+            found[lost & (e.difference[..., -1] >= FAR_APART * e.size)] = PARTED
+            found[lost & (e.size <= ROUND_OFF_SAFETY * e.relative_floor * e.scale)] = ZERO
+        found[unseen & at_rest(e)] = STILL
+        found[coarse & unresolved(e) & (found == NONE)] = DECAY
+    found[has(*ROUGH) & np.isfinite(q.block.missed.time)] = PULSE
+    return found
 
 
 def _first(kinds: list[tuple[Flags, int]], shape: tuple[int, ...]) -> Codes:

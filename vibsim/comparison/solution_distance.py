@@ -17,16 +17,11 @@ from vibsim.apriori.roundoff_floor import SPACING_AT_ONE
 from vibsim.comparison.quantity_comparison import Compared
 from vibsim.convergence.thresholds import ABOVE_ROUND_OFF
 from vibsim.core.array_types import Floats
+from vibsim.core.vocabulary import CENTRED, plain_name
 from vibsim.experiment.schema.checks import EqualCheck
 from vibsim.models import ENERGIES
 from vibsim.observe.common_grid import whole
-from vibsim.observe.member_block import (
-    CENTRED,
-    MemberBlock,
-    energy_at_start,
-    plain_name,
-    stored_or_nan,
-)
+from vibsim.observe.member_block import MemberBlock, energy_at_start, stored_or_nan
 from vibsim.observe.predicted_oscillation import is_simple, natural_frequency, steppers
 
 

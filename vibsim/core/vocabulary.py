@@ -109,10 +109,19 @@ def jsonable(value: Any) -> Any:
     return value
 
 
+FIGURE_FORMATS = ("svg", "png", "pdf")
+"""Formats in which figures of a report are written."""
 HIGHEST = "highest_omega_dt"
 """Name of the highest angular frequency of small oscillations times the step, where it is not that of a period."""
 PHASE, AMPLITUDE = "_phase_error", "_amplitude_error"
 """What follows the name of the position in the names of the parts of its error."""
+CENTRED = "_d2t"
+"""Ends the name of a velocity or an energy that is made with the centred difference ``[D_2t u]`` of the position."""
+
+
+def plain_name(name: str) -> str:
+    """Return the name of a quantity without the mark of the velocity that it is made with."""
+    return name.removesuffix(CENTRED)
 
 
 def is_error_part(name: str) -> bool:

@@ -146,25 +146,7 @@ def _written(
 ) -> Module:
     count = model.coordinates
     states = carried(stepper, model) if count == 1 else 0
-    parameters = n_parameters(stepper, model)
-    with_peaks = with_peaks and with_gathered
-    settings: dict[str, object] = {
-        "GATHER": with_gathered,
-        "D2T": with_gathered and stepper.own_velocity,
-        "SERIES": with_gathered and with_series,
-        "KEEP": with_peaks,
-        "STAGGERED": with_gathered and stepper.staggered,
-        "WORK": with_gathered and with_series and has_budget(model),
-        "STAGED": bool(stages(stepper.step)),
-        "EVENTS": model.events is not None,
-        "LOCATED": stepper.events != "mesh",
-        "PARAMETERS": parameters,
-        **block_loop.row_places(states, parameters, with_peaks),
-        **gather.sample_rows(count),
-        **events.columns(count),
-    }
-    if count > 1:
-        settings["ZERO"] = coordinates.vector(*[0.0] * count)
+    settings = _settings(model, stepper, states, with_gathered, with_series, with_peaks)
     module = _module(lane, settings)
     again = lane != "blocks" and bool(settings["D2T"])
     with_work = bool(settings["WORK"])
@@ -190,20 +172,58 @@ def _written(
     if "backward" not in module.parts:
         collect(module, stepper.backward, "backward", {})
     if lane == "blocks":
-        put_formulas(module, model, "_fast", stepper, with_work=with_work)
-        functions = (n for n, v in stepper.step.__globals__.items() if isinstance(v, FunctionType))
-        renamed = {name: f"{name}_fast" for name in (*HANDED, *functions)}
-        if stepper.implicit:
-            # where an iteration ends is a comparison, which would hide the NaN of a fast function out of its range
-            module.define("step_fast(state, t, dt, p)", "return step(state, t, dt, p)")
-        elif settings["STAGED"]:
-            rows.put_stages(module, stepper, renamed, settings)
-        else:
-            collect(module, stepper.step, "step_fast", renamed)
-        rows.put_rows(module, states, parameters, settings)
+        _put_step_of_blocks(module, model, stepper, settings)
+        rows.put_rows(module, states, n_parameters(stepper, model), settings)
     collect(module, block_loop.run if lane == "blocks" else member_loop.run, "run", {})
     module.put("kernel", _ENTRY)
     return module
+
+
+def _settings(
+    model: Model,
+    stepper: Stepper,
+    states: int,
+    with_gathered: bool,
+    with_series: bool,
+    with_peaks: bool,
+) -> dict[str, object]:
+    """Return the constants of a kernel by their names: what it does, and where its rows and columns are."""
+    count, parameters = model.coordinates, n_parameters(stepper, model)
+    with_peaks = with_peaks and with_gathered
+    settings: dict[str, object] = {
+        "GATHER": with_gathered,
+        "D2T": with_gathered and stepper.own_velocity,
+        "SERIES": with_gathered and with_series,
+        "KEEP": with_peaks,
+        "STAGGERED": with_gathered and stepper.staggered,
+        "WORK": with_gathered and with_series and has_budget(model),
+        "STAGED": bool(stages(stepper.step)),
+        "EVENTS": model.events is not None,
+        "LOCATED": stepper.events != "mesh",
+        "PARAMETERS": parameters,
+        **block_loop.row_places(states, parameters, with_peaks),
+        **gather.sample_rows(count),
+        **events.columns(count),
+    }
+    if count > 1:
+        settings["ZERO"] = coordinates.vector(*[0.0] * count)
+    return settings
+
+
+def _put_step_of_blocks(
+    module: Module, model: Model, stepper: Stepper, settings: Mapping[str, object]
+) -> None:
+    """Write the step of a block of members, which takes fast functions."""
+    put_formulas(module, model, "_fast", stepper, with_work=bool(settings["WORK"]))
+    functions = (n for n, v in stepper.step.__globals__.items() if isinstance(v, FunctionType))
+    renamed = {name: f"{name}_fast" for name in (*HANDED, *functions)}
+    if stepper.implicit:
+        # where an iteration ends is a comparison, which would hide the NaN of a fast function out of its range
+        module.define("step_fast(state, t, dt, p)", "return step(state, t, dt, p)")
+    elif settings["STAGED"]:
+        rows.put_stages(module, stepper, renamed, settings)
+    else:
+        collect(module, stepper.step, "step_fast", renamed)
 
 
 def carried(stepper: Stepper, model: Model) -> int:

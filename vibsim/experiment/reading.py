@@ -130,12 +130,47 @@ def build(
     check_names(name, collection, report)
     source = with_repeats(source, report)
     document = read_document(source, report)
+    folder = file.parent if file else Path()
+    equation, numbers, setting = _equation_and_setting(document, source, folder, report)
+    size_limits.check(setting, report)
+    _check_output(document, setting, report)
+    checks = _checks(document, setting, report)
+    check_figures(document.figures, setting, report)
+    report.raise_any()
+    assert setting.time is not None
+    experiment = ExperimentSpec(
+        collection=collection,
+        name=name,
+        **{key: getattr(document, key) for key in AS_WRITTEN},
+        model=_model_spec(equation, numbers.parameters),
+        initial=dict(numbers.initial),
+        time=setting.time,
+        levels=setting.levels,
+        schemes=setting.schemes,
+        sweep=setting.sweep if setting.sweep.axes else None,
+        samples=setting.samples,
+        checks=checks,
+        scaling=numbers.scaling,
+    )
+    kind = experiment.model.kind
+    if kind in report.kinds.own_models:
+        experiment.model.hold(report.kinds.own_models[kind])
+    experiment._file, experiment._settings = file, source.settings
+    size_limits.check_files(experiment, report)
+    report.raise_any()
+    unlikely.note_unlikely(document.checks, setting, report)
+    experiment._notes = report.note_lines
+    return members.update_tables(experiment)
+
+
+def _equation_and_setting(
+    document: Any, source: Source, folder: Path, report: Report
+) -> tuple[Equation, Numbers, size_limits.Setting]:
+    """Return the equation, its numbers with what they are scaled by, and what checks and limits need to know."""
     swept = sorted(set(_keys(source.data.get("sweep"))))
     # a model section with a fault elsewhere still names its model
     of_kind = report.kinds.model_of(source.data.get("model"))
-    equation = read_equation(
-        document.model, of_kind, swept, file.parent if file else Path(), report
-    )
+    equation = read_equation(document.model, of_kind, swept, folder, report)
     model, parameters = equation.model, equation.parameters
     levels = _levels(document, source, report)
     schemes = tuple(scheme_rules.finish_schemes(document.schemes, model, report))
@@ -163,47 +198,22 @@ def build(
         by_tolerance=source.data.get("tolerance") is not None,
         knows_schemes=knows_schemes,
     )
-    size_limits.check(setting, report)
-    _check_output(document, model, levels, report)
-    if sweep.follow is not None and (document.tolerance is not None or document.output == "best"):
-        key = "tolerance" if document.tolerance is not None else "output"
-        rule = "extrapolates members that start as the file says, not those of `follow`"
-        report.add((key,), rule, "leave it out, and give levels")
-    checks = _checks(document, setting, report)
-    check_figures(document.figures, setting, report)
-    report.raise_any()
+    return equation, numbers, setting
+
+
+def _model_spec(equation: Equation, parameters: Mapping[str, float]) -> ModelSpec:
+    """Return the model of an experiment, whose equation is known."""
+    model = equation.model
     assert model is not None
-    assert numbers.time is not None
-    experiment = ExperimentSpec(
-        collection=collection,
-        name=name,
-        **{key: getattr(document, key) for key in AS_WRITTEN},
-        model=ModelSpec(
-            kind=model.kind,
-            parameters=dict(numbers.parameters),
-            formulas=equation.formulas,
-            coordinates=model.positions if model.named is not None else (),
-            tables=equation.tables,
-            terms=equation.terms,
-            structure=equation.structure,
-        ),
-        initial=dict(numbers.initial),
-        time=numbers.time,
-        levels=levels,
-        schemes=schemes,
-        sweep=sweep if sweep.axes else None,
-        samples=setting.samples,
-        checks=checks,
-        scaling=numbers.scaling,
+    return ModelSpec(
+        kind=model.kind,
+        parameters=dict(parameters),
+        formulas=equation.formulas,
+        coordinates=model.positions if model.named is not None else (),
+        tables=equation.tables,
+        terms=equation.terms,
+        structure=equation.structure,
     )
-    if model.kind in report.kinds.own_models:
-        experiment.model.hold(report.kinds.own_models[model.kind])
-    experiment._file, experiment._settings = file, source.settings
-    size_limits.check_files(experiment, report)
-    report.raise_any()
-    unlikely.note_unlikely(document.checks, setting, report)
-    experiment._notes = report.note_lines
-    return members.update_tables(experiment)
 
 
 def _check_members(
@@ -298,21 +308,22 @@ def _checks(document: Any, setting: size_limits.Setting, report: Report) -> tupl
     return (*checks, *rows)
 
 
-def _check_output(
-    document: Any, model: Model | None, levels: tuple[int, ...], report: Report
-) -> None:
-    """Refuse to extrapolate over one level, or the whole motion of several coordinates."""
-    if document.output == "best" and len(levels) == 1:
+def _check_output(document: Any, setting: size_limits.Setting, report: Report) -> None:
+    """Refuse to extrapolate over one level, the whole motion of several coordinates, or members that follow others."""
+    model = setting.model
+    if document.output == "best" and len(setting.levels) == 1:
         rule = "the best solution is extrapolated over at least 2 levels, there is 1"
         report.add(("output",), rule)
-    if model is None or model.is_alone:
-        return
-    rule = f"extrapolates a motion of one coordinate, {model.kind} has {model.coordinates}"
-    if model.loaded is not None:
-        rule = (
-            "extrapolates a motion with the energies of its own states, which a structure has not"
-        )
-    if document.tolerance is not None:
-        report.add(("tolerance",), rule, "give levels", document.tolerance)
-    if document.output == "best":
-        report.add(("output",), rule, "choose from verdict", document.output)
+    if model is not None and not model.is_alone:
+        rule = f"extrapolates a motion of one coordinate, {model.kind} has {model.coordinates}"
+        if model.loaded is not None:
+            rule = "extrapolates a motion with the energies of its own states, which a structure has not"
+        if document.tolerance is not None:
+            report.add(("tolerance",), rule, "give levels", document.tolerance)
+        if document.output == "best":
+            report.add(("output",), rule, "choose from verdict", document.output)
+    is_extrapolated = document.tolerance is not None or document.output == "best"
+    if setting.sweep.follow is not None and is_extrapolated:
+        key = "tolerance" if document.tolerance is not None else "output"
+        rule = "extrapolates members that start as the file says, not those of `follow`"
+        report.add((key,), rule, "leave it out, and give levels")

@@ -8,7 +8,8 @@ evaluated as Python.
 
 from vibsim.formula.algebra import is_multiple, is_zero, tidied
 from vibsim.formula.arrays import bounds, values
-from vibsim.formula.calculus import derivative, has_rule, integral
+from vibsim.formula.derivatives import derivative
+from vibsim.formula.integrals import has_rule, integral
 from vibsim.formula.jumps import Pulses, Switch, first_jump, held, hidden_pulses
 from vibsim.formula.parser import MAX_CHARACTERS, MAX_DEPTH, ExpressionError, parse
 from vibsim.formula.render import constant, evaluate, to_formula, to_statements

@@ -26,7 +26,7 @@ import numpy as np
 from vibsim.core.array_types import Floats, Integers
 from vibsim.formula.algebra import filled, is_zero
 from vibsim.formula.arrays import bounds, values
-from vibsim.formula.calculus import derivative
+from vibsim.formula.derivatives import derivative
 from vibsim.formula.tree import (
     STEPS,
     Binary,

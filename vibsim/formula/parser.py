@@ -27,6 +27,8 @@ from vibsim.formula.tree import (
 )
 
 MAX_CHARACTERS = 2000
+MOST_SHOWN = 60
+"""Characters of a formula in a message."""
 MAX_POWER = 1024
 """Largest whole exponent: it is written out as multiplications."""
 
@@ -266,9 +268,9 @@ def _terms(node: ast.expr) -> int:
     return count and count + 1
 
 
-def shorten(text: str, length: int = 60) -> str:
-    """Return `text`, cut to `length` characters."""
-    return text if len(text) <= length else text[: length - 3] + "..."
+def shorten(text: str) -> str:
+    """Return a text, cut to `MOST_SHOWN` characters."""
+    return text if len(text) <= MOST_SHOWN else text[: MOST_SHOWN - 3] + "..."
 
 
 def place_of_fault(body: str, error: SyntaxError) -> tuple[int, str, str]:

@@ -18,7 +18,7 @@ import numpy as np
 
 from vibsim.core.array_types import Floats
 from vibsim.core.registry import hash_fault
-from vibsim.core.vocabulary import AMPLITUDE, PHASE
+from vibsim.core.vocabulary import AMPLITUDE, CENTRED, PHASE
 from vibsim.formula import (
     CONSTANTS,
     FUNCTIONS,
@@ -410,4 +410,4 @@ def error_parts(model: Model) -> tuple[str, ...]:
 
 def centred(model: Model) -> tuple[str, ...]:
     """Name the centred differences of the positions, ``[D_2t u]``, the energy by these velocities, its deviation."""
-    return (*(f"{name}_d2t" for name in model.velocities), "energy_d2t", "energy_deviation_d2t")
+    return tuple(name + CENTRED for name in (*model.velocities, "energy", "energy_deviation"))

@@ -30,11 +30,11 @@ from vibsim.apriori.roundoff_floor import SPACING_AT_ONE, solution_size
 from vibsim.convergence.differences import largest, safe_ratio
 from vibsim.convergence.thresholds import ABOVE_ROUND_OFF
 from vibsim.core.array_types import Codes, Flags, Floats
-from vibsim.core.vocabulary import DRIFTS
+from vibsim.core.vocabulary import CENTRED, DRIFTS
 from vibsim.formula import derivative, values
 from vibsim.models.base import tree
 from vibsim.observe import thresholds as th
-from vibsim.observe.member_block import CENTRED, MemberBlock, energy_at_start, stored_or_nan
+from vibsim.observe.member_block import MemberBlock, energy_at_start, stored_or_nan
 from vibsim.schemes.base import UNIT_ROUND_OFF, round_off
 
 NONE, BOUNDED, LINEAR, QUADRATIC, EXPONENTIAL, UNCLEAR = range(len(DRIFTS))

@@ -20,7 +20,7 @@ from vibsim.apriori.roundoff_floor import SPACING_AT_ONE, solution_size, stored_
 from vibsim.convergence.differences import laid_out, largest
 from vibsim.core.array_types import Flags, Floats
 from vibsim.core.record import Record
-from vibsim.core.vocabulary import HIGHEST, NORMS, TYPICAL_NORM
+from vibsim.core.vocabulary import CENTRED, HIGHEST, NORMS, TYPICAL_NORM, plain_name
 from vibsim.experiment import Experiment
 from vibsim.models import BUDGET, ENERGIES, Model
 from vibsim.observe.common_grid import Grid, check_belonging, common_grid, take
@@ -29,14 +29,6 @@ from vibsim.observe.sensitivity import sensitivity
 from vibsim.observe.stiffness import Motion, decay_rate, stiffest
 from vibsim.observe.thresholds import FEW_RADIANS
 from vibsim.simulation.members import Members, members
-
-CENTRED = "_d2t"
-"""What follows the name of a velocity or an energy that is made with ``[D_2t u]``."""
-
-
-def plain_name(name: str) -> str:
-    """Return the name of a quantity without the mark of the velocity that it is made with."""
-    return name.removesuffix(CENTRED)
 
 
 @dataclass(frozen=True)

@@ -20,7 +20,7 @@ from vibsim.experiment.collection import ENDINGS
 if TYPE_CHECKING:
     from vibsim.experiment import Experiment
 
-_DIGEST = re.compile("[0-9a-f]{64}")
+DIGEST = re.compile("[0-9a-f]{64}")
 
 
 @dataclass(frozen=True)
@@ -260,7 +260,7 @@ def from_json(text: str, file: str, key: str) -> Plan:
     plan: Plan = replace(_typed(Plan, json.loads(text)), file=file)
     digests = [plan.analysis, plan.report, *([plan.extrapolation] if plan.extrapolation else [])]
     digests += [shard.digest for shard in plan.shards] + [batch.digest for batch in plan.batches]
-    if plan.key != key or not all(map(_DIGEST.fullmatch, digests)):
+    if plan.key != key or not all(map(DIGEST.fullmatch, digests)):
         raise ValueError(f"{plan.key:.100}: not a plan of {key}")
     is_swept = plan.content.get("sweep") is not None
     for level in plan.levels:

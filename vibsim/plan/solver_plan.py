@@ -8,6 +8,7 @@ hours, and vibsim only stores what it wrote.
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping, Sequence
 from functools import partial
 from typing import Any
 
@@ -42,23 +43,19 @@ def build(experiment: SolverExperiment) -> Plan:
     inputs = {name: _digest(experiment, name) for name in solver.inputs}
     module = solver.text.partition(":")[0] if solver.kind == "python" else ""
     package = _code(experiment, module) if module else ""
-    key = f"{experiment.collection}/{experiment.name}"
+    memory = resources.mem_mb * MEGABYTE
     files: dict[str, str] = {}
     levels = []
     for level in experiment.levels:
-        shards = []
-        for member in range(experiment.members):
-            if solver.kind == "files":
-                path = experiment.path(level, member)
-                files[path] = _digest(experiment, path)
-                inputs = {"file": files[path]}
-            own = {"uses": solved(experiment, level, member), "inputs": inputs, "code": package}
-            digest = digest_of({"job": "solve", "format": FORMAT, **own})
-            number = None if experiment.sweep is None else member
-            place = shard_path(key, level, number)
-            shards.append(ShardJob(member, member, member + 1, place, digest))
-        memory = resources.mem_mb * MEGABYTE
-        levels.append(_level(level=level, memory=memory, shards=tuple(shards)))
+        if solver.kind == "files":
+            paths = [experiment.path(level, member) for member in range(experiment.members)]
+            read = {path: _digest(experiment, path) for path in paths}
+            files |= read
+            of_members = [{"file": read[path]} for path in paths]
+        else:
+            of_members = [inputs] * experiment.members
+        shards = _shards(experiment, level, of_members, package)
+        levels.append(_level(level=level, memory=memory, shards=shards))
     made: dict[str, Any] = {
         "levels": [[shard.digest for shard in level.shards] for level in levels]
     }
@@ -100,6 +97,21 @@ def build(experiment: SolverExperiment) -> Plan:
         inputs=tuple((files or inputs).items()),
         packages=((code_digest.MODULE, module, package),) if package else (),
     )
+
+
+def _shards(
+    experiment: SolverExperiment, level: int, inputs: Sequence[Mapping[str, str]], code: str
+) -> tuple[ShardJob, ...]:
+    """Return the jobs of a level, one for each member, from digests of inputs and of the code of its package."""
+    key = f"{experiment.collection}/{experiment.name}"
+    shards = []
+    for member, own in enumerate(inputs):
+        uses = {"uses": solved(experiment, level, member), "inputs": own, "code": code}
+        digest = digest_of({"job": "solve", "format": FORMAT, **uses})
+        number = None if experiment.sweep is None else member
+        place = shard_path(key, level, number)
+        shards.append(ShardJob(member, member, member + 1, place, digest))
+    return tuple(shards)
 
 
 def _digest(experiment: SolverExperiment, name: str) -> str:

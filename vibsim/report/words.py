@@ -9,7 +9,15 @@ from typing import Any
 
 from vibsim.checks.notation import Notation
 from vibsim.core import vocabulary
-from vibsim.core.vocabulary import AMPLITUDE, PHASE, is_error_part, order_interval, whole_of
+from vibsim.core.vocabulary import (
+    AMPLITUDE,
+    CENTRED,
+    PHASE,
+    is_error_part,
+    order_interval,
+    plain_name,
+    whole_of,
+)
 from vibsim.experiment.value_names import VALUES
 
 NAMES = {
@@ -22,8 +30,6 @@ NAMES = {
 }
 """Letter and words of quantities; others go by their name."""
 
-CENTRED = "_d2t"
-"""Ends the name of a quantity that is made with the centred difference ``[D_2t u]`` of the position."""
 PARTS = {PHASE: ("φ({})", "phase error of {}"), AMPLITUDE: ("a({})", "amplitude error of {}")}
 """Of a part of a position's error, by the end of its name: letter and words."""
 
@@ -55,7 +61,7 @@ def _named(quantity: str) -> tuple[str, str]:
         letter = symbol(whole)
         part, text = (form.format(letter) for form in PARTS[quantity.removeprefix(whole)])
         return part, text
-    plain = quantity.removesuffix(CENTRED)
+    plain = plain_name(quantity)
     letter, text = NAMES.get(plain, (plain, plain))
     if plain == quantity:
         return letter, text

@@ -27,11 +27,8 @@ from typing import Any
 
 from vibsim.schemes.base import Acceleration, Scheme, Slopes, Stepper
 from vibsim.schemes.code_generation import self_starting, written
-from vibsim.schemes.newton import solved, solved_together
+from vibsim.schemes.newton import Four, Two, solved, solved_together
 from vibsim.schemes.orders import same_orders
-
-Two = tuple[float, float]
-Four = tuple[float, float, float, float]
 
 
 def step_backward_euler(

@@ -19,10 +19,8 @@ from vibsim.cli.jobs.common import (
     with_settings,
 )
 from vibsim.core.errors import nearest
+from vibsim.core.vocabulary import FIGURE_FORMATS
 from vibsim.experiment import citation
-
-FORMATS = ("svg", "png", "pdf")
-"""Formats of figures, as in `vibsim.report.style`, which takes long to import."""
 
 
 def report(options: Namespace) -> int:
@@ -80,8 +78,8 @@ def _index(options: Namespace) -> int:
 def _formats(options: Namespace) -> list[str]:
     """Return the formats of the figures, each of them known."""
     chosen = (options.formats or "svg").split(",")
-    unknown = [name for name in chosen if name not in FORMATS]
+    unknown = [name for name in chosen if name not in FIGURE_FORMATS]
     if unknown:
-        hint = nearest(unknown[0], FORMATS)
+        hint = nearest(unknown[0], FIGURE_FORMATS)
         raise refusal("--formats", ",".join(unknown), "unknown format", hint)
     return chosen

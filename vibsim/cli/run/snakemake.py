@@ -184,28 +184,14 @@ def run(
         When another signal killed it.
     """
     results_folder.clean(results, [plan.key for plan in plans])
-    config = results / ".vibsim/run.json"
-    content = {
-        "experiments": [plan.file for plan in plans],
-        "settings": plans[0].settings if plans else (),
-        "results": str(results),
-        **where.config,
-    }
-    write_text(config, json.dumps(content))
+    config = _write_config(plans, results, where)
     reading, writing = os.pipe()
     if where.is_remote:
         supervise.take_time(CANCELLING)
-    command = [sys.executable, "-P", "-m", "vibsim.cli.run.snakemake_process", str(os.getpid())]
-    command.append("remote" if where.is_remote else "here")
-    command += ["--logger", "vibsim", "--logger-vibsim-pipe", str(writing)]
-    command += ["--snakefile", str(home() / "Snakefile")]
-    command += ["--workflow-profile", str(home() / "workflow/profiles/default")]
-    command += ["--configfile", str(config), "--directory", str(results), "--nocolor"]
-    command += where.arguments
     with os.fdopen(reading, "rb") as events:
         try:
             process = subprocess.Popen(
-                command,
+                _command(config, results, where, writing),
                 # Snakemake imports what it finds in .snakemake/pip-deployments of the folder that it is started in.
                 cwd="/",
                 env=_environment() | lock.inherited(held),
@@ -236,6 +222,30 @@ def run(
         reader.join()
     ended.text = b"".join(text).decode(errors="replace")
     return ended
+
+
+def _write_config(plans: Sequence[Plan], results: Path, where: Executor) -> Path:
+    """Write what the workflow reads of a run, and return its path."""
+    config = results / ".vibsim/run.json"
+    content = {
+        "experiments": [plan.file for plan in plans],
+        "settings": plans[0].settings if plans else (),
+        "results": str(results),
+        **where.config,
+    }
+    write_text(config, json.dumps(content))
+    return config
+
+
+def _command(config: Path, results: Path, where: Executor, pipe: int) -> list[str]:
+    """Return the command that starts Snakemake, which writes its events to a pipe."""
+    command = [sys.executable, "-P", "-m", "vibsim.cli.run.snakemake_process", str(os.getpid())]
+    command.append("remote" if where.is_remote else "here")
+    command += ["--logger", "vibsim", "--logger-vibsim-pipe", str(pipe)]
+    command += ["--snakefile", str(home() / "Snakefile")]
+    command += ["--workflow-profile", str(home() / "workflow/profiles/default")]
+    command += ["--configfile", str(config), "--directory", str(results), "--nocolor"]
+    return [*command, *where.arguments]
 
 
 def _cancel(process: subprocess.Popen[bytes]) -> None:

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
-from decimal import ROUND_CEILING, Context
 from itertools import pairwise
+
+from vibsim.core.decimals import round_outward
 
 PLAIN_DIGITS = 5
 """Whole numbers of so many digits are written without a power of ten."""
 MOST_DIGITS = 12
 """Of an extrapolated number in a sentence."""
-_UP = Context(prec=2, rounding=ROUND_CEILING)
 
 
 def number(value: float | None, digits: int) -> str:
@@ -40,10 +40,8 @@ def digits_of_values(values: Iterable[float | None]) -> int:
 
 def at_most(bound: float) -> str:
     """Write a bound with two digits, rounded up."""
-    if not 0.0 < bound < math.inf:
-        return number(bound, 2)
     text = number(bound, 2)
-    return text if float(text) >= bound else number(float(_UP.create_decimal(str(bound))), 2)
+    return text if float(text) >= bound else number(round_outward(bound, 2), 2)
 
 
 def percent(share: float | None) -> str:

@@ -7,7 +7,7 @@ from itertools import count
 from typing import Any
 
 from vibsim.core.errors import nearest
-from vibsim.core.vocabulary import BY_TOLERANCE, REASONS, is_error_part
+from vibsim.core.vocabulary import BY_TOLERANCE, REASONS, is_error_part, plain_name
 from vibsim.experiment.faults import Report
 from vibsim.experiment.rules.check_places import Scope
 from vibsim.experiment.rules.size_limits import Setting
@@ -301,7 +301,7 @@ def _equal(check: EqualCheck, scope: Scope) -> None:
         what, choices = check.second, tuple(state.name for state in setting.model.states)
         if check.second == "exact":
             choices += ENERGIES
-            if _plain(check.quantity) in choices and setting.own_velocity:
+            if plain_name(check.quantity) in choices and setting.own_velocity:
                 choices += (check.quantity,)
     if _is_quantity(check.quantity, choices, scope.at("quantity"), what):
         _has_quantity(check.quantity, named)
@@ -324,17 +324,13 @@ def _is_quantity(name: str, choices: tuple[str, ...], scope: Scope, what: str = 
         rule = "exists only where a scheme has another velocity than the centred difference"
         if model.events is not None:
             rule = "does not exist: across an event the centred difference is no velocity"
-        scope.refuse(rule, f"ask for {_plain(name)}", name)
+        scope.refuse(rule, f"ask for {plain_name(name)}", name)
         return False
     known = name in scope.setting.quantities
     rule = f"{what} is not known of this quantity" if known else "unknown quantity"
     hint = "choose from " + ", ".join(choices) if known else nearest(name, choices)
     scope.refuse(rule, hint, name)
     return False
-
-
-def _plain(name: str) -> str:
-    return name.removesuffix("_d2t")
 
 
 def _has_quantity(name: str, schemes: Iterable[tuple[str, Scope]]) -> None:
@@ -344,7 +340,7 @@ def _has_quantity(name: str, schemes: Iterable[tuple[str, Scope]]) -> None:
             return
         if scheme in setting.names and scheme not in setting.own:
             hint = f"choose from {', '.join(setting.own)}" if setting.own else ""
-            scope.refuse(f"has no {name} beside its {_plain(name)}", hint, scheme)
+            scope.refuse(f"has no {name} beside its {plain_name(name)}", hint, scheme)
 
 
 def _known_value(name: str, scope: Scope) -> Value | None:
@@ -405,7 +401,7 @@ def _known_exactly(quantity: str | None, value: str, scope: Scope) -> None:
     if model is None:
         return
     # the energy is known where it is conserved or the motion is known; the budget is 0 always
-    name = _plain(quantity or "")
+    name = plain_name(quantity or "")
     taken, done, budget = BUDGET
     is_solved = has_solution(model) and name not in (taken, done)
     if not (is_solved or name == budget or (model.conservative and name in ENERGIES)):

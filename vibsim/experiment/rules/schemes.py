@@ -9,7 +9,7 @@ from vibsim.core.errors import nearest
 from vibsim.experiment.data import SchemeSpec
 from vibsim.experiment.faults import Report
 from vibsim.experiment.kinds import Kinds
-from vibsim.experiment.rules.model import MOST_NAMED
+from vibsim.experiment.rules.formulas import MOST_NAMED
 from vibsim.experiment.schema.checks import SOLUTIONS
 from vibsim.experiment.schema.model_and_schemes import TOLERANCE
 from vibsim.experiment.schema.sweep import tolerance_name

@@ -14,7 +14,7 @@ import numpy as np
 from vibsim.checks.fields import name_of
 from vibsim.core.array_types import Floats
 from vibsim.core.record import Record
-from vibsim.core.vocabulary import DRIFTS
+from vibsim.core.vocabulary import CENTRED, DRIFTS
 from vibsim.observe.thresholds import LEAST_PERIODS, LEAST_SAMPLES, STILL
 from vibsim.report import style
 from vibsim.report.data import Member, at, time_label, times, unit, whole
@@ -80,7 +80,7 @@ def picture(
     if not frame.usable(found.running).size:
         told = "the energy error is 0 at every step, so there is nothing to draw."
         return evidence(f"{member.title}: {told}") if np.any(found.running == 0.0) else None
-    by = " by [D₂ₜu]" if check.conserves.endswith("_d2t") else ""
+    by = " by [D₂ₜu]" if check.conserves.endswith(CENTRED) else ""
     label = f"largest energy error so far{' / E(0)' if first else ''}{by}"
     title = style.label(label, "" if first else unit(record, "energy_deviation_max_abs"))
     figure = style.canvas(1.0)

@@ -9,7 +9,6 @@ from collections.abc import Sequence
 from vibsim.report.style import Picture
 from vibsim.report.types import Bbox, Figure
 
-FORMATS = ("svg", "png", "pdf")  # formats of figures
 MARGIN = 0.05  # between words and the border of a figure [inch]
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cache
 
@@ -64,68 +64,86 @@ def pictures(
 ) -> Gallery:
     """Return the figures of a report, those left out that stand above already; `first` names these."""
     found = choice.quantities(experiment, record)
-    cases = sorted({member.case for member in shown}, key=lambda case: case != lead.member.case)
-    has_series, has_pairs = not data.is_lean(record), bool(data.whole(record, "pair"))
-    series = shown if has_series else []
-    position = choice.position(experiment)
-    moving = Drawn()
-    if has_series:
-        # beside the worst member a typical one
-        typical = [member for member in series if member.role == "typical"]
-        shown_in_motion = [lead.member, *typical[:1]]
-        moving += [solution.motion(record, position, member) for member in shown_in_motion]
-        moving += [long_series.long_series(record, position, lead.member)]
-        moving += [plane.path(experiment, record, series)]
+    case = min((member.case for member in shown), key=lambda case: (case != lead.member.case, case))
+    series = [] if data.is_lean(record) else shown
     own = [member for member in series if member.role != "typical"]
     own.sort(key=lambda one: (one.scheme, one.case) != (lead.member.scheme, lead.member.case))
-
-    def tab(label: str, drawn: Drawn) -> list[Tab]:
-        found = tuple(one for one in drawn if one is not None and one.name not in first)
-        return [Tab(label, found)] if found else []
-
-    def of(quantity: str) -> list[Tab]:
-        letter, is_lead = words.symbol(quantity), quantity == lead.quantity
-        drawn, tabs = Drawn(), list[Tab]()
-        is_energy = quantity == "energy_deviation" and "energy_deviation_scaled" in record
-        if has_pairs:
-            # of a sweep the map has the rest
-            drawn += [order.against_step(experiment, record, quantity, c) for c in cases[:1]]
-        several = is_lead and len(own) > 1
-        for member in own[:FEW_SCHEMES] if is_lead else own[:1]:
-            each: Drawn = [time.energy(record, member)] if is_energy else []
-            is_wanted = not is_energy or quantity in checked_quantities(experiment)
-            if has_pairs and is_wanted and time.name_of_differences(quantity, member) not in first:
-                each.append(time.overlay(record, quantity, member))
-            if several:
-                tabs += tab(f"{letter}, {member.scheme_name}", each)
-            else:
-                drawn += each
-        return [*tab(f"{letter}, order" if several else letter, drawn), *tabs]
-
-    tabs = [one for quantity in found if quantity == lead.quantity for one in of(quantity)]
-    if series:
-        working = tab("work", [work.precision(experiment, record, case) for case in cases[:1]])
+    leading, others = list[Tab](), list[Tab]()
+    for quantity in found:
+        is_lead = quantity == lead.quantity
+        members = own[:FEW_SCHEMES] if is_lead else own[:1]
+        drawn = _of_quantity(experiment, record, quantity, case, members)
+        (leading if is_lead else others).extend(_tabs(drawn, first))
+    general = _tabs(_of_every_quantity(experiment, record, case, series, own), first)
+    working = _tabs([("work", [work.precision(experiment, record, case)])] if series else [], first)
+    if working and np.isnan(data.formal_orders(record, lead.quantity)).any():
         # where a scheme chooses its own steps, the work compares it with the others
-        has_own_steps = bool(np.isnan(data.formal_orders(record, lead.quantity)).any())
-        tabs[1:1] = working * has_own_steps
-    if has_pairs:
-        tabs += tab("estimated error", [solution.solution(record, position, m) for m in own[:1]])
-    if series:
-        if experiment.model.definition.conservative:
-            tabs += tab("energy", [energy.running(record, case) for case in cases[:1]])
-        beside: Drawn = [extrema.local(experiment, record, series, extrema.FEWEST)]
-        if not data.swept(record) and experiment.model.definition.is_alone:
-            beside.append(plane.phase(experiment, record, series))
-        tabs += tab("phase and amplitude", beside)
-    theories: Drawn = [theory.order_and_stability(experiment, record)]
-    theories += [theory.growing(experiment, record)] if has_series else []
-    tabs += tab("theory", theories)
-    if series and not has_own_steps:
-        tabs += working
-    tabs += [one for quantity in found if quantity != lead.quantity for one in of(quantity)]
-    motion = tuple(picture for picture in moving if picture and picture.name not in first)
+        belief = [*leading[:1], *working, *leading[1:], *general, *others]
+    else:
+        belief = [*leading, *general, *working, *others]
+    moving = _motion(experiment, record, series, lead) if series else []
     views, told = over_members(experiment, record, found, lead)
-    return Gallery(motion, tuple(tabs), tuple(views), tuple(told))
+    return Gallery(_new(moving, first), tuple(belief), tuple(views), tuple(told))
+
+
+def _new(drawn: Drawn, first: Sequence[str]) -> tuple[Picture, ...]:
+    """Return the pictures that do not stand above already."""
+    return tuple(one for one in drawn if one is not None and one.name not in first)
+
+
+def _tabs(labelled: Iterable[tuple[str, Drawn]], first: Sequence[str]) -> list[Tab]:
+    """Return the figures behind each label, as far as they do not stand above already."""
+    tabs = (Tab(label, _new(drawn, first)) for label, drawn in labelled)
+    return [tab for tab in tabs if tab.pictures]
+
+
+def _motion(experiment: Experiment, record: Record, series: list[Member], lead: Lead) -> Drawn:
+    """Draw the motion of the member that decides, and beside it of a typical one."""
+    position = choice.position(experiment)
+    typical = [member for member in series if member.role == "typical"]
+    return [
+        *(solution.motion(record, position, member) for member in [lead.member, *typical[:1]]),
+        long_series.long_series(record, position, lead.member),
+        plane.path(experiment, record, series),
+    ]
+
+
+def _of_quantity(
+    experiment: Experiment, record: Record, quantity: str, case: int, members: list[Member]
+) -> list[tuple[str, Drawn]]:
+    """Draw the error of a quantity against the step, and how the levels of each member agree over time."""
+    has_pairs, letter = bool(data.whole(record, "pair")), words.symbol(quantity)
+    is_energy = quantity == "energy_deviation" and "energy_deviation_scaled" in record
+    are_compared = has_pairs and (not is_energy or quantity in checked_quantities(experiment))
+    # of a sweep the map has the other members
+    shared: Drawn = [order.against_step(experiment, record, quantity, case)] if has_pairs else []
+    tabs = list[tuple[str, Drawn]]()
+    for member in members:
+        each: Drawn = [time.energy(record, member)] if is_energy else []
+        each += [time.overlay(record, quantity, member)] if are_compared else []
+        tabs.append((f"{letter}, {member.scheme_name}", each))
+    if len(tabs) < 2:
+        return [(letter, [*shared, *(one for _, each in tabs for one in each)])]
+    return [(f"{letter}, order", shared), *tabs]
+
+
+def _of_every_quantity(
+    experiment: Experiment, record: Record, case: int, series: list[Member], own: list[Member]
+) -> Iterator[tuple[str, Drawn]]:
+    """Draw the estimated error, the energy, phase and amplitude, and what theory says of the schemes."""
+    if own and data.whole(record, "pair"):
+        yield "estimated error", [solution.solution(record, choice.position(experiment), own[0])]
+    equation = experiment.model.definition
+    if series:
+        if equation.conservative:
+            yield "energy", [energy.running(record, case)]
+        beside: Drawn = [extrema.local(experiment, record, series, extrema.FEWEST)]
+        if not data.swept(record) and equation.is_alone:
+            beside.append(plane.phase(experiment, record, series))
+        yield "phase and amplitude", beside
+    theories: Drawn = [theory.order_and_stability(experiment, record)]
+    theories += [theory.growing(experiment, record)] if series else []
+    yield "theory", theories
 
 
 def over_members(

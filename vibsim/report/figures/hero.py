@@ -38,10 +38,10 @@ STRIP = 0.12  # of the height of the axes, for a row of a legend
 LONG = 24  # letters of a label above which it is set smaller
 
 
-def _panel(width: float, title: str, left: float = 0.72, right: float = 0.14) -> Axes:
+def _panel(width: float, title: str, right: float = 0.14) -> Axes:
     """Return the axes of a picture, whose label of the vertical axis stands above them."""
     figure = style.canvas(HEIGHT, width)
-    box = (left / width, 0.46 / HEIGHT, (width - left - right) / width, (HEIGHT - 0.78) / HEIGHT)
+    box = (0.72 / width, 0.46 / HEIGHT, (width - 0.72 - right) / width, (HEIGHT - 0.78) / HEIGHT)
     ax = figure.add_axes(box)
     _name(ax, title)
     return ax
@@ -115,7 +115,7 @@ def _title_of_differences(record: Record, lead: Lead, count: int) -> str:
     return f"The finest curves agree to {words.number(100.0 * last, 'brief')} %{of}"
 
 
-def against_step(experiment: Experiment, record: Record, lead: Lead) -> Picture | None:
+def against_step(record: Record, lead: Lead) -> Picture | None:
     """Draw the error of every level against the step, of every scheme; None where there is none to draw."""
     quantity, case = lead.quantity, lead.member.case
     letter, measure = words.symbol(quantity), data.norm_unit(record, quantity, "linf")
@@ -285,12 +285,12 @@ def _number(experiment: Experiment, record: Record, lead: Lead) -> tuple[str, st
     return text, style.label(text, data.norm_unit(record, quantity)), error
 
 
-def _scaled(ax: Axes, which: str, values: Floats) -> None:
-    """Make an axis logarithmic where positive values spread over decades."""
+def _scaled(ax: Axes, values: Floats) -> None:
+    """Make the vertical axis logarithmic where positive values spread over decades."""
     if style.spans_decades(values):
-        style.log_axis(ax, which, *style.log_limits(values), most=5)
+        style.log_axis(ax, "y", *style.log_limits(values), most=5)
     else:
-        ax.set(**{f"{which}lim": style.limits(values)})
+        ax.set_ylim(*style.limits(values))
 
 
 def _across(ax: Axes, key: sweep_layout.Key) -> None:
@@ -312,7 +312,7 @@ def _curves(lead: Lead, along: Along, values: Floats, text: str) -> Axes:
         look = style.look(i) | few
         ax.plot(x, y, **look, linewidth=1.6, label=name or None)
     _across(ax, along.key)
-    _scaled(ax, "y", values)
+    _scaled(ax, values)
     _mark(ax, along.key.values, values, lead)
     if ax.get_legend_handles_labels()[0]:
         ax.legend(loc="best", fontsize=8, handlelength=1.8)
@@ -349,7 +349,7 @@ def _dots(lead: Lead, key: sweep_layout.Key, values: Floats, text: str) -> Axes:
     ax, is_many = _panel(LEFT, text), values.size > 500
     ax.plot(key.values, values, ".", color=style.COLOURS[0], markersize=3, rasterized=is_many)
     _across(ax, key)
-    _scaled(ax, "y", values)
+    _scaled(ax, values)
     _mark(ax, key.values, values, lead)
     return ax
 

@@ -262,7 +262,7 @@ def pictures(experiment: Experiment, record: Record, lead: Lead) -> list[Picture
         right = drawn.orders(experiment, record, lead) if has_order else None
         right = right or _evidence(experiment, record, lead)
     else:
-        right = drawn.against_step(experiment, record, lead) if has_order else None
+        right = drawn.against_step(record, lead) if has_order else None
         if lead.entry is not None and not lead.is_on_order:
             left = _evidence(experiment, record, lead)
         elif has_order:

@@ -17,7 +17,8 @@ from vibsim.report import style, words
 from vibsim.report.figures import drawing, thumbnail
 from vibsim.report.page import study
 from vibsim.report.page.cards import provenance_rows
-from vibsim.report.page.page import files_of, replace_files, texts_of
+from vibsim.report.page.page import replace_files
+from vibsim.report.page.page_tables import files_of, texts_of
 from vibsim.report.page.templates import environment, sealed
 from vibsim.report.tables import checks as check_tables
 from vibsim.report.tables.table import Cell, Column, Table
@@ -47,7 +48,7 @@ def write(
         figures |= dict(_thumbnail(verdict)) if not figures else {}
         figures |= drawing.files(card["picture"], formats)
     replace_files(directory / "figures", figures)
-    replace_files(directory / "tables", files_of({table.name: texts_of(table) for table in tables}))
+    replace_files(directory / "tables", files_of(texts_of(tables)))
     context = {
         "status": summary["status"],
         "counts": words.passed([entry["status"] for entry in summary["checks"]]),

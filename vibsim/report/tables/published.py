@@ -11,6 +11,7 @@ import numpy as np
 from vibsim.apriori.formal_orders import columns_of
 from vibsim.checks.fields import field_values
 from vibsim.core.record import Record
+from vibsim.core.vocabulary import CENTRED
 from vibsim.experiment.sweep_columns import members_with
 from vibsim.experiment.value_names import VALUES
 from vibsim.report import data, words
@@ -78,14 +79,14 @@ def _columns(record: Record, table: PublishedTable) -> tuple[Column, ...]:
 
 def _beside_header(name: str, table: PublishedTable) -> str:
     """Return the header of a further value: what it has by the scheme's own velocity, it says so."""
-    if f"{name}{words.CENTRED}" == table.value:
+    if f"{name}{CENTRED}" == table.value:
         return OWN
-    own = f" {OWN}" if f"{name}{words.CENTRED}" in VALUES else ""
+    own = f" {OWN}" if f"{name}{CENTRED}" in VALUES else ""
     return f"beside: {_value_in_words(name)}{own}"
 
 
 def _value_in_words(value: str) -> str:
-    return value.replace(words.CENTRED, " by [D₂ₜu]").replace("_", " ")
+    return value.replace(CENTRED, " by [D₂ₜu]").replace("_", " ")
 
 
 def _row(

@@ -1,4 +1,4 @@
-"""Derivatives and integrals of formulas, as formulas: for Newton's method, and the potential energy of a spring.
+"""Integrals of formulas, as formulas: the potential energy of a spring.
 
 The integral is taken from 0, in forms that do not cancel there: a small energy has all its digits. A sum is integrated
 term by term; a term is a constant factor times a power of x, or a function of the table `SMOOTH` of ``a x``. What has a
@@ -18,10 +18,7 @@ import numpy as np
 
 from vibsim.formula.algebra import filled, slope_of
 from vibsim.formula.arrays import values
-from vibsim.formula.parser import ExpressionError
 from vibsim.formula.tree import (
-    ONE,
-    STEPS,
     ZERO,
     Binary,
     Call,
@@ -35,125 +32,8 @@ from vibsim.formula.tree import (
     number,
     paired,
     put,
-    size,
     walk,
 )
-
-MAX_NODES = 100_000
-"""Operations and names of a derivative, at most."""
-_BELL = f"{2.0 / math.sqrt(math.pi)!r}*exp(-x**2)"
-_RULES = {
-    "sin": "cos(x)",
-    "cos": "-sin(x)",
-    "tan": "1 + f**2",
-    "exp": "f",
-    "log": "1/x",
-    "sinh": "cosh(x)",
-    "cosh": "sinh(x)",
-    # 1 - tanh(x)**2 has no digits left for large x
-    "tanh": "1/cosh(x)**2",
-    # in factors: 1 - x**2 cancels near 1
-    "asin": "1/sqrt((1 - x)*(1 + x))",
-    "acos": "-(1/sqrt((1 - x)*(1 + x)))",
-    "atan": "1/(1 + x**2)",
-    # sqrt(1 + x**2) overflows before its inverse vanishes
-    "asinh": "1/hypot(1, x)",
-    # a product of roots, which has no value below 1
-    "acosh": "1/(sqrt(x - 1)*sqrt(x + 1))",
-    "atanh": "1/((1 - x)*(1 + x))",
-    "log10": "0.4342944819032518/x",
-    "log2": "1.4426950408889634/x",
-    "log1p": "1/(1 + x)",
-    "expm1": "exp(x)",
-    "cbrt": f"{1.0 / 3.0!r}/f**2",
-    "erf": _BELL,
-    "erfc": f"-({_BELL})",
-    "sqrt": "0.5/f",
-    "abs": "sign(x)",
-}
-"""Derivative of a function of one argument x, whose value is f."""
-
-
-def derivative(node: Expression, name: str) -> Expression:
-    """Return the derivative of a formula by one of its names.
-
-    Where a formula has a corner or a jump (``abs``, ``min``, ``max``, ``mod``, ``where``, a comparison, one of `STEPS`)
-    the derivative is that of the branch taken; jumps count as flat.
-
-    Raises
-    ------
-    ExpressionError
-        Where the derivative is longer than `MAX_NODES`: that of a product of n factors has n*n of them.
-    """
-    found = _derivative(node, name)
-    if size(found, MAX_NODES) > MAX_NODES:
-        rule = f"its derivatives are too long: that by {name} has more than {MAX_NODES} operations"
-        raise ExpressionError("", 0, rule, "write a simpler formula")
-    return found
-
-
-def _derivative(node: Expression, name: str) -> Expression:
-    match node:
-        case Name(own):
-            return ONE if own == name else ZERO
-        case Negate(operand):
-            return -_derivative(operand, name)
-        case Binary("+", left, right):
-            return _derivative(left, name) + _derivative(right, name)
-        case Binary("-", left, right):
-            return _derivative(left, name) - _derivative(right, name)
-        case Binary("*", left, right):
-            return _derivative(left, name) * right + left * _derivative(right, name)
-        case Binary("/", left, right):
-            # not over right**2, which overflows before the quotient does
-            return _over(_derivative(left, name) - node * _derivative(right, name), right)
-        case Binary("**", base, exponent):
-            by_base, value = _derivative(base, name), literal(exponent)
-            if value is not None:
-                lowered = Binary("**", base, number(value - 1.0))
-                power = base if value == 2.0 else ONE if value == 1.0 else lowered
-                return number(value) * power * by_base
-            lowered = Binary("**", base, Binary("-", exponent, ONE))
-            by_exponent = node * Call("log", (base,)) * _derivative(exponent, name)
-            return exponent * lowered * by_base + by_exponent
-        case Call(function, arguments):
-            return _of_call(node, function, arguments, name)
-    return ZERO
-
-
-def _of_call(
-    node: Expression, function: str, arguments: tuple[Expression, ...], name: str
-) -> Expression:
-    dx, *others = (_derivative(argument, name) for argument in arguments)
-    if all(entry == ZERO for entry in (dx, *others)) or function in STEPS:
-        return ZERO
-    x, *more = arguments
-    if function in _RULES:
-        return filled(_RULES[function], x=x, f=node) * dx
-    if function == "where":
-        return Call("where", (x, *others))
-    [y], [dy] = more, others
-    match function:
-        case "min":
-            return filled("where(x <= y, dx, dy)", x=x, y=y, dx=dx, dy=dy)
-        case "max":
-            return filled("where(x >= y, dx, dy)", x=x, y=y, dx=dx, dy=dy)
-        case "atan2":
-            return _over(y * dx - x * dy, filled("x**2 + y**2", x=x, y=y))
-        case "hypot":
-            # 0 where both are 0, as that of abs
-            by_x, by_y = (filled("part/(f + (f == 0))", part=part, f=node) for part in (x, y))
-            return by_x * dx + by_y * dy
-        case "mod":
-            # the whole number that mod has taken away, which a rounded quotient may miss by 1
-            taken = filled("round((x - f)/y)", x=x, y=y, f=node)
-            return dx - taken * dy
-    raise NotImplementedError(f"{function} has no derivative here")
-
-
-def _over(left: Expression, right: Expression) -> Expression:
-    return ZERO if left == ZERO else Binary("/", left, right)
-
 
 QUADRATURE_POINTS = 24
 """Points of the rule: polynomials up to degree 47 are integrated exactly."""
@@ -224,10 +104,6 @@ def _found(node: Expression, name: str) -> Expression | None:
     def is_free(part: Expression) -> bool:
         return name not in names_in(part)
 
-    def differ(left: Expression, right: Expression) -> bool:
-        """Whether only one of two formulas has the name, so that the slopes of a difference cannot cancel."""
-        return is_free(left) != is_free(right)
-
     if is_free(node):
         return Binary("*", node, Name(name))
     match node:
@@ -242,44 +118,17 @@ def _found(node: Expression, name: str) -> Expression | None:
             return _joined("*", left, _found(right, name))
         case Binary("*" | "/" as symbol, left, right) if is_free(right):
             return _joined(symbol, _found(left, name), right)
-        case Binary("**", Name() as base, exponent):
-            power = literal(exponent)
-            if power is None or power <= 0.0:
-                return None
-            return filled("x**n/n", x=base, n=Number(power + 1.0))
-        case Binary("**", base, exponent) if is_free(base):
+        case Binary("*", left, right):
+            return _of_part(left, right, 1.0, name) or _of_part(right, left, 1.0, name)
+        case Binary("**", base, exponent) if (power := literal(exponent)) is not None:
+            return _of_power(node, base, power, name)
+        case Binary("**", base, exponent) if is_free(base) and not isinstance(base, Name):
             # e**x
             return _found(filled("exp(log(base)*x)", base=base, x=exponent), name)
-        case Call(function, (x,)) if function in SMOOTH:
-            slope = slope_of(x, name, with_start=False)
-            return _over_slope(filled(SMOOTH[function], x=x), slope, node, name)
-        case Call(function, (x,)) if function in BROKEN:
-            return _of_linear(BROKEN[function], x, node, name)
-        case Call("mod", (x, period)) if is_free(period):
-            return _of_linear(MOD, x, node, name, period=period)
-        case Call("max" | "min" as function, (left, right)) if differ(left, right):
-            # max(a, b) = b + max(a - b, 0), min(a, b) = a - max(a - b, 0)
-            base, symbol = (right, "+") if function == "max" else (left, "-")
-            difference = Binary("-", left, right)
-            ramp = filled(RAMP, x=difference)
-            above = _of_linear("0.5*x*max(x, 0)", difference, ramp, name)
-            return _joined(symbol, _found(base, name), above)
-        case Compare("<" | "<=", left, right) if differ(left, right):
+        case Compare("<" | "<=", left, right) if is_free(left) != is_free(right):
             return _of_linear(RAMP, Binary("-", right, left), node, name)
-        case Compare(">" | ">=", left, right) if differ(left, right):
+        case Compare(">" | ">=", left, right) if is_free(left) != is_free(right):
             return _of_linear(RAMP, Binary("-", left, right), node, name)
-        case Binary("**", Call("max", (x, Number(0.0))), exponent):
-            more = (literal(exponent) or -1.0) + 1.0
-            if more <= 1.0:
-                return None
-            return _of_linear("max(x, 0)**n/n", x, node, name, n=Number(more))
-        case Binary("**", base, exponent):
-            # a spring between two coordinates; the powers of u - 1 are left to points, whose sum does not cancel
-            power, start = literal(exponent) or 0.0, put(base, name, ZERO)
-            is_spring = bool(names_in(start)) or values(start, {}) == 0.0
-            if power < 1.0 or not power.is_integer() or not is_spring:
-                return None
-            return _of_linear("x**n/n", base, node, name, n=Number(power + 1.0))
         case Call("where", (condition, yes, no)) if is_free(condition):
             first, second = _found(yes, name), _found(no, name)
             if first is None or second is None:
@@ -288,8 +137,51 @@ def _found(node: Expression, name: str) -> Expression | None:
         case Call("where", (condition, yes, no)):
             first = _of_part(yes, condition, 1.0, name)
             return _joined("+", first, _of_part(no, condition, -1.0, name))
-        case Binary("*", left, right):
-            return _of_part(left, right, 1.0, name) or _of_part(right, left, 1.0, name)
+        case Call(function, arguments):
+            return _of_function(node, function, arguments, name)
+    return None
+
+
+def _of_power(node: Expression, base: Expression, power: float, name: str) -> Expression | None:
+    """Return the integral of a power of x, of ``max(a x + b, 0)``, or of ``a x + b``."""
+    n = Number(power + 1.0)
+    match base:
+        case Name():
+            return filled("x**n/n", x=base, n=n) if power > 0.0 else None
+        case Call("max", (x, Number(0.0))):
+            return _of_linear("max(x, 0)**n/n", x, node, name, n=n) if power > 0.0 else None
+    # a spring between two coordinates; the powers of u - 1 are left to points, whose sum does not cancel
+    start = put(base, name, ZERO)
+    is_spring = bool(names_in(start)) or values(start, {}) == 0.0
+    if power < 1.0 or not power.is_integer() or not is_spring:
+        return None
+    return _of_linear("x**n/n", base, node, name, n=n)
+
+
+def _of_function(
+    node: Expression, function: str, arguments: tuple[Expression, ...], name: str
+) -> Expression | None:
+    """Return the integral of a function of ``a x + b``."""
+    x, *others = arguments
+    if function in SMOOTH:
+        slope = slope_of(x, name, with_start=False)
+        return _over_slope(filled(SMOOTH[function], x=x), slope, node, name)
+    if function in BROKEN:
+        return _of_linear(BROKEN[function], x, node, name)
+    if len(others) != 1:
+        return None
+    (y,) = others
+    are_free = [name not in names_in(argument) for argument in arguments]
+    if function == "mod" and are_free[1]:
+        return _of_linear(MOD, x, node, name, period=y)
+    # with the name in one of them alone, the slopes of their difference cannot cancel
+    if function in ("max", "min") and are_free[0] != are_free[1]:
+        # max(a, b) = b + max(a - b, 0), min(a, b) = a - max(a - b, 0)
+        base, symbol = (y, "+") if function == "max" else (x, "-")
+        difference = Binary("-", x, y)
+        ramp = filled(RAMP, x=difference)
+        above = _of_linear("0.5*x*max(x, 0)", difference, ramp, name)
+        return _joined(symbol, _found(base, name), above)
     return None
 
 

@@ -1,0 +1,136 @@
+"""Derivatives of formulas, as formulas: for Newton's method."""
+
+from __future__ import annotations
+
+import math
+
+from vibsim.formula.algebra import filled
+from vibsim.formula.parser import ExpressionError
+from vibsim.formula.tree import (
+    ONE,
+    STEPS,
+    ZERO,
+    Binary,
+    Call,
+    Expression,
+    Name,
+    Negate,
+    literal,
+    number,
+    size,
+)
+
+MAX_NODES = 100_000
+"""Operations and names of a derivative, at most."""
+_BELL = f"{2.0 / math.sqrt(math.pi)!r}*exp(-x**2)"
+_RULES = {
+    "sin": "cos(x)",
+    "cos": "-sin(x)",
+    "tan": "1 + f**2",
+    "exp": "f",
+    "log": "1/x",
+    "sinh": "cosh(x)",
+    "cosh": "sinh(x)",
+    # 1 - tanh(x)**2 has no digits left for large x
+    "tanh": "1/cosh(x)**2",
+    # in factors: 1 - x**2 cancels near 1
+    "asin": "1/sqrt((1 - x)*(1 + x))",
+    "acos": "-(1/sqrt((1 - x)*(1 + x)))",
+    "atan": "1/(1 + x**2)",
+    # sqrt(1 + x**2) overflows before its inverse vanishes
+    "asinh": "1/hypot(1, x)",
+    # a product of roots, which has no value below 1
+    "acosh": "1/(sqrt(x - 1)*sqrt(x + 1))",
+    "atanh": "1/((1 - x)*(1 + x))",
+    "log10": "0.4342944819032518/x",
+    "log2": "1.4426950408889634/x",
+    "log1p": "1/(1 + x)",
+    "expm1": "exp(x)",
+    "cbrt": f"{1.0 / 3.0!r}/f**2",
+    "erf": _BELL,
+    "erfc": f"-({_BELL})",
+    "sqrt": "0.5/f",
+    "abs": "sign(x)",
+}
+"""Derivative of a function of one argument x, whose value is f."""
+
+
+def derivative(node: Expression, name: str) -> Expression:
+    """Return the derivative of a formula by one of its names.
+
+    Where a formula has a corner or a jump (``abs``, ``min``, ``max``, ``mod``, ``where``, a comparison, one of `STEPS`)
+    the derivative is that of the branch taken; jumps count as flat.
+
+    Raises
+    ------
+    ExpressionError
+        Where the derivative is longer than `MAX_NODES`: that of a product of n factors has n*n of them.
+    """
+    found = _derivative(node, name)
+    if size(found, MAX_NODES) > MAX_NODES:
+        rule = f"its derivatives are too long: that by {name} has more than {MAX_NODES} operations"
+        raise ExpressionError("", 0, rule, "write a simpler formula")
+    return found
+
+
+def _derivative(node: Expression, name: str) -> Expression:
+    match node:
+        case Name(own):
+            return ONE if own == name else ZERO
+        case Negate(operand):
+            return -_derivative(operand, name)
+        case Binary("+", left, right):
+            return _derivative(left, name) + _derivative(right, name)
+        case Binary("-", left, right):
+            return _derivative(left, name) - _derivative(right, name)
+        case Binary("*", left, right):
+            return _derivative(left, name) * right + left * _derivative(right, name)
+        case Binary("/", left, right):
+            # not over right**2, which overflows before the quotient does
+            return _over(_derivative(left, name) - node * _derivative(right, name), right)
+        case Binary("**", base, exponent):
+            by_base, value = _derivative(base, name), literal(exponent)
+            if value is not None:
+                lowered = Binary("**", base, number(value - 1.0))
+                power = base if value == 2.0 else ONE if value == 1.0 else lowered
+                return number(value) * power * by_base
+            lowered = Binary("**", base, Binary("-", exponent, ONE))
+            by_exponent = node * Call("log", (base,)) * _derivative(exponent, name)
+            return exponent * lowered * by_base + by_exponent
+        case Call(function, arguments):
+            return _of_call(node, function, arguments, name)
+    return ZERO
+
+
+def _of_call(
+    node: Expression, function: str, arguments: tuple[Expression, ...], name: str
+) -> Expression:
+    dx, *others = (_derivative(argument, name) for argument in arguments)
+    if all(entry == ZERO for entry in (dx, *others)) or function in STEPS:
+        return ZERO
+    x, *more = arguments
+    if function in _RULES:
+        return filled(_RULES[function], x=x, f=node) * dx
+    if function == "where":
+        return Call("where", (x, *others))
+    [y], [dy] = more, others
+    match function:
+        case "min":
+            return filled("where(x <= y, dx, dy)", x=x, y=y, dx=dx, dy=dy)
+        case "max":
+            return filled("where(x >= y, dx, dy)", x=x, y=y, dx=dx, dy=dy)
+        case "atan2":
+            return _over(y * dx - x * dy, filled("x**2 + y**2", x=x, y=y))
+        case "hypot":
+            # 0 where both are 0, as that of abs
+            by_x, by_y = (filled("part/(f + (f == 0))", part=part, f=node) for part in (x, y))
+            return by_x * dx + by_y * dy
+        case "mod":
+            # the whole number that mod has taken away, which a rounded quotient may miss by 1
+            taken = filled("round((x - f)/y)", x=x, y=y, f=node)
+            return dx - taken * dy
+    raise NotImplementedError(f"{function} has no derivative here")
+
+
+def _over(left: Expression, right: Expression) -> Expression:
+    return ZERO if left == ZERO else Binary("/", left, right)

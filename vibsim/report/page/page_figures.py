@@ -1,0 +1,128 @@
+"""The figures of a page: each is a file, and in the page itself as far as it has room."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+from vibsim.core.record import Record
+from vibsim.experiment.schema.figures import FigureOfSource
+from vibsim.report.choice import Lead
+from vibsim.report.figures import drawing, gallery, of_source, thumbnail
+from vibsim.report.figures.sweeps.view import View
+from vibsim.report.page import explorer, hero
+from vibsim.report.page.templates import markup
+from vibsim.report.style import Picture
+from vibsim.report.types import Experiment
+
+BYTES = 1_000_000  # of all figures behind tabs; figures beyond are files only
+FIGURES = 6  # most figures behind the tabs of a section
+
+Shown = tuple[Picture, str]
+"""A picture with its markup."""
+
+
+@dataclass(frozen=True)
+class PageFigures:
+    """The figures of a page."""
+
+    files: dict[str, bytes]
+    above: list[str]
+    """Names of those that stand above the motion."""
+    of_source: list[tuple[FigureOfSource, list[Picture]]]
+    content: dict[str, Any]
+    """What the page shows of them, by the names that its template uses."""
+
+
+def draw(experiment: Experiment, record: Record, lead: Lead, formats: Sequence[str]) -> PageFigures:
+    """Draw the figures of a page from its first screen down; what stands above is not drawn again below."""
+    drawn = _Drawn(formats)
+    sources = of_source.pictures(experiment, record, lead)
+    groups = {
+        "hero": [drawn.add(picture) for picture in hero.pictures(experiment, record, lead)],
+        "source": [drawn.add(picture) for _, pictures in sources for picture in pictures],
+    }
+    above = [picture.name for group in groups.values() for picture, _ in group]
+    shown, left_out = gallery.choose(experiment, record)
+    below = gallery.pictures(experiment, record, shown, lead, above)
+    groups["motion"] = [drawn.add(picture) for picture in below.motion]
+    belief, over_members = drawn.tabs(below.belief), drawn.views(below.members)
+    views = [view for view, _ in over_members]
+    small = thumbnail.thumbnail(experiment, record, shown[0])
+    content = {
+        "figures": groups | {"belief": belief, "members": over_members},
+        "reading": {name: _captions(group) for name, group in groups.items()}
+        | {"belief": _captions(one for _, group in belief for one in group)}
+        | {"members": _readings(view.picture for view in views)},
+        "members": explorer.content(experiment, record, views),
+        "worst": explorer.worst(experiment, record, views),
+        "shared": below.shared,
+        "shown": left_out,
+        "more_figures": ", ".join(drawn.left_out),
+    }
+    return PageFigures({**drawn.files, "thumbnail.svg": small.encode()}, above, sources, content)
+
+
+class _Drawn:
+    """Pictures as markup for the page, and as files beside it."""
+
+    def __init__(self, formats: Sequence[str]) -> None:
+        self.formats = formats
+        self.files: dict[str, bytes] = {}
+        self.room = BYTES
+        self.left_out: list[str] = []
+        """Labels of tabs that are files only."""
+
+    def add(self, picture: Picture) -> Shown:
+        """Return a picture with its markup, and keep its files."""
+        files = drawing.files(picture, self.formats)
+        self.files |= files
+        text = files[f"{picture.name}.svg"].decode()
+        return picture, markup(drawing.inline(text, picture.alt))
+
+    def tabs(self, tabs: Sequence[gallery.Tab]) -> list[tuple[str, list[Shown]]]:
+        """Return the labels of tabs with their pictures, as long as the page has room; the others are files only."""
+        found, most = [], FIGURES
+        for tab in tabs:
+            added = [self.add(picture) for picture in tab.pictures]
+            most -= len(added)
+            self.room -= sum(len(text) for _, text in added)
+            if most >= 0 and self.room >= 0:
+                found.append((tab.label, added))
+            else:
+                self.left_out.append(tab.label)
+        return found
+
+    def views(self, views: Sequence[View]) -> list[tuple[View, str]]:
+        """Return the views of members with their markup, as long as the page has room; the others are files only."""
+        found = []
+        for view in views:
+            picture, text = self.add(view.picture)
+            self.room -= len(text)
+            if self.room >= 0:
+                found.append((view, text))
+            else:
+                self.left_out.append(picture.title)
+        return found
+
+
+def _captions(drawn: Iterable[Shown]) -> list[tuple[str, str]]:
+    """Return how to read each kind of picture, once: what stands before the first colon of its title, and a caption.
+
+    A caption that several kinds share stands once, too.
+    """
+    found: dict[str, Picture] = {}
+    for picture, _ in drawn:
+        kind = picture.title.partition(":")[0].partition("?")[0]
+        found.setdefault(kind + "?" * ("?" in picture.title), picture)
+    return _readings(replace(picture, title=kind) for kind, picture in found.items())
+
+
+def _readings(pictures: Iterable[Picture]) -> list[tuple[str, str]]:
+    """Return how to read pictures, each caption once, by the title of the first that has it."""
+    found: dict[str, str] = {}
+    for picture in pictures:
+        if picture.caption:
+            found.setdefault(picture.caption, picture.title)
+    return [(title, caption) for caption, title in found.items()]

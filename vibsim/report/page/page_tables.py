@@ -1,0 +1,136 @@
+"""The tables of a page: each is a file, and its first rows stand in the page as far as it has room."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+from vibsim.core.record import Record
+from vibsim.core.vocabulary import TYPICAL_NORM
+from vibsim.experiment.schema.figures import FigureOfSource
+from vibsim.report import choice, data, words
+from vibsim.report.figures import work
+from vibsim.report.style import Picture
+from vibsim.report.tables import (
+    best,
+    checks,
+    degrees,
+    levels,
+    members,
+    published,
+    source_figures,
+    theory,
+)
+from vibsim.report.tables.latex import to_latex
+from vibsim.report.tables.scales import table as scales_table
+from vibsim.report.tables.table import Table, to_csv
+from vibsim.report.types import Experiment
+
+MOST_ROWS = 8  # of a table that the page itself holds; the CSV file holds all
+ROOM = 220  # cells of all tables of numbers together; a table beyond is a file only
+COPIED = 40_000  # letters of a table that a page holds whole, to be copied; a longer one is a file
+LONG_HEADING = 90  # letters of a caption of which a heading has the first words only
+
+
+def collect(
+    experiment: Experiment,
+    record: Record,
+    summary: Mapping[str, Any],
+    first: str,
+    sources: Iterable[tuple[FigureOfSource, Sequence[Picture]]],
+) -> tuple[dict[str, dict[str, str]], dict[str, Any]]:
+    """Return the texts of all tables, and what the page shows of them by the names that its template uses.
+
+    The quantity `first` comes first; `sources` are the figures of the source with their pictures.
+    """
+    everyone = members.table(record, choice.position(experiment))
+    listed, others = _of_numbers(experiment, record, everyone, first)
+    printed, scales = (
+        published.tables(experiment, record, summary),
+        scales_table(experiment, record),
+    )
+    broken = checks.failures(summary, record)
+    every = [*printed, *listed, *others, scales, checks.checks(summary), broken]
+    every += [source_figures.table(sources), everyone]
+    texts = texts_of(table for table in every if table is not None)
+    failures, more = words.broken(summary), len(summary.get("failures") or [])
+    return texts, {
+        "failures": broken and cut(broken),
+        "unlisted": f"In all {failures} runs broke down; listed are the first {more}." * (failures > more),
+        "numbers_shown": [cut(table) for table in listed],
+        "tables": {table.name: _copied(texts[table.name]) for table in (*printed, *listed)},
+        "scales": scales,
+        "printed": printed,
+        "printed_sentence": published.sentence(printed),
+        "digits": members.digits(record),
+    }  # fmt: skip
+
+
+def _of_numbers(
+    experiment: Experiment, record: Record, everyone: Table | None, first: str
+) -> tuple[list[Table], list[Table]]:
+    """Return the tables that the page shows, as far as it has room for them, and those that are files only.
+
+    The quantity `first` comes first, if there are tables of it.
+    """
+    model = experiment.model.definition
+    found = sorted(choice.quantities(experiment, record), key=lambda quantity: quantity != first)
+    shown = choice.with_levels(experiment, choice.members(record, choice.first(experiment, record)))
+    norms = [name for name in record.words("norm") if name != TYPICAL_NORM]
+    orders = [levels.orders(record, quantity, shown) for quantity in found]
+    wanted = [
+        *orders[:1], best.table(model, record, shown), theory.schemes(experiment, record), *orders[1:],
+        degrees.table(experiment), levels.scalars(record, shown), levels.events(record), *theory.predictions(record),
+        # what damping or a force changes says nothing of a scheme
+        *((levels.velocities(record), levels.maxima(record, shown)) if model.conservative else ()),
+        None if data.is_lean(record) else work.table(experiment, record),
+    ]  # fmt: skip
+    if everyone is not None and len(everyone.rows) <= MOST_ROWS:
+        wanted.append(everyone)
+    listed, room = list[Table](), ROOM
+    others = [levels.orders(record, quantity, shown, norm) for quantity in found for norm in norms]
+    for table in wanted:
+        if table is None:
+            continue
+        room -= len(table.columns) * min(len(table.rows), MOST_ROWS)
+        (listed if room >= 0 or not listed else others).append(table)
+    return listed, others
+
+
+def cut(table: Table) -> tuple[str, Table, str]:
+    """Return the heading of a table, its first rows in whole blocks, and a sentence on the rows of its file alone."""
+    shown = table.rows[:MOST_ROWS]
+    if len(shown) < len(table.rows) and (heads := table.heads):
+        # a block is shown whole, but the first
+        last = table.rows[len(shown)][:heads]
+        shown = tuple(row for row in shown if row[:heads] != last) or shown
+    more = len(table.rows) - len(shown)
+    told = f"{more} more rows are in tables/{table.name}.csv." if more else ""
+    return _heading(table.caption), replace(table, rows=shown).without_empty(), told
+
+
+def _heading(caption: str) -> str:
+    """Return what stands above a table."""
+    found = (re.split(end, caption, maxsplit=1)[0] for end in ("$", r"; |\. ", r": | \("))
+    return next((text for text in found if len(text) <= LONG_HEADING), caption)
+
+
+def texts_of(tables: Iterable[Table]) -> dict[str, dict[str, str]]:
+    """Return each table as text, by its name and the name of the format."""
+    return {table.name: {"CSV": to_csv(table), "LaTeX": to_latex(table)} for table in tables}
+
+
+def files_of(written: Mapping[str, Mapping[str, str]]) -> dict[str, bytes]:
+    """Return the files of tables by their names, from the `texts_of` them."""
+    found = {}
+    for name, texts in written.items():
+        found[f"{name}.csv"] = texts["CSV"].encode()
+        found[f"{name}.tex"] = texts["LaTeX"].encode()
+    return found
+
+
+def _copied(texts: Mapping[str, str]) -> Mapping[str, str]:
+    """Return what buttons copy of a table, its texts; nothing of a very long one."""
+    return texts if max(map(len, texts.values())) <= COPIED else {}
