@@ -307,9 +307,7 @@ def drawn_experiment(rng: Rng) -> Content:
     base, levels = drawn_levels(rng, end)
     treated = [kind for kind, scheme in FIXED_STEP.items() if scheme.treats(plain)]
     kinds = rng.choice(treated, size=min(2, len(treated)), replace=False)
-    schemes = [
-        drawn_scheme(rng, str(kind), f"s{i}", plain) for i, kind in enumerate(kinds)
-    ]
+    schemes = [drawn_scheme(rng, str(kind), f"s{i}", plain) for i, kind in enumerate(kinds)]
     quantities = [*plain.positions[:1], *plain.velocities[:1], "energy_deviation"]
     if plain.events is not None:
         # a velocity that jumps has no order

@@ -73,7 +73,10 @@ def test_two_files_without_results_have_settings_alone(made: Made, capsys: Captu
     assert "levels: 6 to 8 -> 6 to 9" in shown
     assert "verdicts\n" not in shown
     for file in (made.file, copy):
-        assert f"{file}: there are no verdicts of these settings yet: .venv/bin/vibsim run {file}" in shown
+        assert (
+            f"{file}: there are no verdicts of these settings yet: .venv/bin/vibsim run {file}"
+            in shown
+        )
 
 
 def test_numbers_have_the_digits_that_tell_them_apart(made: Made, capsys: Capture) -> None:

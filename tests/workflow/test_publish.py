@@ -153,7 +153,10 @@ def test_what_is_not_whole_or_would_be_overwritten_is_refused(place: Place, kind
             status, told = 1, "level_06.nc: it belongs to job "
         case "missing":
             shutil.rmtree(place.tiny)
-            status, told = 1, f"only whole results are published: .venv/bin/vibsim run '{place.file}'"
+            status, told = (
+                1,
+                f"only whole results are published: .venv/bin/vibsim run '{place.file}'",
+            )
         case "mixed":
             words += ["--formats", "png"]
             told = "does not go with --publish"

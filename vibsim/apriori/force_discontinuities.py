@@ -196,8 +196,7 @@ def _of_scheme(
     least, least_time, switch = powers[which, own], times[which, own], switches[which, own]
     is_jump = (jump[0] == 1.0) & ~((least <= 1.0) & (least_time <= jump[1]))
     power, time, switch = (
-        np.where(is_jump, *pair)
-        for pair in zip(jump, (least, least_time, switch), strict=True)
+        np.where(is_jump, *pair) for pair in zip(jump, (least, least_time, switch), strict=True)
     )
     return power, time, np.asarray(switch, dtype=np.int64), least, least_time
 

@@ -352,7 +352,11 @@ def test_corners_of_the_load_of_a_structure_are_known(load: str, power: float) -
 
 
 def test_a_pulse_of_the_load_of_a_structure_that_no_level_sees_is_known() -> None:
-    model = {"kind": "structure", "stiffness": [[2, -1], [-1, 2]], "load": {1: "1e4*exp(-((t - 7.3)/1e-5)**2)"}}
+    model = {
+        "kind": "structure",
+        "stiffness": [[2, -1], [-1, 2]],
+        "load": {1: "1e4*exp(-((t - 7.3)/1e-5)**2)"},
+    }
     checks = [{"converges": "u1"}]
     made = experiment(["newmark"], model=model, initial={}, levels=[7, 8, 9], checks=checks)
     (verdict,) = judged(made)

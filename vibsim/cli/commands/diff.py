@@ -49,7 +49,9 @@ def diff(options: Namespace) -> int:
             print(painted(name, "bold"))
             print(*(f"  {change}" for change in changes), sep="\n")
     for word in missing:
-        print(f"{word}: there are no verdicts of these settings yet: {called(command_to_run(word))}")
+        print(
+            f"{word}: there are no verdicts of these settings yet: {called(command_to_run(word))}"
+        )
     if any(parts.values()):
         return 1
     if not missing:

@@ -352,9 +352,9 @@ def _one_shape(sizes: Floats, terms: Terms) -> Table:
 
 
 def _beside_last(c: Floats, squares: Floats) -> tuple[Floats, Floats]:
-    """Return the size of the other rows over that of the last one, and the covariance that the misfit gives them beside.
+    """Return the size of the other rows over that of the last one, and the covariance of what they are beside it.
 
-    That is what they are beside multiples of the last row, if all have one shape and the sizes `c`.
+    That is what the misfit leaves beside multiples of the last row, if all have one shape and the sizes `c`.
     """
     noise = noise_of_rows(squares)
     part = c[:, :-1] / c[:, -1:]
