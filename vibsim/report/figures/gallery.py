@@ -72,7 +72,7 @@ def pictures(
     for quantity in found:
         is_lead = quantity == lead.quantity
         members = own[:FEW_SCHEMES] if is_lead else own[:1]
-        drawn = _of_quantity(experiment, record, quantity, case, members)
+        drawn = _of_quantity(experiment, record, quantity, case, members, first)
         (leading if is_lead else others).extend(_tabs(drawn, first))
     general = _tabs(_of_every_quantity(experiment, record, case, series, own), first)
     working = _tabs([("work", [work.precision(experiment, record, case)])] if series else [], first)
@@ -109,9 +109,17 @@ def _motion(experiment: Experiment, record: Record, series: list[Member], lead: 
 
 
 def _of_quantity(
-    experiment: Experiment, record: Record, quantity: str, case: int, members: list[Member]
+    experiment: Experiment,
+    record: Record,
+    quantity: str,
+    case: int,
+    members: list[Member],
+    first: Sequence[str],
 ) -> list[tuple[str, Drawn]]:
-    """Draw the error of a quantity against the step, and how the levels of each member agree over time."""
+    """Draw the error of a quantity against the step, and how the levels of each member agree over time.
+
+    The latter takes longest, and stands above already for the member that decides.
+    """
     has_pairs, letter = bool(data.whole(record, "pair")), words.symbol(quantity)
     is_energy = quantity == "energy_deviation" and "energy_deviation_scaled" in record
     are_compared = has_pairs and (not is_energy or quantity in checked_quantities(experiment))
@@ -120,7 +128,8 @@ def _of_quantity(
     tabs = list[tuple[str, Drawn]]()
     for member in members:
         each: Drawn = [time.energy(record, member)] if is_energy else []
-        each += [time.overlay(record, quantity, member)] if are_compared else []
+        if are_compared and time.name_of_differences(quantity, member) not in first:
+            each.append(time.overlay(record, quantity, member))
         tabs.append((f"{letter}, {member.scheme_name}", each))
     if len(tabs) < 2:
         return [(letter, [*shared, *(one for _, each in tabs for one in each)])]

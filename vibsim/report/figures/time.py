@@ -27,6 +27,11 @@ ROOM, BEYOND = 0.35, 3.0  # least and most distance from the promised order to t
 SPREAD = "the spread: how far each curve is from the finest one above round-off."
 
 
+def name_of_differences(quantity: str, member: Member) -> str:
+    """Return the name of the picture that `overlay` draws."""
+    return f"differences_{quantity}_{member.stem}"
+
+
 def overlay(record: Record, quantity: str, member: Member) -> Picture:
     """Draw the rescaled level differences of a quantity, their spread, ratio and order over time."""
     t, order = data.times(record, member.case), data.power(record, member, quantity)
@@ -50,7 +55,7 @@ def overlay(record: Record, quantity: str, member: Member) -> Picture:
     if math.isinf(data.formal_order(record, member, quantity)):
         what = ". The scheme is exact in this quantity, so nothing is rescaled and what is seen is round-off."
     return Picture(
-        name=f"differences_{quantity}_{member.stem}",
+        name=name_of_differences(quantity, member),
         title=f"Do the levels agree? {words.title(quantity)}, {member.title}",
         caption=style.sentences(
             f"{letter}{words.lowered(levels[0])} is {letter} on level {levels[0]}, and so on. Top: the differences "
