@@ -5,7 +5,7 @@ import pytest
 import samples
 
 from vibsim import simulate
-from vibsim.report import choice, data, words
+from vibsim.report import choice, data, style, words
 from vibsim.report.figures import gallery, plane
 
 CONTENT = {
@@ -95,3 +95,29 @@ def test_a_body_at_rest_and_one_coordinate_have_no_path():
     exp, _, _, picture = drawn(**one, checks=checks)
     assert picture is None
     assert choice.position(exp) == "theta"
+
+
+def test_of_many_coordinates_the_one_that_decides_is_drawn_and_no_path():
+    """A path of the first two of a chain says nothing of its motion."""
+    chain = {
+        "kind": "system",
+        "coordinates": ["x", "y", "z"],
+        "acceleration": {"x": "y - 2*x", "y": "x - 2*y + z", "z": "y - 2*z"},
+    }
+    exp = samples.experiment(
+        model=chain,
+        initial={"x": 1.0},
+        time={"end": 6.0},
+        levels=[5, 6, 7],
+        schemes=["rk4"],
+        checks=[{"converges": "z"}],
+    )
+    record = samples.record(exp)
+    decisive = choice.find_lead(exp, record, samples.summary(exp, record))
+    shown = gallery.choose(exp, record)[0]
+    with style.applied():
+        found = gallery.pictures(exp, record, shown, decisive, [])
+    names = [picture.name for picture in found.motion]
+    assert names == ["motion_z_0_rk4"]
+    estimated = next(tab for tab in found.belief if tab.label == "estimated error")
+    assert [picture.name for picture in estimated.pictures] == ["solution_z_0_rk4"]

@@ -66,6 +66,8 @@ def pictures(
     found = choice.quantities(experiment, record)
     case = min((member.case for member in shown), key=lambda case: (case != lead.member.case, case))
     series = [] if data.is_lean(record) else shown
+    positions = experiment.model.definition.positions
+    position = lead.quantity if lead.quantity in positions else positions[0]
     own = [member for member in series if member.role != "typical"]
     own.sort(key=lambda one: (one.scheme, one.case) != (lead.member.scheme, lead.member.case))
     leading, others = list[Tab](), list[Tab]()
@@ -74,14 +76,14 @@ def pictures(
         members = own[:FEW_SCHEMES] if is_lead else own[:1]
         drawn = _of_quantity(experiment, record, quantity, case, members, first)
         (leading if is_lead else others).extend(_tabs(drawn, first))
-    general = _tabs(_of_every_quantity(experiment, record, case, series, own), first)
+    general = _tabs(_of_every_quantity(experiment, record, case, series, own, position), first)
     working = _tabs([("work", [work.precision(experiment, record, case)])] if series else [], first)
     if working and np.isnan(data.formal_orders(record, lead.quantity)).any():
         # where a scheme chooses its own steps, the work compares it with the others
         belief = [*leading[:1], *working, *leading[1:], *general, *others]
     else:
         belief = [*leading, *general, *working, *others]
-    moving = _motion(experiment, record, series, lead) if series else []
+    moving = _motion(experiment, record, series, lead, position) if series else []
     views, told = over_members(experiment, record, found, lead)
     return Gallery(_new(moving, first), tuple(belief), tuple(views), tuple(told))
 
@@ -97,9 +99,10 @@ def _tabs(labelled: Iterable[tuple[str, Drawn]], first: Sequence[str]) -> list[T
     return [tab for tab in tabs if tab.pictures]
 
 
-def _motion(experiment: Experiment, record: Record, series: list[Member], lead: Lead) -> Drawn:
+def _motion(
+    experiment: Experiment, record: Record, series: list[Member], lead: Lead, position: str
+) -> Drawn:
     """Draw the motion of the member that decides, and beside it of a typical one."""
-    position = choice.position(experiment)
     typical = [member for member in series if member.role == "typical"]
     return [
         *(solution.motion(record, position, member) for member in [lead.member, *typical[:1]]),
@@ -137,11 +140,16 @@ def _of_quantity(
 
 
 def _of_every_quantity(
-    experiment: Experiment, record: Record, case: int, series: list[Member], own: list[Member]
+    experiment: Experiment,
+    record: Record,
+    case: int,
+    series: list[Member],
+    own: list[Member],
+    position: str,
 ) -> Iterator[tuple[str, Drawn]]:
     """Draw the estimated error, the energy, phase and amplitude, and what theory says of the schemes."""
     if own and data.whole(record, "pair"):
-        yield "estimated error", [solution.solution(record, choice.position(experiment), own[0])]
+        yield "estimated error", [solution.solution(record, position, own[0])]
     equation = experiment.model.definition
     if series:
         if equation.conservative:

@@ -124,12 +124,12 @@ def _draw_end(ax: Axes, points: Points, k: int, width: float, name: str) -> None
 def path(experiment: Experiment, record: Record, shown: list[Member]) -> Picture | None:
     """Draw the paths of the schemes shown: a panel for each level, or for each member of a sweep at its finest level.
 
-    None of a model with one coordinate.
+    None of a model with one coordinate, or with more than two: no plane holds their motion.
     """
     from matplotlib.ticker import MaxNLocator
 
     model = experiment.model.definition
-    if model.coordinates < 2 or not shown:
+    if model.coordinates != 2 or not shown:
         return None
     names, levels = model.positions[:2], whole(record, "level")
     if data.swept(record):
