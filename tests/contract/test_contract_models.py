@@ -380,3 +380,51 @@ def test_a_scaled_run_is_that_of_the_scaled_equation() -> None:
     np.testing.assert_array_equal(first(one, "theta"), first(other, "theta"))
     np.testing.assert_array_equal(one["t"].values, other["t"].values)
     assert float(one.attrs["scale_t"]) == pytest.approx(0.5, rel=1e-15)
+
+
+def test_a_system_with_formulas_at_each_coordinate_and_events_beside_the_model() -> None:
+    """The bounce of x at 0.9 and the motion before it, against SciPy."""
+    from scipy.integrate import solve_ivp
+
+    content = {
+        "model": {
+            "kind": "system",
+            "coordinates": {
+                "x": {"acceleration": "-k*x + c*(y - x)"},
+                "y": {"mass": 2.0, "force": "-k*y - c*(y - x) - d*vy"},
+            },
+            "parameters": {"k": 1.0, "c": 0.2, "d": 0.05},
+            "potential": "k*x**2/2 + k*y**2/2 + c*(y - x)**2/2",
+        },
+        "initial": {"x": 1.0},
+        "stop": "x < -0.5",
+        "events": [{"when": "x - 0.9", "falling": True, "then": {"vx": "-0.8*vx"}}],
+        "time": {"end": 2.0},
+        "levels": [8, 9],
+        "schemes": ["rk4"],
+    }
+
+    def slope(_: float, s: np.ndarray[Any, Any]) -> list[float]:
+        x, y, vx, vy = s
+        return [vx, vy, -x + 0.2 * (y - x), (-y - 0.2 * (y - x) - 0.05 * vy) / 2.0]
+
+    def falls(_: float, s: np.ndarray[Any, Any]) -> float:
+        return float(s[0] - 0.9)
+
+    falls.terminal = True  # type: ignore[attr-defined]
+    found = solve_ivp(slope, (0, 2), [1, 0, 0, 0], events=falls, rtol=1e-11, atol=1e-13)
+    (when,) = found.t_events[0]
+    dataset = simulate(build(content), 9)
+    assert float(np.ravel(dataset["event_time"])[0]) == pytest.approx(when, abs=1e-9)
+    x, t = first(dataset, "x"), np.ravel(dataset["t"])
+    after = x[(t > when) & (t < when + 0.1)]
+    assert np.all(np.diff(after) > 0.0), "x goes up again behind the event"
+
+
+def test_one_equation_is_a_system() -> None:
+    content = content_of("system")
+    content["model"] = {"kind": "system", "equation": "u'' + (u**2 - 1)*u' + u = 0"}
+    content["initial"] = {"u": 1.0}
+    usual = {**content, "model": {"kind": "system", "acceleration": "(1 - u**2)*v - u"}}
+    one, other = (first(simulate(build(each), 7), "u") for each in (content, usual))
+    assert np.max(np.abs(one - other)) < 1e-13

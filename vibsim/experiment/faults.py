@@ -108,8 +108,9 @@ class Report:
         written, origin = "" if value is None else _written(value), self.source.origin(path)
         if place and place.text and not (written and origin):
             written = place.text
-        # the positions of a list are those of the file
-        shown = origin if origin and isinstance(origin[-1], int) else path
+        # a key that `repeat` wrote out says more than the one of the file; positions of a list are those of the file
+        is_repeated = any("{" in str(key) for key in origin or ())
+        shown = path if origin is None or (is_repeated and isinstance(path[-1], str)) else origin
         return Fault(file, line, dotted(shown), shorten(written), rule, hint)
 
     def add_malformed(

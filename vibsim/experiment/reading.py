@@ -14,6 +14,7 @@ from vibsim.experiment.collection import collection_of
 from vibsim.experiment.data import ExperimentSpec, ModelSpec, Sweep, TimeSpec
 from vibsim.experiment.faults import MISSING, Report, shorten
 from vibsim.experiment.kinds import Kinds
+from vibsim.experiment.other_forms import with_other_forms
 from vibsim.experiment.repeat import with_repeats
 from vibsim.experiment.rules import continuation, members, size_limits, timing, unlikely
 from vibsim.experiment.rules import schemes as scheme_rules
@@ -128,7 +129,7 @@ def build(
     """
     report = Report(source, kinds)
     check_names(name, collection, report)
-    source = with_repeats(source, report)
+    source = with_other_forms(with_repeats(source, report), report)
     document = read_document(source, report)
     folder = file.parent if file else Path()
     equation, numbers, setting = _equation_and_setting(document, source, folder, report)

@@ -12,6 +12,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from itertools import product
 from math import prod
+from types import MappingProxyType
 from typing import Any
 
 from vibsim.core.errors import nearest
@@ -89,14 +90,21 @@ class _Writer:
         self.origins: dict[Path_, Path_] = {}
         """Where what was written out stands in the file."""
 
-    def mapping(self, path: Path_, written: Mapping[str, Any], out: Path_) -> dict[str, Any]:
+    def mapping(
+        self,
+        path: Path_,
+        written: Mapping[str, Any],
+        out: Path_,
+        above: Mapping[str, int] = MappingProxyType({}),
+    ) -> dict[str, Any]:
         """Return a mapping with its keys written out, in their order; those without an index take precedence.
 
-        It stands at `path` in the file, and at `out` in what is written out.
+        It stands at `path` in the file, and at `out` in what is written out. Indices of the keys above have their
+        values already.
         """
         found: dict[str, Any] = {}
         for key, value in written.items():
-            for values in self._values(str(key)):
+            for values in self._values(str(key), above):
                 own = self._put((*path, key), str(key), values)
                 if own == key or own not in written:
                     if values:
@@ -106,22 +114,22 @@ class _Writer:
 
     def _value(self, path: Path_, value: Any, values: Mapping[str, int], out: Path_) -> Any:
         if isinstance(value, Mapping):
-            return self.mapping(path, value, out)
+            return self.mapping(path, value, out, values)
         if not isinstance(value, list | tuple):
             return self._put(path, value, values) if isinstance(value, str) else value
         found: list[Any] = []
         for i, item in enumerate(value):
-            for own in self._values(item) if isinstance(item, str) else [{}]:
+            for own in self._values(item, {}) if isinstance(item, str) else [{}]:
                 self.origins[*out, len(found)] = (*path, i)
                 found.append(self._put((*path, i), item, own) if isinstance(item, str) else item)
         return found
 
-    def _values(self, text: str) -> Iterator[dict[str, int]]:
-        """Yield the values of the indices in a text, the last one fastest; once nothing where it has none."""
+    def _values(self, text: str, above: Mapping[str, int]) -> Iterator[dict[str, int]]:
+        """Yield the values of the indices in a text and above it, the last one fastest; once those above alone."""
         names = dict.fromkeys(match[1] for match in _INDEX.finditer(text))
-        known = {name: self.indices[name] for name in names if name in self.indices}
-        for values in product(*known.values()):
-            yield dict(zip(known, values, strict=True))
+        own = [name for name in names if name in self.indices and name not in above]
+        for values in product(*(self.indices[name] for name in own)):
+            yield {**above, **dict(zip(own, values, strict=True))}
 
     def _put(self, path: Path_, text: str, values: Mapping[str, int]) -> str:
         """Return a text with numbers in the places of its indices."""

@@ -32,7 +32,9 @@ from vibsim.experiment.schema.fields import (
 )
 from vibsim.experiment.value_names import MOST_EVENTS, VALUES, Value
 
-Take = Literal["largest", "smallest", "mean", "where_largest", "where_smallest", "monotone"]
+Take = Literal[
+    "largest", "smallest", "mean", "where", "where_largest", "where_smallest", "monotone"
+]
 Drift = Literal["none", "bounded", "linear", "quadratic"]
 SOLUTIONS = ("exact", "discrete")
 """What a scheme may be compared with beside another scheme; no scheme has such a name."""
@@ -373,9 +375,9 @@ class ValueCheck(MeasuringCheck):
     at: At = At()
     """Where it is taken."""
     over: Text | None = None
-    """The swept key over which one number is taken of all members: see `take`."""
+    """The swept key over which one number is taken of all members, or `cases` where one varies only: see `take`."""
     take: Take | None = None
-    """That number: the `largest`, the `smallest` or the `mean`, the value of the key `where_largest` or
+    """That number: the `largest`, the `smallest` or the `mean`, the value of the key `where_largest` (or `where`) or
     `where_smallest` is, or `monotone`: 1 where it rises with the key, -1 where it falls, else 0."""
     equals: Number | None = None
     """The number that it must equal, within `rtol` and `atol`."""

@@ -22,6 +22,7 @@ from vibsim.experiment.schema.fields import (
     MAX_ENTRIES,
     MAX_LEVEL,
     Count,
+    FormulaText,
     Fraction,
     Level,
     Number,
@@ -35,10 +36,11 @@ from vibsim.experiment.schema.fields import (
     tagged,
 )
 from vibsim.experiment.schema.figures import FigureOfSource
-from vibsim.experiment.schema.model_and_schemes import model_section, scheme_section
+from vibsim.experiment.schema.model_and_schemes import Event, model_section, scheme_section
 from vibsim.experiment.schema.published import PublishedTable
 from vibsim.experiment.schema.sweep import SweepSection, swept_options
 from vibsim.models import MODELS, Model
+from vibsim.models.shared.crossings import MOST_EVENTS
 from vibsim.schemes import SCHEMES, Scheme
 
 
@@ -186,6 +188,10 @@ class Document(Section):
     """Units of the file's own, such as ``rod: 4.9 m``: every number with a unit may name them."""
     model: AnyModel
     """The equation of motion and its parameters."""
+    stop: FormulaText | None = None
+    """A comparison that ends the motion, the same as under `model`."""
+    events: Annotated[tuple[Event, ...], short(MOST_EVENTS)] = ()
+    """Events of your own, the same as under `model`."""
     initial: Annotated[
         dict[str, Number], WithJsonSchema(_initial_schema(MODELS.built_in.values()))
     ] = Field({})

@@ -221,6 +221,22 @@ class Event(Section):
     """new values of states, as formulas in the values before the event"""
 
 
+class Coordinate(Section):
+    """The formulas of one coordinate of a system."""
+
+    acceleration: FormulaText | None = None
+    """its acceleration"""
+    mass: FormulaText | dict[str, FormulaText] | None = None
+    """its mass, or what couples it with the accelerations of others, by name"""
+    force: FormulaText | None = None
+    """the force on it"""
+
+
+def _refuse_coordinates(_: Any) -> Any:
+    # what has formulas is written otherwise before (`vibsim.experiment.other_forms`)
+    raise refused("each coordinate must have an acceleration, or a force with its mass")
+
+
 @cache
 def model_section(model: Model) -> type[Section]:
     """Return the class of the section of a model."""
@@ -234,7 +250,12 @@ def model_section(model: Model) -> type[Section]:
     if model.named is not None:
         words = "names of the coordinates; the velocity of x is vx, that of u alone v"
         several = Annotated[tuple[Text, ...], Field(min_length=1), short(MOST)]
-        fields[COORDINATES] = (several, Field(default=model.positions, description=words))
+        each = Annotated[dict[str, Coordinate], AfterValidator(_refuse_coordinates)]
+        listed = by_form({"mapping": each, "other": several})
+        words += "; or a mapping of the names to the formulas of each"
+        fields[COORDINATES] = (listed, Field(default=model.positions, description=words))
+        words = "the equation of one coordinate, such as u'' + u = 0, in place of its acceleration"
+        fields["equation"] = (Text | None, Field(default=None, description=words))
         words = "indices with first and last value: every key and entry with {i} in it is written out for each i"
         indices = Field(default=None, description=words)
         fields["repeat"] = (dict[str, tuple[int, int]] | None, indices)
