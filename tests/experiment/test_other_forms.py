@@ -86,6 +86,16 @@ initial: {theta: 1}
 sweep: {model.L: [1, 2]}
 checks: [{value: period, over: model.L, take: where_largest, equals: 2}]""",
     ),
+    "a check of the cases with one value": (
+        """model: {kind: pendulum}
+initial: {theta: 1}
+sweep: {model.L: [1, 2], model.g: [1, 2]}
+checks: [{value: period, over: cases, at: {model.g: 1}, take: largest, below: 20}]""",
+        """model: {kind: pendulum}
+initial: {theta: 1}
+sweep: {model.L: [1, 2], model.g: [1, 2]}
+checks: [{value: period, over: model.L, at: {model.g: 1}, take: largest, below: 20}]""",
+    ),
     "a claim on members that vary together": (
         """model: {kind: pendulum}
 initial: {theta: 1}
@@ -183,6 +193,10 @@ def test_what_is_no_equation_of_one_coordinate_is_refused(equation: str, rule: s
         (
             "model: {kind: oscillator, spring: u}\ninitial: {u: 1}\nevents:\n  - {when: q}",
             "one.yaml:4: events[0].when: q: unknown name 'q'",
+        ),
+        (
+            "model: {kind: system, acceleration: -k*u, parameters: {k: 1}, k: 2}",
+            "one.yaml:1: model.k: 2: unknown key: the parameter of this name is `model.parameters.k`",
         ),
         (
             "model: {kind: structure, M: [2, 1], mass: [2, 1], K: [1, 1]}",

@@ -141,9 +141,17 @@ class Report:
             rule, hint = "unknown key", nearest(written, list(_FORMS) if is_rule else known)
             if "take" in known and path[-1] in _PLACES:
                 hint = f"write at: {{{_PLACES[str(path[-1])]}: ...}}"
+            if self._is_parameter(path):
+                hint = f"the parameter of this name is `model.parameters.{path[-1]}`"
             if value is None and str(path[-1])[0:1].isdigit():
                 hint = "between braces a comma ends a value: write numbers with a decimal point"
         self.add_malformed(path, rule, hint, value, at_key=True)
+
+    def _is_parameter(self, path: Path_) -> bool:
+        """Tell whether a key of the model is the name of a parameter that the model declares."""
+        model = self.source.data["model"] if path[:-1] == ("model",) else {}
+        declared = model.get("parameters")
+        return isinstance(declared, Mapping) and path[-1] in declared
 
     def add_invalid(self, error: ValidationError, path: Path_) -> list[Path_]:
         """Note every fault that pydantic found in the value at `path`; return their places."""

@@ -145,14 +145,14 @@ def _over_a_key(check: Any, sweep: Any) -> Any:
     if check.get("take") == "where":
         found["take"] = "where_largest"
     if check.get("over") == "cases" and isinstance(sweep, Mapping):
+        fixed = check["at"] if isinstance(check.get("at"), Mapping) else {}
         together = sweep.get("zip")
-        keys = [
-            key
-            for key in (*sweep, *(together if isinstance(together, Mapping) else ()))
-            if "." in str(key)
-        ]
-        if len(keys) == 1 or (keys and list(sweep) == ["zip"]):
-            found["over"] = keys[0]
+        own = [key for key in sweep if "." in str(key) and key not in fixed]
+        if isinstance(together, Mapping) and not together.keys() & fixed.keys():
+            # those that vary together are one
+            own += list(together)[:1]
+        if len(own) == 1:
+            found["over"] = own[0]
     return found
 
 
