@@ -24,7 +24,8 @@ solution |
 | ... another limit than the exact solution | ``wrong_limit`` |
 | ... the expected order, and no promised power may hide behind it | ``asymptotic`` |
 | ... a lower order, which no corner of the force within a step explains | ``order_low`` |
-| such a corner explains an order below the expected one | ``non_smooth`` |
+| such a corner explains an order below the expected one, or one power less beside a point of all levels | \
+``non_smooth`` |
 | the error model finds a higher order, and no promised power may hide behind it | ``order_high`` |
 | events are left to the mesh, or a corner leaves less than the expected order | ``non_smooth`` |
 | anything else | ``pre_asymptotic`` |

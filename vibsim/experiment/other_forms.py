@@ -34,6 +34,7 @@ from vibsim.formula import (
     tidied,
     to_formula,
 )
+from vibsim.models.system import velocities_of
 
 EQUATION = "equation"
 BESIDE_MODEL = "stop", "events"
@@ -168,14 +169,14 @@ def solved(equation: str) -> tuple[str, str]:
     sides = equation.split("=")
     if len(sides) != 2:
         raise ExpressionError(equation, 0, "must have one =", "e.g. u'' + u = 0")
-    marks = {name: mark for name, mark in _DERIVATIVE.findall(equation) if mark == "''"}
-    if len(marks) != 1:
+    names = {name for name, mark in _DERIVATIVE.findall(equation) if mark == "''"}
+    if len(names) != 1:
         rule = "must have the second derivative of one coordinate"
         raise ExpressionError(
             equation, 0, rule, "e.g. u'' + u = 0; of several give each its acceleration"
         )
-    (name,) = marks
-    velocity = "v" if name == "u" else f"v{name}"
+    (name,) = names
+    (velocity,) = velocities_of((name,))
 
     def named(match: re.Match[str]) -> str:
         if match[1] != name:

@@ -300,15 +300,22 @@ TOGETHER = 5
 """So many shares of the second power have a bound together."""
 
 
+def _independent(
+    terms: Terms, c: tuple[Floats, Floats]
+) -> tuple[Floats, tuple[Floats, Floats, Floats]]:
+    """Return `signal` and `prior` of `_table` for two powers whose sizes have nothing to do with each other."""
+    square = terms.share**2
+    signal = outer(c[0], c[0]) + square[:, None, None] * outer(c[1], c[1])
+    return signal, (np.ones_like(square), np.zeros_like(square), square)
+
+
 def _two_shapes(sizes: Floats, terms: Terms, *, alternating: bool = False) -> list[Table]:
     """Return the hypotheses of two shapes on the rows between levels of these sizes, for each of `FINEST_NOISE`."""
     first, second, squares = _sizes(terms, sizes)
     if alternating:
         first, second = (x * (-1.0) ** np.arange(len(sizes)) for x in (first, second))
     c = between(first), between(second)
-    square = terms.share**2
-    signal = outer(c[0], c[0]) + square[:, None, None] * outer(c[1], c[1])
-    prior = np.ones_like(square), np.zeros_like(square), square
+    signal, prior = _independent(terms, c)
     finest = np.flatnonzero(sizes)[-1]
     found = []
     for noise in priors.FINEST_NOISE:
@@ -342,12 +349,10 @@ def _one_shape(sizes: Floats, terms: Terms) -> Table:
     """Return the hypotheses that both powers have one shape: the second is any multiple of the first, of its share."""
     first, second, squares = _sizes(terms, sizes)
     c = between(first), between(second)
-    square = terms.share**2
-    signal = outer(c[0], c[0]) + square[:, None, None] * outer(c[1], c[1])
-    size = np.sqrt(c[0] ** 2 + square[:, None] * c[1] ** 2)
+    signal, prior = _independent(terms, c)
+    size = np.sqrt(c[0] ** 2 + prior[2][:, None] * c[1] ** 2)
     _, across = _beside_last(size, squares)
     beside = priors.TAIL * across / size[:, -1, None, None] ** 2
-    prior = np.ones_like(square), np.zeros_like(square), square
     return _table(terms, signal, priors.MISFIT**2 * squares, c, prior, beside)
 
 
