@@ -118,9 +118,9 @@ def keep_for_verdicts(
     """Pass parts on, and keep of each in `thin` what `verdicts` and `summarise` need of it."""
     # a claim reads what the check that decides it reads
     measured = [check.measured for check in experiment.checks]
-    asked = [one.converges for one in measured if one.kind == "converges"]
+    checked = [one.converges for one in measured if one.kind == "converges"]
     which = ("observed_order", "formal_order", "coincidence")
-    of_orders = {f"{name}_{one}" for name in asked for one in which}
+    of_orders = {f"{name}_{one}" for name in checked for one in which}
 
     def is_read(name: str) -> bool:
         of_check = name.startswith(("check_", "corner_")) or is_bound(name) or is_of_parts(name)

@@ -108,13 +108,15 @@ def error_in_words(f: Found, quantity: str) -> str:
         return ""
     number, (mean, largest) = f.notation.number, (_mean_square(f, x) for x in (error, most))
     unit = unit_of_quantity(f.record, quantity)
-    told = f" The root-mean-square error of the finest level is {number(mean, 2)} {unit}".rstrip()
+    sentence = (
+        f" The root-mean-square error of the finest level is {number(mean, 2)} {unit}".rstrip()
+    )
     if math.isfinite(relative):
-        told += f" ({number(relative, 2)} of its size)"
+        sentence += f" ({number(relative, 2)} of its size)"
     # of a true error the bound has the same digits
     if number(largest, 2) != number(mean, 2):
-        told += f", at most {number(largest, 2)}"
-    return f"{told}."
+        sentence += f", at most {number(largest, 2)}"
+    return f"{sentence}."
 
 
 def _mean_square(f: Found, error: float) -> float:
@@ -126,11 +128,11 @@ def _mean_square(f: Found, error: float) -> float:
 def _level_needed(last: int, found: FinestError, judged: Judgement, check: AccurateCheck) -> Codes:
     """Return the finer level whose bound is probably as asked, shape (scheme, case); -1 where none is known."""
     with np.errstate(all="ignore"):
-        asked = check.accuracy * (found.size if check.is_relative else 1.0)
-        steps = np.ceil(np.log2(found.bound / asked) / judged.order)
+        allowed = check.accuracy * (found.size if check.is_relative else 1.0)
+        steps = np.ceil(np.log2(found.bound / allowed) / judged.order)
         # neither round-off nor another limit vanishes with the step
         known = (judged.order > 0.0) & (steps >= 1.0) & (steps <= MOST)
-        known &= (found.round_off < asked) & (judged.reason != code("wrong_limit"))
+        known &= (found.round_off < allowed) & (judged.reason != code("wrong_limit"))
     return np.where(known, last + np.where(known, steps, 0.0), -1.0).astype(np.int16)
 
 
@@ -138,28 +140,28 @@ def judge(experiment: Experiment, record: Record, check: AccurateCheck, found: M
     """Compare the error of the finest level with what is asked."""
     error, bound, order_reason = found["error"], found["error_bound"], found["order_reason"]
     is_true, size = found["basis"] == EXACT, found["size"]
-    asked = found["accuracy"] * (size if check.is_relative else np.ones_like(size))
+    allowed = found["accuracy"] * (size if check.is_relative else np.ones_like(size))
     # as far below the error as the bound is above it
     least = np.maximum(2.0 * error - bound, 0.0)
     decides = is_true | is_one_of(order_reason, *ORDER_KNOWN)
     cases = [
         (is_one_of(order_reason, "unstable", "non_finite"), order_reason),
-        ((found["basis"] == NONE) | ~(asked > 0.0), "not_applicable"),
-        (decides & (bound < asked), "match"),
-        (decides & (least > asked), "mismatch"),
+        ((found["basis"] == NONE) | ~(allowed > 0.0), "not_applicable"),
+        (decides & (bound < allowed), "match"),
+        (decides & (least > allowed), "mismatch"),
         (is_true, "round_off"),
         (is_open(order_reason), order_reason),
     ]
     reason = first_reason(cases, "pre_asymptotic")
     with np.errstate(all="ignore"):
-        away = bound / asked
+        away = bound / allowed
     return Judged(reason, away, as_expected(check.expect, reason))
 
 
 def rule(check: AccurateCheck, notation: Notation = PLAIN) -> str:
     """Say what an error should be."""
-    asked = notation.number(check.accuracy)
-    return f"accurate to {asked} of its size" if check.is_relative else f"accurate to {asked}"
+    accuracy = notation.number(check.accuracy)
+    return f"accurate to {accuracy} of its size" if check.is_relative else f"accurate to {accuracy}"
 
 
 def describe(f: Found, check: AccurateCheck) -> Description:
@@ -237,13 +239,13 @@ class _Phrases:
             return ""
         mean = self.f.notation.number(_mean_square(self.f, self.f.fact("error")), 2)
         unit = unit_of_quantity(self.f.record, self.check.accurate)
-        told = f" These are L2 norms over time. The root-mean-square error is {mean} {unit}"
-        return f"{told.rstrip()}."
+        sentence = f" These are L2 norms over time. The root-mean-square error is {mean} {unit}"
+        return f"{sentence.rstrip()}."
 
     def error(self) -> str:
         """Say how large the error is."""
-        told = self._counted(self.f.fact("error"))
-        return f"{told} of its size" if self.check.is_relative else told
+        phrase = self._counted(self.f.fact("error"))
+        return f"{phrase} of its size" if self.check.is_relative else phrase
 
     def most(self) -> str:
         return self._counted(self.f.fact("error_bound"))

@@ -120,8 +120,8 @@ def describe(f: Found, check: ConservesCheck) -> Description:
         case "non_finite":
             return Description(NOT_FINITE[0].format(name), NOT_FINITE[1])
         case "not_applicable" if f.word("motion") == "rests":
-            told = f"{NOTHING_MOVES.format('the energy')}, and there is nothing to conserve."
-            return Description(told, MOVE)
+            sentence = f"{NOTHING_MOVES.format('the energy')}, and there is nothing to conserve."
+            return Description(sentence, MOVE)
         case "not_applicable":
             return Description(
                 f"{name} does not exist here, or was not stored.",
@@ -134,16 +134,16 @@ def describe(f: Found, check: ConservesCheck) -> Description:
                 "Take a coarser `level:`, whose error is larger than round-off, lengthen the run (`time: end`), or set "
                 "`drift: none`, which is what this level shows.",
             )
-    told = _DRIFTS[drift]
+    sentence = _DRIFTS[drift]
     if drift == "exponential" and rate < 0:
-        told = "shows that the energy decays exponentially"
+        sentence = "shows that the energy decays exponentially"
     if rate and math.isfinite(rate):
-        told += _RATES.get(drift, "").format(number(rate, 4))
+        sentence += _RATES.get(drift, "").format(number(rate, 4))
     most = "The energy is 0"
     if math.isfinite(size):
         most = f"The error is at most {number(size, 4)} of the energy"
-    told = f"The error of {name} {told}. {most}. {expects}"
-    return Description(told, _advice(f.reason, drift, check))
+    sentence = f"The error of {name} {sentence}. {most}. {expects}"
+    return Description(sentence, _advice(f.reason, drift, check))
 
 
 def _advice(reason: str, drift: str, check: ConservesCheck) -> str:

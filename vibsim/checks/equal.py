@@ -113,24 +113,27 @@ def describe(f: Found, check: EqualCheck) -> Description:
     enough = f"above {round_outward(distance, 2):.2g} if that is close enough"
     match f.reason:
         case "match":
-            told, advice = f"{what} of scheme {check.first} equals {other}. They are {brief}.", ""
+            sentence, advice = (
+                f"{what} of scheme {check.first} equals {other}. They are {brief}.",
+                "",
+            )
         case "non_finite":
-            told, advice = NOT_FINITE[0].format(what), NOT_FINITE[1]
+            sentence, advice = NOT_FINITE[0].format(what), NOT_FINITE[1]
         case "not_applicable" if distance <= allowed:
-            told = f"{NOTHING_MOVES.format(what)}. A comparison with {other} shows nothing."
+            sentence = f"{NOTHING_MOVES.format(what)}. A comparison with {other} shows nothing."
             advice = MOVE
         case "not_applicable" if math.isfinite(distance):
-            told = f"{both} are {apart}, but the round-off to compare with is not known here."
+            sentence = f"{both} are {apart}, but the round-off to compare with is not known here."
             advice = f"Give `atol:`, {enough}."
         case "not_applicable":
-            told = f"{what} and {other} cannot be compared here, or were not stored."
+            sentence = f"{what} and {other} cannot be compared here, or were not stored."
             advice = (
                 "Name a scheme or a solution that exists here (`equal:`), or another `quantity:`."
             )
         case _:
-            told = f"{what} of scheme {check.first} differs from {other}. They are {brief}."
+            sentence = f"{what} of scheme {check.first} differs from {other}. They are {brief}."
             ways = " or the options of one of the `schemes:`,"
             if check.second in SOLUTIONS:
                 ways = ", take a finer `level:`,"
             advice = f"Correct `equal:`{ways} or give `atol:` {enough}."
-    return Description(told, advice, brief)
+    return Description(sentence, advice, brief)

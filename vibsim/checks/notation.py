@@ -48,7 +48,7 @@ PLAIN = Notation()
 def beside(notation: Notation, value: float, limit: float) -> str:
     """Write a number with two digits, or with as many as show on which side of a limit it is."""
     for digits in range(2, 16):
-        told = float(f"{value:.{digits}g}")
-        if (told > limit, told < limit) == (value > limit, value < limit):
+        rounded = float(f"{value:.{digits}g}")
+        if (rounded > limit, rounded < limit) == (value > limit, value < limit):
             return notation.number(value, digits)
     return notation.number(value, 16)

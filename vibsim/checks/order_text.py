@@ -513,15 +513,15 @@ class _Phrases(OrderContext):
         why = ", because a higher power of dt still dominates" if is_above else ""
         if len(known) == 1:
             return f", which is above {goal}{why}" if is_above else ""
-        told = ", ".join(f"{order:.2f}" for order in known)
+        listed = ", ".join(f"{order:.2f}" for order in known)
         start = ". From level to level the estimates"
         steps = {math.copysign(1.0, b - a) for a, b in pairwise(known)}
         same_side = all((order > due) == is_above for order in known)
         if len(steps) > 1 or not same_side:
-            return f"{start} do not settle ({told})"
+            return f"{start} do not settle ({listed})"
         if (steps == {-1.0}) != is_above:
-            return f"{start} move away from {goal} ({told})"
-        return f"{start} {'fall' if is_above else 'rise'} towards {goal} ({told}){why}"
+            return f"{start} move away from {goal} ({listed})"
+        return f"{start} {'fall' if is_above else 'rise'} towards {goal} ({listed}){why}"
 
     def hidden(self) -> str:
         """Say which power may take over on finer levels, as near a special case; empty where none is known to."""

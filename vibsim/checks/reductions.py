@@ -216,19 +216,21 @@ def describe(f: Found, check: ValueCheck) -> Description:
         f.reason == "too_few_levels" and np.isfinite(f.fact("value"))
     ):
         own = value.describe(f, check)
-        told = own.sentence.removesuffix(".")
+        finding = own.sentence.removesuffix(".")
         here = _at(f, check, f.case)
-        rule = f"{f.notation.opening(of)} cannot be taken together: at {here}, {told}."
+        rule = f"{f.notation.opening(of)} cannot be taken together: at {here}, {finding}."
         return Description(rule, own.advice, f"not known at {here}")
     found = {name: field_values(f.record, f.id, name) for name in ("value", "error_bound")}
     one = _reduced(f.experiment, f.record, check, found, f.scheme, about)
-    told = _told(f, check, one, about)
+    finding = _finding(f, check, one, about)
     holds, doubted, not_so = _asked(f, check)
     if f.reason == "match":
-        return Description(f"{told}{holds}.", "", told)
+        return Description(f"{finding}{holds}.", "", finding)
     if f.reason == "mismatch":
         key, _ = value.border(check)
-        return Description(f"{told}{not_so}.", f"Change `{key}:`, `model:` or `sweep:`.", told)
+        return Description(
+            f"{finding}{not_so}.", f"Change `{key}:`, `model:` or `sweep:`.", finding
+        )
     places = about[np.flatnonzero(one.open)]
     more = " and others" if len(places) > 1 else ""
     which = f" ({_at(f, check, int(places[0]))}{more})" if len(places) else ""
@@ -236,7 +238,7 @@ def describe(f: Found, check: ValueCheck) -> Description:
     left = f"{len(places)} of {len(about)} members {verb} not resolved well enough{which}"
     finer, cost = value.finer_levels(f)
     advice = f"Add levels {finer[0]} and {finer[-1]} to `levels:` ({cost}) to shrink the errors."
-    return Description(f"{told}{doubted}, because {left}.", advice, told)
+    return Description(f"{finding}{doubted}, because {left}.", advice, finding)
 
 
 def _at(f: Found, check: ValueCheck, case: int) -> str:
@@ -265,7 +267,7 @@ def _asked(f: Found, check: ValueCheck) -> tuple[str, str, str]:
     return f"; it is {rule}", f"; it may or may not be {rule}", f"; it is not {rule}"
 
 
-def _told(f: Found, check: ValueCheck, one: Reduced, about: Any) -> str:
+def _finding(f: Found, check: ValueCheck, one: Reduced, about: Any) -> str:
     """Say what was found, with the error that the levels leave."""
     what, take, count = value.what(check, f.notation), str(check.take), len(about)
     here = _at(f, check, int(about[one.member]))
@@ -279,10 +281,10 @@ def _told(f: Found, check: ValueCheck, one: Reduced, about: Any) -> str:
         span = "" if one.low == one.high else span
         return f"The {which} {what} over {count} members is at {here}{span}"
     error = max(one.high - one.value, one.value - one.low)
-    told = f"The {take} {what} over {count} members is {number(one.value, 10)} {unit}".rstrip()
-    told += "" if take == "mean" else f", at {here}"
+    finding = f"The {take} {what} over {count} members is {number(one.value, 10)} {unit}".rstrip()
+    finding += "" if take == "mean" else f", at {here}"
     if not check.number.has_limit(check.at.level):
-        return told
+        return finding
     if math.isinf(error):
-        return f"{told}, with an unknown error"
-    return f"{told}, with an error of at most {number(error, 2)}"
+        return f"{finding}, with an unknown error"
+    return f"{finding}, with an error of at most {number(error, 2)}"

@@ -128,12 +128,12 @@ def growth_in_words(f: Found, predicted: float, measured: float) -> str:
     if not f.model.conservative:
         theory = "predicted for free oscillations without damping"
         seen = "measured, with damping and forces"
-    told = [
+    phrases = [
         f"{f.notation.factor(value)} ({word})"
         for value, word in ((predicted, theory), (measured, seen))
         if not math.isnan(value)
     ]
-    return f" The growth factor per period is {' and '.join(told)}." if told else ""
+    return f" The growth factor per period is {' and '.join(phrases)}." if phrases else ""
 
 
 def cost_in_words(experiment: Experiment, levels: Sequence[int]) -> str:

@@ -141,18 +141,18 @@ def describe(f: Found, check: StableCheck) -> Description:
             "`model:`.",
         )
     factors = f.fact("predicted_growth"), f.fact("growth")
-    told = (
+    sentence = (
         f"Scheme {f.scheme_name} is {'stable' if f.reason == 'match' else 'unstable'} at level {level}"
         f"{f', where w dt = {number(p, 4)}' if math.isfinite(p) else ''}."
     )
-    told += growth_in_words(f, *factors)
+    sentence += growth_in_words(f, *factors)
     if f.reason == "match" and _always_grows(f):
-        told += _vanishing(f, factors)
+        sentence += _vanishing(f, factors)
     if time:
-        told += f" It produced a number that is not finite or too large at t = {time}."
+        sentence += f" It produced a number that is not finite or too large at t = {time}."
     if f.reason == "mismatch":
-        told += " Prediction and measurement disagree, so this is not the scheme that the theory describes."
-    return Description(told, _advice(f, level, p, time))
+        sentence += " Prediction and measurement disagree, so this is not the scheme that the theory describes."
+    return Description(sentence, _advice(f, level, p, time))
 
 
 def _always_grows(f: Found) -> bool:

@@ -26,7 +26,7 @@ BINS = 8
 """A key's values are told in so many bins with the same number of members, or fewer."""
 TELLING = 0.5
 """Ranges that hold no more than this part of all members say where something is."""
-TOLD = 2
+MOST_KEYS = 2
 """A sentence names so many keys."""
 
 
@@ -113,7 +113,9 @@ def _sentence(
     start = f"{status} in {count} of {total} results"
     all_with = "all with" if count > 1 else "with"
     for name, words in (("range", all_with), ("box", f"at least {IN_BOX:.0%} of them with")):
-        places = sorted(_place(key, columns[key], keys[key], name, hits) for key in columns)[:TOLD]
+        places = sorted(_place(key, columns[key], keys[key], name, hits) for key in columns)[
+            :MOST_KEYS
+        ]
         telling = [text for part, text, alone in places if part <= TELLING or (alone and part < 1)]
         if not telling and math.prod(part for part, _, _ in places) <= TELLING:
             telling = [text for part, text, _ in places if part < 1]

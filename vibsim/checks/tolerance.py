@@ -91,10 +91,10 @@ def describe(f: Found) -> Description:
     levels = experiment.levels
     largest, which = (found[f.scheme, f.case] for found in _largest_bound(experiment, f.record))
     state = f.model.states[which].name
-    told = "The error of the extrapolated solution is unknown, because its levels do not agree."
+    sentence = "The error of the extrapolated solution is unknown, because its levels do not agree."
     if math.isfinite(largest):
         verb = "is" if f.reason == "match" else "is not"
-        told = (
+        sentence = (
             f"The error bound of the extrapolated solution is {f.notation.number(largest, 3)} (of "
             f"{f.notation.quantity(state)}, the largest over time). It {verb} {rule(experiment, f.notation)}."
         )
@@ -110,4 +110,4 @@ def describe(f: Found) -> Description:
     if options.get("arithmetic", "compensated") != "compensated":
         ways.append(f"set `arithmetic: compensated` for scheme {name}")
     text = ", or ".join(ways)
-    return Description(told, f"{text[0].upper()}{text[1:]}.")
+    return Description(sentence, f"{text[0].upper()}{text[1:]}.")

@@ -280,31 +280,36 @@ def rule(check: ValueCheck, notation: Notation = PLAIN) -> str:
 
 def describe(f: Found, check: ValueCheck) -> Description:
     """Say what a number is, whether it is what a check asks for, and what to change."""
-    told = f.notation.opening(what(check, f.notation))
-    brief, asked = _measured(f, check), rule(check, f.notation)
+    subject = f.notation.opening(what(check, f.notation))
+    brief, expected = _measured(f, check), rule(check, f.notation)
     match f.reason:
         case "match":
-            sentence, advice = f"{told} is {brief}; it is {asked}.", ""
+            sentence, advice = f"{subject} is {brief}; it is {expected}.", ""
         case "mismatch":
-            sentence, advice = f"{told} is {brief}; it is not {asked}.", _on_mismatch(f, check)
+            sentence, advice = (
+                f"{subject} is {brief}; it is not {expected}.",
+                _on_mismatch(f, check),
+            )
             if check.number.needs_force and not _is_unsteady(f, check):
                 advice += " If the motion is not steady yet, a longer run helps (`time: periods`)."
         case "non_finite":
-            sentence, advice = NOT_FINITE[0].format(told), NOT_FINITE[1]
+            sentence, advice = NOT_FINITE[0].format(subject), NOT_FINITE[1]
         case "not_applicable" if check.at.event is not None:
-            sentence = f"{told} does not exist: fewer events happen until the end."
+            sentence = f"{subject} does not exist: fewer events happen until the end."
             advice = "Ask for an earlier `event:`, or make `time: end` later."
         case "not_applicable":
-            sentence = f"{told} does not exist here, or was not stored."
+            sentence = f"{subject} does not exist here, or was not stored."
             advice = (
                 "Ask for a level, a step and a time that are stored (`at:`, `samples: all`), and choose `time: end` so "
                 "that the number exists."
             )
         case "too_few_levels" if _lacks_levels(f.experiment, check):
-            sentence = f"{told} does not exist here, because it needs more levels than there are."
+            sentence = (
+                f"{subject} does not exist here, because it needs more levels than there are."
+            )
             advice = f"Add finer `levels:` until there are {check.number.finer_levels + 1}."
         case _:
-            sentence = f"{told} is {brief}; it may or may not be {asked}."
+            sentence = f"{subject} is {brief}; it may or may not be {expected}."
             advice = f"Set `events: located` for scheme {f.scheme_name}."
             if not _is_on_the_mesh(f, check):
                 finer, cost = finer_levels(f)
@@ -331,14 +336,14 @@ def _measured(f: Found, check: ValueCheck, digits: int = MOST_DIGITS) -> str:
     found, bound = f.fact("value"), f.fact("error_bound")
     # of round-off two digits say all
     digits = 2 if f.reason == "match" and abs(found) <= ROUND_OFF else digits
-    told = f"{f.notation.number(found, digits)} {unit_of(f.experiment, f.record, check)}".rstrip()
+    phrase = f"{f.notation.number(found, digits)} {unit_of(f.experiment, f.record, check)}".rstrip()
     if check.value == "stability_limit" and found == 0.0:
-        told += " (it grows at every step)"
+        phrase += " (it grows at every step)"
     if not check.number.has_limit(check.at.level):
-        return told
+        return phrase
     if math.isnan(bound):
-        return f"{told}, with an unknown error{_why_unknown(f, check)}"
-    return f"{told}, with an error of at most {f.notation.number(bound, 2)}"
+        return f"{phrase}, with an unknown error{_why_unknown(f, check)}"
+    return f"{phrase}, with an error of at most {f.notation.number(bound, 2)}"
 
 
 def _why_unknown(f: Found, check: ValueCheck) -> str:
@@ -394,5 +399,5 @@ def _at(check: ValueCheck, level: int) -> str:
     if check.at.step is not None and isinstance(check.at.level, int):
         found["step"] = check.at.step * 2 ** (level - check.at.level)
     found |= {key: getattr(check.at, key) for key in ("t", "event", "scheme", "case")}
-    told = (f"{key}: {value}" for key, value in found.items() if value is not None)
-    return f"{{{', '.join(told)}}}"
+    pairs = (f"{key}: {value}" for key, value in found.items() if value is not None)
+    return f"{{{', '.join(pairs)}}}"

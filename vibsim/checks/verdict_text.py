@@ -104,7 +104,7 @@ class Wording:
             Where in a sweep those of a status lie (`vibsim.checks.sweep_regions`).
         """
         check, status, total = self._measured, _status(counts), sum(counts.values())
-        told = self.sentence(result)
+        sentence = self.sentence(result)
         expect = None if check is None else check.expected_verdict
         if expect is not None:
             reason = compared_reason(check, status, result.status, result.reason)
@@ -112,27 +112,27 @@ class Wording:
             if expect.status == "PASS" and reason == result.reason:
                 pass
             elif reason == "match":
-                told += f" The check detected {expected}, as intended."
+                sentence += f" The check detected {expected}, as intended."
             elif reason == "mismatch":
-                told += f" The check expects {expected}."
-        asked = self._swept_values()
-        if total == 1 and asked:
-            told = f"With {asked}: {told}"
+                sentence += f" The check expects {expected}."
+        members = self._swept_values()
+        if total == 1 and members:
+            sentence = f"With {members}: {sentence}"
         if total > 1:
             head = f"{status} in {counts[status]} of {total} results"
             if status == "PASS":
                 whole = "Both" if total == 2 else f"All {total}"
-                head = f"{whole} results{asked and f' with {asked}'} passed"
+                head = f"{whole} results{members and f' with {members}'} passed"
             elif status in where:
                 head = where[status]["text"]
             is_of_all = check is not None and check.kind == "value" and check.take is not None
             hardest = f"scheme {result.scheme}" if is_of_all else self._place(result, brackets=True)
-            told = f"{head}. The hardest is {hardest}. {told}"
+            sentence = f"{head}. The hardest is {hardest}. {sentence}"
         if self.check is None or self.check.kind != "claim":
-            return told
+            return sentence
         holds = truth(self.check, status, result.reason)
         decided = "cannot be decided" if holds is None else f"is {'true' if holds else 'false'}"
-        return f"The statement {decided}. {told}"
+        return f"The statement {decided}. {sentence}"
 
     def _swept_values(self) -> str:
         """Name the swept values of the members that the check is about; empty where it is about every one."""
@@ -150,8 +150,8 @@ class Wording:
             swept.append(f"{key} = {self.notation.number(one) if isinstance(one, float) else one}")
         if not swept:
             return head
-        told = ", ".join(swept)
-        return f"{head}, case {result.case}{f' ({told})' if brackets else f', {told}'}"
+        listed = ", ".join(swept)
+        return f"{head}, case {result.case}{f' ({listed})' if brackets else f', {listed}'}"
 
     def advice(self, status: str, result: Result, counts: Mapping[str, int]) -> str:
         """Say what to change in the YAML; empty for a check whose status is PASS."""

@@ -102,5 +102,5 @@ def _lines(series: Series, shown: range, low: float, high: float, width: int) ->
 
 def legend(series: Series) -> str:
     """Say what the symbols mean."""
-    told = f"{NUMERICAL} {series.name}"
-    return told if series.exact is None else f"{told}, {EXACT} exact, {BOTH} both"
+    text = f"{NUMERICAL} {series.name}"
+    return text if series.exact is None else f"{text}, {EXACT} exact, {BOTH} both"

@@ -79,12 +79,12 @@ def scheme_rows(scheme: Scheme) -> Iterator[Row]:
     if not scheme.adaptive:
         orders = scheme.orders(scheme.defaults())
         of = {"position": order, "velocity": f"{orders.velocity:g}", "energy": f"{orders.energy:g}"}
-        told = ", ".join(f"{number} of the {name}" for name, number in of.items())
+        listed = ", ".join(f"{number} of the {name}" for name, number in of.items())
         if orders.energy_linear != orders.energy:
             exact = math.isinf(orders.energy_linear)
             linear = "none, it is exact" if exact else f"{orders.energy_linear:g}"
-            told += f" (on a linear, conservative model: {linear})"
-        yield "orders", told
+            listed += f" (on a linear, conservative model: {linear})"
+        yield "orders", listed
         if orders.velocity_dependent is not None:
             with_damping = orders.velocity_dependent.position
             yield "", f"{with_damping:g} of the position where a force depends on the velocity"

@@ -66,8 +66,8 @@ def machine() -> str:
             found.setdefault(key.strip(), value.strip())
     name = found.get("model name") or found.get("CPU part", "unknown processor")
     features = found.get("flags") or found.get("Features", "")
-    told = hashlib.sha256(" ".join(sorted(features.split())).encode()).hexdigest()[:8]
-    return f"{os.uname().machine}, {ascii(name)[1:-1][:100]}, features {told}"
+    digest = hashlib.sha256(" ".join(sorted(features.split())).encode()).hexdigest()[:8]
+    return f"{os.uname().machine}, {ascii(name)[1:-1][:100]}, features {digest}"
 
 
 def add(results: Path, key: str, names: Iterable[str], job: str = "") -> None:

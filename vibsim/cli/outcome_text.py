@@ -77,16 +77,16 @@ def headline(entry: Entry, columns: int) -> str:
     """Say in at most so many columns what an experiment found: its order and error, or why it did not pass."""
     rows: Sequence[Entry] = entry["checks"]
     missed = [row for row in rows if row["status"] != "PASS"]
-    told = [str(entry.get("error") or (rows[0]["text"] if rows else "no checks"))]
+    candidates = [str(entry.get("error") or (rows[0]["text"] if rows else "no checks"))]
     if missed:
         first = max(missed, key=lambda row: SEVERITY[row["status"]])
-        told = [f"{first['reason']} ({len(missed)} of {len(rows)} checks did not pass)"]
-        told.append(str(first["reason"]))
+        candidates = [f"{first['reason']} ({len(missed)} of {len(rows)} checks did not pass)"]
+        candidates.append(str(first["reason"]))
     else:
         # what was meant to fail says less than what was meant to pass
         plain = [row for row in rows if row["expected"] == "PASS"] or rows
-        told = next(filter(None, map(numbers, plain)), told)
-    fitting = next((text for text in told if len(text) <= columns), told[-1])
+        candidates = next(filter(None, map(numbers, plain)), candidates)
+    fitting = next((text for text in candidates if len(text) <= columns), candidates[-1])
     return textwrap.shorten(clean(fitting), columns, placeholder=" ...")
 
 
@@ -103,10 +103,10 @@ def numbers(check: Entry) -> list[str]:
     ends = order_interval(low, high) if low is not None and high is not None else ()
     between = f" ({' to '.join(ends)})" if len(ends) > 1 else ""
     error = facts.get("relative_error")
-    told = "" if error is None else f", relative error {error:.2g}"
+    error_text = "" if error is None else f", relative error {error:.2g}"
     total = sum(check["counts"].values())
     of = f", the hardest of {total}" if total > 1 else ""
-    return [head + between + told + of, head + between + told, head + told, head]
+    return [head + between + error_text + of, head + between + error_text, head + error_text, head]
 
 
 def _name(entry: Entry) -> str:

@@ -108,8 +108,8 @@ def _refuse(paths: Iterable[os.PathLike[str]]) -> None:
         with suppress(FileNotFoundError, NotADirectoryError):
             kind = stat.S_IFMT(os.lstat(path).st_mode)
             if kind not in (stat.S_IFREG, stat.S_IFDIR):
-                told = _KINDS.get(kind, "no file and no folder")
-                rule = f"is {told}, and vibsim writes to real files and folders only"
+                what = _KINDS.get(kind, "no file and no folder")
+                rule = f"is {what}, and vibsim writes to real files and folders only"
                 faults.append(Fault(os.fspath(path), 0, "", "", rule, advice))
     if faults:
         raise InputError(faults)

@@ -91,7 +91,7 @@ def child(words: Sequence[str], *, is_heard: bool = True) -> int:
 
 def end_at_once() -> None:
     """End this process as soon as it is told to, whatever handlers are set later."""
-    _when_told(lambda number: os._exit(128 + number))
+    _on_signal(lambda number: os._exit(128 + number))
 
 
 def end_in_order() -> None:
@@ -101,10 +101,10 @@ def end_in_order() -> None:
     """
     signal.signal(signal.SIGUSR1, signal.default_int_handler)
     main = threading.main_thread().ident or 0
-    _when_told(lambda _: signal.pthread_kill(main, signal.SIGUSR1))
+    _on_signal(lambda _: signal.pthread_kill(main, signal.SIGUSR1))
 
 
-def _when_told(act: Callable[[int], None]) -> None:
+def _on_signal(act: Callable[[int], None]) -> None:
     """Act once, in a thread of its own, when this process is told to end.
 
     The signals are blocked in every thread but that one, which does nothing else than wait for them: a handler would
@@ -178,18 +178,18 @@ def _interrupt(number: int, _: object) -> None:
 
 def _watch(worker: int, ends: set[signal.Signals]) -> tuple[int, int]:
     """Return the wait status of the worker, and the signal by which it was to end, 0 without one."""
-    asked, deadline = 0, 0.0
+    signalled, deadline = 0, 0.0
     while True:
-        left = max(deadline - time.monotonic(), 0) if asked else 3600.0
+        left = max(deadline - time.monotonic(), 0) if signalled else 3600.0
         found = wait_for_signal(ends | {signal.SIGCHLD}, left)
         if (status := _ended(worker)) is not None:
-            return status, asked
+            return status, signalled
         if found == signal.SIGCHLD:
             continue
-        if found and not asked:
-            asked, deadline = found, time.monotonic() + max(_GRACE, _grace[0])
+        if found and not signalled:
+            signalled, deadline = found, time.monotonic() + max(_GRACE, _grace[0])
             os.kill(worker, signal.SIGTERM)
-        elif asked and (found or time.monotonic() >= deadline):
+        elif signalled and (found or time.monotonic() >= deadline):
             # out of time, or asked again
             os.kill(worker, signal.SIGKILL)
 
@@ -213,10 +213,10 @@ def _wait_for_children() -> None:
                 time.sleep(0.01)
 
 
-def _exit_status(status: int, asked: int, orderly: bool) -> int:
+def _exit_status(status: int, signalled: int, orderly: bool) -> int:
     """Say how the worker ended, unless it has said so itself; return the exit status."""
     code = os.waitstatus_to_exitcode(status)
-    if number := asked or ended_by(code):
+    if number := signalled or ended_by(code):
         _say("interrupted; run the same command again to continue")
         return 128 + number
     if not orderly:

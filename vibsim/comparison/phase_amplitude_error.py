@@ -54,8 +54,8 @@ def parts_of_errors(
     """Compare the parts of errors with these names between levels; `found` are the states, compared."""
     parts: dict[str, Comparison] = {}
     for position in dict.fromkeys(map(whole_of, names)):
-        told, scales, known = _phase_and_amplitude(block, found, position)
-        blurs = _blur(block, [time for time, _ in told])
+        levels, scales, known = _phase_and_amplitude(block, found, position)
+        blurs = _blur(block, [time for time, _ in levels])
         # the true value of a part, where that of the motion is known
         exact = np.where(known, 0.0, np.nan)[None, :, None] if known.any() else None
         for k, (end, words, units) in enumerate(PARTS):
@@ -68,8 +68,10 @@ def parts_of_errors(
                 name=name,
                 long_name=words.format(found[position].long_name),
                 units=units,
-                values=[level[k] for level in told],
-                exact=None if exact is None else np.broadcast_to(exact, (1, *told[0][k].shape[1:])),
+                values=[level[k] for level in levels],
+                exact=None
+                if exact is None
+                else np.broadcast_to(exact, (1, *levels[0][k].shape[1:])),
                 order=_order(block, name),
                 floor=block.floor_of(name, scales[k]) + noise,
                 scale=scales[k],
@@ -122,7 +124,7 @@ def _phase_and_amplitude(
     period = np.broadcast_to(period_scale(block), block.shape).ravel()
     spacing = np.broadcast_to(grid.spacing, block.shape).ravel()
     of, stride = quintic_interpolant(u, v, a, spacing), strides(period, spacing, shape[-1])
-    told = []
+    levels = []
     # a level of a few members costs as much as all of them together
     together = max(SAMPLES_AT_A_TIME // math.prod(shape), 1)
     for start in range(0, len(grid.levels), together):
@@ -131,14 +133,14 @@ def _phase_and_amplitude(
         count = len(series[0])
         scales = np.tile(period, count), np.tile(stride, count)
         parts = fit_shift(moved, moving, of.repeated(count), *scales)
-        told += list(np.moveaxis(parts.reshape(2, count, *shape), 1, 0))
+        levels += list(np.moveaxis(parts.reshape(2, count, *shape), 1, 0))
     # what is missing at one level is taken out of all
-    every = np.all([np.isfinite(time).all(axis=-1) for time, _ in told], axis=0)
-    for parts in told:
+    every = np.all([np.isfinite(time).all(axis=-1) for time, _ in levels], axis=0)
+    for parts in levels:
         parts[:, ~every] = np.nan
     rest, fastest = (_least(x, stride).reshape(block.shape) for x in (u, v))
     scale = found[position].scale
-    return told, (scale / fastest, scale / rest), known
+    return levels, (scale / fastest, scale / rest), known
 
 
 def _truth(q: Comparison, known: Flags, shape: tuple[int, ...]) -> Floats:

@@ -54,8 +54,8 @@ def work_precision(block: MemberBlock, found: Compared) -> Table:
         ("work_error", errors, of_error, position.units, reference_name),
     ):
         values[block.adaptive, :, :-1] = np.nan
-        told = f"{text}; of an adaptive scheme once, at the finest level"
-        table[name] = Variable.of(OF_LEVEL, values, told, units, **more)
+        long_name = f"{text}; of an adaptive scheme once, at the finest level"
+        table[name] = Variable.of(OF_LEVEL, values, long_name, units, **more)
     of_bound = Variable.of(("case",), bound, f"largest error bound of {words}", position.units)
     return table | {"work_reference_error": of_bound}
 

@@ -105,12 +105,12 @@ def judge(e: Evidence) -> Judgement:
     if len(e.levels) < 3:
         cases.append((np.ones(shape, dtype=bool), "too_few_levels"))
     else:
-        asked = e.applicable & ~undefined & ~fails & ~growing
-        believed = _believed(e, asked)
+        judged = e.applicable & ~undefined & ~fails & ~growing
+        believed = _believed(e, judged)
         read, lower, noise = _cases(e, believed, orders)
         cases += read
         # the order of noise is none
-        stated = asked & ~noise & ~(np.isinf(e.order) & at_round_off(e))
+        stated = judged & ~noise & ~(np.isinf(e.order) & at_round_off(e))
         order, low, high = (
             np.where(stated, x, np.nan) for x in (believed.order, lower, believed.high)
         )
@@ -132,9 +132,9 @@ def judge(e: Evidence) -> Judgement:
     )
 
 
-def _believed(e: Evidence, asked: Flags) -> Decision:
+def _believed(e: Evidence, judged: Flags) -> Decision:
     """Return what the error model says of the ladders that it is asked about, and of all others that they are noise."""
-    shape, n = asked.shape, len(e.levels)
+    shape, n = judged.shape, len(e.levels)
     found = Decision(
         status=np.full(shape, INCONCLUSIVE, dtype=np.int8),
         reason=np.full(shape, code("round_off"), dtype=np.int8),
@@ -147,9 +147,9 @@ def _believed(e: Evidence, asked: Flags) -> Decision:
     rows = np.concatenate([e.difference, e.error[..., None]], axis=-1)
     keys = np.stack([np.isfinite(e.error), _expected(e), _is_theory(e)], axis=-1)
     # differences that all vanish have no size
-    asked = asked & np.any(e.difference > 0.0, axis=-1)
-    for key in np.unique(keys[asked].astype(np.float64), axis=0):
-        chosen = asked & np.all(keys == key, axis=-1)
+    judged = judged & np.any(e.difference > 0.0, axis=-1)
+    for key in np.unique(keys[judged].astype(np.float64), axis=0):
+        chosen = judged & np.all(keys == key, axis=-1)
         exact_known, expected, by_theory = key.tolist()
         count = n if exact_known else n - 1
         sizes = rows[chosen][:, :count]

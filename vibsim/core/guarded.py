@@ -36,8 +36,8 @@ def problem(work: Callable[[], object], size: int) -> str:
             os._exit(failed)
     os.close(writing)
     with os.fdopen(reading, "rb") as pipe:
-        told = pipe.read().decode(errors="replace")
-    return TOO_MUCH if os.waitpid(child, 0)[1] else told
+        message = pipe.read().decode(errors="replace")
+    return TOO_MUCH if os.waitpid(child, 0)[1] else message
 
 
 def _limit(size: int) -> None:

@@ -348,11 +348,11 @@ def _check_files(experiment: SolverExperiment, report: Report) -> None:
             _check_file(experiment.folder / path, (SOLVER, "files"), f"{path}: ", report)
 
 
-def _check_file(path: Path, place: Path_, told: str, report: Report) -> None:
+def _check_file(path: Path, place: Path_, subject: str, report: Report) -> None:
     try:
         is_file, is_there = path.is_file(), path.exists()
     except (OSError, ValueError):
         is_file = is_there = False
     if not is_file:
         rule = "must be a file" if is_there else "there is no such file"
-        report.add(place, f"{told}{rule}")
+        report.add(place, f"{subject}{rule}")

@@ -179,9 +179,9 @@ def elastic_pendulum(
 def _equation(is_dragged: bool, formulas: Mapping[str, str]) -> str:
     drags = [f" - (gamma/beta) |v| {name}'" if is_dragged else "" for name in ("x", "y")]
     pushes = (" + F_x(t)", " + F_y(t)") if formulas else ("", "")
-    told = EQUATION.format(*(drag + push for drag, push in zip(drags, pushes, strict=True)))
+    equations = EQUATION.format(*(drag + push for drag, push in zip(drags, pushes, strict=True)))
     given = (f"{name.removeprefix('exact_')} = {text}" for name, text in formulas.items())
-    return f"{told}, with F such that {', '.join(given)}" if formulas else told
+    return f"{equations}, with F such that {', '.join(given)}" if formulas else equations
 
 
 ELASTIC_PENDULUM = replace(written({}, ()), equation=_equation(is_dragged=True, formulas={}))

@@ -481,21 +481,21 @@ def _equation(own: Written) -> str:
         lines.append(" = ".join(map(to_formula, both)))
     if len(lines) > SHOWN:
         lines = [*lines[: SHOWN // 2], "...", lines[-1]]
-    told = ", ".join(lines)
+    equations = ", ".join(lines)
     if own.lookup is not None:
         table, place = own.lookup.table, own.formulas[INPUT]
-        told += (
+        equations += (
             f", {INPUT} from a table of {table.points} points, {table.spacing:g} apart, at {place}"
         )
     if own.crossings is not None:
-        told += described(own.crossings, own.formulas)
+        equations += described(own.crossings, own.formulas)
     if own.manufactured is None:
-        return told
+        return equations
     motion = (
         f"{name} = {text}"
         for name, text in zip(own.coordinates, own.manufactured.texts, strict=True)
     )
-    return f"{told}, with forces added such that {', '.join(motion)}"
+    return f"{equations}, with forces added such that {', '.join(motion)}"
 
 
 SYSTEM = replace(named(("u",)), equation="x'' = a(x, y, ..., x', y', ..., t) for each coordinate x")

@@ -81,10 +81,10 @@ def vehicle(
     spring, road = parse(texts[0], ("u", *known)), parse(texts[1], ("x", *known))
     bend: Expression = put(derivative(derivative(road, "x"), "x"), "x", PLACE)
     height: Expression = put(road, "x", PLACE)
-    told, more = f"h(x) = {to_formula(road)}", dict[str, Any]()
+    road_text, more = f"h(x) = {to_formula(road)}", dict[str, Any]()
     if lookup is not None:
         bend, height, table = Name(BEND), Name(HEIGHT), lookup.table
-        told = f"h(x) from a table of {table.points} points, {table.spacing:g} m apart"
+        road_text = f"h(x) from a table of {table.points} points, {table.spacing:g} m apart"
         more = {"lookup": lookup, "exact": None}
     push = Number(-1.0) * (Name("m") * bend * parse("speed**2", known))
     damping = parse("b*v", ("v", *known)) if "b" in terms else ZERO
@@ -96,7 +96,7 @@ def vehicle(
         kind="vehicle",
         title="Vehicle on a bumpy road",
         source="vibration text, section 10.8, equation (114)",
-        equation=f"m u'' + {damper}{to_formula(spring)} = -m h''(speed t) speed^2, {told}",
+        equation=f"m u'' + {damper}{to_formula(spring)} = -m h''(speed t) speed^2, {road_text}",
         outputs=(
             Output("road_height", "m", "height of the road under the wheel", height),
             Output("absolute_position", "m", "height of the body", Name("u") + height),

@@ -59,8 +59,8 @@ def build(experiment: Experiment) -> Plan:
     made: dict[str, Any] = {
         "levels": [[shard.digest for shard in level.shards] for level in levels]
     }
-    told = told_settings(experiment.settings)
-    analysis = job_digest("analyse", in_numbers(analysed(content)), made | told)
+    settings = digested_settings(experiment.settings)
+    analysis = job_digest("analyse", in_numbers(analysed(content)), made | settings)
     reference = round(forecast.reference_seconds(experiment), 3)
     extrapolation = ""
     if experiment.output == "best":
@@ -96,7 +96,7 @@ def build(experiment: Experiment) -> Plan:
     )
 
 
-def told_settings(settings: tuple[str, ...]) -> dict[str, Any]:
+def digested_settings(settings: tuple[str, ...]) -> dict[str, Any]:
     """Return what the digest of an analysis has of the settings that its results tell of; of none, nothing."""
     return {"settings": list(settings)} if settings else {}
 

@@ -217,10 +217,10 @@ def _imports(module: str) -> frozenset[str]:
     parts = module.split(".")
     found = {".".join(parts[:size]) for size in range(1, len(parts))}
     nodes = list(_run(_tree(module)))
-    asked = {node.id for node in nodes if isinstance(node, ast.Name)}
+    used = {node.id for node in nodes if isinstance(node, ast.Name)}
     bound = {as_: place for node in nodes for as_, place in _bound(node)}
     for name, place in bound.items():
-        if not _is_package(module) or name in asked:
+        if not _is_package(module) or name in used:
             found |= _homes(*place)
     for node in nodes:
         if isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name):

@@ -17,7 +17,7 @@ from vibsim.core.errors import Fault, InputError
 from vibsim.core.vocabulary import FORMAT
 from vibsim.experiment.solver import SolverExperiment
 from vibsim.plan import code_digest
-from vibsim.plan.build import job_digest, told_settings
+from vibsim.plan.build import digested_settings, job_digest
 from vibsim.plan.digests import analysed, digest_of, solved
 from vibsim.plan.jobs import Batch, LevelJob, Plan, ShardJob, shard_path
 from vibsim.plan.versions import DRAWING, NUMERICAL, versions
@@ -60,7 +60,7 @@ def build(experiment: SolverExperiment) -> Plan:
         "levels": [[shard.digest for shard in level.shards] for level in levels]
     }
     analysis = job_digest(
-        "judge_levels", analysed(content), made | told_settings(experiment.settings)
+        "judge_levels", analysed(content), made | digested_settings(experiment.settings)
     )
     return Plan(
         collection=experiment.collection,

@@ -238,18 +238,18 @@ class Names:
     def memory(self, megabytes: int) -> Callable[[Any, int], int]:
         """Return what gives the memory of a job: with that of its executor, and more where it was not enough before."""
 
-        def asked(wildcards: Any, attempt: int) -> int:
+        def of_attempt(wildcards: Any, attempt: int) -> int:
             return (megabytes + self.overhead) * attempt
 
-        return asked
+        return of_attempt
 
     def runtime(self, minutes: int | None) -> Callable[[Any, int], int | None]:
         """Return what gives the minutes of a job: more where they were not enough before."""
 
-        def asked(wildcards: Any, attempt: int) -> int | None:
+        def of_attempt(wildcards: Any, attempt: int) -> int | None:
             return minutes and minutes * attempt
 
-        return asked
+        return of_attempt
 
     @property
     def files(self) -> list[str]:

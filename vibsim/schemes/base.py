@@ -140,8 +140,8 @@ def handed(
 ) -> Callable[..., Any]:
     """Return `function`, a `Stepper`'s start or step, with those functions of the model that it asks for."""
     known = {"acceleration": acceleration, "slopes": slopes, "damping_rate": damping_rate}
-    asked = inspect.signature(function).parameters
-    return partial(function, **{name: known[name] for name in HANDED if name in asked})
+    parameters = inspect.signature(function).parameters
+    return partial(function, **{name: known[name] for name in HANDED if name in parameters})
 
 
 ORDER_AT_CORNERS = 2.0

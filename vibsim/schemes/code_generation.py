@@ -82,8 +82,8 @@ def self_starting(
 
     Where it carries the acceleration, with which the last step ended and a step begins, the state is (u, v, a).
     """
-    asked = [name for name in HANDED if name in inspect.signature(step).parameters]
-    rest = ", ".join(["dt", "p", *asked])
+    taken = [name for name in HANDED if name in inspect.signature(step).parameters]
+    rest = ", ".join(["dt", "p", *taken])
     state = "u, v, acceleration(u, v, 0.0, p)" if carries_acceleration else "u, v"
     start = written(
         f"def start_one_step(variant, u, v, {rest}):\n"

@@ -223,11 +223,11 @@ def _series(
     words_of = dict(_ENERGY_WORDS)
     if has_budget(model):
         words_of |= zip(BUDGET, _BUDGET_WORDS, strict=True)
-    told = [(name, words, unit) for name, words in words_of.items()]
-    told += [(row.name, row.long_name, row.unit) for row in model.outputs]
-    told = [row for row in told if row[0] in wanted]
-    values_of = derived(model, group, found, steps, every, [name for name, _, _ in told])
-    rows += [(name, values_of[name], words, own_unit) for name, words, own_unit in told]
+    columns = [(name, words, unit) for name, words in words_of.items()]
+    columns += [(row.name, row.long_name, row.unit) for row in model.outputs]
+    columns = [row for row in columns if row[0] in wanted]
+    values_of = derived(model, group, found, steps, every, [name for name, _, _ in columns])
+    rows += [(name, values_of[name], words, own_unit) for name, words, own_unit in columns]
     start = values_of["energy_initial"]
     return {
         **_table(SERIES, rows),
@@ -286,12 +286,12 @@ def _ranges(model: Model, run: Gathered) -> Iterable[Row]:
     """Yield what was gathered of states and energies over every step; arrays of shape (scheme, case)."""
     for k, state in enumerate(model.states):
         for i, (end, words) in enumerate((("min", "least"), ("max", "largest"))):
-            told = f"{words} {state.long_name} over every step"
-            yield f"{state.name}_{end}", run.ranges[..., k, i], told, state.unit
-        told = f"norm of the {state.long_name} over every step"
-        yield f"{state.name}_l1", run.norms[..., k, 0], f"l1 {told}", _times_second(state.unit)
+            long_name = f"{words} {state.long_name} over every step"
+            yield f"{state.name}_{end}", run.ranges[..., k, i], long_name, state.unit
+        long_name = f"norm of the {state.long_name} over every step"
+        yield f"{state.name}_l1", run.norms[..., k, 0], f"l1 {long_name}", _times_second(state.unit)
         # udunits knows no root of a unit
-        words = f"l2 {told} (times the square root of s)"
+        words = f"l2 {long_name} (times the square root of s)"
         yield f"{state.name}_l2", run.norms[..., k, 1], words, state.unit
     words, unit = "largest absolute energy deviation over every step", model.energy_unit
     yield "energy_deviation_max_abs", run.deviation, words, unit

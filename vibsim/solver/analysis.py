@@ -132,15 +132,15 @@ def _check(experiment: SolverExperiment, found: CheckResults) -> dict[str, Any]:
 def _text(experiment: SolverExperiment, found: CheckResults) -> str:
     """Say what was found where it decides, and of how many members."""
     decides, status = found.results[0], found.status
-    told = decides.verdict.sentence
+    sentence = decides.verdict.sentence
     total = len(found.results)
     if total == 1:
-        return told
+        return sentence
     head = f"{status} in {found.counts[status]} of {total} members"
     if status == "PASS":
         head = f"{'Both' if total == 2 else f'All {total}'} members passed"
     place = ", ".join(f"{k} = {v}" for k, v in experiment.parameters_of(decides.member).items())
-    return f"{head}. The hardest is member {decides.member} ({place}). {told}"
+    return f"{head}. The hardest is member {decides.member} ({place}). {sentence}"
 
 
 def _result(experiment: SolverExperiment, result: SolverResult) -> dict[str, Any]:

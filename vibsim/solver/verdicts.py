@@ -151,27 +151,29 @@ def _accuracy(
 ) -> tuple[LadderVerdict, dict[str, Any], float]:
     """Return the verdict on an error, its facts, and the bound of the error over what is allowed."""
     size = abs(found.levels[-1].value or 0.0)
-    asked = check.accuracy * (size if check.is_relative else 1.0)
+    allowed = check.accuracy * (size if check.is_relative else 1.0)
     error = None if found.error is None else abs(found.error)
     bound = found.error_bound
     is_error_known = found.is_exact_known or found.reason in ORDER_KNOWN
     decides = is_error_known and error is not None and bound is not None
     if found.reason == "non_finite":
         reason = "non_finite"
-    elif not asked > 0.0:
+    elif not allowed > 0.0:
         reason = "not_applicable"
     elif decides and error is not None and bound is not None:
         # as far below the error as the bound is above it
         least = max(2.0 * error - bound, 0.0)
-        reason = "match" if bound < asked else "mismatch" if least > asked else "pre_asymptotic"
+        reason = "match" if bound < allowed else "mismatch" if least > allowed else "pre_asymptotic"
     else:
         reason = found.reason
     facts = {name: getattr(found, name, None) for name in SOLVER_FACTS["accurate"]}
     facts |= {"size": size, "accuracy": check.accuracy}
     sentence, advice = _words(check, found, reason, size, decides)
-    told = replace(found, status=REASONS[reason], reason=reason, sentence=sentence, advice=advice)
-    away = math.inf if bound is None or not asked > 0.0 else bound / asked
-    return told, facts, away
+    changed = replace(
+        found, status=REASONS[reason], reason=reason, sentence=sentence, advice=advice
+    )
+    away = math.inf if bound is None or not allowed > 0.0 else bound / allowed
+    return changed, facts, away
 
 
 def _words(
@@ -179,7 +181,7 @@ def _words(
 ) -> tuple[str, str]:
     """Return sentence and advice of a verdict on an error."""
     unit, of_size = (size, " of its size") if check.is_relative else (1.0, "")
-    asked = f"as asked ({number(check.accuracy, 3)}{of_size})"
+    accuracy = f"as asked ({number(check.accuracy, 3)}{of_size})"
     name, h = found.quantity, f"{found.size_name} = {number(found.levels[-1].h, 6)}"
     if reason == "non_finite":
         return found.sentence, found.advice
@@ -189,33 +191,33 @@ def _words(
             "Give `absolute:` in place of `relative:`.",
         )
     if not decides:
-        told = f"{name} may or may not be as accurate {asked}. {found.sentence}"
-        return told, found.advice or "Add a finer level."
+        finding = f"{name} may or may not be as accurate {accuracy}. {found.sentence}"
+        return finding, found.advice or "Add a finer level."
     error, bound = abs(found.error or 0.0) / unit, (found.error_bound or 0.0) / unit
     least = max(2.0 * error - bound, 0.0)
-    told = f"The error at {h} is {number(error, 2)}{of_size}"
+    finding = f"The error at {h} is {number(error, 2)}{of_size}"
     finer = f"Add a finer level, or change `{check.key}:`."
     if reason == "match":
-        return f"{name} is accurate {asked}. {told}, at most {at_most(bound)}.", ""
+        return f"{name} is accurate {accuracy}. {finding}, at most {at_most(bound)}.", ""
     if reason == "mismatch":
-        return f"{name} is not accurate {asked}. {told}, at least {number(least, 2)}.", finer
+        return f"{name} is not accurate {accuracy}. {finding}, at least {number(least, 2)}.", finer
     between = f"between {number(least, 2)} and {at_most(bound)}"
-    return f"{name} may or may not be as accurate {asked}. {told}, {between}.", finer
+    return f"{name} may or may not be as accurate {accuracy}. {finding}, {between}.", finer
 
 
 def expected(check: SolverCheck) -> str:
     """Say what a check expects."""
     if isinstance(check, SolverAccurateCheck):
         of_size = " of its size" if check.is_relative else ""
-        asked = f"accurate to {number(check.accuracy, 3)}{of_size}"
+        wanted = f"accurate to {number(check.accuracy, 3)}{of_size}"
     elif check.order is not None:
-        asked = f"order {check.order:g}"
+        wanted = f"order {check.order:g}"
     elif check.at_least is not None:
-        asked = f"order {check.at_least:g} at least"
+        wanted = f"order {check.at_least:g} at least"
     else:
-        asked = "an order that can be believed"
+        wanted = "an order that can be believed"
     expect = check.expect
     if (expect.status, expect.reason) == ("PASS", None):
-        return asked
+        return wanted
     reason = f" ({expect.reason})" if expect.reason else ""
-    return f"{asked}: {expect.status}{reason}"
+    return f"{wanted}: {expect.status}{reason}"

@@ -39,8 +39,8 @@ def explain(options: Namespace) -> int:
 def _lines(word: str) -> Iterator[str]:
     status = REASONS[word]
     yield f"{terminal.painted(word, 'bold')}: {terminal.painted(status, status)}"
-    for head, told in meanings(word):
-        yield from _paragraphs(told, head)
+    for head, text in meanings(word):
+        yield from _paragraphs(text, head)
     yield "\nMore: docs/verdicts.md, section Reasons"
 
 
@@ -52,10 +52,10 @@ def meanings(word: str) -> Iterator[tuple[str, Reason]]:
     own = EXPLAINED[word]
     yield "", own
     # what a kind of check means by the same word
-    told: dict[Reason, list[str]] = {}
+    kinds_of: dict[Reason, list[str]] = {}
     for kind in DECISIVE:
-        told.setdefault(reason(word, kind), []).append(f"`{kind}`")
-    for other, kinds in told.items():
+        kinds_of.setdefault(reason(word, kind), []).append(f"`{kind}`")
+    for other, kinds in kinds_of.items():
         if other != own:
             yield f"For {', '.join(kinds)}: ", other
     promised = reason(word, "converges", is_promised=True)

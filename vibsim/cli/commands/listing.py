@@ -83,8 +83,8 @@ def _models(models: Iterable[Model]) -> Iterable[tuple[str, str]]:
             shape = ""
         if model.formulas:
             shape = f"formulas {', '.join(row.name for row in model.formulas)}"
-        told = (f"{model.title}: {model.equation}", parameters, shape)
-        yield model.kind, "; ".join(filter(None, told))
+        parts = (f"{model.title}: {model.equation}", parameters, shape)
+        yield model.kind, "; ".join(filter(None, parts))
 
 
 def _schemes(schemes: Collection[Scheme]) -> Iterable[tuple[str, str]]:

@@ -114,9 +114,9 @@ def _film(plan: Plan, options: Namespace, form: str) -> Film:
         if level not in made:
             problem = f"level {level} is not made yet: {called(command_to_run(options.experiment))}"
             raise VibsimError(f"{plan.key}: {problem}")
-    asked = options.level or [made[-1]]
-    records = {level: level_member.of_level(plan, results, level, case) for level in asked}
-    record = records[asked[0]]
+    wanted_levels = options.level or [made[-1]]
+    records = {level: level_member.of_level(plan, results, level, case) for level in wanted_levels}
+    record = records[wanted_levels[0]]
     names = level_member.series(record)
     if not names:
         rest = f"run one member alone: {called(command_to_run(f'{options.experiment}@{case}'))}"
@@ -129,7 +129,7 @@ def _film(plan: Plan, options: Namespace, form: str) -> Film:
     def run(level: int, scheme: str) -> Run:
         return film.run(plan.experiment, records[level], scheme, quantity)
 
-    runs = [run(*pair) for pair in _pairs(asked, schemes)]
+    runs = [run(*pair) for pair in _pairs(wanted_levels, schemes)]
     if not (options.level or options.scheme) and len(made) > 1:
         records[made[0]] = level_member.of_level(plan, results, made[0], case)
         others = [run(made[0], scheme) for scheme in record.words("scheme")]

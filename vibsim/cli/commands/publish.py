@@ -161,11 +161,11 @@ def metadata(
 def _description(folder: Path, plan: Plan) -> str:
     summary = store.read_json(folder / plan.summary)
     passed = sum(check["status"] == "PASS" for check in summary["checks"])
-    told = [f"Results of the vibsim experiment {plan.key}."]
-    told += [f"{passed} of {len(summary['checks'])} checks passed: {summary['status']}."]
-    told += [f"Source: {plan.source}."] if plan.source else []
-    told += [f"Settings: {', '.join(plan.settings)}."] if plan.settings else []
-    return " ".join(told)
+    sentences = [f"Results of the vibsim experiment {plan.key}."]
+    sentences += [f"{passed} of {len(summary['checks'])} checks passed: {summary['status']}."]
+    sentences += [f"Source: {plan.source}."] if plan.source else []
+    sentences += [f"Settings: {', '.join(plan.settings)}."] if plan.settings else []
+    return " ".join(sentences)
 
 
 def _references(names: Iterable[str]) -> Any:

@@ -139,14 +139,14 @@ def _in_operators(stepper: Stepper, write: Callable[[Any], str], *, latex: bool)
     with suppress(ValueError):
         rows.append(", ".join(map(equation, operators.with_velocity(stepper))))
         yield "with v", rows[-1]
-    told = {
+    definitions = {
         _operator(name, latex=latex): re.sub(r"\^\(([^)]*)\)", r"^{\1}", means) if latex else means
         for name, means in operators.NOTATION.items()
     }
-    used = [name for name in told if any(f"{name} " in row for row in rows)]
+    used = [name for name in definitions if any(f"{name} " in row for row in rows)]
     yield (
         "operators",
-        "; ".join(f"{_at(f'[{x} u]', Fraction(0), latex=latex)} = {told[x]}" for x in used),
+        "; ".join(f"{_at(f'[{x} u]', Fraction(0), latex=latex)} = {definitions[x]}" for x in used),
     )
 
 

@@ -72,7 +72,7 @@ def verify(options: Namespace) -> int:
             status = supervise.child(command, is_heard=False)
             if status not in (0, 1):
                 return status
-        faults += sum(_tell_recomputed(plan, results, folder) for plan in plans)
+        faults += sum(_report_recomputed(plan, results, folder) for plan in plans)
     return 1 if faults else 0
 
 
@@ -165,15 +165,15 @@ def _tell_files(results: Path, key: str) -> int:
     return len(problems)
 
 
-def _tell_recomputed(plan: Plan, results: Path, folder: Path) -> int:
+def _report_recomputed(plan: Plan, results: Path, folder: Path) -> int:
     """Print which recomputed files differ from those that are there, and why; return how many."""
     causes = differences(plan, results, folder)
     for cause, names in causes.items():
         # data before pages, tables and figures
         names.sort(key=lambda name: (not name.endswith(".nc"), name))
         more = f" and {len(names) - SHOWN} more" if len(names) > SHOWN else ""
-        told = ", ".join(names[:SHOWN]) + more
-        print(clean(f"{plan.key}: recomputed, other bytes ({cause}): {told}"))
+        listed = ", ".join(names[:SHOWN]) + more
+        print(clean(f"{plan.key}: recomputed, other bytes ({cause}): {listed}"))
     if not causes:
         number = len(made_files.load(folder, plan.key))
         print(clean(f"{plan.key}: recomputed, all {number} files have the same bytes"))

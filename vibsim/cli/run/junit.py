@@ -69,9 +69,9 @@ def _check(suite: Element, entry: Entry, check: Entry) -> None:
         case = _case(suite, entry, check["id"])
         SubElement(case, "system-out").text = clean(check["text"])
         return
-    told = "\n".join(clean(text) for text in (check["text"], check["advice"]) if text)
+    details = "\n".join(clean(text) for text in (check["text"], check["advice"]) if text)
     message = f"{check['status']}: {check['reason']}"
-    _case(suite, entry, check["id"], "failure", str(check["reason"]), message, told)
+    _case(suite, entry, check["id"], "failure", str(check["reason"]), message, details)
 
 
 def _case(

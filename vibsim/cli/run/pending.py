@@ -19,7 +19,7 @@ _REASON = 200
 
 
 @contextmanager
-def told(results: Path, clear: Callable[[], None]) -> Iterator[None]:
+def reported(results: Path, clear: Callable[[], None]) -> Iterator[None]:
     """While this lasts, say on stderr how many jobs of a run wait and why, whenever that has changed.
 
     `clear` removes the line of the progress first.

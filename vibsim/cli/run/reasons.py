@@ -45,10 +45,10 @@ def why(plan: Plan, results: Path) -> str:
         made = read_provenance(results / plan.convergence)
     except FileError:
         return "not finished yet"
-    return _told(plan, made)
+    return _what_differs(plan, made)
 
 
-def _told(plan: Plan, made: Mapping[str, Any]) -> str:
+def _what_differs(plan: Plan, made: Mapping[str, Any]) -> str:
     found = differences(made["experiment"], analysed(plan.content))
     if not found:
         found = versions(plan, made)

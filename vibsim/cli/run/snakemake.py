@@ -208,7 +208,7 @@ def run(
         try:
             with ExitStack() as stack:
                 if progress and where.is_remote:
-                    stack.enter_context(pending.told(results, progress.clear))
+                    stack.enter_context(pending.reported(results, progress.clear))
                 ended = follow(events, progress)
             ended.status = _status(process)
         except supervise.Interrupted:

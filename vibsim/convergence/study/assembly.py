@@ -9,7 +9,7 @@ import numpy as np
 
 from vibsim.convergence.differences import orders_of_steps
 from vibsim.convergence.study.common_points import CommonValues
-from vibsim.convergence.study.outcomes import FEWEST, Asked, Outcome
+from vibsim.convergence.study.outcomes import FEWEST, Outcome, Request
 from vibsim.convergence.study.refinement import Refinement
 from vibsim.convergence.study.sentences import Setting, describe
 from vibsim.convergence.study.verdict import LadderVerdict, Level
@@ -22,7 +22,7 @@ ROUNDING_SAID = 0.1
 
 
 def verdict(
-    asked: Asked,
+    request: Request,
     steps: Refinement,
     common: CommonValues,
     one: Outcome,
@@ -33,12 +33,12 @@ def verdict(
     `shown` are the compared values, shape (n, *points), and the names of their dimensions.
     """
     h, (values, dims) = steps.h, shown
-    hidden = _hidden(asked, common, one)
+    hidden = _hidden(request, common, one)
     reason = "not_applicable" if hidden else one.reason
     best = _known(float(one.best[0])) if one.best is not None and not dims else None
     size = one.size if one.size > 0.0 else np.nan
     found = LadderVerdict(
-        quantity=asked.quantity,
+        quantity=request.quantity,
         status=REASONS[reason],
         reason=reason,
         order=_known(one.order),
@@ -54,8 +54,8 @@ def verdict(
         sentence="",
         advice="",
         levels=tuple(_table(one, h)),
-        expected=asked.order,
-        at_least=asked.at_least,
+        expected=request.order,
+        at_least=request.at_least,
         size_name=steps.names[0],
         is_exact_known=one.exact_known,
         dims=dims,
@@ -64,7 +64,7 @@ def verdict(
         best_values=None if one.best is None else one.best.reshape(values.shape[1:]),
     )
     setting = Setting(
-        noise=asked.noise or 0.0,
+        noise=request.noise or 0.0,
         sizes=steps.names,
         is_proportional=steps.is_proportional,
         interpolation=(common.kind, common.interpolation_order or 0) if hidden else None,
@@ -79,7 +79,7 @@ def _known(value: float) -> float | None:
     return float(value) if np.isfinite(value) else None
 
 
-def _hidden(asked: Asked, common: CommonValues, one: Outcome) -> bool:
+def _hidden(request: Request, common: CommonValues, one: Outcome) -> bool:
     """Say whether an order may be that of the interpolation: one that is at or above it cannot be believed."""
     if common.interpolation_order is None or not np.isfinite(one.order):
         return False
@@ -87,7 +87,7 @@ def _hidden(asked: Asked, common: CommonValues, one: Outcome) -> bool:
     if one.order < least or one.reason in ("exact", "non_finite"):
         return False
     # the error of the values falls at least as fast as that of values and interpolation together
-    enough = asked.at_least is not None and asked.at_least <= least
+    enough = request.at_least is not None and request.at_least <= least
     return not (enough and one.reason == "asymptotic")
 
 

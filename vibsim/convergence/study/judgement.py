@@ -10,7 +10,7 @@ import numpy as np
 from vibsim.convergence.study.assembly import verdict
 from vibsim.convergence.study.common_points import common_values, exact_values
 from vibsim.convergence.study.grid_values import GridValues, grid_values
-from vibsim.convergence.study.outcomes import Asked, outcomes
+from vibsim.convergence.study.outcomes import Request, outcomes
 from vibsim.convergence.study.refinement import refinement
 from vibsim.convergence.study.refusal import chosen, finite_number, refused
 from vibsim.convergence.study.verdict import LadderVerdict
@@ -198,7 +198,7 @@ def verdicts(
     fixed = levels[0].dims[:1] if members else ()
     common = common_values(levels, kind, dims, fixed)
     truth = None if exact is None else exact_values(exact, common, members=members)
-    asked = Asked(quantity or levels[0].name or "u", order, at_least, noise)
+    request = Request(quantity or levels[0].name or "u", order, at_least, noise)
     shape, n = common.values.shape[1:], len(steps.h)
     count, inner = (shape[0], shape[1:]) if members else (1, shape)
     ladders = np.swapaxes(common.values.reshape(n, count, -1), 0, 1)
@@ -206,9 +206,9 @@ def verdicts(
     shown = common.dims[1:] if members else common.dims
     # numbers near the ends of double precision: what cannot be said of them is not stated
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
-        found = outcomes(asked, steps.h, ladders, common.epsilon, limits)
+        found = outcomes(request, steps.h, ladders, common.epsilon, limits)
         return [
-            verdict(asked, steps, common, one, (ladder.reshape(n, *inner), shown))
+            verdict(request, steps, common, one, (ladder.reshape(n, *inner), shown))
             for one, ladder in zip(found, ladders, strict=True)
         ]
 

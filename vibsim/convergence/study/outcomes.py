@@ -25,7 +25,7 @@ SEEN = 0.1
 
 
 @dataclass(frozen=True)
-class Asked:
+class Request:
     """What a user asks of a ladder."""
 
     quantity: str
@@ -72,7 +72,7 @@ class Outcome:
 
 
 def outcomes(
-    asked: Asked, h: Floats, values: Floats, epsilon: Floats, exact: Floats | None
+    request: Request, h: Floats, values: Floats, epsilon: Floats, exact: Floats | None
 ) -> list[Outcome]:
     """Return what was decided of each member.
 
@@ -94,14 +94,14 @@ def outcomes(
     for pattern in np.unique(finite, axis=0):
         members = np.flatnonzero(np.all(finite == pattern, axis=1))
         truth = None if exact is None else exact[members]
-        some = _with_finite(asked, h, values[members], epsilon, truth, pattern)
+        some = _with_finite(request, h, values[members], epsilon, truth, pattern)
         found |= dict(zip(members.tolist(), some, strict=True))
     if exact is not None:
         for i, one in found.items():
             half = _rounding_of_exact(one, exact[i])
             if not half:
                 continue
-            (levels,) = _with_finite(asked, h, values[i : i + 1], epsilon, None, finite[i])
+            (levels,) = _with_finite(request, h, values[i : i + 1], epsilon, None, finite[i])
             is_better = one.reason == "wrong_limit" or levels.reason in (*DECIDED, "exact")
             if is_better and _agrees(levels, exact[i], half):
                 levels.agrees_to_digits = True
@@ -127,7 +127,7 @@ def _agrees(levels: Outcome, exact: Floats, half: float) -> bool:
 
 
 def _with_finite(
-    asked: Asked,
+    request: Request,
     h: Floats,
     values: Floats,
     epsilon: Floats,
@@ -144,11 +144,11 @@ def _with_finite(
     if not len(finite):
         return found
     part = values[:, finite]
-    measured = measurement(part, h[finite], epsilon[finite], asked.noise, exact)
+    measured = measurement(part, h[finite], epsilon[finite], request.noise, exact)
     decided = None
     if len(finite) >= FEWEST:
-        factor = STATED_NOISE_FACTOR if asked.noise else NOISE_FACTOR
-        question = Question(asked.order, asked.at_least, noise_factor=factor)
+        factor = STATED_NOISE_FACTOR if request.noise else NOISE_FACTOR
+        question = Question(request.order, request.at_least, noise_factor=factor)
         decided = assess(measured.ladder, question)
     for k, one in enumerate(found):
         truth = None if exact is None else exact[k]

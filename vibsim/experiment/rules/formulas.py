@@ -203,9 +203,9 @@ def _several(
             found[f"{row.name}.{name}"] = text.strip()
         taken.append(name)
     missing = [name for name in model.positions if name not in written]
-    # a name that is misspelt is told already
-    is_told = any(name not in model.positions for name in written)
-    if row.of == "coordinate" and missing and not is_told:
+    # a name that is misspelt is reported already
+    is_reported = any(name not in model.positions for name in written)
+    if row.of == "coordinate" and missing and not is_reported:
         report.add(path, f"must have a formula for each coordinate, has none for {_some(missing)}")
     return found
 

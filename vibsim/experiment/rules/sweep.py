@@ -80,7 +80,7 @@ def _is_wellformed(report: Report) -> bool:
     return not any(path[:1] == ("sweep",) for path in report.faulty)
 
 
-def _told(kind: Any) -> str:
+def _values_of_kind(kind: Any) -> str:
     """Name what a key takes that is no number; empty where it takes numbers."""
     if kind is StrictBool:
         return "true and false"
@@ -152,7 +152,7 @@ class SweepReader:
         kind = self._type(key, path)
         if kind is None:
             return False
-        if what := _told(kind):
+        if what := _values_of_kind(kind):
             rule = f"takes {what}, which cannot be drawn"
             self.report.add(path, rule, "sweep it by a list outside sample", at_key=True)
             return False
@@ -171,7 +171,7 @@ class SweepReader:
             found = self._entries(written, kind, path)
             is_flags = found is not None and kind is StrictBool
             return tuple(FLAGS[flag] for flag in found) if is_flags else found
-        if what := _told(kind):
+        if what := _values_of_kind(kind):
             hint = "" if kind is StrictBool else "choose from " + ", ".join(get_args(kind))
             self.report.add(path, f"must be a list of {what}", hint)
             return None

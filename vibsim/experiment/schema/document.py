@@ -233,10 +233,12 @@ class _Generator(GenerateJsonSchema):
     def model_schema(self, schema: Any) -> dict[str, Any]:
         found, kind = super().model_schema(schema), schema["cls"]
         kinds = (base for base in kind.mro() if issubclass(base, Section))
-        told = ChainMap(*(_texts_of_module(c.__module__).get(c.__name__, {}) for c in kinds))
+        descriptions = ChainMap(
+            *(_texts_of_module(c.__module__).get(c.__name__, {}) for c in kinds)
+        )
         for name, field in kind.model_fields.items():
-            if field.description is None and name in told:
-                found["properties"][field.alias or name]["description"] = told[name]
+            if field.description is None and name in descriptions:
+                found["properties"][field.alias or name]["description"] = descriptions[name]
         return found
 
 

@@ -245,8 +245,8 @@ def model_section(model: Model) -> type[Section]:
     fields: dict[str, Any] = {"kind": (Literal[model.kind], Field(description=model.title))}
     for row in model.parameters:
         description = f"{row.description} [{row.unit}]"
-        told = Field(default=row.default, description=description)
-        fields[row.name] = (_parameter_type(row), told)
+        default = Field(default=row.default, description=description)
+        fields[row.name] = (_parameter_type(row), default)
     if model.named is not None:
         words = "names of the coordinates; the velocity of x is vx, that of u alone v"
         several = Annotated[tuple[Text, ...], Field(min_length=1), short(MOST)]

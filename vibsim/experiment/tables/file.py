@@ -75,9 +75,9 @@ def _read(
 
 
 def _from_text(content: bytes, keys: tuple[str, str], names: tuple[str, str]) -> _Columns:
-    def choose(known: list[str], is_told: bool) -> list[int]:
+    def choose(known: list[str], may_list: bool) -> list[int]:
         pairs = zip(keys, names, strict=True)
-        return [_found(known, name, key, "column", is_told=is_told) for key, name in pairs]
+        return [_found(known, name, key, "column", may_list=may_list) for key, name in pairs]
 
     try:
         (place, value), lines = csv_text.read(content, choose, MOST_POINTS)
@@ -93,10 +93,10 @@ def _from_text(content: bytes, keys: tuple[str, str], names: tuple[str, str]) ->
     return place, value, lambda i: f"line {lines[i]}"
 
 
-def _found(names: list[str], name: str, key: str, word: str, *, is_told: bool = True) -> int:
-    """Return the number of the column `name`; `is_told`: a message may tell the others."""
+def _found(names: list[str], name: str, key: str, word: str, *, may_list: bool = True) -> int:
+    """Return the number of the column `name`; `may_list`: a message may list the others."""
     if name not in names:
-        hint = nearest(name, [known[:MOST_SHOWN] for known in names]) if is_told else ""
+        hint = nearest(name, [known[:MOST_SHOWN] for known in names]) if may_list else ""
         if len(names) > MOST_LISTED and not hint.startswith("did"):
             hint = f"it has {len(names)}"
         raise TableError(f"the table has no {word} '{name}'", hint, key)

@@ -86,8 +86,8 @@ class Assembly:
         else:
             lengths = {len(line) for line in row.rows if isinstance(line, tuple)}
             if len(lengths) > 1:
-                told = f"{min(lengths)} to {max(lengths)} numbers"
-                raise TableError(f"must have rows of one length, has {told}")
+                counts = f"{min(lengths)} to {max(lengths)} numbers"
+                raise TableError(f"must have rows of one length, has {counts}")
             found = np.array(row.rows, dtype=float)
         self.digests[key] = _digest(found), content
         return found
