@@ -31,7 +31,7 @@ HIGHEST = 12.0
 FAR_DOWN = 1.0
 """An interval that reaches further below its order holds a lower power of the expansion as well."""
 LAST_ORDERS = 4
-"""So many of the last orders are looked at, and told."""
+"""So many of the last orders are looked at and reported."""
 NEAR_DUE = 0.3
 """Orders this near to the one that is due need no word on where they go."""
 BACKWARD_DAMPING = "central_backward_damping"

@@ -11,7 +11,7 @@ from vibsim.core.vocabulary import AMPLITUDE, PHASE, TYPICAL_NORM
 APART = 0.5
 """Orders that differ by less are the same."""
 NEAR = 0.125
-"""How near to a whole or half order a stated one must be to be told."""
+"""How near to a whole or half order a stated one must be to be reported."""
 FROM_THE_START = 0.5
 """A shift is there from the start where that of the first step is at least this part of the largest."""
 NAMES = {1.0: "first", 2.0: "second", 3.0: "third", 4.0: "fourth", 5.0: "fifth", 6.0: "sixth"}

@@ -21,7 +21,7 @@ from vibsim.experiment.schema.checks import Measurement
 from vibsim.models.base import Model
 
 LONG = 120.0
-"""Seconds above which times are told in minutes, and sixty times that in hours."""
+"""Seconds above which times are written in minutes, and sixty times that in hours."""
 
 NOT_FINITE = (
     "{} has no meaning here, because the calculation produced a number that is not finite.",

@@ -23,7 +23,7 @@ Column = NDArray[Any]
 IN_BOX = 0.95
 """Part of the results that the box holds, at least."""
 BINS = 8
-"""A key's values are told in so many bins with the same number of members, or fewer."""
+"""A key's values are reported in so many bins with the same number of members, or fewer."""
 TELLING = 0.5
 """Ranges that hold no more than this part of all members say where something is."""
 MOST_KEYS = 2

@@ -162,7 +162,7 @@ def _believed(e: Evidence, judged: Flags) -> Decision:
             numbers=e.numbers[chosen],
             exact_known=bool(exact_known),
         )
-        # what is exact is told from the predicted round-off of the scheme
+        # what is exact is recognised by the predicted round-off of the scheme
         question = Question(
             expected=expected,
             tolerance=e.tolerance,

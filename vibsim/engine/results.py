@@ -61,7 +61,7 @@ class Extrema:
 
 @dataclass(frozen=True)
 class EventTimes:
-    """The events of members of a model that has some (`vibsim.models.events`); arrays of shape (case,) unless told."""
+    """The events of members of a model that has some (`vibsim.models.events`); arrays of shape (case,) unless noted."""
 
     event_count: Floats
     """All events, those for whose times there was no room among them."""

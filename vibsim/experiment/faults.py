@@ -73,7 +73,7 @@ class Report:
         self.faulty: set[Path_] = set()
         """Places of malformed values; nothing more is said about them."""
         self._repeated: set[Path_] = set()
-        """Places with an index of `repeat`; a fault is told for the first of its values."""
+        """Places with an index of `repeat`; a fault is reported for the first of its values."""
 
     def add(
         self, path: Path_, rule: str, hint: str = "", value: object = None, at_key: bool = False

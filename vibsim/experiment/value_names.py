@@ -50,7 +50,7 @@ class Value:
     needs_force: bool = False
     """Whether it is of whole periods of a force, whose frequency ``time:`` names."""
     is_sample: bool = False
-    """Whether it is a sample of a series, and is told by the name of that."""
+    """Whether it is a sample of a series, and is reported under the name of that."""
     is_count_of_work: bool = False
     """Whether finer levels make it larger, and no more accurate."""
     survives_failure: bool = False

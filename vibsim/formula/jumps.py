@@ -1,6 +1,6 @@
 """Where a formula has corners, jumps, and pulses between the times at which it is looked at, which no step knows of.
 
-A pulse is told from what steps see: between two times the formula leaves, by far, all values that it has at these and
+A pulse is recognised by what steps see: between two times the formula leaves, by far, all values that it has at these and
 at those beside them. Bounds of the formula over intervals of time (`vibsim.formula.arrays`) say where that may
 be: these are halved until a value is found there, or none can be.
 

@@ -140,6 +140,6 @@ def _by_trial(model: Model, t: Floats, initial: States, parameters: States) -> F
                 change = np.max(np.abs(moved[other] - undisturbed[other]), axis=-1)
                 unit = DISTURBANCE * whole[:, 0]
                 response = np.divide(change, unit, out=np.ones_like(change), where=unit > 0)
-                # where the exact solution is not known, nothing is told
+                # where the exact solution is not known, nothing is reported
                 found = np.fmax(found, response)
     return found

@@ -25,7 +25,7 @@ from vibsim.observe.common_grid import take
 from vibsim.observe.member_block import MemberBlock
 
 FIRST_LINE = 3
-"""The lowest line whose frequency is told: below it, a negative frequency is too near."""
+"""The lowest line whose frequency is reported: below it, a negative frequency is too near."""
 
 
 def lines(series: Floats) -> Floats:

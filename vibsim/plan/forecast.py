@@ -43,7 +43,7 @@ VARIABLE_BYTES, FEW_SERIES = 2 * 10**6, 12
 MOST_GAPS = 2**21
 """Of these at a time (`vibsim.observe.thresholds`)."""
 LONG_SECONDS = 5.0
-"""A reference that takes longer is told beforehand."""
+"""A reference that takes longer is announced."""
 
 MOST_REFERENCES = 1024
 """Members, of more no reference is computed (`vibsim.simulation.level`)."""
@@ -118,7 +118,7 @@ def other_seconds(experiment: Experiment, loads: Sequence[Load]) -> float:
 
 
 def notes(seconds: float, kind: str) -> tuple[tuple[int, str], ...]:
-    """Return what is told of a reference that takes so long, as a note without a line; nothing of a quick one."""
+    """Return what is said of a reference that takes so long, as a note without a line; nothing of a quick one."""
     if seconds < LONG_SECONDS:
         return ()
     text = f"a reference solution of {kind} is computed once, which takes about {seconds:.0f} s"

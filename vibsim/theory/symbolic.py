@@ -25,7 +25,7 @@ from vibsim.theory.phase_amplitude import Principal, principal, principal_mode
 POWERS = 9
 """Power of p from which on errors are not worked out."""
 TERMS = 4
-"""Terms of a series, in even powers of p, unless told."""
+"""Terms of a series, in even powers of p, unless noted."""
 
 
 def symbol(name: str) -> Any:

@@ -5,7 +5,7 @@ longer each time, so half of a minute goes by after a job of a minute. Here the 
 and with nothing else. A job is missed for a fifth of its time at most, and a scheduler gets one question a minute for
 jobs that take long.
 
-Why a job failed is lost in Snakemake where it is one of a group; here each of the group is told with the reason.
+Why a job failed is lost in Snakemake where it is one of a group; here each of the group is reported with the reason.
 
 An interrupt cancels all jobs under way. The interface of Snakemake leaves out those whose states it is just asking for.
 """
@@ -91,7 +91,7 @@ def cancel_all() -> None:
 
 
 def tell_reasons() -> None:
-    """Have every job that failed told with what its executor says of that, also where it is one of a group."""
+    """Have every job that failed reported with what its executor says of that, also where it is one of a group."""
 
     def print_job_error(
         self: RemoteExecutor, job_info: SubmittedJobInfo, msg: str | None = None, **more: Any

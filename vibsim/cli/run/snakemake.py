@@ -265,7 +265,7 @@ def follow(events: Iterable[bytes], progress: Progress | None = None) -> Outcome
     """Return what Snakemake did, from its events (`vibsim.cli.run.snakemake_process`) until there are no more."""
     found = Outcome()
     for line in events:
-        # one that a kill cut short is told by the status
+        # one that a kill cut short is recognised by the status
         if line.endswith(b"\n"):
             _take(json.loads(line), found, progress)
     return found

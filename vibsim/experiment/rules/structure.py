@@ -69,7 +69,7 @@ def _array(value: Any) -> ArraySpec:
     if isinstance(value, Mode):
         return ArraySpec(mode=value.mode, size=value.size)
     if isinstance(value, Mapping):
-        # what is no number of a degree of freedom is told of later
+        # what is no number of a degree of freedom is reported later
         entries = ((int(dof) if dof.isdigit() else 0, number) for dof, number in value.items())
         return ArraySpec(entries=tuple(sorted(entries)))
     return ArraySpec(rows=tuple(value))
