@@ -108,8 +108,8 @@ def describe(f: Found, check: EqualCheck) -> Description:
     what, other = f.notation.opening(f.notation.quantity(check.quantity)), other_solution(check)
     distance, allowed, number = f.fact("distance"), f.fact("allowed"), f.notation.number
     both = f"{what} of scheme {check.first} and {other}"
-    apart = f"at most {number(distance, 4)} apart"
-    brief = f"{apart}; {number(allowed, 4)} is allowed"
+    distance_text = f"at most {number(distance, 4)} apart"
+    brief = f"{distance_text}; {number(allowed, 4)} is allowed"
     enough = f"above {round_outward(distance, 2):.2g} if that is close enough"
     match f.reason:
         case "match":
@@ -123,7 +123,9 @@ def describe(f: Found, check: EqualCheck) -> Description:
             sentence = f"{NOTHING_MOVES.format(what)}. A comparison with {other} shows nothing."
             advice = MOVE
         case "not_applicable" if math.isfinite(distance):
-            sentence = f"{both} are {apart}, but the round-off to compare with is not known here."
+            sentence = (
+                f"{both} are {distance_text}, but the round-off to compare with is not known here."
+            )
             advice = f"Give `atol:`, {enough}."
         case "not_applicable":
             sentence = f"{what} and {other} cannot be compared here, or were not stored."

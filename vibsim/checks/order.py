@@ -175,9 +175,9 @@ def _more_levels(q: Comparison, judged: Judgement, order: Floats, tolerance: flo
         aim = np.where(np.abs(last - has) < np.abs(last - order), has, order)
         away = np.abs(orders - aim[..., None])
         promised = np.where(even_powers(q.block.experiment, q.name, q.block.columns), 0.25, 0.5)
-        seen = away[..., -1] / away[..., -2] if orders.shape[-1] > 1 else promised
+        observed = away[..., -1] / away[..., -2] if orders.shape[-1] > 1 else promised
         # what was seen once may be an accident; no power falls faster than the next one
-        factor = np.maximum(seen, promised)
+        factor = np.maximum(observed, promised)
         steps = np.ceil(np.log(tolerance / away[..., -1]) / np.log(factor)) + 1
         # an error that falls faster than the powers do is none of them
         known = early & np.isfinite(steps) & (last <= aim + MOST_ABOVE)

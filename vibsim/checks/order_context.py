@@ -110,7 +110,7 @@ class OrderContext:
         return float(record[name][place]) if name in record else math.nan
 
     @cached_property
-    def apart(self) -> float:
+    def rescaled_distance(self) -> float:
         """How far the finest two rescaled differences of the levels that decide are apart, over the finer one."""
         for i, finest in enumerate(self.levels[2:]):
             if finest == self.last:

@@ -354,10 +354,10 @@ class _Phrases(OrderContext):
         """Say whether the levels agree, or why the measured order is not yet the one that dominates."""
         if moved := higher_part(self.order, self.expected, self.tolerance):
             return f" {moved}"
-        if self.apart <= COINCIDE:
+        if self.rescaled_distance <= COINCIDE:
             return " The rescaled differences coincide."
         # the last point, which this norm leaves out, is part of the differences
-        if self.apart > COINCIDE and self.norm != "linf_interior":
+        if self.rescaled_distance > COINCIDE and self.norm != "linf_interior":
             return " The rescaled differences do not coincide yet."
         return ""
 

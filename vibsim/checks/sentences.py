@@ -124,13 +124,13 @@ def growth_in_words(f: Found, predicted: float, measured: float) -> str:
     theory = "predicted" if f.model.linear else "predicted for small oscillations"
     if len(f.model.positions) > 1:
         theory = "predicted for the fastest small oscillations"
-    seen = "measured"
+    word_of_measured = "measured"
     if not f.model.conservative:
         theory = "predicted for free oscillations without damping"
-        seen = "measured, with damping and forces"
+        word_of_measured = "measured, with damping and forces"
     phrases = [
         f"{f.notation.factor(value)} ({word})"
-        for value, word in ((predicted, theory), (measured, seen))
+        for value, word in ((predicted, theory), (measured, word_of_measured))
         if not math.isnan(value)
     ]
     return f" The growth factor per period is {' and '.join(phrases)}." if phrases else ""

@@ -113,10 +113,10 @@ def _measured_growth(block: MemberBlock, level: int) -> Floats:
 def _differs(block: MemberBlock, index: int, measured: Floats, expected: Floats) -> Flags:
     periods = predicted_oscillation.natural_frequency(block) * block.group.end / (2.0 * np.pi)
     with np.errstate(divide="ignore", invalid="ignore"):
-        apart = np.abs(np.log(measured) - np.log(expected)) * periods
+        distance = np.abs(np.log(measured) - np.log(expected)) * periods
         whole = np.log(expected) * periods
     late = np.log(4.0 + 2.0 * block.grid.steps[index])
-    return np.asarray(apart > NEAR * np.abs(whole) + late)
+    return np.asarray(distance > NEAR * np.abs(whole) + late)
 
 
 def judge(experiment: Experiment, record: Record, check: StableCheck, found: Measured) -> Judged:

@@ -327,8 +327,8 @@ def _digits(f: Found, check: ValueCheck) -> int:
     if not (math.isfinite(found) and found != 0.0 and room > 0.0):
         return MOST_DIGITS
     # a whole number is not rounded
-    whole, apart = (math.log10(abs(found) / unit) for unit in (1.0, room))
-    return min(max(FEWEST_DIGITS, 1 + math.floor(whole), 2 + math.ceil(apart)), MOST_DIGITS)
+    whole, finer = (math.log10(abs(found) / unit) for unit in (1.0, room))
+    return min(max(FEWEST_DIGITS, 1 + math.floor(whole), 2 + math.ceil(finer)), MOST_DIGITS)
 
 
 def _measured(f: Found, check: ValueCheck, digits: int = MOST_DIGITS) -> str:

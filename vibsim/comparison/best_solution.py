@@ -68,8 +68,8 @@ def extrapolated(
     group = members(experiment, int(finest["case"][0]), int(finest["case"][-1]) + 1)
     states = [state.name for state in experiment.model.definition.states]
     levels = [tuple(take(grid, records[level], name) for name in states) for level in grid.levels]
-    every = [grid.apart * n // grid.steps[0] for n in grid.steps]
-    t = (np.arange(len(grid.t)) * grid.apart / grid.steps[0])[:, None]
+    every = [grid.stride * n // grid.steps[0] for n in grid.steps]
+    t = (np.arange(len(grid.t)) * grid.stride / grid.steps[0])[:, None]
     rows = []
     for i in experiment.ladder:
         parts = []

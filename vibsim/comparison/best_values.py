@@ -133,9 +133,9 @@ def _missed(
     """
     model, data, near = place.block.model, place.block.finest, ORDER_ABOVE_ROUND_OFF * floor
     p = np.minimum(place.block.omega_dt[:, -1], 1.0)
-    apart = np.abs(np.diff(values[..., -3:], axis=-1))
+    changes = np.abs(np.diff(values[..., -3:], axis=-1))
     with np.errstate(invalid="ignore"):
-        same = np.all(apart <= near[..., -1:], axis=-1)
+        same = np.all(changes <= near[..., -1:], axis=-1)
         states = dict(zip(model.positions, model.velocities, strict=True))
         speed = states.get(place.quantity, "")
         if name in ("min", "max") and speed in data and place.quantity in data:

@@ -14,8 +14,8 @@ from vibsim.observe.member_block import MemberBlock, energy_at_start
 def comparisons(block: MemberBlock, names: tuple[str, ...]) -> Compared:
     """Compare quantities between the levels of a part."""
     positions = block.model.positions
-    apart = error_parts_to_compare(block, names)
-    names = tuple(name for name in names if name not in apart)
+    error_parts = error_parts_to_compare(block, names)
+    names = tuple(name for name in names if name not in error_parts)
     values = {name: block.series(name) for name in dict.fromkeys((*positions, *names))}
     # of the energy what it was plus what became of it
     became = solution_size(block.series("energy_deviation"))
@@ -40,4 +40,4 @@ def comparisons(block: MemberBlock, names: tuple[str, ...]) -> Compared:
             scale=scale,
             blur=np.zeros_like(floor),
         )
-    return found | parts_of_errors(block, found, apart)
+    return found | parts_of_errors(block, found, error_parts)

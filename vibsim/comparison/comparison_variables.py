@@ -111,12 +111,12 @@ def _index(q: Comparison, norm: str, change: Floats) -> Floats:
     """
     levels = q.block.grid.levels
     promised = np.where(np.isfinite(q.order), q.order, ORDINARY_ORDER)
-    seen = np.full(q.block.shape, np.nan)
+    observed = np.full(q.block.shape, np.nan)
     if len(levels) > 2:
-        seen = q.observed_orders(norm)[..., -1]
-    if change.ndim > seen.ndim:
-        promised, seen = promised[..., None], seen[..., None]
-    return of_order(change, levels[-1] - levels[-2], seen, promised)
+        observed = q.observed_orders(norm)[..., -1]
+    if change.ndim > observed.ndim:
+        promised, observed = promised[..., None], observed[..., None]
+    return of_order(change, levels[-1] - levels[-2], observed, promised)
 
 
 def in_precision(q: Comparison, values: Floats) -> NDArray[np.floating]:

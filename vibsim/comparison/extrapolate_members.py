@@ -237,9 +237,9 @@ def _distance_of_twin(
     twin = level_at(method, start, steps, every, method.twin, threads=threads, lane=lane)
     u, v = level
     du, dv = twin[0][: len(u)] - u, twin[1][: len(u)] - v
-    apart = np.fmax(np.abs(du), np.abs(dv) / rate_of(start))
+    distance = np.fmax(np.abs(du), np.abs(dv) / rate_of(start))
     predicted = (method.scheme.round_off(o, steps) for o in (method.options, method.twin))
-    return np.asarray(np.fmax.accumulate(apart, axis=0) / max(predicted))
+    return np.asarray(np.fmax.accumulate(distance, axis=0) / max(predicted))
 
 
 def extrapolate_members(

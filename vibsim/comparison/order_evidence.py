@@ -17,7 +17,7 @@ from functools import partial
 import numpy as np
 
 from vibsim.apriori.roundoff_floor import SPACING_AT_ONE, norm_of_floor
-from vibsim.comparison.parting import FAR_APART
+from vibsim.comparison.parting import FAR
 from vibsim.comparison.quantity_comparison import Compared, Comparison
 from vibsim.comparison.thresholds import STRAIGHT, THEORY_ROUNDING, VANISHING_RATE
 from vibsim.convergence.differences import largest, safe_ratio
@@ -269,7 +269,7 @@ def _causes_unseen(
         if q.block.stored_floor[-1] > 0.0:
             found[lost] = STORED
         if q.name in (state.name for state in q.block.model.states):
-            found[lost & (e.difference[..., -1] >= FAR_APART * e.size)] = PARTED
+            found[lost & (e.difference[..., -1] >= FAR * e.size)] = PARTED
             found[lost & (e.size <= ROUND_OFF_SAFETY * e.relative_floor * e.scale)] = ZERO
         found[unseen & at_rest(e)] = STILL
         found[coarse & unresolved(e) & (found == NONE)] = DECAY

@@ -16,7 +16,7 @@ from vibsim.convergence.differences import largest
 from vibsim.core.array_types import Flags, Floats
 from vibsim.schemes.base import UNIT_ROUND_OFF
 
-FAR_APART = 0.01
+FAR = 0.01
 """Levels have parted where they differ by this part of the quantity. [convention]"""
 HIGHEST_POWER = 8.0
 """What grows faster than this power of the time grows like an exponential. [convention]"""
@@ -39,13 +39,13 @@ def parting(q: Comparison, where: Flags) -> Floats:
     part = np.asarray(q.block.grid.t) / q.block.grid.t[-1]
     size = largest(q.values[-1])
     for scheme, case in zip(*np.nonzero(where), strict=True):
-        apart = np.maximum.accumulate(np.abs(q.differences[-1][scheme, case]))
-        far = np.flatnonzero(apart >= FAR_APART * size[scheme, case])
+        distance = np.maximum.accumulate(np.abs(q.differences[-1][scheme, case]))
+        far = np.flatnonzero(distance >= FAR * size[scheme, case])
         if not len(far):
             continue
-        half = apart[np.searchsorted(part, part[far[0]] / 2.0)]
+        half = distance[np.searchsorted(part, part[far[0]] / 2.0)]
         time = part[far[0]] * np.ravel(q.block.group.end)[case]
-        growth = math.log(apart[far[0]] / half) if 0.0 < half < math.inf else 0.0
+        growth = math.log(distance[far[0]] / half) if 0.0 < half < math.inf else 0.0
         if growth > HIGHEST_POWER * math.log(2.0):
             found[scheme, case] = time, 2.0 * growth / time
     return found
@@ -53,6 +53,6 @@ def parting(q: Comparison, where: Flags) -> Floats:
 
 def levels_to_the_end(time: float, rate: float, end: float, order: float) -> float:
     """Return how many finer levels of an order agree to the end; infinite where rounding makes every level part."""
-    if rate * end > math.log(FAR_APART / UNIT_ROUND_OFF):
+    if rate * end > math.log(FAR / UNIT_ROUND_OFF):
         return math.inf
     return math.ceil(rate * (end - time) / (order * math.log(2.0)))

@@ -80,7 +80,7 @@ def value(name: str, place: Place) -> Floats:
 def samples(p: Place) -> list[Floats]:
     """Return the value of a series at a common time, by default the last one, at every level."""
     q, grid = p.comparison(), p.block.grid
-    index = _index(p, grid.t, grid.apart)
+    index = _index(p, grid.t, grid.stride)
     if q is None or index is None:
         return [p.missing for _ in p.levels]
     return [values[..., index] for values in q.values]

@@ -155,8 +155,8 @@ def _would_show(e: Evidence, moved: Floats) -> Flags:
     # of what grew without bound nothing is said
     with np.errstate(invalid="ignore"):
         visible = ordinary * e.size >= th.VISIBLE_ERROR * e.blur[..., 0]
-    seen = ordinary >= th.VISIBLE_ERROR * th.ABOVE_ROUND_OFF * e.relative_floor
-    return np.asarray(seen & visible)
+    is_large = ordinary >= th.VISIBLE_ERROR * th.ABOVE_ROUND_OFF * e.relative_floor
+    return np.asarray(is_large & visible)
 
 
 def unresolved(e: Evidence) -> Flags:

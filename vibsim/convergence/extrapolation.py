@@ -205,15 +205,15 @@ def extrapolate_series(
         if n == 3:
             return first[-1] + np.where(even, second, every)[..., None] * change, so_far(change)
         before = first[-2] - first[-3]
-        seen = _seen_fall(before, change)
+        fall = _seen_fall(before, change)
         slow, quick = (of_orders(levels, order, q, lambda s: s[3][1].change_fall) for q in (1, 2))
-        is_even = np.nan_to_num(seen, nan=2.0) > np.sqrt(quick * slow)
+        is_even = np.nan_to_num(fall, nan=2.0) > np.sqrt(quick * slow)
         value = first[-1] + np.where(is_even, second, every)[..., None] * change
         most = np.where(even, quick, slow)
-        factor = np.clip(np.nan_to_num(seen, nan=2.0), 2.0, np.maximum(most, 2.0))
+        factor = np.clip(np.nan_to_num(fall, nan=2.0), 2.0, np.maximum(most, 2.0))
         # a change that fell faster than any term falls is one that happens to vanish here: trust the one before it
         expected = so_far(before) / np.maximum(slow, 2.0)[..., None]
-        vanishing = seen > most * SERIES_SAFETY
+        vanishing = fall > most * SERIES_SAFETY
         size = np.maximum(so_far(change), np.where(vanishing[..., None], expected, 0.0))
         factor = np.where(vanishing, np.minimum(factor, np.maximum(slow, 2.0)), factor)
         return value, np.asarray(error_left(SERIES_SAFETY * size, factor[..., None]))

@@ -76,27 +76,27 @@ def index(values: Floats, levels: Sequence[int], order: Floats, kinds: Codes) ->
         if n == 2:
             return np.asarray(error_left(th.GCI_CAUTIOUS * change, gap_ratio(promised, gap)))
         last = -np.diff(values[..., -3:], axis=-1)
-        seen = order_of_ratio(safe_ratio(last[..., 0], last[..., 1]), levels[-3:])
-        regular = of_order(change, gap, seen, promised)
+        observed = order_of_ratio(safe_ratio(last[..., 0], last[..., 1]), levels[-3:])
+        regular = of_order(change, gap, observed, promised)
         rough = _fitted(values, levels, promised) if n > 3 else _range(values)
         exact = (kinds == ROUND_OFF) & (change == 0.0)
-        sure = _agrees(seen, promised)
+        sure = _agrees(observed, promised)
         cautious = np.fmax(regular, rough) if n > 3 else regular
         regular = np.where(sure, regular, cautious)
-        return np.where(exact, 0.0, np.where(seen > 0, regular, rough))
+        return np.where(exact, 0.0, np.where(observed > 0, regular, rough))
 
 
-def of_order(change: Floats, gap: int, seen: Floats, promised: Floats) -> Floats:
+def of_order(change: Floats, gap: int, observed: Floats, promised: Floats) -> Floats:
     """Return ``F |change|/(r^p - 1)`` of two levels, from observed and promised order; NaN for one not known."""
-    agrees = _agrees(seen, promised)
+    agrees = _agrees(observed, promised)
     factor = np.where(agrees, th.GCI_TRUSTED, th.GCI_CAUTIOUS)
-    capped = np.clip(np.where(np.isfinite(seen), seen, promised), th.GCI_LEAST_ORDER, None)
+    capped = np.clip(np.where(np.isfinite(observed), observed, promised), th.GCI_LEAST_ORDER, None)
     p = np.where(agrees, promised, np.minimum(capped, promised))
     return np.asarray(error_left(factor * change, gap_ratio(p, gap)))
 
 
-def _agrees(seen: Floats, promised: Floats) -> Flags:
-    return np.asarray(np.abs(seen - promised) <= th.GCI_AGREES * promised)
+def _agrees(observed: Floats, promised: Floats) -> Flags:
+    return np.asarray(np.abs(observed - promised) <= th.GCI_AGREES * promised)
 
 
 def relative(index: Floats, value: Floats, scale: Floats) -> Floats:

@@ -82,11 +82,12 @@ def _limit(
         unsure = np.where(np.isnan(bound), np.inf, bound)
         best = Limit(values[..., -1].copy(), unsure, finest, finest.copy())
         if n > 2:
-            seen = observed_order(values, levels, floor)
+            observed = observed_order(values, levels, floor)
             # a number whose error changes its sign falls fast by accident, and not at two triples alike
             earlier = observed_order(values[..., :-1], levels[:-1], floor[..., :-1])
             p = _leading(
-                np.where(earlier < seen - th.OTHER_ORDER, np.fmin(seen, order), seen), order
+                np.where(earlier < observed - th.OTHER_ORDER, np.fmin(observed, order), observed),
+                order,
             )
             best = _extrapolated(values, levels, p, np.where(even, 2, 1), floor, best)
     known = np.isfinite(best.bound) & np.isfinite(best.value)
@@ -110,11 +111,11 @@ def triple_at(values: Floats, floor: Floats, i: int) -> tuple[tuple[Floats, Floa
         return (first, second), (np.abs(second) > noise) & (np.abs(first) > noise)
 
 
-def _leading(seen: Floats, promised: Floats) -> Floats:
+def _leading(observed: Floats, promised: Floats) -> Floats:
     """Return the order to extrapolate with: the promised one, or another one that the levels show."""
     p = np.where(np.isfinite(promised), promised, th.ORDINARY_ORDER)
-    likely = np.clip(np.round(2.0 * seen) / 2, 0.5, th.HIGHEST_ORDER)
-    other = (np.abs(seen - p) > th.OTHER_ORDER) & (np.abs(seen - likely) <= th.NEAR_HALF)
+    likely = np.clip(np.round(2.0 * observed) / 2, 0.5, th.HIGHEST_ORDER)
+    other = (np.abs(observed - p) > th.OTHER_ORDER) & (np.abs(observed - likely) <= th.NEAR_HALF)
     return np.where(other, likely, p)
 
 
@@ -174,7 +175,7 @@ class _Rows:
         self.safety_alone = th.SAFETY_OF_THREE if few else th.NUMBER_SAFETY_ALONE
         self.least_part = th.LEAST_SHARE_OF_THREE if few else th.LEAST_SHARE
 
-    def _apart(self, j: int, i: int) -> Floats:
+    def _misfit_of_ratio(self, j: int, i: int) -> Floats:
         """Return how far the ratio of the changes of column j at rows i - 1 and i is from that of its power."""
         wanted = self.scheme[i][j].change_fall
         return np.abs(self.changes[i - 1][j] / (self.changes[i][j] * wanted) - 1.0)
@@ -184,9 +185,9 @@ class _Rows:
         if i < j + 2:
             return np.zeros(self.floor.shape[:-1], dtype=bool)
         alone = i == j + 2
-        agrees = self._apart(j, i) <= (self.agrees_alone if alone else th.RATIO_AGREES)
+        agrees = self._misfit_of_ratio(j, i) <= (self.agrees_alone if alone else th.RATIO_AGREES)
         if not alone:
-            agrees &= self._apart(j, i - 1) <= th.RATIO_BEFORE_AGREES
+            agrees &= self._misfit_of_ratio(j, i - 1) <= th.RATIO_BEFORE_AGREES
         return np.asarray(agrees)
 
     def _error(self, j: int, i: int) -> Floats:

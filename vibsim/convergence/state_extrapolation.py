@@ -209,11 +209,11 @@ def _next_row(
         if entry.change_fall:
             fall = row.changes[j] / (change * entry.change_fall) + _TINY
             trust = of.smaller(of.smaller(fall, 1.0 / fall), trust)
-            seen = fall == fall
+            is_known = fall == fall
         if j or entry.change_fall:
             left = error_left(change, of.larger(entry.fall * trust, th.LEAST_FALL))
         if j == 0 and entry.change_fall:
-            left = of.choose(seen, left, change)
+            left = of.choose(is_known, left, change)
         if j > 1:
             gain = of.smaller(entry.coarser * lefts[-1] / lefts[-2], 1.0)
             left = of.larger(lefts[-1] * gain, left)

@@ -1,8 +1,8 @@
 """Where a formula has corners, jumps, and pulses between the times at which it is looked at, which no step knows of.
 
-A pulse is recognised by what steps see: between two times the formula leaves, by far, all values that it has at these and
-at those beside them. Bounds of the formula over intervals of time (`vibsim.formula.arrays`) say where that may
-be: these are halved until a value is found there, or none can be.
+A pulse is recognised by what steps see: between two times the formula leaves, by far, all values that it has at these
+and at those beside them. Bounds of the formula over intervals of time (`vibsim.formula.arrays`) say where that may be:
+these are halved until a value is found there, or none can be.
 
 The derivative of a formula leaves jumps out, so that its integral is not the difference of the formula. Over a piece of
 time [a, b] the difference D of ``f(b) - f(a)`` and the integral of f' vanishes for a continuous f and a piece that is
@@ -147,11 +147,13 @@ def _limits(formula: Expression, numbers: Mapping[str, Floats], t: Floats) -> tu
     around = np.arange(count)[:, None] + np.array([-1, 0, 1, 2])
     places = np.take(t, np.clip(around, 0, count), axis=1)
     own = {name: np.broadcast_to(x, (len(t), count))[..., None] for name, x in numbers.items()}
-    seen = np.broadcast_to(values(formula, {**own, "t": places}), places.shape)
+    beside = np.broadcast_to(values(formula, {**own, "t": places}), places.shape)
     # behind the last time of a member nothing is known
-    seen = np.where(np.isfinite(places), seen, seen[..., 1:2])
-    low, high = np.min(seen, axis=-1), np.max(seen, axis=-1)
-    size = np.nanmax(np.abs(np.where(np.isfinite(seen), seen, np.nan)), axis=(1, 2), initial=0.0)
+    beside = np.where(np.isfinite(places), beside, beside[..., 1:2])
+    low, high = np.min(beside, axis=-1), np.max(beside, axis=-1)
+    size = np.nanmax(
+        np.abs(np.where(np.isfinite(beside), beside, np.nan)), axis=(1, 2), initial=0.0
+    )
     room = PULSE_RATIO * (high - low) + SMALLEST_PULSE * size[:, None]
     return (low - room).ravel(), (high + room).ravel()
 

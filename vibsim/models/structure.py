@@ -146,8 +146,8 @@ class Structure:
         found = np.zeros(self.dofs)
         if self.damping is not None:
             between = self.modes.shapes.T @ (self.damping.sparse @ self.modes.shapes)
-            apart = between - np.diag(np.diag(between))
-            if np.max(np.abs(apart)) > UNCOUPLED * np.max(np.abs(between), initial=0.0):
+            coupling = between - np.diag(np.diag(between))
+            if np.max(np.abs(coupling)) > UNCOUPLED * np.max(np.abs(between), initial=0.0):
                 return None
             found += 0.5 * np.diag(between)
         if self.ratios:
@@ -324,8 +324,8 @@ class Loaded:
                 )
                 loads.append((push * amplitude * np.exp(1j * phase), angular))
         q, v = mode_motion(t, w, d, (start[0], start[1]), loads)
-        seen = own.observed @ modes.shapes
-        return np.concatenate([seen @ q, seen @ v])
+        shapes = own.observed @ modes.shapes
+        return np.concatenate([shapes @ q, shapes @ v])
 
     def start(self, parameters: Numbers) -> dict[str, Any]:
         """Return the observed displacements and velocities at t = 0; see `vibsim.models.Model.start`."""

@@ -39,17 +39,17 @@ class Grid:
     strides: tuple[int, ...]  # distance between common points, in stored samples of each level
     t: Floats  # common times, shape (t,); fractions of the end where that differs between members
     dt: Floats  # shape (level, case), with one case where all members have the same
-    apart: int  # distance between common points, in steps of the coarsest level
+    stride: int  # distance between common points, in steps of the coarsest level
     end_included: bool  # whether the last common point is the end of the time interval
 
     @property
     def spacing(self) -> Floats:
         """Distance between common points in time, shape (case,) or (1,)."""
-        return np.asarray(self.dt[0] * self.apart, dtype=np.float64)
+        return np.asarray(self.dt[0] * self.stride, dtype=np.float64)
 
     def times(self, end: Floats) -> Floats:
         """Return the common times of members that end at `end`, shape (case, t): the bits of those in level files."""
-        number = self.apart * np.arange(len(self.t), dtype=np.int64)
+        number = self.stride * np.arange(len(self.t), dtype=np.int64)
         return number * (end / self.steps[0])[:, None]
 
 
@@ -65,8 +65,8 @@ def common_grid(records: Mapping[int, Record]) -> Grid:
     every = tuple(whole(records[level], "every") for level in levels)
     unit = math.lcm(*steps)
     spacings = [e * (unit // n) for e, n in zip(every, steps, strict=True)]
-    apart = math.lcm(*spacings)
-    strides = tuple(apart // spacing for spacing in spacings)
+    stride = math.lcm(*spacings)
+    strides = tuple(stride // spacing for spacing in spacings)
     count = min((np.size(records[lv]["t"]) - 1) // s for lv, s in zip(levels, strides, strict=True))
     if count < 1:
         raise VibsimError(f"levels {list(levels)} have fewer than two stored times in common")
@@ -76,8 +76,8 @@ def common_grid(records: Mapping[int, Record]) -> Grid:
         strides=strides,
         t=np.asarray(records[levels[0]]["t"][: count * strides[0] + 1 : strides[0]], dtype=float),
         dt=np.stack([_step(records[level]) for level in levels]),
-        apart=strides[0] * every[0],
-        end_included=count * apart == unit,
+        stride=strides[0] * every[0],
+        end_included=count * stride == unit,
     )
 
 

@@ -216,13 +216,13 @@ def fit_recurrence(position: Floats) -> Recurrence:
         # orthogonal first, for two roots of which one has nearly left the other behind
         c = np.sum(level * level, axis=-1)
         share, by_level = (np.sum(level * x, axis=-1) / c for x in (slope, bend))
-        apart = slope - share[..., None] * level
+        difference = slope - share[..., None] * level
         rest = bend - by_level[..., None] * level
-        square = np.sum(apart * apart, axis=-1)
-        by_slope = np.sum(apart * rest, axis=-1) / square
+        square = np.sum(difference * difference, axis=-1)
+        by_slope = np.sum(difference * rest, axis=-1) / square
         by_level = by_level - by_slope * share
         is_plane = square > th.SINGULAR * np.sum(slope * slope, axis=-1)
-        both = is_plane & _is_small(rest - by_slope[..., None] * apart)
+        both = is_plane & _is_small(rest - by_slope[..., None] * difference)
         # x - 1 = z solves z^2 - (by_slope + by_level) z - by_level = 0
         log_growth, angle = _roots(by_slope + by_level, by_level)
         # where one root has left all others behind, u^(n+1) = x u^n

@@ -69,8 +69,8 @@ def section_period(block: MemberBlock, level: int) -> Floats:
     found = np.zeros(block.shape)
     size = np.max(np.abs(rows), axis=-1, initial=0.0)
     for k in range(rows.shape[-1] // 2, 0, -1):
-        apart = np.max(np.abs(rows[..., k:] - rows[..., :-k]), axis=-1)
-        found = np.where((apart <= SAME_STATE * size).all(axis=0), float(k), found)
+        distance = np.max(np.abs(rows[..., k:] - rows[..., :-k]), axis=-1)
+        found = np.where((distance <= SAME_STATE * size).all(axis=0), float(k), found)
     return np.where(np.isfinite(rows).all(axis=(0, -1)) & (rows.shape[-1] >= 2), found, np.nan)
 
 

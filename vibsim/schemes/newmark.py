@@ -99,8 +99,8 @@ def _hht(options: Options) -> tuple[str, ...]:
 def _generalized_alpha(options: Options) -> tuple[str, ...]:
     rho = repr(options["rho_inf"])
     alpha_m, alpha_f = f"(2*{rho} - 1)/({rho} + 1)", f"{rho}/({rho} + 1)"
-    apart = f"({alpha_f} - {alpha_m})"
-    return f"(1 + {apart})**2/4", f"1/2 + {apart}", alpha_m, alpha_f
+    difference = f"({alpha_f} - {alpha_m})"
+    return f"(1 + {difference})**2/4", f"1/2 + {difference}", alpha_m, alpha_f
 
 
 @dataclass(frozen=True)

@@ -221,11 +221,11 @@ def _split(found: Complexes, before: Complexes) -> tuple[Complexes, Complexes]:
     pairs, rest = _pairs(found.shape[-1])
     first, second = found[:, pairs[:, 0]], found[:, pairs[:, 1]]
     a, b = before[:, :1], before[:, 1:]
-    apart = np.minimum(
+    distance = np.minimum(
         np.abs(first - a) + np.abs(second - b), np.abs(first - b) + np.abs(second - a)
     )
     is_pair = np.abs((first + second).imag) <= 1e-12 * (np.abs(first) + np.abs(second))
-    best = np.argmin(np.where(is_pair, apart, np.inf), axis=-1)
+    best = np.argmin(np.where(is_pair, distance, np.inf), axis=-1)
     return (
         np.take_along_axis(found, pairs[best], axis=-1),
         np.take_along_axis(found, rest[best], axis=-1),

@@ -81,10 +81,10 @@ def error_series(stepper: Stepper) -> tuple[Any, Any]:
         return np.array([sum(a[: k + 1] * b[k::-1]) for k in range(POWERS)], dtype=object)
 
     # the motion is the real part of B exp(i w t) exp(apart), where apart vanishes with p
-    apart = row(mode.rate) * turned, row(mode.frequency - 1.0) * turned
+    factors = row(mode.rate) * turned, row(mode.frequency - 1.0) * turned
     power = total = row(mode.position[0]), -row(mode.slope[0] / mode.frequency)
     for k in range(1, POWERS):
-        (a, b), (c, d) = power, apart
+        (a, b), (c, d) = power, factors
         power = (product(a, c) - product(b, d)) / k, (product(a, d) + product(b, c)) / k
         total = total[0] + power[0], total[1] + power[1]
     along, beside = total[0] * -1, total[1]

@@ -221,7 +221,7 @@ def story(**changes: Any) -> _Phrases:
         "readable": -1,
         "compensated": -1,
         "orders": (),
-        "apart": 0.01,
+        "rescaled_distance": 0.01,
         "failures": (),
         "notation": PLAIN,
         "cost": lambda levels: f"{len(levels)} levels",
@@ -282,7 +282,7 @@ def test_a_measured_order_away_from_the_one_that_dominates_is_explained(
     ],
 )
 def test_only_differences_that_coincide_are_told_to(apart: float, norm: str, told: str) -> None:
-    text = tell(story(reason="asymptotic", order=2.0, apart=apart, norm=norm))
+    text = tell(story(reason="asymptotic", order=2.0, rescaled_distance=apart, norm=norm))
     assert told in text
     assert ("coincide" in text) == bool(told)
 

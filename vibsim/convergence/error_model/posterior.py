@@ -299,8 +299,8 @@ class _Fit:
         falls = between(sizes**order)
         own = np.sqrt(np.diagonal(self.differences, axis1=1, axis2=2)[:, end - 1 :])
         expected = np.maximum(own[:, :1] * falls[:, 1:] / falls[:, :1], TINY)
-        seen = np.max(own[:, 1:], axis=-1, initial=0.0)
-        size = np.maximum(seen, self.ladder.floor[:, end])[:, None]
+        largest = np.max(own[:, 1:], axis=-1, initial=0.0)
+        size = np.maximum(largest, self.ladder.floor[:, end])[:, None]
         return np.asarray(self.points * np.sum(np.fmin(np.log(size / expected), 0.0), axis=-1))
 
     def behind(self, start: int, end: int) -> Floats:

@@ -110,12 +110,12 @@ def _plain_ticks(ax: Axes, h: Floats) -> None:
     """Label the step sizes themselves, and powers of ten as plain text."""
     from matplotlib.ticker import FixedLocator, FuncFormatter, LogLocator, NullLocator
 
-    apart = [h[-1]]
+    ticks = [h[-1]]
     for size in h[::-1]:
         # labels of neighbours that are too near would lie on each other
-        if np.log10(size / apart[-1]) > 0.12 * np.log10(h[0] / h[-1]):
-            apart.append(size)
-    ax.xaxis.set_major_locator(FixedLocator(apart))
+        if np.log10(size / ticks[-1]) > 0.12 * np.log10(h[0] / h[-1]):
+            ticks.append(size)
+    ax.xaxis.set_major_locator(FixedLocator(ticks))
     ax.xaxis.set_minor_locator(NullLocator())
     plain = FuncFormatter(lambda x, _: number(x, 3))
     ax.xaxis.set_major_formatter(plain)

@@ -226,12 +226,12 @@ def _started(own: Assembly, key: str, structure: Structure, observed: Floats) ->
         own.add(f"{key}.mode", f"{known.shape[1]} modes are found, there is no mode {row.mode}")
         return np.zeros(structure.dofs)
     shape = known[:, row.mode - 1]
-    seen = float(observed[0] @ shape)
-    if abs(seen) <= FLAT * float(np.max(np.abs(shape))):
+    start = float(observed[0] @ shape)
+    if abs(start) <= FLAT * float(np.max(np.abs(shape))):
         name = own.spec.observe[0][0]
         own.add(f"{key}.mode", f"{name}, which would measure its size, does not move in it")
         return np.zeros(structure.dofs)
-    return shape * (row.size / seen)
+    return shape * (row.size / start)
 
 
 def with_digests(own: Assembly) -> StructureSpec:

@@ -206,8 +206,8 @@ def divided_twice(a: Any, b: Any, c: Any) -> Complexes:
     )
     far = np.maximum(np.maximum(ab, bc), ca)
     gap = np.where(far > NEAR, last - first, 1.0)
-    apart = (divided(middle, last) - divided(first, middle)) / gap
-    return np.asarray(np.where(far > NEAR, apart, _close(a, b, c)))
+    second = (divided(middle, last) - divided(first, middle)) / gap
+    return np.asarray(np.where(far > NEAR, second, _close(a, b, c)))
 
 
 def _close(a: Complexes, b: Complexes, c: Complexes) -> Complexes:

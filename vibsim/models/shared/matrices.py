@@ -136,15 +136,15 @@ def all_modes(mass: Floats, stiffness: Floats) -> Modes:
     for _ in range(REFINEMENTS):
         gap, s = np.eye(len(k)) - x.T @ (m @ x), x.T @ (k @ x)
         squares = np.diag(s) / (1.0 - np.diag(gap))
-        apart = squares[None, :] - squares[:, None]
+        gaps = squares[None, :] - squares[:, None]
         # modes of one frequency stay as they are, but for their lengths and angles
         limit = 2.0 * (
             np.linalg.norm(np.asarray(s - np.diag(squares), dtype=float))
             + float(np.max(np.abs(squares))) * np.linalg.norm(np.asarray(gap, dtype=float))
         )
-        is_apart = np.abs(apart) > limit
-        turned = (s + squares[None, :] * gap) / np.where(is_apart, apart, 1.0)
-        x = x + x @ np.where(is_apart, turned, 0.5 * gap)
+        is_distinct = np.abs(gaps) > limit
+        turned = (s + squares[None, :] * gap) / np.where(is_distinct, gaps, 1.0)
+        x = x + x @ np.where(is_distinct, turned, 0.5 * gap)
     order = np.argsort(squares)
     squares = np.where(np.abs(squares) < RIGID * np.max(np.abs(squares)), 0.0, squares)
     with np.errstate(invalid="ignore"):
@@ -227,12 +227,12 @@ def mode_motion(
     second = -d - s
     is_real = (np.abs(d) > np.abs(w)) & (second != 0.0)
     first = np.where(is_real, w * w / np.where(is_real, second, 1.0), -d + s)
-    apart, time = first - second, t[None, :].astype(complex)
-    is_near = np.abs(apart) * np.abs(time) < NEAR
-    gap = np.where(apart == 0.0, 1.0, apart)
+    difference, time = first - second, t[None, :].astype(complex)
+    is_near = np.abs(difference) * np.abs(time) < NEAR
+    gap = np.where(difference == 0.0, 1.0, difference)
     middle = 0.5 * (first + second)
     # those that are near lie within so small a distance that the other ones may be put in the middle
-    half = np.where(is_near, 0.5 * apart, 0.0)
+    half = np.where(is_near, 0.5 * difference, 0.0)
 
     def divided(at_first: Complexes, at_second: Complexes, slope: Any) -> Complexes:
         found: Complexes = (at_first - at_second) / gap

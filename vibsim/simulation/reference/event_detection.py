@@ -98,7 +98,7 @@ class Exits:
     def _brackets(self, outside: Floats, which: Integers) -> tuple[Integers, Floats, Floats]:
         """Return the first switch, and parts of the step before and behind its exit, each of shape (n',)."""
         is_out = (outside > 0.0).any(axis=0)
-        seen = is_out.any(axis=0)
+        is_found = is_out.any(axis=0)
         first = np.argmax(is_out, axis=0)
         own = np.arange(len(which))
         behind = outside[:, first, own]
@@ -109,7 +109,7 @@ class Exits:
         switch = np.argmin(np.where(behind > 0.0, np.abs(way), np.inf), axis=0)
         left, right = X[first], X[first + 1]
         hidden = self.hidden[which]
-        earlier = np.isfinite(hidden) & (~seen | (hidden < right))
+        earlier = np.isfinite(hidden) & (~is_found | (hidden < right))
         left = np.where(earlier, np.maximum(hidden - 1.0 / PARTS_OF_A_STEP, 0.0), left)
         return (
             np.where(earlier, self.hidden_switch[which], switch),
