@@ -27,7 +27,7 @@ def home(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def ask(name: str = NAME, content: bytes = CONTENT, kind: str = "plans") -> bytes:
-    return private_cache.kept(kind, name, lambda: content, bytes, bytes)
+    return private_cache.cached(kind, name, lambda: content, bytes, bytes)
 
 
 def again(home: Path) -> bytes:

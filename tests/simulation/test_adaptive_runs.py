@@ -29,9 +29,9 @@ LEAST = 100 * 2.0**-52
 @pytest.fixture(autouse=True)
 def nothing_kept() -> Iterator[None]:
     """Forget the runs that other tests have left."""
-    adaptive._kept.clear()
+    adaptive._cache.clear()
     yield
-    adaptive._kept.clear()
+    adaptive._cache.clear()
 
 
 def experiment(*schemes: Any, **sections: Any) -> Any:
@@ -175,7 +175,7 @@ def test_a_member_does_not_depend_on_those_beside_it(kind: str) -> None:
         sweep={"initial.theta": [0.3, 1.0, 2.0, 3.0], f"schemes.{kind}.tolerance": [1e-3, 1e-6]},
     )
     whole = simulate_record(asked, 5, threads=2)
-    adaptive._kept.clear()
+    adaptive._cache.clear()
     same(whole, simulate_record(asked, 5, 3, 6), slice(3, 6))
 
 
@@ -270,13 +270,13 @@ def test_no_step_of_a_given_size_is_taken(kind: str) -> None:
 def test_runs_are_kept_within_bounds(monkeypatch: pytest.MonkeyPatch) -> None:
     asked = [problem("dop853", end=end) for end in (10.0, 20.0, 30.0)]
     steps = [len(adaptive.solved(one).pieces) for one in asked]
-    assert list(adaptive._kept) == asked
-    monkeypatch.setattr(adaptive, "KEPT_STEPS", steps[2] + steps[0])
+    assert list(adaptive._cache) == asked
+    monkeypatch.setattr(adaptive, "CACHED_STEPS", steps[2] + steps[0])
     adaptive.solved(asked[0])
-    assert list(adaptive._kept) == [asked[2], asked[0]]
-    monkeypatch.setattr(adaptive, "KEPT_STEPS", 0)
+    assert list(adaptive._cache) == [asked[2], asked[0]]
+    monkeypatch.setattr(adaptive, "CACHED_STEPS", 0)
     adaptive.solved(asked[2])
-    assert list(adaptive._kept) == [asked[2]]
+    assert list(adaptive._cache) == [asked[2]]
 
 
 @pytest.mark.parametrize("kind", ADAPTIVE)

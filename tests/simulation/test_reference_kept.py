@@ -107,9 +107,9 @@ def test_the_digest_knows_the_table() -> None:
 
 
 def test_a_large_entry_is_not_kept(home: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    solve.kept("a" * 64, lambda: {"x": np.zeros(1000)})
+    solve.cached("a" * 64, lambda: {"x": np.zeros(1000)})
     monkeypatch.setattr(private_cache, "MOST_OF_ENTRY", 7999)
-    solve.kept("e" * 64, lambda: {"x": np.zeros(1000)})
+    solve.cached("e" * 64, lambda: {"x": np.zeros(1000)})
     assert [path.name[0] for path in entries(home)] == ["a"]
 
 

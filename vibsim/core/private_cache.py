@@ -44,7 +44,7 @@ _MOST_LINKS = 40
 """Links that a path may lead through, as for the system."""
 
 
-def kept(
+def cached(
     kind: str,
     name: str,
     make: Callable[[], Thing],

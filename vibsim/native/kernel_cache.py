@@ -41,5 +41,5 @@ def load(text: str, kinds: str) -> Kernel:
             folder.put(f"{name}.py", text.encode())
         return machine_code(text, ENTRY, kinds)
 
-    code = private_cache.kept("kernels", f"{name}.o", make, bytes, bytes)
+    code = private_cache.cached("kernels", f"{name}.o", make, bytes, bytes)
     return link(code, ENTRY, kinds)

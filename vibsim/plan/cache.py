@@ -56,7 +56,7 @@ def load(choice: Choice, resolve: Resolver | None = None, *, cached: bool = Fals
         is_same = key == _key(choice) and _has_inputs(plan, choice)
         return to_json(plan).encode() if is_same else None
 
-    def kept(content: bytes) -> Plan | None:
+    def load_cached(content: bytes) -> Plan | None:
         try:
             plan = from_json(content.decode(), word, choice.key)
         except (ValueError, RecursionError):
@@ -64,7 +64,7 @@ def load(choice: Choice, resolve: Resolver | None = None, *, cached: bool = Fals
         return plan if _has_inputs(plan, choice) else None
 
     key = _key(choice) if cached else ""
-    return private_cache.kept("plans", key, build, dump, kept) if key else build()
+    return private_cache.cached("plans", key, build, dump, load_cached) if key else build()
 
 
 def _built(choice: Choice, resolve: Resolver | None) -> Plan:

@@ -202,13 +202,13 @@ def _of_all_modules() -> Mapping[str, frozenset[str]]:
     def dump(found: Mapping[str, frozenset[str]]) -> bytes:
         return json.dumps({module: sorted(names) for module, names in found.items()}).encode()
 
-    def kept(content: bytes) -> Mapping[str, frozenset[str]] | None:
+    def load_cached(content: bytes) -> Mapping[str, frozenset[str]] | None:
         try:
             return {module: frozenset(names) for module, names in json.loads(content).items()}
         except (ValueError, TypeError, AttributeError):
             return None
 
-    return private_cache.kept("imports", everything(), make, dump, kept)
+    return private_cache.cached("imports", everything(), make, dump, load_cached)
 
 
 @cache

@@ -39,7 +39,7 @@ from vibsim.schemes.code_generation import written
 
 MOST_STEPS = 2**20
 """Steps after which a run is given up, as one that fails: some minutes of work."""
-KEPT_STEPS = 140_000
+CACHED_STEPS = 140_000
 """Steps that are kept in the process for the other levels of a job, of all runs together."""
 POINTS_AT_A_TIME = 2**20
 """Points that are worked out at a time."""
@@ -206,16 +206,16 @@ def integrate(
     return replace(found, gathered=counts)
 
 
-_kept: OrderedDict[Problem, Run] = OrderedDict()
+_cache: OrderedDict[Problem, Run] = OrderedDict()
 
 
 def solved(problem: Problem) -> Run:
     """Return the run of a problem: that of another level, where it is still kept."""
-    run = _kept.pop(problem, None) or solve(problem)
-    _kept[problem] = run
-    total = sum(len(other.pieces) for other in _kept.values())
-    while total > KEPT_STEPS and len(_kept) > 1:
-        total -= len(_kept.popitem(last=False)[1].pieces)
+    run = _cache.pop(problem, None) or solve(problem)
+    _cache[problem] = run
+    total = sum(len(other.pieces) for other in _cache.values())
+    while total > CACHED_STEPS and len(_cache) > 1:
+        total -= len(_cache.popitem(last=False)[1].pieces)
     return run
 
 

@@ -53,7 +53,7 @@ def publish(options: Namespace) -> int:
     if target.exists() and not (target.is_dir() and not any(target.iterdir())):
         raise refusal("--publish", options.publish, "must be a new or an empty folder")
     plan, results = one_plan(options)
-    with verify.kept(results):
+    with verify.locked(results):
         _check(plan, options, results)
         target.parent.mkdir(parents=True, exist_ok=True)
         with TemporaryDirectory(prefix=f".{target.name}.", dir=target.parent) as place:

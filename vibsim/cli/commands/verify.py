@@ -60,7 +60,7 @@ def verify(options: Namespace) -> int:
     choices = choose(words, home(), options.settings) if words else []
     keys = [choice.key for choice in choices] or [made_files.INDEX, *experiments(results)]
     results_folder.check(results, filter(None, keys))
-    with kept(results), temporary_folder() as folder:
+    with locked(results), temporary_folder() as folder:
         faults = sum(_tell_files(results, key) for key in keys)
         # what was never run has nothing to compare with
         known = experiments(results)
@@ -77,7 +77,7 @@ def verify(options: Namespace) -> int:
 
 
 @contextmanager
-def kept(results: Path) -> Iterator[None]:
+def locked(results: Path) -> Iterator[None]:
     """Keep runs out of a results folder: what one is making is neither damaged nor missing."""
     # where nothing can be written, there is no run
     held = lock.hold(results) if os.access(results / ".vibsim", os.W_OK) else None

@@ -104,7 +104,7 @@ def choose(model: Model, numbers: tuple[bytes, ...]) -> Chosen:
     numbers
         The initial values, the end times and the parameters of all members, in the order of the model.
     """
-    arrays = kept(digest_of(model, numbers), lambda: _arrays(computed(model, numbers)))
+    arrays = cached(digest_of(model, numbers), lambda: _arrays(computed(model, numbers)))
     count = sum(name.startswith("members_") for name in arrays)
     parts = []
     for i in range(count):
@@ -123,7 +123,7 @@ def _arrays(chosen: Chosen) -> Arrays:
     return found
 
 
-def kept(digest: str, compute: Callable[[], Arrays]) -> Arrays:
+def cached(digest: str, compute: Callable[[], Arrays]) -> Arrays:
     """Return the arrays of an entry of the cache: those on disk, or what `compute` returns, which is kept."""
 
     def dump(arrays: Arrays) -> bytes | None:
@@ -138,7 +138,7 @@ def kept(digest: str, compute: Callable[[], Arrays]) -> Arrays:
         with np.load(io.BytesIO(content), allow_pickle=False) as arrays:
             return dict(arrays)
 
-    return private_cache.kept("references", digest, compute, dump, load)
+    return private_cache.cached("references", digest, compute, dump, load)
 
 
 def digest_of(model: Model, numbers: tuple[bytes, ...]) -> str:
