@@ -245,7 +245,7 @@ def make():
         file.write("x")
     time.sleep(0.2)
     return b"content"
-print(private.kept("plans", "ab" * 32, make, bytes, bytes))
+print(private.cached("plans", "ab" * 32, make, bytes, bytes))
 """
 
 

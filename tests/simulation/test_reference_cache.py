@@ -125,12 +125,12 @@ def test_a_folder_that_cannot_be_written_changes_nothing(
 JOB = """
 import sys, numpy as np
 from pathlib import Path
-from vibsim.simulation.reference import solve as kept
+from vibsim.simulation.reference import solve
 def compute():
     with Path(sys.argv[1]).open("a") as file:
         file.write("x")
     return {"x": np.arange(100000.0)}
-print(float(kept.kept("ab" * 8, compute)["x"].sum()))
+print(float(solve.cached("ab" * 8, compute)["x"].sum()))
 """
 
 
