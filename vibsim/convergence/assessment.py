@@ -9,7 +9,7 @@ A power *dominates* where no other one has more than a tenth of it. The table of
 | all differences are noise as expected, but not the distance from the exact solution | FAIL ``wrong_limit`` |
 | the levels surely show an expansion with another limit than the exact solution (`is_missed`) | FAIL ``wrong_limit`` |
 | all differences are noise as expected | PASS ``exact`` |
-| a power within the tolerance of the expected one dominates, surely | PASS ``asymptotic`` |
+| a power within the tolerance of the expected one dominates, surely, and was measured | PASS ``asymptotic`` |
 | others dominate, surely, the expected one does not, and one is definite | FAIL ``order_low``, ``order_high`` |
 | noise is more probable than errors that alternate, and than all else | INCONCLUSIVE ``round_off`` |
 | errors that change their sign from level to level are | INCONCLUSIVE ``oscillating`` |
@@ -17,7 +17,8 @@ A power *dominates* where no other one has more than a tenth of it. The table of
 
 *Surely* is a probability above ``1 - RISK``. Where it rests on three levels and coarser ones do not fit them, it is one
 above ``1 - RISK_OF_THREE`` for a FAIL, and for a PASS that no exact solution confirms: three levels may fall like a
-power by accident.
+power by accident. *Was measured*: the order of the finest levels is nearer to the expected one than to the next order
+of an expansion. Levels may fit two powers by accident whose weaker one moves the measured order by more than that.
 
 Noise that is predicted to grow may not do so. Where it ends the window, and the finest differences show that it may be
 far less, the ladder is judged with less noise as well (`_with_less_noise`). Then a verdict is sure that is sure with
@@ -46,7 +47,7 @@ from vibsim.convergence.likely_powers import (
     tails,
 )
 from vibsim.convergence.reasons import code, first_reason, is_one_of
-from vibsim.convergence.thresholds import DEFINITE, NOISE_FACTOR, RISK, RISK_OF_THREE
+from vibsim.convergence.thresholds import DEFINITE, HALF_SPACING, NOISE_FACTOR, RISK, RISK_OF_THREE
 from vibsim.core.array_types import Codes, Flags, Floats, Integers
 from vibsim.core.vocabulary import ORDER_TOLERANCE
 
@@ -72,6 +73,13 @@ class Question:
     """Noise may be so many times `Ladder.floor` where levels are said to differ by nothing else."""
     by_theory: bool = False
     """Whether theory promises the order that is expected."""
+
+    def is_met_by(self, order: Floats) -> Flags:
+        """Say which measured orders are nearer to the expected one than to the next order of an expansion."""
+        margin = max(self.tolerance, HALF_SPACING)
+        if self.expected is not None:
+            return np.asarray(~(np.abs(order - self.expected) > margin))
+        return np.asarray(~(order < (self.at_least or -np.inf) - margin))
 
     @property
     def promise(self) -> Promise | None:
@@ -131,12 +139,15 @@ class _Evaluation:
     exact: Flags
     away: Flags  # only noise, and not the exact solution
     by_three: Flags  # whether three levels decide behind others that do not fit
+    is_measured: Flags  # whether the order of the finest levels is near the expected one
     is_confirmed: bool  # whether an exact solution is known
     cut_short: Flags  # whether noise that may be far less than predicted ends the window: nothing is decided
 
     def some(self, rows: Integers) -> _Evaluation:
         """Return what was found of some of the ladders."""
-        parts = {name: getattr(self, name)[rows] for name in ("exact", "away", "by_three")}
+        parts = {
+            name: getattr(self, name)[rows] for name in ("exact", "away", "by_three", "is_measured")
+        }
         return replace(
             self,
             posterior=self.posterior.some(rows),
@@ -150,6 +161,7 @@ class _Evaluation:
         self.posterior.replace(ladders, other.posterior, rows)
         self.sides[:, ladders] = other.sides[:, rows]
         self.by_three[ladders] = other.by_three[rows]
+        self.is_measured[ladders] = other.is_measured[rows]
 
 
 def _assess_block(ladder: Ladder, factors: Floats, question: Question) -> dict[str, np.ndarray]:
@@ -181,8 +193,21 @@ def _evaluate(ladder: Ladder, question: Question, left_out: float) -> _Evaluatio
     if ladder.exact_known:
         noise = question.noise_factor * ladder.floor[:, -1]
         away = exact & (np.sqrt(ladder.gram[:, -1, -1]) > noise)
-    by_three, cut_short = rests_on_three(believed), _is_cut_short(ladder, believed)
-    return _Evaluation(believed, of_sides, exact, away, by_three, ladder.exact_known, cut_short)
+    return _Evaluation(
+        believed,
+        of_sides,
+        exact,
+        away,
+        by_three=rests_on_three(believed),
+        is_measured=question.is_met_by(_order_of(believed)),
+        is_confirmed=ladder.exact_known,
+        cut_short=_is_cut_short(ladder, believed),
+    )
+
+
+def _order_of(believed: Posterior) -> Floats:
+    """Return the order of the finest levels of the most probable window."""
+    return finest_order(believed.orders, likely_window(believed)[1])
 
 
 def _is_sure(ladder: Ladder, found: _Evaluation, question: Question) -> Flags:
@@ -276,7 +301,12 @@ def _reasons(found: _Evaluation, missed: Flags) -> Codes:
     cases = [
         (missed, "wrong_limit"),
         (found.exact, "exact"),
-        ((right > 1.0 - (RISK if found.is_confirmed else risk)) & ~found.cut_short, "asymptotic"),
+        (
+            (right > 1.0 - (RISK if found.is_confirmed else risk))
+            & found.is_measured
+            & ~found.cut_short,
+            "asymptotic",
+        ),
         (another & (lower > higher), "order_low"),
         (another, "order_high"),
         (p.noise > np.maximum(1.0 - p.noise - p.alternating, p.alternating), "round_off"),
@@ -291,7 +321,7 @@ def _numbers(
     """Return what a `Decision` holds beside the status, for ladders of three levels and more."""
     n, believed, exact = len(ladder.h), found.posterior, found.exact
     first, last = likely_window(believed)
-    order = np.where(exact, np.nan, finest_order(believed.orders, last))
+    order = np.where(exact, np.nan, _order_of(believed))
     low, high = interval(believed, order)
     if np.any(missed):
         # where the exact solution is missed, the levels alone have an order

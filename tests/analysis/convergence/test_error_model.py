@@ -227,6 +227,16 @@ def test_three_levels_behind_others_that_do_not_fit_may_fall_like_a_power_by_acc
     assert found(assess(given, Question(expected))) == verdict
 
 
+def test_an_order_that_two_powers_only_explain_passes_when_it_is_measured() -> None:
+    h = 0.1 * 0.5 ** np.arange(6)
+    values = numbers(h, (1.0, 2.5), (0.0345 / h[4] ** 2, 4.5))
+    coarse = assess(ladder(h[:5], values[:5]), Question(2.5))
+    assert coarse.order == pytest.approx(3.0, abs=0.001)
+    assert found(coarse) == ("INCONCLUSIVE", "pre_asymptotic")
+    assert found(assess(ladder(h[:5], values[:5]), Question(at_least=2.5)))[0] == "PASS"
+    assert found(assess(ladder(h, values), Question(2.5))) == ("PASS", "asymptotic")
+
+
 @pytest.mark.parametrize("factor", [1e-30, 1e30])
 def test_units_do_not_matter(factor: float) -> None:
     usual = series(UNEVEN, (1.0, 2.0, SHAPE), (0.5, 3.0, OTHER_SHAPE))
