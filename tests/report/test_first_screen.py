@@ -300,6 +300,31 @@ def test_an_order_beside_the_band_whose_interval_reaches_it_is_told_as_such(monk
             assert drawn.orders(exp, record, decisive).title.startswith(title)
 
 
+def test_members_that_the_check_does_not_ask_about_are_not_counted_and_are_grey():
+    exp = samples.experiment(
+        sweep={"initial.theta": [0.5, 1.0, 1.5]},
+        checks=[{"converges": "theta", "at": {"initial.theta": 1.0}}],
+    )
+    record, _, decisive = found(exp)
+    with style.applied():
+        picture = drawn.orders(exp, record, decisive)
+    assert picture.title == "1 of 1 members asked about are in the band; grey: the 2 others"
+    assert "does not ask about the grey members" in picture.caption
+    colours = {line.get_color(): line.get_xdata().size for line in picture.figure.axes[0].get_lines()}
+    assert (colours[style.PALE], colours[style.COLOURS[0]]) == (2, 1)
+
+
+def test_the_best_value_has_as_many_digits_as_its_bound():
+    """A bound of 1e-13 beside twelve digits would say more than the value."""
+    exp = samples.experiment(levels=[9, 10, 11, 12], schemes=["rk4"])
+    record, _, decisive = found(exp)
+    best = next(row for row in hero.numbers(exp, record, decisive) if row["label"].startswith("Best"))
+    bound = float(record["theta_end_richardson_error"][0, 0])
+    digits = best["value"].split()[0].partition(".")[2]
+    assert len(digits) == 1 - np.floor(np.log10(bound))
+    assert len(digits) > 12
+
+
 def test_a_curve_over_the_sweep_counts_the_members_that_have_the_number():
     exp = samples.swept(16)
     record, _, decisive = found(exp)

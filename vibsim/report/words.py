@@ -218,6 +218,12 @@ def number(value: Any, form: str = "norm") -> str:
     return mantissa.rstrip("0").rstrip(".") + dot + exponent
 
 
+def ceiling(size: float) -> str:
+    """Write a positive number with two digits that are not less than it."""
+    unit = 10.0 ** (math.floor(math.log10(size)) - 1)
+    return number(math.ceil(size / unit) * unit, "brief")
+
+
 def share(part: float) -> str:
     """Write a part of a whole: in per cent, or as a power of ten where it is very small."""
     return f"{number(100.0 * part, 'brief')} %" if part >= LEAST_PERCENT else number(part, "brief")

@@ -449,8 +449,9 @@ def _text(*parts: str) -> str:
 
 def _beside(ax: Axes, along: Along, **options: Any) -> None:
     """Put the legend beside the axes, below the key in which lines differ."""
-    key = along.lines[0][0].rpartition(" = ")[0]
-    if key and ", " not in key:
+    name = along.lines[0][0]
+    if " = " in name and ", " not in name:
+        key = name.rpartition(" = ")[0]
         options |= {"title": key, "title_fontsize": 8, "alignment": "left"}
     style.beside(ax, **options)
 
