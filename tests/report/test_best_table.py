@@ -129,7 +129,9 @@ def test_what_is_never_negative_and_may_be_zero_is_said_to_be_below_its_bound() 
     assert best.best("min", -1e-8, 1e-6).text == "−1·10⁻⁸"
 
 
-@pytest.mark.parametrize(("size", "text"), [(4.653e-7, "4.7·10⁻⁷"), (1.0, "1.0"), (9.95e3, "1.0·10⁴")])
+@pytest.mark.parametrize(
+    ("size", "text"), [(4.653e-7, "4.7·10⁻⁷"), (1.0, "1.0"), (9.95e3, "1.0·10⁴")]
+)
 def test_two_digits_that_are_not_less(size: float, text: str) -> None:
     assert words.ceiling(size) == text
 
@@ -142,7 +144,9 @@ def test_a_period_of_a_motion_that_has_none_is_left_out_unless_it_is_asked_for()
     record, model = samples.record(driven), driven.model.definition
     shown = choice.members(record, "u")
     found = [row[0] for row in best.table(model, record, shown).rows]
-    assert not [name for name in found if name.startswith(("period", "growth", "angular frequency"))]
+    assert not [
+        name for name in found if name.startswith(("period", "growth", "angular frequency"))
+    ]
     assert any(name.startswith("amplitude") for name in found)
     asked = [row[0] for row in best.table(model, record, shown, ["period"]).rows]
     assert [name for name in asked if name not in found] == ["period [s]"]

@@ -310,7 +310,9 @@ def test_members_that_the_check_does_not_ask_about_are_not_counted_and_are_grey(
         picture = drawn.orders(exp, record, decisive)
     assert picture.title == "1 of 1 members asked about are in the band; grey: the 2 others"
     assert "does not ask about the grey members" in picture.caption
-    colours = {line.get_color(): line.get_xdata().size for line in picture.figure.axes[0].get_lines()}
+    colours = {
+        line.get_color(): line.get_xdata().size for line in picture.figure.axes[0].get_lines()
+    }
     assert (colours[style.PALE], colours[style.COLOURS[0]]) == (2, 1)
 
 
@@ -318,7 +320,9 @@ def test_the_best_value_has_as_many_digits_as_its_bound():
     """A bound of 1e-13 beside twelve digits would say more than the value."""
     exp = samples.experiment(levels=[9, 10, 11, 12], schemes=["rk4"])
     record, _, decisive = found(exp)
-    best = next(row for row in hero.numbers(exp, record, decisive) if row["label"].startswith("Best"))
+    best = next(
+        row for row in hero.numbers(exp, record, decisive) if row["label"].startswith("Best")
+    )
     bound = float(record["theta_end_richardson_error"][0, 0])
     digits = best["value"].split()[0].partition(".")[2]
     assert len(digits) == 1 - np.floor(np.log10(bound))
@@ -455,7 +459,7 @@ def test_one_exact_scheme_of_several_does_not_give_the_title():
         levels={"from": 4, "to": 8}, schemes=["crank_nicolson", "central"],
         checks=[{"converges": "energy_deviation", "order": "scheme"}],
     )  # fmt: skip
-    title = "The energy deviation dE = E(t) − E(0) converges at the order that both schemes promise"
+    title = "The energy deviation ΔE = E(t) − E(0) converges at the order that both schemes promise"
     assert first(exp)["finding"] == title
 
 

@@ -312,7 +312,7 @@ def test_the_index_calls_a_quantity_what_its_page_calls_it(tmp_path, check):
     told = " ".join(read(tmp_path / "index.html").text)
     ours = cards.cards(exp, record, summary)[0]["text"]
     # a page writes its own powers of ten
-    labels = re.compile(r"\b(?:θ|ω|dE|theta|omega|energy\w*)\b")
+    labels = re.compile(r"\b(?:θ|ω|ΔE|theta|omega|energy\w*)\b")
     assert labels.findall(ours)
     assert labels.findall(told)[-len(labels.findall(ours)) :] == labels.findall(ours)
 

@@ -332,7 +332,7 @@ def test_without_an_exact_solution_maps_show_the_estimate_and_its_error_bar(monk
     assert "error bar of the error of θ" in names
     assert "estimated over true error of θ" not in names
     title = names["error of θ"].figure.axes[0].get_title(loc="left")
-    assert title == "Estimated error of θ (l2) [rad √s]"
+    assert title == "Estimated error of θ (L2 norm) [rad √s]"
     assert not [name for name, picture in names.items() if "separatrix" in picture.caption]
     assert "exact period" not in names
     error = finest_level.error(record, "theta")
@@ -537,7 +537,9 @@ def test_a_path_that_is_followed_is_a_line_up_and_a_line_down_with_their_directi
     both = [key([1, 1, 1, 2, 2, 2, 3, 3, 3], "model.b"), key([1, 2, 1] * 3, "model.g")]
     along = sweep_layout.along_of(both, "model.g")
     assert along.key.key == "model.g"
-    assert [name for name, _ in along.lines] == [f"b = {b}, {way}" for b in (1, 2, 3) for way in (up, down)]
+    assert [name for name, _ in along.lines] == [
+        f"b = {b}, {way}" for b in (1, 2, 3) for way in (up, down)
+    ]
 
 
 def test_both_ways_of_a_followed_path_are_in_the_legends():
@@ -550,7 +552,10 @@ def test_both_ways_of_a_followed_path_are_in_the_legends():
     record = samples.record(exp)
     lead = choice.find_lead(exp, record, {"checks": []})
     with style.applied():
-        drawn = [hero.response(exp, record, lead), *(v.picture for v in samples.views(exp, record, "u")[0].values())]
+        drawn = [
+            hero.response(exp, record, lead),
+            *(v.picture for v in samples.views(exp, record, "u")[0].values()),
+        ]
         for picture in drawn:
             if "verdict" not in picture.name and "histogram" not in picture.name:
                 legend = picture.figure.axes[0].get_legend()

@@ -284,7 +284,7 @@ def describe(f: Found, check: ValueCheck) -> Description:
     brief, asked = _measured(f, check), rule(check, f.notation)
     match f.reason:
         case "match":
-            sentence, advice = f"{told} is {brief}; it is {asked}.", ""
+            sentence, advice = f"{told} is {brief}; it is {asked}.{_unproved(f, check)}", ""
         case "mismatch":
             sentence, advice = f"{told} is {brief}; it is not {asked}.", _on_mismatch(f, check)
             if check.number.needs_force and not _is_unsteady(f, check):
@@ -315,10 +315,22 @@ def describe(f: Found, check: ValueCheck) -> Description:
     return Description(sentence, advice, _measured(f, check, _digits(f, check)))
 
 
+def _unproved(f: Found, check: ValueCheck) -> str:
+    """Say that a number which is as asked might be another one by its bound; empty where it might not."""
+    if check.number.has_limit(check.at.level) and f.fact("error_bound") > _room(f, check):
+        return " The levels agree with it, but do not prove it: the error bound is wider than what is asked."
+    return ""
+
+
+def _room(f: Found, check: ValueCheck) -> float:
+    """Return how far a number may be from what is asked, or is from a limit."""
+    key, wanted = border(check)
+    return float(check.allowed if key == "equals" else abs(f.fact("value") - wanted))
+
+
 def _digits(f: Found, check: ValueCheck) -> int:
     """Return how many digits of a number tell it from what a check asks for, and one more."""
-    found, (key, wanted) = f.fact("value"), border(check)
-    room = check.allowed if key == "equals" else abs(found - wanted)
+    found, room = f.fact("value"), _room(f, check)
     if not (math.isfinite(found) and found != 0.0 and room > 0.0):
         return MOST_DIGITS
     # a whole number is not rounded

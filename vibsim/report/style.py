@@ -316,7 +316,9 @@ def log_ticks(axis: Any, low: float, high: float, most: int = 7) -> None:
     axis.set_major_locator(FixedLocator(shown))
     axis.set_minor_locator(NullLocator())
     plain = low >= 0.005 and high <= 2000
-    axis.set_major_formatter(FuncFormatter(lambda x, _: f"{x:.{TICK_DIGITS}g}" if plain else log_tick(x)))
+    axis.set_major_formatter(
+        FuncFormatter(lambda x, _: f"{x:.{TICK_DIGITS}g}" if plain else log_tick(x))
+    )
 
 
 def _within(low: float, high: float) -> tuple[float, float]:

@@ -189,8 +189,8 @@ class Along:
     key: Key
     lines: tuple[Line, ...]
     """Members that belong to one line, with a name; without where there is one line. They are in ascending order of the
-    key, or in their own where values repeat. A path that turns is a line for each of its ways, which share the member at
-    the turn."""
+    key, or in their own where values repeat. A path that turns is a line for each of its ways: these share the member
+    at the turn."""
     follows: bool = False  # whether other keys change with this one
 
 

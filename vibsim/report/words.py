@@ -13,6 +13,7 @@ from vibsim.core.vocabulary import (
     AMPLITUDE,
     CENTRED,
     PHASE,
+    TYPICAL_NORM,
     is_error_part,
     order_interval,
     plain_name,
@@ -26,7 +27,7 @@ NAMES = {
     "energy": ("E", "the energy E"),
     "kinetic_energy": ("T", "the kinetic energy T"),
     "potential_energy": ("V", "the potential energy V"),
-    "energy_deviation": ("dE", "the energy deviation dE = E(t) − E(0)"),
+    "energy_deviation": ("ΔE", "the energy deviation ΔE = E(t) − E(0)"),
 }
 """Letter and words of quantities; others go by their name."""
 
@@ -145,6 +146,11 @@ ERRORS = {
     "error_l1": "error in the L1 norm", "error_l2": "error in the L2 norm",
 }  # fmt: skip
 """Words for the errors in a norm."""
+NORMS = {
+    "l1": "L1 norm", "l2": "L2 norm", "linf": "largest value", "linf_interior": "largest value without the last point",
+}  # fmt: skip
+"""Words for the norms over time."""
+USUAL_NORM = NORMS[TYPICAL_NORM]
 DIGITS = {"brief": 2, "close": 7, "full": 10, "step": 6, "value": 12}  # significant digits of forms
 LEAST_PERCENT = 1e-5  # of a whole, that is written in per cent
 MORE_DIGITS = 2  # of a number beside a printed one

@@ -383,7 +383,10 @@ def orders(experiment: Experiment, record: Record, lead: Lead) -> Picture | None
     if order.size > FEW:
         ax = _panel(RIGHT, "members (logarithmic)")
         borders = np.linspace(*style.limits(shown[known], around), 41)
-        both, colours = [shown[known & asked], shown[known & ~asked]], [style.COLOURS[0], style.PALE]
+        both, colours = (
+            [shown[known & asked], shown[known & ~asked]],
+            [style.COLOURS[0], style.PALE],
+        )
         ax.hist(both, borders.tolist(), color=colours, stacked=True, zorder=2)
         for value in due:
             ax.axvspan(value - allowed, value + allowed, **style.ALLOWED)
@@ -395,10 +398,14 @@ def orders(experiment: Experiment, record: Record, lead: Lead) -> Picture | None
         ax = _panel(RIGHT, f"observed order of {letter}")
         for value in due:
             ax.axhspan(value - allowed, value + allowed, **style.ALLOWED)
-        low_end, high_end = (np.clip(part, around.min() - 1.0, around.max() + 1.0) for part in (low, high))
+        low_end, high_end = (
+            np.clip(part, around.min() - 1.0, around.max() + 1.0) for part in (low, high)
+        )
         for of_kind, colour in ((~asked, style.PALE), (asked, style.COLOURS[0])):
             x = key.values[of_kind]
-            ax.vlines(x, low_end[of_kind], high_end[of_kind], color=colour, linewidth=1.6, alpha=0.5)
+            ax.vlines(
+                x, low_end[of_kind], high_end[of_kind], color=colour, linewidth=1.6, alpha=0.5
+            )
             ax.plot(x, shown[of_kind], ".", color=colour, markersize=4)
         _across(ax, key)
         ax.set_ylim(*style.limits(shown[known], around))

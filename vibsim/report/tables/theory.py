@@ -14,7 +14,7 @@ import numpy as np
 from vibsim.analysis.motion_variables import PEAKS
 from vibsim.core.array_types import Floats
 from vibsim.core.record import Record
-from vibsim.core.vocabulary import MEMBER, OF_LEVEL, TYPICAL_NORM
+from vibsim.core.vocabulary import MEMBER, OF_LEVEL
 from vibsim.report import choice, data, finest_level, words
 from vibsim.report.data import Member, known, swept, whole
 from vibsim.report.tables.levels import Fill, by_level
@@ -53,7 +53,7 @@ def schemes(experiment: Experiment, record: Record) -> Table | None:
     is_measured = bool(whole(record, "triple"))
     caption = (
         "Schemes: stated properties (explicit or implicit, s: symplectic)"
-        + f", and the order measured in the {TYPICAL_NORM} norm" * is_measured
+        + f", and the order measured in the {words.USUAL_NORM}" * is_measured
         + " (order ∞: exact, no error to shrink)"
         + "; in a sweep, that of the member farthest from the stated order"
         * (is_measured and bool(swept(record)))

@@ -19,7 +19,6 @@ GLOSSARY = {
     "hardest member": "The member of the sweep with the worst verdict; of equal ones that whose order is furthest off.",
     "printed": "The number as the source prints it.",
     "l2 norm": "The root of the integral over time of the squared value.",
-    "linf norm": "The largest absolute value over time.",
     "growth per period": "The amplitude after one period over that before it.",
     "dimensionless": "Without a unit, because it is a ratio of quantities of the same kind.",
     "trap caught": "A check that expects a failure, which occurred.",
