@@ -159,6 +159,8 @@ def test_the_finding_of_a_trap_is_no_headline():
     assert headline([trap]).text == "It is unstable"
     assert headline([trap, good | {"status": "FAIL"}]) == Headline()
     assert headline([]) == Headline()
+    named = check("PASS", "error_linf of u is 0.25 m; it is below 1.")
+    assert headline([named]).text == "largest error of u is 0.25 m"
 
 
 @pytest.mark.parametrize("broken", [0, 1, 3])

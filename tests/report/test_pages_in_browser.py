@@ -228,6 +228,17 @@ def test_a_page_is_printed_on_a_few_sheets(
     assert 1 <= browser.printed(pages[name], tmp_path) <= MOST_SHEETS
 
 
+def test_an_index_of_many_experiments_is_printed_as_a_list(
+    pages: dict[str, Path], tmp_path: Path
+) -> None:
+    text = pages["index"].read_text("utf-8")
+    cards = re.findall(r"<article.*?</article>", text, re.DOTALL)
+    passed = next(card for card in cards if "✓ PASS" in card)
+    page = tmp_path / "many.html"
+    page.write_text(text.replace(passed, 116 * passed), "utf-8")
+    assert browser.printed(page, tmp_path) <= MOST_SHEETS
+
+
 def test_a_page_that_is_too_long_is_seen_in_print(pages: dict[str, Path], tmp_path: Path) -> None:
     longer = '<p style="height: 7000px">much room</p></main>'
     page = tmp_path / "longer.html"
