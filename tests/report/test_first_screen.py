@@ -19,6 +19,7 @@ from vibsim.experiment.schema.checks import MEASURED
 from vibsim.report import choice, data, style, words
 from vibsim.report.figures import hero as drawn
 from vibsim.report.page import cards, hero
+from vibsim.report.tables import theory
 from vibsim.report.text import equation, experiment_file, findings, glossary
 
 CONFIGS = Path(__file__).parents[2] / "configs"
@@ -298,6 +299,24 @@ def test_an_order_beside_the_band_whose_interval_reaches_it_is_told_as_such(monk
         monkeypatch.setattr(drawn.finest_level, "orders", lambda *_, ends=tuple(ends): ends)
         with style.applied():
             assert drawn.orders(exp, record, decisive).title.startswith(title)
+
+
+def test_the_interval_of_an_order_says_what_it_is():
+    exp = samples.experiment()
+    record, summary, decisive = found(exp)
+    order = next(hero.numbers(exp, record, decisive))
+    facts = summary["checks"][0]["results"][0]["facts"]
+    interval = words.interval((facts["order_low"], facts["order_high"]))
+    assert order["note"] == f"95 % interval {interval}; the scheme promises 2"
+    assert "a probability of 95 %" in glossary.explained(order["note"])
+    card = cards.card(exp, record, summary["checks"][0])
+    assert interval in card["got"]
+    assert "in brackets above: the stated order with its 95 % interval" in card["picture"].caption
+    several = samples.experiment(schemes=["central", "rk4"])
+    table = theory.schemes(several, samples.record(several))
+    place = [column.header for column in table.columns].index("measured (95 % interval)")
+    for row in table.text_rows():
+        assert re.fullmatch(r"\d\.\d{3} \(\d\.\d+ to \d\.\d+\)", row[place])
 
 
 def test_members_that_the_check_does_not_ask_about_are_not_counted_and_are_grey():

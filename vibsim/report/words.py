@@ -295,10 +295,10 @@ def interval(bounds: Sequence[float | None] | None) -> str:
     return " to ".join(end.replace("-", "−") for end in order_interval(*known))
 
 
-def between(bounds: Sequence[float | None] | None) -> str:
-    """Write the interval of an order as part of a sentence; empty where there is none."""
+def likely(bounds: Sequence[float | None] | None) -> str:
+    """Write the interval of an order with what it is; empty where there is none."""
     text = interval(bounds)
-    return f"between {text.replace(' to ', ' and ')}" if text != "–" else ""
+    return f"95 % interval {text}" if text != "–" else ""
 
 
 def with_interval(order: float | None, bounds: Sequence[float | None] | None) -> str:

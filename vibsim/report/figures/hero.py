@@ -425,7 +425,7 @@ def orders(experiment: Experiment, record: Record, lead: Lead) -> Picture | None
     else:
         measured = np.abs(order - promised) <= allowed
         title = "All members keep their order" if measured.all() else "All intervals reach the band"
-    bars = "" if order.size > FEW else "; the bars are the intervals of the orders"
+    bars = "" if order.size > FEW else "; the bars are the 95 % intervals of the orders"
     return Picture(
         "hero_orders",
         title,

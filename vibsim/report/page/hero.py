@@ -186,7 +186,7 @@ def _order(experiment: Experiment, record: Record, lead: Lead) -> Iterator[Numbe
         if lead.is_on_order or lead.entry is None:
             yield {"label": label, "value": "not known", "note": due}
     else:
-        note = "; ".join(filter(None, [words.between((low, high)), due]))
+        note = "; ".join(filter(None, [words.likely((low, high)), due]))
         yield {"label": label, "value": words.number(float(order), "order"), "note": note}
 
 

@@ -48,7 +48,7 @@ def schemes(experiment: Experiment, record: Record) -> Table | None:
         letter = words.symbol(quantity)
         columns.append(Column(f"order of {letter}, stated", form="step"))
         if whole(record, "triple"):
-            columns.append(Column("measured, ± half its interval", form="order"))
+            columns.append(Column("measured (95 % interval)", form="order"))
     rows = tuple(tuple(_scheme(experiment, record, s, quantities)) for s in range(len(names)))
     is_measured = bool(whole(record, "triple"))
     caption = (
@@ -83,15 +83,8 @@ def _scheme(
         case = int(np.argmax(np.where(np.isfinite(away), away, -1.0)))
         yield _alike(formal)
         if whole(record, "triple"):
-            yield _with_interval(float(value[case]), 0.5 * float(high[case] - low[case]))
-
-
-def _with_interval(order: float, half: float) -> Cell:
-    """Return an order that is written with its interval, to no more digits than that leaves."""
-    if not math.isfinite(order) or not math.isfinite(half):
-        return order
-    places = min(max(1 - math.floor(math.log10(half)), 1), 6) if half > 0.0 else 6
-    return Written(order, f"{order:.{places}f} ± {half:.{places}f}".replace("-", "−"))
+            order, *ends = (float(part[case]) for part in (value, low, high))
+            yield Written(order, words.with_interval(order, ends))
 
 
 def _alike(values: Floats) -> Cell:

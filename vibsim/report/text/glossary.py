@@ -7,6 +7,8 @@ from typing import Any
 
 GLOSSARY = {
     "observed order": "The power p with which the error shrinks from level to level: error = C dt^p.",
+    "95 % interval": "It contains the true order with a probability of 95 %, and the measured one. It often ends at a "
+    "whole power, such as the promised order.",
     "asymptotic": "The steps are so small that one power of dt makes up nearly all of the error.",
     "rescaled differences": "Differences between successive levels, multiplied so that they coincide where the error "
     "has the promised order.",
