@@ -174,8 +174,8 @@ def place_in(key: Key, borders: Floats) -> NDArray[np.intp]:
 
 def layout_of(experiment: Experiment, record: Record) -> Along | Grid | None:
     """Return how the members of a sweep lie; None where they are a cloud, or differ in nothing."""
-    found = keys(record)
-    return along_of(found, experiment.sweep and experiment.sweep.follow) or grid_of(found)
+    found, sweep = keys(record), experiment.sweep
+    return along_of(found, sweep.follow if sweep is not None else None) or grid_of(found)
 
 
 Line = tuple[str, NDArray[np.intp]]

@@ -192,7 +192,8 @@ def _draw_levels(
 ) -> None:
     for k, (i, values) in enumerate(series.items()):
         dashes = "-" if i == max(series) else style.DASHES[1 + k % (style.MANY - 1)]
-        ax.plot(*style.thin(t, values), **{"linestyle": dashes} | looks[i])
+        look: Look = {"linestyle": dashes} | looks[i]
+        ax.plot(*style.thin(t, values), **look)
     panels.stop_at_breakdown(ax, t, list(series.values()))
     whole = [values for values in series.values() if np.isfinite(values).all()]
     whole = whole or list(series.values())
