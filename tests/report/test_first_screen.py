@@ -278,6 +278,16 @@ def test_a_number_has_the_digits_that_tell_it_from_what_is_asked(asked, told):
     assert cards.card(exp, record, summary["checks"][0])["got"] == told
 
 
+def test_a_number_whose_bound_is_wider_than_what_is_asked_has_a_sentence_on_its_page():
+    period = {"value": "period", "at": {"level": "best"}, "equals": 6.699975}
+    for atol, is_told in ((5e-7, True), (1e-3, False)):
+        exp = samples.experiment(checks=[period | {"atol": atol}])
+        record, summary, _ = found(exp)
+        assert summary["checks"][0]["status"] == "PASS"
+        card = cards.card(exp, record, summary["checks"][0])
+        assert ("do not prove it" in card["text"]) is is_told
+
+
 def test_a_large_number_is_not_rounded_before_its_point():
     exp = samples.experiment(
         model={"kind": "pendulum", "g": 1e-8}, time={"end": 2e5}, levels=[9],

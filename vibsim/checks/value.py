@@ -54,6 +54,9 @@ FEWEST = 3
 """Fewer levels do not show how large an error is."""
 FINER = 2
 """So many finer levels are advised."""
+UNPROVED = (
+    " The levels agree with it, but do not prove it: the error bound is wider than what is asked."
+)
 FEWEST_DIGITS, MOST_DIGITS = 4, 10
 """Significant digits of a number."""
 
@@ -284,7 +287,9 @@ def describe(f: Found, check: ValueCheck) -> Description:
     brief, asked = _measured(f, check), rule(check, f.notation)
     match f.reason:
         case "match":
-            sentence, advice = f"{told} is {brief}; it is {asked}.{_unproved(f, check)}", ""
+            sentence, advice = f"{told} is {brief}; it is {asked}.", ""
+            if not is_proved(check, f.fact("value"), f.fact("error_bound")):
+                sentence += UNPROVED
         case "mismatch":
             sentence, advice = f"{told} is {brief}; it is not {asked}.", _on_mismatch(f, check)
             if check.number.needs_force and not _is_unsteady(f, check):
@@ -315,22 +320,21 @@ def describe(f: Found, check: ValueCheck) -> Description:
     return Description(sentence, advice, _measured(f, check, _digits(f, check)))
 
 
-def _unproved(f: Found, check: ValueCheck) -> str:
-    """Say that a number which is as asked might be another one by its bound; empty where it might not."""
-    if check.number.has_limit(check.at.level) and f.fact("error_bound") > _room(f, check):
-        return " The levels agree with it, but do not prove it: the error bound is wider than what is asked."
-    return ""
+def is_proved(check: ValueCheck, value: float, bound: float) -> bool:
+    """Say of a number that is as asked whether no other one within its bound would be otherwise."""
+    return not (check.number.has_limit(check.at.level) and bound > _room(check, value))
 
 
-def _room(f: Found, check: ValueCheck) -> float:
+def _room(check: ValueCheck, value: float) -> float:
     """Return how far a number may be from what is asked, or is from a limit."""
     key, wanted = border(check)
-    return float(check.allowed if key == "equals" else abs(f.fact("value") - wanted))
+    return float(check.allowed if key == "equals" else abs(value - wanted))
 
 
 def _digits(f: Found, check: ValueCheck) -> int:
     """Return how many digits of a number tell it from what a check asks for, and one more."""
-    found, room = f.fact("value"), _room(f, check)
+    found = f.fact("value")
+    room = _room(check, found)
     if not (math.isfinite(found) and found != 0.0 and room > 0.0):
         return MOST_DIGITS
     # a whole number is not rounded
