@@ -238,6 +238,17 @@ def test_checks_compare_the_limit_and_tell_its_bound() -> None:
     assert "`levels:`" in found[2].advice
 
 
+def test_a_number_that_agrees_within_less_than_its_bound_is_said_not_to_be_proved() -> None:
+    value, bound = best(analysed(**PENDULUM)[1], "period")
+    near = {"value": "period", "at": {"level": "best"}}
+    asked = [{"equals": value, "atol": part * bound} for part in (0.5, 2.0)]
+    asked += [{"below": value + part * bound} for part in (0.5, 2.0)]
+    found = judged(*(near | one for one in asked), **PENDULUM)
+    assert [v.status for v in found] == ["PASS"] * 4
+    unproved = "do not prove it: the error bound is wider than what is asked"
+    assert [unproved in v.text for v in found] == [True, False, True, False]
+
+
 def test_one_level_bounds_nothing() -> None:
     checks = [{"value": "period", "at": {"best": True}, "below": x} for x in (6.0, 7.0)]
     found = judged(*checks, **(PENDULUM | {"levels": [9]}))

@@ -49,9 +49,15 @@ def dumped(address: str, profile: Path, *options: str) -> str:
 
 def printed(page: Path, folder: Path) -> int:
     """Print a page, and return how many sheets that takes."""
+    return len(sheets(page, folder))
+
+
+def sheets(page: Path, folder: Path) -> list[bool]:
+    """Print a page, and return of each sheet whether there is anything on it."""
     path = folder / "page.pdf"
     _opened(page.as_uri(), folder / "profile", f"--print-to-pdf={path}", "--no-pdf-header-footer")
-    return len(re.findall(rb"/Type */Page\b", path.read_bytes()))
+    found = re.findall(rb"/Type */Page\b(.*?)endobj", path.read_bytes(), re.DOTALL)
+    return [b"/Font" in resources or b"/XObject" in resources for resources in found]
 
 
 def picture(page: Path, size: tuple[int, int], folder: Path, *options: str) -> Image.Image:

@@ -13,7 +13,7 @@ import samples
 
 from vibsim.analysis import analyse_records
 from vibsim.core.record import Record
-from vibsim.report import choice
+from vibsim.report import choice, words
 from vibsim.report.tables import best
 from vibsim.report.tables.latex import to_latex
 from vibsim.report.tables.table import to_csv
@@ -106,7 +106,47 @@ def test_latex_has_every_row() -> None:
         (0.0, 1e-3, "0.0000"),
         (1.0, 0.0, "1"),
         (1.0, float("nan"), "1"),
+        (2.5e-7, 0.0, "2.5·10⁻⁷"),
+        (0.000123456789012345, 1.2e-15, "1.234567890123·10⁻⁴"),
+        (-1.5e300, 2.5e295, "−1.500000·10³⁰⁰"),
+        (0.123456789012345, 4.5e-14, "0.123456789012345"),
     ],
 )
 def test_rounding(value: float, error: float, text: str) -> None:
     assert best.rounded(value, error).text == text
+
+
+def test_what_is_never_negative_and_may_be_zero_is_said_to_be_below_its_bound() -> None:
+    """The levels leave no energy error, so that its limit is -1e-8 with a larger bound."""
+    _, found = table(samples.plain())
+    header = [column.header for column in found.columns]
+    place = header.index("best value")
+    read = next(row for row in found.text_rows() if row[0].startswith("max |E"))
+    held = float(next(row for row in found.rows if str(row[0]).startswith("max |E"))[place])
+    bound = float(next(row for row in found.rows if str(row[0]).startswith("max |E"))[place + 1])
+    assert held < 0.0
+    assert read[place] == f"below {words.ceiling(held + bound)}"
+    assert best.best("min", -1e-8, 1e-6).text == "−1·10⁻⁸"
+
+
+@pytest.mark.parametrize(
+    ("size", "text"), [(4.653e-7, "4.7·10⁻⁷"), (1.0, "1.0"), (9.95e3, "1.0·10⁴")]
+)
+def test_two_digits_that_are_not_less(size: float, text: str) -> None:
+    assert words.ceiling(size) == text
+
+
+def test_a_period_of_a_motion_that_has_none_is_left_out_unless_it_is_asked_for() -> None:
+    driven = samples.experiment(
+        model={"kind": "duffing", "delta": 0.1, "alpha": 1.0, "beta": 0.04, "gamma": 1.0, "omega": 1.0},
+        initial={"u": 0.0, "v": 0.0}, schemes=["rk4"],
+    )  # fmt: skip
+    record, model = samples.record(driven), driven.model.definition
+    shown = choice.members(record, "u")
+    found = [row[0] for row in best.table(model, record, shown).rows]
+    assert not [
+        name for name in found if name.startswith(("period", "growth", "angular frequency"))
+    ]
+    assert any(name.startswith("amplitude") for name in found)
+    asked = [row[0] for row in best.table(model, record, shown, ["period"]).rows]
+    assert [name for name in asked if name not in found] == ["period [s]"]

@@ -19,6 +19,7 @@ from vibsim.experiment.schema.checks import MEASURED
 from vibsim.report import choice, data, style, words
 from vibsim.report.figures import hero as drawn
 from vibsim.report.page import cards, hero
+from vibsim.report.tables import theory
 from vibsim.report.text import equation, experiment_file, findings, glossary
 
 CONFIGS = Path(__file__).parents[2] / "configs"
@@ -277,6 +278,16 @@ def test_a_number_has_the_digits_that_tell_it_from_what_is_asked(asked, told):
     assert cards.card(exp, record, summary["checks"][0])["got"] == told
 
 
+def test_a_number_whose_bound_is_wider_than_what_is_asked_has_a_sentence_on_its_page():
+    period = {"value": "period", "at": {"level": "best"}, "equals": 6.699975}
+    for atol, is_told in ((5e-7, True), (1e-3, False)):
+        exp = samples.experiment(checks=[period | {"atol": atol}])
+        record, summary, _ = found(exp)
+        assert summary["checks"][0]["status"] == "PASS"
+        card = cards.card(exp, record, summary["checks"][0])
+        assert ("do not prove it" in card["text"]) is is_told
+
+
 def test_a_large_number_is_not_rounded_before_its_point():
     exp = samples.experiment(
         model={"kind": "pendulum", "g": 1e-8}, time={"end": 2e5}, levels=[9],
@@ -298,6 +309,53 @@ def test_an_order_beside_the_band_whose_interval_reaches_it_is_told_as_such(monk
         monkeypatch.setattr(drawn.finest_level, "orders", lambda *_, ends=tuple(ends): ends)
         with style.applied():
             assert drawn.orders(exp, record, decisive).title.startswith(title)
+
+
+def test_the_interval_of_an_order_says_what_it_is():
+    exp = samples.experiment()
+    record, summary, decisive = found(exp)
+    order = next(hero.numbers(exp, record, decisive))
+    facts = summary["checks"][0]["results"][0]["facts"]
+    interval = words.interval((facts["order_low"], facts["order_high"]))
+    assert order["note"] == f"95 % interval {interval}; the scheme promises 2"
+    assert "a probability of 95 %" in glossary.explained(order["note"])
+    card = cards.card(exp, record, summary["checks"][0])
+    assert interval in card["got"]
+    assert "in brackets above: the stated order with its 95 % interval" in card["picture"].caption
+    several = samples.experiment(schemes=["central", "rk4"])
+    table = theory.schemes(several, samples.record(several))
+    place = [column.header for column in table.columns].index("measured (95 % interval)")
+    for row in table.text_rows():
+        assert re.fullmatch(r"\d\.\d{3} \(\d\.\d+ to \d\.\d+\)", row[place])
+
+
+def test_members_that_the_check_does_not_ask_about_are_not_counted_and_are_grey():
+    exp = samples.experiment(
+        sweep={"initial.theta": [0.5, 1.0, 1.5]},
+        checks=[{"converges": "theta", "at": {"initial.theta": 1.0}}],
+    )
+    record, _, decisive = found(exp)
+    with style.applied():
+        picture = drawn.orders(exp, record, decisive)
+    assert picture.title == "1 of 1 members asked about are in the band; grey: the 2 others"
+    assert "does not ask about the grey members" in picture.caption
+    colours = {
+        line.get_color(): line.get_xdata().size for line in picture.figure.axes[0].get_lines()
+    }
+    assert (colours[style.PALE], colours[style.COLOURS[0]]) == (2, 1)
+
+
+def test_the_best_value_has_as_many_digits_as_its_bound():
+    """A bound of 1e-13 beside twelve digits would say more than the value."""
+    exp = samples.experiment(levels=[9, 10, 11, 12], schemes=["rk4"])
+    record, _, decisive = found(exp)
+    best = next(
+        row for row in hero.numbers(exp, record, decisive) if row["label"].startswith("Best")
+    )
+    bound = float(record["theta_end_richardson_error"][0, 0])
+    digits = best["value"].split()[0].partition(".")[2]
+    assert len(digits) == 1 - np.floor(np.log10(bound))
+    assert len(digits) > 12
 
 
 def test_a_curve_over_the_sweep_counts_the_members_that_have_the_number():
@@ -430,7 +488,7 @@ def test_one_exact_scheme_of_several_does_not_give_the_title():
         levels={"from": 4, "to": 8}, schemes=["crank_nicolson", "central"],
         checks=[{"converges": "energy_deviation", "order": "scheme"}],
     )  # fmt: skip
-    title = "The energy deviation dE = E(t) − E(0) converges at the order that both schemes promise"
+    title = "The energy deviation ΔE = E(t) − E(0) converges at the order that both schemes promise"
     assert first(exp)["finding"] == title
 
 

@@ -159,6 +159,8 @@ def test_the_finding_of_a_trap_is_no_headline():
     assert headline([trap]).text == "It is unstable"
     assert headline([trap, good | {"status": "FAIL"}]) == Headline()
     assert headline([]) == Headline()
+    named = check("PASS", "error_linf of u is 0.25 m; it is below 1.")
+    assert headline([named]).text == "largest error of u is 0.25 m"
 
 
 @pytest.mark.parametrize("broken", [0, 1, 3])
@@ -312,7 +314,7 @@ def test_the_index_calls_a_quantity_what_its_page_calls_it(tmp_path, check):
     told = " ".join(read(tmp_path / "index.html").text)
     ours = cards.cards(exp, record, summary)[0]["text"]
     # a page writes its own powers of ten
-    labels = re.compile(r"\b(?:θ|ω|dE|theta|omega|energy\w*)\b")
+    labels = re.compile(r"\b(?:θ|ω|ΔE|theta|omega|energy\w*)\b")
     assert labels.findall(ours)
     assert labels.findall(told)[-len(labels.findall(ours)) :] == labels.findall(ours)
 

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 import samples
 
-from vibsim.report import style
+from vibsim.report import choice, style
 from vibsim.report.data import Member
-from vibsim.report.figures import drawing
+from vibsim.report.figures import drawing, moments, solution
 from vibsim.report.figures.long_series import MOST, PERIODS, long_series
 
 
@@ -101,3 +101,29 @@ def test_few_samples_a_period_are_dots_on_a_smooth_exact_solution():
     picture, text = drawn(periods=20, steps=20)
     assert "<use" not in text
     assert "Dots" not in picture.caption
+
+
+@pytest.mark.parametrize(("every", "is_dotted"), [(2, False), (16, True)])
+def test_a_motion_of_few_samples_has_no_line_between_them(every, is_dotted):
+    """Lines between three samples a period would be a motion of another frequency, of other extremes."""
+    exp = samples.experiment(
+        time={"end": 40.0}, levels=[8, 9, 10], samples={"every": every}, schemes=["rk4"]
+    )
+    record = samples.record(exp)
+    (member,) = choice.members(record, "theta")
+    with style.applied():
+        picture = solution.motion(record, "theta", member)
+    above, below = picture.figure.axes
+    dashes = {line.get_linestyle() for ax in (above, below) for line in ax.get_lines()}
+    assert (dashes == {"None"}) is is_dotted
+    assert ("stored times" in above.get_title(loc="left")) is is_dotted
+    assert ("stored samples" in picture.caption) is is_dotted
+
+
+def test_the_points_of_the_steps_themselves_keep_their_line():
+    """Where every step is drawn, as at the limit of stability, nothing is hidden between."""
+    record = samples.record(samples.experiment())
+    t = np.linspace(0.0, 20.0, int(record["steps"][0]) + 1)
+    fast = np.cos(0.8 * np.pi * np.arange(t.size))
+    assert not moments.is_undersampled(record, t, fast)
+    assert moments.is_undersampled(record, t[::2], fast[::2])

@@ -436,12 +436,12 @@ def test_a_quantity_has_one_name_on_the_page(tmp_path):
     make(tmp_path, samples.experiment(checks=checks))
     text = re.sub(r"<[^>]*>", "", (tmp_path / "report.html").read_text(encoding="utf-8"))
     assert "θ converges more slowly than order 3" in text
-    assert "dE converges more slowly than order 3" in text
+    assert "ΔE converges more slowly than order 3" in text
     assert "theta converges" not in text
     assert "energy_deviation converges" not in text
     assert "“theta is" in text
     assert "θ is" not in text
-    assert "The statement is false. dE converges" in text
+    assert "The statement is false. ΔE converges" in text
 
 
 @pytest.mark.parametrize(

@@ -228,6 +228,38 @@ def test_a_page_is_printed_on_a_few_sheets(
     assert 1 <= browser.printed(pages[name], tmp_path) <= MOST_SHEETS
 
 
+def test_a_page_that_just_fills_its_sheets_has_no_blank_one_behind(tmp_path: Path) -> None:
+    """The height at which another sheet begins is found by halving; what begins behind it is text, not a margin."""
+    exp = samples.plain(model={"kind": "pendulum", "g": 9.81, "L": 1.0}, name="filled")
+    record = samples.record(exp)
+    report.write(samples.plan(exp), record, samples.summary(exp, record), tmp_path / "filled")
+    text, page = (tmp_path / "filled/report.html").read_text("utf-8"), tmp_path / "page.html"
+
+    def sheets(height: int) -> list[bool]:
+        room = f'<section id="computed"><p style="height: {height}px; margin: 0"></p>'
+        page.write_text(text.replace('<section id="computed">', room), "utf-8")
+        return browser.sheets(page, tmp_path)
+
+    low, high = 0, 1000  # a sheet is no higher
+    fewest = len(sheets(low))
+    assert len(sheets(high)) > fewest
+    while high - low > 2:
+        middle = (low + high) // 2
+        low, high = (middle, high) if len(sheets(middle)) == fewest else (low, middle)
+    assert all(sheets(high + 3))
+
+
+def test_an_index_of_many_experiments_is_printed_as_a_list(
+    pages: dict[str, Path], tmp_path: Path
+) -> None:
+    text = pages["index"].read_text("utf-8")
+    cards = re.findall(r"<article.*?</article>", text, re.DOTALL)
+    passed = next(card for card in cards if "✓ PASS" in card)
+    page = tmp_path / "many.html"
+    page.write_text(text.replace(passed, 116 * passed), "utf-8")
+    assert browser.printed(page, tmp_path) <= MOST_SHEETS
+
+
 def test_a_page_that_is_too_long_is_seen_in_print(pages: dict[str, Path], tmp_path: Path) -> None:
     longer = '<p style="height: 7000px">much room</p></main>'
     page = tmp_path / "longer.html"

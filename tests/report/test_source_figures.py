@@ -119,7 +119,7 @@ def test_small_numbers_have_their_power_of_ten_beside_the_unit() -> None:
     )
     angle, energy = picture.figure.axes
     assert angle.get_ylabel() == "θ [rad]"
-    assert energy.get_ylabel() == "dE [10⁻⁵ J]"
+    assert energy.get_ylabel() == "ΔE [10⁻⁵ J]"
     ticks = energy.yaxis.get_major_formatter()
     assert not ticks.get_offset()
     assert max(abs(float(text.replace("−", "-"))) for text in map(ticks, energy.get_yticks())) >= 1

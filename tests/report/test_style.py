@@ -8,13 +8,14 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 import samples
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from matplotlib.colors import to_rgb
 
 from vibsim import report
 from vibsim.report import style
 from vibsim.report.data import Member
+from vibsim.report.evidence import frame
 from vibsim.report.figures import drawing, time
 from vibsim.report.page.templates import TEMPLATES
 
@@ -209,3 +210,17 @@ def test_axes_make_no_artists_for_ticks_until_somebody_draws_them():
     lines = [tick.gridline for tick in ax.xaxis.majorTicks]
     # a frame that is a rectangle clips as a box
     assert [line.get_clip_box() is None for line in lines] == [False, False]
+
+
+@settings(deadline=None)
+@given(st.floats(1e-12, 1e12), st.floats(1e-7, 3.0), st.sampled_from([3, 5, 7]))
+def test_no_two_ticks_of_an_axis_read_alike(low, wide, most):
+    high = low * (1.0 + wide)
+    with style.applied():
+        ax = style.canvas(2.0).add_subplot()
+        style.log_axis(ax, "y", low, high, most)
+        formatter, places = ax.yaxis.get_major_formatter(), ax.get_yticks()
+        assert len(set(formatter.format_ticks(places))) == len(places)
+        frame.scale(ax, np.array([low, high]))
+        formatter, places = ax.yaxis.get_major_formatter(), ax.get_yticks()
+        assert len(set(formatter.format_ticks(places))) == len(places)

@@ -17,7 +17,8 @@ from vibsim import report
 from vibsim.core.record import Record, Variable
 from vibsim.core.vocabulary import REASONS
 from vibsim.models import MODELS
-from vibsim.report import data, finest_level, style, sweep_layout
+from vibsim.report import choice, data, finest_level, style, sweep_layout
+from vibsim.report.figures import hero
 from vibsim.report.figures import order as figures_order
 from vibsim.report.figures.sweeps import maps, members, separatrix
 from vibsim.report.page import explorer
@@ -331,7 +332,7 @@ def test_without_an_exact_solution_maps_show_the_estimate_and_its_error_bar(monk
     assert "error bar of the error of θ" in names
     assert "estimated over true error of θ" not in names
     title = names["error of θ"].figure.axes[0].get_title(loc="left")
-    assert title == "Estimated error of θ (l2) [rad √s]"
+    assert title == "Estimated error of θ (L2 norm) [rad √s]"
     assert not [name for name, picture in names.items() if "separatrix" in picture.caption]
     assert "exact period" not in names
     error = finest_level.error(record, "theta")
@@ -521,3 +522,42 @@ def test_a_curve_that_goes_up_and_down_is_drawn_in_its_order():
     both = [key([0.5] * 5 + [1.0] * 5, "model.gamma"), key([1, 2, 3, 2, 1] * 2, "model.omega")]
     lines = sweep_layout.along_of(both).lines
     assert [row[1].tolist() for row in lines] == [[0, 1, 2, 3, 4], [5, 6, 7, 8, 9]]
+
+
+def test_a_path_that_is_followed_is_a_line_up_and_a_line_down_with_their_directions():
+    """Without a name for each way a reader cannot see the hysteresis; the values need not repeat."""
+    up, down = sweep_layout.UP, sweep_layout.DOWN
+    for values in ([1.0, 2.0, 3.0, 2.0, 1.0], [1.0, 2.0, 3.0, 2.5, 1.5]):
+        lines = sweep_layout.along_of([key(values)], "model.g").lines
+        found = [(name, members.tolist()) for name, members in lines]
+        assert found == [(up, [0, 1, 2]), (down, [2, 3, 4])]
+    (line,) = sweep_layout.along_of([key([3.0, 2.0, 1.0])], "model.g").lines
+    assert (line[0], line[1].tolist()) == ("", [0, 1, 2])
+    # the key that is followed runs along the axis, also where another has more values
+    both = [key([1, 1, 1, 2, 2, 2, 3, 3, 3], "model.b"), key([1, 2, 1] * 3, "model.g")]
+    along = sweep_layout.along_of(both, "model.g")
+    assert along.key.key == "model.g"
+    assert [name for name, _ in along.lines] == [
+        f"b = {b}, {way}" for b in (1, 2, 3) for way in (up, down)
+    ]
+
+
+def test_both_ways_of_a_followed_path_are_in_the_legends():
+    exp = samples.experiment(
+        model={"kind": "duffing", "delta": 0.1, "alpha": 1.0, "beta": 0.04, "gamma": 1.0, "omega": 1.0},
+        initial={"u": 0.0, "v": 0.0}, levels=[1, 2, 3], schemes=["rk4"],
+        time={"periods": 4, "steps_per_period": 16, "frequency": "model.omega"},
+        sweep={"follow": "model.omega", "model.omega": [1.0, 1.1, 1.2, 1.1, 1.0]},
+    )  # fmt: skip
+    record = samples.record(exp)
+    lead = choice.find_lead(exp, record, {"checks": []})
+    with style.applied():
+        drawn = [
+            hero.response(exp, record, lead),
+            *(v.picture for v in samples.views(exp, record, "u")[0].values()),
+        ]
+        for picture in drawn:
+            if "verdict" not in picture.name and "histogram" not in picture.name:
+                legend = picture.figure.axes[0].get_legend()
+                texts = [text.get_text() for text in legend.get_texts()]
+                assert {sweep_layout.UP, sweep_layout.DOWN} <= set(texts), picture.name

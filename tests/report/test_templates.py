@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+import samples
 from jinja2 import environment as jinja
 
 from vibsim.core import private_cache
+from vibsim.report import choice, words
 from vibsim.report.page import templates
+from vibsim.report.tables import levels
+from vibsim.report.text import assertions
 
 NAME = "study.html"
 
@@ -77,3 +82,33 @@ def test_no_cache_is_no_fault(compiled: list[str], monkeypatch: pytest.MonkeyPat
     again()
     again()
     assert compiled == [NAME] * 2
+
+
+@pytest.mark.parametrize(
+    ("text", "markup"),
+    [
+        ("rescaled by 4^k", "rescaled by 4<sup>k</sup>"),
+        ("-4/3 (u_l - u_(l+1))", "-4/3 (u<sub>l</sub> - u<sub>l+1</sub>)"),
+        ("like dt^2 and (w0/w)^-2", "like dt<sup>2</sup> and (w0/w)<sup>-2</sup>"),
+        ("2^(k+1) < `a^b` & c", "2<sup>k+1</sup> &lt; <code>a^b</code> &amp; c"),
+        ("steps_per_period, level_07, rk4_a, x^ y", "steps_per_period, level_07, rk4_a, x^ y"),
+    ],
+)
+def test_exponents_and_indices_of_a_statement_are_set_and_code_is_not(
+    text: str, markup: str
+) -> None:
+    assert str(templates.environment().filters["code"](text)) == markup
+
+
+def test_no_page_names_a_norm_by_its_key() -> None:
+    assert set(words.NORMS) == {"l1", "l2", "linf", "linf_interior"}
+    experiment = samples.experiment(
+        checks=[{"converges": "theta", "order": 2, "norm": norm} for norm in words.NORMS]
+    )
+    told = [assertions.about(check) + assertions.measured(check) for check in experiment.checks]
+    record = samples.record(experiment)
+    told += [
+        levels.orders(record, "energy_deviation", choice.members(record, "theta"), norm).caption
+        for norm in words.NORMS
+    ]
+    assert not re.search(r"\bl1|\bl2|linf|dE", " ".join(told))

@@ -156,7 +156,7 @@ def test_stability_is_a_word(p, limit, word):
 def test_a_scheme_conserves_with_its_own_velocity_what_the_centred_difference_seems_to_lose(text):
     _, rec, _ = text
     table = contents_levels.velocities(rec)
-    own, centred = (column(table, f"max |dE|/E(0), {v}") for v in ("own velocity", "[D₂ₜu]"))
+    own, centred = (column(table, f"max |ΔE|/E(0), {v}") for v in ("own velocity", "[D₂ₜu]"))
     implicit = [i for i, name in enumerate(column(table, "scheme")) if name == "crank_nicolson"]
     assert all(own[i] < 1e-12 < 1e-3 < centred[i] for i in implicit)
     # nothing is compared with round-off, and what is compared is written plainly

@@ -114,7 +114,7 @@ def judge(experiment: Experiment, record: Record, check: ConservesCheck, found: 
 def describe(f: Found, check: ConservesCheck) -> Description:
     """Say how the error of the energy grows with time, and what to change where a check expects otherwise."""
     size, rate, drift = f.fact("energy_error"), f.fact("drift_rate"), f.word("drift")
-    number, name = f.notation.number, check.conserves
+    number, name = f.notation.number, f.notation.value(check.conserves)
     expects = f"The check expects `drift: {check.drift}`."
     match f.reason:
         case "non_finite":

@@ -54,6 +54,9 @@ FEWEST = 3
 """Fewer levels do not show how large an error is."""
 FINER = 2
 """So many finer levels are advised."""
+UNPROVED = (
+    " The levels agree with it, but do not prove it: the error bound is wider than what is asked."
+)
 FEWEST_DIGITS, MOST_DIGITS = 4, 10
 """Significant digits of a number."""
 
@@ -285,6 +288,8 @@ def describe(f: Found, check: ValueCheck) -> Description:
     match f.reason:
         case "match":
             sentence, advice = f"{subject} is {brief}; it is {expected}.", ""
+            if not is_proved(check, f.fact("value"), f.fact("error_bound")):
+                sentence += UNPROVED
         case "mismatch":
             sentence, advice = (
                 f"{subject} is {brief}; it is not {expected}.",
@@ -320,10 +325,21 @@ def describe(f: Found, check: ValueCheck) -> Description:
     return Description(sentence, advice, _measured(f, check, _digits(f, check)))
 
 
+def is_proved(check: ValueCheck, value: float, bound: float) -> bool:
+    """Say of a number that is as asked whether no other one within its bound would be otherwise."""
+    return not (check.number.has_limit(check.at.level) and bound > _room(check, value))
+
+
+def _room(check: ValueCheck, value: float) -> float:
+    """Return how far a number may be from what is asked, or is from a limit."""
+    key, wanted = border(check)
+    return float(check.allowed if key == "equals" else abs(value - wanted))
+
+
 def _digits(f: Found, check: ValueCheck) -> int:
     """Return how many digits of a number tell it from what a check asks for, and one more."""
-    found, (key, wanted) = f.fact("value"), border(check)
-    room = check.allowed if key == "equals" else abs(found - wanted)
+    found = f.fact("value")
+    room = _room(check, found)
     if not (math.isfinite(found) and found != 0.0 and room > 0.0):
         return MOST_DIGITS
     # a whole number is not rounded

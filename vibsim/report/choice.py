@@ -14,7 +14,14 @@ from vibsim.experiment.storage import checked_quantities
 from vibsim.report import data
 from vibsim.report.data import Member
 from vibsim.report.finest_level import deviation
-from vibsim.report.types import Check, ConvergesCheck, Experiment, Measurement, SchemeSpec
+from vibsim.report.types import (
+    Check,
+    ConvergesCheck,
+    Experiment,
+    Measurement,
+    SchemeSpec,
+    ValueCheck,
+)
 
 
 def promises(experiment: Experiment, record: Record, quantity: str) -> list[tuple[float, float]]:
@@ -54,6 +61,12 @@ def _on_order(experiment: Experiment, quantity: str) -> list[ConvergesCheck]:
 def position(experiment: Experiment) -> str:
     """Return the name of the model's position."""
     return experiment.model.definition.position
+
+
+def asked_values(experiment: Experiment) -> list[ValueCheck]:
+    """Return the numbers that checks ask for, those of statements among them."""
+    inner = [check.measured for check in experiment.checks]
+    return [row for row in inner if row.kind == "value"]
 
 
 def has_swept_options(experiment: Experiment, spec: SchemeSpec) -> bool:

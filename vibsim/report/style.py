@@ -55,6 +55,7 @@ MANY = len(COLOURS)  # schemes above which a figure has one legend for all of it
 LOG_RATIO = 30.0  # largest over least value above which a logarithmic axis shows them better
 LARGEST, TINIEST = 1e300, 1e-300  # of logarithmic axes: beyond, a margin would overflow
 LEAST, MOST = 1e-290, 1e290  # what lies beyond is drawn at the edge
+TICK_DIGITS = 12  # most significant digits of a tick, so that no two neighbours read alike
 DECADES = (1, 2, 3, 5, 10, 20, 30, 50, 100, 200, 300)  # between ticks of a logarithmic axis
 
 _RC: dict[Any, Any] = {
@@ -315,7 +316,9 @@ def log_ticks(axis: Any, low: float, high: float, most: int = 7) -> None:
     axis.set_major_locator(FixedLocator(shown))
     axis.set_minor_locator(NullLocator())
     plain = low >= 0.005 and high <= 2000
-    axis.set_major_formatter(FuncFormatter(lambda x, _: f"{x:g}" if plain else log_tick(x)))
+    axis.set_major_formatter(
+        FuncFormatter(lambda x, _: f"{x:.{TICK_DIGITS}g}" if plain else log_tick(x))
+    )
 
 
 def _within(low: float, high: float) -> tuple[float, float]:
@@ -325,12 +328,12 @@ def _within(low: float, high: float) -> tuple[float, float]:
 
 
 def log_tick(value: float) -> str:
-    """Write a tick of a logarithmic axis as a power of ten, with a digit where it needs one."""
+    """Write a tick of a logarithmic axis as a power of ten, with the digits that it needs."""
     if value <= 0:
         return ""
-    exponent = math.floor(math.log10(value) + 1e-9)
-    digit = round(value / 10.0**exponent)
-    return power(exponent) if digit == 1 else f"{digit}·{power(exponent)}"
+    mantissa, exponent = f"{value:.{TICK_DIGITS - 1}e}".split("e")
+    digits = f"{float(mantissa):.{TICK_DIGITS}g}"
+    return power(int(exponent)) if digits == "1" else f"{digits}·{power(int(exponent))}"
 
 
 def beside(ax: Axes, **options: Any) -> None:

@@ -5,6 +5,7 @@ Everything is found out from the swept values, so that it does not matter how a 
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -17,10 +18,13 @@ from vibsim.core.record import Record
 from vibsim.report import words
 from vibsim.report.data import swept, swept_label
 from vibsim.report.style import LOG_RATIO, label
+from vibsim.report.types import Experiment
 
 LARGEST_TO_SCALE = 1e100  # swept values from here on are not drawn to scale
 FEW, LINES = 5, 6
 """Most lines that the other parameter of a sweep of two may make, and those of one of more; others are no curves."""
+UP, DOWN = "going up →", "← going down"
+"""Ways along a path."""
 CELLS = 400  # most cells along each side of a map: more than its pixels could show
 BINS = 8, 100  # least and most cells along each side of a map of members that lie on no grid
 
@@ -168,9 +172,14 @@ def place_in(key: Key, borders: Floats) -> NDArray[np.intp]:
     return np.clip(found, 0, borders.size - 2)
 
 
-def layout_of(found: list[Key]) -> Along | Grid | None:
-    """Return how members lie that differ in some `keys`; None where they are a cloud, or differ in none."""
-    return along_of(found) or grid_of(found)
+def layout_of(experiment: Experiment, record: Record) -> Along | Grid | None:
+    """Return how the members of a sweep lie; None where they are a cloud, or differ in nothing."""
+    found, sweep = keys(record), experiment.sweep
+    return along_of(found, sweep.follow if sweep is not None else None) or grid_of(found)
+
+
+Line = tuple[str, NDArray[np.intp]]
+"""The name of a line, and its members."""
 
 
 @dataclass(frozen=True)
@@ -178,23 +187,30 @@ class Along:
     """Members laid out along one key."""
 
     key: Key
-    lines: tuple[tuple[str, NDArray[np.intp]], ...]
+    lines: tuple[Line, ...]
     """Members that belong to one line, with a name; without where there is one line. They are in ascending order of the
-    key, or in their own where values repeat, as up and down a response curve."""
+    key, or in their own where values repeat. A path that turns is a line for each of its ways: these share the member
+    at the turn."""
     follows: bool = False  # whether other keys change with this one
 
 
-def along_of(found: list[Key]) -> Along | None:
-    """Lay members out along the key with most values, one line per value of the others; None for too many lines."""
+def along_of(found: list[Key], follow: str | None = None) -> Along | None:
+    """Lay members out along a key, one line per value of the others; None for too many lines.
+
+    `follow` is the dotted key along which each member starts where the one before ended, if there is one. The lines are
+    drawn along it, else along the key with most values.
+    """
     if not found:
         return None
-    longest = max(found, key=lambda key: key.distinct.size)
+    longest = max(found, key=lambda key: (key.key == follow, key.distinct.size))
+    ways = _ways if longest.key == follow else _in_order
     others = [key for key in found if key is not longest]
     order = np.arange(longest.values.size)
     if not others or longest.distinct.size == longest.values.size:
         # of keys that move together one says it all
-        line = _in_order(longest, order)
-        return Along(longest, (("", line),), bool(others)) if _moves_together(found) else None
+        lines = ways(longest, order)
+        is_one = not others or _moves_together(found)
+        return Along(longest, tuple(lines), bool(others)) if is_one else None
     if int(np.prod([key.distinct.size for key in others])) > (FEW if len(others) == 1 else LINES):
         return None
     number = np.zeros(longest.values.size, dtype=np.intp)
@@ -202,18 +218,30 @@ def along_of(found: list[Key]) -> Along | None:
         number = number * key.distinct.size + np.searchsorted(key.distinct, key.values)
     lines = []
     for code in np.unique(number):
-        members = _in_order(longest, order[number == code])
-        name = ", ".join(
-            f"{key.name} = {key.text(float(key.values[members[0]]))}" for key in others
-        )
-        lines.append((name, members))
+        members = order[number == code]
+        at = [f"{key.name} = {key.text(float(key.values[members[0]]))}" for key in others]
+        for way, line in ways(longest, members):
+            lines.append((", ".join([*at, way] if way else at), line))
     return Along(longest, tuple(lines))
 
 
-def _in_order(key: Key, members: NDArray[np.intp]) -> NDArray[np.intp]:
-    """Return the members of a line in the order in which it is drawn."""
+def _in_order(key: Key, members: NDArray[np.intp]) -> list[Line]:
+    """Return the one line of members, in the order in which it is drawn."""
     rising = members[np.argsort(key.values[members], kind="stable")]
-    return rising if np.all(np.diff(key.values[rising]) > 0.0) else members
+    return [("", rising if np.all(np.diff(key.values[rising]) > 0.0) else members)]
+
+
+def _ways(key: Key, members: NDArray[np.intp]) -> list[Line]:
+    """Return the ways up and down of members on a path, or one line where it never turns or turns too often."""
+    is_up = np.diff(key.values[members]) > 0.0
+    turns = (np.flatnonzero(is_up[1:] != is_up[:-1]) + 1).tolist()
+    if not 0 < len(turns) < LINES:
+        return [("", members)]
+    ends = [0, *turns, members.size - 1]
+    return [
+        (UP if is_up[start] else DOWN, members[start : end + 1])
+        for start, end in itertools.pairwise(ends)
+    ]
 
 
 def _moves_together(found: list[Key]) -> bool:

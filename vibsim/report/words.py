@@ -13,6 +13,7 @@ from vibsim.core.vocabulary import (
     AMPLITUDE,
     CENTRED,
     PHASE,
+    TYPICAL_NORM,
     is_error_part,
     order_interval,
     plain_name,
@@ -26,7 +27,7 @@ NAMES = {
     "energy": ("E", "the energy E"),
     "kinetic_energy": ("T", "the kinetic energy T"),
     "potential_energy": ("V", "the potential energy V"),
-    "energy_deviation": ("dE", "the energy deviation dE = E(t) − E(0)"),
+    "energy_deviation": ("ΔE", "the energy deviation ΔE = E(t) − E(0)"),
 }
 """Letter and words of quantities; others go by their name."""
 
@@ -145,6 +146,11 @@ ERRORS = {
     "error_l1": "error in the L1 norm", "error_l2": "error in the L2 norm",
 }  # fmt: skip
 """Words for the errors in a norm."""
+NORMS = {
+    "l1": "L1 norm", "l2": "L2 norm", "linf": "largest value", "linf_interior": "largest value without the last point",
+}  # fmt: skip
+"""Words for the norms over time."""
+USUAL_NORM = NORMS[TYPICAL_NORM]
 DIGITS = {"brief": 2, "close": 7, "full": 10, "step": 6, "value": 12}  # significant digits of forms
 LEAST_PERCENT = 1e-5  # of a whole, that is written in per cent
 MORE_DIGITS = 2  # of a number beside a printed one
@@ -218,6 +224,12 @@ def number(value: Any, form: str = "norm") -> str:
     return mantissa.rstrip("0").rstrip(".") + dot + exponent
 
 
+def ceiling(size: float) -> str:
+    """Write a positive number with two digits that are not less than it."""
+    unit = 10.0 ** (math.floor(math.log10(size)) - 1)
+    return number(math.ceil(size / unit) * unit, "brief")
+
+
 def share(part: float) -> str:
     """Write a part of a whole: in per cent, or as a power of ten where it is very small."""
     return f"{number(100.0 * part, 'brief')} %" if part >= LEAST_PERCENT else number(part, "brief")
@@ -283,10 +295,10 @@ def interval(bounds: Sequence[float | None] | None) -> str:
     return " to ".join(end.replace("-", "−") for end in order_interval(*known))
 
 
-def between(bounds: Sequence[float | None] | None) -> str:
-    """Write the interval of an order as part of a sentence; empty where there is none."""
+def likely(bounds: Sequence[float | None] | None) -> str:
+    """Write the interval of an order with what it is; empty where there is none."""
     text = interval(bounds)
-    return f"between {text.replace(' to ', ' and ')}" if text != "–" else ""
+    return f"95 % interval {text}" if text != "–" else ""
 
 
 def with_interval(order: float | None, bounds: Sequence[float | None] | None) -> str:

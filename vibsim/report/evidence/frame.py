@@ -59,7 +59,7 @@ def round_ticks(axis: Any, most: int = 4) -> None:
     from matplotlib.ticker import FuncFormatter, MaxNLocator
 
     axis.set_major_locator(MaxNLocator(most, steps=[1, 2, 5, 10], min_n_ticks=FEWEST))
-    axis.set_major_formatter(FuncFormatter(lambda value, _: words.number(value, "step")))
+    axis.set_major_formatter(FuncFormatter(lambda value, _: words.number(value, "value")))
 
 
 def scale(ax: Axes, *shown: Floats, is_log: bool = False, margin: float = 0.15) -> None:

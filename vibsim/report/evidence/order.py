@@ -30,7 +30,7 @@ def picture(
     alt = f"Evidence on the order of {words.name(quantity)}"
     told = (
         "the order from three levels, at the coarsest of them; filled where it counts. Grey: what the check asks for. "
-        "Bar: the stated order with its interval."
+        "Bar, and in brackets above: the stated order with its 95 % interval, which often ends at a whole power."
     )
     figure = style.canvas(1.0)
     has_series = not data.is_lean(record)

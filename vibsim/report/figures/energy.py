@@ -66,8 +66,8 @@ def running(record: Record, case: int) -> Picture | None:
         ax.plot([], [], color=style.GREY, label="own velocity")
         ax.plot([], [], color=style.GREY, linestyle=DASHED, label="[D₂ₜu]")
         style.beside(ax, fontsize=8, handlelength=2.4)
-        text = style.label("max |dE| so far", unit(record, "energy_deviation_max_abs"))
-        ax.set_ylabel("max |dE| / E(0) so far" if usable else text)
+        text = style.label("max |ΔE| so far", unit(record, "energy_deviation_max_abs"))
+        ax.set_ylabel("max |ΔE| / E(0) so far" if usable else text)
     axes[0].set_title("Energy error by velocity")
     axes[-1].set_xlabel(time_label(record))
     return Picture(

@@ -170,7 +170,7 @@ def over_members(
     keys = sweep_layout.keys(record)
     if not keys:
         return [], []
-    layout = sweep_layout.layout_of(keys)
+    layout = sweep_layout.layout_of(experiment, record)
     schemes = range(min(len(record["scheme"]), MOST_SHOWN))
 
     @cache

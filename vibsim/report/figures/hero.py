@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from vibsim.checks.order_context import COINCIDE
+from vibsim.checks.outcome import about_members
 from vibsim.core.array_types import Floats
 from vibsim.core.record import Record
 from vibsim.report import choice, data, finest_level, style, sweep_layout, words
@@ -240,7 +241,7 @@ def response(experiment: Experiment, record: Record, lead: Lead) -> Picture | No
     if found is None:
         return None
     name, text, values = found
-    layout = sweep_layout.layout_of(keys)
+    layout = sweep_layout.layout_of(experiment, record)
     if isinstance(layout, Along):
         ax = _curves(lead, layout, values, text)
     elif isinstance(layout, Grid):
@@ -269,7 +270,7 @@ def _number(experiment: Experiment, record: Record, lead: Lead) -> tuple[str, st
     First comes what a check asks for, then period and amplitude, then the error of the finest level.
     """
     position, scheme = choice.position(experiment), lead.member.scheme
-    asked = [check.measured.value for check in experiment.checks if check.measured.kind == "value"]
+    asked = [check.value for check in choice.asked_values(experiment)]
     usual = ["period", "amplitude"]
     usual = usual if experiment.model.definition.conservative else usual[::-1]
     for name in [*(name for name in asked if name in usual), *usual]:
@@ -373,6 +374,7 @@ def orders(experiment: Experiment, record: Record, lead: Lead) -> Picture | None
     known = np.isfinite(order)
     if not known.any():
         return None
+    asked = about_members(record, lead.measured if lead.is_on_order else None)
     letter = words.symbol(quantity)
     allowed = choice.tolerance(experiment, quantity, record.words("scheme")[lead.member.scheme])
     due = np.unique(promised[np.isfinite(promised)])
@@ -381,7 +383,11 @@ def orders(experiment: Experiment, record: Record, lead: Lead) -> Picture | None
     if order.size > FEW:
         ax = _panel(RIGHT, "members (logarithmic)")
         borders = np.linspace(*style.limits(shown[known], around), 41)
-        ax.hist(shown[known], borders.tolist(), color=style.COLOURS[0], zorder=2)
+        both, colours = (
+            [shown[known & asked], shown[known & ~asked]],
+            [style.COLOURS[0], style.PALE],
+        )
+        ax.hist(both, borders.tolist(), color=colours, stacked=True, zorder=2)
         for value in due:
             ax.axvspan(value - allowed, value + allowed, **style.ALLOWED)
         most = float(np.histogram(shown[known], borders)[0].max())
@@ -392,9 +398,15 @@ def orders(experiment: Experiment, record: Record, lead: Lead) -> Picture | None
         ax = _panel(RIGHT, f"observed order of {letter}")
         for value in due:
             ax.axhspan(value - allowed, value + allowed, **style.ALLOWED)
-        ends = (np.clip(part, around.min() - 1.0, around.max() + 1.0) for part in (low, high))
-        ax.vlines(key.values, *ends, color=style.COLOURS[0], linewidth=1.6, alpha=0.5)
-        ax.plot(key.values, shown, ".", color=style.COLOURS[0], markersize=4)
+        low_end, high_end = (
+            np.clip(part, around.min() - 1.0, around.max() + 1.0) for part in (low, high)
+        )
+        for of_kind, colour in ((~asked, style.PALE), (asked, style.COLOURS[0])):
+            x = key.values[of_kind]
+            ax.vlines(
+                x, low_end[of_kind], high_end[of_kind], color=colour, linewidth=1.6, alpha=0.5
+            )
+            ax.plot(x, shown[of_kind], ".", color=colour, markersize=4)
         _across(ax, key)
         ax.set_ylim(*style.limits(shown[known], around))
         _mark(ax, key.values, shown, lead)
@@ -404,18 +416,22 @@ def orders(experiment: Experiment, record: Record, lead: Lead) -> Picture | None
         & (np.fmin(order, low) <= promised + allowed)
         & (np.fmax(order, high) >= promised - allowed)
     )
-    counts = (inside.sum(), order.size, np.sum(~known))
-    kept, every, missing = (words.number(int(count), "integer") for count in counts)
-    title = f"{kept} of {every} members have an order in the band"
-    if inside.all():
+    counts = (inside[asked].sum(), asked.sum(), np.sum(~asked), np.sum(~known))
+    kept, due_of, others, missing = (words.number(int(count), "integer") for count in counts)
+    if not asked.all():
+        title = f"{kept} of {due_of} members asked about are in the band; grey: the {others} others"
+    elif not inside.all():
+        title = f"{kept} of {due_of} members have an order in the band"
+    else:
         measured = np.abs(order - promised) <= allowed
         title = "All members keep their order" if measured.all() else "All intervals reach the band"
-    bars = "" if order.size > FEW else "; the bars are the intervals of the orders"
+    bars = "" if order.size > FEW else "; the bars are the 95 % intervals of the orders"
     return Picture(
         "hero_orders",
         title,
         f"The band is what the tolerance allows around the promised order{bars}."
-        + f" {missing} members have no order and are left out." * (not known.all()),
+        + f" {missing} members have no order and are left out." * (not known.all())
+        + " The check does not ask about the grey members." * (not asked.all()),
         f"Observed orders of {words.name(quantity)} of all members",
         ax.get_figure(root=True),
     )

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from vibsim.core.array_types import Floats
+from vibsim.core.record import Record
 from vibsim.models import Model
 from vibsim.report import data
 from vibsim.report.figures.scenes import Motion
@@ -15,6 +16,9 @@ from vibsim.report.figures.scenes import Motion
 SECONDS_A_PERIOD = 2.0  # at speed 1
 WINDOW_PERIODS = 6.0  # a series over time is shown whole up to 1.5 times as many
 VISIBLE = 0.03  # difference of two motions that is seen, over the size of the motion
+FEWEST_SAMPLES = (
+    6.0  # a period: straight lines between fewer cut off more than a tenth of its extremes
+)
 UNBOUNDED = 3.0  # a motion larger than this, over the size of the finest one, is not drawn
 
 
@@ -44,6 +48,12 @@ def period(t: Floats, u: Floats) -> float:
     step = step[np.abs(step) > 1e-9 * data.largest(u)]
     turns = int(np.sum(np.signbit(step[1:]) != np.signbit(step[:-1])))
     return float(t[-1] - t[0]) / max(1.0, 0.5 * turns)
+
+
+def is_undersampled(record: Record, t: Floats, u: Floats) -> bool:
+    """Say whether lines between samples would hide what the steps between them show of a motion."""
+    has_more = int(np.min(record["steps"])) > t.size - 1
+    return has_more and t.size * period(t, u) < FEWEST_SAMPLES * float(t[-1] - t[0])
 
 
 def at_times(times: Floats, t: Floats, x: Floats) -> Floats:

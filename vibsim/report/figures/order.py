@@ -121,7 +121,7 @@ def _draw_norms(
             ax.plot([], [], color=style.GREY, **mark, label=text)
     ax.set_xlabel(style.label("dt", data.time_unit(record, "dt")))
     measure = data.norm_unit(record, quantity)
-    ax.set_ylabel(style.label(f"{TYPICAL_NORM} norm, {words.symbol(quantity)}", measure))
+    ax.set_ylabel(style.label(f"{words.USUAL_NORM}, {words.symbol(quantity)}", measure))
     _level_axis(ax, dt, data.whole(record, "level"))
     return found
 
@@ -228,7 +228,7 @@ def _draw_by_level(
     ax.set_xlim(levels[0] - 0.5, levels[-1] + 0.5)
     ax.xaxis.set_major_locator(MaxNLocator(nbins=10, integer=True))
     ax.set_xlabel("level (coarsest of three)")
-    ax.set_ylabel(f"local order of {words.symbol(quantity)} ({TYPICAL_NORM})")
+    ax.set_ylabel(f"local order of {words.symbol(quantity)} ({words.USUAL_NORM})")
     return stated
 
 
@@ -254,7 +254,7 @@ def _draw_each(
     names = [style.entry(member.scheme_name) for member in members]
     ax.set_yticks(range(len(members)), names, fontsize=7.5)
     ax.set_ylim(len(members) - 0.4, -0.6)
-    ax.set_xlabel(f"order of {words.symbol(quantity)} ({TYPICAL_NORM})")
+    ax.set_xlabel(f"order of {words.symbol(quantity)} ({words.USUAL_NORM})")
     return settled
 
 

@@ -13,7 +13,7 @@ from vibsim.core.array_types import Floats
 from vibsim.core.record import Record
 from vibsim.report import data, style, words
 from vibsim.report.data import Member
-from vibsim.report.figures import panels
+from vibsim.report.figures import moments, panels
 from vibsim.report.style import Picture
 from vibsim.report.types import Axes
 
@@ -26,6 +26,8 @@ CUT = 3.0
 TINY = 1e-18
 """Smallest relative size that a logarithmic panel shows: anything below is an accident of rounding."""
 BAND = "#56B4E9"
+DOTS: Look = {"linestyle": "none", "marker": ".", "markersize": 3.0}
+"""In place of a line, where samples are too few for one."""
 
 
 def solution(record: Record, quantity: str, member: Member) -> Picture:
@@ -150,22 +152,28 @@ def motion(record: Record, quantity: str, member: Member) -> Picture:
     has_errors = bool(np.isfinite(best).any()) and len(levels) > (0 if is_known else 1)
     axes = panels.stacked([2.3, *[1.7] * has_errors], style.TIME)
     text = "exact" if is_known else "extrapolated"
+    is_dotted = moments.is_undersampled(record, t, data.at(record, f"{quantity}_finest", member))
     if has_errors:
-        axes[0].plot(*style.thin(t, best), color=style.PALE, linewidth=5.0, label=text, zorder=1)
-    looks = {i: _look(k, record, i) for k, i in enumerate(chosen)}
+        pale: Look = {"color": style.PALE, "linewidth": 5.0, "label": text, "zorder": 1}
+        axes[0].plot(
+            *style.thin(t, best), **pale | (DOTS | {"markersize": 6.0} if is_dotted else {})
+        )
+    looks = {i: _look(k, record, i) | (DOTS if is_dotted else {}) for k, i in enumerate(chosen)}
     _draw_levels(axes[0], t, series, looks, best)
-    axes[0].set(ylabel=style.label(letter, measure), title=f"{letter}(t)")
+    title = f"{letter}(t){' at the stored times alone' if is_dotted else ''}"
+    axes[0].set(ylabel=style.label(letter, measure), title=title)
     if has_errors:
         errors = {i: values - best for i, values in series.items()}
         exponent = _draw_level_errors(axes[1], t, errors, looks)
         axes[1].set_title(f"Each level minus the {text} solution", fontweight="normal", fontsize=9)
         axes[1].set_ylabel(style.label(f"error of {letter}", measure, exponent))
     axes[-1].set_xlabel(data.time_label(record))
+    dots = " Dots: the stored samples, which are too few for lines between them." * is_dotted
     told = f"Wide and grey is the {text} solution, the lines are the levels; below it, how far each level is from it."
     return Picture(
         f"motion_{quantity}_{member.stem}",
         f"{words.title(quantity)}(t), {member.title}",
-        told if has_errors else "Each line is a level.",
+        (told if has_errors else "Each line is a level.") + dots,
         f"{words.name(quantity)} against time on all levels for {member.title}"
         + ", and the error of each level" * has_errors,
         axes[0].get_figure(root=True),
@@ -184,7 +192,8 @@ def _draw_levels(
 ) -> None:
     for k, (i, values) in enumerate(series.items()):
         dashes = "-" if i == max(series) else style.DASHES[1 + k % (style.MANY - 1)]
-        ax.plot(*style.thin(t, values), linestyle=dashes, **looks[i])
+        look: Look = {"linestyle": dashes} | looks[i]
+        ax.plot(*style.thin(t, values), **look)
     panels.stop_at_breakdown(ax, t, list(series.values()))
     whole = [values for values in series.values() if np.isfinite(values).all()]
     whole = whole or list(series.values())

@@ -46,7 +46,7 @@ Lines = list[tuple[Floats, Floats]]
 
 def thumbnail(experiment: Experiment, record: Record, member: Member) -> str:
     """Return the small picture as an SVG document; `member` is the one whose motion is drawn where no sweep is."""
-    layout = sweep_layout.layout_of(sweep_layout.keys(record))
+    layout = sweep_layout.layout_of(experiment, record)
     model = experiment.model.definition
     names = sorted(NUMBERS, key="period".__ne__) if model.conservative else NUMBERS
     if isinstance(layout, Along) and (lines := _response(record, layout, names)):

@@ -86,13 +86,13 @@ def energy(record: Record, member: Member) -> Picture:
     for i in _few(above):
         values = data.at(record, f"{name}_scaled", member, level=i)
         factor = words.factor(float(gap_ratio(order, levels[i] - levels[0])), 2.0**order)
-        text = f"{factor}dE{words.lowered(levels[i])}"
+        text = f"{factor}ΔE{words.lowered(levels[i])}"
         lost = _lost(record, name, member, [i])
         curves.append(panels.Curve(text, values, above[i], lost, style.of_level(levels[i])))
     spread = panels.comparable(curves)
     axes = panels.stacked([2.4, *[1.3] * spread], style.TIME)
-    panels.draw_curves(axes[0], t, curves, "rescaled dE", measure)
-    axes[0].set_title("Energy deviation dE = E(t) − E(0), rescaled")
+    panels.draw_curves(axes[0], t, curves, "rescaled ΔE", measure)
+    axes[0].set_title("Energy deviation ΔE = E(t) − E(0), rescaled")
     if spread:
         panels.draw_spread(axes[1], t, curves, measure)
     axes[-1].set_xlabel(data.time_label(record))
@@ -100,7 +100,7 @@ def energy(record: Record, member: Member) -> Picture:
         name=f"conservation_{member.stem}",
         title=f"Convergence to conservation: {member.title}",
         caption=style.sentences(
-            f"dE{words.lowered(levels[0])} is dE on level {levels[0]}, and so on. The exact energy is constant, so dE "
+            f"ΔE{words.lowered(levels[0])} is ΔE on level {levels[0]}, and so on. The exact energy is constant, so ΔE "
             "itself is an error.",
             "The scheme conserves the energy exactly: what is seen is round-off."
             if math.isinf(data.formal_order(record, member, name))

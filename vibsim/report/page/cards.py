@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from vibsim.checks.outcome import Result
-from vibsim.checks.value import unit_of
+from vibsim.checks.value import is_proved, unit_of
 from vibsim.checks.verdict_text import Wording
 from vibsim.core.home import called
 from vibsim.core.record import Record
@@ -130,6 +130,11 @@ def _is_said(asserted: Check | None, check: Mapping[str, Any]) -> bool:
     is_doubtful = order is not None and low is not None and order - low > WIDE
     # that the interval reaches what is wanted, where the order itself does not, is worth a sentence
     is_doubtful |= None not in (order, wanted) and abs(order - wanted) > allowed
+    if asserted.measured.kind == "value":
+        number, bound = (words.fact(result, name) for name in ("value", "error_bound"))
+        is_doubtful |= None not in (number, bound) and not is_proved(
+            asserted.measured, number, bound
+        )
     is_plain = asserted.measured.kind in SAID_BY_THE_LINE and not is_trap(asserted)
     return is_plain and not is_doubtful
 

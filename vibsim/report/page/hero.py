@@ -12,7 +12,7 @@ import numpy as np
 
 from vibsim.checks.outcome import about_members
 from vibsim.checks.value import unit_of
-from vibsim.comparison.best_values import WORDS, scalars
+from vibsim.comparison.best_values import WORDS
 from vibsim.core.home import called
 from vibsim.core.record import Record
 from vibsim.core.vocabulary import decisive_number
@@ -24,13 +24,13 @@ from vibsim.report.figures import solution
 from vibsim.report.style import Picture
 from vibsim.report.tables import published
 from vibsim.report.tables.best import error_size, rounded
+from vibsim.report.tables.best import numbers as numbers_of
 from vibsim.report.text import assertions, findings
 from vibsim.report.types import Experiment
 
 NUMBERS = 3  # large numbers on the first screen
 NAMED = 3  # schemes that are named
 STATEMENTS = 3  # statements that are read beside the finding
-MOST_LETTERS = 14  # of a best value; tables have every digit
 MEASURED = {
     "stable": "Growth per period", "conserves": "Largest energy error over E(0)", "equal": "Largest difference",
     "accurate": "Error of the finest level", "tolerance": "Error bound of the best solution",
@@ -186,7 +186,7 @@ def _order(experiment: Experiment, record: Record, lead: Lead) -> Iterator[Numbe
         if lead.is_on_order or lead.entry is None:
             yield {"label": label, "value": "not known", "note": due}
     else:
-        note = "; ".join(filter(None, [words.between((low, high)), due]))
+        note = "; ".join(filter(None, [words.likely((low, high)), due]))
         yield {"label": label, "value": words.number(float(order), "order"), "note": note}
 
 
@@ -218,11 +218,12 @@ def _error(experiment: Experiment, record: Record, lead: Lead) -> Iterator[Numbe
 def _best(experiment: Experiment, record: Record, lead: Lead) -> Iterator[Number]:
     """Yield the best value of the first number that is asked for, or of the end or the period."""
     position, model = choice.position(experiment), experiment.model.definition
-    asked = [check.measured for check in experiment.checks if check.measured.kind == "value"]
+    asked = choice.asked_values(experiment)
     wanted = [
         f"{check.quantity}_{check.value}" if check.quantity else check.value for check in asked
     ]
-    rows = {row.variable: row for row in scalars(model, "scalar" not in record)}
+    known = numbers_of(model, "scalar" not in record, [check.value for check in asked])
+    rows = {row.variable: row for _, row in known}
     for name in [*wanted, f"{position}_end", "period", "amplitude"]:
         field = f"{name}_richardson"
         if name not in rows or field not in record:
@@ -237,12 +238,10 @@ def _best(experiment: Experiment, record: Record, lead: Lead) -> Iterator[Number
         text = f"{words.symbol(row.quantity)} {WORDS[row.value]}" if is_named else row.words
         unit, size = data.unit(record, field), error_size(bound)
         levels = len(data.whole(record, "level"))
-        told = rounded(value, bound).text
-        told = told if len(told) <= MOST_LETTERS else words.number(value, "value")
         note = f"± {size.text if size else '0'} {unit}".rstrip()
         yield {
             "label": f"Best value: {text}{data.of_several(record, lead.member.scheme)}",
-            "value": f"{told} {unit}".rstrip(),
+            "value": f"{rounded(value, bound).text} {unit}".rstrip(),
             "note": f"{note}, extrapolated over {levels} levels{_of_member(record, lead)}",
         }
         return

@@ -82,7 +82,7 @@ def finding(verdicts: Sequence[LadderVerdict]) -> str:
 
 def numbers(verdict: LadderVerdict) -> list[dict[str, str]]:
     """Return the large numbers of a ladder: the order, the error of the finest level, and the best value."""
-    span = words.between((verdict.order_low, verdict.order_high))
+    span = words.likely((verdict.order_low, verdict.order_high))
     asked, wanted = verdict.expected or verdict.at_least, ""
     if asked is not None:
         wanted = f"expected{'' if verdict.expected else ' at least'}: {asked:g}"

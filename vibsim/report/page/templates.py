@@ -47,15 +47,28 @@ def environment() -> Environment:
     return made
 
 
+_RAISED = re.compile(r"(?<=[\w)])\^(?:\(([^()]*)\)|(-?\w+))")
+_LOWERED = re.compile(r"(?<!\w)([A-Za-z])_(?:\(([^()]*)\)|([A-Za-z0-9]{1,2}))(?!\w)")
+"""An exponent, and the index of a letter, such as those of ``4^k`` and ``u_(l+1)``."""
+
+
 def _code(text: str) -> str:
-    """Escape a text, and set what stands between backticks as code."""
+    """Escape a text, set what stands between backticks as code, and elsewhere exponents and indices as such."""
     parts = text.split("`")
     if len(parts) % 2 == 0:
         return escape(text)
     pieces = [
-        Markup("<code>{}</code>").format(p) if i % 2 else escape(p) for i, p in enumerate(parts)
+        Markup("<code>{}</code>").format(p) if i % 2 else _shifted(p) for i, p in enumerate(parts)
     ]
     return Markup("").join(pieces)
+
+
+def _shifted(text: str) -> str:
+    """Escape a text and set its exponents and indices."""
+    raised = _RAISED.sub(lambda found: f"<sup>{found[1] or found[2]}</sup>", escape(text))
+    return Markup(
+        _LOWERED.sub(lambda found: f"{found[1]}<sub>{found[2] or found[3]}</sub>", raised)
+    )
 
 
 def source(name: str) -> str:

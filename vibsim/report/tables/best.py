@@ -7,14 +7,15 @@ value of the finest level (the grid convergence index, `vibsim.convergence.gci`)
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 
-from vibsim.comparison.best_values import WORDS, scalars
+from vibsim.comparison.best_values import WORDS, Scalar, scalars
 from vibsim.core.record import Record
 from vibsim.models import Model
 from vibsim.report import style, words
 from vibsim.report.data import Member, at, exact_periods, exact_series, flags, swept, unit, whole
 from vibsim.report.tables.table import Cell, Column, Table, Written
+from vibsim.schemes.orders import is_autonomous
 
 CLASSES = {
     "unknown": "–",
@@ -26,12 +27,20 @@ CLASSES = {
 }
 """How the levels follow each other, in words."""
 MOST_DIGITS = 16  # significant digits of a double
+OF_A_PERIODIC_MOTION = "period", "frequency", "growth_per_period"
+"""Numbers that mean something of a free motion in one coordinate; of any other one where a check asks for them."""
+NEVER_NEGATIVE = *OF_A_PERIODIC_MOTION, "amplitude", "relative_energy_error"
 PER_NUMBER = ("finest level", "GCI", "GCI relative", "order", "levels", "convergence")
 """Columns that are kept with series only."""
 
 
-def table(model: Model, record: Record, shown: Sequence[Member]) -> Table | None:
-    """Return the limit of every number of the members; None where there is none, or one level only."""
+def table(
+    model: Model, record: Record, shown: Sequence[Member], asked: Collection[str] = ()
+) -> Table | None:
+    """Return the limit of every number of the members; None where there is none, or one level only.
+
+    `asked` are the names of the numbers that checks ask for.
+    """
     if len(whole(record, "level")) < 2 or "period_richardson" not in record:
         return None
     columns = (
@@ -40,7 +49,7 @@ def table(model: Model, record: Record, shown: Sequence[Member]) -> Table | None
         Column("best value", form="full"), Column("bound", form="small"), Column("true error", form="small"),
         Column("order", form="order"), Column("levels"), Column("convergence"),
     )  # fmt: skip
-    rows = tuple(_rows(model, record, shown))
+    rows = tuple(_rows(model, record, shown, asked))
     if not rows:
         return None
     text = (
@@ -56,9 +65,21 @@ def table(model: Model, record: Record, shown: Sequence[Member]) -> Table | None
     return Table("best_values", text, columns, rows, 1).without_empty(missing)
 
 
-def _rows(model: Model, record: Record, shown: Sequence[Member]) -> Iterator[tuple[Cell, ...]]:
+def numbers(model: Model, is_lean: bool, asked: Collection[str]) -> list[tuple[int, Scalar]]:
+    """Return the numbers that mean something of a motion, each with its position in the record."""
+    is_periodic = model.is_alone and is_autonomous(model)
+    return [
+        (k, row)
+        for k, row in enumerate(scalars(model, is_lean))
+        if is_periodic or row.value in asked or row.value not in OF_A_PERIODIC_MOTION
+    ]
+
+
+def _rows(
+    model: Model, record: Record, shown: Sequence[Member], asked: Collection[str]
+) -> Iterator[tuple[Cell, ...]]:
     has_series = "scalar" in record
-    for k, row in enumerate(scalars(model, not has_series)):
+    for k, row in numbers(model, not has_series, asked):
         name, nothing = row.variable, (None, None, None)
         is_named = row.quantity in words.NAMES or (row.quantity and model.coordinates > 1)
         text = f"{words.symbol(row.quantity)} {WORDS[row.value]}" if is_named else row.words
@@ -74,7 +95,7 @@ def _rows(model: Model, record: Record, shown: Sequence[Member]) -> Iterator[tup
                 member.scheme_name,
                 *([member.case_name] if swept(record) else []),
                 *(_finest(record, index, k, member) if has_series else nothing),
-                rounded(value, bound if math.isfinite(bound) else index),
+                best(row.value, value, bound if math.isfinite(bound) else index),
                 Written(bound, "unknown") if math.isnan(bound) else error_size(bound),
                 error_size(abs(value - _exact(record, name, member))),
                 *(_approach(record, k, member) if has_series else nothing),
@@ -96,16 +117,22 @@ def error_size(size: float) -> Written | None:
     return Written(size, words.number(size, "brief"))
 
 
+def best(name: str, value: float, bound: float) -> Written:
+    """Write a best value; of one that is never negative and may be 0 what it lies below."""
+    if name in NEVER_NEGATIVE and abs(value) <= bound:
+        return Written(value, f"below {words.ceiling(value + bound)}")
+    return rounded(value, bound)
+
+
 def rounded(value: float, error: float) -> Written:
     """Write a number with one digit beyond the first that its error touches."""
     if not (math.isfinite(error) and error > 0.0):
-        return Written(value, f"{value:.12g}".replace("-", "−"))
+        return Written(value, words.printed(f"{value:.12g}"))
     size = math.floor(math.log10(abs(value))) if value else 0
-    decimals = max(min(1 - math.floor(math.log10(error)), MOST_DIGITS - 1 - size), 0)
-    if abs(value) >= 1e-3 or value == 0.0:
-        return Written(value, f"{value:.{decimals}f}".replace("-", "−"))
-    digits = max(decimals + size, 0)
-    return Written(value, words.PAGE.digits(f"{value:.{digits}e}").replace("-", "−"))
+    decimals = min(1 - math.floor(math.log10(error)), MOST_DIGITS - 1 - size)
+    if -3 <= size < MOST_DIGITS:
+        return Written(value, f"{value:.{max(decimals, 0)}f}".replace("-", "−"))
+    return Written(value, words.printed(f"{value:.{max(decimals + size, 0)}e}"))
 
 
 def _approach(record: Record, k: int, member: Member) -> tuple[Cell, Cell, Cell]:

@@ -91,7 +91,7 @@ def orders(
         (Column("floor", measure, "norm"), lambda member, i: float(floors[member][i])),
         (Column("counts"), lambda member, i: notes[member][i]) if triples else None,
     )
-    caption = f"{letter}: {norm} norm of {f'{letter}(level) − {letter}(next level)' if pairs else 'its error'}"
+    caption = f"{letter}: {words.NORMS[norm]} of {f'{letter}(level) − {letter}(next level)' if pairs else 'its error'}"
     caption += "; ratio and order from three levels starting here" if triples else ""
     return by_level(record, f"orders_{quantity}_{norm}", caption, shown, filled)
 
@@ -116,14 +116,14 @@ def _notes(record: Record, quantity: str, member: Member) -> list[str]:
 
 
 def maxima(record: Record, shown: Sequence[Member]) -> Table | None:
-    """Return max|dE| over every step with and without the last point, and their ratios from level to level."""
+    """Return max|ΔE| over every step with and without the last point, and their ratios from level to level."""
     if OWN not in record:
         return None
     measure, several = unit(record, OWN), len(whole(record, "level")) > 1
     filled: list[tuple[Column, Fill]] = []
     for name, text, ratio in (
-        (OWN, "max |dE|", "ratio"),
-        (f"{OWN}_interior", "max |dE| without the last point", "ratio, without"),
+        (OWN, "max |ΔE|", "ratio"),
+        (f"{OWN}_interior", "max |ΔE| without the last point", "ratio, without"),
     ):
         # lean records leave the second out
         if name in record:
@@ -196,8 +196,8 @@ def velocities(record: Record) -> Table | None:
     )
     filled = (
         _step_column(record),
-        (Column("max |dE|/E(0), own velocity", form="small"), _cells(own)),
-        (Column("max |dE|/E(0), [D₂ₜu]", form="small"), _cells(second)),
+        (Column("max |ΔE|/E(0), own velocity", form="small"), _cells(own)),
+        (Column("max |ΔE|/E(0), [D₂ₜu]", form="small"), _cells(second)),
         (Column("second over first", form="norm"), quotient),
         (Column("drift of the energy, own velocity"), drift) if is_named else None,
     )

@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 
 from vibsim import store
 from vibsim.core.record import Record
-from vibsim.core.vocabulary import TYPICAL_NORM
 from vibsim.report import finest_level, words
 from vibsim.report.data import exact_periods, flags, norm_unit, swept, swept_label, unit, whole
 from vibsim.report.tables.table import Column, Table, csv_line
@@ -72,7 +71,7 @@ def table(record: Record, quantity: str) -> Table | None:
         for s, scheme in enumerate(schemes)
         for row in zip(*(values[s].tolist() for _, values in found), strict=True)
     ]
-    caption = f"Members: order of {words.symbol(quantity)} ({TYPICAL_NORM}), and numbers of the finest level"
+    caption = f"Members: order of {words.symbol(quantity)} ({words.USUAL_NORM}), and numbers of the finest level"
     columns = (Column("scheme"), *(column for column, _ in found))
     return Table("members", caption, columns, tuple(rows))
 

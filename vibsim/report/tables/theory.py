@@ -14,7 +14,7 @@ import numpy as np
 from vibsim.analysis.motion_variables import PEAKS
 from vibsim.core.array_types import Floats
 from vibsim.core.record import Record
-from vibsim.core.vocabulary import MEMBER, OF_LEVEL, TYPICAL_NORM
+from vibsim.core.vocabulary import MEMBER, OF_LEVEL
 from vibsim.report import choice, data, finest_level, words
 from vibsim.report.data import Member, known, swept, whole
 from vibsim.report.tables.levels import Fill, by_level
@@ -48,12 +48,12 @@ def schemes(experiment: Experiment, record: Record) -> Table | None:
         letter = words.symbol(quantity)
         columns.append(Column(f"order of {letter}, stated", form="step"))
         if whole(record, "triple"):
-            columns.append(Column("measured, ± half its interval", form="order"))
+            columns.append(Column("measured (95 % interval)", form="order"))
     rows = tuple(tuple(_scheme(experiment, record, s, quantities)) for s in range(len(names)))
     is_measured = bool(whole(record, "triple"))
     caption = (
         "Schemes: stated properties (explicit or implicit, s: symplectic)"
-        + f", and the order measured in the {TYPICAL_NORM} norm" * is_measured
+        + f", and the order measured in the {words.USUAL_NORM}" * is_measured
         + " (order ∞: exact, no error to shrink)"
         + "; in a sweep, that of the member farthest from the stated order"
         * (is_measured and bool(swept(record)))
@@ -83,15 +83,8 @@ def _scheme(
         case = int(np.argmax(np.where(np.isfinite(away), away, -1.0)))
         yield _alike(formal)
         if whole(record, "triple"):
-            yield _with_interval(float(value[case]), 0.5 * float(high[case] - low[case]))
-
-
-def _with_interval(order: float, half: float) -> Cell:
-    """Return an order that is written with its interval, to no more digits than that leaves."""
-    if not math.isfinite(order) or not math.isfinite(half):
-        return order
-    places = min(max(1 - math.floor(math.log10(half)), 1), 6) if half > 0.0 else 6
-    return Written(order, f"{order:.{places}f} ± {half:.{places}f}".replace("-", "−"))
+            order, *ends = (float(part[case]) for part in (value, low, high))
+            yield Written(order, words.with_interval(order, ends))
 
 
 def _alike(values: Floats) -> Cell:

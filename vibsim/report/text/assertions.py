@@ -46,7 +46,7 @@ def about(check: Check | None) -> str:
 
 def _of_norm(check: ConvergesCheck) -> str:
     """Say in brackets in which norm, unless it is the usual one, and which schemes an order is about."""
-    parts = [] if check.norm == TYPICAL_NORM else [f"{check.norm} norm"]
+    parts = [] if check.norm == TYPICAL_NORM else [words.NORMS[check.norm]]
     parts += [_listed(check.schemes)] if check.schemes else []
     return f" ({', '.join(parts)})" if parts else ""
 
@@ -80,7 +80,7 @@ def measured(check: Measurement) -> str:
             )
             named = [_listed(check.schemes)] if check.schemes else []
             only = "".join(f", {part}" for part in [*named, *swept_values(check)])
-            told = f"converges with {order} ± {check.tolerance:g} ({check.norm} norm{only})"
+            told = f"converges with {order} ± {check.tolerance:g} ({words.NORMS[check.norm]}{only})"
             is_trap = check.expect.status != "PASS"
             trap = f", expected to end as {expected_verdict(check.expect)}" if is_trap else ""
             return f"{words.title(check.converges)} {told}{trap}"

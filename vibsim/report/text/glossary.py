@@ -7,6 +7,8 @@ from typing import Any
 
 GLOSSARY = {
     "observed order": "The power p with which the error shrinks from level to level: error = C dt^p.",
+    "95 % interval": "It contains the true order with a probability of 95 %, and the measured one. It often ends at a "
+    "whole power, such as the promised order.",
     "asymptotic": "The steps are so small that one power of dt makes up nearly all of the error.",
     "rescaled differences": "Differences between successive levels, multiplied so that they coincide where the error "
     "has the promised order.",
@@ -19,7 +21,6 @@ GLOSSARY = {
     "hardest member": "The member of the sweep with the worst verdict; of equal ones that whose order is furthest off.",
     "printed": "The number as the source prints it.",
     "l2 norm": "The root of the integral over time of the squared value.",
-    "linf norm": "The largest absolute value over time.",
     "growth per period": "The amplitude after one period over that before it.",
     "dimensionless": "Without a unit, because it is a ratio of quantities of the same kind.",
     "trap caught": "A check that expects a failure, which occurred.",

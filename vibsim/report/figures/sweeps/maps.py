@@ -10,7 +10,7 @@ import numpy as np
 
 from vibsim.core.array_types import Floats
 from vibsim.core.record import Record
-from vibsim.core.vocabulary import REASONS, SEVERITY, TYPICAL_NORM
+from vibsim.core.vocabulary import REASONS, SEVERITY
 from vibsim.report import data, finest_level, style, words
 from vibsim.report.choice import position, tolerance
 from vibsim.report.figures.sweeps import view
@@ -144,7 +144,7 @@ def _errors(record: Record, quantity: str, scheme: int) -> Iterator[Map]:
     """Yield the error of the finest level, and how far its estimate can be trusted."""
     found, letter = finest_level.error(record, quantity), words.symbol(quantity)
     unit, level = data.norm_unit(record, quantity), data.whole(record, "level")[-1]
-    text = style.label(f"{found.kind} error of {letter} ({TYPICAL_NORM})", unit)
+    text = style.label(f"{found.kind} error of {letter} ({words.USUAL_NORM})", unit)
     best, estimate = style.positive(found.best[scheme]), found.estimate[scheme]
     yield Map(
         f"{quantity}_error", f"error of {letter}", quantity, best, text, unit, f"Of level {level}."

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from vibsim.core.array_types import Floats
 from vibsim.core.record import Record
-from vibsim.core.vocabulary import SEVERITY, TYPICAL_NORM
+from vibsim.core.vocabulary import SEVERITY
 from vibsim.report import data, finest_level, frame, style, sweep_layout, words
 from vibsim.report.choice import position, promises
 from vibsim.report.figures.panels import explosive, stacked
@@ -253,7 +253,7 @@ def _draw_orders(
         least, most = promised[0][0], promised[-1][0]
         bottom, top = style.limits(value, np.array([least - 0.25, most + 0.25]))
         ax.set_ylim(max(bottom, least - 3), min(top, most + 2))
-    ax.set_ylabel(f"order of {words.symbol(quantity)} ({TYPICAL_NORM})")
+    ax.set_ylabel(f"order of {words.symbol(quantity)} ({words.USUAL_NORM})")
     _beside(ax, along, fontsize=7.5 if style.crowded(record) else 8.5)
     return ""
 
@@ -278,7 +278,7 @@ def _draw_errors(ax: Axes, record: Record, along: Along, quantity: str) -> str:
             text = f"_true, {curve.text}" if has_entry else curve.text or "true"
             dots = look | {"linestyle": "none", "markersize": 4, "markerfacecolor": "white"}
             _line(ax, x, curve.of(true), label=text, **dots)
-    text = f"error of {words.symbol(quantity)} ({TYPICAL_NORM})"
+    text = f"error of {words.symbol(quantity)} ({words.USUAL_NORM})"
     ax.set_ylabel(style.label(text, data.norm_unit(record, quantity)))
     if not style.crowded(record):
         _beside(ax, along)
@@ -449,8 +449,9 @@ def _text(*parts: str) -> str:
 
 def _beside(ax: Axes, along: Along, **options: Any) -> None:
     """Put the legend beside the axes, below the key in which lines differ."""
-    key = along.lines[0][0].rpartition(" = ")[0]
-    if key and ", " not in key:
+    name = along.lines[0][0]
+    if " = " in name and ", " not in name:
+        key = name.rpartition(" = ")[0]
         options |= {"title": key, "title_fontsize": 8, "alignment": "left"}
     style.beside(ax, **options)
 
