@@ -78,8 +78,8 @@ def picture(
         rate=rate,
     )
     if not frame.usable(found.running).size:
-        told = "the energy error is 0 at every step, so there is nothing to draw."
-        return evidence(f"{member.title}: {told}") if np.any(found.running == 0.0) else None
+        sentence = "the energy error is 0 at every step, so there is nothing to draw."
+        return evidence(f"{member.title}: {sentence}") if np.any(found.running == 0.0) else None
     by = " by [D₂ₜu]" if check.conserves.endswith(CENTRED) else ""
     label = f"largest energy error so far{' / E(0)' if first else ''}{by}"
     title = style.label(label, "" if first else unit(record, "energy_deviation_max_abs"))

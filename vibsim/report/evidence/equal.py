@@ -56,13 +56,13 @@ def picture(
     frame.points(ax, [t[place]], distance[[place]], [True])
     # a number that is not finite is the largest of all
     if math.isnan(most):
-        told = "; then the run breaks down"
+        allowance = "; then the run breaks down"
     elif math.isnan(bound):
-        told = "; the rounding error is not known"
+        allowance = "; the rounding error is not known"
     elif bound == 0.0:
-        told = "; none is allowed"
+        allowance = "; none is allowed"
     else:
         times = f"{brief(largest / bound)} times the allowed {short(bound)}"
-        told = f", {times} (dashed; grey is below it)"
+        allowance = f", {times} (dashed; grey is below it)"
     where = f"It is largest at t = {short(float(t[place]))}, with {short(largest)} (dot)"
-    return evidence(f"{who} less that of {second}. {where}{told}.", title, figure)
+    return evidence(f"{who} less that of {second}. {where}{allowance}.", title, figure)

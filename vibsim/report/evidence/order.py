@@ -28,7 +28,7 @@ def picture(
     if orders not in record or not np.isfinite(at(record, orders, member, norm=norm)).any():
         return None
     alt = f"Evidence on the order of {words.name(quantity)}"
-    told = (
+    right_text = (
         "the order from three levels, at the coarsest of them; filled where it counts. Grey: what the check asks for. "
         "Bar, and in brackets above: the stated order with its 95 % interval, which often ends at a whole power."
     )
@@ -38,11 +38,11 @@ def picture(
         _draw_differences(figure, record, quantity, member)
     _draw_orders(figure, record, check, member, norm)
     if not has_series:
-        return evidence(f"{member.title}: {told}", alt, figure)
+        return evidence(f"{member.title}: {right_text}", alt, figure)
     order = data.power(record, member, quantity)
     how = f"rescaled to coincide where the error has order {order:g}" if order else "as they are"
     left = f"Left: differences between levels of {member.title}, {how}; the finest pair is the thinnest line."
-    return evidence(f"{left} Right: {told}", alt, figure)
+    return evidence(f"{left} Right: {right_text}", alt, figure)
 
 
 def _draw_differences(figure: Figure, record: Record, quantity: str, member: Member) -> None:

@@ -64,10 +64,10 @@ def picture(
     size = known(record, "size_over_exact", ("level",), scheme=member.scheme, case=member.case)
     letter = words.symbol(position(experiment))
     found = [_steps(run), _sizes(run, size, letter), _growths(run, record, member, name)]
-    told = [text for text in found if text]
-    if not told:
+    texts = [text for text in found if text]
+    if not texts:
         return None
-    sides = " ".join(f"{s}: {text}" for s, text in zip(SIDES[len(told)], told, strict=True))
+    sides = " ".join(f"{s}: {text}" for s, text in zip(SIDES[len(texts)], texts, strict=True))
     head = f"{member.title}, level by level; the judged level {level} is filled."
     caption = f"{head} {NO_LIMIT.get(limit, '')}{sides}"
     return evidence(caption, f"Stability of {member.title}", run.figure)
@@ -120,12 +120,14 @@ def _sizes(run: _Run, size: Floats, letter: str) -> str:
 
 def _growths(run: _Run, record: Record, member: Member, name: str) -> str:
     """Draw the growth factor per period, measured and predicted, the latter perhaps of small oscillations only."""
-    seen, told = (np.array(at(record, f"{who}_growth", member)) for who in ("measured", "theory"))
-    is_near = not math.isfinite(told[run.index])
-    for values, field in ((seen, "growth"), (told, "predicted_growth")):
+    observed, predicted = (
+        np.array(at(record, f"{who}_growth", member)) for who in ("measured", "theory")
+    )
+    is_near = not math.isfinite(predicted[run.index])
+    for values, field in ((observed, "growth"), (predicted, "predicted_growth")):
         if not math.isfinite(values[run.index]):
             values[run.index] = measured(record, name, field, member)
-    both = usable(np.concatenate([seen, told]))
+    both = usable(np.concatenate([observed, predicted]))
     if not both.size:
         return ""
     scale = frame.growth_scale(both)
@@ -133,12 +135,14 @@ def _growths(run: _Run, record: Record, member: Member, name: str) -> str:
     frame.scale(ax, both - scale.less, frame.ALIKE - scale.less, is_log=scale.is_log)
     ax.axhline(1.0 - scale.less, **frame.DASHED)
     ends = np.array(run.levels) + np.array([[-0.35], [0.35]])
-    ax.plot(ends, np.stack([told - scale.less] * 2), color=frame.SECOND, linewidth=1.8, zorder=3)
-    run.points(ax, seen - scale.less)
+    ax.plot(
+        ends, np.stack([predicted - scale.less] * 2), color=frame.SECOND, linewidth=1.8, zorder=3
+    )
+    run.points(ax, observed - scale.less)
     how = "predicted for small oscillations" if is_near else "predicted"
     numbers = [
         f"{words.PAGE.factor(float(values[run.index])).replace(' - ', ' − ')} {word}"
-        for values, word in ((seen, "measured (dot)"), (told, f"{how} (bar)"))
+        for values, word in ((observed, "measured (dot)"), (predicted, f"{how} (bar)"))
         if math.isfinite(values[run.index])
     ]
     if not numbers:

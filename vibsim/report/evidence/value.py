@@ -48,8 +48,8 @@ def picture(
     if not is_limit or not known.size or allowed <= 0.0:
         around = wanted + np.array([-allowed, allowed])
         ax = row.panel(title, values, around, is_log=False)
-        told = f"what the tolerance allows around {number(wanted, 'step')} (dashed)"
-        return row.finish(ax, (around[0], around[1]), wanted, bar, told)
+        band_text = f"what the tolerance allows around {number(wanted, 'step')} (dashed)"
+        return row.finish(ax, (around[0], around[1]), wanted, bar, band_text)
     ends = np.maximum(away[-1] + np.array([-row.bound, row.bound]), 0.0)
     around = np.append(ends[1:], [allowed, 0.1 * known.max()])
     ax = row.panel(f"distance of {title} from {number(wanted, 'step')}", away, around, is_log=True)
@@ -70,10 +70,10 @@ def _beside_border(row: ByLevel, check: ValueCheck, title: str, bar: Floats) -> 
 
 def _spoken(check: ValueCheck) -> str:
     """Return the name of a number as a title has it."""
-    told = what(check, words.PAGE)
+    text = what(check, words.PAGE)
     if check.number.is_sample or (check.at.t is None and check.at.step is None):
-        return told
-    return f"{told} up to {f't = {check.at.t:g}' if check.at.t is not None else f'step {check.at.step}'}"
+        return text
+    return f"{text} up to {f't = {check.at.t:g}' if check.at.t is not None else f'step {check.at.step}'}"
 
 
 def _values(
@@ -116,7 +116,7 @@ class ByLevel:
         return ax
 
     def finish(
-        self, ax: Axes, band: tuple[float, float], border: float, ends: Floats, told: str
+        self, ax: Axes, band: tuple[float, float], border: float, ends: Floats, band_text: str
     ) -> Picture:
         """Fill a band, draw a border and an error bar between two `ends` where they are known."""
         frame.allowed(ax, *band)
@@ -127,7 +127,7 @@ class ByLevel:
             bar = "; the bar is the bound of its error"
         one = len(self.levels) == 1 and len(self.values) == 1
         head = f"{self.scheme}, level {self.levels[0]}" if one else f"{self.scheme}, level by level"
-        caption = f"{head}: the one asked for is filled{bar}; grey is {told}."
+        caption = f"{head}: the one asked for is filled{bar}; grey is {band_text}."
         return evidence(caption, ax.get_title(loc="left"), ax.get_figure(root=True))
 
 

@@ -84,8 +84,8 @@ def pictures(
     else:
         belief = [*leading, *general, *working, *others]
     moving = _motion(experiment, record, series, lead, position) if series else []
-    views, told = over_members(experiment, record, found, lead)
-    return Gallery(_new(moving, first), tuple(belief), tuple(views), tuple(told))
+    views, notes = over_members(experiment, record, found, lead)
+    return Gallery(_new(moving, first), tuple(belief), tuple(views), tuple(notes))
 
 
 def _new(drawn: Drawn, first: Sequence[str]) -> tuple[Picture, ...]:
@@ -186,13 +186,13 @@ def over_members(
         drawn = members.views(experiment, record, keys, found, worst, schemes)
     shown = list(drawn)
     views = [one for one in shown if isinstance(one, View)]
-    told = [one for one in shown if isinstance(one, str)]
+    notes = [one for one in shown if isinstance(one, str)]
     for quantity in found if data.whole(record, "pair") else ():
         # the verdict that colours them is on the order
         picture = members.histograms(experiment, record, quantity)
         if picture is not None:
             views.append(View(f"histograms of {words.symbol(quantity)}", picture, panels=()))
-    return views, told
+    return views, notes
 
 
 def choose(experiment: Experiment, record: Record) -> tuple[list[Member], str]:

@@ -128,7 +128,7 @@ def against_step(record: Record, lead: Lead) -> Picture | None:
     ax = _panel(RIGHT, style.label(f"{size} of {letter}", measure))
     ax.set_gid(style.STEP)
     drawn: list[Floats] = []
-    told = dict[str, None]()
+    notes = dict[str, None]()
     for s in [*others, lead.member.scheme]:
         member = Member(s, case, names[s])
         if not math.isfinite(data.formal_order(record, member, quantity)):
@@ -141,12 +141,12 @@ def against_step(record: Record, lead: Lead) -> Picture | None:
         if style.finite(estimate).size:
             ax.plot(dt, estimate, **mark, markersize=5 if is_lead else 3.5, label=text)
             drawn.append(estimate)
-            told["Filled: estimated from the differences of the levels."] = None
+            notes["Filled: estimated from the differences of the levels."] = None
         if style.finite(true).size:
             ring = mark | {"markerfacecolor": "none", "markersize": 9 if is_lead else 6.5}
             ax.plot(dt, true, **ring, label="true" if alone else f"_true, {names[s]}")
             drawn.append(true)
-            told["Rings: the true error."] = None
+            notes["Rings: the true error."] = None
         norm = data.norm_index(record, lead.norm)
         has_order = math.isfinite(data.stated_order(record, quantity, member, norm)[0])
         if is_lead and (has_order or lead.is_on_order) and lead.result.get("reason") != "exact":
@@ -171,7 +171,7 @@ def against_step(record: Record, lead: Lead) -> Picture | None:
         "hero_error",
         title,
         style.sentences(
-            "Both axes are logarithmic, so an error of order p is a line of slope p.", *told
+            "Both axes are logarithmic, so an error of order p is a line of slope p.", *notes
         ),
         f"Error of {words.name(quantity)} against the time step",
         ax.get_figure(root=True),

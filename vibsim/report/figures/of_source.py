@@ -53,26 +53,26 @@ def pictures(
 ) -> list[tuple[FigureOfSource, list[Picture]]]:
     """Return the pictures of every figure that is asked for; none where what it shows is not kept of the run."""
     found, names = [], set[str]()
-    for i, asked in enumerate(experiment.figures, 1):
+    for i, figure in enumerate(experiment.figures, 1):
         named = []
-        for picture in _drawn(experiment, record, lead, asked, f"source_{i}"):
+        for picture in _drawn(experiment, record, lead, figure, f"source_{i}"):
             # one that is asked for twice is on the page twice
             name = picture.name if picture.name not in names else f"source_{i}_{picture.name}"
             names.add(name)
-            title = f"{opening(asked.source)}: {picture.title}"
+            title = f"{opening(figure.source)}: {picture.title}"
             named.append(replace(picture, name=name, title=title))
-        found.append((asked, named))
+        found.append((figure, named))
     return found
 
 
 def _drawn(
-    experiment: Experiment, record: Record, lead: Lead, asked: FigureOfSource, name: str
+    experiment: Experiment, record: Record, lead: Lead, figure: FigureOfSource, name: str
 ) -> list[Picture]:
-    if asked.shows == PLAYER or (asked.shows not in OF_RECORD and data.is_lean(record)):
+    if figure.shows == PLAYER or (figure.shows not in OF_RECORD and data.is_lean(record)):
         return []
-    if asked.shows == "over_time":
-        return over_time.pictures(experiment, record, asked, name)
-    picture = DRAWN[asked.shows](experiment, record, lead)
+    if figure.shows == "over_time":
+        return over_time.pictures(experiment, record, figure, name)
+    picture = DRAWN[figure.shows](experiment, record, lead)
     return [] if picture is None else [picture]
 
 
@@ -81,9 +81,9 @@ def undrawn(
 ) -> list[str]:
     """Return the sources of what is asked for and not shown."""
     return [
-        opening(asked.source)
-        for asked, drawn in found
-        if not (has_player if asked.shows == PLAYER else drawn)
+        opening(figure.source)
+        for figure, drawn in found
+        if not (has_player if figure.shows == PLAYER else drawn)
     ]
 
 

@@ -100,8 +100,10 @@ def _draw_norms(
         for kind, values in zip(kinds, (difference, true, floor), strict=True):
             kinds[kind].append(values)
     # two schemes apart, differences and errors stand by turns
-    seen = [part for pair in zip(kinds["difference"], kinds["true"], strict=True) for part in pair]
-    if not any(np.isfinite(part).any() for part in seen):
+    measured = [
+        part for pair in zip(kinds["difference"], kinds["true"], strict=True) for part in pair
+    ]
+    if not any(np.isfinite(part).any() for part in measured):
         for line in list(ax.lines):
             line.remove()
         ax.set(xticks=[], yticks=[])
@@ -112,9 +114,9 @@ def _draw_norms(
     found = {name for name in ("difference", "true") if style.finite(*kinds[name]).size}
     for k, order in enumerate(orders):
         dashes = SLOPES[k % len(SLOPES)] if len(orders) > 1 else None
-        if _reference(ax, dt, seen, order, due, dashes):
+        if _reference(ax, dt, measured, order, due, dashes):
             found.add("slope")
-    if _step_limits(ax, dt, seen, kinds["floor"]):
+    if _step_limits(ax, dt, measured, kinds["floor"]):
         found.add("floor")
     for kind, (text, mark) in KINDS.items():
         if kind in found:

@@ -47,16 +47,16 @@ class _Panel:
 
 
 def pictures(
-    experiment: Experiment, record: Record, asked: FigureOfSource, name: str
+    experiment: Experiment, record: Record, figure: FigureOfSource, name: str
 ) -> list[Picture]:
     """Return the figures that are asked for, one or one for each value of what `asked.each` names."""
     everyone = choice.with_levels(experiment, data.everyone(record))
-    groups = _divided(record, everyone, asked.each)
+    groups = _divided(record, everyone, figure.each)
     found = []
     for k, i in enumerate(style.spaced(len(groups), MOST)):
         text, members = groups[i]
         stem = f"{name}_{k}" if len(groups) > 1 else name
-        found.append(_picture(experiment, record, asked, (stem, text, members)))
+        found.append(_picture(experiment, record, figure, (stem, text, members)))
     return [picture for picture in found if picture is not None]
 
 
@@ -75,18 +75,18 @@ def _divided(
 def _picture(
     experiment: Experiment,
     record: Record,
-    asked: FigureOfSource,
+    figure: FigureOfSource,
     of: tuple[str, str, list[Member]],
 ) -> Picture | None:
     name, text, members = of
-    shown = _panels(experiment, record, asked, members)
+    shown = _panels(experiment, record, figure, members)
     tall = 2.2 if len(shown) < 4 else 1.6
     axes = panels.stacked([tall] * len(shown), style.TIME)
     cases = {member.case for panel in shown for _, member in panel.runs}
     end = max(float(data.times(record, case)[-1]) for case in cases)
-    end = end if asked.until is None else min(asked.until, end)
+    end = end if figure.until is None else min(figure.until, end)
     for ax, panel in zip(axes, shown, strict=True):
-        if not _draw(ax, experiment, record, asked, panel, end):
+        if not _draw(ax, experiment, record, figure, panel, end):
             return None
     axes[-1].set_xlabel(data.time_label(record))
     letters = ", ".join(dict.fromkeys(words.symbol(panel.quantity) for panel in shown))
@@ -99,52 +99,52 @@ def _picture(
             f"Wide and grey: the exact solution{'' if is_known else ', or its reference'}, where it is known.",
             f"Markers are steps. What grows beyond {LEAVES_FRAME:g} times the exact solution leaves the frame.",
             f"At most {MOST} figures and {MOST} panels are drawn, and {style.MANY} runs in a panel."
-            * _is_thinned(record, asked, members),
+            * _is_thinned(record, figure, members),
         ),
         f"{letters} against time, {len(shown)} {'panel' if len(shown) == 1 else 'panels'}",
         axes[0].get_figure(root=True),
     )
 
 
-def _is_thinned(record: Record, asked: FigureOfSource, members: list[Member]) -> bool:
+def _is_thinned(record: Record, figure: FigureOfSource, members: list[Member]) -> bool:
     """Say whether figures, panels or runs are left out."""
-    is_by_level = asked.panels == LEVEL
-    figures = _divided(record, data.everyone(record), asked.each)
-    groups = _divided(record, members, None if is_by_level else asked.panels)
+    is_by_level = figure.panels == LEVEL
+    figures = _divided(record, data.everyone(record), figure.each)
+    groups = _divided(record, members, None if is_by_level else figure.panels)
     levels = data.whole(record, "level") if is_by_level else []
     runs = max(len(group) for _, group in groups)
     return max(len(figures), len(groups), len(levels)) > MOST or runs > style.MANY
 
 
 def _panels(
-    experiment: Experiment, record: Record, asked: FigureOfSource, members: list[Member]
+    experiment: Experiment, record: Record, figure: FigureOfSource, members: list[Member]
 ) -> list[_Panel]:
-    quantities = asked.quantities or (choice.position(experiment),)
+    quantities = figure.quantities or (choice.position(experiment),)
     levels = data.whole(record, "level")
     finest = len(levels) - 1
-    if asked.panels == LEVEL:
+    if figure.panels == LEVEL:
         steps = [data.time_text(record, dt) for dt in data.steps_of(record, members[0].case)]
-        runs = _named(record, members, asked)
+        runs = _named(record, members, figure)
         return [
             _Panel(f"level {levels[i]}, dt = {steps[i]}", quantities[0], runs, i)
             for i in style.spaced(len(levels), MOST)
         ]
-    if asked.panels is not None:
-        groups = _divided(record, members, asked.panels)
+    if figure.panels is not None:
+        groups = _divided(record, members, figure.panels)
         return [
-            _Panel(groups[i][0], quantities[0], _named(record, groups[i][1], asked), finest)
+            _Panel(groups[i][0], quantities[0], _named(record, groups[i][1], figure), finest)
             for i in style.spaced(len(groups), MOST)
         ]
-    runs = _named(record, members, asked)
+    runs = _named(record, members, figure)
     return [_Panel(words.title(name), name, runs, finest) for name in quantities]
 
 
 def _named(
-    record: Record, members: list[Member], asked: FigureOfSource
+    record: Record, members: list[Member], figure: FigureOfSource
 ) -> tuple[tuple[str, Member], ...]:
     """Name runs by what they do not have in common."""
     several = len({member.scheme for member in members}) > 1
-    divided = {asked.each, asked.panels}
+    divided = {figure.each, figure.panels}
     keys = [data.swept_label(record, name)[0] for name in data.swept(record)]
     own = [] if MEMBER in divided else [key for key in keys if key not in divided]
     found = []
@@ -157,7 +157,7 @@ def _named(
 
 
 def _draw(
-    ax: Axes, experiment: Experiment, record: Record, asked: FigureOfSource, panel: _Panel, end: float
+    ax: Axes, experiment: Experiment, record: Record, figure: FigureOfSource, panel: _Panel, end: float
 ) -> bool:  # fmt: skip
     """Draw a panel up to the time `end`; return whether its quantity is known."""
     model = experiment.model.definition
@@ -186,7 +186,7 @@ def _draw(
         drawn.append(found)
     fine = np.linspace(float(t[0]), end, SMOOTH)
     parameters = series.parameters_of(experiment, record, first.case)
-    for k, (text, formula) in enumerate(asked.beside.items()):
+    for k, (text, formula) in enumerate(figure.beside.items()):
         curve = values(parse(formula, ("t", *parameters)), {**parameters, "t": fine})
         curve = np.broadcast_to(curve, fine.shape)
         colour = style.COLOURS[(len(panel.runs) + k) % style.MANY]

@@ -83,11 +83,11 @@ def phase(experiment: Experiment, record: Record, shown: list[Member]) -> Pictur
         if n % PANELS_A_ROW == 0:
             ax.set_ylabel(style.label(f"{words.symbol(model.velocity)} / w", measure))
     legend_above(figure, axes[0])
-    told = f"Of the whole motion the first period (thin) and the last {PERIODS:g} are drawn. "
+    drawn_text = f"Of the whole motion the first period (thin) and the last {PERIODS:g} are drawn. "
     return Picture(
         name=f"phase_plane_{case}",
         title="Phase plane: velocity against position",
-        caption=told
+        caption=drawn_text
         * is_long
         + "Black, dashed: the exact orbit. The marker is the end of the motion. A spiral outwards gains energy, one "
         "inwards loses it; an orbit that closes beside the exact one conserves an energy of its own.",

@@ -169,11 +169,11 @@ def motion(record: Record, quantity: str, member: Member) -> Picture:
         axes[1].set_ylabel(style.label(f"error of {letter}", measure, exponent))
     axes[-1].set_xlabel(data.time_label(record))
     dots = " Dots: the stored samples, which are too few for lines between them." * is_dotted
-    told = f"Wide and grey is the {text} solution, the lines are the levels; below it, how far each level is from it."
+    guide = f"Wide and grey is the {text} solution, the lines are the levels; below it, how far each level is from it."
     return Picture(
         f"motion_{quantity}_{member.stem}",
         f"{words.title(quantity)}(t), {member.title}",
-        (told if has_errors else "Each line is a level.") + dots,
+        (guide if has_errors else "Each line is a level.") + dots,
         f"{words.name(quantity)} against time on all levels for {member.title}"
         + ", and the error of each level" * has_errors,
         axes[0].get_figure(root=True),

@@ -52,22 +52,22 @@ def order_and_stability(experiment: Experiment, record: Record) -> Picture | Non
     grid = np.geomspace(0.9 * lowest, 1.1 * highest, CURVE_POINTS)
     curves = [_theory(experiment, s, grid) for s in range(len(record["scheme"]))]
     limits = known(record, "stability_limit", MEMBER)[:, 0]
-    for k, (ax, (told, seen)) in enumerate(zip(axes, (growth, phase), strict=True)):
+    for k, (ax, (from_theory, measured)) in enumerate(zip(axes, (growth, phase), strict=True)):
         # what has no theory, such as an adaptive scheme, has no place over w dt
-        found = np.where(np.isnan(told), np.nan, seen)
+        found = np.where(np.isnan(from_theory), np.nan, measured)
         for s, name in enumerate(record.words("scheme")):
-            if np.isnan(told[s]).all():
+            if np.isnan(from_theory[s]).all():
                 continue
             look, curve = style.look(s), curves[s]
             if curve is None:
-                _dots(ax, p, told[s], look | {"marker": "+"}, "")
+                _dots(ax, p, from_theory[s], look | {"marker": "+"}, "")
             else:
                 y, size = curve[k], _visible(curve[k])
                 for keep, dashes, width in ((y > 0.0, "-", 1.1), (y < 0.0, (0, (1, 1.3)), 1.5)):
                     line: dict[str, Any] = {"linestyle": dashes, "linewidth": width}
                     ax.plot(grid, np.where(keep, size, np.nan), color=look["color"], **line)
             _dots(ax, p, found[s], look, style.entry(name))
-        _finish(ax, told, found, limits, grid)
+        _finish(ax, from_theory, found, limits, grid)
     alike = _alike(record.words("scheme"), curves)
     axes[0].set_ylabel("|growth per period − 1|")
     axes[0].set_title("Growth of the amplitude: filled grows, hollow decays")
@@ -116,14 +116,16 @@ def _visible(values: Floats) -> Floats:
 
 def _sentence(alike: list[tuple[str, str, str]]) -> str:
     """Say for the caption which curves are the same; empty where none are."""
-    told = []
+    phrases = []
     for kind in KINDS:
         groups: dict[str, list[str]] = {}
         for found, name, other in alike:
             if found == kind:
                 groups.setdefault(other, []).append(name)
-        told += [f"{kind} of {', '.join(names)} as of {first}" for first, names in groups.items()]
-    return f" The same curve: {'; '.join(told)}." if told else ""
+        phrases += [
+            f"{kind} of {', '.join(names)} as of {first}" for first, names in groups.items()
+        ]
+    return f" The same curve: {'; '.join(phrases)}." if phrases else ""
 
 
 def _theory(experiment: Experiment, s: int, grid: Floats) -> tuple[Floats, Floats] | None:
@@ -154,16 +156,16 @@ def _dots(ax: Axes, p: Floats, y: Floats, look: dict[str, Any], text: str) -> No
         ax.plot(p[keep], size[keep], **mark, markerfacecolor=face, zorder=3)
 
 
-def _finish(ax: Axes, told: Floats, found: Floats, limits: Floats, grid: Floats) -> None:
+def _finish(ax: Axes, from_theory: Floats, found: Floats, limits: Floats, grid: Floats) -> None:
     """Choose both logarithmic ranges, and mark the limits of stability at the upper edge.
 
     The range is that of theory, as far as it predicts anything but zero, and of what lies above: far below there is
     round-off only.
     """
-    predicted_size = told[np.isfinite(told) & (np.abs(told) >= SMALLEST)]
+    predicted_size = from_theory[np.isfinite(from_theory) & (np.abs(from_theory) >= SMALLEST)]
     lowest = float(np.min(np.abs(predicted_size), initial=np.inf))
     least = lowest / 10.0 if math.isfinite(lowest) else SMALLEST
-    values = np.concatenate([told.ravel(), found.ravel()])
+    values = np.concatenate([from_theory.ravel(), found.ravel()])
     size = np.abs(values[np.isfinite(values) & (np.abs(values) >= least)])
     if size.size == 0:
         style.remark(ax, "theory and measurement agree: there is none")
@@ -255,9 +257,11 @@ def _unstable(record: Record) -> list[tuple[Member, int]]:
 
 
 def _of_run(record: Record, member: Member, level: int) -> str:
-    told, seen = (
+    from_theory, measured = (
         words.number(data.at(record, f"{who}_growth", member, level=level).item())
         for who in ("theory", "measured")
     )
     product = words.number(float(omega_dt(record)[member.case, level]), "step")
-    return style.entry(f"{member.scheme_name}, w dt = {product}\n× {seen}, theory {told}")
+    return style.entry(
+        f"{member.scheme_name}, w dt = {product}\n× {measured}, theory {from_theory}"
+    )

@@ -90,9 +90,9 @@ def card(experiment: Experiment, record: Record, check: Mapping[str, Any]) -> di
     facts = (decisive[key] for key in ("scheme", "case", "status", "reason", "facts"))
     result = Result(*facts)
     decides = worst(word for word, count in counts.items() if count)
-    told = wording.text(result, counts, check["where"])
+    text = wording.text(result, counts, check["where"])
     if _is_said(asserted, check):
-        told = _hardest(record, check)
+        text = _hardest(record, check)
     wanted = assertions.wanted(experiment, measured, words.fact(decisive, "expected"))
     results, more = _results(record, check, unit)
     return {
@@ -114,7 +114,7 @@ def card(experiment: Experiment, record: Record, check: Mapping[str, Any]) -> di
         "where": [f"{place['text']}." for word, place in check["where"].items() if word != decides],
         "alone": _alone(check),
         "picture": figure.picture(experiment, record, asserted, check),
-        "text": told,
+        "text": text,
         "advice": wording.advice(status, result, counts),
         "change": experiment_file.change(experiment, measured, check),
     }
@@ -167,9 +167,9 @@ def _results(record: Record, check: Mapping[str, Any], unit: str) -> tuple[Any, 
     # where all passed, the table of checks has the hardest
     if table is None or total < 2 or check["status"] == "PASS":
         return None, ""
-    told = ", ".join(f"{n} {word}" for word, n in counts.items() if n)
+    counted = ", ".join(f"{n} {word}" for word, n in counts.items() if n)
     listed = len(table.rows)
-    return table, f"In all: {told}. Listed are the {listed} worst." if total > listed else ""
+    return table, f"In all: {counted}. Listed are the {listed} worst." if total > listed else ""
 
 
 def _alone(check: Mapping[str, Any]) -> str:

@@ -196,9 +196,9 @@ def headline(checks: Sequence[Mapping[str, Any]]) -> Headline:
     for check, result in passed:
         sentence = str(result.get("sentence") or "").partition("; ")[0].rstrip(".")
         text = words.PAGE.powers(words.labelled(sentence, check["quantity"]))
-        named, space, told = text.partition(" ")
-        if told.startswith(("is ", "of ")):
-            text = f"{words.PAGE.value(named)}{space}{told}"
+        named, space, rest = text.partition(" ")
+        if rest.startswith(("is ", "of ")):
+            text = f"{words.PAGE.value(named)}{space}{rest}"
         if text:
             return Headline(text=f"{text[: LONGEST - 1]}…" if len(text) > LONGEST else text)
     return Headline()

@@ -108,8 +108,8 @@ def cut(table: Table) -> tuple[str, Table, str]:
         last = table.rows[len(shown)][:heads]
         shown = tuple(row for row in shown if row[:heads] != last) or shown
     more = len(table.rows) - len(shown)
-    told = f"{more} more rows are in tables/{table.name}.csv." if more else ""
-    return _heading(table.caption), replace(table, rows=shown).without_empty(), told
+    note = f"{more} more rows are in tables/{table.name}.csv." if more else ""
+    return _heading(table.caption), replace(table, rows=shown).without_empty(), note
 
 
 def _heading(caption: str) -> str:

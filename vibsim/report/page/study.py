@@ -56,7 +56,7 @@ def write(
         The verdicts as the command prints them.
     """
     cards = [
-        card(str(i), verdict, _asked(verdict), files)
+        card(str(i), verdict, _expectation(verdict), files)
         for i, (verdict, files) in enumerate(zip(verdicts, sources, strict=True))
     ]
     context = {
@@ -83,9 +83,9 @@ def finding(verdicts: Sequence[LadderVerdict]) -> str:
 def numbers(verdict: LadderVerdict) -> list[dict[str, str]]:
     """Return the large numbers of a ladder: the order, the error of the finest level, and the best value."""
     span = words.likely((verdict.order_low, verdict.order_high))
-    asked, wanted = verdict.expected or verdict.at_least, ""
-    if asked is not None:
-        wanted = f"expected{'' if verdict.expected else ' at least'}: {asked:g}"
+    expected, wanted = verdict.expected or verdict.at_least, ""
+    if expected is not None:
+        wanted = f"expected{'' if verdict.expected else ' at least'}: {expected:g}"
     share, bound = verdict.relative_error, verdict.best_bound
     size = None if verdict.error is None else abs(verdict.error)
     of_size = f"{words.share(share)} of its size" if share is not None else ""
@@ -111,7 +111,7 @@ def _best(verdict: LadderVerdict) -> str:
     return rounded(verdict.best, verdict.best_bound).text
 
 
-def _asked(verdict: LadderVerdict) -> str:
+def _expectation(verdict: LadderVerdict) -> str:
     """Say what order was asked for."""
     if verdict.expected is not None:
         return f"order {verdict.expected:g}"
@@ -120,10 +120,10 @@ def _asked(verdict: LadderVerdict) -> str:
     return "no order, so any that may be believed passes"
 
 
-def card(name: str, verdict: LadderVerdict, asked: str, files: Sequence[str]) -> dict[str, Any]:
+def card(name: str, verdict: LadderVerdict, expected: str, files: Sequence[str]) -> dict[str, Any]:
     """Return what the page shows of a quantity: `asked` is what was expected, and `name` unique on the page."""
     rows = [
-        ("Expected", asked),
+        ("Expected", expected),
         ("Order", words.with_interval(verdict.order, (verdict.order_low, verdict.order_high))),
         ("Levels used", ", ".join(words.number(h, "step") for h in verdict.h_used) or "–"),
         ("Error of the finest level", words.number(verdict.error, "small")),
@@ -178,11 +178,11 @@ def _value(value: float | None, digits: int) -> Written | None:
 
 def _picture(name: str, verdict: LadderVerdict) -> Picture:
     """Return the figure of a verdict with its caption."""
-    asked = verdict.expected or verdict.at_least
-    order = asked or verdict.order
+    expected = verdict.expected or verdict.at_least
+    order = expected or verdict.order
     caption = ""
     if order is not None and order > 0.0:
-        word = "expected" if asked else "observed"
+        word = "expected" if expected else "observed"
         caption = CAPTION.format(word=word, order=f"{order:.3g}")
         if shows_curves(verdict):
             caption += " " + CURVES.format(order=f"{order:.3g}")

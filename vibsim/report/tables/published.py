@@ -38,8 +38,8 @@ def sentence(found: list[Table]) -> str:
         place = [column.header for column in table.columns].index(AGREES)
         marks += [str(row[place]) for row in table.rows]
     agreed = sum(mark.startswith("yes") for mark in marks)
-    told = f"{agreed} of {len(marks)} printed numbers agree with ours to the last printed digit."
-    return told if marks else ""
+    text = f"{agreed} of {len(marks)} printed numbers agree with ours to the last printed digit."
+    return text if marks else ""
 
 
 def tables(experiment: Experiment, record: Record, summary: Mapping[str, Any]) -> list[Table]:

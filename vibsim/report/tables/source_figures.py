@@ -28,9 +28,9 @@ HEADERS = ("figure", "shows", "place")
 def table(found: Iterable[tuple[FigureOfSource, Sequence[Picture]]]) -> Table | None:
     """Return which figure of the source stands where on the page; None where none is asked for."""
     rows = []
-    for asked, drawn in found:
-        places = [picture.name for picture in drawn] or [PLAYER] * (asked.shows == PLAYER)
-        rows += [(asked.source, asked.shows.replace("_", " "), place) for place in places]
+    for figure, drawn in found:
+        places = [picture.name for picture in drawn] or [PLAYER] * (figure.shows == PLAYER)
+        rows += [(figure.source, figure.shows.replace("_", " "), place) for place in places]
     columns = tuple(map(Column, HEADERS))
     return Table("figures", "Figures of the source", columns, tuple(rows)) if rows else None
 

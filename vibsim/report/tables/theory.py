@@ -134,12 +134,17 @@ def _predictions(
         (Column("stable"), stable),
     ]
     for kind, (text, measure) in shown.items():
-        told, seen = (known(record, f"{who}_{kind}", OF_LEVEL) for who in ("theory", "measured"))
-        noise, less = step * sizes.get(kind, np.fmax(np.abs(told), 1.0)), float(kind == "growth")
+        from_theory, measured = (
+            known(record, f"{who}_{kind}", OF_LEVEL) for who in ("theory", "measured")
+        )
+        noise, less = (
+            step * sizes.get(kind, np.fmax(np.abs(from_theory), 1.0)),
+            float(kind == "growth"),
+        )
         filled += [
-            (Column(f"{text}: predicted", measure, "close"), _written(told - less, noise)),
-            (Column("measured", measure, "close"), _written(seen - less, noise)),
-            (Column("difference", measure, "brief"), _beyond(seen - told, noise)),
+            (Column(f"{text}: predicted", measure, "close"), _written(from_theory - less, noise)),
+            (Column("measured", measure, "close"), _written(measured - less, noise)),
+            (Column("difference", measure, "brief"), _beyond(measured - from_theory, noise)),
         ]
     caption, there = (
         f"Theory beside measurement: {caption}",

@@ -80,13 +80,17 @@ def measured(check: Measurement) -> str:
             )
             named = [_listed(check.schemes)] if check.schemes else []
             only = "".join(f", {part}" for part in [*named, *swept_values(check)])
-            told = f"converges with {order} ± {check.tolerance:g} ({words.NORMS[check.norm]}{only})"
+            statement = (
+                f"converges with {order} ± {check.tolerance:g} ({words.NORMS[check.norm]}{only})"
+            )
             is_trap = check.expect.status != "PASS"
             trap = f", expected to end as {expected_verdict(check.expect)}" if is_trap else ""
-            return f"{words.title(check.converges)} {told}{trap}"
+            return f"{words.title(check.converges)} {statement}{trap}"
         case "accurate":
-            told = f"{words.title(check.accurate)} is {rule(check, words.PAGE)} at the finest level"
-            return f"{told}{_where(check)}"
+            statement = (
+                f"{words.title(check.accurate)} is {rule(check, words.PAGE)} at the finest level"
+            )
+            return f"{statement}{_where(check)}"
         case "value":
             bounds = {"equals": check.equals, "is below": check.below, "is above": check.above}
             given = [
@@ -114,15 +118,15 @@ def subject(check: Measurement) -> str:
         return f"{words.title(check.quantity)} by {check.first}{_where(check)}"
     if check.kind != "value":
         return measured(check)
-    told, is_sampled = what(check, words.PAGE), check.number.is_sample
+    statement, is_sampled = what(check, words.PAGE), check.number.is_sample
     keys = ("level", "scheme", "case") if is_sampled else PLACES
     places = ((key, getattr(check.at, key)) for key in keys)
     parts = [f"{key} {value}" for key, value in places if value is not None]
     where = ", ".join([*parts, *swept_values(check)])
     if check.take is not None:
-        told = f"{TAKEN[check.take]} {told} over {check.over}"
-    told = f"{told}{(f' ({where})' if is_sampled else f' at {where}') if where else ''}"
-    return told.replace("level best", "the limit of the levels")
+        statement = f"{TAKEN[check.take]} {statement} over {check.over}"
+    statement = f"{statement}{(f' ({where})' if is_sampled else f' at {where}') if where else ''}"
+    return statement.replace("level best", "the limit of the levels")
 
 
 def _where(check: Measurement) -> str:

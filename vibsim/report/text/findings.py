@@ -96,18 +96,18 @@ def title(experiment: Experiment, record: Record, lead: Lead, printed: Collectio
     """Return the finding of an experiment in one line; `printed` names the checks of printed numbers."""
     if lead.entry is None:
         return NO_CHECK
-    entry, told = lead.entry, _of_claim(lead) or _by_check(experiment, record, lead)
+    entry, finding = lead.entry, _of_claim(lead) or _by_check(experiment, record, lead)
     if entry["status"] != "PASS":
         against = ", against what the check expects" if _is_trap_of_a_number(lead) else ""
-        return f"{told}{against}{_of_some(record, entry)}"
+        return f"{finding}{against}{_of_some(record, entry)}"
     if entry["id"] in printed:
         return f"All {len(printed)} printed numbers are as expected"
     asked = [check.value for check in experiment.checks if check.kind == "value"]
     if len(asked) > 1 and lead.asserted is not None and lead.asserted.kind == "value":
-        told = f"All {len(asked)} numbers are as expected"
+        finding = f"All {len(asked)} numbers are as expected"
         if len(set(asked)) == 1:
-            told = f"{_opened(f'the {words.PAGE.value(asked[0])}')} is as expected in all {len(asked)} checks"
-    return f"{told}{_caught(experiment, lead)}"
+            finding = f"{_opened(f'the {words.PAGE.value(asked[0])}')} is as expected in all {len(asked)} checks"
+    return f"{finding}{_caught(experiment, lead)}"
 
 
 def _of_some(record: Record, entry: Mapping[str, Any]) -> str:
@@ -237,11 +237,11 @@ def _apart(order: float | None, expected: float | None) -> dict[str, str]:
 
 def _named(experiment: Experiment, quantity: str) -> str:
     """Return a quantity in words: those of the model where it has no letter of its own."""
-    told, model = words.name(quantity), experiment.model.definition
+    name, model = words.name(quantity), experiment.model.definition
     long = {state.name: state.long_name for state in model.states}
     long |= {output.name: output.long_name for output in model.outputs}
-    if told != quantity or quantity not in long:
-        return told
+    if name != quantity or quantity not in long:
+        return name
     # a name of several words is no letter
     return f"the {long[quantity]}" if "_" in quantity else f"the {long[quantity]} {quantity}"
 

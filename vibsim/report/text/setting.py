@@ -42,8 +42,10 @@ def setup(experiment: Experiment, record: Record) -> Iterator[tuple[str, str]]:
         yield from structure.rows(experiment.model.structure, model.loaded)
     if experiment.units:
         parts = [(name, *text.partition(" ")) for name, text in experiment.units.items()]
-        told = [f"1 {name} = {number} {data.pretty_unit(base)}" for name, number, _, base in parts]
-        yield "Units of the file", ", ".join(text.rstrip() for text in told)
+        conversions = [
+            f"1 {name} = {number} {data.pretty_unit(base)}" for name, number, _, base in parts
+        ]
+        yield "Units of the file", ", ".join(text.rstrip() for text in conversions)
     if (scaling := experiment.scaling) is not None:
         # everything else on the page is in characteristic units
         parameters = _listing("model", scaling.parameters, sizes)
@@ -95,15 +97,15 @@ def _times(experiment: Experiment, record: Record) -> Iterator[tuple[str, str]]:
     steps, sizes = (ends[: len(levels)] for ends in ([counts[0], counts[-1]], sizes))
     yield "Levels", f"{named}: {' to '.join(steps)} steps, dt = {' to '.join(sizes)} {time}"
     if "omega_dt" in record:
-        told = 0.0
+        last = 0.0
         for name, term, text in (
             ("omega_dt", "w dt", "natural frequency"),
             (HIGHEST, "Highest w dt", "frequency of the fastest oscillation"),
         ):
             largest = data.largest(np.asarray(record[name], np.float64)) if name in record else 0.0
             # a ball in free fall has no frequency, and one oscillation alone is the fastest one, too
-            if largest > 0.0 and largest != told:
-                told = largest
+            if largest > 0.0 and largest != last:
+                last = largest
                 yield term, f"at most {words.number(largest)} ({text} times step)"
 
 
@@ -115,9 +117,11 @@ def _listing(
     parts = []
     for key, value in values.items():
         name = letters.get(key, key)
-        told = "swept" if f"{section}.{key}" in swept else f"= {_plain(value)} {units.get(key, '')}"
+        value_text = (
+            "swept" if f"{section}.{key}" in swept else f"= {_plain(value)} {units.get(key, '')}"
+        )
         parts.append(
-            f"{name} {told.strip()}{'' if key in (name, f'parameters.{name}') else f' ({key})'}"
+            f"{name} {value_text.strip()}{'' if key in (name, f'parameters.{name}') else f' ({key})'}"
         )
     return ", ".join(parts)
 

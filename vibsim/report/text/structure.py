@@ -62,11 +62,11 @@ def _entries(entries: tuple[tuple[int, float], ...]) -> Any:
 
 def rows(spec: StructureSpec, loaded: Loaded) -> Iterator[tuple[str, str]]:
     """Yield what a page says of a structure."""
-    own, told = loaded.structure, [f"{loaded.structure.dofs} degrees of freedom"]
+    own, facts = loaded.structure, [f"{loaded.structure.dofs} degrees of freedom"]
     for key, word in WORDS.items():
         if (row := spec.arrays.get(key)) is not None and row.file is not None:
-            told.append(f"{word} from {row.file}")
-    yield "Structure", ", ".join(told)
+            facts.append(f"{word} from {row.file}")
+    yield "Structure", ", ".join(facts)
     found = own.modes.frequencies
     listed = ", ".join(words.number(float(w)) for w in found[:MOST_SHOWN])
     rest = ", ..." if len(found) > MOST_SHOWN or own.dofs > len(found) else ""

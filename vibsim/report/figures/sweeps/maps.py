@@ -53,7 +53,7 @@ class Map:
     texts: tuple[str, ...] = ()  # what the numbers stand for, where the verdict does not tell it
     number: Floats | None = None
     """The number itself, where the map shows its distance from another one."""
-    told: str | None = None
+    shared: str | None = None
     """What is said where all members have the same; None for the value."""
 
 
@@ -64,7 +64,7 @@ def views(
     for scheme in schemes:
         several = data.of_several(record, scheme)
         for each in _maps(experiment, record, found, scheme):
-            text = each.told
+            text = each.shared
             if text is None:
                 text = view.shared(each.name, each.values, each.unit)
             if text:
@@ -131,7 +131,7 @@ def _order(experiment: Experiment, record: Record, quantity: str, scheme: int) -
     yield Map(
         f"{quantity}_order", f"order of {letter}", quantity, away,
         f"order of {letter} − {data.promised_text(record, quantity, scheme)}", badness=np.abs(away), kind="distance",
-        tolerance=allowed, number=order, told=view.shared(f"order of {letter}", np.round(order, 3), form="order"),
+        tolerance=allowed, number=order, shared=view.shared(f"order of {letter}", np.round(order, 3), form="order"),
         caption=f"Pale colours are orders within ± {allowed:g} of the {data.basis_of_order(record, quantity)} one, "
         "where the scale jumps.",
     )  # fmt: skip
@@ -189,8 +189,8 @@ def _reasons(record: Record, quantity: str, scheme: int) -> Map:
         (code, f"{REASONS[word]}: {word}", style.REASON_COLOURS[word]) for code, word, _ in named
     ]
     name = f"verdict on {words.symbol(quantity)}"
-    told = view.shared_verdict(record, quantity, scheme)
-    return _coded(f"{quantity}_verdict", name, quantity, reason, codes, told=told)
+    shared = view.shared_verdict(record, quantity, scheme)
+    return _coded(f"{quantity}_verdict", name, quantity, reason, codes, shared=shared)
 
 
 def _window(record: Record, quantity: str, scheme: int) -> Map:
@@ -207,9 +207,9 @@ def _window(record: Record, quantity: str, scheme: int) -> Map:
         if np.any(first == level)
     ]
     name = f"levels used for the order of {words.symbol(quantity)}"
-    told = f"{name} {codes[0][1]}" if codes and np.all(first == codes[0][0]) else ""
+    shared = f"{name} {codes[0][1]}" if codes and np.all(first == codes[0][0]) else ""
     texts = tuple(text for _, text, _ in codes)
-    return _coded(f"{quantity}_levels", name, quantity, first, codes, told=told, texts=texts)
+    return _coded(f"{quantity}_levels", name, quantity, first, codes, shared=shared, texts=texts)
 
 
 def _view(record: Record, grid: Grid, each: Map, scheme: int, worst: int) -> View:
@@ -226,8 +226,8 @@ def _view(record: Record, grid: Grid, each: Map, scheme: int, worst: int) -> Vie
         * bool(grid.separatrix[0].size),
         grid.note,
     )
-    own, is_told = each.values if each.number is None else each.number, each.kind != "code"
-    values = view.by_scheme(record, scheme, own) if is_told or each.texts else None
+    own, is_number = each.values if each.number is None else each.number, each.kind != "code"
+    values = view.by_scheme(record, scheme, own) if is_number or each.texts else None
     return View(
         each.name, Picture(f"map_{each.stem}_{scheme}", title, text, f"{title} over two swept parameters", figure),
         each.quantity, values, None, each.unit, each.texts, (scheme,), several.removeprefix(", "), ((0, 1),),

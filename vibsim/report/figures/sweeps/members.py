@@ -165,8 +165,8 @@ class _Projection:
         is_beyond = not np.all(np.abs(away) < ORDER_FRAME)
         band = f"Grey: the tolerance around the {basis_of_order(record, quantity)} order."
         places = np.clip(np.nan_to_num(away, nan=-ORDER_FRAME), -ORDER_FRAME, ORDER_FRAME)
-        told = style.sentences(band, beyond * is_beyond)
-        yield self._view("order", name, label, axes, told, order, places)
+        explanation = style.sentences(band, beyond * is_beyond)
+        yield self._view("order", name, label, axes, explanation, order, places)
 
     def error(self) -> Iterator[View | str]:
         """Yield the error of the finest level."""
@@ -184,27 +184,27 @@ class _Projection:
             # an axis of logarithms
             ax.yaxis.set_major_locator(MaxNLocator(5, integer=True))
             ax.yaxis.set_major_formatter(FuncFormatter(lambda y, _: power(round(y))))
-        told = f"Of level {whole(self.record, 'level')[-1]}."
+        explanation = f"Of level {whole(self.record, 'level')[-1]}."
         label = style.label(f"{error.kind} {name}", unit)
-        yield self._view("error", name, label, axes, told, error.best, size, unit)
+        yield self._view("error", name, label, axes, explanation, error.best, size, unit)
 
     def shares(self) -> View:
         """Return what share of the members near a value of a key comes to which verdict."""
         axes = self._axes()
         for ax, key in zip(axes, self.keys, strict=False):
             _draw_shares(ax, key, self.masks)
-        told = (
+        explanation = (
             "Shares of the verdicts near a value. A key whose shares do not vary does not matter."
         )
         name = f"verdict on {words.symbol(self.quantity)}"
-        return self._view("verdict", name, "share", axes, told, None, None)
+        return self._view("verdict", name, "share", axes, explanation, None, None)
 
     def _axes(self) -> list[Axes]:
         columns = [(0.72 + 2.9 * i, 2.35) for i in range(3)]
         return rows_of(min(len(self.keys), MOST_PANELS), columns, 1.9, 0.3, 0.5)[1]
 
     def _view(
-        self, kind: str, name: str, label: str, axes: list[Axes], told: str, values: Floats | None,
+        self, kind: str, name: str, label: str, axes: list[Axes], explanation: str, values: Floats | None,
         place: Floats | None, unit: str = "",
     ) -> View:  # fmt: skip
         """Finish the axes of a view, and mark the worst member."""
@@ -226,7 +226,7 @@ class _Projection:
         several, more = of_several(record, self.scheme), len(self.keys) - len(axes)
         text = style.sentences(
             "Each panel shows all members against one swept key, whatever the others are.",
-            told,
+            explanation,
             "Darker cells hold more members; FAIL lies over INCONCLUSIVE over PASS."
             * (len(record["case"]) > MOST_POINTS and place is not None),
             f"{more} more keys are not shown; the table of members has them." * (more > 0),

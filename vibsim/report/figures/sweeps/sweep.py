@@ -65,8 +65,8 @@ class _Drawing:
         `draw` draws them, and returns a sentence where they leave the frame.
         """
         # an order is read with three decimals
-        told = np.round(values, 3) if form == "order" else values
-        if text := view.shared(name, told, unit, form):
+        explanation = np.round(values, 3) if form == "order" else values
+        if text := view.shared(name, explanation, unit, form):
             yield text
         elif np.isfinite(values).any():
             tall = max(TALL, ENTRY * len(self.record["scheme"]) * len(self.along.lines))
@@ -130,11 +130,13 @@ class _Drawing:
         barred = bounded & frame.is_bounded(found.error, size)
         value, error = np.where(bounded, found.value, np.nan), np.where(barred, found.error, np.nan)
         within = replace(found, value=value, error=error)
-        told = "Half the height between the last peak and the last trough, on the finest level."
+        explanation = (
+            "Half the height between the last peak and the last trough, on the finest level."
+        )
         turns = bool(self.experiment.model.definition.turn)
-        told += " Members that go over the top have none." * turns
+        explanation += " Members that go over the top have none." * turns
         yield from self._view(
-            "amplitude", "amplitude", of, found.value, told,
+            "amplitude", "amplitude", of, found.value, explanation,
             lambda ax: _draw_amplitudes(ax, record, along, found, within, size), found.unit,
         )  # fmt: skip
         if data.whole(record, "pair"):
@@ -157,14 +159,16 @@ class _Drawing:
     def error(self, quantity: str) -> Iterator[View | str]:
         """Yield the error of every member at the finest level."""
         found = finest_level.error(self.record, quantity)
-        told = "At the finest level, estimated from two levels"
+        explanation = "At the finest level, estimated from two levels"
         if found.kind == "true":
-            told = "At the finest level: true (dots), and what two levels alone say of it (lines)"
+            explanation = (
+                "At the finest level: true (dots), and what two levels alone say of it (lines)"
+            )
         has_pairs = bool(data.whole(self.record, "pair"))
-        told = f"{told}, with the interval of the order." if has_pairs else "True."
+        explanation = f"{explanation}, with the interval of the order." if has_pairs else "True."
         unit = data.norm_unit(self.record, quantity)
         yield from self._view(
-            f"sweep_error_{quantity}", f"error of {words.symbol(quantity)}", quantity, found.best, told,
+            f"sweep_error_{quantity}", f"error of {words.symbol(quantity)}", quantity, found.best, explanation,
             lambda ax: _draw_errors(ax, self.record, self.along, quantity), unit, "norm",
         )  # fmt: skip
 
