@@ -248,8 +248,14 @@ def test_rounding_of_steep_differences_is_no_evidence(kind: str) -> None:
     none = np.empty((1, 0))
     found = getattr(hypotheses_of((8.0, 4.0, 2.0, 1.0), Promise(6.0)), kind)
     for table in found if isinstance(found, list) else [found]:
+        apart = table.beside is not None
         one, other = (
-            likelihood.weights(table, g, np.array([2.0]), none, np.array([-np.inf]))[0]
+            likelihood.weights(
+                table,
+                likelihood.read_of(g, np.array([2.0]), apart=apart),
+                none,
+                np.array([-np.inf]),
+            )[0]
             for g in (gram, rounded)
         )
         assert other == pytest.approx(one, abs=1e-6)
