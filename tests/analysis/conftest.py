@@ -18,10 +18,16 @@ def all_hypotheses() -> Iterator[None]:
 
 
 @pytest.fixture
-def without_series(monkeypatch: pytest.MonkeyPatch) -> None:
+def with_series() -> None:
+    """Keep series for a test that looks at them, in a file whose other tests are `without_series`."""
+
+
+@pytest.fixture
+def without_series(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
     """Keep what a large sweep keeps, where verdicts alone are looked at: they take half of the work.
 
     Numbers and verdicts are the same as with series of the same points (`test_parts`); more points of few
     members are kept with them alone.
     """
-    monkeypatch.setattr("vibsim.experiment.storage.LEAN", 0)
+    if "with_series" not in request.fixturenames:
+        monkeypatch.setattr("vibsim.experiment.storage.LEAN", 0)
