@@ -135,7 +135,7 @@ def test_the_separatrix_is_searched_once_for_all_maps(across, monkeypatch):
 def test_no_separatrix_is_drawn_where_there_is_none():
     sweep = {"initial.theta": {"linspace": [0.1, 2.0, 9]}, "model.g": {"linspace": [1.0, 3.0, 8]}}
     for model in ("pendulum", "linear_pendulum"):
-        exp = samples.experiment(sweep=sweep, model={"kind": model})
+        exp = samples.experiment(sweep=sweep, model={"kind": model}, levels=[6])
         grid = sweep_layout.grid_of(sweep_layout.keys(samples.record(exp)))
         assert not separatrix.with_separatrix(exp, grid).separatrix[0].size
         assert not separatrix.on_line(exp, grid.x).size
@@ -143,7 +143,7 @@ def test_no_separatrix_is_drawn_where_there_is_none():
 
 def test_the_separatrix_crosses_a_line_once():
     exp = samples.experiment(
-        initial={"theta": 0.5}, sweep={"initial.omega": {"linspace": [0.1, 3.0, 20]}}
+        initial={"theta": 0.5}, sweep={"initial.omega": {"linspace": [0.1, 3.0, 20]}}, levels=[6]
     )
     (found,) = separatrix.on_line(exp, sweep_layout.keys(samples.record(exp))[0])
     assert abs(found - 2.0 * np.cos(0.25)) < 1e-9
