@@ -67,6 +67,7 @@ def test_every_verdict_passes(branches: Any) -> None:
     assert [v.status for v in verdicts(experiment, convergence)] == ["PASS"] * 9
 
 
+@pytest.mark.usefixtures("without_series")
 def test_a_number_of_all_members_names_the_branch_and_one_that_is_not_steady_asks_for_periods() -> (
     None
 ):
@@ -142,6 +143,7 @@ def test_each_branch_is_near_one_of_harmonic_balance() -> None:
             assert abs(down / known[0] - 1.0) < 0.03
 
 
+@pytest.mark.usefixtures("without_series")
 def test_amplitude_and_phase_of_a_linear_oscillator_converge_to_the_closed_form() -> None:
     """``A = 1/sqrt((k - w^2)^2 + (b w)^2)``, ``tan(phase) = b w/(k - w^2)``, with the order of the scheme."""
     b, w, k = 0.4, 1.3, 1.0
