@@ -123,6 +123,7 @@ def test_a_change_that_happens_to_vanish_is_no_small_error(quantity: str) -> Non
     assert true <= record[f"{quantity}_richardson_error"].max().item()
 
 
+@pytest.mark.usefixtures("with_series")
 @pytest.mark.slow
 def test_bounds_of_extrapolations_hold_for_random_members() -> None:
     """Of members that pass, 99 in 100 at least have an error within the bound, and none is far beyond."""

@@ -28,8 +28,6 @@ from vibsim.experiment.schema.checks import MEASURED
 from vibsim.report.words import interval
 from vibsim.simulation import simulate_record
 
-pytestmark = pytest.mark.usefixtures("without_series")
-
 SCHEMA = Path(__file__).parents[3] / "workflow/schemas/experiment.schema.json"
 GOOD = {name for name, status in REASONS.items() if status == "PASS"}
 KINDS: dict[str, dict[str, Any]] = {
