@@ -6,6 +6,8 @@ import gc
 import os
 import sys
 
+import pytest
+
 # Without compiled modules beside the sources every worker rewrites the assertions of 200 files, and every job of a
 # workflow compiles 300 modules: 20 s and 0.5 s. Copies of the package that tests change are in folders of their own.
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
@@ -24,3 +26,19 @@ def pytest_collection_finish() -> None:
     gc.collect()
     gc.freeze()
     gc.set_threshold(50_000, 20, 1000)
+
+
+@pytest.fixture
+def with_series() -> None:
+    """Keep series for a test that looks at them, in a file whose other tests are `without_series`."""
+
+
+@pytest.fixture
+def without_series(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Keep what a large sweep keeps, where verdicts alone are looked at: they take half of the work.
+
+    Numbers and verdicts are the same as with series of the same points (`analysis/test_parts`); more points of few
+    members are kept with them alone.
+    """
+    if "with_series" not in request.fixturenames:
+        monkeypatch.setattr("vibsim.experiment.storage.LEAN", 0)

@@ -3,7 +3,8 @@
 It goes the same way as ``python -m vibsim``, from the command line over its supervisor to its exit status. What the
 test has changed in this process (`monkeypatch`) holds in it too, but nothing that only the start of an interpreter
 reads (``sitecustomize.py``): where that matters, start one. Snakemake is a fork in the same way, and so are its jobs,
-which else import for half of their time; `tests/contract` and the run that `tests/workflow` looks at start all of them.
+which else import for half of their time; a run of `tests/contract` and the one that `tests/workflow` looks at start
+all of them.
 """
 
 from __future__ import annotations

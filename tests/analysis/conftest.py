@@ -15,13 +15,3 @@ def all_hypotheses() -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(posterior, "hypotheses_of", keeping)
         yield
-
-
-@pytest.fixture
-def without_series(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Keep what a large sweep keeps, where verdicts alone are looked at: they take half of the work.
-
-    Numbers and verdicts are the same as with series of the same points (`test_parts`); more points of few
-    members are kept with them alone.
-    """
-    monkeypatch.setattr("vibsim.experiment.storage.LEAN", 0)

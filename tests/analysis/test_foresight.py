@@ -17,6 +17,8 @@ from vibsim.experiment import Experiment
 from vibsim.experiment.cost import load_of
 from vibsim.simulation import simulate_record
 
+pytestmark = pytest.mark.usefixtures("without_series")
+
 PENDULUM = {"model": {"kind": "pendulum"}, "initial": {"theta": 1.0}, "time": {"end": 20.0}}
 CHECK = {"converges": "theta"}
 

@@ -11,6 +11,8 @@ from thinned import thinned
 
 from vibsim import Experiment, analyse, simulate, verdicts
 
+pytestmark = pytest.mark.usefixtures("without_series")
+
 NUMBER = re.compile(r"[-+]?[0-9][-+.0-9e]*")
 Make = Callable[[float, float, float], dict[str, Any]]
 """Makes a problem whose units of time, length and mass are as small."""

@@ -20,6 +20,8 @@ from vibsim.simulation import simulate_record
 sys.path.append(str(Path(__file__).parents[1] / "theory"))
 from scheme_variants import VARIANTS
 
+pytestmark = pytest.mark.usefixtures("without_series")
+
 PARTS = ("u_phase_error", "u_amplitude_error")
 STARTS = [(1.0, 0.0), (0.0, 1.0), (1.0, 1.0)]
 MODELS = {
@@ -202,6 +204,7 @@ def test_an_amplitude_that_should_be_exact_and_is_not_fails() -> None:
     assert rows == {"central": ("PASS", "exact"), "trap": ("FAIL", "order_low")}
 
 
+@pytest.mark.usefixtures("with_series")
 def test_differences_are_rescaled_by_the_promised_order_whatever_a_check_expects() -> None:
     checks = [{"converges": PARTS[0], "order": 2}, {"converges": PARTS[0], "order": "scheme"}]
     run = ladder({"kind": "spring"}, ["euler_cromer"], checks=checks)

@@ -46,10 +46,10 @@ def made(name: str, storage: str) -> tuple[dict[int, Record], Record]:
     indirect=["storage"],
 )
 def test_parts_and_processes_change_no_bit(name: str, storage: str) -> None:
-    """Parts of three processes that do not divide the members evenly, and of one member where there are few."""
+    """Parts of three processes that do not divide the members evenly, and of one member where they are fewest."""
     experiment = SWEEPS[name]
     records, whole = made(name, storage)
-    size = 1 if experiment.members <= 8 else 5
+    size = {6: 1, 8: 3}.get(experiment.members, 5)
     assert_same_bytes(analysed(experiment, records, size, 3), whole)
 
 

@@ -11,6 +11,8 @@ from thinned import thinned
 
 from vibsim import Experiment, VibsimError, analyse, simulate, verdicts
 
+pytestmark = pytest.mark.usefixtures("without_series")
+
 KICK = {"kind": "central", "end_velocity": "kick"}
 
 
@@ -112,6 +114,7 @@ def test_a_start_near_the_top_converges_to_the_exact_solution(
     assert found == [("PASS", "asymptotic")]
 
 
+@pytest.mark.usefixtures("with_series")
 @pytest.mark.parametrize("quantity", ["omega", "energy_deviation"])
 def test_a_change_that_happens_to_vanish_is_no_small_error(quantity: str) -> None:
     experiment = problem(range(3, 8), "central", 1.7, theta=1.18, omega=1.16, quantity=quantity)
@@ -120,6 +123,7 @@ def test_a_change_that_happens_to_vanish_is_no_small_error(quantity: str) -> Non
     assert true <= record[f"{quantity}_richardson_error"].max().item()
 
 
+@pytest.mark.usefixtures("with_series")
 @pytest.mark.slow
 def test_bounds_of_extrapolations_hold_for_random_members() -> None:
     """Of members that pass, 99 in 100 at least have an error within the bound, and none is far beyond."""

@@ -9,6 +9,7 @@ from types import SimpleNamespace
 from typing import Any
 
 import pytest
+from forked import vibsim
 
 from vibsim.cli import main, results_folder
 from vibsim.cli.jobs import extrapolate
@@ -306,10 +307,11 @@ def test_unknown_formats_are_refused_first(file: Path, tmp_path: Path, capsys: C
     assert "gif: unknown format: choose from svg, png, pdf" in capsys.readouterr().err
 
 
-def test_a_dry_run_makes_no_folder(file: Path, tmp_path: Path, capsys: Capture) -> None:
+def test_a_dry_run_makes_no_folder(file: Path, tmp_path: Path) -> None:
     new = tmp_path / "new"
-    assert main(["run", str(file), "--results", str(new), "--dry-run", "--cores", "1"]) == 0
-    lines = capsys.readouterr().out.splitlines()
+    ended = vibsim("run", file, "--results", new, "--dry-run", "--cores", "1")
+    assert ended.returncode == 0
+    lines = ended.stdout.splitlines()
     assert lines[0] == "adhoc/tiny: not made yet: levels 5 to 7, analysis, report"
     assert lines[1] == "  simulate adhoc/tiny level_05.nc"
     assert not new.exists()

@@ -308,12 +308,19 @@ def write(path: Path, n: int, form: str = "NETCDF4", power: float = 2.0) -> str:
 COUNTS = [10, 20, 40, 80]
 
 
-@pytest.mark.parametrize("form", ["NETCDF4", "NETCDF3_CLASSIC", "NETCDF3_64BIT_OFFSET"])
-def test_files_of_other_programs_are_judged(form: str, tmp_path: Path, capsys: Capture) -> None:
+LISTED = ",".join(str(1 / n) for n in reversed(COUNTS))
+
+
+@pytest.mark.parametrize(
+    ("form", "sizes"),
+    [("NETCDF4", ["dx", LISTED]), ("NETCDF3_CLASSIC", ["dt"]), ("NETCDF3_64BIT_OFFSET", ["dx"])],
+)
+def test_files_of_other_programs_are_judged(
+    form: str, sizes: list[str], tmp_path: Path, capsys: Capture
+) -> None:
     files = [write(tmp_path / f"run_{n}.nc", n, form) for n in COUNTS]
     command = ["judge", *reversed(files), "--order", "2", "--quantity", "T", "flux", "--json"]
-    listed = ",".join(str(1 / n) for n in reversed(COUNTS))
-    for size in ("dx", "dt", listed):
+    for size in sizes:
         assert main([*command, "--h", size]) == 0
         field, flux = entries(capsys)
         assert field["quantity"] == "T"
@@ -322,12 +329,15 @@ def test_files_of_other_programs_are_judged(form: str, tmp_path: Path, capsys: C
         assert flux["best"] == pytest.approx(2.0, abs=1e-5)
         factor = 0.5 if size == "dt" else 1.0
         assert field["h_used"] == pytest.approx([factor / n for n in COUNTS])
-    assert main([*command, "--h", "dx", "--exact", "flux=2"]) == 0
-    capsys.readouterr()
-    assert (
-        main(["judge", *files, "--h", "dx", "--quantity", "T", "--report", str(tmp_path / "r")])
-        == 0
-    )
+
+
+def test_a_limit_that_is_known_and_a_report_are_of_files_too(
+    tmp_path: Path, capsys: Capture
+) -> None:
+    files = [write(tmp_path / f"run_{n}.nc", n) for n in COUNTS]
+    command = ["judge", *files, "--h", "dx", "--quantity"]
+    report = ["--report", str(tmp_path / "r")]
+    assert main([*command, "T", "flux", "--order", "2", "--exact", "flux=2", *report]) == 0
     assert "<svg" in (tmp_path / "r/report.html").read_text()
 
 

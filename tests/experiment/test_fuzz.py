@@ -14,7 +14,7 @@ from torture.fuzz import experiment as read
 from vibsim.experiment import Experiment, sweep_columns
 
 QUIET = settings(
-    max_examples=150, deadline=None, suppress_health_check=[HealthCheck.too_slow], derandomize=True
+    max_examples=75, deadline=None, suppress_health_check=[HealthCheck.too_slow], derandomize=True
 )
 
 

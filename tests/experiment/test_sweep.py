@@ -202,7 +202,7 @@ HUGE = 10**12
 def test_what_is_too_large_is_counted_and_not_written_out(sweep: dict[str, Any]) -> None:
     build(sweep={"model.m": [1]})
     tracemalloc.start()
-    with calls_at_most(10_000):
+    with calls_at_most(5_000):
         faults = faults_of(levels=[1], sweep=sweep)
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()

@@ -62,7 +62,7 @@ TREES = st.recursive(_LEAVES, _nodes, max_leaves=25)
 # a strategy that contains itself has a long name, which a few of its draws write out
 @pytest.mark.filterwarnings("ignore:Generating overly large repr")
 @given(TREES)
-@settings(max_examples=400, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=200, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 def test_text_of_a_formula_reads_back_as_the_same_tree(tree: Expression) -> None:
     assert parse(to_formula(tree), NAMES) == tree
 

@@ -136,18 +136,26 @@ def test_the_separatrix_is_searched_once_for_all_maps(across, monkeypatch):
 def test_no_separatrix_is_drawn_where_there_is_none():
     sweep = {"initial.theta": {"linspace": [0.1, 2.0, 9]}, "model.g": {"linspace": [1.0, 3.0, 8]}}
     for model in ("pendulum", "linear_pendulum"):
-        exp = samples.experiment(sweep=sweep, model={"kind": model})
+        exp = samples.experiment(sweep=sweep, model={"kind": model}, levels=[6])
         grid = sweep_layout.grid_of(sweep_layout.keys(samples.record(exp)))
         assert not separatrix.with_separatrix(exp, grid).separatrix[0].size
         assert not separatrix.on_line(exp, grid.x).size
 
 
-def test_the_separatrix_crosses_a_line_once():
+def test_the_separatrix_crosses_a_line_once_and_is_searched_once_for_all_curves(monkeypatch):
     exp = samples.experiment(
-        initial={"theta": 0.5}, sweep={"initial.omega": {"linspace": [0.1, 3.0, 20]}}
+        initial={"theta": 0.5},
+        sweep={"initial.omega": {"linspace": [0.1, 3.0, 20]}},
+        levels=[6, 7],
     )
     (found,) = separatrix.on_line(exp, sweep_layout.keys(samples.record(exp))[0])
     assert abs(found - 2.0 * np.cos(0.25)) < 1e-9
+    searches, on_line = [], separatrix.on_line
+    monkeypatch.setattr(separatrix, "on_line", lambda *a: searches.append(1) or on_line(*a))
+    views, _ = samples.views(exp, samples.record(exp), "theta", "omega")
+    marked = [view for view in views.values() if "separatrix" in view.picture.caption]
+    assert len(marked) >= 3
+    assert len(searches) == 1
 
 
 def test_the_estimated_error_of_the_finest_level_is_the_true_one(across):

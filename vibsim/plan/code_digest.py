@@ -167,6 +167,7 @@ def _digest(files: Iterable[Path], folder: Path | None = None) -> str:
     return digest.hexdigest()
 
 
+@cache
 def _file(module: str) -> Path:
     path = PACKAGE.joinpath(*module.split(".")[1:])
     # a folder that is left over from a package that became a module is none

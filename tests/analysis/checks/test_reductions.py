@@ -23,6 +23,8 @@ from vibsim.experiment import Experiment
 from vibsim.experiment.experiment import canonical, restore
 from vibsim.report.text.assertions import about
 
+pytestmark = pytest.mark.usefixtures("without_series")
+
 DAMPING = 0.4
 FREQUENCIES = np.linspace(0.5, 1.5, 11)
 AMPLITUDES = 1.0 / np.hypot(1.0 - FREQUENCIES**2, DAMPING * FREQUENCIES)

@@ -14,6 +14,8 @@ from vibsim.core.errors import InputError
 from vibsim.experiment import Experiment
 from vibsim.experiment.experiment import canonical, restore
 
+pytestmark = pytest.mark.usefixtures("without_series")
+
 LENGTHS = [1.0, 1.25, 1.5, 1.75, 2.0]
 ANGLES = [0.1, 0.2]
 PLAIN: dict[str, Any] = {

@@ -11,6 +11,8 @@ from vibsim.checks.value import unit_of
 from vibsim.experiment.value_names import VALUES
 from vibsim.simulation import simulate_record
 
+pytestmark = pytest.mark.usefixtures("without_series")
+
 QUANTITIES = {"value": "end", "quantity": "omega", "above": -9.0}
 
 

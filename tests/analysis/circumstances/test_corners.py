@@ -12,6 +12,8 @@ from vibsim import Experiment, Verdict, analyse, simulate, verdicts
 from vibsim.apriori.force_discontinuities import switches_of, words_of
 from vibsim.schemes import FIXED_STEP, SCHEMES
 
+pytestmark = pytest.mark.usefixtures("without_series")
+
 QUADRATIC = {"kind": "oscillator", "damping": {"quadratic": 0.5}}
 
 
@@ -183,6 +185,7 @@ def test_members_of_a_sweep_have_their_own_corner() -> None:
         assert alone["corner_time"].values[0, 0] == pytest.approx(times[case], nan_ok=True)
 
 
+@pytest.mark.usefixtures("with_series")
 def test_a_velocity_that_an_event_turns_has_passed_no_corner() -> None:
     event = {"when": "u", "falling": True, "then": {"v": "-0.75*v"}}
     ball = {**QUADRATIC, "spring": "g", "parameters": {"g": 9.81}, "events": [event]}
@@ -281,6 +284,7 @@ def test_a_jump_within_a_step_makes_no_wrong_limit(levels: list[int]) -> None:
     assert reasons <= {"asymptotic", "non_smooth", "pre_asymptotic"}
 
 
+@pytest.mark.usefixtures("with_series")
 def test_a_wrong_limit_is_seen_beside_a_jump() -> None:
     made = Experiment.from_dict(JUMPS | {"levels": [4, 5, 6, 7, 8], "schemes": ["rk4"]})
     data = [simulate(made, level) for level in made.levels]
@@ -305,6 +309,7 @@ def test_a_jump_in_the_last_step_makes_no_wrong_limit(scheme: str) -> None:
     assert "t = 1.7" in found.text
 
 
+@pytest.mark.usefixtures("with_series")
 def test_a_jump_beside_a_point_of_all_levels_makes_no_wrong_limit() -> None:
     """It lies 0.005 of a step behind a point of level 10 and of every finer one: all of them take it to be there."""
     made = experiment(

@@ -15,6 +15,8 @@ import yaml
 from vibsim import Experiment, analyse, simulate, verdicts
 from vibsim.core.vocabulary import REASON_NAMES
 
+pytestmark = pytest.mark.usefixtures("without_series")
+
 MEMBERS = 24
 BOX = {"kind": "sliding_box", "mu": 0.05}
 ORDERS: list[Any] = ["scheme", 2, 4]
@@ -210,6 +212,7 @@ def test_levels_that_notice_an_event_at_one_point_have_no_wrong_limit() -> None:
     assert "events: located" in found.advice
 
 
+@pytest.mark.usefixtures("with_series")
 def test_the_times_of_all_events_are_stored_of_every_level() -> None:
     made = experiment(**BALL, time={"end": 5.0}, levels=[6, 7], schemes=["rk4"], checks=[])
     levels = [simulate(made, level) for level in made.levels]

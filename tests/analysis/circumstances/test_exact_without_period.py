@@ -8,6 +8,8 @@ import pytest
 
 from vibsim import Experiment, Verdict, analyse, simulate, verdicts
 
+pytestmark = pytest.mark.usefixtures("without_series")
+
 BALL = {"kind": "bouncing_ball", "g": 9.81, "restitution": 0.5}
 
 

@@ -8,6 +8,8 @@ import pytest
 
 from vibsim import Experiment, Verdict, analyse, simulate, verdicts
 
+pytestmark = pytest.mark.usefixtures("without_series")
+
 SPRING = {"kind": "spring", "w": 9}
 
 

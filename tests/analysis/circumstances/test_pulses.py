@@ -10,6 +10,8 @@ import pytest
 from vibsim import Experiment, analyse, simulate, verdicts
 from vibsim.core.errors import VibsimError
 
+pytestmark = pytest.mark.usefixtures("without_series")
+
 
 def judged(force: str, *, schemes: Any = ("rk4",), levels: Any = (5, 6, 7, 8), **more: Any) -> Any:
     content = {

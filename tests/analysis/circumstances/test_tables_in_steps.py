@@ -11,6 +11,8 @@ import pytest
 from vibsim import Experiment, Verdict, analyse, simulate, verdicts
 from vibsim.apriori.formal_orders import left_to_the_mesh
 
+pytestmark = pytest.mark.usefixtures("without_series")
+
 MODEL = {"kind": "vehicle", "m": 60, "b": 80, "speed": 5, "spring": "600*u"}
 LEVELS = [0, 1, 2, 3, 4]
 
@@ -98,6 +100,7 @@ def test_an_adaptive_scheme_finds_the_same_motion(folder: Path) -> None:
     assert np.abs(u[1] - u[0]).max() < 1e-6 * np.abs(u[0]).max()
 
 
+@pytest.mark.usefixtures("with_series")
 def test_the_road_is_an_output(folder: Path) -> None:
     made = experiment(100, ["central"], [], levels=[0, 3])
     heights = np.loadtxt("road.csv", delimiter=",", skiprows=1)[:, 1]

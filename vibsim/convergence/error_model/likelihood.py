@@ -5,16 +5,18 @@ from __future__ import annotations
 import math
 from functools import lru_cache
 from itertools import combinations
+from typing import NamedTuple
 
 import numpy as np
 
 from vibsim.convergence.error_model import priors
 from vibsim.convergence.error_model.hypotheses import Table, outer, packed
 from vibsim.convergence.error_model.kernel import weigh
-from vibsim.core.array_types import Floats
+from vibsim.core.array_types import Floats, Integers
 
 TINY = 1e-300
 """Less is nothing."""
+_NONE = np.empty((1, 0))
 
 
 def log_gamma(n: Floats) -> Floats:
@@ -42,16 +44,42 @@ def log_sum(logs: Floats) -> Floats:
     return np.asarray(largest + np.log(np.sum(np.exp(logs - largest[..., None]), axis=-1)))
 
 
-def _whole(table: Table, last: Floats, points: Floats, w: int) -> Floats:
-    """Return the log evidence of w rows for which root over trace is that of the square of the last row, and 1."""
-    if table.beside is None:
-        return scale_free(last, 0.0, points, w)
-    # one dimension along the last row, which may have any direction, and the others across it, of a Student's t
-    free = (points - 1.0) * (w - 1)
+class Read(NamedTuple):
+    """What all tables of a kind read of the rows of a window; the first axis is that of ladders."""
+
+    last: Floats  # square of the last row
+    whole: Floats  # log evidence of rows for which root over trace is that square, and 1
+    # see `vibsim.convergence.error_model.kernel.kernel`
+    gram: Floats
+    read: Floats
+    points: Integers
+    powers: Integers
+    across: Floats
+    squares: Floats  # of what each row has across the last one, over that of the last one
+
+
+def read_of(gram: Floats, points: Floats, *, apart: bool) -> Read:
+    """Return what tables read of Gram matrices of w rows: all at once, or `apart` what is along and across the last."""
+    w, last, number = gram.shape[-1], _last(gram), points.astype(np.int64)
+    relative = gram / last[:, None, None]
+    if not apart:
+        whole, all_ = scale_free(last, 0.0, points, w), packed(relative)
+        powers, none = np.stack([number * w, 0 * number], axis=-1), np.empty((len(gram), 0))
+        return Read(last, whole, all_, all_, number, powers, none, none)
+    # one dimension along the last row, which may have any direction, and the others across it, of a Student's t, of
+    # which numbers have nothing
+    free, one = (points - 1.0) * (w - 1), np.ones_like(points)
     rest = math.log(2.0) + 0.5 * np.log(last) + scale_free(last, 0.0, points, 1)
     rest += log_gamma(free + priors.TAIL) - math.lgamma(0.5 * priors.TAIL)
     rest -= 0.5 * free * np.log(np.pi * last / points)
-    return rest + scale_free(last, 0.0, np.ones_like(points), w)
+    powers = np.stack([one * w, (free + priors.TAIL) * (free > 0.0)], axis=-1).astype(np.int64)
+    along = outer(relative[:, -1], relative[:, -1])
+    read = np.where(points[:, None, None] > 1.0, along, relative)
+    across = packed((relative - along)[:, :-1, :-1]) * points[:, None]
+    own = np.diagonal(gram, axis1=1, axis2=2)[:, :-1] / last[:, None]
+    squares = np.maximum(own - (gram[:, -1, :-1] / last[:, None]) ** 2, 0.0)
+    whole = rest + scale_free(last, 0.0, one, w)
+    return Read(last, whole, packed(relative), packed(read), number, powers, across, squares)
 
 
 def _last(gram: Floats) -> Floats:
@@ -59,36 +87,23 @@ def _last(gram: Floats) -> Floats:
     return np.maximum(gram[:, -1, -1], TINY)
 
 
-def highest(table: Table, gram: Floats, points: Floats) -> Floats:
-    """Return what the log evidence of all hypotheses of a table on w rows is at most, shape (ladder,)."""
-    w, last = gram.shape[-1], _last(gram)
-    found = _whole(table, last, points, w) + np.where(points > 1.0, *table.limit[::-1])
+def highest(table: Table, read: Read) -> Floats:
+    """Return what the log evidence of all hypotheses of a table on some rows is at most, shape (ladder,)."""
+    found = read.whole + np.where(read.points > 1, *table.limit[::-1])
     if table.beside_bounds is not None:
-        # what the other rows have across the last one
-        own = np.diagonal(gram, axis1=1, axis2=2)[:, :-1]
-        across = np.maximum(own / last[:, None] - (gram[:, -1, :-1] / last[:, None]) ** 2, 0.0)
-        least = np.sum(across * np.min(table.beside_bounds, axis=0), axis=-1) * points
-        found -= 0.5 * _across_power(points, w) * np.log1p(least)
+        bounds = np.min(table.beside_bounds, axis=0)
+        least = np.sum(read.squares * bounds, axis=-1) * read.points
+        found -= 0.5 * read.powers[:, 1] * np.log1p(least)
     return np.asarray(found)
 
 
-def _across_power(points: Floats, w: int) -> Floats:
-    """Return the power, twice, of the evidence of what w rows have across the last one: numbers have nothing."""
-    free = (points - 1.0) * (w - 1)
-    return np.asarray((free + priors.TAIL) * (free > 0.0))
-
-
 def weights(
-    table: Table, gram: Floats, points: Floats, behind: Floats, least: Floats
+    table: Table, read: Read, behind: Floats, least: Floats
 ) -> tuple[Floats, Floats, Floats, Floats]:
     """Weigh the hypotheses of a table on the rows of a window.
 
     Parameters
     ----------
-    gram
-        Of the w rows, shape (ladder, w, w).
-    points
-        N, shape (ladder,).
     behind
         See `vibsim.convergence.error_model.kernel.kernel`; over the square of the last row.
     least
@@ -100,34 +115,23 @@ def weights(
         The log of their evidence, with priors, summed up, shape (ladder,), and the means of what `kernel` finds: of
         pairs of powers, shape (ladder, 3, pair), of the limit in the rows, shape (ladder, w), and of its square.
     """
-    count, w = len(gram), gram.shape[-1]
-    last = _last(gram)
-    relative, whole = gram / last[:, None, None], _whole(table, last, points, w)
-    read, dimensions = relative, points
-    beside, bounds, across = np.empty((1, 0)), np.empty((1, 0)), np.empty((count, 0))
-    powers = np.stack([points * w, np.zeros(count)], axis=-1)
-    if table.beside is not None and table.beside_bounds is not None:
-        along = outer(relative[:, -1], relative[:, -1])
-        beside, bounds = table.beside, table.beside_bounds
-        across = packed((relative - along)[:, :-1, :-1])
-        # numbers have nothing across
-        read, dimensions = np.where(points[:, None, None] > 1.0, along, relative), np.ones(count)
-        powers = np.stack([dimensions * w, _across_power(points, w)], axis=-1)
-        across = across * points[:, None]
+    count, w, half = len(read.last), table.columns.shape[1] - 5, 0.5 * read.powers[:, 0]
+    beside, bounds = (_NONE if x is None else x for x in (table.beside, table.beside_bounds))
     pairs, size = int(table.pair[-1]) + 1, len(table.pair)
     found = np.empty((count, 3 + w + 3 * pairs))
-    smallest = np.exp(np.clip((least - whole) / (0.5 * powers[:, 0]), -600.0, 600.0))
+    smallest = np.exp(np.clip((least - read.whole) / half, -600.0, 600.0))
     weigh()(
-        packed(relative), packed(read), points.astype(np.int64), powers.astype(np.int64), smallest, across, behind,
+        read.gram, read.read, read.points, read.powers, smallest, read.across, behind,
         table.forms, beside, bounds, table.columns, table.pair, table.groups, table.bounds, pairs,
         np.empty(size, dtype=np.int64), *np.empty((3, size)), found,
     )  # fmt: skip
     # rows that are nowhere near any hypothesis have no weight at all
     none = found[:, 1] <= 0.0
     top, total = np.where(none, 1.0, found[:, 0]), np.where(none, 1.0, found[:, 1])
-    log = np.where(none, -np.inf, whole + 0.5 * dimensions * w * np.log(top) + np.log(total))
+    log = np.where(none, -np.inf, read.whole + half * np.log(top) + np.log(total))
     found[:, 2:] /= total[:, None]
-    return log, found[:, 3 + w :].reshape(count, 3, pairs), found[:, 3 : 3 + w], found[:, 2] * last
+    pair_weights = found[:, 3 + w :].reshape(count, 3, pairs)
+    return log, pair_weights, found[:, 3 : 3 + w], found[:, 2] * read.last
 
 
 def single_power(

@@ -20,11 +20,13 @@ from vibsim.convergence.error_model.hypotheses import (
 )
 from vibsim.convergence.error_model.likelihood import (
     TINY,
+    Read,
     any_size,
     highest,
     log_sum,
     noise,
     noise_of_finest,
+    read_of,
     scale_free,
     single_power,
     weights,
@@ -179,6 +181,7 @@ class _Fit:
         self.unit = np.sum(self.alone_rows, axis=-1)
         if ladder.exact_known:
             self.unit = self.unit + self.error_of(0)
+        self.of_ends = {end: self.beyond(end) for end in range(2, n)}
         self.total, self.every = np.ones(count), np.arange(count)
         pairs, windows = len(terms.first_of_pairs), len(self.windows)
         shapes: dict[str, tuple[int, ...]] = {
@@ -195,10 +198,8 @@ class _Fit:
         start, end = self.windows[index]
         ladder = self.ladder
         rest = np.sum(self.alone_rows[:, :start], axis=-1)
-        rest += noise(
-            ladder.h[end:], self.differences[:, end:, end:], self.points, ladder.floor[:, end:]
-        )
-        rest += self.hidden(end)
+        for part in self.of_ends[end]:
+            rest += part
         smallest = self.differences[:, end - 1, end - 1]
         sizes = ladder.h[start : end + 1] / ladder.h[end]
         inside, behind = self.rows(start, end), np.empty((len(rest), 0))
@@ -223,12 +224,13 @@ class _Fit:
             for table, p in zip(of_window.factors, priors.JITTER_PRIORS, strict=True)
         ]
         tables += [(of_window.factors_with_shape, several), (of_window.one_shape, alike)]
+        read = [read_of(inside, self.points, apart=x) for x in (False, True)]
         for table, prior in tables:
-            self.add_table(index, table, prior, inside, behind)
+            self.add_table(index, table, prior, read, behind)
         self.add_any_power(index, sizes, inside, behind, noisy[0], of_window.any_power)
         for i, table in enumerate(of_window.alternating):
             prior = noisy[i] + math.log(priors.ALTERNATING)
-            self.add_table(index, table, prior, inside, behind[:, :0], name="alternating")
+            self.add_table(index, table, prior, read, behind[:, :0], name="alternating")
 
     def matters(self, most: Floats) -> tuple[Rows, Floats]:
         """Return the ladders of which a table with evidence up to this may matter, and what hypothesis would not."""
@@ -241,19 +243,18 @@ class _Fit:
         index: int,
         table: Table,
         prior: Floats,
-        inside: Floats,
+        of_kinds: list[Read],
         behind: Floats,
         *,
         name: str = "window",
     ) -> None:
         """Add the hypotheses of a table on the rows of a window."""
-        rows, least = self.matters(prior + highest(table, inside, self.points))
-        part = inside[rows]
-        if not len(part):
+        read = of_kinds[table.beside is not None]
+        rows, least = self.matters(prior + highest(table, read))
+        part = read if isinstance(rows, slice) else Read._make(x[rows] for x in read)
+        if not len(part.last):
             return
-        log, pairs, path, squared = weights(
-            table, part, self.points[rows], behind[rows], (least - prior)[rows]
-        )
+        log, pairs, path, squared = weights(table, part, behind[rows], (least - prior)[rows])
         if not np.any(np.isfinite(log)):
             return
         if name == "window":
@@ -288,20 +289,24 @@ class _Fit:
             found[:, count, count - 1] -= self.rounding[:, end]
         return found
 
-    def hidden(self, end: int) -> Floats:
-        """Return the log of how likely noise hides what an expansion leaves behind the window that ends at a level.
+    def beyond(self, end: int) -> tuple[Floats, Floats]:
+        """Return what is said of the rows behind windows that end at a level: the evidence of noise, and what it hides.
 
-        A difference of which D is expected is as small as noise of the size s < D with the probability ``(s/D)^N``. D
-        falls by the order of the finest levels of the window; where they have none, nothing is expected.
+        The second is the log of how likely noise hides what an expansion leaves there. A difference of which D is
+        expected is as small as noise of the size s < D with the probability ``(s/D)^N``. D falls by the order of the
+        finest levels of the window; where they have none, nothing is expected.
         """
-        sizes = self.ladder.h[end - 1 :] / self.ladder.h[end]
+        sizes, floor = self.ladder.h[end - 1 :] / self.ladder.h[end], self.ladder.floor[:, end:]
         order = np.clip(self.orders[:, end - 2, None], priors.POWERS[0], priors.HIGHEST)
         falls = between(sizes**order)
         own = np.sqrt(np.diagonal(self.differences, axis1=1, axis2=2)[:, end - 1 :])
         expected = np.maximum(own[:, :1] * falls[:, 1:] / falls[:, :1], TINY)
         largest = np.max(own[:, 1:], axis=-1, initial=0.0)
-        size = np.maximum(largest, self.ladder.floor[:, end])[:, None]
-        return np.asarray(self.points * np.sum(np.fmin(np.log(size / expected), 0.0), axis=-1))
+        hidden = np.fmin(np.log(np.maximum(largest, floor[:, 0])[:, None] / expected), 0.0)
+        rows = self.differences[:, end:, end:]
+        return noise(self.ladder.h[end:], rows, self.points, floor), self.points * np.sum(
+            hidden, axis=-1
+        )
 
     def behind(self, start: int, end: int) -> Floats:
         """Return what `kernel` reads of the differences behind a window."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -19,7 +20,7 @@ from vibsim.report.figures.sweeps import separatrix, view
 from vibsim.report.figures.sweeps.view import View, Worst
 from vibsim.report.finest_level import Measured
 from vibsim.report.style import Picture
-from vibsim.report.sweep_layout import Along
+from vibsim.report.sweep_layout import Along, Key
 from vibsim.report.types import Axes, Experiment, ValueCheck
 
 TALL, ENTRY = 3.0, 0.18  # least height of a panel, height of an entry of a legend [inch]
@@ -56,6 +57,12 @@ class _Drawing:
     along: Along
     worst: Worst
 
+    @cached_property
+    def on_separatrix(self) -> list[float]:
+        """Return where the separatrix crosses the line of the members, if there is one line."""
+        is_alone = len(self.along.lines) == 1 and not self.along.follows
+        return separatrix.on_line(self.experiment, self.along.key).tolist() if is_alone else []
+
     def _view(
         self, stem: str, name: str, quantity: str, values: Floats, caption: str, draw: Callable[[Axes], str],
         unit: str = "", form: str = "step",
@@ -80,7 +87,7 @@ class _Drawing:
     ) -> View:  # fmt: skip
         """Finish the axes of a view, and mark the worst member."""
         key, worst = self.along.key, self.worst(quantity)
-        marked = _finish(ax, self.experiment, self.along)
+        marked = _finish(ax, key, self.on_separatrix)
         ax.set_gid(style.MEMBER)
         is_ringed = view.ring(
             ax, float(key.values[worst.case]), float(places[worst.scheme, worst.case])
@@ -199,13 +206,10 @@ class _Drawing:
         )  # fmt: skip
 
 
-def _finish(ax: Axes, experiment: Experiment, along: Along) -> str:
+def _finish(ax: Axes, key: Key, found: list[float]) -> str:
     """Give the axis of the key its scale, label and separatrix; return the sentence on the latter."""
-    key = along.key
     view.key_axis(ax, key, 0.03)
     ax.set_xlabel(key.label)
-    is_alone = len(along.lines) == 1 and not along.follows
-    found = separatrix.on_line(experiment, key).tolist() if is_alone else []
     for x in found:
         ax.axvline(x, color="black", linestyle=(0, (1, 2)), linewidth=1.0, zorder=1)
     return "Dotted: the separatrix, where the exact period is infinite." if found else ""
