@@ -230,6 +230,13 @@ def test_every_exercise_has_an_answer_that_runs_and_passes_through_checks_that_e
             assert full in (checks if check else known()), f"{name}{check}"
 
 
+@pytest.mark.parametrize("note", [1, 2, 4, 5])
+def test_an_answered_note_has_a_picture(note: int) -> None:
+    """Note 3 asks how many faults are caught: it has numbers."""
+    (text,) = (part for part in EXERCISES if part.startswith(f"Note [hpl {note}]"))
+    assert re.search(r"^!\[.+\]\(images/exercises-.+\.svg\)$", text, re.MULTILINE)
+
+
 def test_numbers_of_answers_are_those_that_checks_ask_for() -> None:
     """A number beside a check with a bound on a value agrees with it to the digits that it has."""
     checked = 0

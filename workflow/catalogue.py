@@ -36,13 +36,13 @@ of every statement.
 | badge | meaning |
 |---|---|
 | CONFIRMED | an experiment shows it; a statement is decided by the check that is named |
-| CORRECTED | the text is wrong here or leaves a condition out; `Correct:` says what is right, `Refuted:` what a check did not find |
+| CORRECTED | the text is wrong, or leaves a condition out; `Correct:` says what is right, `Refuted:` what is refuted |
 | OPEN | something is missing, and the row says what |
 | PROVIDED | a command or a page does what the text asks for; nothing is measured |
 
 `python workflow/catalogue.py` writes this page from [catalogue.yaml](catalogue.yaml) and the experiment files.
-Numbers 1 to {things} count what the texts describe, E1 to E{errata} the places where they are wrong, seem to be, or leave a
-condition out. Rows without a number come from the files of experiments. Figures are also in
+Numbers 1 to {things} count what the texts describe, E1 to E{errata} the places where they are wrong, seem to be, or
+leave a condition out. Rows without a number come from the files of experiments. Figures are also in
 [a list of their own](figures.md), and [the exercises](exercises.md) have a page with their answers.
 """
 
