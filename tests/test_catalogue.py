@@ -80,11 +80,23 @@ def test_no_row_is_missing() -> None:
         (changed("things", 1), "things, 1: has none of shown_by, see, open"),
         (changed("errata", 1, truth="x", open="it"), "errata, 1: has none of shown_by, not_run"),
         (changed("errata", 36, truth="x", not_run="y"), "no erratum names the check"),
+        (changed("errata", 1, not_run="y"), "errata, 1: has not one of truth, confirmed"),
+        (
+            changed("errata", 36, confirmed="x", shown_by=["vibration_text/resonance#about_unity"]),
+            "about_unity refutes it",
+        ),
     ],
 )
 def test_a_faulty_row_is_told(found: dict[str, Any], word: str) -> None:
     (told, *_) = CATALOGUE["faults"](found, known())
     assert word in told
+
+
+@pytest.mark.parametrize("number", [15, 30, 55])
+def test_an_erratum_that_the_text_has_right_is_not_called_corrected(number: int) -> None:
+    (row,) = re.findall(rf"^\| E{number} \|.*$", PAGE, re.MULTILINE)
+    assert "| CONFIRMED |" in row
+    assert "Correct:" not in row
 
 
 def test_a_statement_of_nobody_is_not_refuted() -> None:
@@ -216,6 +228,13 @@ def test_every_exercise_has_an_answer_that_runs_and_passes_through_checks_that_e
         for name, check in named:
             full = f"{by_name().get(name)}{check}"
             assert full in (checks if check else known()), f"{name}{check}"
+
+
+@pytest.mark.parametrize("note", [1, 2, 4, 5])
+def test_an_answered_note_has_a_picture(note: int) -> None:
+    """Note 3 asks how many faults are caught: it has numbers."""
+    (text,) = (part for part in EXERCISES if part.startswith(f"Note [hpl {note}]"))
+    assert re.search(r"^!\[.+\]\(images/exercises-.+\.svg\)$", text, re.MULTILINE)
 
 
 def test_numbers_of_answers_are_those_that_checks_ask_for() -> None:

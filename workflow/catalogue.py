@@ -36,13 +36,13 @@ of every statement.
 | badge | meaning |
 |---|---|
 | CONFIRMED | an experiment shows it; a statement is decided by the check that is named |
-| CORRECTED | the text is wrong here; `Correct:` says what is right, `Refuted:` what a check did not find |
+| CORRECTED | the text is wrong, or leaves a condition out; `Correct:` says what is right, `Refuted:` what is refuted |
 | OPEN | something is missing, and the row says what |
 | PROVIDED | a command or a page does what the text asks for; nothing is measured |
 
 `python workflow/catalogue.py` writes this page from [catalogue.yaml](catalogue.yaml) and the experiment files.
-Numbers 1 to {things} count what the texts describe, E1 to E{errata} the places where they are wrong or leave a
-condition out. Rows without a number come from the files of experiments. Figures are also in
+Numbers 1 to {things} count what the texts describe, E1 to E{errata} the places where they are wrong, seem to be, or
+leave a condition out. Rows without a number come from the files of experiments. Figures are also in
 [a list of their own](figures.md), and [the exercises](exercises.md) have a page with their answers.
 """
 
@@ -87,6 +87,10 @@ def faults(listed: dict[str, Any], known: dict[str, Experiment]) -> list[str]:
             found.append(f"{where}: has none of {', '.join(WAYS[kind])}")
         if kind == "errata":
             named.update(shown)
+            if ("truth" in content) == ("confirmed" in content):
+                found.append(f"{where}: has not one of truth, confirmed")
+            if "confirmed" in content:
+                found += [f"{where}: {name} refutes it" for name in shown if name in refuted]
         else:
             found += [f"{where}: {name} refutes it" for name in shown if name in refuted]
     for name, claim in refuted.items():
@@ -105,11 +109,13 @@ def rows(listed: dict[str, Any], known: dict[str, Experiment]) -> Iterator[Row]:
         shown = ", ".join(_places(thing))
         yield Row(thing["source"], str(number), thing["says"], shown, badge, thing.get("open", ""))
     for number, row in listed["errata"].items():
-        told = f"Correct: {row['truth']}"
+        badge, told = CONFIRMED, row.get("confirmed")
+        if told is None:
+            badge, told = CORRECTED, f"Correct: {row['truth']}"
         if "not_run" in row:
             told += f". Not run: {row['not_run']}"
         shown = ", ".join(_places(row))
-        yield Row(row["source"], f"E{number}", row["says"], shown, CORRECTED, told)
+        yield Row(row["source"], f"E{number}", row["says"], shown, badge, told)
     for name, experiment in known.items():
         for check in experiment.checks:
             if check.kind != "claim" or not check.source:

@@ -11,6 +11,7 @@ from vibsim.analysis import analyse_records
 from vibsim.core.record import Record, Variable
 from vibsim.experiment.storage import FEWEST_EXTREMA
 from vibsim.schemes import FIXED_STEP
+from vibsim.simulation.level import simulate_record
 
 SCHEMES = ["central", "rk2", "rk4", "crank_nicolson", "euler_cromer", "backward_euler"]
 
@@ -32,6 +33,24 @@ def test_growth_frequency_and_phase_error_are_the_predicted_ones() -> None:
         assert logs[0] == pytest.approx(logs[1], abs=height + decay), name
         assert frequency[0][i] / frequency[1][i] == pytest.approx(1.0, abs=time), name
         assert phase[0][i] == pytest.approx(phase[1][i], abs=time), name
+
+
+def test_a_run_without_a_period_has_no_measured_growth() -> None:
+    """Beyond the limit the pendulum turns over more than once in a step, and the times of its turns fall back."""
+    of = experiment(
+        model={"kind": "pendulum"},
+        initial={"theta": 1.0},
+        time={"end": 20.0},
+        levels=[2, 9],
+        schemes=["central"],
+        checks=[{"converges": "theta", "order": 2}],
+    )
+    levels = {level: simulate_record(of, level) for level in of.levels}
+    assert float(levels[2]["period"][0, 0]) < 0
+    record = analyse_records(of, levels)
+    unstable, stable = record["measured_growth"][0, 0]
+    assert np.isnan(unstable)
+    assert stable == pytest.approx(1.0, abs=1e-3)
 
 
 def test_values_are_those_of_the_record() -> None:

@@ -27,7 +27,8 @@ def run(monkeypatch: pytest.MonkeyPatch) -> Any:
                 assert cell.outputs == []
                 exec(compile(cell.source, f"{name}, cell {i + 1}", "exec"), names)
                 if matplotlib.pyplot.get_fignums():
-                    names["drawn"].append(matplotlib.pyplot.gca().get_ylabel())
+                    axes = matplotlib.pyplot.gca()
+                    names["drawn"].append((axes.get_xlabel(), axes.get_ylabel()))
                     matplotlib.pyplot.close("all")
         return names
 
@@ -43,7 +44,8 @@ def test_from_yaml_to_figure(run: Any, capsys: pytest.CaptureFixture[str]) -> No
     names = run("from_yaml_to_figure")
     assert names["ratios"] == pytest.approx([4.0, 4.0], abs=0.25)
     assert len(names["drawn"]) == 4
-    assert names["drawn"][-1] == "largest error of theta [rad]"
+    assert {x for x, _ in names["drawn"][:-1]} == {"time [s]"}
+    assert names["drawn"][-1] == ("time step [s]", "largest error of theta [rad]")
     assert {line.split()[0] for line in capsys.readouterr().out.splitlines()} == {"PASS"}
 
 

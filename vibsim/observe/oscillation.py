@@ -71,7 +71,8 @@ def growth_over_run(block: MemberBlock, record: Record) -> Floats:
     time = np.asarray(record["period"] * record["period_count"], dtype=float)
     natural = 2.0 * np.pi / natural_frequency(block) if is_simple(block) else period
     intervals = safe_ratio(*np.broadcast_arrays(time, natural))
-    usable = (factor > 0) & (intervals > 0)
+    # beyond a limit a nonlinear run may have no period: turns that it seems to make backwards in time
+    usable = (factor > 0) & (intervals > 0) & (period > 0)
     log = np.log(np.where(usable, factor, 1.0)) / np.where(usable, intervals, 1.0)
     with np.errstate(over="ignore"):
         return np.where(usable, np.exp(log), np.nan)
