@@ -33,7 +33,6 @@ A second power of the same shape covers a lower order than the true one.
 PREDICTED = "noise is predicted so large that the finest of 13 or 16 levels, where a lower power emerges, are not read"
 KNOWN = {
     "2.13.8": PREDICTED,
-    "2.15.6": "three levels, of which the first has blown up",
     "2.23.22": "seven levels with errors that swing",
     "1.1.8": "three levels, of which the first two have blown up",
     "1.16.3": "three levels with errors that swing",
