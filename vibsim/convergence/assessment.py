@@ -75,8 +75,11 @@ class Question:
     """Whether theory promises the order that is expected."""
 
     def is_met_by(self, order: Floats) -> Flags:
-        """Say which measured orders are nearer to the expected one than to the next order of an expansion."""
-        margin = max(self.tolerance, HALF_SPACING)
+        """Say which measured orders are nearer to the expected one than to the next order of an expansion.
+
+        Orders of expansions are 0.5 apart, and those of a scheme by its theory 1.
+        """
+        margin = max(self.tolerance, (2.0 if self.by_theory else 1.0) * HALF_SPACING)
         if self.expected is not None:
             return np.asarray(~(np.abs(order - self.expected) > margin))
         return np.asarray(~(order < (self.at_least or -np.inf) - margin))

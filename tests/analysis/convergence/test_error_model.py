@@ -246,6 +246,28 @@ def test_an_order_that_two_powers_only_explain_passes_when_it_is_measured() -> N
     assert found(assess(ladder(h, values), Question(2.5))) == ("PASS", "asymptotic")
 
 
+def test_orders_of_a_theory_are_one_apart() -> None:
+    orders = np.array([1.4, 1.6, 1.8, 2.4, 2.6, np.nan])
+    assert Question(2.0, by_theory=True).is_met_by(orders).tolist() == [
+        False,
+        True,
+        True,
+        True,
+        False,
+        True,
+    ]
+    assert Question(2.0).is_met_by(orders).tolist() == [False, False, True, False, False, True]
+    assert Question(at_least=2.0).is_met_by(orders).tolist() == [
+        False,
+        False,
+        True,
+        True,
+        True,
+        True,
+    ]
+    assert Question().is_met_by(orders).all()
+
+
 @pytest.mark.parametrize("factor", [1e-30, 1e30])
 def test_units_do_not_matter(factor: float) -> None:
     usual = series(UNEVEN, (1.0, 2.0, SHAPE), (0.5, 3.0, OTHER_SHAPE))
