@@ -137,34 +137,34 @@ def decide(ladder: Ladder, question: Question) -> Decision:
 class _Evaluation:
     """What the posterior of ladders leads to, but for an exact solution that is missed."""
 
+    question: Question
     posterior: Posterior
     sides: Floats  # probabilities of a lower, an expected and a higher power, shape (3, ladder)
     exact: Flags
     away: Flags  # only noise, and not the exact solution
-    by_three: Flags  # whether three levels decide behind others that do not fit
-    is_measured: Flags  # whether the order of the finest levels is near the expected one
     is_confirmed: bool  # whether an exact solution is known
     cut_short: Flags  # whether noise that may be far less than predicted ends the window: nothing is decided
 
+    @property
+    def by_three(self) -> Flags:
+        """Whether three levels decide behind others that do not fit."""
+        return rests_on_three(self.posterior)
+
+    @property
+    def order(self) -> Floats:
+        """The order of the finest levels of the most probable window."""
+        return finest_order(self.posterior.orders, likely_window(self.posterior)[1])
+
     def some(self, rows: Integers) -> _Evaluation:
         """Return what was found of some of the ladders."""
-        parts = {
-            name: getattr(self, name)[rows] for name in ("exact", "away", "by_three", "is_measured")
-        }
-        return replace(
-            self,
-            posterior=self.posterior.some(rows),
-            sides=self.sides[:, rows],
-            cut_short=self.cut_short[rows],
-            **parts,
-        )
+        parts = {name: getattr(self, name)[rows] for name in ("exact", "away", "cut_short")}
+        posterior, of_sides = self.posterior.some(rows), self.sides[:, rows]
+        return replace(self, posterior=posterior, sides=of_sides, **parts)
 
     def replace(self, ladders: Integers, other: _Evaluation, rows: Flags) -> None:
         """Take what was found of some ladders from some rows of another one."""
         self.posterior.replace(ladders, other.posterior, rows)
         self.sides[:, ladders] = other.sides[:, rows]
-        self.by_three[ladders] = other.by_three[rows]
-        self.is_measured[ladders] = other.is_measured[rows]
 
 
 def _assess_block(ladder: Ladder, factors: Floats, question: Question) -> dict[str, np.ndarray]:
@@ -196,21 +196,8 @@ def _evaluate(ladder: Ladder, question: Question, left_out: float) -> _Evaluatio
     if ladder.exact_known:
         noise = question.noise_factor * ladder.floor[:, -1]
         away = exact & (np.sqrt(ladder.gram[:, -1, -1]) > noise)
-    return _Evaluation(
-        believed,
-        of_sides,
-        exact,
-        away,
-        by_three=rests_on_three(believed),
-        is_measured=question.is_met_by(_order_of(believed)),
-        is_confirmed=ladder.exact_known,
-        cut_short=_is_cut_short(ladder, believed),
-    )
-
-
-def _order_of(believed: Posterior) -> Floats:
-    """Return the order of the finest levels of the most probable window."""
-    return finest_order(believed.orders, likely_window(believed)[1])
+    cut_short = _is_cut_short(ladder, believed)
+    return _Evaluation(question, believed, of_sides, exact, away, ladder.exact_known, cut_short)
 
 
 def _is_sure(ladder: Ladder, found: _Evaluation, question: Question) -> Flags:
@@ -306,7 +293,7 @@ def _reasons(found: _Evaluation, missed: Flags) -> Codes:
         (found.exact, "exact"),
         (
             (right > 1.0 - (RISK if found.is_confirmed else risk))
-            & found.is_measured
+            & found.question.is_met_by(found.order)
             & ~found.cut_short,
             "asymptotic",
         ),
@@ -324,7 +311,7 @@ def _numbers(
     """Return what a `Decision` holds beside the status, for ladders of three levels and more."""
     n, believed, exact = len(ladder.h), found.posterior, found.exact
     first, last = likely_window(believed)
-    order = np.where(exact, np.nan, _order_of(believed))
+    order = np.where(exact, np.nan, found.order)
     low, high = interval(believed, order)
     if np.any(missed):
         # where the exact solution is missed, the levels alone have an order
