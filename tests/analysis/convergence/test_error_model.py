@@ -293,7 +293,7 @@ def test_rounding_of_steep_differences_is_no_evidence(kind: str) -> None:
         one, other = (
             likelihood.weights(
                 table,
-                likelihood.read_of(g, np.array([2.0]), apart=apart),
+                likelihood.window_rows(g, np.array([2.0]), split=apart),
                 none,
                 np.array([-np.inf]),
             )[0]

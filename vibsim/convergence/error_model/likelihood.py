@@ -44,7 +44,7 @@ def log_sum(logs: Floats) -> Floats:
     return np.asarray(largest + np.log(np.sum(np.exp(logs - largest[..., None]), axis=-1)))
 
 
-class Read(NamedTuple):
+class WindowRows(NamedTuple):
     """What all tables of a kind read of the rows of a window; the first axis is that of ladders."""
 
     last: Floats  # square of the last row
@@ -58,14 +58,14 @@ class Read(NamedTuple):
     squares: Floats  # of what each row has across the last one, over that of the last one
 
 
-def read_of(gram: Floats, points: Floats, *, apart: bool) -> Read:
-    """Return what tables read of Gram matrices of w rows: all at once, or `apart` what is along and across the last."""
+def window_rows(gram: Floats, points: Floats, *, split: bool) -> WindowRows:
+    """Return what tables read of Gram matrices of w rows: all at once, or `split` what is along and across the last."""
     w, last, number = gram.shape[-1], _last(gram), points.astype(np.int64)
     relative = gram / last[:, None, None]
-    if not apart:
+    if not split:
         whole, all_ = scale_free(last, 0.0, points, w), packed(relative)
         powers, none = np.stack([number * w, 0 * number], axis=-1), np.empty((len(gram), 0))
-        return Read(last, whole, all_, all_, number, powers, none, none)
+        return WindowRows(last, whole, all_, all_, number, powers, none, none)
     # one dimension along the last row, which may have any direction, and the others across it, of a Student's t, of
     # which numbers have nothing
     free, one = (points - 1.0) * (w - 1), np.ones_like(points)
@@ -79,7 +79,7 @@ def read_of(gram: Floats, points: Floats, *, apart: bool) -> Read:
     own = np.diagonal(gram, axis1=1, axis2=2)[:, :-1] / last[:, None]
     squares = np.maximum(own - (gram[:, -1, :-1] / last[:, None]) ** 2, 0.0)
     whole = rest + scale_free(last, 0.0, one, w)
-    return Read(last, whole, packed(relative), packed(read), number, powers, across, squares)
+    return WindowRows(last, whole, packed(relative), packed(read), number, powers, across, squares)
 
 
 def _last(gram: Floats) -> Floats:
@@ -87,7 +87,7 @@ def _last(gram: Floats) -> Floats:
     return np.maximum(gram[:, -1, -1], TINY)
 
 
-def highest(table: Table, read: Read) -> Floats:
+def highest(table: Table, read: WindowRows) -> Floats:
     """Return what the log evidence of all hypotheses of a table on some rows is at most, shape (ladder,)."""
     found = read.whole + np.where(read.points > 1, *table.limit[::-1])
     if table.beside_bounds is not None:
@@ -98,7 +98,7 @@ def highest(table: Table, read: Read) -> Floats:
 
 
 def weights(
-    table: Table, read: Read, behind: Floats, least: Floats
+    table: Table, read: WindowRows, behind: Floats, least: Floats
 ) -> tuple[Floats, Floats, Floats, Floats]:
     """Weigh the hypotheses of a table on the rows of a window.
 

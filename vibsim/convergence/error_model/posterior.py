@@ -20,16 +20,16 @@ from vibsim.convergence.error_model.hypotheses import (
 )
 from vibsim.convergence.error_model.likelihood import (
     TINY,
-    Read,
+    WindowRows,
     any_size,
     highest,
     log_sum,
     noise,
     noise_of_finest,
-    read_of,
     scale_free,
     single_power,
     weights,
+    window_rows,
 )
 from vibsim.core.array_types import Flags, Floats, Integers
 
@@ -224,7 +224,7 @@ class _Fit:
             for table, p in zip(of_window.factors, priors.JITTER_PRIORS, strict=True)
         ]
         tables += [(of_window.factors_with_shape, several), (of_window.one_shape, alike)]
-        read = [read_of(inside, self.points, apart=x) for x in (False, True)]
+        read = [window_rows(inside, self.points, split=x) for x in (False, True)]
         for table, prior in tables:
             self.add_table(index, table, prior, read, behind)
         self.add_any_power(index, sizes, inside, behind, noisy[0], of_window.any_power)
@@ -243,7 +243,7 @@ class _Fit:
         index: int,
         table: Table,
         prior: Floats,
-        of_kinds: list[Read],
+        of_kinds: list[WindowRows],
         behind: Floats,
         *,
         name: str = "window",
@@ -251,7 +251,7 @@ class _Fit:
         """Add the hypotheses of a table on the rows of a window."""
         read = of_kinds[table.beside is not None]
         rows, least = self.matters(prior + highest(table, read))
-        part = read if isinstance(rows, slice) else Read._make(x[rows] for x in read)
+        part = read if isinstance(rows, slice) else WindowRows._make(x[rows] for x in read)
         if not len(part.last):
             return
         log, pairs, path, squared = weights(table, part, behind[rows], (least - prior)[rows])
