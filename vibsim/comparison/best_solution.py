@@ -127,9 +127,11 @@ def record_of(
 ) -> Record:
     """Name what was extrapolated, one row for each scheme."""
     model = experiment.model.definition
-    kept = {name: v for name, v in coords.items() if v.dims in (("scheme",), ("case",), ("t",))}
+    coords_of_best = {
+        name: v for name, v in coords.items() if v.dims in (("scheme",), ("case",), ("t",))
+    }
     names = np.asarray([experiment.schemes[i].name for i in experiment.ladder])
-    kept["scheme"] = Variable(("scheme",), names, coords["scheme"].attrs)
+    coords_of_best["scheme"] = Variable(("scheme",), names, coords["scheme"].attrs)
     variables: dict[str, Variable] = {}
 
     def add(name: str, fields: Iterable[NDArray[Any]], words: str, units: str) -> None:
@@ -160,4 +162,4 @@ def record_of(
         "model": model.kind,
         "levels": list(levels),
     }
-    return in_scales(Record(kept, variables, about), experiment)
+    return in_scales(Record(coords_of_best, variables, about), experiment)

@@ -234,7 +234,7 @@ COLUMNS = {
 def table(block: MemberBlock, compared: Compared) -> Table:
     """Return the limits of all numbers with their bounds, as variables of the convergence Record."""
     found: Table = {}
-    kept: dict[str, list[NDArray[Any]]] = {name: [] for name in COLUMNS}
+    columns_found: dict[str, list[NDArray[Any]]] = {name: [] for name in COLUMNS}
     levels = np.array(block.grid.levels, dtype=np.int16)
     for rows in batches(scalars(block.model, block.lean), math.prod(block.shape)):
         places = [
@@ -264,9 +264,9 @@ def table(block: MemberBlock, compared: Compared) -> Table:
             levels[best.first],
             levels[best.last],
         )
-        for column, values in zip(kept.values(), columns, strict=True):
+        for column, values in zip(columns_found.values(), columns, strict=True):
             column.extend(values)
-    for name, of_rows in kept.items():
+    for name, of_rows in columns_found.items():
         if of_rows:
             more = flags(gci.CLASSES) if name == "convergence" else {}
             dims, values = ("scalar", *MEMBER), np.stack(of_rows)

@@ -124,13 +124,13 @@ def _import_matplotlib() -> None:
 
     module: Any = artist
     names = ((module, "kwdoc"), (module.Artist, "_update_set_signature_and_docstring"))
-    kept = [(place, name, vars(place)[name]) for place, name in names]
+    originals = [(place, name, vars(place)[name]) for place, name in names]
     module.kwdoc = lambda _: ""
     module.Artist._update_set_signature_and_docstring = classmethod(_without_help)
     try:
         import_module("vibsim.report.canvas")
     finally:
-        for place, name, value in kept:
+        for place, name, value in originals:
             setattr(place, name, value)
 
 

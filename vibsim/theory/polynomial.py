@@ -47,23 +47,24 @@ def restoring(model: Model) -> Expression:
     def is_constant(node: Expression) -> bool:
         return states.isdisjoint(names_in(node))
 
-    def kept(node: Expression) -> Expression:
+    def reduced(node: Expression) -> Expression:
         match node:
             case _ if is_constant(node):
                 return ZERO
             case Negate(operand):
-                return Negate(kept(operand))
+                return Negate(reduced(operand))
             case Binary("+" | "-" as sign, left, right):
-                return kept(left) + kept(right) if sign == "+" else kept(left) - kept(right)
+                a, b = reduced(left), reduced(right)
+                return a + b if sign == "+" else a - b
             case Binary("*", left, right) if is_constant(left):
-                return left * kept(right)
+                return left * reduced(right)
             case Binary("*", left, right) if is_constant(right):
-                return kept(left) * right
+                return reduced(left) * right
             case Binary("/", left, right) if is_constant(right):
-                return kept(left) / right
+                return reduced(left) / right
         return node
 
-    return kept(tree(model, model.acceleration))
+    return reduced(tree(model, model.acceleration))
 
 
 def is_rational(node: Expression) -> bool:

@@ -34,7 +34,7 @@ class EnergyError:
     """The energy error of one run as the check found it, over the energy at the start where that is not 0."""
 
     kind: str  # of `vocabulary.DRIFTS`
-    asked: str  # kind of drift that the check asks for
+    expected: str  # kind of drift that the check asks for
     t: Floats
     running: Floats  # the largest error so far, shape (t,)
     means: Floats  # m3, m2, m1
@@ -45,7 +45,7 @@ class EnergyError:
     @property
     def has_border(self) -> bool:
         """Whether the error has to be compared with round-off."""
-        return "none" in (self.kind, self.asked)
+        return "none" in (self.kind, self.expected)
 
     @property
     def is_broken(self) -> bool:
@@ -68,7 +68,7 @@ def picture(
     running = at(record, series, member, level=whole(record, "level").index(int(level)))
     found = EnergyError(
         kind=DRIFTS[int(kind)],
-        asked=check.drift,
+        expected=check.drift,
         t=times(record, member.case),
         # the last velocity may be a one-sided one, which the verdict does not look at
         running=np.append(running[:-1], np.nan) / (first or 1.0),
@@ -125,9 +125,9 @@ def _expected(found: EnergyError, t: Floats) -> Floats:
     _, second, first = found.means
     if found.has_border:
         return np.full(t.shape, np.nan)
-    if found.asked == "bounded":
+    if found.expected == "bounded":
         return np.full(t.shape, second)
-    power = POWERS[found.asked]
+    power = POWERS[found.expected]
     # the mean of t^k over a window
     earlier, later = (
         (b ** (power + 1) - a ** (power + 1)) / ((power + 1) * (b - a)) for a, b in WINDOWS[1:]
@@ -172,9 +172,9 @@ def _dashed_line(found: EnergyError) -> str:
         return ""
     if found.has_border:
         return "Dashed: the largest error that counts as round-off."
-    if found.asked == "bounded":
+    if found.expected == "bounded":
         return "Dashed: m₂, above which a bounded error does not rise."
-    return f"Dashed: a drift in proportion to {_like(found.asked)} through m₂ and m₁."
+    return f"Dashed: a drift in proportion to {_like(found.expected)} through m₂ and m₁."
 
 
 def _like(drift: str) -> str:

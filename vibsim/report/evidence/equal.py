@@ -33,8 +33,8 @@ def picture(
     who = f"{member.title}, level {level:.0f}: its {words.symbol(check.quantity)}"
     if not np.isfinite(distance).any():
         return None
-    seen = frame.usable(distance)
-    if not seen.size:
+    usable = frame.usable(distance)
+    if not usable.size:
         return evidence(f"{who} and that of {second} are identical bit by bit at every time.")
     measure = data.unit(record, f"{check.quantity}_finest")
     title = style.label(f"difference of {words.symbol(check.quantity)}", measure)
@@ -43,7 +43,7 @@ def picture(
     ax.set_gid(style.TIME)
     t = np.linspace(0.0, data.ends_of(record)[member.case], distance.size)
     ax.set_xlim(t[0], t[-1])
-    usual = seen[seen >= np.percentile(seen, DIPS)]
+    usual = usable[usable >= np.percentile(usable, DIPS)]
     frame.scale(ax, usual, np.array([bound, 0.1 * usual.max()]), is_log=True, margin=0.12)
     if 0.0 < bound < math.inf:
         frame.below(ax, bound)

@@ -85,9 +85,9 @@ def _values(
         return at(record, field, member), measure
     if check.at.t is not None or check.at.step is not None:
         return None
-    kept = f"{check.quantity}_{check.value}" if check.quantity else check.value
-    if kept in record and record.variable(kept).dims == OF_LEVEL:
-        return at(record, kept, member), unit(record, kept)
+    variable = f"{check.quantity}_{check.value}" if check.quantity else check.value
+    if variable in record and record.variable(variable).dims == OF_LEVEL:
+        return at(record, variable, member), unit(record, variable)
     norm, errors = check.value.removeprefix("error_"), f"{check.quantity}_error_norm"
     if norm == check.value or errors not in record or norm not in record.words("norm"):
         return None

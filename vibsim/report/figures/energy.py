@@ -101,9 +101,9 @@ def _draw(ax: Axes, t: Floats, values: Floats, **look: Any) -> None:
 
 def _limits(series: list[Floats], most: float) -> tuple[float, float]:
     """Return limits that hold the series that stay below `most`, and of others where they begin to grow."""
-    kept = [values for values in series if 0.0 < largest(values) <= most]
+    usual = [values for values in series if 0.0 < largest(values) <= most]
     grown = [values for values in series if largest(values) > most]
-    shown = kept or [values[values <= most] for values in grown]
+    shown = usual or [values[values <= most] for values in grown]
     values = style.finite(*shown)
     if values.size == 0:
         return (most / frame.UNBOUNDED, most) if grown else (0.1, 1.0)

@@ -216,16 +216,16 @@ def _ranges(
     for ax, lines, value in zip(axes, drawn, sizes, strict=True):
         most = CUT_OFF * abs(value)
         values = style.finite(*map(_heights_of, ax.lines))
-        kept = values[~(np.abs(values) > most)]
-        if kept.size in (0, values.size):
+        usual = values[~(np.abs(values) > most)]
+        if usual.size in (0, values.size):
             ax.set_ylim(*style.limits(values))
             continue
         # most of the curves have to be seen at two places at least
-        seen = [int(np.sum(np.abs(_heights_of(line)) <= most)) > 1 for line in lines]
-        if sum(seen) < MOSTLY * len(seen):
+        is_readable = [int(np.sum(np.abs(_heights_of(line)) <= most)) > 1 for line in lines]
+        if sum(is_readable) < MOSTLY * len(is_readable):
             _grow(ax, lines, abs(value))
         else:
-            ax.set_ylim(*style.limits(kept))
+            ax.set_ylim(*style.limits(usual))
             note(ax, f"cut off beyond {CUT_OFF:g} times the exact one")
         for line in lines:
             x = np.asarray(line.get_xdata(), dtype=np.float64)

@@ -270,10 +270,10 @@ def _number(experiment: Experiment, record: Record, lead: Lead) -> tuple[str, st
     First comes what a check asks for, then period and amplitude, then the error of the finest level.
     """
     position, scheme = choice.position(experiment), lead.member.scheme
-    asked = [check.value for check in choice.asked_values(experiment)]
+    checked = [check.value for check in choice.asked_values(experiment)]
     usual = ["period", "amplitude"]
     usual = usual if experiment.model.definition.conservative else usual[::-1]
-    for name in [*(name for name in asked if name in usual), *usual]:
+    for name in [*(name for name in checked if name in usual), *usual]:
         if name in record:
             values = finest_level.measured(record, name, position).value[scheme]
             if finest_level.varies(values):
@@ -374,7 +374,7 @@ def orders(experiment: Experiment, record: Record, lead: Lead) -> Picture | None
     known = np.isfinite(order)
     if not known.any():
         return None
-    asked = about_members(record, lead.measured if lead.is_on_order else None)
+    is_checked = about_members(record, lead.measured if lead.is_on_order else None)
     letter = words.symbol(quantity)
     allowed = choice.tolerance(experiment, quantity, record.words("scheme")[lead.member.scheme])
     due = np.unique(promised[np.isfinite(promised)])
@@ -384,7 +384,7 @@ def orders(experiment: Experiment, record: Record, lead: Lead) -> Picture | None
         ax = _panel(RIGHT, "members (logarithmic)")
         borders = np.linspace(*style.limits(shown[known], around), 41)
         both, colours = (
-            [shown[known & asked], shown[known & ~asked]],
+            [shown[known & is_checked], shown[known & ~is_checked]],
             [style.COLOURS[0], style.PALE],
         )
         ax.hist(both, borders.tolist(), color=colours, stacked=True, zorder=2)
@@ -401,7 +401,7 @@ def orders(experiment: Experiment, record: Record, lead: Lead) -> Picture | None
         low_end, high_end = (
             np.clip(part, around.min() - 1.0, around.max() + 1.0) for part in (low, high)
         )
-        for of_kind, colour in ((~asked, style.PALE), (asked, style.COLOURS[0])):
+        for of_kind, colour in ((~is_checked, style.PALE), (is_checked, style.COLOURS[0])):
             x = key.values[of_kind]
             ax.vlines(
                 x, low_end[of_kind], high_end[of_kind], color=colour, linewidth=1.6, alpha=0.5
@@ -416,12 +416,14 @@ def orders(experiment: Experiment, record: Record, lead: Lead) -> Picture | None
         & (np.fmin(order, low) <= promised + allowed)
         & (np.fmax(order, high) >= promised - allowed)
     )
-    counts = (inside[asked].sum(), asked.sum(), np.sum(~asked), np.sum(~known))
-    kept, due_of, others, missing = (words.number(int(count), "integer") for count in counts)
-    if not asked.all():
-        title = f"{kept} of {due_of} members asked about are in the band; grey: the {others} others"
+    counts = (inside[is_checked].sum(), is_checked.sum(), np.sum(~is_checked), np.sum(~known))
+    within, due_of, others, missing = (words.number(int(count), "integer") for count in counts)
+    if not is_checked.all():
+        title = (
+            f"{within} of {due_of} members asked about are in the band; grey: the {others} others"
+        )
     elif not inside.all():
-        title = f"{kept} of {due_of} members have an order in the band"
+        title = f"{within} of {due_of} members have an order in the band"
     else:
         measured = np.abs(order - promised) <= allowed
         title = "All members keep their order" if measured.all() else "All intervals reach the band"
@@ -431,7 +433,7 @@ def orders(experiment: Experiment, record: Record, lead: Lead) -> Picture | None
         title,
         f"The band is what the tolerance allows around the promised order{bars}."
         + f" {missing} members have no order and are left out." * (not known.all())
-        + " The check does not ask about the grey members." * (not asked.all()),
+        + " The check does not ask about the grey members." * (not is_checked.all()),
         f"Observed orders of {words.name(quantity)} of all members",
         ax.get_figure(root=True),
     )

@@ -139,16 +139,16 @@ def _highest(values: Floats) -> float:
 
 
 def _reference(
-    ax: Axes, dt: Floats, seen: list[Floats], order: float, due: str, dashes: Any
+    ax: Axes, dt: Floats, errors: list[Floats], order: float, due: str, dashes: Any
 ) -> bool:
     """Draw the promised slope a little above the largest value at the coarsest step, and say whether there is room.
 
     Of several each has dashes of its own, and its number at its end.
     """
-    coarsest = np.array([part[0] for part in seen if np.isfinite(part[0])] or [1.0])
+    coarsest = np.array([part[0] for part in errors if np.isfinite(part[0])] or [1.0])
     start = 2.5 * _highest(coarsest)
     line = start * (dt / dt[0]) ** order
-    reach = line >= _positive(seen).min()
+    reach = line >= _positive(errors).min()
     if reach.sum() < 2 or start <= 0.0:
         return False
     look = style.REFERENCE | ({"linestyle": dashes} if dashes else {})
@@ -162,9 +162,9 @@ def _reference(
     return True
 
 
-def _step_limits(ax: Axes, dt: Floats, seen: list[Floats], floors: list[Floats]) -> bool:
+def _step_limits(ax: Axes, dt: Floats, errors: list[Floats], floors: list[Floats]) -> bool:
     """Set the ranges; show the floor, and say so, only where the data come within three decades of it."""
-    values = _positive(seen)
+    values = _positive(errors)
     low, high = float(values.min()), _highest(values)
     floor = float(_positive(floors).max())
     near = floor > 1e-3 * low
@@ -209,9 +209,9 @@ def _draw_by_level(
         ax.axhline(order, **style.REFERENCE)
     sound: list[Floats] = []
     stated = False
-    seen = [data.sound_triples(record, quantity, member) for member in members]
-    for member, good in zip(members, seen, strict=True):
-        if any(map(any, seen)) and not any(good):
+    are_sound = [data.sound_triples(record, quantity, member) for member in members]
+    for member, good in zip(members, are_sound, strict=True):
+        if any(map(any, are_sound)) and not any(good):
             # beside orders, those of noise would be taken for some
             continue
         look = style.look(member.scheme)
@@ -238,7 +238,7 @@ def _draw_each(
     ax: Axes, experiment: Experiment, record: Record, quantity: str, members: list[Member]
 ) -> bool:
     """Draw the stated order of every scheme in a row of its own; return whether an order is stated."""
-    norm, seen, settled = data.norm_index(record), list[float](), False
+    norm, orders, settled = data.norm_index(record), list[float](), False
     members = [m for m in members if not np.isnan(data.formal_order(record, m, quantity))]
     for row, member in enumerate(members):
         look, promised = style.look(member.scheme), data.formal_order(record, member, quantity)
@@ -250,9 +250,9 @@ def _draw_each(
         ax.plot([low, high], [row, row], color=look["color"], linewidth=3.0, alpha=0.35)
         ax.plot([value], [row], **look | {"markerfacecolor": face, "markersize": 5})
         ax.plot([promised], [row], color="black", marker="|", markersize=9, markeredgewidth=1.2)
-        seen += [x for x in (promised, value if is_stated else promised) if np.isfinite(x)]
-    if seen:
-        ax.set_xlim(min(seen) - 0.6, max(seen) + 0.6)
+        orders += [x for x in (promised, value if is_stated else promised) if np.isfinite(x)]
+    if orders:
+        ax.set_xlim(min(orders) - 0.6, max(orders) + 0.6)
     names = [style.entry(member.scheme_name) for member in members]
     ax.set_yticks(range(len(members)), names, fontsize=7.5)
     ax.set_ylim(len(members) - 0.4, -0.6)

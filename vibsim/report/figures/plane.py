@@ -142,8 +142,10 @@ def path(experiment: Experiment, record: Record, shown: list[Member]) -> Picture
     if not data.swept(record):
         # levels that look like the finest one are left out
         last = len(curves) - 1
-        kept = [i for i, paths in enumerate(curves) if i == last or _differ(paths, curves[last])]
-        panels, curves = [panels[i] for i in kept], [curves[i] for i in kept]
+        distinct = [
+            i for i, paths in enumerate(curves) if i == last or _differ(paths, curves[last])
+        ]
+        panels, curves = [panels[i] for i in distinct], [curves[i] for i in distinct]
     references = [_points(record, names, members[0], None) for _, members, _ in panels]
     is_known = [bool(np.isfinite(reference).all()) for reference in references]
     each = zip(references, is_known, curves, strict=True)
@@ -191,20 +193,20 @@ def _points(record: Record, names: tuple[str, ...], member: Member, level: int |
 
 def _differ(panel: list[Points], finest: list[Points]) -> bool:
     """Say whether one of the paths of a level looks different from that of the finest level."""
-    apart = [data.largest(np.subtract(a, b)) for a, b in zip(panel, finest, strict=True)]
-    return max(apart) > SEEN * max(data.largest(np.asarray(points)) for points in finest)
+    distances = [data.largest(np.subtract(a, b)) for a, b in zip(panel, finest, strict=True)]
+    return max(distances) > SEEN * max(data.largest(np.asarray(points)) for points in finest)
 
 
-def _frame(seen: list[Points]) -> tuple[tuple[float, float], tuple[float, float]] | None:
+def _frame(paths: list[Points]) -> tuple[tuple[float, float], tuple[float, float]] | None:
     """Return the limits of both axes: around the first path, with room for the others as far as they stay near it."""
-    first = [style.finite(values) for values in seen[0]]
+    first = [style.finite(values) for values in paths[0]]
     if not all(values.size for values in first):
         return None
     middle = [0.5 * float(np.min(values) + np.max(values)) for values in first]
     half = [0.5 * float(np.ptp(values)) for values in first]
     limits = []
     for axis in (0, 1):
-        reach = max(data.largest(points[axis] - middle[axis]) for points in seen)
+        reach = max(data.largest(points[axis] - middle[axis]) for points in paths)
         room = max(min(reach, CUT_PATH * half[axis]), FLATTEST * max(half))
         limits.append((middle[axis] - 1.08 * room, middle[axis] + 1.08 * room))
     return (limits[0], limits[1]) if max(half) > 0.0 else None

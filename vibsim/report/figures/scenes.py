@@ -185,11 +185,11 @@ def vehicle(motion: Motion) -> Scene:
     across = min(up, 0.5 * WIDTH / max(AROUND, 0.02 * float(place[-1])))
     # it is level before the start and behind the end
     ends = across * place[0] - WIDTH, across * place[-1] + WIDTH
-    seen = np.concatenate([ends[:1], across * place, ends[1:]])
+    points = np.concatenate([ends[:1], across * place, ends[1:]])
     heights = np.pad(178.0 - up * road, 1, mode="edge")
     wheel = 178.0 - up * road - 13.0
     parts = (
-        Part("track", "ground", (across * place - 160.0,), _outline(seen, heights)),
+        Part("track", "ground", (across * place - 160.0,), _outline(points, heights)),
         Part("spring", "wire", (160.0, wheel, 160.0, 96.0 - up * body)),
         Part("circle", "wheel", (160.0, wheel, 13.0)),
         Part("box", "body", (160.0, 84.0 - up * body, 84.0, 24.0)),
@@ -304,10 +304,10 @@ SCENES: Mapping[str, Callable[[Motion], Scene] | None] = {
 def _outline(x: Floats, y: Floats) -> str:
     """Return a line through points as the data of a path."""
     points = zip(np.round(x).astype(int).tolist(), np.round(y, 1).tolist(), strict=True)
-    kept: dict[int, float] = {}
+    heights_at: dict[int, float] = {}
     for across, height in points:
-        kept.setdefault(across, height)
-    return "M" + "L".join(f"{across} {height:g}" for across, height in kept.items())
+        heights_at.setdefault(across, height)
+    return "M" + "L".join(f"{across} {height:g}" for across, height in heights_at.items())
 
 
 def values_of(part: Part, k: int) -> list[float]:

@@ -40,12 +40,12 @@ def spectrum(experiment: Experiment, record: Record, member: Member) -> Picture 
     chosen = range(max(len(levels) - MOST_LEVELS, 0), len(levels))
     for k, level in enumerate(chosen):
         found = observed.lines(of_level(record, name, member, level))
-        w_of, seen = w[: found.size], found[: w.size]
+        w_of, values = w[: found.size], found[: w.size]
         colour, text = style.look(k)["color"], f"level {levels[level]}"
-        ax.plot(w_of, seen, color=colour, linewidth=1.0, label=text)
+        ax.plot(w_of, values, color=colour, linewidth=1.0, label=text)
         top = data.largest(found)
         highest = max(highest, top)
-        last = max(last, float(w_of[seen > 1e-3 * top].max(initial=0.0)))
+        last = max(last, float(w_of[values > 1e-3 * top].max(initial=0.0)))
         predicted = _predicted(experiment, record, member, level)
         if math.isfinite(predicted):
             look: Any = {"color": colour, "linestyle": ":", "linewidth": 1.2}

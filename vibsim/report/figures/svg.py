@@ -152,8 +152,8 @@ class Writer(RendererBase):  # type: ignore[misc, unused-ignore]
         if ax.axison and (ax.patch.get_hatch() or to_hex(ax.get_facecolor()) != "#ffffff"):
             ax.patch.draw(self)
         lines = ax.spines.values() if ax.axison else ()
-        apart = {ax.patch, ax.xaxis, ax.yaxis, *ax.spines.values()}
-        artists = [a for a in ax.get_children() if a not in apart]
+        excluded = {ax.patch, ax.xaxis, ax.yaxis, *ax.spines.values()}
+        artists = [a for a in ax.get_children() if a not in excluded]
         artists += [ax.xaxis, ax.yaxis, *lines] if ax.axison else []
         for artist in _in_order(artists):
             if artist is ax.xaxis or artist is ax.yaxis:
@@ -194,7 +194,7 @@ class Writer(RendererBase):  # type: ignore[misc, unused-ignore]
         places = np.asarray(axis.get_majorticklocs(), dtype=np.float64)
         texts = axis.get_major_formatter().format_ticks(places)
         at = self._places(ax, places, i)
-        seen = [k for k in range(places.size) if low - 0.01 <= at[k] <= high + 0.01]
+        visible = [k for k in range(places.size) if low - 0.01 <= at[k] <= high + 0.01]
         self._body.append(f'<g data-ticks="{which}">' if ax.get_gid() else "<g>")
         # where a tick begins and ends across the axis, downwards
         edges = {
@@ -205,11 +205,11 @@ class Writer(RendererBase):  # type: ignore[misc, unused-ignore]
             look = f'stroke="{to_hex(RC["grid.color"])}" stroke-width="{RC["grid.linewidth"]}"'
             start = edges[near][0]
             ends = (start, box.height * -1.0) if i == 0 else (start, box.width)
-            self._strokes([at[k] for k in seen], ends, i, look)
+            self._strokes([at[k] for k in visible], ends, i, look)
         look = f'stroke="{colour}" stroke-width="0.8"'
         for side in (near, far):
             if known.get(side, side == near):
-                self._strokes([at[k] for k in seen], edges[side], i, look)
+                self._strokes([at[k] for k in visible], edges[side], i, look)
             if side == near and not isinstance(axis.get_minor_locator(), NullLocator):
                 found = self._places(ax, np.asarray(axis.get_minorticklocs(), float), i)
                 start, long = edges[near]
@@ -220,7 +220,7 @@ class Writer(RendererBase):  # type: ignore[misc, unused-ignore]
                 continue
             start, long = edges[side]
             off = start + long + np.sign(long) * pad
-            for k in seen:
+            for k in visible:
                 widest = max(widest, self.width(texts[k], size))
                 if i == 0:
                     down = off + ASCENT * size if side == near else off - DESCENT * size

@@ -151,13 +151,13 @@ def _few(sound: list[bool]) -> list[int]:
 
     Where none is sound, round-off is what there is to see, and all count.
     """
-    kept = [i for i, good in enumerate(sound) if good] or list(range(len(sound)))
-    lost = [i for i, good in enumerate(sound) if not good and i > max(kept, default=-1)][:1]
+    shown = [i for i, good in enumerate(sound) if good] or list(range(len(sound)))
+    lost = [i for i, good in enumerate(sound) if not good and i > max(shown, default=-1)][:1]
     room = MOST_CURVES - len(lost)
-    if len(kept) > room:
-        between = np.linspace(0, len(kept) - 2, room - 1).round().astype(int)
-        kept = [*(kept[i] for i in between), kept[-1]]
-    return [*kept, *lost]
+    if len(shown) > room:
+        between = np.linspace(0, len(shown) - 2, room - 1).round().astype(int)
+        shown = [*(shown[i] for i in between), shown[-1]]
+    return [*shown, *lost]
 
 
 def _draw_ratios(

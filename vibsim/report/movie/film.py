@@ -94,9 +94,9 @@ def differs_visibly(other: Run, first: Run) -> float:
     if not (np.isfinite(first.series).all() and np.isfinite(other.series).all()):
         return 0.0
     size = data.largest(first.series)
-    apart = data.largest(other.series - np.interp(other.t, first.t, first.series))
+    distance = data.largest(other.series - np.interp(other.t, first.t, first.series))
     is_held = data.largest(other.series) < moments.UNBOUNDED * size
-    return apart / size if is_held and moments.VISIBLE * size < apart else 0.0
+    return distance / size if is_held and moments.VISIBLE * size < distance else 0.0
 
 
 def film(

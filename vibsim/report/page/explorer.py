@@ -82,16 +82,16 @@ def listed(keys: Sequence[Key], count: int, most: int, marked: Iterable[int]) ->
     """
     if count <= most:
         return np.arange(count)
-    room, kept = most, np.ones(count, dtype=bool)
+    room, is_shown = most, np.ones(count, dtype=bool)
     for i, key in enumerate(sorted(keys, key=lambda key: key.distinct.size)):
         # keys of few values leave room for the others
         part = max(int(room ** (1.0 / (len(keys) - i))), 1)
         chosen = key.distinct[style.spaced(key.distinct.size, part)]
-        kept &= np.isin(key.values, chosen)
+        is_shown &= np.isin(key.values, chosen)
         room //= min(part, key.distinct.size)
-    if not most / 4 <= kept.sum() <= most:
-        kept = np.isin(np.arange(count), style.spaced(count, most))
-    return np.union1d(np.flatnonzero(kept), np.fromiter(marked, dtype=np.intp))
+    if not most / 4 <= is_shown.sum() <= most:
+        is_shown = np.isin(np.arange(count), style.spaced(count, most))
+    return np.union1d(np.flatnonzero(is_shown), np.fromiter(marked, dtype=np.intp))
 
 
 def _view(view: View, cases: NDArray[np.intp]) -> dict[str, Any]:

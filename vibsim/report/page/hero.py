@@ -218,11 +218,11 @@ def _error(experiment: Experiment, record: Record, lead: Lead) -> Iterator[Numbe
 def _best(experiment: Experiment, record: Record, lead: Lead) -> Iterator[Number]:
     """Yield the best value of the first number that is asked for, or of the end or the period."""
     position, model = choice.position(experiment), experiment.model.definition
-    asked = choice.asked_values(experiment)
+    checked = choice.asked_values(experiment)
     wanted = [
-        f"{check.quantity}_{check.value}" if check.quantity else check.value for check in asked
+        f"{check.quantity}_{check.value}" if check.quantity else check.value for check in checked
     ]
-    known = numbers_of(model, "scalar" not in record, [check.value for check in asked])
+    known = numbers_of(model, "scalar" not in record, [check.value for check in checked])
     rows = {row.variable: row for _, row in known}
     for name in [*wanted, f"{position}_end", "period", "amplitude"]:
         field = f"{name}_richardson"

@@ -99,8 +99,8 @@ class Row:
     def search(self) -> str:
         """What a search looks through, in small letters."""
         found = (result.get("scheme") for check in self.checks for result in check["results"])
-        asked = (check["quantity"] for check in self.checks)
-        known = dict.fromkeys(str(word) for word in (*found, *asked) if word)
+        checked = (check["quantity"] for check in self.checks)
+        known = dict.fromkeys(str(word) for word in (*found, *checked) if word)
         return " ".join((self.title, self.key, self.stands, *known)).lower()
 
 

@@ -100,12 +100,12 @@ def _write_tables(
     directory: Path, texts: Mapping[str, Mapping[str, str]], experiment: Experiment, record: Record
 ) -> None:
     """Write the files of tables; that of the members of a sweep has all of them, however many."""
-    files, kept = page_tables.files_of(texts), list[str]()
+    files, streamed = page_tables.files_of(texts), list[str]()
     if data.swept(record):
-        kept = ["members.csv"]
-        members.write_csv(directory / kept[0], record, choice.position(experiment))
-        files.pop(kept[0], None)
-    replace_files(directory, files, kept)
+        streamed = ["members.csv"]
+        members.write_csv(directory / streamed[0], record, choice.position(experiment))
+        files.pop(streamed[0], None)
+    replace_files(directory, files, streamed)
 
 
 def _checks(

@@ -80,9 +80,9 @@ def _of_numbers(
     shown = choice.with_levels(experiment, choice.members(record, choice.first(experiment, record)))
     norms = [name for name in record.words("norm") if name != TYPICAL_NORM]
     orders = [levels.orders(record, quantity, shown) for quantity in found]
-    asked = [check.value for check in choice.asked_values(experiment)]
+    checked = [check.value for check in choice.asked_values(experiment)]
     wanted = [
-        *orders[:1], best.table(model, record, shown, asked), theory.schemes(experiment, record), *orders[1:],
+        *orders[:1], best.table(model, record, shown, checked), theory.schemes(experiment, record), *orders[1:],
         degrees.table(experiment), levels.scalars(record, shown), levels.events(record), *theory.predictions(record),
         # what damping or a force changes says nothing of a scheme
         *((levels.velocities(record), levels.maxima(record, shown)) if model.conservative else ()),

@@ -118,10 +118,10 @@ def _chosen(
     others = []
     for one in data.of_case(record, member.case):
         found = series(one, 0)
-        apart = max(float(np.max(np.abs(found[name] - first[name]))) for name in positions)
+        distance = max(float(np.max(np.abs(found[name] - first[name]))) for name in positions)
         largest = max(float(np.max(np.abs(found[name]))) for name in positions)
-        if VISIBLE * size < apart and largest < UNBOUNDED * size:
-            others.append((apart, one, found))
+        if VISIBLE * size < distance and largest < UNBOUNDED * size:
+            others.append((distance, one, found))
     if not others:
         return [(member, finest, first)]
     _, one, found = max(others, key=lambda other: other[0])

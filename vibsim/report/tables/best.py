@@ -35,7 +35,7 @@ PER_NUMBER = ("finest level", "GCI", "GCI relative", "order", "levels", "converg
 
 
 def table(
-    model: Model, record: Record, shown: Sequence[Member], asked: Collection[str] = ()
+    model: Model, record: Record, shown: Sequence[Member], checked: Collection[str] = ()
 ) -> Table | None:
     """Return the limit of every number of the members; None where there is none, or one level only.
 
@@ -49,7 +49,7 @@ def table(
         Column("best value", form="full"), Column("bound", form="small"), Column("true error", form="small"),
         Column("order", form="order"), Column("levels"), Column("convergence"),
     )  # fmt: skip
-    rows = tuple(_rows(model, record, shown, asked))
+    rows = tuple(_rows(model, record, shown, checked))
     if not rows:
         return None
     text = (
@@ -65,21 +65,21 @@ def table(
     return Table("best_values", text, columns, rows, 1).without_empty(missing)
 
 
-def numbers(model: Model, is_lean: bool, asked: Collection[str]) -> list[tuple[int, Scalar]]:
+def numbers(model: Model, is_lean: bool, checked: Collection[str]) -> list[tuple[int, Scalar]]:
     """Return the numbers that mean something of a motion, each with its position in the record."""
     is_periodic = model.is_alone and is_autonomous(model)
     return [
         (k, row)
         for k, row in enumerate(scalars(model, is_lean))
-        if is_periodic or row.value in asked or row.value not in OF_A_PERIODIC_MOTION
+        if is_periodic or row.value in checked or row.value not in OF_A_PERIODIC_MOTION
     ]
 
 
 def _rows(
-    model: Model, record: Record, shown: Sequence[Member], asked: Collection[str]
+    model: Model, record: Record, shown: Sequence[Member], checked: Collection[str]
 ) -> Iterator[tuple[Cell, ...]]:
     has_series = "scalar" in record
-    for k, row in numbers(model, not has_series, asked):
+    for k, row in numbers(model, not has_series, checked):
         name, nothing = row.variable, (None, None, None)
         is_named = row.quantity in words.NAMES or (row.quantity and model.coordinates > 1)
         text = f"{words.symbol(row.quantity)} {WORDS[row.value]}" if is_named else row.words

@@ -132,8 +132,8 @@ def _character(character: str) -> str:
     # what is not seen: controls, joiners, a combining mark by itself
     if unicodedata.category(character) in {"Cc", "Cf", "Cs", "Mn", "Me"}:
         return ""
-    apart = unicodedata.normalize("NFD", character)
-    base, marks = apart[0], apart[1:]
+    decomposed = unicodedata.normalize("NFD", character)
+    base, marks = decomposed[0], decomposed[1:]
     if marks and base.isascii() and base.isalpha():
         accent = next((_ACCENTS[mark] for mark in marks if mark in _ACCENTS), "")
         return f"\\{accent}{{{base}}}" if accent else base

@@ -60,14 +60,14 @@ class Table:
 
     def without_empty(self, headers: Collection[str] | None = None) -> Table:
         """Return the table without those columns of some headers, or of all but the heads, that hold nothing."""
-        kept = [
+        chosen = [
             i
             for i, column in enumerate(self.columns)
             if not (column.header in headers if headers is not None else i >= self.heads)
             or any(not is_nothing(row[i]) for row in self.rows)
         ]
-        rows = tuple(tuple(row[i] for i in kept) for row in self.rows)
-        return replace(self, columns=tuple(self.columns[i] for i in kept), rows=rows)
+        rows = tuple(tuple(row[i] for i in chosen) for row in self.rows)
+        return replace(self, columns=tuple(self.columns[i] for i in chosen), rows=rows)
 
     def text_rows(self) -> Iterator[list[str]]:
         """Yield every row as it is read."""

@@ -102,11 +102,11 @@ def title(experiment: Experiment, record: Record, lead: Lead, printed: Collectio
         return f"{finding}{against}{_of_some(record, entry)}"
     if entry["id"] in printed:
         return f"All {len(printed)} printed numbers are as expected"
-    asked = [check.value for check in experiment.checks if check.kind == "value"]
-    if len(asked) > 1 and lead.asserted is not None and lead.asserted.kind == "value":
-        finding = f"All {len(asked)} numbers are as expected"
-        if len(set(asked)) == 1:
-            finding = f"{_opened(f'the {words.PAGE.value(asked[0])}')} is as expected in all {len(asked)} checks"
+    checked = [check.value for check in experiment.checks if check.kind == "value"]
+    if len(checked) > 1 and lead.asserted is not None and lead.asserted.kind == "value":
+        finding = f"All {len(checked)} numbers are as expected"
+        if len(set(checked)) == 1:
+            finding = f"{_opened(f'the {words.PAGE.value(checked[0])}')} is as expected in all {len(checked)} checks"
     return f"{finding}{_caught(experiment, lead)}"
 
 
@@ -200,8 +200,8 @@ def _phrases(experiment: Experiment, record: Record, lead: Lead) -> dict[str, st
             found = ["is stable", "makes the amplitude grow"]
             if len(named) > 1:
                 found = ["are stable", "make the amplitude grow"]
-            asked, other = found if measured.stable else found[::-1]
-            filled |= {"stability": asked, "not_stability": f"{other}, against what is asked"}
+            expected, other = found if measured.stable else found[::-1]
+            filled |= {"stability": expected, "not_stability": f"{other}, against what is asked"}
     if _has_own_orders(record, lead):
         filled["at"] = "at the order that its scheme promises"
         if (each := len(named)) > 1:
@@ -267,9 +267,9 @@ def _everywhere(record: Record, lead: Lead) -> str:
         which = "both" if total == 2 else f"all {words.number(total, 'integer')}"
         noun = "members" if total <= members else "runs"
         values = assertions.swept_values(lead.measured) if lead.measured else []
-        asked = f" with {words.swept(', '.join(values))}" if values else " that are asked about"
-        asked = asked if total < members else ""
-        return f" in {which} {noun}{asked}{by}"
+        about = f" with {words.swept(', '.join(values))}" if values else " that are asked about"
+        about = about if total < members else ""
+        return f" in {which} {noun}{about}{by}"
     if total == len(schemes) == 2:
         return " by both schemes"
     return f" by {'all' if total == len(schemes) else f'{total} of'} {len(schemes)} schemes"
@@ -318,8 +318,8 @@ def paragraph(experiment: Experiment, record: Record, lead: Lead, levels: int) -
     found, is_passed = factor(lead), lead.entry["status"] == "PASS"
     if found is not None and is_passed and lead.result["reason"] == "asymptotic":
         part = _estimate_over_true(record, lead)
-        apart = data.coincidence(record, lead.quantity, lead.member)
-        is_rough = apart > COINCIDE or (part is not None and part > COINCIDE)
+        distance = data.coincidence(record, lead.quantity, lead.member)
+        is_rough = distance > COINCIDE or (part is not None and part > COINCIDE)
         percent = "" if part is None else words.number(max(100.0 * part, 0.1), "brief")
         return CONVERGES.format(
             factor=f"{found:.2g}",

@@ -38,12 +38,12 @@ def explained(text: str) -> Any:
     """Return a text as markup in which each term of the glossary carries its meaning, where it stands first."""
     from markupsafe import Markup, escape
 
-    seen, pieces, end = set[str](), [], 0
+    explained, pieces, end = set[str](), [], 0
     for found in _TERMS.finditer(text):
         word = found[1].lower()
-        if word in seen:
+        if word in explained:
             continue
-        seen.add(word)
+        explained.add(word)
         pieces += [escape(text[end : found.start()]), term(found[1], GLOSSARY[word])]
         end = found.end()
     return Markup("").join([*pieces, escape(text[end:])])

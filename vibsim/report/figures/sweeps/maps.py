@@ -323,13 +323,13 @@ def _mark(ax: Axes, ridge: tuple[Floats, Floats]) -> None:
         return
     ends = ax.get_xlim(), ax.get_ylim()
     places = ax.transAxes.inverted().transform(ax.transData.transform(np.column_stack(ridge)))
-    kept: list[int] = []
+    chosen: list[int] = []
     for i in np.lexsort((places[:, 1], places[:, 0])).tolist():
-        if not kept or np.hypot(*(places[kept] - places[i]).T).min() >= DOT_SPACING:
-            kept.append(i)
+        if not chosen or np.hypot(*(places[chosen] - places[i]).T).min() >= DOT_SPACING:
+            chosen.append(i)
     dot: Any = {"linestyle": "none", "marker": "o", "markeredgewidth": 0.0}
     for size, colour in ((3.0, "white"), (1.6, "black")):
-        ax.plot(ridge[0][kept], ridge[1][kept], markersize=size, color=colour, **dot)
+        ax.plot(ridge[0][chosen], ridge[1][chosen], markersize=size, color=colour, **dot)
     ax.set(xlim=ends[0], ylim=ends[1])
 
 
