@@ -22,10 +22,12 @@ from typing import Any
 
 from battery import POLYNOMIALS, SOLUTIONS
 from faults import FAULTS, Fault
+from picture import matrix
 
 HERE = Path(__file__).parent
 ROOT = HERE.parents[1]
 PAGE = ROOT / "docs" / "mutation.md"
+PICTURE = ROOT / "docs" / "images" / "exercises-faults.svg"
 NUMERICAL = ("scheme", "damping", "start", "end")
 """Places of faults in the numerical method, as against the models, the analysis and the rest."""
 SECONDS = 300
@@ -131,6 +133,14 @@ def lost(before: Report, after: Report) -> tuple[str, ...]:
     )
 
 
+def _picture(outcomes: list[Outcome]) -> str:
+    """Draw which tests catch which faults in the numerical method."""
+    numerical = [o for o in outcomes if o.fault.place in NUMERICAL]
+    caught = {f"{name} solution": [name in o.solutions for o in numerical] for name in SOLUTIONS}
+    caught["other checks"] = [bool(o.caught) for o in numerical]
+    return matrix([f"{o.fault.name} ({o.fault.place})" for o in numerical], caught)
+
+
 def _row(o: Outcome) -> str:
     told = "; ".join(o.caught[:3]) or "**nothing**"
     plain = "sees it" if o.plain else "misses it"
@@ -192,7 +202,7 @@ def _counts(name: str, outcomes: list[Outcome], caught: Callable[[Outcome], bool
 
 
 def main() -> int:
-    """Run all faults, or those whose names have a word, and write the page."""
+    """Run all faults, or those whose names have a word, and write the page and the picture."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument(
         "word", nargs="?", default="", help="only faults whose name has it; writes no page"
@@ -220,7 +230,8 @@ def main() -> int:
             print(f"{found.fault.name:50} {told:60} plain: {found.plain}", flush=True)
     if not given.word:
         PAGE.write_text(page(outcomes))
-        print(f"written: {PAGE.relative_to(ROOT)}")
+        PICTURE.write_text(_picture(outcomes))
+        print(f"written: {PAGE.relative_to(ROOT)} and {PICTURE.relative_to(ROOT)}")
     return 0
 
 
