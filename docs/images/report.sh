@@ -5,5 +5,5 @@ browser=$(command -v chromium || command -v chromium-browser || command -v googl
 results=$(mktemp -d)
 trap 'rm -rf "$results"' EXIT
 .venv/bin/vibsim run theta_convergence -q --results "$results"
-"$browser" --headless=new --no-sandbox --disable-gpu --hide-scrollbars --window-size=1400,750 --screenshot=docs/images/report.png \
+"$browser" --headless=new --no-sandbox --disable-gpu --hide-scrollbars --window-size=1400,636 --screenshot=docs/images/report.png \
     "file://$results/pendulum_lab/theta_convergence/report.html" 2>/dev/null
