@@ -57,6 +57,7 @@ def test_the_claimed_end_is_that_of_another_solver() -> None:
     assert abs(claim.measured.equals - end) < 1e-9 * abs(end)
 
 
+@pytest.mark.slow
 def test_steps_from_point_to_point_keep_their_order_at_every_speed(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

@@ -15,6 +15,7 @@ import netCDF4
 import numpy as np
 import pytest
 import yaml
+from thinned import thinned
 
 from vibsim import Experiment, analyse, simulate, theory, verdicts
 from vibsim.cli import main
@@ -115,6 +116,7 @@ def test_the_example_runs_and_an_edit_of_its_code_makes_results_again(
     assert "cart.yaml:7: schemes[0]: ralston: unknown scheme" in refused.stderr
 
 
+@pytest.mark.slow
 def test_commands_list_what_is_installed(
     installed: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -155,7 +157,9 @@ def test_keys_bounds_and_units_are_those_of_the_package(installed: Path) -> None
     assert "kg" in found["model.L"]
 
 
-@pytest.mark.parametrize("quantity", ["theta", "omega", "x", "kinetic_energy", "potential_energy"])
+@pytest.mark.parametrize(
+    "quantity", thinned(["theta", "omega", "x", "kinetic_energy", "potential_energy"], 2)
+)
 def test_every_quantity_converges_as_the_package_promises(installed: Path, quantity: str) -> None:
     experiment = example(checks=[{"converges": quantity, "order": "scheme"}], schemes=["ralston"])
     levels = [simulate(experiment, level) for level in experiment.levels]
@@ -163,6 +167,7 @@ def test_every_quantity_converges_as_the_package_promises(installed: Path, quant
     assert (verdict.status, verdict.reason) == ("PASS", "asymptotic"), verdict.text
 
 
+@pytest.mark.slow
 def test_the_energy_of_the_model_belongs_to_its_acceleration(installed: Path) -> None:
     experiment = example(levels=[12], schemes=["gauss4"], checks=[{"converges": "theta"}])
     data = simulate(experiment, 12)

@@ -46,6 +46,7 @@ def judged(*checks: dict[str, Any], **data: Any) -> list[Verdict]:
     return verdicts(*analysed(*checks, **data))
 
 
+@pytest.mark.slow
 def test_the_period_of_the_pendulum_is_within_its_bound() -> None:
     """Against the complete elliptic integral, for every scheme and amplitude."""
     schemes = ["central", "rk4", "euler_cromer", "velocity_verlet", "heun"]
@@ -289,6 +290,7 @@ def test_a_scheme_that_chooses_its_own_steps_has_no_limits() -> None:
     assert np.isfinite(record["period_richardson"][0]).all()
 
 
+@pytest.mark.slow
 def test_a_large_sweep_keeps_period_and_amplitude_only() -> None:
     sweep = {"initial.theta": {"linspace": [0.1, 2.0, 5]}}
     experiment, record = analysed(**(PENDULUM | {"sweep": sweep}))
@@ -306,6 +308,7 @@ def test_a_large_sweep_keeps_period_and_amplitude_only() -> None:
     assert "scalar" not in thin.coords
 
 
+@pytest.mark.slow
 def test_members_are_the_same_in_parts() -> None:
     data = PENDULUM | {"sweep": {"initial.theta": [0.3, 1.0, 3.0, 2.0]}}
     experiment, whole = analysed(**data)

@@ -283,6 +283,7 @@ def test_costs_are_those_of_the_plan() -> None:
     assert f"{seconds:.2g} s" in large or " min" in large
 
 
+@pytest.mark.slow
 def test_what_is_foreseen_of_a_member_depends_on_no_other() -> None:
     sweep = {"sweep": {"initial.theta": [0.5, 3.0, 2.0]}}
     _, whole = judged(**sweep, levels=[4, 5, 6, 7])

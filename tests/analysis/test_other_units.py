@@ -172,7 +172,7 @@ def found(make: Make, scale: tuple[float, float, float]) -> dict[tuple[str, str]
 MODELS = [spring, pendulum, oscillator, pulse, ball, box, circuit]
 
 
-@pytest.mark.parametrize("number", thinned(range(len(MODELS)), 3))
+@pytest.mark.parametrize("number", thinned(range(len(MODELS)), 9))
 def test_other_units_change_no_verdict(number: int) -> None:
     """Each model with one scale by powers of two and one by powers of ten, smaller ones and larger ones in turn."""
     make = MODELS[number]

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 from spring_runs import Run, judged
+from thinned import thinned
 
 from vibsim.analysis.blockwise import analyse_parts, join_parts
 from vibsim.core.record import Record, Variable
@@ -101,7 +102,7 @@ TABLE = [
 ]
 
 
-@pytest.mark.parametrize(("model", "start", "phase", "amplitude"), TABLE)
+@pytest.mark.parametrize(("model", "start", "phase", "amplitude"), thinned(TABLE, 2))
 def test_promises_of_some_schemes_are_kept(
     model: str, start: tuple[float, float], phase: list[float], amplitude: list[float]
 ) -> None:
@@ -176,7 +177,7 @@ def test_a_constant_force_moves_the_place_of_rest_only() -> None:
     assert [verdict.reason for verdict in run.verdicts] == ["asymptotic", "exact"]
 
 
-@pytest.mark.parametrize("per_period", [10, 20, 40])
+@pytest.mark.parametrize("per_period", thinned([10, 20, 40], 3))
 def test_what_is_exact_is_seen_where_the_true_motion_has_few_samples(per_period: int) -> None:
     # a quintic between 10 samples of a period is off by 1e-6: that is laid to the measurement, not to the scheme
     time = {"periods": 10, "steps_per_period": per_period}

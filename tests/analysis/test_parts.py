@@ -42,7 +42,9 @@ def made(name: str, storage: str) -> tuple[dict[int, Record], Record]:
 
 @pytest.mark.parametrize(
     ("name", "storage"),
-    [("grid", "lean"), ("ends", "series"), ("options", "lean"), ("tolerance", "series")],
+    thinned(
+        [("grid", "lean"), ("ends", "series"), ("options", "lean"), ("tolerance", "series")], 2
+    ),
     indirect=["storage"],
 )
 def test_parts_and_processes_change_no_bit(name: str, storage: str) -> None:
@@ -62,6 +64,7 @@ def analyse_or_die(experiment: Experiment, records: dict[int, Record]) -> Record
     return analyse_records(experiment, records)
 
 
+@pytest.mark.slow
 def test_a_process_that_is_killed_ends_the_analysis(monkeypatch: pytest.MonkeyPatch) -> None:
     experiment = SWEEPS["grid"]
     monkeypatch.setattr(blockwise, "analyse_records", analyse_or_die)
@@ -146,6 +149,7 @@ def values_of(experiment: Experiment, record: Record) -> NDArray[np.float64]:
     return np.array([record[name] for name in names])
 
 
+@pytest.mark.slow
 def test_every_value_can_be_asked_for_where_storage_is_bounded(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
@@ -219,6 +223,7 @@ def test_options_that_are_swept_give_each_member_the_promises_of_its_own_scheme(
         assert set(shares) == {"kick", "extrapolate", "backward"}
 
 
+@pytest.mark.slow
 def test_swept_words_are_as_wide_in_every_part() -> None:
     experiment = SWEEPS["options"]
     records, _ = made("options", "series")
@@ -261,6 +266,7 @@ def test_a_grid_unstacks_with_one_call(storage: str) -> None:
         assert {"initial_theta", "initial_omega"} < set(grid.theta_ratio.dims)
 
 
+@pytest.mark.slow
 def test_without_an_exact_solution_only_errors_are_unknown(
     storage: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:

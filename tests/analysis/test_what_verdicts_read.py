@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import pytest
+from thinned import thinned
 
 from vibsim import Experiment
 from vibsim.analysis import analyse_records, keep_for_verdicts, summarise, verdicts
@@ -66,7 +67,7 @@ EXPERIMENTS: dict[str, dict[str, Any]] = {
 }
 
 
-@pytest.mark.parametrize("name", EXPERIMENTS)
+@pytest.mark.parametrize("name", thinned(EXPERIMENTS, 3))
 def test_what_is_kept_of_parts_is_all_that_verdicts_read(
     name: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:

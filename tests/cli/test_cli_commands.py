@@ -168,6 +168,7 @@ def test_a_failing_shard_names_its_members_and_the_other_levels_are_made(
     assert "level 5, members 0 to 299: not enough memory" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_an_extrapolation_is_made_only_where_it_is_asked_for(
     file: Path, tmp_path: Path, capsys: Capture
 ) -> None:

@@ -73,6 +73,7 @@ def test_a_scheme_added_tomorrow_is_listed(
     assert line.split() == ["new", "4", "explicit", "no", "7", "w", "dt", "<", "2.82843"]
 
 
+@pytest.mark.slow
 def test_the_list_and_the_numbers_of_theory_do_without_sympy() -> None:
     code = (
         "import sys; from vibsim.cli import main; main(['list', 'schemes']); "

@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 from snakemake_interface_logger_plugins.common import LogEvent
 from snakemake_interface_logger_plugins.tests import MockOutputSettings
+from thinned import thinned
 
 from vibsim.cli.resources import amount, duration, size
 from vibsim.cli.run import lock, snakemake
@@ -133,12 +134,15 @@ def test_the_cause_is_the_exception_or_the_last_line(
 
 @pytest.mark.parametrize(
     ("snakefile", "profile", "cause"),
-    [
-        ('raise ValueError("no good")', "{}", 'Snakefile", line 2: no good'),
-        ("rule all:\n    input: 'none'", "{}", "Missing input files for rule all:"),
-        ("", "scheduler: none", "argument --scheduler: invalid choice: 'none'"),
-        ("", "[", 'config.yaml", line 1'),
-    ],
+    thinned(
+        [
+            ('raise ValueError("no good")', "{}", 'Snakefile", line 2: no good'),
+            ("rule all:\n    input: 'none'", "{}", "Missing input files for rule all:"),
+            ("", "scheduler: none", "argument --scheduler: invalid choice: 'none'"),
+            ("", "[", 'config.yaml", line 1'),
+        ],
+        2,
+    ),
     ids=["exception", "input", "argument", "profile"],
 )
 def test_a_broken_workflow_is_told_in_a_line(

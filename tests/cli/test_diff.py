@@ -28,6 +28,7 @@ def other(made: Made) -> Path:
     return earlier
 
 
+@pytest.mark.slow
 def test_settings_verdicts_and_numbers_of_two_results(
     made: Made, other: Path, capsys: Capture
 ) -> None:
@@ -49,6 +50,7 @@ def test_settings_verdicts_and_numbers_of_two_results(
     assert "end.value" in found
 
 
+@pytest.mark.slow
 def test_a_folder_may_be_named_by_its_files_and_compared_with_a_name(
     made: Made, other: Path, capsys: Capture
 ) -> None:

@@ -56,6 +56,7 @@ def limit(what: int, size: int) -> Callable[[], None]:
     return lambda: resource.setrlimit(what, (size, size))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["x" * 300, "/".join(["y" * 99] * 50)], ids=["300", "5000"])
 def test_a_path_that_is_too_long_is_refused(file: Path, tmp_path: Path, name: str) -> None:
     for ended in (
@@ -91,6 +92,7 @@ def test_too_little_memory_is_told_with_what_is_needed(file: Path, megabytes: in
     assert ended.stderr == f"vibsim: not enough memory: {text}\n"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kilobytes", [2, 12])
 def test_a_limit_of_the_size_of_files_is_named(file: Path, tmp_path: Path, kilobytes: int) -> None:
     """The library says only `HDF error`, wherever in the file it comes to the limit."""

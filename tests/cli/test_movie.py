@@ -53,6 +53,7 @@ def test_a_movie_has_its_frames_and_the_same_bytes_every_time(
             assert container.streams.video[0].average_rate == 5
 
 
+@pytest.mark.slow
 def test_frames_are_numbered_and_those_of_a_longer_movie_stay(
     made: Made, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -69,6 +70,7 @@ def test_frames_are_numbered_and_those_of_a_longer_movie_stay(
     assert sorted(path.name for path in folder.iterdir()) == names
 
 
+@pytest.mark.slow
 def test_the_drawing_moves_as_the_level_file_says(made: Made, tmp_path: Path) -> None:
     asked = ("--scheme", "rk4", "--level", 8, "--frames", 9, "--frames-to", tmp_path)
     assert made.vibsim("movie", made.file, *asked) == 0
@@ -84,6 +86,7 @@ def test_the_drawing_moves_as_the_level_file_says(made: Made, tmp_path: Path) ->
     assert swing[0] > 100.0
 
 
+@pytest.mark.slow
 def test_two_runs_stand_side_by_side_and_one_alone_where_one_is_named(
     made: Made, tmp_path: Path
 ) -> None:

@@ -20,7 +20,7 @@ Capture = pytest.CaptureFixture[str]
 LINE = "# yaml-language-server: $schema="
 
 
-@pytest.mark.parametrize("kind", thinned(MODELS, 2))
+@pytest.mark.parametrize("kind", thinned(MODELS, 4))
 def test_a_new_file_of_every_model_passes_as_it_is(kind: str, tmp_path: Path) -> None:
     file = tmp_path / "mine.yaml"
     assert main(["new", str(file), "--model", kind]) == 0
@@ -118,6 +118,7 @@ def test_what_cannot_be_written_is_refused_and_leaves_nothing(
     assert (tmp_path / "taken.yaml").read_text() == "mine"
 
 
+@pytest.mark.slow
 def test_a_schema_of_somebody_else_is_left_alone_and_one_of_vibsim_renewed(
     tmp_path: Path, capsys: Capture
 ) -> None:

@@ -86,6 +86,7 @@ JSON = st.recursive(
 )
 
 
+@pytest.mark.slow
 @hypothesis_settings(max_examples=100, deadline=None)
 @given(st.dictionaries(st.sampled_from(["model", "schemes", "checks", "sweep"]), JSON), JSON)
 def test_content_of_any_form_is_compared(old: dict[str, Any], new: Any) -> None:

@@ -113,6 +113,7 @@ def test_what_is_no_experiment_file_is_refused(
     assert "must be an experiment file that is there" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_a_signal_ends_it(file: Path, tmp_path: Path) -> None:
     """It shows the faults of each version of the file, goes on, and ends with the status of the signal."""
     file.write_text("title: one\nmodel: {kind: pendulm}\n")

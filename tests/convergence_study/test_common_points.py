@@ -134,6 +134,7 @@ def test_averages_of_cells_are_exact_for_averages() -> None:
         judge([1, 0.5, 0.3], [np.ones(8), np.ones(16), np.ones(20)], restrict="mean")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("kind", "own"), [("linear", 2), ("cubic", 4)])
 def test_an_order_is_not_believed_from_that_of_the_interpolation_on(kind: str, own: int) -> None:
     counts = [16, 37, 83, 190, 431]

@@ -341,6 +341,7 @@ def test_a_limit_that_is_known_and_a_report_are_of_files_too(
     assert "<svg" in (tmp_path / "r/report.html").read_text()
 
 
+@pytest.mark.slow
 def test_fields_are_brought_to_common_points(tmp_path: Path, capsys: Capture) -> None:
     files = [write(tmp_path / f"run_{n}.nc", n) for n in (10, 20, 40)]
     common = ["judge", *files, "--h", "dx", "--order", "2"]

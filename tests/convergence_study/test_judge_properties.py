@@ -42,6 +42,7 @@ def levels_of(ladders: Ladders) -> tuple[list[float], float, list[Floats]]:
     return h, p, [5.0 + x**p + np.array(second) * x ** (p + 1) for x in h]
 
 
+@pytest.mark.slow
 @settings(max_examples=5, deadline=None)
 @given(LADDERS, st.randoms(use_true_random=False))
 def test_the_order_of_levels_does_not_matter(ladders: Ladders, random: object) -> None:
@@ -52,6 +53,7 @@ def test_the_order_of_levels_does_not_matter(ladders: Ladders, random: object) -
     assert mixed == judge(h, values, order=p, members=True)
 
 
+@pytest.mark.slow
 @settings(max_examples=5, deadline=None)
 @given(LADDERS, st.integers(-60, 60), SIGNS)
 def test_units_and_signs_do_not_matter(ladders: Ladders, power: int, sign: float) -> None:
@@ -71,6 +73,7 @@ def test_units_and_signs_do_not_matter(ladders: Ladders, power: int, sign: float
         assert other_units.reason == verdict.reason
 
 
+@pytest.mark.slow
 @settings(max_examples=5, deadline=None)
 @given(LADDERS)
 def test_a_number_is_a_field_of_one_point_and_a_member_is_judged_as_alone(ladders: Ladders) -> None:
@@ -90,6 +93,7 @@ def test_the_order_of_three_levels_solves_their_equation(
     assert orders_of_steps(ratio[None], h)[0] == pytest.approx(order, abs=1e-9)
 
 
+@pytest.mark.slow
 @settings(max_examples=5, deadline=None)
 @given(st.integers(1, 6).flatmap(lambda n: arrays(np.float64, (n, MEMBERS), elements=st.floats())))
 def test_no_numbers_break_it(values: Floats) -> None:

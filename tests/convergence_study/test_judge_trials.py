@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import xarray
+from thinned import thinned
 
 from vibsim import InputError, judge
 
@@ -110,6 +111,7 @@ def test_two_powers_below_the_expected_one_are_not_that_one() -> None:
     assert judge(h, values, at_least=0.5).status == "PASS"
 
 
+@pytest.mark.slow
 def test_printed_bounds_hold() -> None:
     """The bounds of sentences are not below those of the numbers."""
     rng = np.random.default_rng(3)
@@ -136,7 +138,7 @@ def test_an_exact_value_may_be_any_distance_away() -> None:
         assert (verdict.status, verdict.reason) == ("FAIL", "wrong_limit")
 
 
-@pytest.mark.parametrize("limit", [1.23456, -3.21987])
+@pytest.mark.parametrize("limit", thinned([1.23456, -3.21987], 2))
 @pytest.mark.parametrize("digits", [4, 5, 6])
 @pytest.mark.parametrize("order", [1, 2, 4])
 def test_bounds_hold_of_printed_numbers(limit: float, digits: int, order: int) -> None:

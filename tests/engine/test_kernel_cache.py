@@ -63,6 +63,7 @@ def test_a_kernel_is_compiled_once_and_a_damaged_one_again(tmp_path):
             assert path.read_bytes() != damage
 
 
+@pytest.mark.slow
 def test_a_job_that_finds_its_kernel_has_no_compiler_in_its_memory(tmp_path):
     environment = {
         "VIBSIM_CACHE_DIR": str(tmp_path),
@@ -83,6 +84,7 @@ def test_a_job_that_finds_its_kernel_has_no_compiler_in_its_memory(tmp_path):
     assert outputs[0][0] == outputs[1][0]
 
 
+@pytest.mark.slow
 def test_jobs_that_want_one_kernel_at_once_all_get_it(tmp_path):
     environment = {
         "VIBSIM_CACHE_DIR": str(tmp_path),
@@ -100,6 +102,7 @@ def test_jobs_that_want_one_kernel_at_once_all_get_it(tmp_path):
     assert all(job.returncode == 0 for job in jobs)
 
 
+@pytest.mark.slow
 def test_without_a_cache_a_kernel_is_compiled_in_memory(tmp_path):
     blocked = tmp_path / "blocked"
     blocked.touch()
@@ -150,6 +153,7 @@ def test_a_tableau_of_numbers_can(lane):
     np.testing.assert_array_equal(one.position, other.position)
 
 
+@pytest.mark.slow
 def test_the_text_of_a_kernel_does_not_depend_on_those_written_before():
     wanted = [
         (MODELS[model], SCHEMES[kind].stepper_for(MODELS[model], SCHEMES[kind].defaults()), *more)

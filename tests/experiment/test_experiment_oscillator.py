@@ -359,6 +359,7 @@ def test_every_member_has_its_own_numbers() -> None:
     assert len(np.unique(ends)) == len(cases)
 
 
+@pytest.mark.slow
 def test_a_member_alone_starts_on_its_own_exact_solution() -> None:
     swept = oscillator(
         {"sweep": {"model.parameters.a": {"linspace": [0.3, 1.9, 7]}, "model.m": [0.5, 2]}},

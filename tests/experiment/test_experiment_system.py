@@ -67,6 +67,7 @@ def triple(_, state):
     return *v, *np.linalg.solve(lengths * np.cos(apart), right)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scheme", ["rk4", "crank_nicolson"])
 def test_masses_of_three_coordinates_make_a_triple_pendulum(scheme):
     start = [0.5, -0.3, 0.8]

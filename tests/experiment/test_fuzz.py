@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from typing import Any
 
+import pytest
 from experiment_files import content
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
@@ -173,6 +174,7 @@ def test_sound_sweeps(sweep: dict[str, Any]) -> None:
     assert {key: values[key] for key in columns} == {k: c[case] for k, c in columns.items()}
 
 
+@pytest.mark.slow
 @given(sound_sweeps(), st.data())
 @QUIET
 def test_sweeps_with_one_fault(sweep: dict[str, Any], data: st.DataObject) -> None:
@@ -185,6 +187,7 @@ def test_sweeps_with_one_fault(sweep: dict[str, Any], data: st.DataObject) -> No
     attempt(lambda: Experiment.from_dict(content(sweep=sweep, levels=[1, 2])))
 
 
+@pytest.mark.slow
 @given(CHANGES)
 @QUIET
 def test_any_dictionary(changes: dict[str, Any]) -> None:

@@ -146,6 +146,7 @@ def test_shipped_experiments_mean_what_they_say() -> None:
     assert [file for file in files if Experiment.from_yaml(file).notes] == []
 
 
+@pytest.mark.slow
 def test_commands_print_notes_with_their_place_and_go_on(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

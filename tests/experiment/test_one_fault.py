@@ -118,7 +118,7 @@ def is_there(fault: Fault, where: Where) -> bool:
     return fault.key == wanted or wanted.startswith((f"{fault.key}.", f"{fault.key}["))
 
 
-@pytest.mark.parametrize("name", thinned(FILES, 3))
+@pytest.mark.parametrize("name", thinned(FILES, 5))
 def test_one_broken_thing_is_one_fault(
     name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

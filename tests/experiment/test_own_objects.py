@@ -86,6 +86,7 @@ def test_a_model_and_a_scheme_in_memory_have_everything_that_registered_ones_hav
     assert best(experiment).sizes["case"] == 2
 
 
+@pytest.mark.slow
 def test_a_natural_frequency_may_be_a_number() -> None:
     """Where it depends on no parameter, nobody thinks of arrays."""
     model = replace(RAYLEIGH, natural_frequency=lambda parameters: 1.0)

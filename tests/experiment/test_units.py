@@ -356,6 +356,7 @@ QUANTITY = st.one_of(
 )
 
 
+@pytest.mark.slow
 @given(
     QUANTITY,
     QUANTITY,
@@ -377,6 +378,7 @@ def test_prefixes_and_names() -> None:
     assert registry() is registry()
 
 
+@pytest.mark.slow
 def test_pint_is_imported_for_units_alone(tmp_path: Path) -> None:
     probe = (
         "import sys; from vibsim.experiment import Experiment\n"

@@ -222,7 +222,7 @@ def test_tanh_and_acos_keep_their_digits_at_the_edge():
             "mod({}, 2 + x)",
             "x if x > 2 else {}",
         ],
-        4,
+        8,
     ),
 )
 def test_the_derivative_of_the_deepest_formula_is_still_python(nest):

@@ -264,6 +264,7 @@ def test_a_long_row_of_conditions_is_no_deep_one(word: str) -> None:
     assert len(to_statements(parse(text, ()), "y")) == 1
 
 
+@pytest.mark.slow
 def test_chains_in_a_row_do_not_explode() -> None:
     """A side of a chain stands twice in the tree: chains within chains would double it again and again."""
     text = "1 < x"

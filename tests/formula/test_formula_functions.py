@@ -10,6 +10,7 @@ from typing import Any
 import mpmath
 import numpy as np
 import pytest
+from thinned import thinned
 
 from vibsim.elementary import ELEMENTARY, primitives
 from vibsim.engine import text as kernel_text
@@ -124,6 +125,7 @@ def test_plain_numbers_and_arrays(text: str) -> None:
     close(values(tree, {"u": np.array(PLACES), "k": K}) * np.ones(len(PLACES)), text)
 
 
+@pytest.mark.slow
 def test_the_compiled_lane_has_the_bits_of_the_plain_one() -> None:
     module = kernel_text.Module("", given=primitives.NAMES)
     for name, function in ELEMENTARY.items():
@@ -214,7 +216,7 @@ def true_integrals(text: str, places: Sequence[float], breaks: Any) -> dict[floa
     return {u: found[u] for u in places}
 
 
-@pytest.mark.parametrize("text", [*BROKEN, *SMOOTH])
+@pytest.mark.parametrize("text", thinned([*BROKEN, *SMOOTH], 3))
 def test_integral_across_corners_and_jumps(text: str) -> None:
     tree = parse(text, ("u", "k"))
     assert has_rule(tree, "u")

@@ -129,6 +129,7 @@ def test_frequencies_of_a_cantilever_are_those_of_the_closed_form():
     assert sparse.frequencies[0] == pytest.approx(CANTILEVER, rel=1e-8)
 
 
+@pytest.mark.slow
 def test_damping_ratios_are_those_of_the_decay():
     """A mode of the ratio z loses ``exp(-2 pi z/sqrt(1 - z^2))`` in a period."""
     model = {**{key: TWO[key] for key in ("kind", "mass", "stiffness", "observe")},

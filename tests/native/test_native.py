@@ -318,6 +318,7 @@ def expression(choice: random.Random, depth: int) -> str:
     return form.format(a=a, b=b, c=c)
 
 
+@pytest.mark.slow
 def test_expressions_at_random_have_the_bits_of_python() -> None:
     choice = random.Random(11)
     small = [value for value in WHOLES if abs(value) < 20]

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from thinned import thinned
 
 from vibsim.analysis import analyse_records, verdicts
 from vibsim.experiment import Experiment, storage, sweep_columns
@@ -66,7 +67,7 @@ SWEEPS: list[dict[str, Any]] = [
 ]
 
 
-@pytest.mark.parametrize("sweep", SWEEPS)
+@pytest.mark.parametrize("sweep", thinned(SWEEPS, 2))
 def test_every_range_of_members_is_that_part_of_the_whole(sweep: dict[str, Any]) -> None:
     grid = experiment(sweep=sweep)
     whole = sweep_columns.columns(grid, 0, grid.members)

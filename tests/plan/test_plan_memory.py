@@ -109,6 +109,7 @@ def share(plan: Plan, level: LevelJob) -> float:
     return level.bytes * level.shards[0].stop / plan.cases
 
 
+@pytest.mark.slow
 def test_the_size_of_a_comparison_with_series_is_as_planned(tmp_path: Path) -> None:
     text = "levels: [6, 7, 8, 9]\nschemes: [central]\n" + GRID % 30
     plan = planned(tmp_path, text)

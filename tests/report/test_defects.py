@@ -102,6 +102,7 @@ def test_a_caption_names_the_dotted_line_where_it_is_drawn():
     assert "dotted" in picture.caption
 
 
+@pytest.mark.slow
 def test_missing_cells_of_a_map_are_hatched_and_cells_have_borders():
     def draw(last):
         exp = samples.experiment(

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 import samples
 import yaml
+from thinned import thinned
 
 from vibsim import report
 from vibsim.convergence import judge
@@ -190,7 +191,7 @@ WITHOUT_TABLES = [
 ]
 
 
-@pytest.mark.parametrize("path", WITHOUT_TABLES, ids=lambda path: path.stem)
+@pytest.mark.parametrize("path", thinned(WITHOUT_TABLES, 5), ids=lambda path: path.stem)
 def test_the_file_that_a_page_shows_means_the_same_experiment(path):
     exp = Experiment.from_yaml(path)
     assert not exp.model.tables
@@ -451,6 +452,7 @@ def test_curves_of_the_first_screen_are_told_apart_without_colours_and_the_ring_
     assert ax.get_title(loc="left").endswith("ring: the member that decides")
 
 
+@pytest.mark.slow
 def test_the_schemes_of_the_first_screen_have_markers_of_their_own_and_legends_hide_no_point():
     exp = samples.experiment(
         levels={"from": 5, "to": 10}, schemes=["central", "rk4", "euler_cromer"]

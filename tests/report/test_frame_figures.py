@@ -155,6 +155,7 @@ def test_few_common_times_are_not_told_to_be_round_off():
     assert "too few common times for ratios" in words_of(figure)
 
 
+@pytest.mark.slow
 def test_runs_that_broke_down_are_not_told_to_be_round_off(overflowing):
     _, record = overflowing
     assert (record["status"] != 0).any()
@@ -219,6 +220,7 @@ def test_a_mark_stands_where_a_curve_leaves():
     assert not frame.mark_leaving(ax, x, np.full(5, 0.5), color="black")
 
 
+@pytest.mark.slow
 def test_the_legend_of_work_and_precision_has_a_name_for_every_symbol():
     exp = spring(schemes=MANY, levels=[0, 1])
     record = samples.record(exp)

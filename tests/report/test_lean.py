@@ -79,6 +79,7 @@ def test_the_worst_members_are_listed_with_their_command(tmp_path):
     assert "all with model.g of 300 or more." in text
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("unrendered")
 def test_a_sweep_whose_checks_ask_about_no_order_has_a_page(tmp_path):
     check = {"value": "amplitude", "below": 4.0}

@@ -50,6 +50,7 @@ def legend(record: Record) -> str:
     return " ".join(label for ax in figure.axes for label in ax.get_legend_handles_labels()[1])
 
 
+@pytest.mark.slow
 def test_a_floor_above_round_off_is_not_called_round_off() -> None:
     _, record = made(range(6, 14), noise=1e-5)
     assert "round-off" not in " ".join(notes(record)) + legend(record)

@@ -253,6 +253,7 @@ def test_nan_everywhere_makes_a_page_with_its_failures(tmp_path):
     assert not re.search(r"\bnan\b", text.lower())
 
 
+@pytest.mark.slow
 def test_a_sweep_shows_period_orders_and_the_worst_member(swept):
     names = {path.stem for path in (swept / "figures").iterdir()}
     assert {"period", "sweep_order_theta", "sweep_error_energy_deviation"} <= names
@@ -271,12 +272,14 @@ def test_a_large_sweep_stays_a_small_page(tmp_path):
     assert len((tmp_path / "tables/members.csv").read_text().splitlines()) == 3001
 
 
+@pytest.mark.slow
 def test_a_dense_grid_stays_a_small_page(tmp_path):
     make(tmp_path, samples.experiment(levels=[12, 13, 14]))
     assert (tmp_path / "report.html").stat().st_size < 1_000_000
     assert all(path.stat().st_size < 300_000 for path in (tmp_path / "figures").iterdir())
 
 
+@pytest.mark.slow
 def test_a_ladder_lost_in_round_off_shows_what_is_there(tmp_path):
     scheme = {"kind": "central", "arithmetic": "three_term"}
     make(
@@ -376,6 +379,7 @@ def test_one_promise_of_several_schemes_is_drawn_once():
     assert text.count(">slope 2 (promised)</text>") == 1
 
 
+@pytest.mark.slow
 def test_a_sweep_shows_every_promise_and_the_map_is_relative_to_it():
     def drawn(sweep):
         exp = samples.several(checks=TOLERANT, sweep=sweep)
@@ -411,6 +415,7 @@ def test_a_promise_of_order_zero_makes_a_page(tmp_path):
     assert not read(tmp_path / "report.html").faults
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("changes", [{}, {"sweep": {"initial.u": [0.5, 1.0, 2.0]}}])
 def test_a_model_without_exact_solution_and_period_makes_a_page(tmp_path, changes):
     rubbed = {"kind": "oscillator", "spring": "sin(u)", "damping": {"coulomb": 0.01}}

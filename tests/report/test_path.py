@@ -43,6 +43,7 @@ def test_every_chosen_level_has_a_panel_with_one_scale(levels):
         assert shape == pytest.approx((high - low) / (right - left), rel=1e-9)
 
 
+@pytest.mark.slow
 def test_a_level_that_looks_like_the_finest_one_is_left_out():
     *_, picture = drawn(levels=[5, 8, 11, 12])
     assert [ax.get_title() for ax in picture.figure.axes] == ["level 5", "level 12"]

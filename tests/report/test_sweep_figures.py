@@ -98,6 +98,7 @@ def test_a_large_grid_shows_the_worst_member_of_every_block(monkeypatch, across)
     assert [border.size for border in grid.borders] == [5, 4]
 
 
+@pytest.mark.slow
 def test_members_anywhere_in_a_plane_are_gathered_in_cells():
     over = {"initial.theta": [0.2, 2.9], "model.g": [0.5, 60.0]}
     exp = samples.experiment(sweep={"sample": {**SAMPLE["sample"], "over": over}})
@@ -133,6 +134,7 @@ def test_the_separatrix_is_searched_once_for_all_maps(across, monkeypatch):
     assert len(searches) == 2
 
 
+@pytest.mark.slow
 def test_no_separatrix_is_drawn_where_there_is_none():
     sweep = {"initial.theta": {"linspace": [0.1, 2.0, 9]}, "model.g": {"linspace": [1.0, 3.0, 8]}}
     for model in ("pendulum", "linear_pendulum"):
@@ -215,6 +217,7 @@ def test_every_reason_has_a_colour_of_its_own():
     assert len(set(style.REASON_COLOURS.values())) == len(REASONS)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("values", "scale"), [([0.1, 300.0], "log"), ([1.0, 1.5], "linear")])
 def test_a_sweep_over_decades_has_a_logarithmic_axis(values, scale):
     exp = samples.experiment(sweep={"model.g": {"logspace": [*values, 7]}})
@@ -240,6 +243,7 @@ def cloud():
     return exp, samples.record(exp)
 
 
+@pytest.mark.slow
 def test_a_sample_of_three_keys_is_shown_against_each(cloud):
     exp, record = cloud
     assert sweep_layout.along_of(sweep_layout.keys(record)) is None
@@ -330,6 +334,7 @@ def bare(monkeypatch):
             monkeypatch.setattr(module, "MODELS", known)
 
 
+@pytest.mark.slow
 def test_without_an_exact_solution_maps_show_the_estimate_and_its_error_bar(monkeypatch):
     bare(monkeypatch)
     monkeypatch.setattr("vibsim.simulation.level.MOST_REFERENCES", 0)
@@ -371,6 +376,7 @@ def test_few_levels_make_the_pages_of_a_sweep(tmp_path, sweep, levels):
     assert all(check["reason"] in page for check in summary["checks"])
 
 
+@pytest.mark.slow
 def test_numbers_of_checks_have_maps_unless_they_are_shown_already():
     checks = [
         {"id": "kept", "value": "relative_energy_error", "at": {"level": 9}, "below": 1.0},
@@ -511,6 +517,7 @@ def test_of_many_members_an_even_part_can_be_pointed_at_and_the_worst():
     assert explorer.listed(keys, 2000, 2000, []).size == 2000
 
 
+@pytest.mark.slow
 def test_curves_of_many_schemes_differ_in_their_dashes_too():
     schemes = ["central", "rk4", "heun", "euler_cromer"]
     sweep = {"initial.theta": {"linspace": [0.1, 2.0, 90]}}

@@ -170,6 +170,7 @@ def test_a_scheme_conserves_with_its_own_velocity_what_the_centred_difference_se
     assert {"own velocity", "[D₂ₜu]"} <= set(texts)
 
 
+@pytest.mark.slow
 def test_an_energy_that_damping_takes_away_is_no_error(tmp_path):
     model = {"kind": "oscillator", "spring": "39.5*u"}
     for more, is_error in (({}, True), ({"damping": {"linear": 0.5}}, False)):
@@ -221,6 +222,7 @@ def test_the_centred_scheme_alone_has_no_second_energy():
     assert figures_energy.running(rec, 0) is None
 
 
+@pytest.mark.slow
 def test_every_scheme_has_a_look_of_its_own_and_one_legend_entry(everything):
     exp, rec = everything
     looks = [str(style.look(i)) for i in range(len(rec["scheme"]))]
@@ -231,6 +233,7 @@ def test_every_scheme_has_a_look_of_its_own_and_one_legend_entry(everything):
     assert len(contents_theory.schemes(exp, rec).rows) == len(texts)
 
 
+@pytest.mark.slow
 def test_a_page_of_all_schemes_is_small_and_folds_long_tables(everything, tmp_path):
     exp, rec = everything
     page = write(tmp_path, exp, rec, samples.summary(exp, rec))
@@ -241,6 +244,7 @@ def test_a_page_of_all_schemes_is_small_and_folds_long_tables(everything, tmp_pa
     assert len(drawn) == gallery.MOST_SHOWN // 2
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("unrendered")
 def test_adaptive_schemes_have_their_place_in_work_alone(tmp_path):
     adaptive = {"kind": "dop853", "tolerance": [1e-8, 1e-4]}

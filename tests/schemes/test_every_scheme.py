@@ -82,7 +82,7 @@ def test_every_quantity_converges_with_the_promised_order(scheme, model):
             assert high - low <= 0.1
 
 
-@pytest.mark.parametrize(("scheme", "options", "model"), VARIED)
+@pytest.mark.parametrize(("scheme", "options", "model"), thinned(VARIED, 5))
 def test_differences_fall_with_the_promised_order_whatever_the_options(scheme, options, model):
     """Without the analysis, for all quantities, those with ``[D_2t u]`` too, and for forces of every kind."""
     known = {}

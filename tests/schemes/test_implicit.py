@@ -7,6 +7,7 @@ import math
 import mpmath
 import numpy as np
 import pytest
+from thinned import thinned
 
 from vibsim.engine import integrate, lane_for
 from vibsim.models import MODELS
@@ -148,7 +149,7 @@ def newmark(kind, u, v, a, t, dt, options):
     return root(equations, (u, v, a))
 
 
-@pytest.mark.parametrize(("kind", "options"), OPTIONS)
+@pytest.mark.parametrize(("kind", "options"), thinned(OPTIONS, 3))
 def test_steps_solve_the_equations_of_the_scheme(kind, options):
     """Large steps, of which a scheme that stops early or starts otherwise would show."""
     steps, end = 24, 12.0
@@ -186,7 +187,7 @@ def errors(kind, model, level, options):
 
 
 @pytest.mark.parametrize("model", [SPRING, MODELS["pendulum"]], ids=["spring", "pendulum"])
-@pytest.mark.parametrize(("kind", "options"), OPTIONS)
+@pytest.mark.parametrize(("kind", "options"), thinned(OPTIONS, 3))
 def test_every_quantity_has_its_order(kind, options, model):
     """Far enough down the ladder that second-order terms do not show, and above round-off."""
     scheme = SCHEMES[kind]

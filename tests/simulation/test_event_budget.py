@@ -131,6 +131,7 @@ def test_both_compiled_and_plain_sum_the_same() -> None:
         np.testing.assert_array_equal(one, other)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "schemes",
     [ON_BOX[2::3], pytest.param(ON_BOX, marks=pytest.mark.slow)],

@@ -134,6 +134,7 @@ print(float(solve.cached("ab" * 8, compute)["x"].sum()))
 """
 
 
+@pytest.mark.slow
 def test_jobs_that_want_the_same_one_compute_it_once(home: Path, tmp_path: Path) -> None:
     count = tmp_path / "count"
     jobs = [

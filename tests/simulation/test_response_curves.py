@@ -67,6 +67,7 @@ def test_every_verdict_passes(branches: Any) -> None:
     assert [v.status for v in verdicts(experiment, convergence)] == ["PASS"] * 9
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("without_series")
 def test_a_number_of_all_members_names_the_branch_and_one_that_is_not_steady_asks_for_periods() -> (
     None
@@ -125,6 +126,7 @@ def test_each_branch_is_that_of_an_independent_continuation(branches: Any) -> No
     np.testing.assert_allclose(change, np.abs(last - before) / np.abs(last), rtol=1e-2, atol=1e-7)
 
 
+@pytest.mark.slow
 def test_each_branch_is_near_one_of_harmonic_balance() -> None:
     """The jumps are there: up and down differ at 1.3 to 1.5 alone, where one harmonic has three answers."""
     experiment = Experiment.from_yaml(FILE)
@@ -143,6 +145,7 @@ def test_each_branch_is_near_one_of_harmonic_balance() -> None:
             assert abs(down / known[0] - 1.0) < 0.03
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("without_series")
 def test_amplitude_and_phase_of_a_linear_oscillator_converge_to_the_closed_form() -> None:
     """``A = 1/sqrt((k - w^2)^2 + (b w)^2)``, ``tan(phase) = b w/(k - w^2)``, with the order of the scheme."""

@@ -12,6 +12,7 @@ from vibsim.core.record import Record
 from .conftest import DIGEST, build
 
 
+@pytest.mark.slow
 def test_every_flipped_bit_is_seen(file: Path) -> None:
     whole = file.read_bytes()
     places = random.Random(7).sample(range(8 * len(whole)), 600)

@@ -147,6 +147,7 @@ def test_large_provenance_fits(tmp_path: Path, record: Record) -> None:
     assert json.loads(str(store.read(path).attrs["provenance"])) == {"sweep": values}
 
 
+@pytest.mark.slow
 def test_cf_checker_finds_nothing(file: Path) -> None:
     checker = Path(sys.executable).with_name("compliance-checker")
     ended = subprocess.run(

@@ -108,6 +108,7 @@ def test_a_file_that_has_changed_is_refused(made: Path) -> None:
         path.write_bytes(whole)
 
 
+@pytest.mark.slow
 def test_with_chunks_nothing_is_read_before_it_is_needed(made: Path) -> None:
     folder = made / "adhoc" / "four"
     with vibsim.open(folder) as read, vibsim.open(folder, chunks={}) as tree:

@@ -196,7 +196,7 @@ def run(scheme, options, name, degree, n, end):
     return np.abs(found - u_e), np.max(np.abs(u_e))
 
 
-@pytest.mark.parametrize(("scheme", "options", "name"), cases(corrected=True))
+@pytest.mark.parametrize(("scheme", "options", "name"), thinned(cases(corrected=True), 2))
 def test_the_engine_reproduces_that_degree_and_no_higher(scheme, options, name):
     highest = exact_degree(scheme.stepper_for(model(name), options), model(name))
     # lines, but for the correction, which changes the initial velocity
@@ -240,7 +240,7 @@ def first_error(scheme, options, name, degree, dt):
     return [x - y for x, y in zip(state, exact, strict=True)]
 
 
-@pytest.mark.parametrize(("scheme", "options", "name"), cases(corrected=False))
+@pytest.mark.parametrize(("scheme", "options", "name"), thinned(cases(corrected=False), 3))
 def test_residuals_of_the_first_step_are_those_in_floats(scheme, options, name):
     of = model(name)
     own = scheme.stepper_for(of, options)
@@ -337,6 +337,7 @@ def test_no_fitted_force_makes_a_wrong_start_right():
             fitted_force(stepper(kind, model("none")), model("none"), degree)
 
 
+@pytest.mark.slow
 def test_nothing_is_missed_without_forces_but_by_the_differences():
     of = written({"spring": "0*u"}, ())
     assert exact_degree(stepper("rk4", of), of) == 4

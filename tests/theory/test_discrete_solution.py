@@ -31,7 +31,7 @@ def run(scheme, options, p, initial, steps):
     return runs.position, runs.velocity, runs.last_step
 
 
-@pytest.mark.parametrize(("scheme", "options"), thinned(VARIANTS, 2))
+@pytest.mark.parametrize(("scheme", "options"), thinned(VARIANTS, 5))
 def test_what_is_computed_is_the_exact_discrete_solution(scheme, options):
     p = steps_per_radian(scheme, options)
     steps = 500

@@ -100,7 +100,7 @@ FACTORS: dict[str, Callable[[complex], complex]] = {
 }
 
 
-@pytest.mark.parametrize("kind", FACTORS)
+@pytest.mark.parametrize("kind", thinned(FACTORS, 3))
 @pytest.mark.parametrize("damping", [0.0, 0.3, -0.2, 1.4])
 def test_the_mode_of_one_step_methods_is_that_of_their_stability_function(
     kind: str, damping: float

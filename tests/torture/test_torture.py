@@ -6,6 +6,7 @@ import random
 from collections.abc import Iterator
 
 import pytest
+from thinned import thinned
 from workflow.conftest import Place
 
 from torture import edits, fuzz
@@ -44,7 +45,7 @@ def test_nothing_is_lost_and_nothing_wrong_in_silence(lab: Laboratory, kind: str
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", sorted({*edits.EDITS} - {*QUICK}))
+@pytest.mark.parametrize("name", thinned(sorted({*edits.EDITS} - {*QUICK}), 2))
 def test_an_edit_runs_exactly_what_uses_it(lab: Laboratory, name: str) -> None:
     edit = edits.EDITS[name]
     edits.check(lab.copy(edit.experiment), edit)

@@ -141,6 +141,7 @@ for top in map(Path, sys.argv[2:]):
 """
 
 
+@pytest.mark.slow
 def test_another_user_cannot_reach_what_is_kept(
     folder: Path, compiled: tuple[Path, list[bytes]]
 ) -> None:
@@ -214,6 +215,7 @@ def test_a_results_folder_holds_no_plan(finished: Place) -> None:
             assert b'"batches"' not in path.read_bytes(), path
 
 
+@pytest.mark.slow
 def test_a_changed_plan_is_not_taken(
     place: Place, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -327,6 +329,7 @@ class Payload:
         return os.system, (f"touch '{self.trace}'",)
 
 
+@pytest.mark.slow
 def test_nothing_in_a_results_folder_is_loaded_as_code(place: Place, tmp_path: Path) -> None:
     trace, results = tmp_path / "trace", place.results
     code = f"open({str(trace)!r}, 'a').write(__name__)\n"

@@ -72,6 +72,7 @@ def test_every_changed_or_missing_result_comes_back_with_its_bytes(
     assert place.jobs() == []
 
 
+@pytest.mark.slow
 def test_a_missing_table_is_noticed(place: Place) -> None:
     next((place.tiny / "tables").glob("*.csv")).unlink()
     ended = place.run("--dry-run", "--json")
@@ -79,6 +80,7 @@ def test_a_missing_table_is_noticed(place: Place) -> None:
     assert [job["rule"] for job in json.loads(ended.stdout)["jobs"]] == ["report", "index"]
 
 
+@pytest.mark.slow
 def test_verify_compares_every_digest(place: Place) -> None:
     place.changed()
     same_time(place.tiny / "figures/thumbnail.svg", flip)
@@ -92,6 +94,7 @@ def test_verify_compares_every_digest(place: Place) -> None:
     ]
 
 
+@pytest.mark.slow
 def test_a_copy_without_its_times_is_read_and_not_computed_again(
     finished: Place, tmp_path: Path
 ) -> None:
@@ -102,6 +105,7 @@ def test_a_copy_without_its_times_is_read_and_not_computed_again(
     assert {p: (copy.tiny / p.name).stat().st_mtime_ns for p in times} == times
 
 
+@pytest.mark.slow
 def test_without_a_record_seals_are_compared_and_the_rest_is_made_again(
     place: Place, finished: Place
 ) -> None:
@@ -114,6 +118,7 @@ def test_without_a_record_seals_are_compared_and_the_rest_is_made_again(
     assert place.changed() == set()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("content", [b"\xc0", b"[1]", b"{}", b""])
 def test_what_an_edit_makes_stale_is_made_again_also_without_records_of_the_workflow(
     place: Place, content: bytes
@@ -137,6 +142,7 @@ def test_what_is_as_it_was_is_not_read(place: Place, monkeypatch: pytest.MonkeyP
     assert place.changed() == set()
 
 
+@pytest.mark.slow
 def test_after_another_title_only_the_page_is_made_again_and_nothing_through_another_name(
     place: Place, tmp_path: Path
 ) -> None:
@@ -198,6 +204,7 @@ def test_what_is_no_longer_asked_for_is_removed_and_nothing_else(place: Place) -
     assert all(path.is_file() for path in (*users, other))
 
 
+@pytest.mark.slow
 def test_two_files_of_one_name_do_not_replace_each_other(place: Place) -> None:
     assert place.run().returncode == 0
     other = place.folder / "elsewhere/tiny.yaml"
@@ -215,6 +222,7 @@ def test_two_files_of_one_name_do_not_replace_each_other(place: Place) -> None:
     assert place.run("--dry-run", files=[other]).returncode == 0
 
 
+@pytest.mark.slow
 def test_another_spelling_of_a_path_is_the_same_file(place: Place) -> None:
     assert place.run().returncode == 0
     link = place.folder / "link"

@@ -55,6 +55,7 @@ def scheduler(folder: Path, *, loses: bool = False, answers_after: int = 0) -> l
     return [*options, "--seconds-between-status-checks", "1"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("here", [20, pytest.param(0, marks=pytest.mark.slow)])
 def test_jobs_of_a_scheduler_give_the_same_bytes(place: Place, tmp_path: Path, here: int) -> None:
     wanted = place.content()

@@ -170,6 +170,7 @@ def trap(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return path
 
 
+@pytest.mark.slow
 def test_a_failing_job_is_named_with_its_log_and_the_others_go_on(place: Place, trap: Path) -> None:
     other = place.file.with_name("other.yaml")
     other.write_text(TEXT)

@@ -78,6 +78,7 @@ def nothing_is_left(folder: Path) -> bool:
     return is_free(folder / "results") and not processes(folder)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("number", "status"),
     [

@@ -7,6 +7,7 @@ import json
 from dataclasses import replace
 
 import pytest
+from thinned import thinned
 
 from vibsim.cli.chosen_plans import plans_of
 from vibsim.cli.run import command, reasons
@@ -17,6 +18,7 @@ from .conftest import TEXT, Place
 EVERYTHING = {"level_06", "level_07", "level_08", "level_09", "analyse", "report", "index"}
 
 
+@pytest.mark.slow
 def test_a_finished_experiment_at_another_place_has_nothing_to_do(place: Place) -> None:
     ended = place.run()
     assert ended.returncode == 0
@@ -43,12 +45,13 @@ WORDS = {
 }
 
 
-@pytest.mark.parametrize(("old", "new", "told"), WORDS.values(), ids=WORDS)
+@pytest.mark.parametrize(("old", "new", "told"), thinned(WORDS.values(), 4), ids=WORDS)
 def test_a_dry_run_says_in_words_what_changed(place: Place, old: str, new: str, told: str) -> None:
     place.change(old, new)
     assert place.run("--dry-run").stdout.splitlines()[0] == f"adhoc/tiny: {told}"
 
 
+@pytest.mark.slow
 def test_a_dry_run_says_what_else_there_is_to_say(place: Place) -> None:
     (place.tiny / "report.html").unlink()
     lines = place.run("--dry-run").stdout.splitlines()

@@ -27,6 +27,7 @@ def by_hand(place: Place, *options: str) -> subprocess.CompletedProcess[str]:
     return snakemake("--configfile", config, "--cores", 2, *options)
 
 
+@pytest.mark.slow
 def test_snakemake_by_hand_has_nothing_to_do_after_a_run(place: Place) -> None:
     ended = by_hand(place)
     assert ended.returncode == 0, ended.stderr
@@ -59,6 +60,7 @@ def test_rules_are_in_style() -> None:
     subprocess.run([BIN / "snakefmt", "--check", *files], check=True, capture_output=True)
 
 
+@pytest.mark.slow
 def test_a_job_imports_what_it_uses_and_no_more(place: Place, tmp_path: Path) -> None:
     command = ["simulate", str(place.file), "--level", "6", "--out", str(tmp_path / "x.nc")]
     program = (

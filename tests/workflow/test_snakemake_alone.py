@@ -49,6 +49,7 @@ def named(place: Place, tmp_path: Path) -> tuple[object, ...]:
     return ("--snakefile", ROOT / "workflow/Snakefile", "--config", *config)
 
 
+@pytest.mark.slow
 def test_one_experiment_is_named_as_text(named: tuple[object, ...], tmp_path: Path) -> None:
     text = snakemake(tmp_path, "--dry-run", *named, "--forcerun", "report")
     # everything else is up to date

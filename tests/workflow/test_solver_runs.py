@@ -238,6 +238,7 @@ def test_pages_and_the_index_show_the_verdicts(made: Study) -> None:
     assert sum(line.startswith("adhoc,function,") for line in lines) == 4
 
 
+@pytest.mark.slow
 def test_what_is_up_to_date_is_not_run_again(study: Study) -> None:
     assert study.jobs("command") == []
     assert study.jobs("function") == []
@@ -269,6 +270,7 @@ def test_a_change_runs_what_depends_on_it(study: Study, change: str) -> None:
     assert study.jobs(name) == sorted(wanted)
 
 
+@pytest.mark.slow
 def test_a_change_of_an_input_runs_again_what_depends_on_it(study: Study) -> None:
     folder = study.folder / "my files"
     everything = {f"level_0{level}/shard_000{member}" for level in range(3) for member in range(2)}
@@ -283,6 +285,7 @@ def test_a_change_of_an_input_runs_again_what_depends_on_it(study: Study) -> Non
         assert level["u"][...] == 1.0156
 
 
+@pytest.mark.slow
 def test_programs_run_only_where_the_command_line_allows_it(study: Study, tmp_path: Path) -> None:
     for name in ("command", "function"):
         for options in ((), ("--dry-run",)):
@@ -416,6 +419,7 @@ def test_a_member_runs_alone(study: Study) -> None:
     assert here("check", f"{study.file('command')}@2").returncode == 2
 
 
+@pytest.mark.slow
 def test_a_solver_ends_with_the_run_that_started_it(study: Study) -> None:
     study.write("hangs", BROKEN.replace("fails", "hangs"))
     child = os.fork()

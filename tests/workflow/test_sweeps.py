@@ -118,6 +118,7 @@ def test_one_member_alone_is_run_and_has_then_nothing_to_do(empty: Place) -> Non
     assert empty.jobs(files=[alone]) == []
 
 
+@pytest.mark.slow
 def test_one_member_alone_is_an_experiment_of_its_own(empty: Place) -> None:
     write(empty, "initial.theta: [0.5, 1.0]")
     alone = Path(f"{empty.file}@1")
@@ -174,6 +175,7 @@ def test_a_tolerance_that_a_member_does_not_reach_is_told(empty: Place) -> None:
     )
 
 
+@pytest.mark.slow
 def test_a_member_that_fails_costs_no_other(empty: Place) -> None:
     """A member that overflows is a result with a status; the others are as without it."""
     write(empty, "initial.omega: [0.1, 1.0e+200, 0.2]")

@@ -111,6 +111,7 @@ def test_a_foreign_folder_and_a_lost_one_are_noticed(place: Place) -> None:
     assert set(told.values()) == {"is missing"}
 
 
+@pytest.mark.slow
 def test_a_damaged_manifest_is_named_and_the_next_run_mends_it(
     place: Place, finished: Place
 ) -> None:
@@ -125,6 +126,7 @@ def test_a_damaged_manifest_is_named_and_the_next_run_mends_it(
     assert place.content() == finished.content()
 
 
+@pytest.mark.slow
 def test_manifests_of_two_experiments_that_changed_places_are_damaged(
     place: Place, finished: Place
 ) -> None:
@@ -162,6 +164,7 @@ def test_changes_of_runs_are_no_damage(place: Place) -> None:
         assert made_files.path(place.results, key).read_text().count("\n") == 1
 
 
+@pytest.mark.slow
 def test_a_job_that_is_killed_before_its_files_are_on_record_damages_nothing(
     place: Place, monkeypatch: pytest.MonkeyPatch
 ) -> None:

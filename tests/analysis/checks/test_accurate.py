@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 import xarray
+from thinned import thinned
 
 from vibsim import Experiment, Verdict, analyse, simulate, verdicts
 from vibsim.analysis.blockwise import keep_for_verdicts
@@ -83,6 +84,7 @@ def test_a_known_error_is_the_true_one() -> None:
     assert found.text.startswith(f"u is accurate to {error / size:.2g} of its size at level 9")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("content", "levels"),
     [(SPRING, [8, 9, 10]), (PENDULUM, [7, 8, 9, 10])],
@@ -110,6 +112,7 @@ def test_an_estimated_error_is_the_true_one_within_its_bound(
         assert told["error"] == pytest.approx(error, rel=0.3), scheme
 
 
+@pytest.mark.slow
 def test_a_jump_of_the_force_beside_a_point_of_all_levels_is_part_of_the_bound() -> None:
     """Levels that meet it too early by the same agree on another motion; the true error is that from the reference."""
     content = {
@@ -140,7 +143,7 @@ def test_an_absolute_accuracy_is_told_as_a_root_mean_square_beside() -> None:
     assert told in found.text
 
 
-@pytest.mark.parametrize("kind", ["relative", "absolute"])
+@pytest.mark.parametrize("kind", thinned(["relative", "absolute"], 2))
 @pytest.mark.parametrize("factor", [0.9999, 1.0001])
 def test_numbers_beside_what_is_asked_have_the_digits_that_tell_them_apart(
     kind: str, factor: float
@@ -162,7 +165,7 @@ def test_numbers_beside_what_is_asked_have_the_digits_that_tell_them_apart(
 SMALL, TINY = {"accurate": "theta", "relative": 0.1}, {"accurate": "theta", "relative": 1e-9}
 
 
-@pytest.mark.parametrize("with_exact", [True, False])
+@pytest.mark.parametrize("with_exact", thinned([True, False], 2))
 def test_a_small_error_passes_and_a_large_one_fails_with_the_level_that_reaches_it(
     with_exact: bool,
 ) -> None:
@@ -178,6 +181,7 @@ def test_a_small_error_passes_and_a_large_one_fails_with_the_level_that_reaches_
     assert [v.status for v in asked(more, a_little, with_exact=with_exact)] == ["PASS"]
 
 
+@pytest.mark.slow
 def test_what_lies_between_the_bounds_is_open() -> None:
     (found,) = asked(PENDULUM, SMALL, with_exact=False)
     told = facts(found)
@@ -188,6 +192,7 @@ def test_what_lies_between_the_bounds_is_open() -> None:
     assert "Add level 10" in found.advice
 
 
+@pytest.mark.slow
 def test_an_error_that_may_be_round_off_is_open_where_it_is_known() -> None:
     """Of a solution that is exact but for round-off no accuracy far below round-off is known."""
     content = {**SPRING, "schemes": ["crank_nicolson"]}
@@ -199,31 +204,34 @@ def test_an_error_that_may_be_round_off_is_open_where_it_is_known() -> None:
 
 @pytest.mark.parametrize(
     ("reason", "content", "quantity"),
-    [
-        ("too_few_levels", {**PENDULUM, "levels": [8, 9]}, "theta"),
-        ("pre_asymptotic", {**PENDULUM, "levels": [4, 5, 6], "schemes": ["rk4"]}, "theta"),
-        (
-            "round_off",
-            {
-                **SPRING,
-                "time": {"end": 10.0, "base_steps": 7},
-                "levels": [9, 10, 11, 12],
-                "schemes": ["pefrl"],
-            },
-            "u",
-        ),
-        (
-            "non_smooth",
-            {
-                **SPRING,
-                "model": {"kind": "oscillator", "damping": {"coulomb": 0.06}},
-                "initial": {"u": 1.0, "v": 0.25},
-                "time": {"end": 16.0},
-                "schemes": [{"kind": "rk4", "events": "mesh"}],
-            },
-            "u",
-        ),
-    ],
+    thinned(
+        [
+            ("too_few_levels", {**PENDULUM, "levels": [8, 9]}, "theta"),
+            ("pre_asymptotic", {**PENDULUM, "levels": [4, 5, 6], "schemes": ["rk4"]}, "theta"),
+            (
+                "round_off",
+                {
+                    **SPRING,
+                    "time": {"end": 10.0, "base_steps": 7},
+                    "levels": [9, 10, 11, 12],
+                    "schemes": ["pefrl"],
+                },
+                "u",
+            ),
+            (
+                "non_smooth",
+                {
+                    **SPRING,
+                    "model": {"kind": "oscillator", "damping": {"coulomb": 0.06}},
+                    "initial": {"u": 1.0, "v": 0.25},
+                    "time": {"end": 16.0},
+                    "schemes": [{"kind": "rk4", "events": "mesh"}],
+                },
+                "u",
+            ),
+        ],
+        2,
+    ),
 )
 def test_an_estimate_without_an_order_decides_nothing(
     reason: str, content: Content, quantity: str
@@ -294,6 +302,7 @@ def test_a_step_that_is_broken_on_purpose_is_not_accurate() -> None:
     assert "the code of scheme central if it is your own" in accurate.advice
 
 
+@pytest.mark.slow
 def test_a_start_of_first_order_is_less_accurate_than_the_estimate_of_a_right_one() -> None:
     trap = {
         **PENDULUM,
@@ -330,6 +339,7 @@ def test_a_verdict_on_an_order_states_the_same_error(with_exact: bool) -> None:
         assert f"The root-mean-square error of the finest level is {size}." in found.text
 
 
+@pytest.mark.slow
 def test_a_bound_with_other_digits_is_stated() -> None:
     content = {**PENDULUM, "schemes": ["forward_euler"], "levels": [12, 13, 14]}
     (found,) = asked(content, {"converges": "theta"}, with_exact=False)
@@ -376,7 +386,7 @@ def test_expectations_and_claims() -> None:
     assert asked(PENDULUM, SMALL)[0].expected == "accurate to 0.1 of its size"
 
 
-@pytest.mark.parametrize("samples", ["auto", {"every": 2}])
+@pytest.mark.parametrize("samples", thinned(["auto", {"every": 2}], 2))
 def test_the_worst_member_of_a_sweep_decides(samples: Any) -> None:
     """It is the fastest spring, whose error is the largest."""
     content = {
@@ -392,6 +402,7 @@ def test_the_worst_member_of_a_sweep_decides(samples: Any) -> None:
     assert errors == sorted(errors, reverse=True)
 
 
+@pytest.mark.slow
 def test_a_member_alone_and_in_a_sweep_has_the_same_error() -> None:
     check = {"accurate": "u", "relative": 2e-3}
     sweep = {**SPRING, "sweep": {"model.w": [0.5, 1.0, 2.0]}}
@@ -410,6 +421,7 @@ FRICTION: Content = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("content", [FRICTION, {**SPRING, "sweep": {"model.w": [0.5, 1.0, 2.0]}}])
 def test_a_large_sweep_says_the_same_as_a_small_one(
     monkeypatch: pytest.MonkeyPatch, content: Content

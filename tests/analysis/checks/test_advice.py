@@ -404,6 +404,7 @@ PENDULUM = {"title": "t", "model": {"kind": "pendulum"}, "initial": {"theta": 1.
 RUN = {**PENDULUM, "time": {"end": 10.0}, "schemes": ["central"]}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("value", ["end", "period"])
 def test_advice_on_a_number_is_right_when_it_is_followed(value: str) -> None:
     """Finer levels bring a number that is off by their error, and none that is off by more."""
@@ -417,6 +418,7 @@ def test_advice_on_a_number_is_right_when_it_is_followed(value: str) -> None:
     assert judged({**RUN, "levels": [5, 6, 13, 14], "checks": [check]}).status == "PASS"
 
 
+@pytest.mark.slow
 def test_a_number_of_the_finest_level_by_its_name_asks_for_a_finer_one() -> None:
     """Levels that are added do not change a check that names its level."""
     truth = _number({"value": "period", "at": {"level": 14}, "equals": 9.0}, [13, 14])
@@ -444,6 +446,7 @@ def test_advice_on_a_number_of_several_levels_looks_at_those_that_have_one() -> 
     assert near.advice.startswith("Add finer `levels:`")
 
 
+@pytest.mark.slow
 def test_a_finer_level_is_asked_for_where_it_has_the_number() -> None:
     check = {"value": "at", "quantity": "theta", "atol": 1e-3, "at": {"level": 5, "step": 16}}
     truth = _number({**check, "at": {"t": 5.0}, "equals": 9.0}, [13, 14])
@@ -485,6 +488,7 @@ def test_where_orders_go_is_told(orders: tuple[float, ...], due: float, says: st
     assert ("From level to level" in told) == (len(says) > 0 and len(orders) > 1)
 
 
+@pytest.mark.slow
 def test_an_order_above_the_promised_one_is_said_to_fall_towards_it() -> None:
     """The error of Forward Euler on a pendulum is that of its growth, which a coarse step does not show."""
     check = {"converges": "theta", "order": "scheme"}
@@ -513,6 +517,7 @@ def test_a_corner_is_not_blamed_for_an_order_that_the_scheme_does_not_have() -> 
     assert "to see order 4" in advise(kept)
 
 
+@pytest.mark.slow
 def test_a_scheme_that_is_exact_is_not_sent_to_coarser_levels_alone() -> None:
     """A ball in free flight is a parabola, which this scheme has to round-off on every level."""
     ball = {"title": "t", "model": {"kind": "bouncing_ball"}, "initial": {"h": 1.0}}
@@ -524,6 +529,7 @@ def test_a_scheme_that_is_exact_is_not_sent_to_coarser_levels_alone() -> None:
     assert "If the coarser ones are round-off, too, the scheme is exact here" in verdict.advice
 
 
+@pytest.mark.slow
 def test_levels_are_started_behind_the_last_one_that_fails() -> None:
     """Heun's method on a hardening spring overflows on levels 4 and 5, at times that differ."""
     model = {"kind": "duffing", "gamma": 0.3, "omega": 1.2, "delta": 0.1}

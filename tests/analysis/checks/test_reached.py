@@ -42,6 +42,7 @@ def convergence(swept: Experiment) -> Record:
     return analyse_records(swept, simulated(swept))
 
 
+@pytest.mark.slow
 def test_a_member_that_the_pilot_did_not_try_fails(swept: Experiment, convergence: Record) -> None:
     assert HARD not in ladder.choosing.pilot(swept)
     order, verdict = verdicts(swept, convergence)

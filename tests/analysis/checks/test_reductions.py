@@ -151,6 +151,7 @@ def words_of(take: str, **asked: float) -> tuple[str, str, str, str]:
     return verdict.status, verdict.reason, verdict.text, verdict.advice
 
 
+@pytest.mark.slow
 def test_every_verdict_occurs_and_says_the_finding() -> None:
     status, reason, text, _ = words_of("largest", below=3)
     assert (status, reason) == ("PASS", "match")
@@ -181,6 +182,7 @@ def test_every_verdict_occurs_and_says_the_finding() -> None:
     )
 
 
+@pytest.mark.slow
 def test_members_that_decide_and_are_not_resolved_leave_it_open() -> None:
     # so coarse that the neighbours of the peak may be higher
     status, reason, text, _ = words_of("where_largest", equals=1.0, levels=[3, 4, 5])
@@ -216,6 +218,7 @@ def test_a_member_that_breaks_down_leaves_no_number_of_all() -> None:
     assert verdict.results[0].case == 1
 
 
+@pytest.mark.slow
 def test_claims_and_schemes_have_a_result_each() -> None:
     claim = {
         "claim": "the peak is at 1",
@@ -230,6 +233,7 @@ def test_claims_and_schemes_have_a_result_each() -> None:
     assert "case" not in found[0].text
 
 
+@pytest.mark.slow
 def test_other_swept_keys_are_fixed_by_value() -> None:
     sweep = {"initial.u": [0.5, 1.0, 2.0], "model.m": [1.0, 4.0]}
     row = {"value": "end", "quantity": "u", "over": "initial.u", "take": "largest"}

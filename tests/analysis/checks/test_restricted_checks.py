@@ -48,6 +48,7 @@ KINDS: dict[str, dict[str, Any]] = {
 }
 
 
+@pytest.mark.slow
 def test_every_kind_of_check_is_about_the_named_members() -> None:
     rows = [
         row | {"at": at}
@@ -61,6 +62,7 @@ def test_every_kind_of_check_is_about_the_named_members() -> None:
         assert sum(verdict.counts.values()) == schemes * len(expected)
 
 
+@pytest.mark.slow
 def test_a_member_by_its_values_has_the_verdict_of_its_number() -> None:
     own = KINDS["value"] | {"equals": 0.5, "atol": 1e-3}
     del own["below"]

@@ -90,6 +90,7 @@ def test_advice_on_stability_points_the_right_way() -> None:
     assert "finer" in unstable.advice
 
 
+@pytest.mark.slow
 def test_a_tolerance_that_is_advised_suffices() -> None:
     check = {"equal": ["central", "exact"], "quantity": "u"}
     for u in (1.0, 1.3, 1.7, 2.1, 2.3):

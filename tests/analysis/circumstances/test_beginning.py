@@ -76,6 +76,7 @@ TREATED = [
 ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("model", thinned([*FREE, *OTHERS], 3))
 def test_schemes_of_first_order_keep_their_promise_however_a_motion_begins(model: str) -> None:
     energies = ("kinetic_energy", "potential_energy", "energy") if model in FREE else ()

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from thinned import thinned
 
 from vibsim import Experiment, Verdict, analyse, simulate, verdicts
 from vibsim.apriori.force_discontinuities import switches_of, words_of
@@ -233,6 +234,7 @@ def test_the_mean_of_both_sides_keeps_order_2_of_central() -> None:
     assert (verdict.status, verdict.reason) == ("PASS", "asymptotic")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "content",
     [
@@ -276,7 +278,7 @@ JUMPS = {
 }
 
 
-@pytest.mark.parametrize("levels", [[4, 8], [4, 12], [6, 11]])
+@pytest.mark.parametrize("levels", thinned([[4, 8], [4, 12], [6, 11]], 2))
 def test_a_jump_within_a_step_makes_no_wrong_limit(levels: list[int]) -> None:
     """Differences may show order 1 by accident, with errors that belong to another place of the jump in its step."""
     made = Experiment.from_dict(JUMPS | {"levels": {"from": levels[0], "to": levels[1]}})
@@ -347,6 +349,7 @@ def test_the_roughest_corner_counts_not_the_first() -> None:
         assert (verdict.status, verdict.reason) == ("INCONCLUSIVE", "non_smooth"), verdict.text
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("load", "power"), [("heaviside(t - 1.7)", 1.0), ("max(t - 1.7, 0)", 2.0)])
 def test_corners_of_the_load_of_a_structure_are_known(load: str, power: float) -> None:
     model = {"kind": "structure", "stiffness": [[2, -1], [-1, 2]], "load": {2: load}}

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 import yaml
+from thinned import thinned
 
 from vibsim import Experiment, analyse, simulate, verdicts
 from vibsim.core.vocabulary import REASON_NAMES
@@ -95,6 +96,7 @@ def test_finer_levels_are_not_advised_where_they_count_the_same_bounces(
     assert verdict.advice.startswith(advice)
 
 
+@pytest.mark.slow
 def test_the_verdict_says_what_to_change() -> None:
     made = experiment(initial={"u": 1.0, "v": 0.3})
     record = analyse(made, [simulate(made, level) for level in made.levels])
@@ -104,6 +106,7 @@ def test_the_verdict_says_what_to_change() -> None:
     assert verdict.advice == "Set `events: located` for scheme mesh."
 
 
+@pytest.mark.slow
 def test_members_whose_exact_solution_is_unknown_stand_beside_those_with_one() -> None:
     checks = [{"converges": "u", "order": 4}, {"converges": "v", "order": 4}]
     made = experiment(
@@ -161,6 +164,7 @@ def test_a_motion_without_a_frequency_is_told_without_one() -> None:
     assert "nan" not in verdict.text
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("events", ["located", "mesh"])
 def test_what_meets_no_event_has_the_order_of_a_smooth_motion(events: str) -> None:
     """The position of this scheme has order 2 until the first event, and the order of its velocity behind it."""
@@ -291,7 +295,7 @@ def test_the_time_of_an_event_on_the_mesh_is_not_trusted() -> None:
         assert "events: located" in verdict.advice
 
 
-@pytest.mark.parametrize("kind", ["central", "heun", "gauss4", "ab3", "forward_euler"])
+@pytest.mark.parametrize("kind", thinned(["central", "heun", "gauss4", "ab3", "forward_euler"], 3))
 def test_the_bounds_of_the_times_of_events_hold(kind: str) -> None:
     made = beads([kind], [time_of(k, above=0.0) for k in (1, 2, 3)])
     record = analyse(made, [simulate(made, level) for level in made.levels])

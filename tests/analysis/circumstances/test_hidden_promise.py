@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import pytest
+from thinned import thinned
 
 from vibsim import Experiment, Verdict, analyse, simulate, verdicts
 
@@ -43,15 +44,18 @@ WEAK = {"kind": "oscillator", "spring": "u", "damping": {"linear": 1e-4}}
 
 @pytest.mark.parametrize(
     ("model", "initial", "levels", "scheme", "quantity", "promised", "shown"),
-    [
-        (SPRING, {"u": 1.0, "v": 0.5}, range(7, 12), "euler_cromer", "v", 1, 2),
-        (SPRING, {"u": 1.0, "v": 0.1}, range(8, 13), "euler_cromer", "v", 1, 2),
-        (SPRING, {"u": 1.0, "v": -0.003}, range(9, 13), "euler_cromer", "v", 1, 2),
-        (SPRING, {"u": 0.001, "v": 9.0}, range(8, 12), "euler_cromer_u_first", "u", 1, 2),
-        (WEAK, {"u": 1.0}, range(6, 11), "central_backward_damping", "u", 1, 2),
-        ({"kind": "pendulum"}, {"theta": 0.03}, range(6, 10), "rk4", "energy", 4, 5),
-        (SPRING, {"u": 1.0, "v": 0.01}, range(8, 12), "rkn4", "u_amplitude_error", 4, 5),
-    ],
+    thinned(
+        [
+            (SPRING, {"u": 1.0, "v": 0.5}, range(7, 12), "euler_cromer", "v", 1, 2),
+            (SPRING, {"u": 1.0, "v": 0.1}, range(8, 13), "euler_cromer", "v", 1, 2),
+            (SPRING, {"u": 1.0, "v": -0.003}, range(9, 13), "euler_cromer", "v", 1, 2),
+            (SPRING, {"u": 0.001, "v": 9.0}, range(8, 12), "euler_cromer_u_first", "u", 1, 2),
+            (WEAK, {"u": 1.0}, range(6, 11), "central_backward_damping", "u", 1, 2),
+            ({"kind": "pendulum"}, {"theta": 0.03}, range(6, 10), "rk4", "energy", 4, 5),
+            (SPRING, {"u": 1.0, "v": 0.01}, range(8, 12), "rkn4", "u_amplitude_error", 4, 5),
+        ],
+        3,
+    ),
 )
 def test_levels_that_show_a_higher_order_decide_nothing_against_the_promised_one(
     model: dict[str, Any],
@@ -76,6 +80,7 @@ def test_what_is_small_in_the_energy_is_small_in_the_motion_that_it_drives() -> 
     assert {(one.status, one.reason) for one in told} == {("INCONCLUSIVE", "pre_asymptotic")}
 
 
+@pytest.mark.slow
 def test_finer_levels_decide_for_the_promised_order() -> None:
     told = judged(
         SPRING, {"u": 1.0, "v": 0.5}, range(16, 21), "euler_cromer", "v", (1, "scheme", 2)
@@ -87,6 +92,7 @@ def test_finer_levels_decide_for_the_promised_order() -> None:
     ]
 
 
+@pytest.mark.slow
 def test_an_order_above_and_one_below_both_fail_all_the_same() -> None:
     above, below = judged(SPRING, {"u": 1.0, "v": 0.1}, range(8, 13), "euler_cromer", "v", (3, 0.5))
     assert (above.status, above.reason) == ("FAIL", "order_low")

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from counts import HEAD, tally
 from synthetic import EPSILON, TOLERANCE, Group, groups
+from thinned import thinned
 
 from vibsim.convergence import assessment, likely_powers
 from vibsim.convergence.assessment import Assessment, Decision, Question, assess, decide
@@ -170,7 +171,7 @@ def of_all(ladders: list[Ladder], question: Question) -> list[tuple[str, str]]:
 ROWS = ("gram", "floor", "numbers")
 
 
-@pytest.mark.parametrize("levels", [4, 5, 6])
+@pytest.mark.parametrize("levels", thinned([4, 5, 6], 3))
 @pytest.mark.parametrize(
     ("lower", "order", "shares"),
     [
@@ -196,7 +197,7 @@ def test_a_part_of_lower_order_counts_from_a_tenth_on(
         assert verdict == expected, (kind, share)
 
 
-@pytest.mark.parametrize("known", [True, False], ids=["exact", "unknown"])
+@pytest.mark.parametrize("known", thinned([True, False], 3), ids=["exact", "unknown"])
 @pytest.mark.parametrize(
     ("expected", "verdict"), [(4.0, (PASSES, "asymptotic")), (2.0, (FAILS, "order_high"))]
 )
@@ -309,6 +310,7 @@ def test_levels_with_another_limit_have_their_own_order() -> None:
     assert a.high[0] == pytest.approx(2.0, abs=0.05)
 
 
+@pytest.mark.slow
 def test_the_bound_of_noise_is_as_large_as_the_noise() -> None:
     for seed in range(20):
         rng = np.random.default_rng(seed)
@@ -407,6 +409,7 @@ def test_no_more_is_left_out_than_may_be(known: bool, left_out: float) -> None:
             assert np.max(off) <= left_out, name
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("expected", [None, 2.0])
 def test_a_decision_is_that_of_the_whole_posterior(expected: float | None) -> None:
     for group in groups(HELD_OUT, 9, 12):
@@ -550,6 +553,7 @@ def check(c: Counts) -> None:
     assert min(c.intervals, c.errors, c.best) >= 0.95 - margin, c
 
 
+@pytest.mark.slow
 def test_pipeline_and_error_model_are_counted_on_the_same_ladders(tmp_path: Path) -> None:
     pipeline, model = tally(HELD_OUT, tmp_path, number=5, size=6)
     assert pipeline.decidable == model.decidable > 0

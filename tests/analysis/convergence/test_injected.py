@@ -38,6 +38,7 @@ def test_proportional_series_have_the_sign_of_their_inner_product(norm: str) -> 
     assert opposite == -alike
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("known", [False, True])
 def test_a_change_of_sign_is_no_half_order(known: bool, tmp_path: Path) -> None:
     """At the finest level of h - 0.83 h^3 there is h; the last two ratios are those of h^(1/2) by accident."""
@@ -127,6 +128,7 @@ def test_a_wrong_order_to_a_wrong_limit_fails(part: float, tmp_path: Path) -> No
     assert found[1.0].reason == "wrong_limit"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("more", thinned([-0.12, -0.08, 0.08, 0.12], 3))
 def test_a_level_more_takes_no_verdict_away(more: float, tmp_path: Path) -> None:
     """The finest three levels pass with their errors; so do they with coarser ones before them."""

@@ -233,6 +233,7 @@ def held_out() -> list[Tried]:
     return tried(HELD_OUT)
 
 
+@pytest.mark.slow
 def test_bounds_hold_in_95_percent_of_a_large_random_set(held_out: list[Tried]) -> None:
     known = [one for one in held_out if one.known]
     assert len(held_out) > 10_000

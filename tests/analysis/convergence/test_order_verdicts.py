@@ -123,6 +123,7 @@ def noise_like(size: float, seed: int) -> np.ndarray:
     return size * np.random.default_rng(seed).normal(size=len(T))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("growth", [0.5, 1.5])
 def test_a_floor_in_the_ladder_leaves_the_window_before_it(growth: float) -> None:
     levels = tuple(range(6, 16))
@@ -268,6 +269,7 @@ def stacked(rows: list[Evidence], shape: tuple[int, ...]) -> Evidence:
     return dataclasses.replace(rows[0], **arrays)
 
 
+@pytest.mark.slow
 def test_many_ladders_at_once_are_judged_as_one_by_one() -> None:
     rng = np.random.default_rng(9)
     rows = []
@@ -481,6 +483,7 @@ def test_every_line_of_the_table_of_cases(case: str) -> None:
         assert decide(fields, FOUR, **others) == otherwise, fact
 
 
+@pytest.mark.slow
 def test_no_line_of_the_table_of_cases_can_go(monkeypatch: pytest.MonkeyPatch) -> None:
     """Without any one of them, some ladder of the table above is judged otherwise."""
     cases, believed, needed, lines = verdict._cases, verdict._believed, set(), []
@@ -530,6 +533,7 @@ def test_three_levels_must_be_proportional_however_wide_the_tolerance() -> None:
     assert decide(turned, THREE, tolerance=0.5) == UNDECIDED
 
 
+@pytest.mark.slow
 def test_ladders_judged_together_are_judged_as_alone() -> None:
     rng = np.random.default_rng(11)
     groups: dict[tuple[int, ...], list[Truth]] = {}

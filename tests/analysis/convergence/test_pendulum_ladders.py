@@ -27,6 +27,7 @@ def decide(levels: range, quantity: str, **more: Any) -> tuple[str, str, float]:
     )
 
 
+@pytest.mark.slow
 def test_the_reference_gives_the_numbers_of_the_issue() -> None:
     for level, value in THETA_AT_20.items():
         for three_term in (False, True):

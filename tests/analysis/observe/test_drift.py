@@ -122,6 +122,7 @@ def pushed(state, t, dt, p, acceleration, slopes):  # type: ignore[no-untyped-de
     return (u * (1.0 + 1e-12), v * (1.0 + 1e-12)), own
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("steps", [2000, 100_000])
 def test_a_small_drift_is_above_that_rounding(monkeypatch: pytest.MonkeyPatch, steps: int) -> None:
     """RK4 loses p^6/72 at each step; Crank-Nicolson pushed by 1e-12 at each gains that much."""

@@ -229,6 +229,7 @@ def without_truth(record: Record) -> Record:
     return Record(record.coords, kept, record.attrs)
 
 
+@pytest.mark.slow
 def test_members_of_a_sweep_have_the_bits_that_they_have_alone() -> None:
     sweep = {"initial.theta": [0.5, 1.0, 2.5]}
     together = pendulum(["central", "rk4"], sweep=sweep).record
@@ -337,6 +338,7 @@ def test_parts_of_another_name_and_of_motions_with_events() -> None:
     assert "unknown quantity" in text
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("asked", ["u_phase_error", "u_amplitude_error"])
 def test_a_large_run_that_is_asked_for_one_part_alone_is_judged(asked: str) -> None:
     """Beyond 2^14 samples a part that no check asks for is not there; what the parts say is then left out."""
@@ -350,6 +352,7 @@ def test_a_large_run_that_is_asked_for_one_part_alone_is_judged(asked: str) -> N
     assert "The phase is of" not in found.verdicts[0].text
 
 
+@pytest.mark.slow
 def test_the_order_of_a_part_is_promised_where_theory_has_it_and_expected_elsewhere() -> None:
     parts = [
         {"converges": "u_phase_error", "order": "scheme"},
