@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from vibsim.report.figures.svg import document
+from vibsim.report.figures import drawing
 from vibsim.report.style import COLOURS, GREY, MARKERS, applied, canvas
 
 ROW, MARGIN = 0.2, 0.9
@@ -25,4 +25,4 @@ def matrix(faults: list[str], caught: dict[str, list[bool]]) -> str:
         axes.set_xticks(range(len(caught)), [""] * len(caught))
         axes.set_yticks(range(len(faults)), faults)
         axes.tick_params(colors=GREY, labelcolor="black", length=0.0)
-        return document(figure, "faults")
+        return drawing.svg(figure, "faults")

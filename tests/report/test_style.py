@@ -126,6 +126,23 @@ def test_a_legend_has_its_lines_above_a_figure_too(height):
         assert drawing.svg(figure, "legend").count('stroke="#123456"') == 2
 
 
+def test_a_label_with_a_place_of_its_own_stays_clear_of_wide_numbers():
+    numbers = [3.00000001, 3.00000002, 3.00000003]
+    lefts = []
+    for texts in (["3"] * 3, [f"{number:.8f}" for number in numbers]):
+        with style.applied():
+            figure = style.canvas(2.0)
+            axes = figure.add_axes((0.1, 0.1, 0.8, 0.8))
+            axes.plot([0, 1, 2], numbers)
+            axes.set_yticks(numbers, texts)
+            axes.set_ylabel("amplitude")
+            axes.yaxis.set_label_coords(-0.05, 0.5)
+            (label,) = re.findall(r"<text[^>]*>amplitude", drawing.svg(figure, "label"))
+        lefts.append(float(re.search(r"(?:translate\(| x=\")(-?[\d.]+)", label)[1]))
+    # a digit is 5.4 points wide
+    assert lefts[1] < lefts[0] - 9 * 5.0 + 0.05 * 0.8 * style.WIDTH * 72.0
+
+
 def test_ids_of_a_figure_are_unique_and_references_resolve(documents):
     ids = re.findall(r'\bid="([^"]*)"', documents[0])
     used = set(re.findall(r'(?:url\(#|href="#)([^")]+)', documents[0]))

@@ -252,18 +252,22 @@ class Writer(RendererBase):  # type: ignore[misc, unused-ignore]
             self._body.append(f'<path d="{path}" {look}/>')
 
     def _label(self, ax: Any, axis: Any, i: int, numbers: tuple[float, float]) -> None:
-        """Draw the label of an axis, beyond the numbers of its ticks unless it has a place of its own."""
+        """Draw the label of an axis beyond the numbers of its ticks, of y not nearer than its own place if it has one."""
         if not axis.label.get_text():
             return
+        which, near = (("x", "bottom"), ("y", "left"))[i]
+        room = RC[f"{which}tick.major.size"] if axis.get_tick_params().get(near, True) else 0.0
+        widest, size = numbers
+        if size:
+            room += RC[f"{which}tick.major.pad"]
+            room += size * (ASCENT + DESCENT) if i == 0 else widest
+        edge = (ax.bbox.y0 if i == 0 else ax.bbox.x0) - room - axis.labelpad
         if axis._autolabelpos:
-            which, near = (("x", "bottom"), ("y", "left"))[i]
-            room = RC[f"{which}tick.major.size"] if axis.get_tick_params().get(near, True) else 0.0
-            widest, size = numbers
-            if size:
-                room += RC[f"{which}tick.major.pad"]
-                room += size * (ASCENT + DESCENT) if i == 0 else widest
-            room += axis.labelpad
-            axis.label.set(**({"y": ax.bbox.y0 - room} if i == 0 else {"x": ax.bbox.x0 - room}))
+            axis.label.set(**{"yx"[i]: edge})
+        elif i == 1:
+            to_figure = axis.label.get_transform()
+            x, y = to_figure.transform(axis.label.get_position())
+            axis.label.set_position(to_figure.inverted().transform((min(x, edge), y)))
         axis.label.draw(self)
 
     def _legend(self, legend: Any) -> None:
