@@ -1,11 +1,13 @@
-"""The catalogue of the two source texts, ``docs/catalogue.md``: ``python workflow/catalogue.py [--check]``.
+"""The catalogue of the two source texts: ``python workflow/catalogue.py [--check]``.
 
-Written from ``docs/catalogue.yaml``, which lists what the texts describe and where they are wrong, and from the claims
-of the shipped experiments. It holds no number that a run would have to measure.
+It is the page ``docs/catalogue.md``, and for the index of results the experiments of each section. Both are written
+from ``docs/catalogue.yaml``, which lists what the texts describe and where they are wrong, and from the claims of the
+shipped experiments. They hold no number that a run would have to measure.
 """
 
 from __future__ import annotations
 
+import json
 import re
 import sys
 from collections.abc import Iterator, Sequence
@@ -21,6 +23,8 @@ from vibsim.report.text import assertions
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGE = ROOT / "docs" / "catalogue.md"
+SECTIONS = ROOT / "vibsim" / "report" / "templates" / "sections.json"
+"""What the index of results knows of the texts (`vibsim.report.page.source_sections`)."""
 TEXTS = ("pendulum lecture", "vibration text")
 PROVIDED = "PROVIDED"
 EXERCISES = "Exercises"
@@ -30,13 +34,13 @@ HEAD = """# The two source texts, section by section
 
 What the pendulum lecture and the vibration text describe, and which experiment shows it. To find an equation, a
 figure or an exercise, search this page for `(42)`, `figure 6` or `exercise 12`.
-`.venv/bin/vibsim run NAME` runs an experiment. Its page has the measured numbers, and `results/index.html` has those
-of every statement.
+`.venv/bin/vibsim run NAME` runs an experiment, and `make catalogue` runs all of them. The page of an experiment has the
+measured numbers, and `results/index.html` has those of every statement whose experiment has run.
 
 | badge | meaning |
 |---|---|
-| CONFIRMED | an experiment shows it; a statement is decided by the check that is named |
-| CORRECTED | the text is wrong, or leaves a condition out; `Correct:` says what is right, `Refuted:` what is refuted |
+| CONFIRMED | an experiment shows it; where a check is named behind the experiment, it decides |
+| CORRECTED | the text is wrong, or leaves a condition out. `Correct:` and italics are right, `Refuted:` is not |
 | OPEN | something is missing, and the row says what |
 | PROVIDED | a command or a page does what the text asks for; nothing is measured |
 
@@ -58,6 +62,8 @@ class Row:
     badge: str
     told: str
     """What is true, what is missing, or what decides."""
+    see: str = ""
+    """The command, or the page of the documentation, that it leads to."""
 
 
 def experiments() -> dict[str, Experiment]:
@@ -107,7 +113,8 @@ def rows(listed: dict[str, Any], known: dict[str, Experiment]) -> Iterator[Row]:
         measured = CONFIRMED if thing.get("shown_by") else PROVIDED
         badge = OPEN if "open" in thing else measured
         shown = ", ".join(_places(thing))
-        yield Row(thing["source"], str(number), thing["says"], shown, badge, thing.get("open", ""))
+        told, see = (thing.get(key, "") for key in ("open", "see"))
+        yield Row(thing["source"], str(number), thing["says"], shown, badge, told, see)
     for number, row in listed["errata"].items():
         badge, told = CONFIRMED, row.get("confirmed")
         if told is None:
@@ -129,7 +136,9 @@ def rows(listed: dict[str, Any], known: dict[str, Experiment]) -> Iterator[Row]:
                 badge, told = CORRECTED, f"Correct: {check.note}. Refuted: {decides}"
             elif source != check.source:
                 badge, told = CORRECTED, f"Correct: {decides}"
-            yield Row(source, "", check.claim, _link(f"{name}#{check.id}"), badge, told)
+            is_ours = badge == CORRECTED and check.holds
+            says = f"*{check.claim.replace('*', '&ast;')}*" if is_ours else check.claim
+            yield Row(source, "", says, _link(f"{name}#{check.id}"), badge, told)
 
 
 def unnamed(found: Sequence[Row], known: dict[str, Experiment]) -> Iterator[Row]:
@@ -179,11 +188,50 @@ def _line(row: Row) -> str:
     return "| " + " | ".join(cell.replace("|", "\\|").replace("\n", " ") for cell in cells) + " |"
 
 
+def _every_row(listed: dict[str, Any], known: dict[str, Experiment]) -> list[Row]:
+    found = list(rows(listed, known))
+    return [*found, *unnamed(found, known)]
+
+
+def sections(listed: dict[str, Any], known: dict[str, Experiment]) -> str:
+    """Return the sections and the exercises of both texts with the experiments that belong to each, as JSON."""
+    found: dict[tuple[str, str], dict[str, Any]] = {}
+    for text, titles in listed["sections"].items():
+        for number, title in titles.items():
+            ends = listed["equations"][text].get(number)
+            equations = [f"({i})" for i in range(ends[0], ends[1] + 1)] if ends else []
+            found[text, number] = _section(text, f"section {number}", title, equations)
+        for number in range(1, 24) if text == "vibration text" else ():
+            found[text, f"exercise {number}"] = _section(text, f"exercise {number}", "", [])
+    for row in _every_row(listed, known):
+        text, under = _heading(row)
+        cited = citation.fields(row.source)
+        assert cited is not None
+        exercise = re.match(r"\d+", cited["exercise"] or "")
+        keys = [number for number in under if number != EXERCISES]
+        for key in (*keys, *([f"exercise {exercise[0]}"] if exercise else [])):
+            names = re.findall(r"\(\.\./configs/([\w/]+)\.yaml\)", row.shown)
+            found[text, key]["experiments"].update(dict.fromkeys(names))
+            if cited["figure"]:
+                found[text, key]["words"].update({f"figure {cited['figure']}": None})
+            found[text, key]["see"].update({row.see: None} if row.see else {})
+    content = [
+        {key: list(value) if isinstance(value, dict) else value for key, value in one.items()}
+        for one in found.values()
+    ]
+    return "".join(("[\n", ",\n".join(json.dumps(one) for one in content), "\n]\n"))
+
+
+def _section(text: str, place: str, title: str, words: Sequence[str]) -> dict[str, Any]:
+    """Return a section without experiments; dictionaries stand for sets that keep their order."""
+    names: dict[str, Any] = {"text": text, "place": place, "title": title}
+    return {**names, "words": dict.fromkeys(words), "experiments": {}, "see": {}}
+
+
 def page(listed: dict[str, Any], known: dict[str, Experiment]) -> str:
     """Return the page."""
     found: dict[str, dict[str, list[Row]]] = {text: {} for text in TEXTS}
-    whole = list(rows(listed, known))
-    for row in (*whole, *unnamed(whole, known)):
+    for row in _every_row(listed, known):
         text, sections = _heading(row)
         for section in sections:
             found[text].setdefault(section, []).append(row)
@@ -237,19 +285,20 @@ def _exercise(row: Row) -> list[int]:
 
 
 def main(arguments: list[str], path: Path = PAGE) -> int:
-    """Write the page, or with ``--check`` say whether it is current; return 1 if it is not, or if a list is wrong."""
+    """Write both, or with ``--check`` say whether they are current; return 1 if one is not, or if a list is wrong."""
     listed, known = data(), experiments()
     wrong = faults(listed, known)
     if wrong:
         print(*wrong, sep="\n")
         return 1
-    text = page(listed, known)
+    texts = {path: page(listed, known), SECTIONS: sections(listed, known)}
     if "--check" not in arguments:
-        path.write_text(text, encoding="utf-8")
+        for file, text in texts.items():
+            file.write_text(text, encoding="utf-8")
         return 0
-    is_current = path.is_file() and path.read_text("utf-8") == text
-    print("the catalogue is current" if is_current else f"{path.name} is not current")
-    return 0 if is_current else 1
+    stale = [f.name for f, text in texts.items() if not f.is_file() or f.read_text("utf-8") != text]
+    print(*(f"{name} is not current" for name in stale) if stale else ["the catalogue is current"])
+    return 1 if stale else 0
 
 
 if __name__ == "__main__":

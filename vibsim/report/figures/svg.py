@@ -252,7 +252,7 @@ class Writer(RendererBase):  # type: ignore[misc, unused-ignore]
             self._body.append(f'<path d="{path}" {look}/>')
 
     def _label(self, ax: Any, axis: Any, i: int, numbers: tuple[float, float]) -> None:
-        """Draw the label of an axis beyond the numbers of its ticks, of y not nearer than its own place if it has one."""
+        """Draw the label of an axis beyond the numbers of its ticks, or at its own place if they leave it free."""
         if not axis.label.get_text():
             return
         which, near = (("x", "bottom"), ("y", "left"))[i]

@@ -15,7 +15,7 @@ from vibsim.core.vocabulary import SEVERITY, worst
 from vibsim.experiment import citation
 from vibsim.experiment.collection import ADHOC, SITE
 from vibsim.report import words
-from vibsim.report.page import history, source_statements
+from vibsim.report.page import history, source_sections, source_statements
 from vibsim.report.page.templates import digest_of, environment, source
 from vibsim.report.tables import source_figures
 from vibsim.report.tables.table import Column, Table, to_csv
@@ -126,6 +126,7 @@ def write_index(results: Path) -> None:
         "shipped": [(key, list(group)) for key, group in groupby(shipped, lambda r: r.collection)],
         "figures": source_figures.listed(results, sorted(folders)),
         "statements": source_statements.listed((row.name, row.link, row.checks) for row in rows),
+        "sections": source_sections.listed({row.key: row.link for row in rows if row.link}),
         "site": f"{SITE}/index.html" if (results / SITE / "index.html").is_file() else "",
         "history": history.FILE,
         "script": source("index.js"),

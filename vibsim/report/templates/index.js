@@ -31,17 +31,23 @@
   }
   if (!search) return;
 
-  // filter and search
+  // filter and search: a number is looked for as a whole, so that section 3 is not 2.3
+  const fits = (text, word) => /^\(?[\d.]+\)?$/.test(word)
+    ? text.split(/[^\w.()]+/).includes(word) : text.includes(word);
+  const sections = document.querySelector("#sections"), lines = all("li[data-search]", sections);
   const show = () => {
     const tags = buttons.filter((b) => b.getAttribute("aria-pressed") === "true").map((b) => b.dataset.tag);
     const words = search.value.toLowerCase().split(/\s+/).filter(Boolean);
     let count = 0;
     for (const card of cards) {
       const own = card.dataset.tags.split("|");
-      const fits = (!tags.length || tags.some((tag) => own.includes(tag))) && words.every((word) => card.dataset.search.includes(word));
-      card.hidden = !fits;
-      count += fits;
+      const isShown = (!tags.length || tags.some((tag) => own.includes(tag))) && words.every((word) => fits(card.dataset.search, word));
+      card.hidden = !isShown;
+      count += isShown;
     }
+    const found = lines.filter((line) => { line.hidden = !words.every((word) => fits(line.dataset.search, word)); return !line.hidden; });
+    if (words.length) sections.open = found.length > 0 && (count === 0 || /\d/.test(search.value));
+    count += words.length ? found.length : 0;
     for (const section of all("section")) {
       const inside = all(".card", section);
       section.hidden = inside.length ? inside.every((card) => card.hidden) : Boolean(tags.length || words.length);

@@ -1,0 +1,45 @@
+"""The sections and exercises of the source texts, each with its experiments, for the index of results."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from vibsim.report.page.templates import source
+
+FILE = "sections.json"
+"""Among the templates; ``workflow/catalogue.py`` writes it."""
+
+
+@dataclass(frozen=True)
+class Section:
+    """A section or an exercise of a text."""
+
+    heading: str
+    search: str
+    """What a search looks through, in small letters."""
+    see: list[str]
+    """Commands, and pages of the documentation."""
+    experiments: list[tuple[str, str]]
+    """Name without its collection, and the link of its page; that is empty where the experiment has not run."""
+
+
+def listed(links: Mapping[str, str]) -> list[tuple[str, list[Section]]]:
+    """Return the texts with their sections, in order.
+
+    Parameters
+    ----------
+    links
+        The pages of the experiments that have run, by ``collection/name``.
+    """
+    found: dict[str, list[Section]] = {}
+    for one in json.loads(source(FILE)):
+        heading = f"{one['place'].capitalize()} {one['title']}".rstrip()
+        words = (one["text"], heading, *one["words"], *one["experiments"])
+        experiments = [
+            (name.rpartition("/")[2], links.get(name, "")) for name in one["experiments"]
+        ]
+        section = Section(heading, " ".join(words).lower(), one["see"], experiments)
+        found.setdefault(one["text"], []).append(section)
+    return list(found.items())
