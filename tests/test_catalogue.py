@@ -230,10 +230,15 @@ def test_every_exercise_has_an_answer_that_runs_and_passes_through_checks_that_e
             assert full in (checks if check else known()), f"{name}{check}"
 
 
-@pytest.mark.parametrize("note", [1, 2, 4, 5])
-def test_an_answered_note_has_a_picture(note: int) -> None:
-    """Note 3 asks how many faults are caught: it has numbers."""
-    (text,) = (part for part in EXERCISES if part.startswith(f"Note [hpl {note}]"))
+@pytest.mark.parametrize(
+    "head",
+    [
+        *(f"Note [hpl {i}]" for i in range(1, 6)),
+        *(f"{number}." for number in (6, 7, 12, 18, 19, 20, 21, 22, 23)),
+    ],
+)
+def test_what_asks_for_a_picture_has_one(head: str) -> None:
+    (text,) = (part for part in EXERCISES if part.startswith(head))
     assert re.search(r"^!\[.+\]\(images/exercises-.+\.svg\)$", text, re.MULTILINE)
 
 

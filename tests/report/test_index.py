@@ -59,7 +59,7 @@ def test_an_empty_results_folder_has_an_index(tmp_path):
 
 def test_the_index_links_to_the_documentation_where_it_has_been_built(tmp_path):
     report.write_index(tmp_path)
-    assert "docs/" not in (tmp_path / "index.html").read_text()
+    assert "docs/index.html" not in (tmp_path / "index.html").read_text()
     (tmp_path / "docs").mkdir()
     (tmp_path / "docs/index.html").write_text("a page")
     report.write_index(tmp_path)

@@ -264,15 +264,14 @@ def test_extrema_do_not_depend_on_what_is_stored(samples):
             assert data[kind + name].dims == ("scheme", "extremum")
             np.testing.assert_array_equal(data[kind + name], every_step[kind + name])
         assert (data[f"{kind}_count"] == np.isfinite(data[kind]).sum("extremum")).all()
-    assert data.sizes["extremum"] == 129
+    assert data.sizes["extremum"] == MOST_EXTREMA
     largest = every_step.theta[:, 1:-1].max("t")
     np.testing.assert_array_equal(data.peak_grid.max("extremum"), largest)
 
 
 def test_among_many_members_fewer_extrema_are_kept_and_all_are_counted():
-    assert extrema_kept(2**20, 1) == MOST_EXTREMA
-    assert extrema_kept(6, 10**6) == 4
-    assert extrema_kept(2**20, 10**6) == FEWEST_EXTREMA
+    assert extrema_kept(1) == MOST_EXTREMA
+    assert extrema_kept(10**6) == FEWEST_EXTREMA
     swept = experiment(
         sweep={"model.g": {"linspace": [1, 2, 2000]}},
         time={"end": 100.0},

@@ -145,7 +145,10 @@ def describe(f: Found, check: StableCheck) -> Description:
         f"Scheme {f.scheme_name} is {'stable' if f.reason == 'match' else 'unstable'} at level {level}"
         f"{f', where w dt = {number(p, 4)}' if math.isfinite(p) else ''}."
     )
-    sentence += growth_in_words(f, *factors)
+    if f.reason == "unstable" and _is_at_limit(f, p):
+        sentence += " This is its limit, at which the amplitude grows in proportion to the time."
+    else:
+        sentence += growth_in_words(f, *factors)
     if f.reason == "match" and _always_grows(f):
         sentence += _vanishing(f, factors)
     if time:
@@ -153,6 +156,14 @@ def describe(f: Found, check: StableCheck) -> Description:
     if f.reason == "mismatch":
         sentence += " Prediction and measurement disagree, so this is not the scheme that the theory describes."
     return Description(sentence, _advice(f, level, p, time))
+
+
+def _is_at_limit(f: Found, p: float) -> bool:
+    """Tell whether a step is the longest for which the scheme may be stable."""
+    if "stability_limit" not in f.record:
+        return False
+    limit = float(f.record["stability_limit"][f.scheme, f.case])
+    return abs(p - limit) <= LIMIT_ROUNDING * limit
 
 
 def _always_grows(f: Found) -> bool:

@@ -288,7 +288,7 @@ def load_of(experiment: ExperimentSpec, level: int) -> Load:
         exact=len(model.states) if has_exact and not lean else 0,
         work=sum(explicit for explicit, _ in works),
         iterated=sum(iterated for _, iterated in works),
-        extrema=0 if lean else extrema_kept(steps, experiment.trajectories),
+        extrema=0 if lean else extrema_kept(experiment.trajectories),
         events=event_times(experiment),
         d2t=experiment.own_velocity or not lean,
         own=shared + whole,

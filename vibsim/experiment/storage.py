@@ -64,13 +64,13 @@ def is_lean(samples: int | str, coarsest: int, trajectories: int) -> bool:
     return samples in ("auto", "common") and trajectories * (coarsest + 1) > LEAN
 
 
-def extrema_kept(steps: int, trajectories: int) -> int:
-    """Return how many peaks, and how many troughs, a level with `steps` keeps of every scheme and member.
+def extrema_kept(trajectories: int) -> int:
+    """Return how many peaks, and how many troughs, a level keeps of every scheme and member.
 
-    There cannot be more than half as many as steps. Among many `trajectories` (schemes times members) fewer are kept,
-    so that they take no more room than a series does (`SMALL`); all are counted.
+    It is the same number on every level. Among many `trajectories` (schemes times members) fewer are kept, so that they
+    take no more room than a series does (`SMALL`); all are counted.
     """
-    return _fewer(min(steps // 2 + 1, MOST_EXTREMA), trajectories)
+    return _fewer(MOST_EXTREMA, trajectories)
 
 
 def events_kept(trajectories: int) -> int:

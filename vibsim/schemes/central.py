@@ -27,7 +27,7 @@ acceleration without damping at n, every step of ``u'' + D(u') = a(u, t)`` is ``
   has the sign of ``r = 2 d + dt^2 a``, so ``s = 2 r/(1 + sqrt(1 + c |r|))`` and ``kick = dt^2 a - c |s| s/4``;
 - any damping at the backward difference, ``D(d/dt)``: ``kick = dt^2 a(u^n, d/dt, t^n)`` with D in a.
 
-Source: pendulum lecture (A), equations (7)-(11) and section 3; vibration text (B), equations (7)-(8), (64) and (71),
+Source: pendulum lecture (A), equations (7)-(11) and section 3; vibration text (B), equations (7)-(8), (62) and (69),
 sections 2.1 and 8.2, and exercise 16. Compensated summation: E. Hairer, C. Lubich and G. Wanner, Geometric Numerical
 Integration, section VIII.5.
 """

@@ -96,7 +96,7 @@ def simulate_record(
     group = members(experiment, start, experiment.members if stop is None else stop)
     steps, every = experiment.steps(level), storage.sampling(experiment, level)
     is_lean, wanted = is_bounded(experiment), stored_series(experiment)
-    kept = extrema_kept(steps, experiment.trajectories)
+    kept = extrema_kept(experiment.trajectories)
     of_states = {state.name for state in model.states}.union(ENERGIES)
     of_states |= {output.name for output in model.outputs}
     found = solve(
@@ -144,7 +144,6 @@ def simulate_record(
     coords = coordinates(model, names, group, steps, every, same_end=not experiment.end_varies)
     coords |= _table((), [("level", np.array(level, dtype=np.int16), "level", "1")])
     if found.extrema:
-        # levels keep different numbers of them; with their numbers xarray can put levels side by side
         places = np.arange(found.extrema.peak.shape[-1], dtype=np.int32)
         words = "number of the peak or trough, from 0"
         coords |= _table(("extremum",), [("extremum", places, words, "1")])
@@ -342,7 +341,7 @@ def _extrema(model: Model, found: Extrema) -> dict[str, Variable]:
         table |= _table(
             (*MEMBER, "extremum"), ((row[0], getattr(found, row[0]), *row[1:]) for row in rows)
         )
-        name, words = f"{kind}_count", f"number of {kind}s, those that are not kept among them"
+        name, words = f"{kind}_count", f"number of {kind}s, including those that are not stored"
         table |= _table(MEMBER, [(name, getattr(found, name), words, "1")])
     return table
 

@@ -107,7 +107,7 @@ class Setting:
         known = len(quantities(self.model)) if self.model else 0
         # with the running maximum of the energy deviation
         series = max(known, _SMALLEST_MODEL) + 1 + (_D2T if d2t else 0)
-        extrema = extrema_kept(steps, self.trajectories)
+        extrema = extrema_kept(self.trajectories)
         events = events_kept(self.trajectories) if has_events else 0
         return Load(
             self.scheme_count,
