@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import json
 import re
 import runpy
 from functools import cache
@@ -140,6 +141,17 @@ def test_every_section_leads_to_what_shows_it(text: str, section: str) -> None:
     part = PAGE.partition(f"## {text.capitalize()}\n")[2].partition("\n## ")[0]
     lines = part.partition(f"\n### {section} ")[2].partition("\n### ")[0]
     assert re.search(r"\| (CONFIRMED|CORRECTED|OPEN|PROVIDED) \|", lines)
+
+
+def test_the_index_knows_an_experiment_or_a_page_for_every_section_and_exercise() -> None:
+    listed = json.loads(CATALOGUE["SECTIONS"].read_text("utf-8"))
+    places = {(one["text"], one["place"]) for one in listed}
+    assert places >= {(t, f"section {s}") for t, named in SECTIONS.items() for s in named.split()}
+    assert places >= {("vibration text", f"exercise {number}") for number in range(1, 24)}
+    for one in listed:
+        parts = any(place.startswith(f"{one['place']}.") for _, place in places)
+        assert one["experiments"] or one["see"] or parts, one
+        assert set(one["experiments"]) <= known().keys()
 
 
 @pytest.mark.parametrize(("text", "count"), [("pendulum lecture", 15), ("vibration text", 118)])

@@ -6,6 +6,7 @@ the code. The site opens from its folder, without a server or a network, and so 
 
 from __future__ import annotations
 
+import os
 import re
 import site
 import sys
@@ -34,11 +35,17 @@ html_copy_source = False
 html_show_sphinx = False
 html_extra_path = ["index.html"]
 html_show_copyright = False
+EXPERIMENT = re.compile(r"\]\((?:\.\./)*configs/\w+/(\w+)\.yaml\)")
 
 
 def fill(app: Any, name: str, content: list[str]) -> None:
-    """Put what the code says behind the pages of the reference, and the pages of the index into the side bar."""
+    """Put what the code says behind the pages of the reference, and the pages of the index into the side bar.
+
+    Links to experiment files lead to their place in the reference.
+    """
     folder, _, page = name.rpartition("/")
+    to_experiments = os.path.relpath("docs/reference/experiments.md", folder or ".")
+    content[0] = EXPERIMENT.sub(rf"]({to_experiments}#\1)", content[0])
     if folder == "docs/reference":
         content[0] += "\n" + reference.page(page)
     if name == root_doc:

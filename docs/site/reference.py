@@ -9,6 +9,7 @@ import json
 import re
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from pathlib import Path
 from typing import Any
 
 from xarray import Dataset
@@ -29,6 +30,7 @@ from vibsim.experiment.value_names import VALUES
 from vibsim.models import MODELS
 from vibsim.schemes import SCHEMES
 
+CONFIGS = Path(__file__).resolve().parents[2] / "configs"
 Lines = Iterator[str]
 Schema = Mapping[str, Any]
 
@@ -52,6 +54,18 @@ def table(head: Iterable[str], rows: Iterable[Iterable[str]]) -> Lines:
 def labelled(rows: Iterable[Row]) -> Lines:
     """Yield what a command prints of one entry, as a table."""
     yield from table(("", ""), ((label, plain(text)) for label, text in rows))
+
+
+def experiments() -> Lines:
+    """Yield every shipped experiment: its title, where it stands in a text, and its file."""
+    for path in sorted(CONFIGS.glob("*/*.yaml")):
+        experiment = Experiment.from_yaml(path)
+        source = f" ({experiment.source})" if experiment.source else ""
+        yield from (f"## {path.stem}", "", plain(f"{experiment.title}{source}."), "")
+        yield f"`vibsim run {path.stem}` (`configs/{path.parent.name}/{path.name}`)"
+        lines = path.read_text("utf-8").splitlines()
+        written = [line for line in lines if not line.startswith("# yaml-language-server")]
+        yield from ("", "```yaml", *written, "```", "")
 
 
 def models() -> Lines:
@@ -291,6 +305,7 @@ def link(schema: Schema, name: str) -> str:
 
 PAGES: Mapping[str, Callable[[], Lines]] = {
     "experiment-file": experiment_file,
+    "experiments": experiments,
     "models": models,
     "schemes": schemes,
     "theory": theory,

@@ -15,7 +15,7 @@ from test_page import make, read
 from vibsim import report, store
 from vibsim.experiment import citation
 from vibsim.report import words
-from vibsim.report.page import cards, history
+from vibsim.report.page import cards, history, source_sections
 from vibsim.report.page.index import Headline, headline
 
 
@@ -64,6 +64,19 @@ def test_the_index_links_to_the_documentation_where_it_has_been_built(tmp_path):
     (tmp_path / "docs/index.html").write_text("a page")
     report.write_index(tmp_path)
     assert 'href="docs/index.html"' in (tmp_path / "index.html").read_text()
+
+
+def test_sections_of_the_texts_lead_to_pages_that_are_there_and_name_the_other_experiments():
+    (lecture, sections), (text, others) = source_sections.listed(
+        {"pendulum_lab/theta_convergence": "page.html"}
+    )
+    assert (lecture, text) == ("pendulum lecture", "vibration text")
+    (found,) = (one for one in sections if one.heading.startswith("Section 2.4 "))
+    assert dict(found.experiments) == {"theta_convergence": "page.html", "three_arithmetics": ""}
+    (found,) = (one for one in others if one.heading == "Exercise 12")
+    assert found.experiments == [("amplitude_errors", "")]
+    (found,) = (one for one in others if one.heading.startswith("Section 5.4 "))
+    assert "figure 7" in found.search
 
 
 @pytest.mark.usefixtures("without_pictures")
