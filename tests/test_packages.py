@@ -143,6 +143,7 @@ def test_without_packages_the_printed_schema_is_that_which_is_shipped(
     assert capsys.readouterr().out == shipped.read_text("utf-8")
 
 
+@pytest.mark.slow
 def test_keys_bounds_and_units_are_those_of_the_package(installed: Path) -> None:
     wrong = {"kind": "cart_pendulum", "M": "0 kg", "L": "1 kg", "mass": 1.0}
     with pytest.raises(InputError) as refused:

@@ -100,6 +100,7 @@ def test_numbers_of_the_spring() -> None:
             assert bound < 0.01 * max(abs(number), 1.0)
 
 
+@pytest.mark.slow
 def test_a_jump_of_the_force_that_no_level_shows_is_part_of_every_bound() -> None:
     """Just behind a point of all levels it comes too early on each, by the same; u = 0.4 cos t + F (1 - cos(t - s))."""
     start, end, strength = 1.2501, 2.5, 1.3

@@ -177,6 +177,7 @@ def test_a_constant_force_moves_the_place_of_rest_only() -> None:
     assert [verdict.reason for verdict in run.verdicts] == ["asymptotic", "exact"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("per_period", thinned([10, 20, 40], 3))
 def test_what_is_exact_is_seen_where_the_true_motion_has_few_samples(per_period: int) -> None:
     # a quintic between 10 samples of a period is off by 1e-6: that is laid to the measurement, not to the scheme

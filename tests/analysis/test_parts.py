@@ -297,6 +297,7 @@ def test_without_an_exact_solution_only_errors_are_unknown(
     assert [v.status for v in verdicts(experiment, found)]
 
 
+@pytest.mark.slow
 def test_what_no_level_can_tell_is_said_of_what_is_kept_of_parts() -> None:
     """Of friction with a spring of its own nothing is known; of the undamped one the exact solution is."""
     for alpha, is_said in ((0.5, True), (0.0, False)):

@@ -103,6 +103,7 @@ def test_a_sound_scheme_never_fails(case: dict[str, Any]) -> None:
     assert status != "FAIL", reason
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("levels", "theta", "omega", "end"),
     thinned([(range(12, 17), 3.1415926, 1.0, 1.0), (range(10, 15), math.pi - 1e-8, 2.0, 1.0)], 2),

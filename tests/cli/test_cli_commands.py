@@ -138,6 +138,7 @@ def test_several_levels_are_made_in_one_go_at_the_places_of_the_plan(
     assert main(["simulate", *common, "--level", "5", "6", "--out", str(alone)]) == 2
 
 
+@pytest.mark.slow
 def test_a_failing_shard_names_its_members_and_the_other_levels_are_made(
     file: Path, tmp_path: Path, capsys: Capture, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -308,6 +309,7 @@ def test_unknown_formats_are_refused_first(file: Path, tmp_path: Path, capsys: C
     assert "gif: unknown format: choose from svg, png, pdf" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_a_dry_run_makes_no_folder(file: Path, tmp_path: Path) -> None:
     new = tmp_path / "new"
     ended = vibsim("run", file, "--results", new, "--dry-run", "--cores", "1")

@@ -89,6 +89,7 @@ def test_a_shell_that_is_there_accepts_its_script(shell: str, tmp_path: Path) ->
     subprocess.run([shell, "-n", str(script)], check=True)
 
 
+@pytest.mark.slow
 def test_bash_gets_the_words(tmp_path: Path) -> None:
     command = tmp_path / "vibsim"
     command.write_text(f'#!/bin/sh\nexec {sys.executable} -m vibsim "$@"\n')

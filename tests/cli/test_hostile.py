@@ -118,6 +118,7 @@ def small_disk(tmp_path: Path, kilobytes: int) -> Iterator[Path]:
         yield folder
 
 
+@pytest.mark.slow
 def test_a_full_disk_is_named(file: Path, tmp_path: Path) -> None:
     file.write_text(TEXT.replace("7]", "10]"))
     for kilobytes in (4, 24):

@@ -178,6 +178,7 @@ def test_a_terminal_is_told_how_many_frames_there_are(
     assert "frame 2 of 2" in terminal.getvalue()
 
 
+@pytest.mark.slow
 def test_results_of_another_experiment_are_shown_with_a_note(
     made: Made, tmp_path: Path, capsys: Capture
 ) -> None:

@@ -47,6 +47,7 @@ def test_what_is_commented_out_is_accepted_too(kind: str, tmp_path: Path) -> Non
     assert Experiment.from_yaml(file).members > 1
 
 
+@pytest.mark.slow
 def test_the_schema_line_works_anywhere(tmp_path: Path) -> None:
     file = tmp_path / "mine.yaml"
     assert main(["new", str(file)]) == 0

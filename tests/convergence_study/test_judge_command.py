@@ -253,6 +253,7 @@ def test_a_report_that_cannot_be_written_hides_no_verdict(
     assert "report:" not in captured.out
 
 
+@pytest.mark.slow
 def test_the_report_is_one_page_with_the_verdicts_beside_it(
     table: Callable[..., str], tmp_path: Path, capsys: Capture
 ) -> None:
@@ -331,6 +332,7 @@ def test_files_of_other_programs_are_judged(
         assert field["h_used"] == pytest.approx([factor / n for n in COUNTS])
 
 
+@pytest.mark.slow
 def test_a_limit_that_is_known_and_a_report_are_of_files_too(
     tmp_path: Path, capsys: Capture
 ) -> None:
@@ -396,6 +398,7 @@ def test_missing_values_of_a_file_are_not_finite(tmp_path: Path, capsys: Capture
     assert verdict["reason"] == "non_finite"
 
 
+@pytest.mark.slow
 def test_our_own_levels_are_judged_too(tmp_path: Path, capsys: Capture) -> None:
     file = tmp_path / "tiny.yaml"
     file.write_text(

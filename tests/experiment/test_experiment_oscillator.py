@@ -325,6 +325,7 @@ SWEEP = {
 }
 
 
+@pytest.mark.slow
 def test_every_member_has_its_own_numbers() -> None:
     """Against a file that writes the numbers of the member into its formulas."""
     swept = oscillator(

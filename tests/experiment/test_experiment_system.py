@@ -125,6 +125,7 @@ def test_a_system_without_parameters_runs_and_converges():
     ]
 
 
+@pytest.mark.slow
 def test_a_manufactured_motion_is_followed_by_every_state():
     exact = {"x": "sin(t)", "y": "exp(-t)*cos(2*t)"}
     checks = [{"converges": name, "order": 4} for name in ("x", "y", "vx", "vy")]

@@ -158,6 +158,7 @@ CHANGES = st.one_of(
 )
 
 
+@pytest.mark.slow
 @given(sound_sweeps())
 @QUIET
 def test_sound_sweeps(sweep: dict[str, Any]) -> None:

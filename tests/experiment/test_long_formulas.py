@@ -81,6 +81,7 @@ def test_a_long_formula_takes_bounded_work(kind: str, key: str, text: str, is_so
         assert "operations" in fault.rule or "too long" in fault.rule
 
 
+@pytest.mark.slow
 def test_many_calls_are_not_written_out_one_by_one() -> None:
     """Each call that becomes part of a kernel is a page of machine code: 282 of them took 38 s to compile."""
     few, many = (

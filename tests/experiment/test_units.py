@@ -79,6 +79,7 @@ def test_formula_before_a_unit() -> None:
     assert theta == build(initial={"theta": "2*pi/30"}).initial["theta"]
 
 
+@pytest.mark.slow
 @given(st.decimals(-1000, 1000, places=4))
 def test_a_decimal_is_rounded_once(value: object) -> None:
     """So that a number in millimetres is the double of the same decimal in metres."""

@@ -396,6 +396,7 @@ FORMULAS = st.recursive(
 )
 
 
+@pytest.mark.slow
 @given(FORMULAS)
 @settings(max_examples=150, deadline=None)
 def test_both_ways_give_the_same_bits(text: str) -> None:

@@ -111,6 +111,7 @@ def test_the_motion_is_that_of_the_equation_written_out_by_hand(name, case, righ
         assert abs(float(last) - series[-1]) < 1e-5 * size
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("without_references")
 def test_the_double_pendulum_by_masses_is_that_by_accelerations():
     one, other = (read(name) for name in ("double_pendulum", "double_pendulum_by_masses"))

@@ -65,6 +65,7 @@ def piece(i):
     return slope
 
 
+@pytest.mark.slow
 def test_a_system_follows_its_table_from_point_to_point(folder):
     experiment = read(folder)
     levels = [simulate(experiment, level) for level in experiment.levels]

@@ -92,6 +92,7 @@ def test_an_empty_panel_says_why_and_a_caption_names_only_what_is_drawn(changes,
     assert not [word for word in absent if word in picture.caption]
 
 
+@pytest.mark.slow
 def test_a_caption_names_the_dotted_line_where_it_is_drawn():
     scheme = {"kind": "central", "arithmetic": "three_term"}
     exp = samples.experiment(schemes=[scheme], levels=[10, 12, 14, 16], samples="common")

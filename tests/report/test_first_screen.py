@@ -359,6 +359,7 @@ def test_the_best_value_has_as_many_digits_as_its_bound():
     assert len(digits) > 12
 
 
+@pytest.mark.slow
 def test_a_curve_over_the_sweep_counts_the_members_that_have_the_number():
     exp = samples.swept(16)
     record, _, decisive = found(exp)

@@ -138,6 +138,7 @@ def test_no_word_leaves_a_figure(case):
             assert not drawn_outside(picture.figure), picture.name
 
 
+@pytest.mark.slow
 def test_few_common_times_are_not_told_to_be_round_off():
     circuit = {"kind": "circuit", "L": 0.02, "R": 5.0, "C": 3e-5, "voltage": "12*cos(314.159*t)"}
     exp = spring(
@@ -235,6 +236,7 @@ def test_the_legend_of_work_and_precision_has_a_name_for_every_symbol():
         assert figure.bbox.x0 <= box.x0 <= box.x1 <= figure.bbox.x1, text.get_text()
 
 
+@pytest.mark.slow
 def test_coinciding_curves_are_told(few):
     exp, record = few
     with style.applied():
@@ -266,6 +268,7 @@ def test_several_promised_slopes_are_told_apart(few):
     assert {"1", "2"} <= {text.get_text() for text in figure.axes[0].texts}
 
 
+@pytest.mark.slow
 def test_what_is_left_out_is_named():
     exp = spring(schemes=MANY, levels=[0, 1])
     _, told = gallery.choose(exp, samples.record(exp))

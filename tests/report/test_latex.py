@@ -83,6 +83,7 @@ def written_characters() -> list[str]:
     return sorted({latex.escape(chr(i)) for i in range(LAST + 1)})
 
 
+@pytest.mark.slow
 def test_every_character_is_printed_in_ascii() -> None:
     for written in written_characters():
         assert written.isascii()

@@ -62,6 +62,7 @@ def test_a_lean_record_makes_a_page_without_series(tmp_path, sweep, figures, tim
     assert (tmp_path / "whole.csv").read_bytes() == (tmp_path / "tables/members.csv").read_bytes()
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("without_pictures")
 def test_the_worst_members_are_listed_with_their_command(tmp_path):
     exp = samples.experiment(sweep={"model.g": {"logspace": [1.0, 1e6, 20]}})

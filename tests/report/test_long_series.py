@@ -63,6 +63,7 @@ def test_what_grows_without_bound_leaves_its_panel_and_hides_nothing():
     assert "nan" not in text
 
 
+@pytest.mark.slow
 def test_a_very_long_run_keeps_its_extremes_and_a_small_figure():
     picture, text = drawn(periods=1000)
     assert len(text) < 400_000
@@ -87,6 +88,7 @@ def test_every_point_of_a_curve_is_in_the_page():
     assert len(re.findall(r"[ML]", path[1])) == line.get_xdata().size == 801
 
 
+@pytest.mark.slow
 def test_there_are_at_most_so_many_panels():
     picture, _ = drawn(periods=12, levels=tuple(range(8)), steps=8)
     assert len(picture.figure.axes) == MOST + 1

@@ -60,6 +60,7 @@ def test_a_floor_above_round_off_is_not_called_round_off() -> None:
     assert "have reached round-off" not in found.text
 
 
+@pytest.mark.slow
 def test_what_is_round_off_is_called_so() -> None:
     plain = {"kind": "central", "arithmetic": "three_term", "label": "central"}
     _, record = made(range(10, 19), schemes=[plain], samples="common")

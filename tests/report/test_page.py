@@ -157,6 +157,7 @@ def test_the_page_says_what_was_found(plain):
         assert part in text, part
 
 
+@pytest.mark.slow
 def test_a_trap_is_named_with_both_orders(trapped):
     page = trapped / "report.html"
     text = " ".join(read(page).text)
@@ -293,6 +294,7 @@ def test_a_ladder_lost_in_round_off_shows_what_is_there(tmp_path):
     assert "lost in round-off" in text
 
 
+@pytest.mark.slow
 def test_uneven_levels_are_rescaled_so_that_they_coincide():
     exp = samples.experiment(levels=[8, 9, 11, 12])
     curves = time.differences(samples.record(exp), "theta", Member(0, 0, "central"))
@@ -324,6 +326,7 @@ def test_all_kinds_of_experiments_make_a_page(tmp_path, changes, parts):
         assert part in text, part
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("unrendered")
 def test_a_claim_has_its_source_and_its_measure(tmp_path):
     claim = {
@@ -406,6 +409,7 @@ def test_the_rescaled_curves_are_those_that_are_stored():
     np.testing.assert_array_equal([c.values for c in curves], record["theta_rescaled"][0, 0])
 
 
+@pytest.mark.slow
 def test_a_promise_of_order_zero_makes_a_page(tmp_path):
     exp = samples.plain()
     record = samples.record(exp)
@@ -432,6 +436,7 @@ def test_a_model_without_exact_solution_and_period_makes_a_page(tmp_path, change
     assert not re.search(r"\bnan\b", text)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("unrendered")
 def test_a_quantity_has_one_name_on_the_page(tmp_path):
     checks = [

@@ -80,6 +80,7 @@ def test_members_are_named_in_words(key, told):
     assert words.swept(key) == told
 
 
+@pytest.mark.slow
 def test_members_of_a_sweep_have_panels_of_their_own():
     _, rec, shown, picture = drawn(sweep={"model.gamma": [0.0, 0.5]})
     titles = [ax.get_title() for ax in picture.figure.axes]
@@ -98,6 +99,7 @@ def test_a_body_at_rest_and_one_coordinate_have_no_path():
     assert choice.position(exp) == "theta"
 
 
+@pytest.mark.slow
 def test_of_many_coordinates_the_one_that_decides_is_drawn_and_no_path():
     """A path of the first two of a chain says nothing of its motion."""
     chain = {

@@ -335,6 +335,7 @@ def test_a_spectrum_shows_the_frequency_that_theory_knows() -> None:
     assert w[np.argmax(amplitudes)] == pytest.approx(2.02, abs=2.0 * np.pi / 100.0)
 
 
+@pytest.mark.slow
 def test_a_poincare_section_has_a_point_a_period() -> None:
     exp = samples.experiment(
         model={"kind": "duffing", "delta": 0.3, "gamma": 0.2, "omega": 1.2}, initial={"u": 1.0},

@@ -202,6 +202,7 @@ def test_lines_stand_out_from_light_and_dark_paper(which):
         assert contrast(colour, PAPERS[which]) >= least, name
 
 
+@pytest.mark.slow
 def test_a_page_replaces_the_colour_of_every_line_of_its_figures(documents, tmp_path):
     exp = samples.several()
     record = samples.record(exp)
@@ -229,6 +230,7 @@ def test_axes_make_no_artists_for_ticks_until_somebody_draws_them():
     assert [line.get_clip_box() is None for line in lines] == [False, False]
 
 
+@pytest.mark.slow
 @settings(deadline=None)
 @given(st.floats(1e-12, 1e12), st.floats(1e-7, 3.0), st.sampled_from([3, 5, 7]))
 def test_no_two_ticks_of_an_axis_read_alike(low, wide, most):

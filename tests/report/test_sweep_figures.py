@@ -72,6 +72,7 @@ def across():
     return exp, samples.record(exp)
 
 
+@pytest.mark.slow
 def test_a_grid_has_every_member_in_its_cell(across):
     _, record = across
     grid = sweep_layout.grid_of(sweep_layout.keys(record))
@@ -258,6 +259,7 @@ def test_a_sample_of_three_keys_is_shown_against_each(cloud):
         assert labels == ["initial θ [rad]", "g [m s⁻²]", "L [m]"]
 
 
+@pytest.mark.slow
 def test_shares_add_up_to_one_and_count_every_member(cloud, monkeypatch):
     exp, record = cloud
     monkeypatch.setattr(members, "SHARES", 4)

@@ -66,6 +66,7 @@ def test_two_swept_keys_are_a_map_that_is_filled():
     assert area == pytest.approx(thumbnail.WIDTH * thumbnail.HEIGHT, rel=0.02)
 
 
+@pytest.mark.slow
 def test_a_body_in_the_plane_has_its_path_with_equal_scales():
     exp = samples.experiment(
         model={"kind": "elastic_pendulum", "beta": 0.9, "Theta": 30.0}, initial={}, checks=[]

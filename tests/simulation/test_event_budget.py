@@ -58,6 +58,7 @@ def assert_order_of_budget(
         assert last < exact or np.log2(first / last) / 2.0 > order - missing, kind
 
 
+@pytest.mark.slow
 def test_what_friction_takes_is_its_force_times_the_exact_path() -> None:
     m, k, mu, u, v, end = 1.7, 2.3, 0.04, 1.1, -0.4, 60.0
     made = Experiment.from_dict(
@@ -155,6 +156,7 @@ def test_the_budget_of_a_driven_body_that_sticks_now_and_then(schemes: list[str]
     assert_order_of_budget(schemes, coarse, fine, 1e-12, 0.35)
 
 
+@pytest.mark.slow
 def test_the_budget_of_a_damped_and_driven_body_that_strikes_a_stop() -> None:
     """Damping and force between the impacts are summed piece by piece, from event to event."""
     content = {

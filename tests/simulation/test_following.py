@@ -41,6 +41,7 @@ def alone(settings: dict[str, Any], case: int, u: float, v: float) -> Experiment
     return Experiment.from_dict({**rest, **settings, "model": model, "initial": {"u": u, "v": v}})
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("steps_per_period", "every"),
     [
@@ -99,6 +100,7 @@ def test_a_member_that_breaks_down_stops_its_chain_alone() -> None:
     )
 
 
+@pytest.mark.slow
 def test_levels_are_compared_and_no_exact_solution_is_pretended() -> None:
     linear = {"kind": "duffing", "delta": 0.1, "beta": 0.0, "gamma": 1.0}
     time = {"periods": 4, "steps_per_period": 32, "frequency": "model.omega"}

@@ -113,6 +113,7 @@ def test_a_large_entry_is_not_kept(home: Path, monkeypatch: pytest.MonkeyPatch) 
     assert [path.name[0] for path in entries(home)] == ["a"]
 
 
+@pytest.mark.slow
 def test_a_folder_that_cannot_be_written_changes_nothing(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -36,6 +36,7 @@ def same_time(path: Path, harm: Any) -> None:
     os.utime(path, ns=(status.st_atime_ns, status.st_mtime_ns))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "name",
     [n if n.startswith("fig") else pytest.param(n, marks=pytest.mark.slow) for n in END_PRODUCTS],

@@ -138,6 +138,7 @@ def test_jobs_are_grouped_to_minutes_and_long_ones_are_not(place: Place) -> None
     assert made("[6, 32]") == [("simulate", 3), (None, 6)]
 
 
+@pytest.mark.slow
 def test_what_takes_seconds_is_finished_here(place: Place) -> None:
     def groups(here: int, *names: str) -> tuple[bool, str | None]:
         config = {"experiments": [str(place.file), *names], "here": here}

@@ -45,6 +45,7 @@ WORDS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("old", "new", "told"), thinned(WORDS.values(), 4), ids=WORDS)
 def test_a_dry_run_says_in_words_what_changed(place: Place, old: str, new: str, told: str) -> None:
     place.change(old, new)
@@ -79,6 +80,7 @@ def test_only_a_change_of_the_code_is_left_where_the_settings_are_the_same(
     assert reasons.why(newer, place.results).endswith(" -> 99.0")
 
 
+@pytest.mark.slow
 def test_a_run_says_first_what_changed(place: Place, capsys: pytest.CaptureFixture[str]) -> None:
     command._tell_changes(plans_of([str(place.file)]), place.results)
     assert capsys.readouterr().err == ""

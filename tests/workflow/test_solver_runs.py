@@ -387,6 +387,7 @@ def analysed(study: Study, name: str) -> tuple[int, str]:
     return ended.returncode, ended.stderr
 
 
+@pytest.mark.slow
 def test_numbers_that_are_not_finite_are_data(study: Study) -> None:
     study.write("nan", BROKEN.replace("fails", "nan"))
     assert analysed(study, "nan") == (0, "")
@@ -396,6 +397,7 @@ def test_numbers_that_are_not_finite_are_data(study: Study) -> None:
     assert here("report", study.file("nan"), "--results", study.results).returncode == 0
 
 
+@pytest.mark.slow
 def test_levels_of_other_shapes_are_named(study: Study) -> None:
     study.write("shape", BROKEN.replace("fails", "shape"))
     status, error = analysed(study, "shape")
@@ -403,6 +405,7 @@ def test_levels_of_other_shapes_are_named(study: Study) -> None:
     assert error.startswith("vibsim: u: level 2 (from the coarsest): has the dimensions row")
 
 
+@pytest.mark.slow
 def test_a_damaged_level_is_made_again(study: Study) -> None:
     path = study.of("command") / "level_01/shard_0000.nc"
     path.write_bytes(path.read_bytes()[:-1])

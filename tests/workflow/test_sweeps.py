@@ -31,6 +31,7 @@ def empty(tmp_path: Path) -> Place:
     return Place(tmp_path)
 
 
+@pytest.mark.slow
 def test_shards_of_a_level_are_jobs_of_their_own(empty: Place) -> None:
     write(empty, "model.L: {linspace: [1, 2, 300]}", LARGE)
     shards = [f"level_23/shard_000{n}" for n in range(3)]

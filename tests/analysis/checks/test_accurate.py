@@ -69,6 +69,7 @@ def l2(values: Any, spacing: float) -> float:
 # -- the error ---------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_a_known_error_is_the_true_one() -> None:
     """The closed solution of centred differences is cos(w~ t), w~ dt/2 = asin(w dt/2), at common times 10/64 apart."""
     (found,) = asked(SPRING, {"accurate": "u", "relative": 1e-3})
@@ -165,6 +166,7 @@ def test_numbers_beside_what_is_asked_have_the_digits_that_tell_them_apart(
 SMALL, TINY = {"accurate": "theta", "relative": 0.1}, {"accurate": "theta", "relative": 1e-9}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("with_exact", thinned([True, False], 2))
 def test_a_small_error_passes_and_a_large_one_fails_with_the_level_that_reaches_it(
     with_exact: bool,
@@ -267,6 +269,7 @@ def test_what_is_unstable_or_not_finite_fails() -> None:
     assert (found.status, found.reason) == ("FAIL", "non_finite")
 
 
+@pytest.mark.slow
 def test_where_there_is_no_error_nothing_is_judged() -> None:
     still = {**PENDULUM, "initial": {"theta": 0.0}}
     (found,) = asked(still, {"accurate": "theta", "absolute": 1.0})

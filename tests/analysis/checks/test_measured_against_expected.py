@@ -269,6 +269,7 @@ def test_a_claim_that_cannot_be_decided() -> None:
         assert (found.status, found.reason) == ("INCONCLUSIVE", "too_few_levels")
 
 
+@pytest.mark.slow
 def test_a_sweep_lists_the_worst_ten_and_counts_all() -> None:
     values = [0.01 * (i + 1) for i in range(25)]
 
@@ -319,6 +320,7 @@ def test_the_summary_has_the_keys_of_the_design() -> None:
     assert check["text"].endswith(result["sentence"])
 
 
+@pytest.mark.slow
 def test_known_causes_are_named() -> None:
     start = [{"kind": "central", "start": "first_order"}]
     (found,) = run({"converges": "theta"}, schemes=start, **TRAP)

@@ -82,6 +82,7 @@ def test_the_pilot_alone_passes(swept: Experiment) -> None:
     assert verdict.counts["PASS"] == len(tried)
 
 
+@pytest.mark.slow
 def test_the_bounds_are_those_of_the_extrapolated_solution(
     swept: Experiment, convergence: Record
 ) -> None:

@@ -279,6 +279,7 @@ def test_what_is_exact_may_differ_smoothly_within_round_off(size: float, reason:
     assert np.isnan(found.order[0]) == (reason == "exact")
 
 
+@pytest.mark.slow
 def test_what_is_conserved_exactly_passes_as_exact() -> None:
     check = {"converges": "energy_deviation"}
     run = spring(["crank_nicolson", "gauss4"], check, {"converges": "energy"}, levels=LADDER)
@@ -345,6 +346,7 @@ def test_wrong_weights_do_not_reach_the_exact_solution(monkeypatch: pytest.Monke
     assert run.verdicts[0].reason in {"wrong_limit", "order_high"}
 
 
+@pytest.mark.slow
 def test_adaptive_schemes_have_errors_and_no_orders() -> None:
     adaptive = {"kind": "dop853", "tolerance": [1e-6, 1e-10]}
     names = ["dop853_1e-06", "dop853_1e-10"]

@@ -174,6 +174,7 @@ def test_the_worst_are_the_beginning_of_the_ranking(seed: int) -> None:
     assert len(Results(found)) == len(list(Results(found))) == found.total
 
 
+@pytest.mark.slow
 def test_the_summary_of_a_sweep_tells_where_and_how_to_run_a_member_alone() -> None:
     experiment = SWEEPS["ends"]
     record = analyse_records(experiment, simulated(experiment))

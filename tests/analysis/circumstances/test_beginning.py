@@ -110,6 +110,7 @@ def test_euler_cromer_gains_an_order_from_rest_and_where_no_force_acts(
     assert [np.broadcast_to(row, len(STARTS)).tolist() for row in found] == orders
 
 
+@pytest.mark.slow
 def test_numerovs_method_gains_two_orders_from_rest() -> None:
     """The series of its frequency has no second power, that of the velocity has one."""
     kind = {"kind": "newmark", "beta": "1/12"}

@@ -286,6 +286,7 @@ def test_a_jump_within_a_step_makes_no_wrong_limit(levels: list[int]) -> None:
     assert reasons <= {"asymptotic", "non_smooth", "pre_asymptotic"}
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("with_series")
 def test_a_wrong_limit_is_seen_beside_a_jump() -> None:
     made = Experiment.from_dict(JUMPS | {"levels": [4, 5, 6, 7, 8], "schemes": ["rk4"]})
@@ -311,6 +312,7 @@ def test_a_jump_in_the_last_step_makes_no_wrong_limit(scheme: str) -> None:
     assert "t = 1.7" in found.text
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("with_series")
 def test_a_jump_beside_a_point_of_all_levels_makes_no_wrong_limit() -> None:
     """It lies 0.005 of a step behind a point of level 10 and of every finer one: all of them take it to be there."""

@@ -59,6 +59,7 @@ def test_the_decay_is_named(scheme: str, strength: float) -> None:
     assert "will not help" not in found.advice
 
 
+@pytest.mark.slow
 def test_the_level_that_is_advised_sees_the_decay() -> None:
     made = experiment({"damping": {"linear": 500.0}}, {"v": 1.0}, schemes=["crank_nicolson"])
     coarse = judged(made)[0]

@@ -94,12 +94,14 @@ def test_corners_within_steps_are_told(folder: Path) -> None:
     assert np.isnan(left[2])
 
 
+@pytest.mark.slow
 def test_an_adaptive_scheme_finds_the_same_motion(folder: Path) -> None:
     made = experiment(100, ["rk4", {"kind": "dop853", "tolerance": 1e-10}], [], levels=[0, 5])
     u = simulate(made, 5)["u"].values[:, 0]
     assert np.abs(u[1] - u[0]).max() < 1e-6 * np.abs(u[0]).max()
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("with_series")
 def test_the_road_is_an_output(folder: Path) -> None:
     made = experiment(100, ["central"], [], levels=[0, 3])

@@ -321,6 +321,7 @@ def test_the_bound_of_noise_is_as_large_as_the_noise() -> None:
         assert true / 3.0 < a.error_bound[0] < 100.0 * true, seed
 
 
+@pytest.mark.slow
 def test_many_levels_can_be_judged() -> None:
     """More than a table of logarithms would hold."""
     h = 0.1 * 0.9 ** np.arange(101)

@@ -109,6 +109,7 @@ def test_three_levels_that_do_not_converge_get_three_times_their_range() -> None
     assert of(1.0, 1.1, 0.8) == pytest.approx(3 * 0.3)
 
 
+@pytest.mark.slow
 def test_a_fit_covers_noisy_levels() -> None:
     """Of levels that scatter about the limit, the index bounds the error of the finest one."""
     rng = np.random.default_rng(7)
