@@ -53,7 +53,9 @@ def test_a_refuted_statement_is_never_confirmed(
 ) -> None:
     ((heading, [row]),) = listed([("one", "one/report.html", [check(source, expected, status)])])
     assert (heading, row.badge) == ("b, section 2", badge)
-    assert (row.text, row.link) == ("it falls. The statement is true.", "one/report.html")
+    before = "What is right: " if source.startswith("correction") else ""
+    assert row.text == f"{before}it falls. The statement is true."
+    assert row.link == "one/report.html"
 
 
 def test_the_index_has_what_was_measured(tmp_path) -> None:

@@ -56,11 +56,11 @@ def listed(
 def _statement(
     check: Mapping[str, Any], source: Mapping[str, str | None], name: str, link: str
 ) -> Statement:
-    is_corrected = words.is_trap(check) or str(source["text"]).startswith(CORRECTION)
-    badge = CORRECTED if is_corrected else CONFIRMED
+    is_ours = str(source["text"]).startswith(CORRECTION)
+    badge = CORRECTED if is_ours or words.is_trap(check) else CONFIRMED
     return Statement(
         citation.place(source) if source["section"] else "",
-        str(check["text"]).removeprefix("Claim: "),
+        "What is right: " * is_ours + str(check["text"]).removeprefix("Claim: "),
         str(check["note"] or ""),
         badge if check["status"] == "PASS" else OPEN,
         name,
