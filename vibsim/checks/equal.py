@@ -21,14 +21,15 @@ from vibsim.experiment.schema.checks import SOLUTIONS, EqualCheck
 from vibsim.observe.member_block import MemberBlock
 
 FIELDS = {
-    "distance": Field("largest distance of the two solutions, in the unit of the quantity"),
-    "allowed": Field("how far they may be apart, in the unit of the quantity"),
+    "distance": Field("largest distance of the two solutions", unit_of="quantity"),
+    "allowed": Field("how far they may be apart", unit_of="quantity"),
     "motion": Field("whether anything moves in either", MOTION.type, MOTION.words),
     "level": LEVEL,
     "distance_over_time": Field(
-        "largest distance around each of evenly spaced places in time, in the unit of the quantity",
+        "largest distance around each of evenly spaced places in time",
         dims=("case", "place"),
         of_figure=True,
+        unit_of="quantity",
     ),
 }
 """Of other schemes than the first one that a check names, distances are NaN."""

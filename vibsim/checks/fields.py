@@ -32,6 +32,8 @@ class Field:
     dims: tuple[str, ...] = MEMBER
     of_figure: bool = False
     """Whether only its figure needs it: it is left out where no series are stored."""
+    unit_of: str = ""
+    """Whether it has the unit of the ``number`` or of the ``quantity`` of its check; empty where it has none."""
 
 
 STATUS = Field("status", np.int8, STATUSES)
@@ -46,17 +48,27 @@ def name_of(check: str, field: str) -> str:
 
 
 def variables(
-    check: str, fields: Mapping[str, Field], found: Mapping[str, Any], lean: bool
+    check: str,
+    fields: Mapping[str, Field],
+    found: Mapping[str, Any],
+    units: Mapping[str, str],
+    lean: bool,
 ) -> dict[str, Variable]:
     """Return what a check measured as variables: the values `found` of its fields.
 
-    Where no series are stored (`lean`) those are left out that only its figure needs.
+    Parameters
+    ----------
+    units
+        Of the number and the quantity of the check (`Field.unit_of`).
+    lean
+        Whether no series are stored. Then what only the figure of the check needs is left out.
     """
     table = {}
     for name, field in fields.items():
         if not (lean and field.of_figure):
             more = flags(field.words) if field.words else {}
-            attrs = attributes(f"check {check}: {field.meaning}", "1", **more)
+            unit = units.get(field.unit_of) or "1"
+            attrs = attributes(f"check {check}: {field.meaning}", unit, **more)
             values = np.asarray(found[name], dtype=field.type)
             table[name_of(check, name)] = Variable(field.dims, values, attrs, GROUP)
     return table

@@ -46,8 +46,20 @@ def check_variables(block: MemberBlock, compared: Compared) -> dict[str, Variabl
     for check in block.experiment.checks:
         kind = KINDS[check.measured.kind]
         found = kind.measure(block, compared, check.measured)
-        table |= variables(check.id, kind.fields, found, block.lean)
+        units = _units(block, compared, check.measured)
+        table |= variables(check.id, kind.fields, found, units, block.lean)
     return table
+
+
+def _units(block: MemberBlock, compared: Compared, check: Measurement) -> dict[str, str]:
+    """Return the units of the quantity and of the number that a check is about."""
+    known = {name: "" if q.units == "1" else q.units for name, q in compared.items()}
+    if check.kind == "value":
+        position = block.model.position
+        # UDUNITS has no roots: as elsewhere an L2 norm has the unit of its quantity
+        unit = value.unit_of_number(check, known, position, "s").removesuffix(" sqrt(s)")
+        return {"number": unit}
+    return {"quantity": known.get(getattr(check, "quantity", ""), "")}
 
 
 def judge(experiment: Experiment, record: Record, check: Measurement, id_: str) -> Outcome:

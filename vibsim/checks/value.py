@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -32,8 +32,10 @@ from vibsim.schemes.base import is_on_the_mesh
 from vibsim.simulation.scaled import has_time_unit
 
 FIELDS = {
-    "value": Field("the number, in its own unit"),
-    "error_bound": Field("bound of the error of the number where it is extrapolated"),
+    "value": Field("the number", unit_of="number"),
+    "error_bound": Field(
+        "bound of the error of the number where it is extrapolated", unit_of="number"
+    ),
     "levels_needed": Field(
         "finer levels that are probably needed, 0 where none mends it, -1 unknown", np.int8, none=-1
     ),
@@ -42,6 +44,7 @@ FIELDS = {
         "the number at every level; that of a step at the same time of every level",
         dims=("scheme", "case", "level"),
         of_figure=True,
+        unit_of="number",
     ),
 }
 DIRECTION_ASKED = {1.0: "rising", -1.0: "falling", 0.0: "neither rising nor falling throughout"}
@@ -208,7 +211,14 @@ def unit_of(experiment: Experiment, record: Record, check: ValueCheck) -> str:
 
     A scaled run, and a model without units, have none: the convergence Record says so.
     """
-    time, measure = ("s" if has_time_unit(record) else ""), check.number.measure
+    time = "s" if has_time_unit(record) else ""
+    position = experiment.model.definition.position
+    return unit_of_number(check, _known_units(record), position, time)
+
+
+def unit_of_number(check: ValueCheck, known: Mapping[str, str], position: str, time: str) -> str:
+    """Return the unit of the number of a check, from those of quantities and that of time; empty where it has none."""
+    measure = check.number.measure
     if check.take is not None and check.take not in ("largest", "smallest", "mean"):
         # a swept value has its own unit, a direction none
         return ""
@@ -216,8 +226,8 @@ def unit_of(experiment: Experiment, record: Record, check: ValueCheck) -> str:
     unit = of_time.get(measure, "") if time else ""
     if measure not in ("quantity", "l1", "l2", "position"):
         return unit
-    of = experiment.model.definition.position if measure == "position" else check.quantity
-    return f"{_known_units(record).get(of or '', '')} {unit}".strip()
+    of = position if measure == "position" else check.quantity
+    return f"{known.get(of or '', '')} {unit}".strip()
 
 
 def unit_of_quantity(record: Record, quantity: str) -> str:

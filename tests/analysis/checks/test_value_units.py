@@ -55,11 +55,21 @@ def test_units(check, unit):
     number = f" is {verdict.results[0].value:.10g}"
     told = f"{number} {unit}" if unit else number
     assert f"{told}; it is above -99." in verdict.text
+    # UDUNITS has no roots
+    in_file = unit.removesuffix(" sqrt(s)") or "1"
+    assert record.variable("check_check_1_value").attrs["units"] == in_file
+
+
+def test_a_distance_has_the_unit_of_its_quantity():
+    _, record = run({"equal": ["central", "exact"], "quantity": "omega", "atol": 1.0})
+    for name in ("distance", "allowed"):
+        assert record.variable(f"check_check_1_{name}").attrs["units"] == "rad s-1"
 
 
 def test_a_scaled_run_has_none():
     experiment, record = run({"value": "period", "above": 0.0}, scaled=True)
     assert unit_of(experiment, record, experiment.checks[0]) == ""
+    assert record.variable("check_check_1_value").attrs["units"] == "1"
 
 
 def test_a_counted_number_is_equal_without_a_tolerance():
