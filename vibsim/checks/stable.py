@@ -60,7 +60,7 @@ def measure(block: MemberBlock, compared: Compared, check: StableCheck) -> Measu
     p = np.broadcast_to(block.fastest[:, index], block.shape)
     limit, growth, broken = block.stability_limit, block.growth, block.failed[..., index]
     beyond = p > limit * (1.0 + LIMIT_ROUNDING)
-    at_limit = ~beyond & (p >= limit * (1.0 - LIMIT_ROUNDING))
+    at_limit = _is_at_limit(p, limit)
     grown = (growth[..., index] > BLOWN_UP) & (at_limit | ~_removed(growth, index))
     escaped = broken & ~beyond & _breaks_down_alike(block)
     found = _measured_growth(block, level)
@@ -145,7 +145,7 @@ def describe(f: Found, check: StableCheck) -> Description:
         f"Scheme {f.scheme_name} is {'stable' if f.reason == 'match' else 'unstable'} at level {level}"
         f"{f', where w dt = {number(p, 4)}' if math.isfinite(p) else ''}."
     )
-    if f.reason == "unstable" and _is_at_limit(f, p):
+    if f.reason == "unstable" and not time and f.model.linear and _is_at_limit(p, _limit(f)):
         sentence += " This is its limit, at which the amplitude grows in proportion to the time."
     else:
         sentence += growth_in_words(f, *factors)
@@ -158,18 +158,21 @@ def describe(f: Found, check: StableCheck) -> Description:
     return Description(sentence, _advice(f, level, p, time))
 
 
-def _is_at_limit(f: Found, p: float) -> bool:
-    """Tell whether a step is the longest for which the scheme may be stable."""
-    if "stability_limit" not in f.record:
-        return False
-    limit = float(f.record["stability_limit"][f.scheme, f.case])
-    return abs(p - limit) <= LIMIT_ROUNDING * limit
+def _is_at_limit(p: Floats, limit: Floats) -> Flags:
+    """Say where a step is the longest for which a scheme may be stable."""
+    low, high = limit * (1.0 - LIMIT_ROUNDING), limit * (1.0 + LIMIT_ROUNDING)
+    return np.asarray((p >= low) & (p <= high))
+
+
+def _limit(f: Found) -> Floats:
+    """Return the limit of w dt of a scheme; 0 where none is known."""
+    known = "stability_limit" in f.record
+    return np.asarray(f.record["stability_limit"][f.scheme, f.case] if known else 0.0)
 
 
 def _always_grows(f: Found) -> bool:
     """Tell whether a scheme has no limit of stability of its own, so that it grows at every step."""
-    place = f.scheme, f.case
-    return "stability_limit" not in f.record or bool(f.record["stability_limit"][place] == 0.0)
+    return bool(_limit(f) == 0.0)
 
 
 def _vanishing(f: Found, factors: tuple[float, float]) -> str:

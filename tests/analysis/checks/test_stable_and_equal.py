@@ -81,6 +81,18 @@ def test_a_factor_near_one_shows_its_growth() -> None:
     assert "vanishes" not in decays + neither
 
 
+def test_only_at_a_limit_that_there_is_growth_is_said_to_be_in_proportion_to_the_time() -> None:
+    words = "the amplitude grows in proportion to the time"
+    check = {"stable": False, "level": 0}
+    at = spring(["euler_cromer"], check, levels=(0,), time=at_limit(1.0)).verdicts[0]
+    assert (at.status, words in at.text) == ("PASS", True)
+    beyond = spring(["euler_cromer"], check, levels=(0,), time=at_limit(1.01)).verdicts[0]
+    assert (beyond.status, words in beyond.text) == ("PASS", False)
+    # its limit is infinite
+    none = spring(["crank_nicolson"], check, levels=(0,), time=at_limit(1.0)).verdicts[0]
+    assert words not in none.text
+
+
 def test_advice_on_stability_points_the_right_way() -> None:
     checks = [{"stable": False}, {"stable": True}]
     stable = spring(["central"], *checks, time=at_limit(0.9)).verdicts[0]
