@@ -28,6 +28,8 @@ SECTIONS = ROOT / "vibsim" / "report" / "templates" / "sections.json"
 TEXTS = ("pendulum lecture", "vibration text")
 PROVIDED = "PROVIDED"
 EXERCISES = "Exercises"
+MOST_CHECKS = 2
+"""So many checks of an experiment are written out."""
 WAYS = {"things": ("shown_by", "see", "open"), "errata": ("shown_by", "not_run")}
 """What a row of each list has at least one of."""
 HEAD = """# The two source texts, section by section
@@ -39,7 +41,7 @@ measured numbers, and `results/index.html` has those of every statement whose ex
 
 | badge | meaning |
 |---|---|
-| CONFIRMED | an experiment shows it; where a check is named behind the experiment, it decides |
+| CONFIRMED | an experiment shows it: the check that is named behind it decides, or else all checks of the experiment |
 | CORRECTED | the text is wrong, or leaves a condition out. `Correct:` and italics are right, `Refuted:` is not |
 | OPEN | something is missing, and the row says what |
 | PROVIDED | a command or a page does what the text asks for; nothing is measured |
@@ -114,6 +116,7 @@ def rows(listed: dict[str, Any], known: dict[str, Experiment]) -> Iterator[Row]:
         badge = OPEN if "open" in thing else measured
         shown = ", ".join(_places(thing))
         told, see = (thing.get(key, "") for key in ("open", "see"))
+        told = told or _decided_by(thing.get("shown_by", ()), known)
         yield Row(thing["source"], str(number), thing["says"], shown, badge, told, see)
     for number, row in listed["errata"].items():
         badge, told = CONFIRMED, row.get("confirmed")
@@ -146,7 +149,21 @@ def unnamed(found: Sequence[Row], known: dict[str, Experiment]) -> Iterator[Row]
     shown = " ".join(row.shown for row in found)
     for name, experiment in known.items():
         if str(experiment.source).startswith(TEXTS) and _link(name) not in shown:
-            yield Row(str(experiment.source), "", experiment.title, _link(name), CONFIRMED, "")
+            yield Row(str(experiment.source), "", experiment.title, _link(name), CONFIRMED, _decided_by([name], known))
+
+
+def _decided_by(places: Sequence[str], known: dict[str, Experiment]) -> str:
+    """Return what the checks measure that decide at some places; of many checks of an experiment the first ones."""
+    texts = []
+    for place in places:
+        name, _, wanted = place.partition("#")
+        checks = [check for check in known[name].checks if wanted in ("", check.id)]
+        of_each = (check.that if check.kind == "claim" else check for check in checks)
+        every = [assertions.measured(check) for check in of_each]
+        shown = every[:MOST_CHECKS] if len(every) > MOST_CHECKS + 1 else every
+        rest = len(every) - len(shown)
+        texts.append("; ".join([*shown, f"and {rest} more checks"] if rest else shown))
+    return ". ".join(dict.fromkeys(texts))
 
 
 def _places(row: dict[str, Any]) -> Iterator[str]:
