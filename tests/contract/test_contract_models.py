@@ -428,3 +428,17 @@ def test_one_equation_is_a_system() -> None:
     usual = {**content, "model": {"kind": "system", "acceleration": "(1 - u**2)*v - u"}}
     one, other = (first(simulate(build(each), 7), "u") for each in (content, usual))
     assert np.max(np.abs(one - other)) < 1e-13
+
+
+def test_a_chain_of_a_few_words_swings_in_its_lowest_mode() -> None:
+    content = content_of("system")
+    chain = {"x_i": {"acceleration": "x_(i+1) - 2*x_i + x_(i-1)"}}
+    content["model"] = {"kind": "system", "repeat": {"n": 16, "i": chain}}
+    content["initial"] = {"x_i": "sin(pi*i/17)"}
+    content["levels"] = [8, 9, 10]
+    end = content["time"]["end"]
+    w = 2.0 * np.sin(np.pi / 34)
+    found = simulate(build(content), 10)
+    for i in (1, 8, 16):
+        expected = np.sin(np.pi * i / 17) * np.cos(w * end)
+        assert first(found, f"x_{i}")[-1] == pytest.approx(expected, abs=1e-6)

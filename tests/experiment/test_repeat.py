@@ -131,3 +131,62 @@ def test_a_fault_of_a_repeated_formula_is_told_once_with_its_line(tmp_path):
     ]
     # the character that is named is one of what is written out
     assert caught.value.faults[0].value == "p2 - 2*q1 + q0"
+
+
+SHORT = {
+    "repeat": {"n": 3, "i": {"x_i": {"force": "k*(x_(i+1) - 2*x_i + x_( i - 1 )) - vx_i + f*i"}}},
+    "parameters": {"k": 2.0, "f": 0.5},
+}
+LONG = {
+    "repeat": {"i": [1, 3]},
+    "coordinates": ["x_{i}"],
+    "force": {"x_{i}": "k*(x_{i+1} - 2*x_{i} + x_{i-1}) - vx_{i} + f*{i}"},
+    "parameters": {"x_4": 0.0, "x_0": 0.0, "k": 2.0, "f": 0.5},
+}
+
+
+def test_a_short_chain_is_the_long_one_between_walls():
+    short = Experiment.from_dict(content(SHORT, initial={"x_i": "sin(pi*i/4)", "vx_2": 1}))
+    long = Experiment.from_dict(content(LONG, initial={"x_{i}": "sin(pi*{i}/4)", "vx_2": 1}))
+    assert canonical(short) == canonical(long)
+
+
+def test_beyond_the_ends_of_a_chain_stands_what_is_given():
+    ends = {"coordinates": {"x_4": {"force": "-x_4"}}}
+    parameters = {**SHORT["parameters"], "x_0": 0.25}
+    model = Experiment.from_dict(content({**SHORT, **ends, "parameters": parameters})).model
+    assert model.coordinates == ("x_1", "x_2", "x_3", "x_4")
+    assert model.parameters == {"parameters.k": 2.0, "parameters.f": 0.5, "parameters.x_0": 0.25}
+
+
+@pytest.mark.parametrize(
+    ("changes", "line", "told"),
+    [
+        ("n: many", 5, "model.repeat.n: many: must be a whole number from 1 to 64"),
+        ("n: 65", 5, "model.repeat.n: 65: must be a whole number from 1 to 64"),
+        ("n: 3, m: 4", 5, "model.repeat.m: 4: must be [first, last]"),
+    ],
+)
+def test_a_fault_of_a_chain_has_its_line(changes, line, told, tmp_path):
+    path = tmp_path / "chain.yaml"
+    head = "title: t\nmodel:\n  kind: system\n  repeat: {\n"
+    tail = (
+        "\n    ,i: {\n  x_i: {force: -x_i}}}\ntime: {end: 1}\nlevels: [4, 5, 6]\nschemes: [rk4]\n"
+    )
+    path.write_text(f"{head}    {changes}{tail}")
+    with pytest.raises(InputError) as caught:
+        Experiment.from_yaml(path)
+    fault = caught.value.faults[0]
+    assert (fault.line, told in str(fault)) == (line, True), str(caught.value)
+
+
+def test_an_unknown_name_in_a_chain_is_told_where_it_stands(tmp_path):
+    path = tmp_path / "chain.yaml"
+    path.write_text(
+        "title: t\nmodel:\n  kind: system\n  repeat:\n    n: 4\n    i:\n      x_i: {force: -y_i}\n"
+        "initial: {x_i: i*q}\ntime: {end: 1}\nlevels: [4, 5, 6]\nschemes: [rk4]\n"
+    )
+    with pytest.raises(InputError) as caught:
+        Experiment.from_yaml(path)
+    told = [(fault.line, fault.key) for fault in caught.value.faults]
+    assert told == [(7, "model.repeat.i.x_i.force"), (8, "initial.x_i")]

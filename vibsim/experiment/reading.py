@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from vibsim.core.errors import Fault, InputError, nearest
+from vibsim.experiment.chain import with_chain
 from vibsim.experiment.collection import collection_of
 from vibsim.experiment.data import ExperimentSpec, ModelSpec, Sweep, TimeSpec
 from vibsim.experiment.faults import MISSING, Report, shorten
@@ -129,7 +130,7 @@ def build(
     """
     report = Report(source, kinds)
     check_names(name, collection, report)
-    source = with_other_forms(with_repeats(source, report), report)
+    source = with_other_forms(with_repeats(with_chain(source, report), report), report)
     document = read_document(source, report)
     folder = file.parent if file else Path()
     equation, numbers, setting = _equation_and_setting(document, source, folder, report)

@@ -51,7 +51,8 @@ def with_repeats(source: Source, report: Report) -> Source:
     found = {**data, "model": writer.mapping(("model",), model, ("model",))}
     if isinstance(data.get("initial"), Mapping):
         found["initial"] = writer.mapping(("initial",), data["initial"], ("initial",))
-    report.source = replace(source, data=found, origins=writer.origins)
+    written = {out: source.origin(path) or path for out, path in writer.origins.items()}
+    report.source = replace(source, data=found, origins={**source.origins, **written})
     return report.source
 
 

@@ -257,8 +257,9 @@ def model_section(model: Model) -> type[Section]:
         words = "the equation of one coordinate, such as u'' + u = 0, in place of its acceleration"
         fields["equation"] = (Text | None, Field(default=None, description=words))
         words = "indices with first and last value: every key and entry with {i} in it is written out for each i"
-        indices = Field(default=None, description=words)
-        fields["repeat"] = (dict[str, tuple[int, int]] | None, indices)
+        words += "; or a chain {n: 16, i: {x_i: ...}} with the formulas of each coordinate"
+        ends = tuple[int, int] | int | dict[str, Coordinate]
+        fields["repeat"] = (dict[str, ends] | None, Field(default=None, description=words))
     for field in model.formulas:
         names = ", ".join((*field.names, "parameters"))
         if model.named is not None:
