@@ -175,6 +175,7 @@ def test_the_energy_of_the_model_belongs_to_its_acceleration(installed: Path) ->
     assert abs(data.energy_deviation).max() < 1e-12 * data.energy.max()
 
 
+@pytest.mark.slow
 def test_its_scheme_has_its_theory_and_the_same_bits_in_every_lane(installed: Path) -> None:
     model, scheme = MODELS["cart_pendulum"], SCHEMES["ralston"]
     stepper = scheme.stepper({})

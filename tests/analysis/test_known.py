@@ -105,6 +105,7 @@ def test_the_budget_is_known_no_better_than_the_energy():
     assert np.all(floor >= 1e-17 * energy)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("norm", ["l2", "linf"])
 def test_a_single_level_without_an_exact_solution_has_its_numbers_and_no_order(norm):
     # no row at all whose directions could be compared

@@ -195,6 +195,7 @@ def test_any_dictionary(changes: dict[str, Any]) -> None:
     attempt(lambda: Experiment.from_dict(content(**changes)))
 
 
+@pytest.mark.slow
 @given(CHANGES)
 @QUIET
 def test_any_yaml(changes: dict[str, Any]) -> None:

@@ -238,6 +238,7 @@ def test_compiled_and_plain_give_the_same_bits(name, kind):
         np.testing.assert_array_equal(one.series.deviation_running, other.series.deviation_running)
 
 
+@pytest.mark.slow
 def test_names_of_users_are_no_names_of_kernels():
     """Words that the text of a kernel, Python or C has for something else."""
     names = ("p", "math", "samples", "int", "vector", "stats", "double", "_u"[1:], "state", "run")

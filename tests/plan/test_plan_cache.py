@@ -125,6 +125,7 @@ assert not heavy, heavy
 """
 
 
+@pytest.mark.slow
 def test_cached_plans_load_without_reading_a_file_again(tmp_path: Path) -> None:
     for number in range(20):
         (tmp_path / f"e{number}.yaml").write_text(TEXT + f"# {number}\n")

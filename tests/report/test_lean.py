@@ -7,6 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 import samples
+from thinned import thinned
 
 from vibsim import report
 from vibsim.core.record import Record, Variable
@@ -37,11 +38,11 @@ def lean(record, times):
 @pytest.mark.parametrize("times", [pytest.param(True, marks=pytest.mark.slow), False])
 @pytest.mark.parametrize(
     ("sweep", "figures"),
-    [
+    thinned([
         (ACROSS, {"map_theta_order_0", "map_theta_error_0", "map_period_0", "spread_theta"}),
         ({"initial.theta": {"linspace": [0.1, 3.1, 12]}}, {"period", "amplitude", "sweep_order_theta"}),
         ({"initial.theta": [0.5, 3.0], "model.g": [1.0, 400.0, 1e6]}, {"sweep_error_theta", "period"}),
-    ],
+    ], 3),
 )  # fmt: skip
 def test_a_lean_record_makes_a_page_without_series(tmp_path, sweep, figures, times):
     exp = samples.experiment(sweep=sweep)

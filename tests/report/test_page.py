@@ -305,7 +305,7 @@ def test_uneven_levels_are_rescaled_so_that_they_coincide():
 
 @pytest.mark.parametrize(
     ("changes", "parts"),
-    [
+    thinned([
         ({"time": {"periods": 3, "steps_per_period": 16}, "levels": [3, 4, 5],
           "sweep": {"initial.theta": [0.5, 1.0, 2.0], "model.g": [1.0, 9.81]}},
          ["differs between members", "model.g = 1 m s⁻²", "theta swept", "g swept"]),
@@ -314,7 +314,7 @@ def test_uneven_levels_are_rescaled_so_that_they_coincide():
         ({"initial": {"theta": 0.0, "omega": 2.5}, "levels": [8, 9, 10]}, ["asymptotic", "omega = 2.5 rad s⁻¹"]),
         ({"initial": {"theta": 0.0, "omega": 0.0}}, ["Order of θ"]),
         ({"schemes": [{"kind": "central", "label": "_a $x$ \\frac{"}, "central"]}, ["_a $x$ \\frac{"]),
-    ],
+    ], 3),
 )  # fmt: skip
 def test_all_kinds_of_experiments_make_a_page(tmp_path, changes, parts):
     make(tmp_path, samples.experiment(**changes))

@@ -123,7 +123,7 @@ def test_the_forces_on_a_pendulum_are_those_of_the_model(name):
         assert power.max() < 1e-3 * -power.min()
 
 
-@pytest.mark.parametrize("name", ["dragged", "over the top", "elastic_pendulum"])
+@pytest.mark.parametrize("name", thinned(["dragged", "over the top", "elastic_pendulum"], 3))
 def test_forces_and_angle_are_labelled_and_the_legend_names_what_is_magnified(name):
     exp, record = made(name)
     lane = player.lanes(exp, record)[0]

@@ -305,7 +305,12 @@ def test_levels_of_the_phase_plane_are_those_that_were_computed(text):
     [
         ({"kind": "pendulum"}, 20.0, True),
         ({"kind": "system", "acceleration": "(1 - u**2)*v - u"}, 20.0, False),
-        ({"kind": "system", "acceleration": "(1 - u**2)*v - u"}, 60.0, False),
+        pytest.param(
+            {"kind": "system", "acceleration": "(1 - u**2)*v - u"},
+            60.0,
+            False,
+            marks=pytest.mark.slow,
+        ),
     ],
 )
 def test_an_exact_orbit_that_does_not_close_is_drawn_as_far_as_the_levels(model, end, closes):

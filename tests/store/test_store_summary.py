@@ -40,6 +40,7 @@ def test_numbers_that_json_lacks_are_null(summary: Path) -> None:
     json.loads(summary.read_text(), parse_constant=refuse)
 
 
+@pytest.mark.slow
 def test_every_flipped_bit_and_truncation_is_seen(summary: Path) -> None:
     whole = summary.read_bytes()
     for place in range(8 * len(whole)):

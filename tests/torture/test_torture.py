@@ -66,7 +66,7 @@ def test_a_byte_that_differs_is_told(lab: Laboratory) -> None:
         lab.compare(place.content(), other)
 
 
-@pytest.mark.parametrize("times", [20, pytest.param(60, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("times", [5, pytest.param(60, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("target", fuzz.TARGETS)
 def test_readers_take_or_refuse_what_is_changed_at_random(target: str, times: int) -> None:
     choose = random.Random(f"23 {target}")

@@ -117,6 +117,7 @@ def test_a_killed_workflow_is_told_of(run: subprocess.Popen[str], tmp_path: Path
     assert nothing_is_left(tmp_path)
 
 
+@pytest.mark.slow
 def test_a_killed_run_leaves_nothing_at_work_and_no_lock(
     run: subprocess.Popen[str], tmp_path: Path
 ) -> None:

@@ -18,7 +18,6 @@ import netCDF4
 import pytest
 from forked import vibsim
 from made_once import made_once
-from thinned import thinned
 
 from vibsim.cli import main
 
@@ -261,7 +260,8 @@ CHANGES: dict[str, tuple[str, str, str, list[str]]] = {
 }
 
 
-@pytest.mark.parametrize("change", thinned(CHANGES, 2))
+@pytest.mark.slow
+@pytest.mark.parametrize("change", CHANGES)
 def test_a_change_runs_what_depends_on_it(study: Study, change: str) -> None:
     name, old, new, wanted = CHANGES[change]
     text = study.file(name).read_text()

@@ -94,6 +94,7 @@ def test_the_bounds_are_those_of_the_extrapolated_solution(
         np.testing.assert_array_equal(variable.values, record[f"{state}_error"].max(axis=-1))
 
 
+@pytest.mark.slow
 def test_the_verdict_needs_only_what_is_kept_of_parts(
     swept: Experiment, convergence: Record
 ) -> None:
