@@ -135,12 +135,16 @@ def test_a_fault_of_a_repeated_formula_is_told_once_with_its_line(tmp_path):
 
 SHORT = {
     "repeat": {"n": 3, "i": {"x_i": {"force": "k*(x_(i+1) - 2*x_i + x_( i - 1 )) - vx_i + f*i"}}},
+    "outputs": {"stretch_i": "x_i - x_(i-1) - i"},
+    "potential": ["k*(x_i - x_(i-1))**2/2", "k*x_3**2/2"],
     "parameters": {"k": 2.0, "f": 0.5},
 }
 LONG = {
     "repeat": {"i": [1, 3]},
     "coordinates": ["x_{i}"],
     "force": {"x_{i}": "k*(x_{i+1} - 2*x_{i} + x_{i-1}) - vx_{i} + f*{i}"},
+    "outputs": {"stretch_{i}": "x_{i} - x_{i-1} - {i}"},
+    "potential": ["k*(x_{i} - x_{i-1})**2/2", "k*x_3**2/2"],
     "parameters": {"x_4": 0.0, "x_0": 0.0, "k": 2.0, "f": 0.5},
 }
 
@@ -178,6 +182,23 @@ def test_a_fault_of_a_chain_has_its_line(changes, line, told, tmp_path):
         Experiment.from_yaml(path)
     fault = caught.value.faults[0]
     assert (fault.line, told in str(fault)) == (line, True), str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("chain", "key", "told"),
+    [
+        ({"x": {"force": "-x_(i+1)"}}, "model.repeat.i.x", "must hold the index i behind _: e.g. x_i"),
+        ({"x_i": {"force": "x_i-1 - x_i"}}, "model.repeat.i.x_i.force", "write _(i-1), or spaces"),
+        ({"x_i": {"force": "-x_i", "potential": "0"}}, "model.repeat.i.x_i.potential", "no formula of"),
+    ],
+)  # fmt: skip
+def test_a_slip_in_a_chain_is_one_fault(chain, key, told):
+    with pytest.raises(InputError) as caught:
+        Experiment.from_dict(
+            content({"repeat": {"n": 3, "i": chain}, "outputs": {"far": "x_1 - x_3"}})
+        )
+    (fault,) = caught.value.faults
+    assert (fault.key, told in str(fault)) == (key, True), str(fault)
 
 
 def test_an_unknown_name_in_a_chain_is_told_where_it_stands(tmp_path):

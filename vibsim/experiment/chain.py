@@ -1,8 +1,8 @@
 """A chain in short: ``repeat: {n: 16, i: {x_i: {acceleration: x_(i+1) - 2*x_i + x_(i-1)}}}`` makes x_1 to x_16.
 
-Below the name of an index stand the coordinates that are repeated from 1 to n, with their formulas. There the index
-stands behind ``_``, alone or in parentheses with a number, and ``i`` alone is its value. What a formula names beyond
-the ends is a wall: it stays at 0, unless the section gives it.
+Below the name of an index stand the coordinates that are repeated from 1 to n, with their formulas. The index stands
+behind ``_``, alone or in parentheses with a number, and ``i`` alone is its value; so it may stand in outputs, terms of
+an energy and initial values. What is named beyond the ends is a wall: it stays at 0, unless the section gives it.
 
 That happens to the content of a file in front of `vibsim.experiment.repeat`, whose form it brings this one to.
 """
@@ -11,10 +11,11 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 from vibsim.experiment.faults import Report
+from vibsim.experiment.other_forms import OF_COORDINATE
 from vibsim.experiment.repeat import REPEAT
 from vibsim.experiment.yaml.parse import Path_, Source
 from vibsim.models.system import MOST
@@ -33,58 +34,108 @@ def with_chain(source: Source, report: Report) -> Source:
     if not isinstance(written, Mapping) or COUNT not in written or len(written) != 2:
         return source
     (index,) = (key for key in written if key != COUNT)
-    count, chain = written[COUNT], written[index]
-    if not isinstance(chain, Mapping) or not re.fullmatch(r"[A-Za-z]\w*", str(index)):
+    if not isinstance(written[index], Mapping) or not re.fullmatch(r"[A-Za-z]\w*", str(index)):
         return source
-    if type(count) is not int or not 1 <= count <= MOST:
-        path: Path_ = ("model", REPEAT, COUNT)
-        report.add_malformed(path, f"must be a whole number from 1 to {MOST}", value=count)
-        count = 1
-    own, origins = {}, dict(source.origins)
-    for key, value in chain.items():
-        name = _with_braces(key, index)
-        own[name] = _with_braces(value, index)
-        origins["model", "coordinates", name] = ("model", REPEAT, index, key)
-    model = dict(section)
-    others = model.get("coordinates", {})
+    writer = _Writer(index, report)
+    count = _count(written[COUNT], report)
+    chain = writer.coordinates(written[index])
+    known = (REPEAT, "coordinates", "parameters")
+    model = {
+        key: value if key in known else writer.value(("model", key), value)
+        for key, value in section.items()
+    }
+    others = section.get("coordinates", {})
     if isinstance(others, Mapping):
-        model["coordinates"] = {**own, **others}
+        model["coordinates"] = {**chain, **others}
     else:
         report.add_malformed(("model", "coordinates"), f"stands under `{REPEAT}`, too", at_key=True)
     model[REPEAT] = {index: [1, count]}
-    given = model.get("parameters", {})
+    given = section.get("parameters", {})
     if isinstance(given, Mapping):
-        known = {**dict.fromkeys(map(str, others)), **given}
-        walls = {name: 0.0 for name in _walls(own, count) if name not in known}
+        own = {**dict.fromkeys(map(str, others)), **given}
+        formulas = {key: model[key] for key in model.keys() - {REPEAT, "parameters"}}
+        walls = {name: 0.0 for name in _walls(formulas, count) if name not in own}
         model["parameters"] = {**walls, **given}
     content = {**data, "model": model}
-    if isinstance(starts := data.get("initial"), Mapping):
-        content["initial"] = {}
-        for key, value in starts.items():
-            name = _with_braces(key, index)
-            content["initial"][name] = value if name == key else _with_braces(value, index)
-            origins["initial", name] = ("initial", key)
-    report.source = replace(source, data=content, origins=origins)
+    if isinstance(data.get("initial"), Mapping):
+        content["initial"] = writer.value(("initial",), data["initial"])
+    report.source = replace(source, data=content, origins={**source.origins, **writer.origins})
     return report.source
 
 
-def _with_braces(written: Any, index: str) -> Any:
-    """Return a text, or a mapping with its texts, with the index in braces."""
-    if isinstance(written, Mapping):
-        return {
-            _with_braces(key, index): _with_braces(value, index) for key, value in written.items()
-        }
-    if not isinstance(written, str):
+def _count(written: Any, report: Report) -> int:
+    """Return how many coordinates there are, and as many as there may be where that is faulty."""
+    if type(written) is int and 1 <= written <= MOST:
         return written
-    behind = re.compile(rf"(?<=\w)_(?:{index}(?!\w)|\(\s*{index}\s*([+-]\s*\d+)?\s*\))")
-    braced = behind.sub(lambda found: f"_{{{index}{found[1] or ''}}}", written)
-    return re.sub(rf"(?<![\w{{]){index}(?![\w}}(])", f"{{{index}}}", braced)
+    path: Path_ = ("model", REPEAT, COUNT)
+    report.add_malformed(path, f"must be a whole number from 1 to {MOST}", value=written)
+    return MOST
 
 
-def _walls(chain: Mapping[str, Any], count: int) -> Iterator[str]:
-    """Yield the names beyond both ends that the formulas of a chain of so many hold."""
-    for own in chain.values():
-        for text in own.values() if isinstance(own, Mapping) else (own,):
-            for name, sign, steps in _BEYOND.findall(str(text)):
-                beyond = range(count + 1, count + 1 + int(steps)) if sign == "+" else [0]
-                yield from (f"{name}{number}" for number in beyond)
+@dataclass
+class _Writer:
+    """Writes the index in braces, and remembers where the keys with it stand in the file."""
+
+    index: str
+    report: Report
+
+    def __post_init__(self) -> None:
+        i = self.index
+        self.origins: dict[Path_, Path_] = {}
+        self._behind = re.compile(rf"(?<=\w)_(?:{i}(?!\w)|\(\s*{i}\s*([+-]\s*\d+)?\s*\))")
+        self._alone = re.compile(rf"(?<![\w{{]){i}(?![\w}}(])")
+        self._unclear = re.compile(rf"\w_{i}[+-]\d+(?![\w.])")
+
+    def coordinates(self, written: Mapping[str, Any]) -> dict[str, Any]:
+        """Return the coordinates that are repeated, with their formulas."""
+        found = {}
+        for key, own in written.items():
+            path: Path_ = ("model", REPEAT, self.index, key)
+            name = self.text(path, str(key), always=True)
+            if name == key:
+                rule = f"must hold the index {self.index} behind _"
+                self.report.add_malformed(path, rule, f"e.g. {key}_{self.index}", at_key=True)
+                name = f"{key}_{{{self.index}}}"
+            self.origins["model", "coordinates", name] = path
+            for other in own.keys() - set(OF_COORDINATE) if isinstance(own, Mapping) else ():
+                rule = f"is no formula of a coordinate: {', '.join(OF_COORDINATE)}"
+                self.report.add_malformed((*path, other), rule, at_key=True)
+                own = {known: formula for known, formula in own.items() if known != other}
+            found[name] = self.value(path, own, always=True)
+        return found
+
+    def value(self, path: Path_, written: Any, *, always: bool = False) -> Any:
+        """Return a value with the index in braces where it stands behind a name, or `always` where it stands alone."""
+        if isinstance(written, Mapping):
+            found = {}
+            for key, value in written.items():
+                name = self.text((*path, key), str(key), always=always)
+                if name != key:
+                    self.origins[*path, name] = (*path, key)
+                found[name] = self.value((*path, key), value, always=always or name != key)
+            return found
+        if isinstance(written, list | tuple):
+            return [self.value((*path, i), item) for i, item in enumerate(written)]
+        return self.text(path, written, always=always) if isinstance(written, str) else written
+
+    def text(self, path: Path_, written: str, *, always: bool) -> str:
+        """Return a key or a formula likewise."""
+        if found := self._unclear.search(written):
+            slip = found[0][found[0].rindex("_") + 1 :]
+            rule = f"'_{slip}' may mean a neighbour or a difference"
+            hint = f"write _({slip}), or spaces around the sign"
+            self.report.add(path, rule, hint, written)
+        braced = self._behind.sub(lambda at: f"_{{{self.index}{at[1] or ''}}}", written)
+        if always or braced != written:
+            braced = self._alone.sub(f"{{{self.index}}}", braced)
+        return braced
+
+
+def _walls(written: Any, count: int) -> Iterator[str]:
+    """Yield the names beyond both ends that formulas of a chain of so many hold."""
+    if isinstance(written, Mapping | list):
+        for value in written.values() if isinstance(written, Mapping) else written:
+            yield from _walls(value, count)
+    for name, sign, steps in _BEYOND.findall(written) if isinstance(written, str) else ():
+        beyond = range(count + 1, count + 1 + int(steps)) if sign == "+" else [0]
+        yield from (f"{name}{number}" for number in beyond)
