@@ -279,7 +279,7 @@ def test_a_number_of_a_level_that_is_named_is_asked_of_a_finer_one() -> None:
     asked = {"value": "end", "quantity": "u", "equals": -0.3, "atol": 0.01}
     of_finest, of_level = judged(asked, asked | {"at": {"level": 7}}, **run)
     assert of_finest.reason == of_level.reason == "mismatch"
-    assert of_finest.advice.startswith("Add finer `levels:`")
+    assert of_finest.advice.startswith("Add level")
     assert "ask for one" not in of_finest.advice
     assert "and ask for one (`at: {level: 9}`)" in of_level.advice
 

@@ -236,8 +236,7 @@ def describe(f: Found, check: ValueCheck) -> Description:
     which = f" ({_at(f, check, int(places[0]))}{more})" if len(places) else ""
     verb = "is" if len(places) == 1 else "are"
     left = f"{len(places)} of {len(about)} members {verb} not resolved well enough{which}"
-    finer, cost = value.finer_levels(f)
-    advice = f"Add levels {finer[0]} and {finer[-1]} to `levels:` ({cost}) to shrink the errors."
+    advice = f"A{value.finer_levels(f)} to shrink the errors."
     return Description(f"{finding}{doubted}, because {left}.", advice, finding)
 
 

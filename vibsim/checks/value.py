@@ -10,6 +10,7 @@ import json
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -18,7 +19,7 @@ from vibsim.apriori.formal_orders import columns_of, options_of
 from vibsim.checks.fields import Field, Measured
 from vibsim.checks.notation import PLAIN, ROUND_OFF, Notation
 from vibsim.checks.outcome import Judged
-from vibsim.checks.sentences import NOT_FINITE, Description, Found, cost_in_words
+from vibsim.checks.sentences import NOT_FINITE, Description, Found, add_levels, cost_in_words
 from vibsim.comparison import best_values, value_numbers
 from vibsim.comparison.quantity_comparison import Compared
 from vibsim.convergence.reasons import first_reason
@@ -55,8 +56,8 @@ REACH = 3.0
 """All finer levels together change a number by no more than so many times its last change (an order of 1/2 by 2.4)."""
 FEWEST = 3
 """Fewer levels do not show how large an error is."""
-FINER = 2
-"""So many finer levels are advised."""
+FINER, MOST_FINER = 2, 12
+"""So many finer levels are advised where nothing tells how many are needed, and so many at most."""
 UNPROVED = (
     " The levels agree with it, but do not prove it: the error bound is wider than what is asked."
 )
@@ -327,10 +328,9 @@ def describe(f: Found, check: ValueCheck) -> Description:
             sentence = f"{subject} is {brief}; it may or may not be {expected}."
             advice = f"Set `events: located` for scheme {f.scheme_name}."
             if not _is_on_the_mesh(f, check):
-                finer, cost = finer_levels(f)
                 advice = (
-                    f"Add levels {finer[0]} and {finer[-1]} to `levels:` ({cost}) to shrink the error bound, or ask "
-                    "for the number of one level (`at: {level: ...}`)."
+                    f"A{finer_levels(f)} to shrink the error bound, or ask for the number of one level "
+                    "(`at: {level: ...}`)."
                 )
     return Description(sentence, advice, _measured(f, check, _digits(f, check)))
 
@@ -385,10 +385,23 @@ def _is_on_the_mesh(f: Found, check: ValueCheck) -> bool:
     return check.number.needs_events and is_on_the_mesh(options)
 
 
-def finer_levels(f: Found) -> tuple[list[int], str]:
-    """Return the next finer levels, and what they cost in words."""
-    finer = [f.experiment.levels[-1] + 1 + i for i in range(FINER)]
-    return finer, cost_in_words(f.experiment, finer)
+def finer_levels(f: Found, count: int = FINER) -> str:
+    """Ask for so many finer levels, with what they cost; from the second letter on."""
+    return add_levels(f.experiment.levels[-1], count, partial(cost_in_words, f.experiment))
+
+
+def _levels_to_add(f: Found, check: ValueCheck) -> int:
+    """Return how many finer levels make a number as asked if its changes fall on as the last two did."""
+    numbers: list[float] = f.fact("value_by_level") or []
+    if len(numbers) < FEWEST:
+        return FINER
+    before, last = np.diff(numbers[-3:])
+    fall = last / before if before else 0.0
+    if not 0.0 < fall < 1.0:
+        return FINER
+    steps = np.arange(1, MOST_FINER + 1)
+    fulfilled, _ = compare(check, numbers[-1] + last * fall * (1.0 - fall**steps) / (1.0 - fall))
+    return int(steps[np.argmax(fulfilled)]) if np.any(fulfilled) else FINER
 
 
 def _on_mismatch(f: Found, check: ValueCheck) -> str:
@@ -405,11 +418,12 @@ def _on_mismatch(f: Found, check: ValueCheck) -> str:
         return f"Ask for a finer level (`at: {_at(check, first)}`), where the number is as asked, or c{change}."
     if f.fact("levels_needed") == SETTLED:
         return f"C{change}, `model:` or `initial:`. Finer levels will not help."
-    finer, cost = finer_levels(f)
-    ask = f" and ask for one (`at: {_at(check, finer[-1])}`)"
+    count = _levels_to_add(f, check)
+    finest = f.experiment.levels[-1] + count
+    ask = f" and ask for one (`at: {_at(check, finest)}`)"
     if check.at.level in (None, "best"):
         ask = ""
-    return f"Add finer `levels:` ({finer[0]} and {finer[-1]} cost {cost}){ask}, or c{change}."
+    return f"A{finer_levels(f, count)}{ask}, or c{change}."
 
 
 def _is_unsteady(f: Found, check: ValueCheck) -> bool:

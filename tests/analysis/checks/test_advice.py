@@ -443,7 +443,7 @@ def test_advice_on_a_number_of_several_levels_looks_at_those_that_have_one() -> 
     far = judged({**RUN, "levels": [6, 7, 8, 9, 10], "checks": [{**check, "above": 3.9}]})
     assert far.advice.startswith("Change `above:`")
     near = judged({**RUN, "levels": [4, 5, 6, 7, 8], "checks": [{**check, "below": 2.001}]})
-    assert near.advice.startswith("Add finer `levels:`")
+    assert near.advice.startswith("Add level")
 
 
 @pytest.mark.slow
@@ -548,7 +548,7 @@ def test_finer_levels_of_an_extrapolated_number_are_not_asked_for_one_by_one() -
     run = {**RUN, "model": model, "initial": {"u": 1.0}, "time": {"end": 20.0}, "samples": "all"}
     verdict = judged({**run, "schemes": ["rk4"], "levels": [4, 5, 6], "checks": [check]})
     assert verdict.reason == "mismatch"
-    assert verdict.advice.startswith("Add finer `levels:`")
+    assert verdict.advice.startswith("Add level")
     assert "ask for one" not in verdict.advice
 
 
@@ -578,3 +578,17 @@ def test_an_interval_without_a_width_is_not_told() -> None:
         story(reason="asymptotic", order=2.0, low=2.0, high=2.0)
     )
     assert interval((2.0, 2.0)) == "2.000"
+
+
+@pytest.mark.parametrize("kind", ["forward_euler", "central"])
+def test_as_many_finer_levels_are_asked_for_as_the_measured_changes_need(kind: str) -> None:
+    """A number whose error halves from level to level needs more of them than one whose error falls to a quarter."""
+    check = {"value": "end", "quantity": "theta", "equals": -0.7, "atol": 3e-5}
+    model = {"kind": "linear_pendulum", "g": 1.0, "L": 1.0}
+    run = {**RUN, "model": model, "initial": {"theta": 1.0}, "time": {"end": math.acos(-0.7)}}
+    run |= {"schemes": [kind], "checks": [check]}
+    advice = judged({**run, "levels": [8, 9, 10] if kind == "forward_euler" else [3, 4, 5]}).advice
+    (named,) = re.findall(r"^Add levels? ([\w ]+) to `levels:`", advice)
+    last = max(map(int, re.findall(r"\d+", named)))
+    assert judged({**run, "levels": [*range(5, last + 1)]}).status == "PASS", advice
+    assert judged({**run, "levels": [*range(5, last)]}).status == "FAIL", advice
