@@ -149,7 +149,14 @@ def unnamed(found: Sequence[Row], known: dict[str, Experiment]) -> Iterator[Row]
     shown = " ".join(row.shown for row in found)
     for name, experiment in known.items():
         if str(experiment.source).startswith(TEXTS) and _link(name) not in shown:
-            yield Row(str(experiment.source), "", experiment.title, _link(name), CONFIRMED, _decided_by([name], known))
+            yield Row(
+                str(experiment.source),
+                "",
+                experiment.title,
+                _link(name),
+                CONFIRMED,
+                _decided_by([name], known),
+            )
 
 
 def _decided_by(places: Sequence[str], known: dict[str, Experiment]) -> str:

@@ -8,7 +8,6 @@ named.
 from __future__ import annotations
 
 import importlib.util
-import math
 import re
 import sys
 import tempfile
@@ -102,13 +101,13 @@ def run(file: str, *numbers: str) -> dict[str, Answer]:
     return {v.id: Answer(v.status, v.reason, v.results[0].facts, v.advice or "") for v in found}
 
 
-def first_top(level: int) -> float:
-    """Return the first stored time at which theta is beyond pi, pushed with omega = 2 (edit 4.3) [s]."""
+def leaves_top(level: int) -> float:
+    """Return the first stored time at which theta is beyond 4, pushed with omega = 2 (edit 4.3) [s]."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder, "large_angles.yaml")
         path.write_text(edited(path.name, "4.3"), "utf-8")
         found = simulate(Experiment.from_yaml(path), level)
-    return float(found.t[(found.theta[0, 0].values > math.pi).argmax()])
+    return float(found.t[(found.theta[0, 0].values > 4.0).argmax()])
 
 
 def scheme(path: Path) -> Scheme:
@@ -125,7 +124,7 @@ def scheme(path: Path) -> Scheme:
 def rendered(sheet: int) -> str:
     """Return the part of the key on one sheet."""
     environment = jinja2.Environment(undefined=jinja2.StrictUndefined, autoescape=False)
-    environment.globals.update(run=run, first_top=first_top)
+    environment.globals.update(run=run, leaves_top=leaves_top)
     part = _parts(TEMPLATE.read_text("utf-8"))[sheet]
     return "\n\n".join(map(_filled, environment.from_string(part).render().split("\n\n"))) + "\n\n"
 

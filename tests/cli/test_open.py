@@ -39,6 +39,18 @@ def test_the_page_of_an_experiment_and_the_index_are_opened(
     assert capsys.readouterr().out == "".join(f"opened {page}\n" for page in pages)
 
 
+def test_a_page_of_another_state_of_the_file_is_opened_with_a_note(
+    made: Made, capsys: Capture, opened: list[str]
+) -> None:
+    (made.small / "report.html").touch()
+    made.vibsim("open", made.file)
+    assert capsys.readouterr().err == ""
+    made.change("theta: 1.0", "theta: 1.1")
+    assert made.vibsim("open", made.file) == 0
+    assert "made before the experiment or vibsim changed" in capsys.readouterr().err
+    assert len(opened) == 2
+
+
 @pytest.mark.parametrize("error", [False, True])
 def test_without_a_browser_the_path_is_printed_alone(
     made: Made, capsys: Capture, monkeypatch: pytest.MonkeyPatch, error: bool

@@ -101,16 +101,19 @@ def known_error(q: Comparison) -> dict[str, Any]:
     return {name: np.where(decides, values, np.nan) for name, values in facts.items()}
 
 
-def error_in_words(f: Found, quantity: str) -> str:
-    """Say how large the error of the finest level is, as a root mean square over time; empty where it is not known."""
+def error_in_words(f: Found, quantity: str, norm: str) -> str:
+    """Say how large the error of the finest level is, as a root mean square over time; empty where it is not known.
+
+    It is that of all points, also where a check is about a norm without the last one.
+    """
     error, most, relative = (f.fact(name) for name in ERROR)
     if not math.isfinite(most):
         return ""
     number, (mean, largest) = f.notation.number, (_mean_square(f, x) for x in (error, most))
     unit = unit_of_quantity(f.record, quantity)
-    sentence = (
-        f" The root-mean-square error of the finest level is {number(mean, 2)} {unit}".rstrip()
-    )
+    where = ", its last point included," if norm == "linf_interior" else ""
+    sentence = f" The root-mean-square error of the finest level{where} is {number(mean, 2)} {unit}"
+    sentence = sentence.rstrip()
     if math.isfinite(relative):
         sentence += f" ({number(relative, 2)} of its size)"
     # of a true error the bound has the same digits

@@ -73,7 +73,7 @@ class OrderContext:
         """... and the same in compensated arithmetic."""
         self.has_exact = has_exact(record, quantity, scheme, case)
         self.cost = partial(cost_in_words, experiment)
-        self.error = error_in_words(f, quantity)
+        self.error = error_in_words(f, quantity, check.norm)
         """How large the error of the finest level is; empty where it is not known."""
 
         self.scheme, self.kind = f.scheme_name, experiment.schemes[scheme].kind

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
@@ -25,6 +26,7 @@ from vibsim.comparison.quantity_comparison import Compared
 from vibsim.convergence.reasons import first_reason
 from vibsim.core.array_types import Flags, Floats
 from vibsim.core.record import Record
+from vibsim.core.vocabulary import is_error_part
 from vibsim.experiment import Experiment
 from vibsim.experiment.schema.checks import ValueCheck
 from vibsim.experiment.value_names import VALUES
@@ -270,6 +272,11 @@ def what(check: ValueCheck, notation: Notation = PLAIN) -> str:
     value = notation.value(check.value)
     if check.at.event is not None:
         return f"{value} of event {check.at.event}"
+    if check.quantity and is_error_part(check.quantity):
+        # "largest error" of what is an error: "largest phase error of u"
+        named, is_word = re.subn(r"\berror\b", quantity, value, count=1)
+        if is_word:
+            return named
     return f"{value} of {quantity}" if quantity else value
 
 

@@ -11,11 +11,18 @@ from vibsim.core.errors import VibsimError, nearest
 from vibsim.core.home import called
 from vibsim.core.set_option import command_to_run
 from vibsim.plan import Plan, ShardJob
+from vibsim.store import read_json
 
 if TYPE_CHECKING:
     from vibsim.core.record import Record
 
 OUTDATED = "note: these results were made before the experiment or vibsim changed; run it again for new ones"
+
+
+def has_old_verdicts(plan: Plan, results: Path) -> bool:
+    """Say whether the verdicts in a results folder are of another state of the experiment or of vibsim."""
+    path = results / plan.summary
+    return path.exists() and read_json(path, name=plan.key).get("digest") != plan.analysis
 
 
 def made(plan: Plan, results: Path, case: int, word: str) -> tuple[list[int], list[int]]:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import sys
 import webbrowser
 from argparse import Namespace
 
 from vibsim.cli.chosen_plans import one_plan_of
 from vibsim.cli.jobs.common import chosen_results
+from vibsim.cli.level_member import OUTDATED, has_old_verdicts
 from vibsim.core.errors import VibsimError
 from vibsim.core.home import called
 from vibsim.core.set_option import command_to_run
@@ -22,10 +24,13 @@ def open_(options: Namespace) -> int:
     """
     results = chosen_results(options)
     word = options.experiment
-    page = results / ("index.html" if word is None else one_plan_of(word).page)
+    plan = None if word is None else one_plan_of(word)
+    page = results / ("index.html" if plan is None else plan.page)
     if not page.is_file():
         command = called("vibsim run" if word is None else command_to_run(word))
         raise VibsimError(f"{page}: there is no report yet: {command}")
+    if plan is not None and has_old_verdicts(plan, results):
+        print(OUTDATED, file=sys.stderr)
     try:
         is_open = webbrowser.open(page.as_uri())
     except webbrowser.Error:

@@ -51,7 +51,7 @@ def _verdicts(plan: Plan, results: Path) -> None:
         print(f"{plan.key}: there are no verdicts yet")
         return
     summary = read_json(path, name=plan.key)
-    if summary.get("digest") != plan.analysis:
+    if level_member.has_old_verdicts(plan, results):
         print(level_member.OUTDATED)
     print(*outcome_text.in_full([summary], terminal.columns()), sep="\n")
     page = results / plan.page
