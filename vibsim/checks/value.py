@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from vibsim.apriori.formal_orders import columns_of, options_of
-from vibsim.checks.fields import Field, Measured
+from vibsim.checks.fields import Field, Measured, name_of
 from vibsim.checks.notation import PLAIN, ROUND_OFF, Notation
 from vibsim.checks.outcome import Judged
 from vibsim.checks.sentences import NOT_FINITE, Description, Found, add_levels, cost_in_words
@@ -399,7 +399,8 @@ def finer_levels(f: Found, count: int = FINER) -> str:
 
 def _levels_to_add(f: Found, check: ValueCheck) -> int:
     """Return how many finer levels make a number as asked if its changes fall on as the last two did."""
-    numbers: list[float] = f.fact("value_by_level") or []
+    is_stored = name_of(f.id, "value_by_level") in f.record
+    numbers: list[float] = f.fact("value_by_level") if is_stored else []
     if len(numbers) < FEWEST:
         return FINER
     before, last = np.diff(numbers[-3:])
