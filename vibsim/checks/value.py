@@ -40,7 +40,9 @@ FIELDS = {
         "bound of the error of the number where it is extrapolated", unit_of="number"
     ),
     "levels_needed": Field(
-        "finer levels that are probably needed, 0 where none mends it, -1 unknown", np.int8, none=-1
+        "whether finer levels may make it as asked: 1 they may, 0 they do not, -1 unknown",
+        np.int8,
+        none=-1,
     ),
     "level_as_asked": Field("finer level at which it is as asked, -1 for none", np.int16, none=-1),
     "value_by_level": Field(
