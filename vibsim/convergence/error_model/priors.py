@@ -19,9 +19,9 @@ OTHER_PRIOR = 0.1  # of a single power of any other value up to `HIGHEST` [chose
 _BESIDE = 3e-4 * 2.0 ** np.arange(9)
 AROUND = np.concatenate([-_BESIDE[::-1], [0.0], _BESIDE])
 EXPECTED = 0.5  # prior of the whole order that a user expects, beside that of every power [chosen]
-THEORY = 0.9  # the same of the order that the theory of a scheme promises [calibrated, on seeds 601 to 623]
-# Prior of a power that is not a whole number away from that of theory, beside 1. [calibrated, on seeds 601 to 623]
-BETWEEN = 0.03
+THEORY = 0.9  # the same of the order that the theory of a scheme promises [chosen]
+# Prior of a power that is not a whole number away from that of theory, beside 1. [chosen]
+BETWEEN = 0.01
 DISTANCES = (0.5, 1.0, 2.0)  # from the first power to the second [expansion]
 PURE_PRIOR = 0.3  # that there is no second power in sight [chosen]
 # Size of the second power over the first, at the finest level of a window. [chosen]
