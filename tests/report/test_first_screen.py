@@ -501,3 +501,12 @@ def test_schemes_of_several_orders_that_are_all_exact_are_called_exact():
         levels={"from": 4, "to": 6}, schemes=["rk4", "velocity_verlet"],
     )  # fmt: skip
     assert first(exp)["finding"].endswith("is exact: the levels differ by round-off only")
+
+
+def test_a_letter_with_an_index_is_named_and_a_name_of_words_is_said_in_words() -> None:
+    chain = {"x_i": {"acceleration": "-x_i"}}
+    model = {"kind": "system", "repeat": {"n": 3, "i": chain}, "outputs": {"far_end": "x_3"}}
+    run = {"title": "t", "model": model, "initial": {"x_1": 1}, "time": {"end": 1}}
+    exp = Experiment.from_dict({**run, "levels": [4, 5, 6], "schemes": ["rk4"]})
+    assert findings.short(exp, "x_3") == "x_3"
+    assert findings.short(exp, "far_end").startswith("the ")

@@ -242,14 +242,18 @@ def _named(experiment: Experiment, quantity: str) -> str:
     long |= {output.name: output.long_name for output in model.outputs}
     if name != quantity or quantity not in long:
         return name
-    # a name of several words is no letter
-    return f"the {long[quantity]}" if "_" in quantity else f"the {long[quantity]} {quantity}"
+    return f"the {long[quantity]}{'' if _has_words(quantity) else f' {quantity}'}"
 
 
 def short(experiment: Experiment, quantity: str) -> str:
     """Return the letter of a quantity; in words where it has none and its name has several."""
     letter = words.symbol(quantity)
-    return _named(experiment, quantity) if "_" in letter else letter
+    return _named(experiment, quantity) if _has_words(letter) else letter
+
+
+def _has_words(name: str) -> bool:
+    """Say whether a name has several words, and not a letter with an index such as ``x_3``."""
+    return re.search("_[^0-9]", name) is not None
 
 
 def _everywhere(record: Record, lead: Lead) -> str:
