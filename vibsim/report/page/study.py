@@ -23,8 +23,7 @@ UNSEEN = (
     "Levels can agree with each other and still approach a wrong answer. Only an exact solution shows that, and none "
     "was given."
 )
-NO_BEST = {True: "the levels do not tell it", False: "a field has no single value"}
-"""Why there is no best value, by whether the quantity is a number."""
+NO_BEST = "the levels do not tell it"
 CAPTION = (
     "Both axes are logarithmic: an error of order p is a line of slope p. The dashed line has the "
     "{word} slope {order}."
@@ -81,7 +80,7 @@ def finding(verdicts: Sequence[LadderVerdict]) -> str:
 
 
 def numbers(verdict: LadderVerdict) -> list[dict[str, str]]:
-    """Return the large numbers of a ladder: the order, the error of the finest level, and the best value."""
+    """Return the large numbers of a ladder: the order, the error of the finest level, the best value of a number."""
     span = words.likely((verdict.order_low, verdict.order_high))
     expected, wanted = verdict.expected or verdict.at_least, ""
     if expected is not None:
@@ -89,15 +88,14 @@ def numbers(verdict: LadderVerdict) -> list[dict[str, str]]:
     share, bound = verdict.relative_error, verdict.best_bound
     size = None if verdict.error is None else abs(verdict.error)
     of_size = f"{words.share(share)} of its size" if share is not None else ""
-    best = NO_BEST[verdict.is_number]
-    if bound is not None:
-        best = f"± {words.number(bound, 'brief')}, extrapolated"
+    best = NO_BEST if bound is None else f"± {words.number(bound, 'brief')}, extrapolated"
     of_order = "; ".join(filter(None, [span, wanted]))
-    rows = (
+    rows = [
         ("Observed order", words.number(verdict.order, "order"), of_order),
         ("Error of the finest level", words.number(size, "brief"), of_size),
-        ("Best value", _best(verdict), best),
-    )
+    ]
+    if verdict.is_number:
+        rows.append(("Best value", _best(verdict), best))
     return [
         {"label": label, "value": value if value != "–" else "not known", "note": note}
         for label, value, note in rows
