@@ -21,6 +21,8 @@ from vibsim.experiment.yaml.parse import Path_, Source
 from vibsim.models.system import MOST
 
 COUNT = "n"
+REPEATED = "outputs", "potential", "kinetic", "exact"
+"""Parts of a model that may hold the index beside the coordinates."""
 _BEYOND = re.compile(r"(\w+)\{\w+\s*([+-])\s*(\d{1,4})\}")
 
 
@@ -39,9 +41,8 @@ def with_chain(source: Source, report: Report) -> Source:
     writer = _Writer(index, report)
     count = _count(written[COUNT], report)
     chain = writer.coordinates(written[index])
-    known = (REPEAT, "coordinates", "parameters")
     model = {
-        key: value if key in known else writer.value(("model", key), value)
+        key: writer.value(("model", key), value) if key in REPEATED else value
         for key, value in section.items()
     }
     others = section.get("coordinates", {})
@@ -53,8 +54,7 @@ def with_chain(source: Source, report: Report) -> Source:
     given = section.get("parameters", {})
     if isinstance(given, Mapping):
         own = {**dict.fromkeys(map(str, others)), **given}
-        formulas = {key: model[key] for key in model.keys() - {REPEAT, "parameters"}}
-        walls = {name: 0.0 for name in _walls(formulas, count) if name not in own}
+        walls = {name: 0.0 for name in _walls([chain, model], count) if name not in own}
         model["parameters"] = {**walls, **given}
     content = {**data, "model": model}
     if isinstance(data.get("initial"), Mapping):
@@ -97,11 +97,13 @@ class _Writer:
                 self.report.add_malformed(path, rule, f"e.g. {key}_{self.index}", at_key=True)
                 name = f"{key}_{{{self.index}}}"
             self.origins["model", "coordinates", name] = path
-            for other in own.keys() - set(OF_COORDINATE) if isinstance(own, Mapping) else ():
-                rule = f"is no formula of a coordinate: {', '.join(OF_COORDINATE)}"
-                self.report.add_malformed((*path, other), rule, at_key=True)
-                own = {known: formula for known, formula in own.items() if known != other}
-            found[name] = self.value(path, own, always=True)
+            formulas = own
+            if isinstance(own, Mapping):
+                formulas = {key: own[key] for key in own if key in OF_COORDINATE}
+                for other in (key for key in own if key not in OF_COORDINATE):
+                    rule = f"is no formula of a coordinate: {', '.join(OF_COORDINATE)}"
+                    self.report.add_malformed((*path, other), rule, at_key=True)
+            found[name] = self.value(path, formulas, always=True)
         return found
 
     def value(self, path: Path_, written: Any, *, always: bool = False) -> Any:
