@@ -410,8 +410,13 @@ def _levels_to_add(f: Found, check: ValueCheck) -> int:
     if not 0.0 < fall < 1.0:
         return FINER
     steps = np.arange(1, MOST_FINER + 1)
-    fulfilled, _ = compare(check, numbers[-1] + last * fall * (1.0 - fall**steps) / (1.0 - fall))
-    return int(steps[np.argmax(fulfilled)]) if np.any(fulfilled) else FINER
+    left = last * fall ** (steps + 1) / (1.0 - fall)
+    limit = numbers[-1] + last * fall / (1.0 - fall)
+    # a number that is to equal another one must change by less than it may be off
+    enough = (
+        compare(check, limit - left)[0] if check.equals is None else np.abs(left) <= check.allowed
+    )
+    return int(steps[np.argmax(enough)]) if np.any(enough) else FINER
 
 
 def _on_mismatch(f: Found, check: ValueCheck) -> str:
