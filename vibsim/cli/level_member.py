@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from vibsim.cli.jobs.common import refusal
 from vibsim.core.errors import VibsimError, nearest
 from vibsim.core.home import called
 from vibsim.core.set_option import command_to_run
 from vibsim.plan import Plan, ShardJob
-from vibsim.store import read_json
 
 if TYPE_CHECKING:
     from vibsim.core.record import Record
@@ -19,10 +18,9 @@ if TYPE_CHECKING:
 OUTDATED = "note: these results were made before the experiment or vibsim changed; run it again for new ones"
 
 
-def has_old_verdicts(plan: Plan, results: Path) -> bool:
-    """Say whether the verdicts in a results folder are of another state of the experiment or of vibsim."""
-    path = results / plan.summary
-    return path.exists() and read_json(path, name=plan.key).get("digest") != plan.analysis
+def are_outdated(plan: Plan, summary: Mapping[str, Any]) -> bool:
+    """Say whether verdicts are of another state of the experiment or of vibsim than the present one."""
+    return summary.get("digest") != plan.analysis
 
 
 def made(plan: Plan, results: Path, case: int, word: str) -> tuple[list[int], list[int]]:

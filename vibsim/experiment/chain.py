@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 from vibsim.experiment.faults import Report
@@ -72,15 +72,12 @@ def _count(written: Any, report: Report) -> int:
     return MOST
 
 
-@dataclass
 class _Writer:
     """Writes the index in braces, and remembers where the keys with it stand in the file."""
 
-    index: str
-    report: Report
-
-    def __post_init__(self) -> None:
-        i = self.index
+    def __init__(self, index: str, report: Report) -> None:
+        self.index = i = index
+        self.report = report
         self.origins: dict[Path_, Path_] = {}
         self._behind = re.compile(rf"(?<=\w)_(?:{i}(?!\w)|\(\s*{i}\s*([+-]\s*\d+)?\s*\))")
         self._alone = re.compile(rf"(?<![\w{{]){i}(?![\w}}(])")

@@ -5,13 +5,16 @@ from __future__ import annotations
 import sys
 import webbrowser
 from argparse import Namespace
+from pathlib import Path
 
 from vibsim.cli.chosen_plans import one_plan_of
 from vibsim.cli.jobs.common import chosen_results
-from vibsim.cli.level_member import OUTDATED, has_old_verdicts
+from vibsim.cli.level_member import OUTDATED, are_outdated
 from vibsim.core.errors import VibsimError
 from vibsim.core.home import called
 from vibsim.core.set_option import command_to_run
+from vibsim.plan import Plan
+from vibsim.store import read_json
 
 
 def open_(options: Namespace) -> int:
@@ -29,11 +32,16 @@ def open_(options: Namespace) -> int:
     if not page.is_file():
         command = called("vibsim run" if word is None else command_to_run(word))
         raise VibsimError(f"{page}: there is no report yet: {command}")
-    if plan is not None and has_old_verdicts(plan, results):
-        print(OUTDATED, file=sys.stderr)
+    if plan is not None:
+        _note_where_outdated(plan, results / plan.summary)
     try:
         is_open = webbrowser.open(page.as_uri())
     except webbrowser.Error:
         is_open = False
     print(page if not is_open else f"opened {page}")
     return 0
+
+
+def _note_where_outdated(plan: Plan, summary: Path) -> None:
+    if summary.is_file() and are_outdated(plan, read_json(summary, name=plan.key)):
+        print(OUTDATED, file=sys.stderr)

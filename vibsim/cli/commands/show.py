@@ -51,7 +51,7 @@ def _verdicts(plan: Plan, results: Path) -> None:
         print(f"{plan.key}: there are no verdicts yet")
         return
     summary = read_json(path, name=plan.key)
-    if level_member.has_old_verdicts(plan, results):
+    if level_member.are_outdated(plan, summary):
         print(level_member.OUTDATED)
     print(*outcome_text.in_full([summary], terminal.columns()), sep="\n")
     page = results / plan.page
