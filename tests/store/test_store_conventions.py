@@ -8,6 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+import xarray as xr
 
 from vibsim import store
 from vibsim.cli import main
@@ -112,6 +113,14 @@ def test_an_l1_norm_has_the_unit_of_an_integral_over_time(results: dict[str, Pat
     variables = store.read(file).variables
     assert [variables[f"{q}_l1"].attrs["units"] for q in ("u", "v")] == ["m s", "m"]
     assert "square root of s" in variables["u_l2"].attrs["long_name"]
+
+
+def test_a_coordinate_says_which_power_of_s_a_norm_adds_to_a_unit(results: dict[str, Path]) -> None:
+    with xr.open_dataset(convergence(results), decode_timedelta=False) as data:
+        norms = data["u_difference_norm"]
+        assert norms.attrs["units"] == "m"
+        powers = norms.sel(norm=["l1", "l2", "linf", "linf_interior"])["norm_seconds"].values
+    assert powers.tolist() == [1, 0.5, 0, 0]
 
 
 @pytest.mark.slow

@@ -28,6 +28,7 @@ from vibsim.core.vocabulary import (
     MEMBER,
     OF_LEVEL,
     REASON_NAMES,
+    SECONDS_OF_NORM,
     SERIES,
     STATUSES,
     TYPICAL_NORM,
@@ -154,6 +155,8 @@ def _coords(block: MemberBlock) -> Table:
     if len(levels) > 2:
         add("triple", levels[:-2], "coarsest level of three successive ones")
     add("norm", block.norms, "norm over time")
+    powers = [SECONDS_OF_NORM[norm] for norm in block.norms]
+    add("norm_seconds", powers, "power of s beside the unit of an error or a difference", "norm")
     if block.experiment.checks:
         add("check", [check.id for check in block.experiment.checks], "name of the check")
     coords |= best_values.coordinate(block)

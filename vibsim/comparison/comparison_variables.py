@@ -41,7 +41,6 @@ LEAST_ORDER = (
 """What is said of the order of a part of an error of which theory says nothing."""
 NORM, KNOWN = "_error_norm", "_error_known"
 """What follows the name of a quantity in the names of the norms of its true error, and of whether one is known."""
-_IN_NORM = "{} in a norm over time (times s for l1, times the square root of s for l2)"
 
 
 def _adder(table: Table, q: Comparison) -> Add:
@@ -72,9 +71,9 @@ def numbers(q: Comparison) -> Table:
     def stacked(of: Callable[[str], Floats]) -> Floats:
         return np.stack([of(norm) for norm in block.norms], axis=-1)
 
-    words = _IN_NORM.format("true error")
+    words = "true error in a norm over time"
     add("error_norm", (*of_level, "norm"), stacked(lambda n: q.in_norm(n).error), words)
-    words = _IN_NORM.format("true error of the extrapolation")
+    words = "true error of the extrapolation in a norm over time"
     found = stacked(lambda n: q.in_norm(n).extrapolation)
     add("richardson_error_norm", (*MEMBER, "norm"), found, words)
     if block.lean:
@@ -90,7 +89,7 @@ def numbers(q: Comparison) -> Table:
     table[f"{q.name}_formal_order"] = Variable.of(dims, orders, words, promised=int(is_due))
     if levels > 1:
         found = stacked(lambda n: q.in_norm(n).difference)
-        add("difference_norm", (*MEMBER, "pair", "norm"), found, _IN_NORM.format("difference"))
+        add("difference_norm", (*MEMBER, "pair", "norm"), found, "difference in a norm over time")
     if levels > 2:
         words = "ratio of successive differences in a norm over time"
         add("ratio_norm", of_triple, in_precision(q, stacked(q.ratios)), words, "1")
@@ -98,7 +97,7 @@ def numbers(q: Comparison) -> Table:
         words = "relative distance of the rescaled differences"
         add("coincidence", of_triple[:-1], in_precision(q, q.coincidence), words, "1")
     if levels > 1 and not block.lean:
-        words = _IN_NORM.format("grid convergence index of the finest level")
+        words = "grid convergence index of the finest level in a norm over time"
         found = stacked(lambda n: _index(q, n, q.in_norm(n).difference[..., -1]))
         add("gci_norm", (*MEMBER, "norm"), found, words)
     return table
