@@ -175,7 +175,11 @@ def test_what_is_no_equation_of_one_coordinate_is_refused(equation: str, rule: s
             "one.yaml:5: model.coordinates.y.force: -z: unknown name 'z'",
         ),
         (
-            "model: {kind: system, coordinates: {x: {acceleration: -x, drag: 1}}}",
+            "model:\n  kind: system\n  coordinates:\n    x:\n      acceleration: -x\n      drag: 1",
+            "one.yaml:6: model.coordinates.x.drag: 1: is no formula of a coordinate: acceleration, mass, force",
+        ),
+        (
+            "model: {kind: system, coordinates: {x: {drag: 1}}}",
             "each coordinate must have an acceleration, or a force with its mass",
         ),
         (
@@ -193,6 +197,14 @@ def test_what_is_no_equation_of_one_coordinate_is_refused(equation: str, rule: s
         (
             "model: {kind: oscillator, spring: u}\ninitial: {u: 1}\nevents:\n  - {when: q}",
             "one.yaml:4: events[0].when: q: unknown name 'q'",
+        ),
+        (
+            "model: {kind: system, acceleration: -u, events: [{when: u, then: v = -v}]}",
+            "model.events[0].then: v = -v: must be a mapping: e.g. {v: -0.8*v}",
+        ),
+        (
+            "model: {kind: system, acceleration: -u, events: [{when: u = 1}]}",
+            "events[0].when: u = 1: a formula has no = at character 3: write the difference, or ==",
         ),
         (
             "model: {kind: system, acceleration: -k*u, parameters: {k: 1}, k: 2}",

@@ -201,6 +201,15 @@ def test_a_slip_in_a_chain_is_one_fault(chain, key, told):
     assert (fault.key, told in str(fault)) == (key, True), str(fault)
 
 
+def test_a_list_of_coordinates_beside_a_chain_is_one_fault():
+    beside = {"coordinates": ["y"], "acceleration": {"y": "-y"}}
+    with pytest.raises(InputError) as caught:
+        Experiment.from_dict(content({**SHORT, **beside}, initial={"x_i": "1", "y": 1}))
+    (fault,) = caught.value.faults
+    assert fault.key == "model.coordinates"
+    assert "e.g. {y: {acceleration: -y}}" in str(fault)
+
+
 def test_an_unknown_name_in_a_chain_is_told_where_it_stands(tmp_path):
     path = tmp_path / "chain.yaml"
     path.write_text(

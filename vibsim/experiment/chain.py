@@ -49,7 +49,14 @@ def with_chain(source: Source, report: Report) -> Source:
     if isinstance(others, Mapping):
         model["coordinates"] = {**chain, **others}
     else:
-        report.add_malformed(("model", "coordinates"), f"stands under `{REPEAT}`, too", at_key=True)
+        rule, hint = (
+            f"must hold formulas beside a chain of `{REPEAT}`",
+            "e.g. {y: {acceleration: -y}}",
+        )
+        report.add_malformed(("model", "coordinates"), rule, hint)
+        model = {key: value for key, value in model.items() if key not in OF_COORDINATE}
+        names = others if isinstance(others, list | tuple) else ()
+        model["coordinates"] = {**chain, **{str(name): {"acceleration": "0"} for name in names}}
     model[REPEAT] = {index: [1, count]}
     given = section.get("parameters", {})
     if isinstance(given, Mapping):
@@ -94,13 +101,7 @@ class _Writer:
                 self.report.add_malformed(path, rule, f"e.g. {key}_{self.index}", at_key=True)
                 name = f"{key}_{{{self.index}}}"
             self.origins["model", "coordinates", name] = path
-            formulas = own
-            if isinstance(own, Mapping):
-                formulas = {key: own[key] for key in own if key in OF_COORDINATE}
-                for other in (key for key in own if key not in OF_COORDINATE):
-                    rule = f"is no formula of a coordinate: {', '.join(OF_COORDINATE)}"
-                    self.report.add_malformed((*path, other), rule, at_key=True)
-            found[name] = self.value(path, formulas, always=True)
+            found[name] = self.value(path, own, always=True)
         return found
 
     def value(self, path: Path_, written: Any, *, always: bool = False) -> Any:

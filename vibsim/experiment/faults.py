@@ -52,6 +52,11 @@ _EXAMPLES: Mapping[Path_, str] = {
     ("model", "events"): "begin each one with `- `",
 }
 """How a list or a mapping is written, where the rule alone would help nobody."""
+_EXAMPLES_ANYWHERE: Mapping[object, str] = {
+    "expect": "e.g. {status: FAIL, reason: order_low}",
+    "then": "e.g. {v: -0.8*v}",
+}
+"""The same of keys that stand in entries of a list."""
 
 _MEANT = {"tolerance": "atol", "tol": "atol", "at_least": "above", "at_most": "below"}
 """A key that other programs or other checks have, and the one that has its meaning here."""
@@ -184,9 +189,7 @@ class Report:
         if kind == "literal_error":
             hint = nearest(value, re.findall(r"'([^']*)'", context["expected"]))
         if kind in ("tuple_type", "dict_type", "model_type", "model_attributes_type"):
-            hint = _EXAMPLES.get(path, hint)
-            if path[-1] == "expect":
-                hint = "e.g. {status: FAIL, reason: order_low}"
+            hint = _EXAMPLES.get(path) or _EXAMPLES_ANYWHERE.get(path[-1], hint)
         if kind in ("missing", "too_long", "tuple_type"):
             path, rule = _whole_list(path, rule)
         # a list with wrong items is too short only for pydantic, which counts the right ones

@@ -107,6 +107,10 @@ class _Writer:
             path: Path_ = ("model", "coordinates", name)
             self._came_from(("model", "coordinates", i), path)
             for key, value in own.items():
+                if key not in OF_COORDINATE:
+                    rule = f"is no formula of a coordinate: {', '.join(OF_COORDINATE)}"
+                    self.report.add_malformed((*path, key), rule, at_key=True)
+                    continue
                 is_alone = key == "acceleration" and by_force and len(own) == 1
                 if is_alone:
                     found.setdefault("mass", {})[name] = 1
@@ -158,7 +162,7 @@ def _over_a_key(check: Any, sweep: Any) -> Any:
 
 
 def _has_formulas(own: Any) -> bool:
-    return isinstance(own, Mapping) and bool(own) and own.keys() <= set(OF_COORDINATE)
+    return isinstance(own, Mapping) and not own.keys().isdisjoint(OF_COORDINATE)
 
 
 def solved(equation: str) -> tuple[str, str]:

@@ -42,6 +42,7 @@ TERMS = 16
 TOO_DEEP = f"must not nest deeper than {MAX_DEPTH} operations"
 _JOINED = re.compile(r"(?<![A-Za-z0-9_.])(\d+\.?\d*|\.\d+)(?=[A-Za-z_])(?![eE][+-]?\d)")
 """A number that runs into a name: a forgotten ``*``."""
+_EQUALS = re.compile(r"(?<![<>=!])=(?!=)")
 _UNFINISHED = re.compile(r"([+\-*/<>=!,(]|\b(and|or|not|if|else))$")
 INSTEAD = {
     **{"^": "** for a power", "%": "mod(x, y)", "&": "and", "|": "or", "\u03c0": "pi"},
@@ -286,6 +287,8 @@ def place_of_fault(body: str, error: SyntaxError) -> tuple[int, str, str]:
     # a text that is cut short is reported at its beginning, or past its end
     if _UNFINISHED.search(body):
         return len(body), "ends where a number, a name or '(' was expected", ""
+    if equals := _EQUALS.search(body):
+        return equals.start(), "a formula has no =", "write the difference, or == to compare"
     position = min(max((error.offset or 1) - 1, 0), len(body) - 1)
     return position, "expected an operator, a number, a name or a parenthesis here", ""
 
