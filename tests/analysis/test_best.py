@@ -346,3 +346,13 @@ def test_a_number_that_has_not_settled_does_not_pass_by_chance() -> None:
         ("INCONCLUSIVE", "pre_asymptotic"),
         ("PASS", "match"),
     ]
+
+
+def test_a_number_whose_changes_do_not_shrink_has_no_best_value() -> None:
+    """Pushed to rest upside down, the computed pendulum turns later by ln 4 with each level: there is no period."""
+    given = {"model": {"kind": "pendulum"}, "initial": {"theta": 0.0, "omega": 2.0}}
+    run = given | {"time": {"end": 40.0}, "levels": [9, 10, 11, 12, 13]}
+    near, far = ({"value": "period", "above": x, "at": {"level": "best"}} for x in (6.28, -1.5))
+    found = judged(near, far, **run, schemes=[{"kind": "central", "end_velocity": "kick"}])
+    assert [v.reason for v in found] == ["pre_asymptotic", "match"]
+    assert "because its changes do not shrink steadily from level to level" in found[0].text

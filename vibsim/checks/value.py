@@ -97,7 +97,7 @@ def measure(block: MemberBlock, compared: Compared, check: ValueCheck) -> Measur
         bound = np.where(np.isnan(bound), REACH * _last_change(numbers), bound)
     own = row.own_levels(levels) or tuple(levels)
     level = place.level if place.level in own else own[-1]
-    needed, first = _prospects(check, numbers[..., : len(own)], own, int(level), fulfilled)
+    needed, first = _prospects(check, numbers[..., : len(own)], own, int(level), fulfilled, is_open)
     needed = np.where(fulfilled & ~is_open, UNKNOWN, needed)
     return {
         "value": value,
@@ -137,12 +137,18 @@ def _last_change(numbers: Floats) -> Floats:
 
 
 def _prospects(
-    check: ValueCheck, numbers: Floats, levels: Sequence[int], level: int, fulfilled: Flags
+    check: ValueCheck,
+    numbers: Floats,
+    levels: Sequence[int],
+    level: int,
+    fulfilled: Flags,
+    is_open: Flags,
 ) -> tuple[Any, Any]:
     """Return what finer levels than `level` do to a number, and the first at which it is as asked, -1 for none.
 
     The first is `SETTLED`, `MOVING` or `UNKNOWN`; of a number that is `fulfilled`, `MOVING` where finer levels may move
-    it out again, else `UNKNOWN`. `numbers` are of every level, shape (scheme, case, level).
+    it out again, else `UNKNOWN`. `numbers` are of every level, shape (scheme, case, level). Where `is_open` and the
+    changes do not shrink, each of `MOST_FINER` finer levels may change a number by as much again.
     """
     holds, away = compare(check, numbers)
     helps = holds & (np.array(levels) > level)
@@ -151,9 +157,12 @@ def _prospects(
     if len(levels) > 1:
         with np.errstate(all="ignore"):
             last = _last_change(numbers)
-            code[away[..., -1] <= REACH * last] = MOVING
-            code[(away[..., -1] > REACH * last) | (last == 0.0)] = SETTLED
-            code[fulfilled] = np.where(REACH * last > -away[..., -1], MOVING, UNKNOWN)[fulfilled]
+            change = np.abs(np.diff(numbers[..., -3:], axis=-1))
+            shrinks = change[..., -1] <= REACH / (1.0 + REACH) * change[..., 0]
+            reach = np.where(is_open & ~shrinks, MOST_FINER, REACH) * last
+            code[away[..., -1] <= reach] = MOVING
+            code[(away[..., -1] > reach) | (last == 0.0)] = SETTLED
+            code[fulfilled] = np.where(reach > -away[..., -1], MOVING, UNKNOWN)[fulfilled]
     return code, np.where(fulfilled, -1, first)
 
 
@@ -385,7 +394,16 @@ def _why_unknown(f: Found, check: ValueCheck) -> str:
     """Say why nothing bounds the error of a number, where one cause is sure."""
     if _is_on_the_mesh(f, check):
         return ", because events are left to the mesh"
+    numbers = _by_level_of(f)
+    if len(numbers) >= FEWEST and np.all(np.isfinite(numbers)):
+        return ", because its changes do not shrink steadily from level to level"
     return ", because there is one level only" if len(f.experiment.levels) == 1 else ""
+
+
+def _by_level_of(f: Found) -> list[float]:
+    """Return a number at every level; none where that was not stored."""
+    is_stored = name_of(f.id, "value_by_level") in f.record
+    return f.fact("value_by_level") if is_stored else []
 
 
 def _is_on_the_mesh(f: Found, check: ValueCheck) -> bool:
@@ -401,8 +419,7 @@ def finer_levels(f: Found, count: int = FINER) -> str:
 
 def _levels_to_add(f: Found, check: ValueCheck) -> int:
     """Return how many finer levels make a number as asked if its changes fall on as the last two did."""
-    is_stored = name_of(f.id, "value_by_level") in f.record
-    numbers: list[float] = f.fact("value_by_level") if is_stored else []
+    numbers = _by_level_of(f)
     if len(numbers) < FEWEST:
         return FINER
     before, last = np.diff(numbers[-3:])

@@ -23,7 +23,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from vibsim.convergence import thresholds as th
-from vibsim.convergence.differences import order_of_ratio, safe_ratio
+from vibsim.convergence.differences import order_of_ratio, safe_ratio, target_ratio
 from vibsim.convergence.extrapolation import (
     Scheme,
     error_left,
@@ -78,7 +78,7 @@ def _limit(
     n = len(levels)
     finest = np.full(values.shape[:-1], n - 1)
     with np.errstate(all="ignore"):
-        bound = _bound_of_finest(values, floor)
+        bound = _bound_of_finest(values, levels, floor)
         unsure = np.where(np.isnan(bound), np.inf, bound)
         best = Limit(values[..., -1].copy(), unsure, finest, finest.copy())
         if n > 2:
@@ -119,7 +119,7 @@ def _leading(observed: Floats, promised: Floats) -> Floats:
     return np.where(other, likely, p)
 
 
-def _bound_of_finest(values: Floats, floor: Floats) -> Floats:
+def _bound_of_finest(values: Floats, levels: Sequence[int], floor: Floats) -> Floats:
     """Return a bound of the error of the finest level without any order; NaN where the levels do not approach it."""
     n = values.shape[-1]
     if n == 1:
@@ -131,7 +131,10 @@ def _bound_of_finest(values: Floats, floor: Floats) -> Floats:
     recent = values[..., -3:]
     spread = th.SPREAD_OF_THREE if n == 3 else th.SPREAD
     bound = spread * (np.max(recent, axis=-1) - np.min(recent, axis=-1)) + noise
-    falls = np.all(np.diff(change[..., -3:], axis=-1) < 0, axis=-1)
+    falls = np.ones(values.shape[:-1], dtype=bool)
+    for i in range(max(n - 4, 0), n - 2):
+        least = target_ratio(th.SLOWEST_ORDER, levels[i : i + 3])
+        falls &= change[..., i] >= least * change[..., i + 1]
     rounding = np.max(change[..., -2:], axis=-1) <= th.FALL_ABOVE_ROUND_OFF * floor[..., -1]
     found = np.where(falls | rounding, bound, np.nan)
     if n < th.RAGGED:

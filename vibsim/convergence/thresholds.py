@@ -13,6 +13,8 @@ The priors of the error model are in ``error_model/priors.py``.
 
 from __future__ import annotations
 
+import math
+
 # ---- Expansions
 
 # Orders no further apart are the same one: half the distance between two orders of expansions. [derived]
@@ -94,6 +96,8 @@ RATIO_OF_THREE, SAFETY_OF_THREE, LEAST_SHARE_OF_THREE = 0.05, 6.0, 0.03
 # Factor on what the last three levels differ by (L. Eca and M. Hoekstra, 2014), three levels that are all there are,
 # and two. [calibrated]
 SPREAD, SPREAD_OF_THREE, SPREAD_OF_TWO = 3.0, 3.5, 4.0
+# Least order at which that covers all that is left of changes that fall geometrically. [derived]
+SLOWEST_ORDER = 0.5 * math.log2(1.0 + 1.0 / SPREAD)
 # Of so many levels, changes may fall raggedly: the last two to this part of those before. [calibrated]
 RAGGED, DECLINE = 5, 0.5
 ORDER_ABOVE_ROUND_OFF = 30.0  # a difference has an order above so many times its floor [calibrated]

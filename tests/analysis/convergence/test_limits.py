@@ -98,6 +98,15 @@ def test_levels_that_move_apart_bound_nothing() -> None:
         assert np.array_equal(value, u[-1], equal_nan=True)
 
 
+@pytest.mark.parametrize("levels", [(4, 5, 6, 7), (4, 6, 7, 11), (4, 5, 9)])
+def test_levels_that_hardly_approach_each_other_bound_nothing(levels: tuple[int, ...]) -> None:
+    log = np.array(levels) * 1.4
+    for u in (log, ladder(levels, (0.3, 0.05))):
+        assert np.isnan(run(u, levels)[1])
+    value, bound, *_ = run(ladder(levels, (0.3, 0.5), (0.1, 1.5)), levels)
+    assert abs(value + 0.7) <= bound
+
+
 def test_it_stops_at_round_off() -> None:
     levels = tuple(range(6, 24))
     rng = np.random.default_rng(5)
