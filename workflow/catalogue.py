@@ -267,7 +267,6 @@ def page(listed: dict[str, Any], known: dict[str, Experiment]) -> str:
         lines.append(f"Sections: {', '.join(_jump(section, titles) for section in sections)}\n")
         for section in sections:
             lines.append(f"### {_title(section, titles)}\n")
-            lines += _equations(listed["equations"][text].get(section))
             if section not in parts:
                 below = [s for s in sections if s.startswith(f"{section}.")]
                 ends = " to ".join(_jump(end, titles) for end in (below[0], below[-1]))
@@ -294,14 +293,6 @@ def _jump(section: str, titles: dict[str, str]) -> str:
     """Return a link to the heading of a section."""
     anchor = re.sub(r"[^\w -]", "", _title(section, titles)).lower().replace(" ", "-")
     return f"[{section}](#{anchor})"
-
-
-def _equations(ends: list[int] | None) -> list[str]:
-    """Return the line that names each equation of a section, so that a search for its number finds the section."""
-    if ends is None:
-        return []
-    named = ", ".join(f"({number})" for number in range(ends[0], ends[1] + 1))
-    return [f"Equation{'s' if ends[1] > ends[0] else ''} {named}.\n"]
 
 
 def _exercise(row: Row) -> list[int]:
