@@ -10,6 +10,6 @@ picture() { # NAME SIZE EXPERIMENT
         --screenshot="docs/images/$1.png" "file://$results/$3/report.html" 2>/dev/null
 }
 .venv/bin/vibsim run theta_convergence -q --results "$results"
-picture report 1400,636 pendulum_lab/theta_convergence
+picture report 1100,632 pendulum_lab/theta_convergence
 .venv/bin/vibsim run examples/heat/heat.yaml --allow-commands -q --results "$results"
 picture solver 1100,745 adhoc/heat
