@@ -25,6 +25,7 @@ root_doc = "docs/index"
 include_patterns = ["*.md", "docs/**.md", "examples/**.md", "results/README.md", "config/README.md"]
 extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
 myst_heading_anchors = 4
+myst_enable_extensions = ["html_image"]  # a picture with a width, in the README
 # what pydantic adds is not ours
 autodoc_default_options = {"members": True, "exclude-members": "model_config, model_post_init"}
 autodoc_typehints = "none"  # the docstrings say types and shapes in words
