@@ -195,6 +195,10 @@ def test_what_is_no_equation_of_one_coordinate_is_refused(equation: str, rule: s
             "one.yaml:3: stop: u < 0.5: stands under `model: stop`, too",
         ),
         (
+            "model: {kind: bouncing_ball}\nstop: h < 1",
+            "one.yaml:2: stop: h < 1: the model bouncing_ball takes none: `kind: system` does",
+        ),
+        (
             "model: {kind: oscillator, spring: u}\ninitial: {u: 1}\nevents:\n  - {when: q}",
             "one.yaml:4: events[0].when: q: unknown name 'q'",
         ),

@@ -56,9 +56,13 @@ def with_other_forms(source: Source, report: Report) -> Source:
     rest = {key: value for key, value in data.items() if key not in BESIDE_MODEL}
     if isinstance(checks := data.get("checks"), list | tuple):
         rest["checks"] = [_over_a_key(check, data.get("sweep")) for check in checks]
-    for key in BESIDE_MODEL:
-        if key in data:
+    known = report.kinds.model(section.get("kind"))
+    for key in (key for key in BESIDE_MODEL if key in data):
+        if known is None or known.takes_events:
             model = writer.moved(model, key, data[key], (key,))
+        else:
+            rule = f"the model {known.kind} takes none"
+            report.add_malformed((key,), rule, "`kind: system` does", at_key=True)
     origins = {**source.origins, **writer.origins}
     report.source = replace(source, data={**rest, "model": model}, origins=origins)
     return report.source
