@@ -7,14 +7,17 @@ members. Source: pendulum lecture, section 2.5.
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from vibsim.checks.order_context import COINCIDE
 from vibsim.checks.outcome import about_members
-from vibsim.core.array_types import Floats
+from vibsim.core.array_types import Flags, Floats
 from vibsim.core.record import Record
+from vibsim.core.vocabulary import SECONDS_OF_NORM
 from vibsim.report import choice, data, finest_level, style, sweep_layout, words
 from vibsim.report.choice import Lead
 from vibsim.report.data import Member
@@ -31,10 +34,10 @@ FEW = 300  # of more members a histogram of the orders says more than dots
 FEWEST = 2  # errors that a picture over the step needs
 MOST_SCHEMES = 6  # schemes that the right picture can tell apart
 SIZES = {
-    "l1": ("mean error", 1.0), "l2": ("root-mean-square error", 0.5), "linf": ("largest error", 0.0),
-    "linf_interior": ("largest error without the last point", 0.0),
+    "l1": "mean error", "l2": "root-mean-square error", "linf": "largest error",
+    "linf_interior": "largest error without the last point",
 }  # fmt: skip
-"""Of a norm over time what it is as a size of the error, and over which power of the duration."""
+"""What a norm over time, over the same power of the duration as of a second, is as a size of the error."""
 STRIP = 0.12  # of the height of the axes, for a row of a legend
 LONG = 24  # letters of a label above which it is set smaller
 
@@ -120,12 +123,12 @@ def against_step(record: Record, lead: Lead) -> Picture | None:
     """Draw the error of every level against the step, of every scheme; None where there is none to draw."""
     quantity, case = lead.quantity, lead.member.case
     letter, measure = words.symbol(quantity), data.norm_unit(record, quantity, "linf")
-    size, part = SIZES[lead.norm]
     names = record.words("scheme")
     others = [s for s in range(len(names)) if s != lead.member.scheme][: MOST_SCHEMES - 1]
     # an L2 norm over the root of the duration is the root of the mean square
-    dt, scale = data.steps_of(record, case), float(data.ends_of(record)[case]) ** part
-    ax = _panel(RIGHT, style.label(f"{size} of {letter}", measure))
+    dt = data.steps_of(record, case)
+    scale = float(data.ends_of(record)[case]) ** SECONDS_OF_NORM[lead.norm]
+    ax = _panel(RIGHT, style.label(f"{SIZES[lead.norm]} of {letter}", measure))
     ax.set_gid(style.STEP)
     drawn: list[Floats] = []
     notes = dict[str, None]()
@@ -362,78 +365,127 @@ def _mark(ax: Axes, x: Floats, y: Floats, lead: Lead, *, on_map: bool = False) -
         _name(ax, f"{ax.get_title(loc='left')} · ring: the member that decides")
 
 
+@dataclass(frozen=True)
+class _Orders:
+    """The stated orders of all members of a scheme, with the ends of their intervals; arrays of shape (case,)."""
+
+    order: Floats
+    low: Floats
+    high: Floats
+    promised: Floats
+    allowed: float
+    is_checked: Flags
+    """Of which members the check asks."""
+
+    @cached_property
+    def known(self) -> Flags:
+        """Which members have an order."""
+        return np.isfinite(self.order)
+
+    @cached_property
+    def due(self) -> Floats:
+        """The promised orders, each once."""
+        return np.unique(self.promised[np.isfinite(self.promised)])
+
+    @cached_property
+    def around(self) -> Floats:
+        """What the picture shows in any case."""
+        if not self.due.size:
+            return self.order[self.known]
+        return np.concatenate([self.due - 2 * self.allowed, self.due + 2 * self.allowed])
+
+    def shown(self, orders: Floats) -> Floats:
+        """Return orders, of which those far outside stand at the edge of the picture."""
+        return np.clip(orders, self.around.min() - 1.0, self.around.max() + 1.0)
+
+    @cached_property
+    def limits(self) -> tuple[float, float]:
+        """The ends of the axis of the order."""
+        return style.limits(self.shown(self.order)[self.known], self.around)
+
+    @cached_property
+    def inside(self) -> Flags:
+        """Which members are in the band: as in a verdict, the interval counts where there is one."""
+        low, high = np.fmin(self.order, self.low), np.fmax(self.order, self.high)
+        within = (low <= self.promised + self.allowed) & (high >= self.promised - self.allowed)
+        return np.asarray(self.known & within)
+
+    def title(self) -> str:
+        """Say how many members keep their order."""
+        checked = self.is_checked
+        counts = (self.inside[checked].sum(), checked.sum(), np.sum(~checked))
+        within, of, others = (words.number(int(count), "integer") for count in counts)
+        if not checked.all():
+            return (
+                f"{within} of {of} members asked about are in the band; grey: the {others} others"
+            )
+        if not self.inside.all():
+            return f"{within} of {of} members have an order in the band"
+        measured = np.abs(self.order - self.promised) <= self.allowed
+        return "All members keep their order" if measured.all() else "All intervals reach the band"
+
+
 def orders(experiment: Experiment, record: Record, lead: Lead) -> Picture | None:
     """Draw the stated orders of all members: dots over the key with most values, or of many a histogram."""
-    keys, quantity = sweep_layout.keys(record), lead.quantity
+    keys, quantity, scheme = sweep_layout.keys(record), lead.quantity, lead.member.scheme
     if not keys or not data.whole(record, "triple"):
         return None
-    order, low, high = (
-        part[lead.member.scheme] for part in finest_level.orders(record, quantity, lead.norm)
+    order, low, high = (part[scheme] for part in finest_level.orders(record, quantity, lead.norm))
+    found = _Orders(
+        order,
+        low,
+        high,
+        promised=data.formal_orders(record, quantity)[scheme],
+        allowed=choice.tolerance(experiment, quantity, record.words("scheme")[scheme]),
+        is_checked=about_members(record, lead.measured if lead.is_on_order else None),
     )
-    promised = data.formal_orders(record, quantity)[lead.member.scheme]
-    known = np.isfinite(order)
-    if not known.any():
+    if not found.known.any():
         return None
-    is_checked = about_members(record, lead.measured if lead.is_on_order else None)
-    letter = words.symbol(quantity)
-    allowed = choice.tolerance(experiment, quantity, record.words("scheme")[lead.member.scheme])
-    due = np.unique(promised[np.isfinite(promised)])
-    around = np.concatenate([due - 2 * allowed, due + 2 * allowed]) if due.size else order[known]
-    shown = np.clip(order, around.min() - 1.0, around.max() + 1.0)
-    if order.size > FEW:
-        ax = _panel(RIGHT, "members (logarithmic)")
-        borders = np.linspace(*style.limits(shown[known], around), 41)
-        both, colours = (
-            [shown[known & is_checked], shown[known & ~is_checked]],
-            [style.COLOURS[0], style.PALE],
-        )
-        ax.hist(both, borders.tolist(), color=colours, stacked=True, zorder=2)
-        for value in due:
-            ax.axvspan(value - allowed, value + allowed, **style.ALLOWED)
-        most = float(np.histogram(shown[known], borders)[0].max())
-        style.log_axis(ax, "y", 0.7, 2.0 * most, most=5)
-        ax.set_xlabel(f"observed order of {letter}")
+    text = f"observed order of {words.symbol(quantity)}"
+    if found.order.size > FEW:
+        ax, bars = _histogram_of_orders(found, text), ""
     else:
-        key = max(keys, key=lambda one: one.distinct.size)
-        ax = _panel(RIGHT, f"observed order of {letter}")
-        for value in due:
-            ax.axhspan(value - allowed, value + allowed, **style.ALLOWED)
-        low_end, high_end = (
-            np.clip(part, around.min() - 1.0, around.max() + 1.0) for part in (low, high)
-        )
-        for of_kind, colour in ((~is_checked, style.PALE), (is_checked, style.COLOURS[0])):
-            x = key.values[of_kind]
-            ax.vlines(
-                x, low_end[of_kind], high_end[of_kind], color=colour, linewidth=1.6, alpha=0.5
-            )
-            ax.plot(x, shown[of_kind], ".", color=colour, markersize=4)
-        _across(ax, key)
-        ax.set_ylim(*style.limits(shown[known], around))
-        _mark(ax, key.values, shown, lead)
-    # as in a verdict, the interval counts where there is one
-    inside = (
-        known
-        & (np.fmin(order, low) <= promised + allowed)
-        & (np.fmax(order, high) >= promised - allowed)
-    )
-    counts = (inside[is_checked].sum(), is_checked.sum(), np.sum(~is_checked), np.sum(~known))
-    within, due_of, others, missing = (words.number(int(count), "integer") for count in counts)
-    if not is_checked.all():
-        title = (
-            f"{within} of {due_of} members asked about are in the band; grey: the {others} others"
-        )
-    elif not inside.all():
-        title = f"{within} of {due_of} members have an order in the band"
-    else:
-        measured = np.abs(order - promised) <= allowed
-        title = "All members keep their order" if measured.all() else "All intervals reach the band"
-    bars = "" if order.size > FEW else "; the bars are the 95 % intervals of the orders"
+        ax = _orders_over(max(keys, key=lambda one: one.distinct.size), found, lead, text)
+        bars = "; the bars are the 95 % intervals of the orders"
+    missing = words.number(int(np.sum(~found.known)), "integer")
     return Picture(
         "hero_orders",
-        title,
+        found.title(),
         f"The band is what the tolerance allows around the promised order{bars}."
-        + f" {missing} members have no order and are left out." * (not known.all())
-        + " The check does not ask about the grey members." * (not is_checked.all()),
+        + f" {missing} members have no order and are left out." * (not found.known.all())
+        + " The check does not ask about the grey members." * (not found.is_checked.all()),
         f"Observed orders of {words.name(quantity)} of all members",
         ax.get_figure(root=True),
     )
+
+
+def _histogram_of_orders(found: _Orders, text: str) -> Axes:
+    ax = _panel(RIGHT, "members (logarithmic)")
+    shown, known, checked = found.shown(found.order), found.known, found.is_checked
+    borders = np.linspace(*found.limits, 41)
+    parts, colours = (
+        [shown[known & checked], shown[known & ~checked]],
+        [style.COLOURS[0], style.PALE],
+    )
+    ax.hist(parts, borders.tolist(), color=colours, stacked=True, zorder=2)
+    for value in found.due:
+        ax.axvspan(value - found.allowed, value + found.allowed, **style.ALLOWED)
+    most = float(np.histogram(shown[known], borders)[0].max())
+    style.log_axis(ax, "y", 0.7, 2.0 * most, most=5)
+    ax.set_xlabel(text)
+    return ax
+
+
+def _orders_over(key: sweep_layout.Key, found: _Orders, lead: Lead, text: str) -> Axes:
+    ax = _panel(RIGHT, text)
+    for value in found.due:
+        ax.axhspan(value - found.allowed, value + found.allowed, **style.ALLOWED)
+    order, low, high = map(found.shown, (found.order, found.low, found.high))
+    for part, colour in ((~found.is_checked, style.PALE), (found.is_checked, style.COLOURS[0])):
+        x = key.values[part]
+        ax.vlines(x, low[part], high[part], color=colour, linewidth=1.6, alpha=0.5)
+        ax.plot(x, order[part], ".", color=colour, markersize=4)
+    _across(ax, key)
+    ax.set_ylim(*found.limits)
+    _mark(ax, key.values, order, lead)
+    return ax
