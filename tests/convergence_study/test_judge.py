@@ -50,21 +50,16 @@ def test_the_signature_is_the_public_one() -> None:
     assert vibsim.convergence.judge is judge
 
 
-def test_the_import_is_quick_and_light() -> None:
+def test_the_import_is_light() -> None:
+    """Libraries and rooms that it does without take most of the time of an import."""
     program = (
-        "import sys, time; start = time.process_time(); import vibsim.convergence; "
-        "from vibsim.convergence import judge; judge([1, 2, 4], [1.0, 2.0, 4.0]); "
-        "print(time.process_time() - start); "
+        "import sys; from vibsim.convergence import judge; judge([1, 2, 4], [1.0, 2.0, 4.0]); "
         "heavy = {'xarray', 'matplotlib', 'scipy', 'pydantic', 'netCDF4', 'yaml', 'snakemake'}; "
         "assert not heavy & set(sys.modules), heavy & set(sys.modules); "
         "rooms = {'models', 'schemes', 'experiment', 'engine', 'checks'}; "
         "assert not {f'vibsim.{room}' for room in rooms} & set(sys.modules)"
     )
-    runs = [
-        float(subprocess.run([sys.executable, "-c", program], check=True, capture_output=True, text=True).stdout)
-        for _ in range(2)
-    ]  # fmt: skip
-    assert min(runs) < 0.3
+    subprocess.run([sys.executable, "-c", program], check=True)
 
 
 @pytest.mark.parametrize("order", [1.0, 2.0, 3.0, 4.0])
@@ -468,3 +463,16 @@ def test_the_interval_of_an_order_that_is_no_multiple_of_a_half_holds_it(
     verdict = judge(h, 1.0 + 0.7 * h**p + part * h**q)
     if verdict.status == "PASS":
         assert verdict.order_low <= p <= verdict.order_high
+
+
+@pytest.mark.parametrize("count", [3, 4, 5])
+@pytest.mark.parametrize("order", [None, 1.0])
+def test_of_levels_that_do_not_approach_each_other_no_error_is_stated(
+    order: float | None, count: int
+) -> None:
+    h = 0.1 * 0.5 ** np.arange(count)
+    grows, falls = (judge(h, values, order=order) for values in (np.log(1.0 / h), 1.0 + h**0.5))
+    assert grows.status == "INCONCLUSIVE"
+    assert (grows.error, grows.best) == (None, None)
+    assert "error of the finest level" not in grows.text
+    assert falls.error == pytest.approx(h[-1] ** 0.5, rel=0.05)

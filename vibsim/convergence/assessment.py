@@ -47,7 +47,14 @@ from vibsim.convergence.likely_powers import (
     tails,
 )
 from vibsim.convergence.reasons import code, first_reason, is_one_of
-from vibsim.convergence.thresholds import DEFINITE, HALF_SPACING, NOISE_FACTOR, RISK, RISK_OF_THREE
+from vibsim.convergence.thresholds import (
+    DEFINITE,
+    HALF_SPACING,
+    LEAST_ORDER,
+    NOISE_FACTOR,
+    RISK,
+    RISK_OF_THREE,
+)
 from vibsim.core.array_types import Codes, Flags, Floats, Integers
 from vibsim.core.vocabulary import ORDER_TOLERANCE
 
@@ -107,6 +114,7 @@ class Decision:
 class Assessment(Decision):
     """What was decided of ladders, and their best values; arrays of shape (ladder,) where no other is given."""
 
+    # of levels without a settled order that hardly approach each other, or not at all, these are NaN
     error: Floats  # norm of the error of the finest level, estimated where the exact solution is not known
     error_bound: Floats  # what it is at most
     weights: Floats  # the best value is the sum of these times the values of the levels, shape (ladder, level)
@@ -177,7 +185,12 @@ def _assess_block(ladder: Ladder, factors: Floats, question: Question) -> dict[s
         risk = np.where(rests_on_three(of_limit), RISK_OF_THREE, RISK)
         missed = missed | ((of_limit.expansion > 1.0 - risk) & is_missed(ladder, of_limit))
     numbers = _numbers(ladder, found, of_limit, missed)
-    return numbers | best_value(ladder, of_limit, found.exact, factors)
+    values = best_value(ladder, of_limit, found.exact, factors)
+    if not ladder.exact_known:
+        is_open = is_one_of(numbers["reason"], "pre_asymptotic")
+        for row in values.values():
+            row[is_open & (numbers["order"] < LEAST_ORDER)] = np.nan
+    return numbers | values
 
 
 def _decide_block(ladder: Ladder, factors: Floats, question: Question) -> dict[str, np.ndarray]:
