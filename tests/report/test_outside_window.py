@@ -9,7 +9,8 @@ import pytest
 
 from vibsim import Experiment, analyse, simulate, verdicts
 from vibsim.core.record import Record
-from vibsim.report import style
+from vibsim.core.vocabulary import TYPICAL_NORM
+from vibsim.report import data, style
 from vibsim.report.data import Member
 from vibsim.report.figures import time
 from vibsim.report.tables import levels as tables
@@ -41,7 +42,8 @@ def made(levels: range, noise: float = 0.0, **more: Any) -> tuple[Any, Record]:
 
 def notes(record: Record) -> list[str]:
     """Return what the table of levels says of each of them."""
-    return tables._notes(record, "u", Member(0, 0, "central"))
+    norm = data.norm_index(record, TYPICAL_NORM)
+    return tables._notes(record, "u", Member(0, 0, "central"), norm)
 
 
 def legend(record: Record) -> str:
@@ -71,6 +73,13 @@ def test_coarse_levels_are_called_too_coarse() -> None:
     _, record = made(range(4, 11))
     assert notes(record)[0] == "too coarse"
     assert "round-off" not in notes(record)
+
+
+def test_levels_of_the_same_order_before_those_that_are_used_are_not_called_too_coarse() -> None:
+    _, record = made(range(6, 15))
+    orders = record["u_observed_order"][0, 0, :, record.words("norm").index(TYPICAL_NORM)]
+    assert abs(orders[0] - 2.0) < 0.02
+    assert notes(record)[0] == "not needed"
 
 
 def test_levels_that_overflow_broke_down(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -373,7 +373,7 @@ class _Phrases(OrderContext):
     def unseen(self) -> str:
         if self.has_exact:
             return ""
-        return " There is no exact solution, so convergence to a wrong answer would go unnoticed."
+        return " No exact solution is known, so convergence to a wrong answer would go unnoticed."
 
     def first_good(self) -> int:
         """Return the coarsest level that is stable, or from which on none met a number that is not finite."""

@@ -237,14 +237,25 @@ def _best(experiment: Experiment, record: Record, lead: Lead) -> Iterator[Number
         is_named = row.quantity in words.NAMES or row.quantity == position
         text = f"{words.symbol(row.quantity)} {WORDS[row.value]}" if is_named else row.words
         unit, size = data.unit(record, field), error_size(bound)
-        levels = len(data.whole(record, "level"))
         note = f"± {size.text if size else '0'} {unit}".rstrip()
         yield {
             "label": f"Best value: {text}{data.of_several(record, lead.member.scheme)}",
             "value": f"{rounded(value, bound).text} {unit}".rstrip(),
-            "note": f"{note}, extrapolated over {levels} levels{_of_member(record, lead)}",
+            "note": f"{note}, {_levels_of_best(record, name, lead)}{_of_member(record, lead)}",
         }
         return
+
+
+def _levels_of_best(record: Record, name: str, lead: Lead) -> str:
+    """Say which levels a best value is of."""
+    if "scalar" not in record:
+        return "extrapolated over the levels"
+    k = record.words("scalar").index(name)
+    ends = ("scalar_first", "scalar_last")
+    first, last = (int(data.at(record, end, lead.member, scalar=k)) for end in ends)
+    if first == last:
+        return f"level {last} as it is"
+    return f"extrapolated over levels {words.levels((first, last))}"
 
 
 def _of_member(record: Record, lead: Lead) -> str:

@@ -14,7 +14,7 @@ import numpy as np
 
 from vibsim.core.array_types import Flags, Floats
 from vibsim.core.record import Record
-from vibsim.core.vocabulary import MEMBER, OF_LEVEL, TYPICAL_NORM
+from vibsim.core.vocabulary import MEMBER, OF_LEVEL, ORDER_TOLERANCE, TYPICAL_NORM
 from vibsim.report import data, frame, style, words
 from vibsim.report.data import Member, known, time_unit, unit, whole
 from vibsim.report.tables.table import Cell, Column, Table, Written
@@ -75,7 +75,7 @@ def orders(
     letter, pairs = words.symbol(quantity), bool(whole(record, "pair"))
     triples = bool(whole(record, "triple"))
     floors = {member: data.floor_norm(record, quantity, member, norm) for member in shown}
-    notes = {member: _notes(record, quantity, member) for member in shown}
+    notes = {member: _notes(record, quantity, member, n) for member in shown}
 
     def of(name: str) -> Fill:
         found = known(record, f"{quantity}_{name}", (*MEMBER, "level"), norm=n)
@@ -96,9 +96,12 @@ def orders(
     return by_level(record, f"orders_{quantity}_{norm}", caption, shown, filled)
 
 
-def _notes(record: Record, quantity: str, member: Member) -> list[str]:
+def _notes(record: Record, quantity: str, member: Member, norm: int) -> list[str]:
     """Say of every row whether the stated order rests on the three levels that start there."""
     levels, (first, last) = whole(record, "level"), data.window(record, quantity, member)
+    stated, *_ = data.stated_order(record, quantity, member, norm)
+    orders = known(record, f"{quantity}_observed_order", (*MEMBER, "level"), norm=norm)
+    own = orders[member.scheme, member.case]
     above = data.sound_pairs(record, quantity, member) if len(levels) > 1 else []
     notes = []
     for i, level in enumerate(levels):
@@ -106,7 +109,8 @@ def _notes(record: Record, quantity: str, member: Member) -> list[str]:
         if has_three and first <= level and levels[i + 2] <= last:
             notes.append("yes")
         elif 0 <= level < first:
-            notes.append("too coarse")
+            is_like = has_three and abs(own[i] - stated) <= ORDER_TOLERANCE
+            notes.append("not needed" if is_like else "too coarse")
         elif all(above[k] for k in places[:-1]):
             notes.append("no" if has_three else "–")
         else:

@@ -89,7 +89,7 @@ TRUSTED = (
 )
 ROUGH = "The rescaled differences of the levels do not coincide yet, so the estimate of the error is rough."
 BESIDE = " The true error is known here, and the estimate is within {part} % of it."
-UNSEEN = " There is no exact solution, so convergence to a wrong answer would go unnoticed."
+UNSEEN = " No exact solution is known, so convergence to a wrong answer would go unnoticed."
 
 
 def title(experiment: Experiment, record: Record, lead: Lead, printed: Collection[str]) -> str:
