@@ -181,6 +181,17 @@ def thin(t: Floats, y: Floats, width: int = THINNED_POINTS) -> tuple[Floats, Flo
     return t[keep], y[keep]
 
 
+def curve(ax: Axes, t: Floats, y: Floats, **look: Any) -> None:
+    """Draw a series, thinned; a value between two gaps, to which no line leads, as a dot."""
+    x, values = thin(t, y)
+    ax.plot(x, values, **look)
+    is_gap = np.concatenate([[True], ~np.isfinite(values), [True]])
+    alone = ~is_gap[1:-1] & is_gap[:-2] & is_gap[2:]
+    dot = {key: look[key] for key in ("color", "gid") if key in look}
+    if alone.any():
+        ax.plot(x[alone], values[alone], ".", markersize=3, **dot)
+
+
 def thin_band(t: Floats, low: Floats, high: Floats) -> tuple[Floats, Floats, Floats]:
     """Thin a band for drawing so that it is nowhere narrower.
 

@@ -175,7 +175,7 @@ def _draw_ratios(
             look = {"color": style.COLOURS[k], "linestyle": style.DASHES[k], "linewidth": 1.3}
             drawn.append(values)
         text = _triple(levels, i) + ("" if good[i] else f"\n({lost[i]})")
-        ax.plot(*style.thin(t, values), label=text, gid=style.of_level(levels[i]), **look)
+        style.curve(ax, t, values, label=text, gid=style.of_level(levels[i]), **look)
     if not drawn:
         style.remark(ax, _why_no_ratio(good, lost))
     targets = sorted({float(target_ratio(order, levels[i : i + 3])) for i in _few(good)})
@@ -242,9 +242,9 @@ def _draw_orders(
         band: dict[str, Any] = {"color": colour, "alpha": 0.18, "linewidth": 0, "gid": group}
         borders = (np.where(sure, end, np.nan)[:-1] for end in (low, high))
         ax.fill_between(*style.thin_band(t[:-1], *borders), **band)
-        inner = style.thin(t[:-1], np.where(sure, order, np.nan)[:-1])
         line: dict[str, Any] = {"color": colour, "linestyle": dashes, "linewidth": 1.3}
-        ax.plot(*inner, label=_triple(levels, i), gid=group, **line)
+        inner = np.where(sure, order, np.nan)[:-1]
+        style.curve(ax, t[:-1], inner, label=_triple(levels, i), gid=group, **line)
         point: dict[str, Any] = {"linestyle": "none", "marker": "o", "markersize": 4.2}
         point |= {"markerfacecolor": "white", "markeredgecolor": colour, "gid": group}
         ax.plot(t[-1:], order[-1:], clip_on=False, zorder=5, **point)
