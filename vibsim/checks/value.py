@@ -66,7 +66,9 @@ UNPROVED = (
     " The levels agree with it, but do not prove it: the error bound is wider than what is asked."
 )
 FEWEST_DIGITS, MOST_DIGITS = 4, 10
-"""Significant digits of a number."""
+"""Significant digits of a number that was measured."""
+FEWEST_ASKED, MOST_ASKED = 6, 15
+"""The same of a number that is asked for: most that are typed have no more than the first."""
 
 
 def compare(check: ValueCheck, number: Floats) -> tuple[Flags, Floats]:
@@ -350,7 +352,9 @@ def describe(f: Found, check: ValueCheck) -> Description:
                     f"A{finer_levels(f)} to shrink the error bound, or ask for the number of one level "
                     "(`at: {level: ...}`)."
                 )
-    return Description(sentence, advice, _measured(f, check, _digits(f, check)))
+    found = f.fact("value")
+    digits = _digits(found, _room(check, found), FEWEST_DIGITS, MOST_DIGITS)
+    return Description(sentence, advice, _measured(f, check, digits))
 
 
 def is_proved(check: ValueCheck, value: float, bound: float) -> bool:
@@ -364,15 +368,13 @@ def _room(check: ValueCheck, value: float) -> float:
     return float(check.allowed if key == "equals" else abs(value - wanted))
 
 
-def _digits(f: Found, check: ValueCheck) -> int:
-    """Return how many digits of a number tell it from what a check asks for, and one more."""
-    found = f.fact("value")
-    room = _room(check, found)
-    if not (math.isfinite(found) and found != 0.0 and room > 0.0):
-        return MOST_DIGITS
+def _digits(number: float, room: float, least: int, most: int) -> int:
+    """Return how many digits of a number tell it from others that are so far away, and one more."""
+    if not (math.isfinite(number) and number != 0.0 and room > 0.0):
+        return most
     # a whole number is not rounded
-    whole, finer = (math.log10(abs(found) / unit) for unit in (1.0, room))
-    return min(max(FEWEST_DIGITS, 1 + math.floor(whole), 2 + math.ceil(finer)), MOST_DIGITS)
+    whole, finer = (math.log10(abs(number) / unit) for unit in (1.0, room))
+    return min(max(least, 1 + math.floor(whole), 2 + math.ceil(finer)), most)
 
 
 def _measured(f: Found, check: ValueCheck, digits: int = MOST_DIGITS) -> str:
