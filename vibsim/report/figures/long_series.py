@@ -41,7 +41,7 @@ class Row(NamedTuple):
 
 
 def long_series(record: Record, quantity: str, member: Member) -> Picture | None:
-    """Draw a long series; None where there are few periods, or a single run without anything to compare with.
+    """Draw a long series; None where there are few periods, few samples of each, or nothing to compare a run with.
 
     One scheme is drawn on several levels, several schemes each on the coarsest level.
     """
@@ -57,7 +57,12 @@ def long_series(record: Record, quantity: str, member: Member) -> Picture | None
     period = moments.period(t, compared)
     curves = MOST_POINTS / (POINTS_A_PERIOD * span / period)
     rows = _rows(record, quantity, member, int(np.clip(curves / 2, FEWEST, MOST)))
-    if span <= MANY_PERIODS * period or (len(rows) == 1 and not is_known):
+    is_short = span <= MANY_PERIODS * period
+    if (
+        is_short
+        or (len(rows) == 1 and not is_known)
+        or moments.is_undersampled(record, t, compared)
+    ):
         return None
     # a group of neighbours keeps two points
     width = max(style.THINNED_POINTS, MOST_POINTS // (4 * len(rows)))
