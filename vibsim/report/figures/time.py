@@ -179,7 +179,8 @@ def _draw_ratios(
     if not drawn:
         style.remark(ax, _why_no_ratio(good, lost))
     targets = sorted({float(target_ratio(order, levels[i : i + 3])) for i in _few(good)})
-    for k, target in enumerate(targets):
+    # a line would strike the remark through
+    for k, target in enumerate(targets if drawn else []):
         text = "" if k else data.basis_of_order(record, quantity)
         ax.axhline(target, **style.REFERENCE, label=text)
     # the target and the middle nine tenths of the ratios, but no wild outlier
