@@ -66,9 +66,9 @@ def setup(experiment: Experiment, record: Record) -> Iterator[tuple[str, str]]:
     if axes:
         count = words.number(len(record["case"]), "integer")
         yield "Sweep", f"{count} members. {'; '.join(map(_axis, axes))}"
-    if experiment.chain > 1:
-        before = "the last state of the one before, at its own level"
-        yield "Starts", f"along the last key each member starts from {before}"
+    if experiment.sweep is not None and experiment.sweep.follow:
+        last = f"the last state of the one before along {experiment.sweep.follow}"
+        yield "Starts", f"each member starts from {last}, at its own level"
 
 
 def _scheme(spec: SchemeSpec, swept: set[str]) -> str:
