@@ -81,7 +81,7 @@ SECTIONS = ("initial", "model", "schemes", "time")
 """What the names of swept values begin with."""
 TAKEN = frozenset(
     """
-    t scheme case decay_rate level pair triple norm check steps dt end index extremum size_over
+    t scheme case decay_rate level pair triple norm norm_seconds check steps dt end index extremum size_over
     first_peak last_peak status last_step failure_time natural_frequency omega_dt
     highest_omega_dt stability_limit size_over_exact force_evaluations_total accepted_steps
     exact_period
