@@ -50,7 +50,7 @@ from vibsim.convergence.reasons import code, first_reason, is_one_of
 from vibsim.convergence.thresholds import (
     DEFINITE,
     HALF_SPACING,
-    LEAST_ORDER,
+    LEAST_WITH_LIMIT,
     NOISE_FACTOR,
     RISK,
     RISK_OF_THREE,
@@ -189,7 +189,7 @@ def _assess_block(ladder: Ladder, factors: Floats, question: Question) -> dict[s
     if not ladder.exact_known:
         is_open = is_one_of(numbers["reason"], "pre_asymptotic")
         for row in values.values():
-            row[is_open & (numbers["order"] < LEAST_ORDER)] = np.nan
+            row[is_open & (numbers["order"] < LEAST_WITH_LIMIT)] = np.nan
     return numbers | values
 
 

@@ -20,7 +20,7 @@ import math
 # Orders no further apart are the same one: half the distance between two orders of expansions. [derived]
 HALF_SPACING = 0.25
 LEAST_CANDIDATE = 0.5  # least order of an expansion: a solution that stays away has none [derived]
-LEAST_ORDER = LEAST_CANDIDATE - HALF_SPACING  # what falls more slowly shows no limit [derived]
+LEAST_WITH_LIMIT = LEAST_CANDIDATE - HALF_SPACING  # what falls more slowly shows no limit [derived]
 MOST_ABOVE = 2.0  # a superconvergent quantity gains at most the next even power [derived]
 ORDINARY_ORDER = 2.0  # of an error, where a scheme promises none, or exactness [convention]
 STEEPEST = 64.0  # orders are sought between -STEEPEST and STEEPEST [convention]

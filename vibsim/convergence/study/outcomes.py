@@ -9,7 +9,12 @@ import numpy as np
 from vibsim.convergence.assessment import DECIDED, Assessment, Question, assess
 from vibsim.convergence.differences import orders_of_steps
 from vibsim.convergence.study.measurement import Measurement, half_last_digit, measurement
-from vibsim.convergence.thresholds import LEAST_ORDER, MISSED, NOISE_FACTOR, STATED_NOISE_FACTOR
+from vibsim.convergence.thresholds import (
+    LEAST_WITH_LIMIT,
+    MISSED,
+    NOISE_FACTOR,
+    STATED_NOISE_FACTOR,
+)
 from vibsim.core.array_types import Flags, Floats, Integers
 from vibsim.core.vocabulary import REASON_NAMES
 
@@ -246,7 +251,7 @@ def _estimate(one: Outcome, h: Floats, decided: Assessment, k: int) -> tuple[flo
         if len(known):
             first = int(known[-1])
             order, last = float(orders[first]), first + 2
-    if not np.isfinite(weights).all() and order >= LEAST_ORDER:
+    if not np.isfinite(weights).all() and order >= LEAST_WITH_LIMIT:
         fine = last if last > 0 else len(h) - 1
         part = 1.0 / np.expm1(order * np.log(h[fine - 1] / h[fine]))
         weights = np.zeros(len(h))

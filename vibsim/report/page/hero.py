@@ -23,7 +23,7 @@ from vibsim.report.figures import hero as drawn
 from vibsim.report.figures import solution
 from vibsim.report.style import Picture
 from vibsim.report.tables import published
-from vibsim.report.tables.best import error_size, rounded
+from vibsim.report.tables.best import error_size, rounded, used_levels
 from vibsim.report.tables.best import numbers as numbers_of
 from vibsim.report.text import assertions, findings
 from vibsim.report.types import Experiment
@@ -250,9 +250,7 @@ def _levels_of_best(record: Record, name: str, lead: Lead) -> str:
     """Say which levels a best value is of."""
     if "scalar" not in record:
         return "extrapolated over the levels"
-    k = record.words("scalar").index(name)
-    ends = ("scalar_first", "scalar_last")
-    first, last = (int(data.at(record, end, lead.member, scalar=k)) for end in ends)
+    first, last = used_levels(record, record.words("scalar").index(name), lead.member)
     if first == last:
         return f"level {last} as it is"
     return f"extrapolated over levels {words.levels((first, last))}"

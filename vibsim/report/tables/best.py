@@ -135,9 +135,15 @@ def rounded(value: float, error: float) -> Written:
     return Written(value, words.printed(f"{value:.{max(decimals + size, 0)}e}"))
 
 
+def used_levels(record: Record, k: int, member: Member) -> tuple[int, int]:
+    """Return the coarsest and the finest level that the best value of the k-th number is of."""
+    first, last = (int(at(record, f"scalar_{end}", member, scalar=k)) for end in ("first", "last"))
+    return first, last
+
+
 def _approach(record: Record, k: int, member: Member) -> tuple[Cell, Cell, Cell]:
     """Return the observed order, the levels that were used, and how the levels follow each other."""
-    first, last = (int(at(record, f"scalar_{end}", member, scalar=k)) for end in ("first", "last"))
+    first, last = used_levels(record, k, member)
     used = words.levels((first, last)) if first < last else f"{last} as it is"
     order = float(at(record, "scalar_order", member, scalar=k))
     kind = str(flags(record, "scalar_convergence")[k, member.scheme, member.case])
