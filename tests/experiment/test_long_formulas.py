@@ -43,42 +43,48 @@ def faults_of(model: dict[str, Any], **more: Any) -> tuple[Fault, ...]:
     return ()
 
 
+NO_ENERGY = "its potential energy cannot be worked out"
 SLOW = {"marks": pytest.mark.slow}
 
 
 @pytest.mark.parametrize(
-    ("kind", "key", "text", "is_sound"),
+    ("kind", "key", "text", "rule"),
     thinned(
         [
-            ("oscillator", "spring", total("sin({k}*u)", 94), True),
+            ("oscillator", "spring", total("sin({k}*u)", 94), ""),
             pytest.param(
-                "oscillator", "spring", "u + 1e-9*" + product("sin(0.01*{k}*u)", 94), False, **SLOW
+                "oscillator",
+                "spring",
+                "u + 1e-9*" + product("sin(0.01*{k}*u)", 94),
+                "",
+                **SLOW,
             ),
-            ("oscillator", "spring", nested("sin", 94, "u"), False),
-            pytest.param("oscillator", "spring", total("tanh({k}*u)", 90), False, **SLOW),
-            ("oscillator", "spring", "**".join(["u"] * 90), False),
-            pytest.param("oscillator", "spring", "/".join(["(1 + u**2)"] * 90), False, **SLOW),
+            ("oscillator", "spring", nested("sin", 94, "u"), NO_ENERGY),
+            pytest.param("oscillator", "spring", total("tanh({k}*u)", 90), "", **SLOW),
+            ("oscillator", "spring", "**".join(["u"] * 90), NO_ENERGY),
+            pytest.param("oscillator", "spring", "/".join(["(1 + u**2)"] * 90), NO_ENERGY, **SLOW),
             pytest.param(
-                "oscillator", "damping", "v*" + product("cosh(0.01*{k}*v)", 90), False, **SLOW
+                "oscillator", "damping", "v*" + product("cosh(0.01*{k}*v)", 90), "", **SLOW
             ),
-            ("oscillator", "exact", product("sin({k}*t)", 60), False),
-            ("vehicle", "road", nested("sin", 90, "x"), False),
-            pytest.param("vehicle", "road", product("abs(sin({k}*x))", 89), False, **SLOW),
-            ("circuit", "voltage", product("abs(sin({k}*t))", 89), False),
+            ("oscillator", "exact", product("sin({k}*t)", 60), ""),
+            ("vehicle", "road", nested("sin", 90, "x"), ""),
+            pytest.param(
+                "vehicle", "road", product("abs(sin({k}*x))", 89), "its slope jumps", **SLOW
+            ),
+            ("circuit", "voltage", product("abs(sin({k}*t))", 89), ""),
         ],
         3,
     ),
 )
-def test_a_long_formula_takes_bounded_work(kind: str, key: str, text: str, is_sound: bool) -> None:
+def test_a_long_formula_takes_bounded_work(kind: str, key: str, text: str, rule: str) -> None:
     sweep = {"initial.v" if kind == "oscillator" else "time.end": {"linspace": [1.0, 2.0, 500]}}
     sweep = {} if kind == "circuit" or key == "exact" else sweep
     scheme = "rk4" if key == "damping" else "central"
     found = faults_of(
         {"kind": kind, key: text}, schemes=[scheme], **({"sweep": sweep} if sweep else {})
     )
-    assert [fault.key for fault in found] == ([] if is_sound else [f"model.{key}"])
-    for fault in found:
-        assert "operations" in fault.rule or "too long" in fault.rule
+    assert [fault.key for fault in found] == ([f"model.{key}"] if rule else [])
+    assert all(rule in fault.rule for fault in found)
 
 
 @pytest.mark.slow

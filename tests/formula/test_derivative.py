@@ -128,7 +128,7 @@ CASES = [
 def value(formula: str, x: float) -> float:
     """Evaluate the derivative as the engine does."""
     scope = {**FUNCTIONS, "x": x, "divided": divided}
-    text = "\n".join(to_statements(derivative(parse(formula, ["x"]), "x"), "_r"))
+    text = "\n".join(to_statements({"_r": derivative(parse(formula, ["x"]), "x")}))
     exec(compile(with_quotients(text), "<derivative>", "exec"), scope)
     return float(scope["_r"])
 

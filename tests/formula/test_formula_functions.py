@@ -132,7 +132,7 @@ def test_the_compiled_lane_has_the_bits_of_the_plain_one() -> None:
         kernel_text.collect(module, function.full, name, {}, is_called=True)
     lines = ["@called", "def corpus(u, k, found):"]
     for i, formula in enumerate(CORPUS):
-        statements = to_statements(parse(formula, ("u", "k")), f"found[{i}]")
+        statements = to_statements({f"found[{i}]": parse(formula, ("u", "k"))})
         lines += [f"    {line}" for line in statements]
     text = module.text + "\n".join(lines)
     corpus = link(machine_code(text, "corpus", "f f f1"), "corpus", "f f f1")
@@ -289,7 +289,7 @@ def test_a_constant_without_a_value_is_told(text: str) -> None:
 def test_a_constant_power_has_the_bits_of_the_engine(exponent):
     """Only a whole exponent that is written as a number is a multiplication."""
     formula = parse(f"u**({exponent})", ("u", "k"))
-    text = "\n".join([*to_statements(formula, "found"), ""])
+    text = "\n".join([*to_statements({"found": formula}), ""])
     for u in (0.1, 1e-3, 1.7, 12.25, 3.0):
         numbers = {"u": u, "k": 8.0, "power": ELEMENTARY["power"].full}
         exec(text, numbers)

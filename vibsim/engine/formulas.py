@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Collection, Iterable, Mapping
+from functools import partial
 from inspect import signature
 from typing import Any
 
@@ -21,8 +22,6 @@ from vibsim.schemes.base import Stepper
 
 MOST_INLINE = 64
 """Calls of functions up to which each becomes part of the formula: each then takes 0.1 s to compile, and 3 MB."""
-LONG = 2000
-"""Operations and names of a function above which parts of it that are alike are worked out once."""
 _MODE = "mode"
 _TUPLES = ("guards", "guard_rates")
 """Functions that return a tuple, however many results they have."""
@@ -70,13 +69,13 @@ def put_formulas(
     """
     put = marked(model)
     accelerations = [put(formula) for formula in model.accelerations]
-    parts = _of_events(model, put)
-    if "drive" in parts:
-        held = Binary("*", Name(_MODE), parts["limit"]["_limit"])
-        accelerations = [Binary("-", parts["drive"]["_drive"], held)]
+    of_events = _of_events(model, put)
+    if "drive" in of_events:
+        held = Binary("*", Name(_MODE), of_events["limit"]["_limit"])
+        accelerations = [Binary("-", of_events["drive"]["_drive"], held)]
     formulas = {
         "acceleration": {f"_result_{i}": formula for i, formula in enumerate(accelerations)},
-        **parts,
+        **of_events,
         "energies": {
             "_kinetic": put(model.kinetic_energy),
             "_potential": put(model.potential_energy),
@@ -99,13 +98,8 @@ def put_formulas(
             "_dissipation": put(model.dissipation or "0.0"),
             "_driving": put(model.driving or "0.0"),
         }
-    trees = (formula for results in formulas.values() for formula in results.values())
-    nodes = [node for formula in trees for node in expression.walk(formula)]
-    calls = [node for node in nodes if isinstance(node, Call)]
-    if len(calls) > MOST_INLINE and len(nodes) > LONG:
-        # what is worked out once is compiled once
-        calls = list(set(calls))
-    is_rare = is_rare or len(calls) > MOST_INLINE
+    parts = expression.parts_of(*(row for results in formulas.values() for row in results.values()))
+    is_rare = is_rare or sum(isinstance(part, Call) for part in parts) > MOST_INLINE
     is_scaled = stepper.scaling is not None
     scaled = ("acceleration", "slopes") if is_scaled else ()
     put_functions(module, model, suffix, formulas, is_rare=is_rare, scaled=scaled)
@@ -127,14 +121,10 @@ def put_energy_with(module: Module, model: Model) -> None:
 def marked(model: Model) -> Callable[[Formula], Expression]:
     """Return what reads a formula, its names marked so that no name of a user is one of the kernel's text."""
     states = (state.name for state in model.states)
-    with_marks: dict[Expression, Expression] = {
-        Name(name): Name(name + _MARK) for name in (*states, *parameter_names(model))
-    }
-
-    def put(formula: Formula) -> Expression:
-        return expression.rebuilt(tree(model, formula), lambda node: with_marks.get(node, node))
-
-    return put
+    put = expression.replacing(
+        {name: Name(name + _MARK) for name in (*states, *parameter_names(model))}
+    )
+    return lambda formula: put(tree(model, formula))
 
 
 def put_functions(
@@ -169,15 +159,12 @@ def put_functions(
         if model.events is not None and function in ("acceleration", "slopes"):
             lines += [f"{_MODE} = p[{len(names)}]", f"t = t + p[{len(names) + 1}]"]
         lines += _looking_up(module, model, results.values())
-        ready = {
-            result: _with_functions(module, formula, suffix, is_rare)
-            for result, formula in results.items()
-        }
-        parts = expression.Parts(ready.values()) if _is_long(ready.values()) else None
-        for result, formula in ready.items():
-            lines += expression.to_statements(formula, result, parts)
-            if function in scaled:
-                lines.append(f"{result} = {result} * p[{len(names) + n_between(model)}]")
+        bind = expression.rebuilding(partial(_with_functions, module, suffix, is_rare))
+        ready = {result: bind(formula) for result, formula in results.items()}
+        lines += expression.to_statements(ready)
+        if function in scaled:
+            factor = f"p[{len(names) + n_between(model)}]"
+            lines += [f"{result} = {result} * {factor}" for result in ready]
         returned = ", ".join(results)
         if always_tuple or function in _TUPLES:
             returned = f"({returned},)"
@@ -193,17 +180,13 @@ def put_functions(
         module.define(f"{function}{suffix}({arguments})", *lines)
 
 
-def _is_long(formulas: Iterable[Expression]) -> bool:
-    return sum(expression.size(formula, LONG) for formula in formulas) > LONG
-
-
 def _looking_up(module: Module, model: Model, formulas: Iterable[Expression]) -> list[str]:
     """Return what a function does first whose formulas look a table up; nothing where they do not."""
     used = {name for formula in formulas for name in expression.names_in(formula)}
     if model.lookup is None or not used & {HEIGHT, BEND}:
         return []
     collect(module, looked_up, "looked_up", {})
-    place = expression.to_statements(marked(model)(model.lookup.place), "_place")
+    place = expression.to_statements({"_place": marked(model)(model.lookup.place)})
     return [*place, f"{HEIGHT}, {BEND} = looked_up(p[{len(model.parameters)}], _place)"]
 
 
@@ -271,31 +254,27 @@ def _of_events(
             return found
 
 
-def _with_functions(module: Module, formula: Expression, suffix: str, is_rare: bool) -> Expression:
-    """Collect the functions that a formula calls, and call them by their names in the kernel."""
-
-    def bind(node: Expression) -> Expression:
-        match node:
-            case Binary("**", base, exponent):
-                value = expression.literal(exponent)
-                is_whole = value is not None and value.is_integer()
-                return node if is_whole else bind(Call("power", (base, exponent)))
-            case Compare(_, x, y) if suffix:
-                # what is 0, or NaN where x or y is: a comparison would hide that of a fast function out of its range
-                return filled("node + ((x - x + (y - y)) - (x - x + (y - y)))", node=node, x=x, y=y)
-            case Compare():
-                # as a number: a truth value knows no -0, which the fast text would give
-                return filled("1*node", node=node)
-            case Call(function, arguments):
-                if function not in ELEMENTARY:
-                    raise SimulationError(
-                        f"the engine has no function {function}; it has " + ", ".join(ELEMENTARY)
-                    )
-                texts = ELEMENTARY[function]
-                text = texts.fast if suffix else texts.full
-                collect(module, text, function + suffix, {}, is_called=is_rare)
-                return Call(function + suffix, arguments)
-            case _:
-                return node
-
-    return expression.rebuilt(formula, bind)
+def _with_functions(module: Module, suffix: str, is_rare: bool, node: Expression) -> Expression:
+    """Collect the function that a part of a formula calls, and call it by its name in the kernel."""
+    match node:
+        case Binary("**", base, exponent):
+            value = expression.literal(exponent)
+            is_whole = value is not None and value.is_integer()
+            power = Call("power", (base, exponent))
+            return node if is_whole else _with_functions(module, suffix, is_rare, power)
+        case Compare(_, x, y) if suffix:
+            # what is 0, or NaN where x or y is: a comparison would hide that of a fast function out of its range
+            return filled("node + ((x - x + (y - y)) - (x - x + (y - y)))", node=node, x=x, y=y)
+        case Compare():
+            # as a number: a truth value knows no -0, which the fast text would give
+            return filled("1*node", node=node)
+        case Call(function, arguments):
+            if function not in ELEMENTARY:
+                raise SimulationError(
+                    f"the engine has no function {function}; it has " + ", ".join(ELEMENTARY)
+                )
+            texts = ELEMENTARY[function]
+            text = texts.fast if suffix else texts.full
+            collect(module, text, function + suffix, {}, is_called=is_rare)
+            return Call(function + suffix, arguments)
+    return node

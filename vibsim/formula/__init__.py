@@ -7,7 +7,7 @@ evaluated as Python.
 """
 
 from vibsim.formula.algebra import is_multiple, is_zero, tidied
-from vibsim.formula.arrays import bounds, values
+from vibsim.formula.arrays import bounds, values, values_of
 from vibsim.formula.derivatives import derivative
 from vibsim.formula.integrals import has_rule, integral
 from vibsim.formula.jumps import Pulses, Switch, first_jump, held, hidden_pulses
@@ -25,19 +25,20 @@ from vibsim.formula.tree import (
     Name,
     Negate,
     Number,
-    Parts,
     literal,
     names_in,
+    parts_of,
     put,
+    rebuilding,
     rebuilt,
-    size,
+    replacing,
     walk,
 )
 
 __all__ = [
     "CONSTANTS", "FUNCTIONS", "MAX_CHARACTERS", "MAX_DEPTH", "ONE", "ZERO", "Binary", "Call",
-    "Compare", "Expression", "ExpressionError", "Name", "Negate", "Number", "Parts", "Pulses", "Switch",
+    "Compare", "Expression", "ExpressionError", "Name", "Negate", "Number", "Pulses", "Switch",
     "bounds", "constant", "derivative", "evaluate", "first_jump", "has_rule", "held", "hidden_pulses", "integral",
-    "is_multiple", "is_zero", "literal", "names_in", "parse", "put",
-    "rebuilt", "size", "tidied", "to_formula", "to_statements", "values", "walk",
+    "is_multiple", "is_zero", "literal", "names_in", "parse", "parts_of",
+    "put", "rebuilding", "rebuilt", "replacing", "tidied", "to_formula", "to_statements", "values", "values_of", "walk",
 ]  # fmt: skip

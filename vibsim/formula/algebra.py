@@ -22,6 +22,7 @@ from vibsim.formula.tree import (
     names_in,
     number,
     rebuilt,
+    replacing,
     walk,
 )
 
@@ -35,10 +36,7 @@ def _pattern(text: str, names: tuple[str, ...]) -> Expression:
 
 def filled(text: str, **formulas: Expression) -> Expression:
     """Return the formula of a text, with other formulas in the places of its names."""
-    return rebuilt(
-        _pattern(text, tuple(formulas)),
-        lambda node: formulas[node.name] if isinstance(node, Name) else node,
-    )
+    return replacing(formulas)(_pattern(text, tuple(formulas)))
 
 
 def tidied(node: Expression) -> Expression:

@@ -7,7 +7,8 @@ unbounded.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from importlib import import_module
 from typing import Any
 
@@ -24,6 +25,7 @@ from vibsim.formula.tree import (
     Name,
     Negate,
     Number,
+    folded,
     literal,
 )
 
@@ -56,26 +58,34 @@ def values(expression: Expression, numbers: Mapping[str, Any]) -> Floats:
     numbers
         Value of every name: floats, or arrays that broadcast against each other.
     """
+    return values_of([expression], numbers)[0]
+
+
+def values_of(expressions: Sequence[Expression], numbers: Mapping[str, Any]) -> list[Floats]:
+    """Return the values of some formulas; what they have in common is worked out once."""
     with np.errstate(all="ignore"):
-        return np.asarray(_values(expression, numbers), dtype=np.float64)
+        found = folded(expressions, partial(_value_of, numbers))
+    return [np.asarray(value, dtype=np.float64) for value in found]
 
 
-def _values(node: Expression, numbers: Mapping[str, Any]) -> Any:
+def _value_of(numbers: Mapping[str, Any], node: Expression, *operands: Any) -> Any:
+    """Return the value of a formula from those of its operands."""
     match node:
         case Number(value):
             # of numpy, whose division by zero is infinite
             return np.float64(value)
         case Name(name):
             return np.asarray(numbers[name], dtype=np.float64)
-        case Negate(operand):
-            return np.negative(_values(operand, numbers))
-        case Binary("**", base, exponent):
-            return np.power(_values(base, numbers), _values(exponent, numbers))
-        case Binary(symbol, left, right) | Compare(symbol, left, right):
-            found = OPERATORS[symbol](_values(left, numbers), _values(right, numbers))
-            return found if isinstance(node, Binary) else np.where(found, 1.0, 0.0)
-        case Call(function, arguments):
-            return _FUNCTIONS[function](*(_values(argument, numbers) for argument in arguments))
+        case Negate():
+            return np.negative(*operands)
+        case Binary("**"):
+            return np.power(*operands)
+        case Binary(symbol):
+            return OPERATORS[symbol](*operands)
+        case Compare(symbol):
+            return np.where(OPERATORS[symbol](*operands), 1.0, 0.0)
+        case Call(function):
+            return _FUNCTIONS[function](*operands)
 
 
 def bounds(expression: Expression, numbers: Mapping[str, Any]) -> Interval:
@@ -87,7 +97,8 @@ def bounds(expression: Expression, numbers: Mapping[str, Any]) -> Interval:
         Of every name its value, or a pair of its least and largest value; arrays that broadcast against each other.
     """
     with np.errstate(all="ignore"):
-        return _known(*_bounds(expression, numbers))
+        [(low, high)] = folded([expression], partial(_bounds_of, numbers))
+        return _known(low, high)
 
 
 def _known(low: Any, high: Any) -> Interval:
@@ -96,28 +107,30 @@ def _known(low: Any, high: Any) -> Interval:
     return np.where(unknown, -np.inf, low), np.where(unknown, np.inf, high)
 
 
-def _bounds(node: Expression, numbers: Mapping[str, Any]) -> Interval:
+def _bounds_of(numbers: Mapping[str, Any], node: Expression, *operands: Interval) -> Interval:
+    """Return the bounds of a formula from those of its operands."""
     match node:
         case Number(value):
             return np.asarray(value, dtype=float), np.asarray(value, dtype=float)
         case Name(name):
             found = numbers[name]
             return found if isinstance(found, tuple) else (np.asarray(found), np.asarray(found))
-        case Negate(operand):
-            low, high = _bounds(operand, numbers)
+        case Negate():
+            [(low, high)] = operands
             return -high, -low
-        case Binary("**", base, exponent):
-            return _power(_bounds(base, numbers), _bounds(exponent, numbers), literal(exponent))
-        case Binary(symbol, left, right):
-            ends = _bounds(left, numbers), _bounds(right, numbers)
-            if symbol in "*/":
-                return _known(*(_times(*ends) if symbol == "*" else _over(*ends)))
-            return _known(*_corners(OPERATORS[symbol], *ends))
-        case Compare(symbol, left, right):
-            return _compared(symbol, _bounds(left, numbers), _bounds(right, numbers))
-        case Call(function, arguments):
-            inner = [_bounds(argument, numbers) for argument in arguments]
-            return _known(*_called(function, inner))
+        case Binary("**", _, exponent):
+            base, power = operands
+            return _power(base, power, literal(exponent))
+        case Binary("*"):
+            return _known(*_times(*operands))
+        case Binary("/"):
+            return _known(*_over(*operands))
+        case Binary(symbol):
+            return _known(*_corners(OPERATORS[symbol], *operands))
+        case Compare(symbol):
+            return _compared(symbol, *operands)
+        case Call(function):
+            return _known(*_called(function, operands))
     raise AssertionError(node)
 
 
@@ -171,7 +184,7 @@ def _compared(symbol: str, a: Interval, b: Interval) -> Interval:
     return np.where(is_true, 1.0, 0.0), np.where(is_false, 0.0, 1.0)
 
 
-def _called(function: str, inner: list[Interval]) -> Interval:
+def _called(function: str, inner: Sequence[Interval]) -> Interval:
     match function:
         case "min" | "max" | "hypot":
             a, b = (_sizes(x) for x in inner) if function == "hypot" else inner

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 from vibsim.formula.algebra import filled
-from vibsim.formula.parser import ExpressionError
 from vibsim.formula.tree import (
     ONE,
     STEPS,
@@ -17,11 +17,9 @@ from vibsim.formula.tree import (
     Negate,
     literal,
     number,
-    size,
+    parts_of,
 )
 
-MAX_NODES = 100_000
-"""Operations and names of a derivative, at most."""
 _BELL = f"{2.0 / math.sqrt(math.pi)!r}*exp(-x**2)"
 _RULES = {
     "sin": "cos(x)",
@@ -60,52 +58,53 @@ def derivative(node: Expression, name: str) -> Expression:
 
     Where a formula has a corner or a jump (``abs``, ``min``, ``max``, ``mod``, ``where``, a comparison, one of `STEPS`)
     the derivative is that of the branch taken; jumps count as flat.
-
-    Raises
-    ------
-    ExpressionError
-        Where the derivative is longer than `MAX_NODES`: that of a product of n factors has n*n of them.
     """
-    found = _derivative(node, name)
-    if size(found, MAX_NODES) > MAX_NODES:
-        rule = f"its derivatives are too long: that by {name} has more than {MAX_NODES} operations"
-        raise ExpressionError("", 0, rule, "write a simpler formula")
-    return found
+    for part in parts_of(node, but=lambda part: name not in part.names or name in part.slopes):
+        part.slopes[name] = _slope(part, name)
+    return _known(node, name)
 
 
-def _derivative(node: Expression, name: str) -> Expression:
+def _known(node: Expression, name: str) -> Expression:
+    return node.slopes.get(name, ZERO)
+
+
+def _slope(node: Expression, name: str) -> Expression:
+    """Return the derivative of a formula from those of its operands."""
+    d = [_known(operand, name) for operand in node.operands]
     match node:
-        case Name(own):
-            return ONE if own == name else ZERO
-        case Negate(operand):
-            return -_derivative(operand, name)
-        case Binary("+", left, right):
-            return _derivative(left, name) + _derivative(right, name)
-        case Binary("-", left, right):
-            return _derivative(left, name) - _derivative(right, name)
+        case Name():
+            return ONE
+        case Negate():
+            return -d[0]
+        case Binary("+"):
+            return d[0] + d[1]
+        case Binary("-"):
+            return d[0] - d[1]
         case Binary("*", left, right):
-            return _derivative(left, name) * right + left * _derivative(right, name)
-        case Binary("/", left, right):
+            return d[0] * right + left * d[1]
+        case Binary("/", _, right):
             # not over right**2, which overflows before the quotient does
-            return _over(_derivative(left, name) - node * _derivative(right, name), right)
+            return _over(d[0] - node * d[1], right)
         case Binary("**", base, exponent):
-            by_base, value = _derivative(base, name), literal(exponent)
+            value = literal(exponent)
             if value is not None:
                 lowered = Binary("**", base, number(value - 1.0))
                 power = base if value == 2.0 else ONE if value == 1.0 else lowered
-                return number(value) * power * by_base
+                return number(value) * power * d[0]
             lowered = Binary("**", base, Binary("-", exponent, ONE))
-            by_exponent = node * Call("log", (base,)) * _derivative(exponent, name)
-            return exponent * lowered * by_base + by_exponent
+            return exponent * lowered * d[0] + node * Call("log", (base,)) * d[1]
         case Call(function, arguments):
-            return _of_call(node, function, arguments, name)
+            return _of_call(node, function, arguments, d)
     return ZERO
 
 
 def _of_call(
-    node: Expression, function: str, arguments: tuple[Expression, ...], name: str
+    node: Expression,
+    function: str,
+    arguments: tuple[Expression, ...],
+    slopes: Sequence[Expression],
 ) -> Expression:
-    dx, *others = (_derivative(argument, name) for argument in arguments)
+    dx, *others = slopes
     if all(entry == ZERO for entry in (dx, *others)) or function in STEPS:
         return ZERO
     x, *more = arguments

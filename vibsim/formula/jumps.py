@@ -36,9 +36,9 @@ from vibsim.formula.tree import (
     Name,
     Negate,
     Number,
-    children,
+    folded,
     names_in,
-    rebuilt,
+    rebuilding,
     walk,
 )
 
@@ -274,7 +274,7 @@ def held(
     def moves(symbol: str, left: Expression, right: Expression) -> bool:
         return varies(Binary(symbol, left, right), moving)
 
-    made = tuple(rebuilt(formula, change) for formula in formulas)
+    made = tuple(map(rebuilding(change), formulas))
     return made, tuple(found.values())
 
 
@@ -291,13 +291,17 @@ _HELD = {
 
 def varies(node: Expression, moving: Collection[str]) -> bool:
     """Tell whether the value changes along a motion otherwise than by jumps."""
-    match node:
-        case Name(name):
-            return name in moving
-        case Compare():
-            return False
-        case Call(function, _) if function in STEPS:
-            return False
-        case Call("where", (_, yes, no)):
-            return varies(yes, moving) or varies(no, moving)
-    return any(varies(child, moving) for child in children(node))
+
+    def does(part: Expression, *operands: bool) -> bool:
+        match part:
+            case Name(name):
+                return name in moving
+            case Compare():
+                return False
+            case Call(function, _) if function in STEPS:
+                return False
+            case Call("where", _):
+                return any(operands[1:])
+        return any(operands)
+
+    return folded([node], does)[0]

@@ -7,6 +7,7 @@ bits whether it was worked out here or in the engine.
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Mapping
 from itertools import accumulate
 
@@ -22,8 +23,9 @@ from vibsim.formula.tree import (
     Name,
     Negate,
     Number,
-    Parts,
+    folded,
     literal,
+    parts_of,
 )
 
 MAX_NESTING = 120
@@ -150,32 +152,32 @@ def _within(node: Expression, least: int) -> str:
     return text if binding >= least else f"({text})"
 
 
-def to_statements(expression: Expression, result: str, parts: Parts | None = None) -> list[str]:
-    """Write `expression` as assignments of Python for the engine, the last one to `result`.
+def to_statements(formulas: Mapping[str, Expression]) -> list[str]:
+    """Write formulas as assignments of Python for the engine, each of the last ones to the name of a result.
 
-    With the `parts` of all formulas of a function, what several of them use is worked out once.
-
-    Every operation has its parentheses, so that their order is the formula's. There are numbers, names, ``+ - * /``,
-    comparisons, and calls of `FUNCTIONS`, and of ``power(base, exponent)`` where an exponent is not a whole number. A
-    whole power is squared and multiplied from the exponent's leading bit on, and a factor of it is worked out once:
-    ``sin(x)**2`` becomes ``_1 = sin(x)`` and ``result = (_1 * _1)``. No name of a formula begins with ``_``.
+    What several of their parts use is worked out once: ``sin(x)*sin(x)`` becomes ``_1 = sin(x)`` and
+    ``result = (_1 * _1)``. Every operation has its parentheses, so that their order is the formula's. There are
+    numbers, names, ``+ - * /``, comparisons, and calls of `FUNCTIONS`, and of ``power(base, exponent)`` where an
+    exponent is not a whole number. A whole power is squared and multiplied from the exponent's leading bit on. No name
+    of a formula begins with ``_``.
     """
     lines: list[str] = []
-    before = parts.lines if parts else 0
+    parts = parts_of(*formulas.values())
+    uses = Counter(operand for part in parts for operand in part.operands)
+    uses.update(formulas.values())
 
     def named(source: str) -> str:
         if source.isidentifier() or source.replace(".", "", 1).isdigit():
             return source
-        lines.append(f"_{before + len(lines) + 1} = {source}")
-        return f"_{before + len(lines)}"
+        lines.append(f"_{len(lines) + 1} = {source}")
+        return f"_{len(lines)}"
 
-    def power(base: Expression, exponent: Expression) -> str:
-        whole = literal(exponent)
+    def power(base: str, exponent: str, whole: float | None) -> str:
         if whole is None or not whole.is_integer():
-            return f"power({source(base)}, {source(exponent)})"
+            return f"power({base}, {exponent})"
         if whole == 0.0:
             return "1.0"
-        factor = found = named(source(base))
+        factor = found = named(base)
         for bit in bin(abs(int(whole)))[3:]:
             half = named(found)
             found = f"({half} * {half})"
@@ -183,35 +185,26 @@ def to_statements(expression: Expression, result: str, parts: Parts | None = Non
                 found = f"({found} * {factor})"
         return found if whole > 0.0 else f"(1.0 / {found})"
 
-    def source(node: Expression) -> str:
-        part = parts.number(node) if parts else -1
-        if parts is None or parts.uses[part] < 2:
-            return written(node)
-        if part not in parts.names:
-            parts.names[part] = named(written(node))
-        return parts.names[part]
-
-    def written(node: Expression) -> str:
+    def source(node: Expression, *operands: str) -> str:
         match node:
             case Number(value):
                 found = repr(value)
             case Name(name):
                 found = name
-            case Negate(operand):
-                found = f"(-{source(operand)})"
-            case Binary("**", base, exponent):
-                found = power(base, exponent)
-            case Binary(symbol, left, right) | Compare(symbol, left, right):
-                found = f"({source(left)} {symbol} {source(right)})"
-            case Call(function, arguments):
-                found = f"{function}({', '.join(map(source, arguments))})"
+            case Negate():
+                found = f"(-{operands[0]})"
+            case Binary("**", _, exponent):
+                found = power(operands[0], operands[1], literal(exponent))
+            case Binary(symbol) | Compare(symbol):
+                found = f"({operands[0]} {symbol} {operands[1]})"
+            case Call(function):
+                found = f"{function}({', '.join(operands)})"
+        is_shared = uses[node] > 1 and literal(node) is None
         is_deep = found.count("(") > MAX_NESTING and _nesting(found) > MAX_NESTING
-        return named(found) if is_deep else found
+        return named(found) if is_shared or is_deep else found
 
-    last = source(expression)
-    if parts:
-        parts.lines += len(lines)
-    return [*lines, f"{result} = {last}"]
+    found = folded(list(formulas.values()), source)
+    return lines + [f"{result} = {last}" for result, last in zip(formulas, found, strict=True)]
 
 
 def _nesting(source: str) -> int:

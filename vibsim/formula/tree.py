@@ -1,19 +1,58 @@
-"""The tree of a formula: six kinds of node, all frozen, of which the operators ``+ - * /`` make further formulas."""
+"""The graph of a formula: six kinds of node, all frozen, of which the operators ``+ - * /`` make further formulas.
+
+Formulas that read alike are one object. So two are equal where they are the same, and what formulas have in common is
+looked at once: written out, equations that are solved for the accelerations would be longer than any memory.
+"""
 
 from __future__ import annotations
 
 import math
 import operator
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, KeysView, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import islice
-from typing import Any
+from functools import lru_cache
+from typing import Any, TypeVar
+from weakref import WeakValueDictionary
 
 from vibsim.elementary import ELEMENTARY
 
+T = TypeVar("T")
 
-class Expression:
+
+class _Alike(type):
+    """What makes nodes: one that reads as another does is that one."""
+
+    def __call__(cls, *fields: Any) -> Any:
+        key = (cls, *fields)
+        found = _nodes.get(key)
+        return _nodes.setdefault(key, super().__call__(*fields)) if found is None else found
+
+
+_nodes: WeakValueDictionary[tuple[Any, ...], Expression] = WeakValueDictionary()
+
+
+class Expression(metaclass=_Alike):
     """A formula. A sum, product or quotient of two has no terms 0 and no factors 1; a product with 0 is 0."""
+
+    __match_args__: tuple[str, ...]
+    operands: tuple[Expression, ...]
+    """In the order of the formula."""
+    names: KeysView[str]
+    """Names in it, in the order of their first use."""
+    slopes: dict[str, Expression]
+    """Derivatives that are known already, by name (`vibsim.formula.derivatives`)."""
+
+    def __post_init__(self) -> None:
+        fields = (x if isinstance(x, tuple) else (x,) for x in vars(self).values())
+        operands = tuple(x for field in fields for x in field if isinstance(x, Expression))
+        own = {self.name: None} if isinstance(self, Name) else {}
+        names, *others = [part.names for part in operands] or [own.keys()]
+        if not all(more <= names for more in others):
+            names = dict.fromkeys(name for part in operands for name in part.names).keys()
+        vars(self).update(operands=operands, names=names, slopes={})
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return type(self), tuple(vars(self)[name] for name in self.__match_args__)
 
     def __add__(self, right: Expression) -> Expression:
         if self == ZERO:
@@ -39,28 +78,28 @@ class Expression:
         return self if right == ONE else Binary("/", self, right)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Number(Expression):
     """A finite number that is not negative."""
 
     value: float
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Name(Expression):
     """A state, the time or a parameter."""
 
     name: str
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Negate(Expression):
     """``-operand``."""
 
     operand: Expression
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Binary(Expression):
     """``left operator right`` with an operator out of ``+ - * / **``."""
 
@@ -69,7 +108,7 @@ class Binary(Expression):
     right: Expression
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Compare(Expression):
     """``left operator right`` with an operator out of ``< <= > >= == !=``; its value is 1 or 0."""
 
@@ -78,7 +117,7 @@ class Compare(Expression):
     right: Expression
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Call(Expression):
     """A call of one of `FUNCTIONS`."""
 
@@ -124,78 +163,115 @@ def literal(node: Expression) -> float | None:
     return None
 
 
-def children(node: Expression) -> tuple[Expression, ...]:
-    """Return the operands of `node`, in the order of the formula."""
+def _nothing(_: Expression) -> bool:
+    return False
+
+
+def parts_of(
+    *formulas: Expression, but: Callable[[Expression], bool] = _nothing
+) -> list[Expression]:
+    """Return the distinct parts of formulas, operands before what uses them, from left to right.
+
+    Parameters
+    ----------
+    but
+        Tells of parts that are left out, with all that they alone use.
+    """
+    found: dict[Expression, None] = {}
+    waiting = [*reversed(formulas)]
+    while waiting:
+        node = waiting[-1]
+        missing = [part for part in node.operands if part not in found and not but(part)]
+        if missing and not but(node):
+            waiting += reversed(missing)
+            continue
+        waiting.pop()
+        if not but(node):
+            found[node] = None
+    return list(found)
+
+
+def folded(formulas: Sequence[Expression], work_out: Callable[..., T]) -> list[T]:
+    """Return what is worked out of each formula: of a part, and of what was worked out of its operands.
+
+    It is done once for each distinct part, and what no other part needs any more is forgotten.
+    """
+    found: dict[Expression, T] = {}
+    for part, done in _in_order(tuple(formulas)):
+        found[part] = work_out(part, *[found[operand] for operand in part.operands])
+        for operand in done:
+            del found[operand]
+    return [found[formula] for formula in formulas]
+
+
+@lru_cache(maxsize=64)
+def _in_order(formulas: tuple[Expression, ...]) -> list[tuple[Expression, list[Expression]]]:
+    """Return the parts of formulas, each with those that no part behind it uses."""
+    parts, later = parts_of(*formulas), set(formulas)
+    found = []
+    for part in reversed(parts):
+        done = [operand for operand in dict.fromkeys(part.operands) if operand not in later]
+        later.update(done)
+        found.append((part, done))
+    return found[::-1]
+
+
+def rebuilding(change: Callable[[Expression], Expression]) -> Callable[[Expression], Expression]:
+    """Return what applies `change` to every part of formulas, to operands before what uses them."""
+    made: dict[Expression, Expression] = {}
+
+    def rebuilt(node: Expression) -> Expression:
+        for part in parts_of(node, but=made.__contains__):
+            operands = tuple(made[operand] for operand in part.operands)
+            made[part] = change(_with_operands(part, operands))
+        return made[node]
+
+    return rebuilt
+
+
+def _with_operands(node: Expression, operands: tuple[Expression, ...]) -> Expression:
     match node:
-        case Negate(operand):
-            return (operand,)
-        case Binary(_, left, right) | Compare(_, left, right):
-            return (left, right)
-        case Call(_, arguments):
-            return arguments
-    return ()
+        case Negate():
+            return Negate(*operands)
+        case Binary(symbol) | Compare(symbol):
+            return type(node)(symbol, *operands)
+        case Call(function):
+            return Call(function, operands)
+    return node
 
 
 def rebuilt(node: Expression, change: Callable[[Expression], Expression]) -> Expression:
-    """Return the tree with `change` applied to every node, operands before what uses them."""
-    parts = [rebuilt(child, change) for child in children(node)]
-    match node:
-        case Negate():
-            return change(Negate(*parts))
-        case Binary(symbol) | Compare(symbol):
-            return change(type(node)(symbol, *parts))
-        case Call(function):
-            return change(Call(function, tuple(parts)))
-    return change(node)
+    """Return a formula with `change` applied to every part, to operands before what uses them."""
+    return rebuilding(change)(node)
+
+
+def replacing(formulas: Mapping[str, Expression]) -> Callable[[Expression], Expression]:
+    """Return what puts formulas in the places of names."""
+    return rebuilding(
+        lambda part: formulas.get(part.name, part) if isinstance(part, Name) else part
+    )
 
 
 def put(node: Expression, name: str, what: Expression) -> Expression:
     """Return a formula with another one in the place of a name."""
-    return rebuilt(node, lambda part: what if part == Name(name) else part)
+    return replacing({name: what})(node)
 
 
 def walk(node: Expression) -> Iterator[Expression]:
-    """Yield `node` and every node below it, in the order of the formula."""
-    yield node
-    for child in children(node):
-        yield from walk(child)
+    """Yield each distinct part of a formula, `node` first, in the order of the formula."""
+    seen: set[Expression] = set()
+    waiting = [node]
+    while waiting:
+        part = waiting.pop()
+        if part not in seen:
+            seen.add(part)
+            yield part
+            waiting += reversed(part.operands)
 
 
-def size(node: Expression, most: int) -> int:
-    """Return how many nodes a formula has when it is written out; beyond `most`, `most` and one more."""
-    return sum(1 for _ in islice(walk(node), most + 1))
-
-
-class Parts:
-    """The distinct parts of some formulas, each with a number: parts that read alike are one."""
-
-    def __init__(self, formulas: Iterable[Expression]) -> None:
-        self.uses: list[int] = []
-        """By the number of a part: how many distinct parts and formulas use it."""
-        self.names: dict[int, str] = {}
-        """By the number of a part, how a text that has worked it out calls it."""
-        self.lines = 0
-        """How many lines such a text has."""
-        self._numbers: dict[tuple[Any, ...], int] = {}
-        for formula in formulas:
-            self.uses[self.number(formula)] += 1
-
-    def number(self, node: Expression) -> int:
-        """Return the number of a part."""
-        inner = tuple(self.number(child) for child in children(node))
-        own = (x for x in vars(node).values() if not isinstance(x, Expression | tuple))
-        key = (type(node), *own, inner)
-        if key not in self._numbers:
-            self._numbers[key] = len(self.uses)
-            self.uses.append(0)
-            for part in inner:
-                self.uses[part] += 1
-        return self._numbers[key]
-
-
-def names_in(expression: Expression) -> tuple[str, ...]:
-    """Return the names that `expression` uses, each once, in the order of their first use."""
-    return tuple(dict.fromkeys(node.name for node in walk(expression) if isinstance(node, Name)))
+def names_in(formula: Expression) -> KeysView[str]:
+    """Return the names that a formula uses, in the order of their first use."""
+    return formula.names
 
 
 def paired(terms: Sequence[Expression], join: Callable[..., Expression]) -> Expression:

@@ -117,7 +117,7 @@ def vertical_motion(t: Floats, initial: Numbers, parameters: Numbers) -> dict[st
 def written(formulas: Mapping[str, str], declared: tuple[str, ...]) -> Model:
     """Return the elastic pendulum that hangs straight down, or that follows a manufactured solution.
 
-    ExpressionError where a formula names something else than its field allows, or has derivatives that are too long.
+    ExpressionError where a formula names something else than its field allows.
     """
     return elastic_pendulum(tuple(sorted(formulas.items())), declared, frozenset())
 

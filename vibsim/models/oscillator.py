@@ -132,8 +132,7 @@ def written(formulas: Mapping[str, str], declared: tuple[str, ...]) -> Model:
     Equal formulas give the same model. It has a mass in its equation; its variant without that term is for the mass 1:
     the same bits in fewer operations.
 
-    ExpressionError where a formula names something else than its field allows, or an exact solution derivatives
-    that are too long.
+    ExpressionError where a formula names something else than its field allows.
     """
     return oscillator(tuple(sorted(formulas.items())), declared, frozenset({MASS.name}))
 

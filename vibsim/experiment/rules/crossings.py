@@ -9,7 +9,7 @@ from typing import Any
 from vibsim.core.errors import nearest
 from vibsim.experiment.faults import Report
 from vibsim.formula import Call, Compare, Expression, ExpressionError, bounds
-from vibsim.formula.tree import STEPS, children
+from vibsim.formula.tree import STEPS
 from vibsim.models import Model
 from vibsim.models.shared.crossings import STOP, guard_name, guard_of, is_constant
 
@@ -76,7 +76,7 @@ def _has_one_sign(guard: Expression, names: Collection[str]) -> bool:
 
 def _jumps(node: Expression) -> str:
     """Name what in a formula jumps; nothing where it does not, as a comparison within `where` need not."""
-    parts = children(node)
+    parts = node.operands
     match node:
         case Compare(symbol):
             return f"a comparison by {symbol}"

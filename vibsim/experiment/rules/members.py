@@ -19,7 +19,7 @@ from vibsim.experiment.faults import Report
 from vibsim.experiment.schema.fields import TABLE, FrozenDict
 from vibsim.experiment.schema.sweep import Axis
 from vibsim.experiment.sweep_columns import columns_of
-from vibsim.formula import Expression, derivative, first_jump, parse, put, size, values
+from vibsim.formula import Expression, derivative, first_jump, parse, parts_of, put, values
 from vibsim.models import FormulaField, Model, tree
 from vibsim.models.table import Lookup
 
@@ -31,7 +31,7 @@ MOST_NAMED = 3
 """Most swept numbers of a member that a message names."""
 SAMPLED_MEMBERS = 64
 """Members of a sweep that are looked at for jumps, evenly spread: a jump is hardly ever there for single ones."""
-WORK = 2**14
+WORK = 2**10
 """Operations of all these members together: of a long formula, fewer members are looked at."""
 WORDS = {1: "derivative", 2: "second derivative"}
 HINTS = {
@@ -224,7 +224,7 @@ def _check_jumps(
 
 def _jump(formula: Expression, members: MemberNumbers, along: Expression) -> float | None:
     """Return the place of a jump of some member; None where none is found."""
-    most = max(1, min(SAMPLED_MEMBERS, WORK // size(formula, WORK)))
+    most = max(1, min(SAMPLED_MEMBERS, WORK // len(parts_of(formula))))
     for numbers, end in members.some(most):
         at = first_jump(formula, numbers, end)
         if at is not None:

@@ -14,7 +14,6 @@ from vibsim.experiment.schema.checks import AccurateCheck, Check, ConvergesCheck
 from vibsim.experiment.value_names import VALUES
 from vibsim.experiment.yaml.parse import Path_
 from vibsim.formula import Binary, Call, Name, walk
-from vibsim.formula.tree import children
 from vibsim.models import Model, tree
 
 TURN = 2.0 * math.pi
@@ -103,7 +102,7 @@ def _turned(model: Model) -> Iterator[str]:
             if isinstance(part, Call) and part.function in ("sin", "cos"):
                 (angle,) = part.arguments
                 sides = (
-                    children(angle) if isinstance(angle, Binary) and angle.operator in "+-" else ()
+                    angle.operands if isinstance(angle, Binary) and angle.operator in "+-" else ()
                 )
                 yield from (side.name for side in sides or (angle,) if isinstance(side, Name))
 

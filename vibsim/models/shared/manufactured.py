@@ -13,11 +13,8 @@ from typing import Any
 import numpy as np
 
 from vibsim.core.array_types import Floats
-from vibsim.formula import Expression, ExpressionError, derivative, put, size, values
+from vibsim.formula import Expression, derivative, replacing, values
 from vibsim.models.base import Numbers, Parameter
-
-MAX_NODES = 20_000
-"""Longest force of an exact solution, in operations and names."""
 
 
 @dataclass(frozen=True)
@@ -34,19 +31,18 @@ class Manufactured:
 
     @cached_property
     def velocities(self) -> tuple[Expression, ...]:
-        """Derivatives of the positions; ExpressionError where they are too long to be worked with."""
-        return tuple(self._short(derivative(u, "t"), MAX_NODES // 10) for u in self.positions)
+        """Derivatives of the positions."""
+        return tuple(derivative(u, "t") for u in self.positions)
 
     @cached_property
     def accelerations(self) -> tuple[Expression, ...]:
         """Derivatives of the velocities."""
-        return tuple(self._short(derivative(v, "t"), MAX_NODES) for v in self.velocities)
+        return tuple(derivative(v, "t") for v in self.velocities)
 
     def along(self, formula: Expression) -> Expression:
         """Return a formula in the states at the motion, which depends on ``t`` and the parameters."""
-        for name, motion in zip(self.names, (*self.positions, *self.velocities), strict=True):
-            formula = put(formula, name, motion)
-        return self._short(formula, MAX_NODES)
+        motion = zip(self.names, (*self.positions, *self.velocities), strict=True)
+        return replacing(dict(motion))(formula)
 
     def forces(self, accelerations: Sequence[Expression]) -> tuple[Expression, ...]:
         """Return what must be added to the accelerations so that this is the motion."""
@@ -64,10 +60,3 @@ class Manufactured:
     def start(self, parameters: Numbers) -> dict[str, Any]:
         """Return the initial values: see `Model.start`."""
         return self.exact(np.asarray(0.0), {}, parameters)
-
-    def _short(self, node: Expression, most: int) -> Expression:
-        """Refuse a motion whose derivatives or forces are too long to be worked with."""
-        if size(node, most) > most:
-            rule = "its derivatives are too long to be written out as a force"
-            raise ExpressionError(" and ".join(self.texts), 0, rule, "write a simpler formula")
-        return node

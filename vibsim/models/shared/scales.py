@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from vibsim.formula import Expression, Name, names_in, parse, rebuilt, to_formula, values
+from vibsim.formula import Expression, Name, names_in, parse, replacing, to_formula, values
 from vibsim.models.base import Formula, Model, Numbers, parameter_names
 
 T_C, X_C = Name("@t"), Name("@x")
@@ -135,7 +135,7 @@ def _tree(model: Model, formula: Formula) -> Expression:
     named = {"t_c": T_C, f"{model.position}_c": X_C}
     states = [state.name for state in model.states]
     node = parse(formula, (*states, *parameter_names(model), *named))
-    return _renamed(node, {Name(name): inner for name, inner in named.items()})
+    return replacing(named)(node)
 
 
 def _value(model: Model, formula: Formula, numbers: Numbers) -> Any:
@@ -146,10 +146,6 @@ def _value(model: Model, formula: Formula, numbers: Numbers) -> Any:
 
 def _text(model: Model, formula: Formula) -> str:
     """Write a formula with its initial values as such: ``abs(u(0))``."""
-    names = {Name(state.name): Name(f"{state.name}(0)") for state in model.states}
-    names |= {T_C: Name("t_c"), X_C: Name(f"{model.position}_c")}
-    return to_formula(_renamed(_tree(model, formula), names))
-
-
-def _renamed(node: Expression, names: dict[Name, Name]) -> Expression:
-    return rebuilt(node, lambda part: names.get(part, part) if isinstance(part, Name) else part)
+    names = {state.name: Name(f"{state.name}(0)") for state in model.states}
+    names |= {T_C.name: Name("t_c"), X_C.name: Name(f"{model.position}_c")}
+    return to_formula(replacing(names)(_tree(model, formula)))

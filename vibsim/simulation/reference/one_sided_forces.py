@@ -24,6 +24,7 @@ from vibsim.formula import (
     hidden_pulses,
     names_in,
     values,
+    values_of,
 )
 from vibsim.models import Model, tree
 from vibsim.models.table import BEND, HEIGHT
@@ -74,7 +75,8 @@ class Sides:
         def found(u: Floats, v: Floats, t: Floats) -> Floats:
             numbers = self.numbers(modes, u, v, t)
             shape = np.broadcast_shapes(u.shape[1:], t.shape)
-            return np.stack([np.broadcast_to(values(row, numbers), shape) for row in self.formulas])
+            rows = values_of(self.formulas, numbers)
+            return np.stack([np.broadcast_to(row, shape) for row in rows])
 
         return found
 

@@ -16,7 +16,7 @@ import io
 import platform
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields
-from functools import cache, lru_cache
+from functools import cache, lru_cache, partial
 from importlib import import_module
 from typing import Any
 
@@ -25,6 +25,7 @@ from numpy.typing import NDArray
 
 from vibsim.core import private_cache
 from vibsim.core.array_types import Flags, Floats, Integers
+from vibsim.formula import to_statements
 from vibsim.models import Model, tree
 from vibsim.plan.code_digest import of_folder
 from vibsim.plan.versions import versions
@@ -144,12 +145,14 @@ def cached(digest: str, compute: Callable[[], Arrays]) -> Arrays:
 def digest_of(model: Model, numbers: tuple[bytes, ...]) -> str:
     """Return the digest of all that a reference depends on, with `numbers` as for `choose`."""
     names = [row.name for row in model.states], [row.name for row in model.parameters]
-    formulas = [tree(model, row) for row in model.accelerations]
+    formulas = dict(
+        zip(model.velocities, map(partial(tree, model), model.accelerations), strict=True)
+    )
     parts = [*_surroundings(), *numbers]
     if model.lookup is not None:
-        formulas.append(tree(model, model.lookup.place))
+        formulas["place"] = tree(model, model.lookup.place)
         parts.append(model.lookup.table.digest.encode())
-    parts.append(repr((names, formulas)).encode())
+    parts.append(repr((names, to_statements(formulas))).encode())
     digest = hashlib.sha256()
     for part in parts:
         digest.update(len(part).to_bytes(8, "little"))
