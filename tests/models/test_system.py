@@ -143,7 +143,7 @@ def test_masses_of_two_coordinates_give_the_accelerations_that_are_known():
 
 
 def test_a_cart_with_two_pendulums_moves_as_its_equations_say():
-    """Three coordinates with masses in common, and a fourth one alone whose mass depends on its position."""
+    """Three coordinates with masses in common, and one alone whose mass depends on its position."""
     model = written(
         ("x", "b", "c", "z"),
         {
@@ -172,6 +172,26 @@ def test_a_cart_with_two_pendulums_moves_as_its_equations_say():
         found = [evaluate(tree(model, a), at) for a in model.accelerations]
         np.testing.assert_allclose(found, expected, rtol=1e-11, atol=1e-12)
         assert evaluate(tree(model, model.dissipation), at) == pytest.approx(w[0] ** 2, abs=1e-10)
+
+
+def test_a_bar_of_elements_with_consistent_masses_has_its_frequencies():
+    """64 coordinates, each of which has a mass in common with its neighbours, as linear elements give them.
+
+    M_ii = 2/3, M_ij = 1/6 and the stiffness (2, -1) in units of an element have
+    ``w^2 = 6 (1 - cos(k pi/65))/(2 + cos(k pi/65))``.
+    """
+    names = [f"x_{i}" for i in range(1, 65)]
+    formulas = {}
+    for left, name, right in zip(["0", *names], names, [*names[1:], "0"], strict=False):
+        formulas |= {f"mass.{name}": "2*m/3", f"force.{name}": f"k*({left} - 2*{name} + {right})"}
+        formulas |= {f"mass.{name}.{right}": "m/6"} if right != "0" else {}
+    model = written(tuple(names), formulas, ("m", "k"))
+    own = {"parameters.m": np.array([1.0, 4.0]), "parameters.k": np.array(9.0)}
+    phase = np.cos(np.pi * np.arange(1, 65) / 65)
+    expected = 3.0 * np.sqrt(6.0 * (1.0 - phase) / (2.0 + phase))
+    np.testing.assert_allclose(model.natural_frequency(own), expected[0] / [1.0, 2.0], rtol=1e-11)
+    np.testing.assert_allclose(model.highest_frequency(own), expected[-1] / [1.0, 2.0], rtol=1e-11)
+    assert model.conservative
 
 
 @pytest.mark.parametrize("kind", SCHEMES)

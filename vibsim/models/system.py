@@ -45,8 +45,9 @@ from vibsim.formula import (
     names_in,
     parse,
     put,
+    replacing,
     to_formula,
-    values,
+    values_of,
 )
 from vibsim.formula.algebra import is_jump
 from vibsim.formula.tree import paired, walk
@@ -288,7 +289,7 @@ class Written:
         rng = np.random.default_rng(21)
         numbers = {name: rng.uniform(-1.0, 1.0, TESTS) for name in self.states}
         numbers |= {name: rng.uniform(0.3, 1.7, TESTS) for name in ("t", HEIGHT, *self.declared)}
-        found = [np.broadcast_to(values(term, numbers), TESTS) for term in terms]
+        found = [np.broadcast_to(value, TESTS) for value in values_of(list(terms), numbers)]
         if not found:
             return True
         total, size = np.sum(found, axis=0), np.sum(np.abs(found), axis=0)
@@ -297,28 +298,23 @@ class Written:
 
     @cached_property
     def stiffness(self) -> dict[tuple[int, int], Expression]:
-        """Entries of ``-da/dx`` at the origin and t = 0 that are not 0, in the parameters, by row and column."""
-        found = {}
-        for i, a in enumerate(self.own_accelerations):
-            named = names_in(a)
-            for j, name in enumerate(self.coordinates):
-                if name not in named:
-                    continue
-                slope = derivative(a, name)
-                for state in (*self.states, "t", HEIGHT):
-                    if state in names_in(slope):
-                        slope = put(slope, state, ZERO)
-                if slope != ZERO:
-                    found[i, j] = -slope
-        return found
+        """Entries of ``-da/dx`` that are not 0, by row and column."""
+        found = {
+            (i, j): -derivative(a, name)
+            for i, a in enumerate(self.own_accelerations)
+            for j, name in enumerate(self.coordinates)
+        }
+        return {place: entry for place, entry in found.items() if entry != ZERO}
 
     def frequencies(self, parameters: Numbers) -> Floats:
         """Return the angular frequencies of small oscillations, increasing, NaN behind the last, shape (..., n)."""
         numbers = {row.name: np.asarray(parameters[row.key], float) for row in self.parameters}
         shape = np.broadcast_shapes(*(number.shape for number in numbers.values()))
+        at_origin = dict.fromkeys((*self.states, "t", HEIGHT), np.zeros(()))
         matrix = np.zeros((*shape, len(self.coordinates), len(self.coordinates)))
-        for (i, j), formula in self.stiffness.items():
-            matrix[..., i, j] = values(formula, numbers)
+        entries = values_of(list(self.stiffness.values()), numbers | at_origin)
+        for (i, j), entry in zip(self.stiffness, entries, strict=True):
+            matrix[..., i, j] = entry
         # of a matrix that is not finite nothing is known
         is_known = np.isfinite(matrix).all(axis=(-2, -1), keepdims=True)
         squares = np.linalg.eigvals(np.where(is_known, matrix, 0.0))
@@ -370,8 +366,8 @@ def written(
 ) -> Model:
     """Return the system of formulas, with declared parameters.
 
-    ExpressionError where a formula names something else than its field allows, or an exact solution has derivatives
-    that are too long.
+    ExpressionError where a formula names something else than its field allows, or masses have no
+    inverse.
 
     Parameters
     ----------
@@ -462,25 +458,28 @@ def _damping(own: Written) -> Damping | None:
     return Damping(*found) if found is not None and own.is_constant(found[1]) else None
 
 
+def _sides(own: Written, i: int) -> tuple[Expression, Expression]:
+    """Return both sides of the equation of a coordinate."""
+    accelerations = [Name(f"{name}''") for name in own.coordinates]
+    if own.inertia.is_plain:
+        return accelerations[i], own.own_accelerations[i]
+    left = own.inertia.rest(i)
+    for j, acceleration in reversed(list(enumerate(accelerations))):
+        left = own.inertia.of(i, j) * acceleration + left
+    return left, own.forces[i]
+
+
 def _equation(own: Written) -> str:
     """Return the equations of motion as a user would write them."""
-    speeds = dict(zip(own.velocities, own.coordinates, strict=True))
-    sides = [Name(f"{name}''") for name in own.coordinates]
-    lines = []
-    for i, a in enumerate(own.own_accelerations):
-        left: Expression = sides[i]
-        if not own.inertia.is_plain:
-            left = own.inertia.rest(i)
-            for j, side in reversed(list(enumerate(sides))):
-                left = own.inertia.of(i, j) * side + left
-            a = own.forces[i]
-        both = [left, a]
-        for velocity, position in speeds.items():
-            both = [put(side, velocity, Name(f"{position}'")) for side in both]
-        both = [put(side, HEIGHT, Name(INPUT)) for side in both]
-        lines.append(" = ".join(map(to_formula, both)))
-    if len(lines) > SHOWN:
-        lines = [*lines[: SHOWN // 2], "...", lines[-1]]
+    speeds = zip(own.velocities, own.coordinates, strict=True)
+    shown = replacing({**{v: Name(f"{x}'") for v, x in speeds}, HEIGHT: Name(INPUT)})
+    places = list(range(len(own.coordinates)))
+    is_long = len(places) > SHOWN
+    if is_long:
+        places = [*places[: SHOWN // 2], places[-1]]
+    lines = [" = ".join(to_formula(shown(side)) for side in _sides(own, i)) for i in places]
+    if is_long:
+        lines.insert(-1, "...")
     equations = ", ".join(lines)
     if own.lookup is not None:
         table, place = own.lookup.table, own.formulas[INPUT]

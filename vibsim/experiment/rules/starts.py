@@ -11,7 +11,7 @@ from vibsim.core.array_types import Flags
 from vibsim.experiment.faults import Report
 from vibsim.experiment.rules.members import MemberNumbers, named
 from vibsim.experiment.yaml.parse import Path_
-from vibsim.formula import values
+from vibsim.formula import values, values_of
 from vibsim.models import tree
 from vibsim.models.base import rate
 from vibsim.models.events import Crossings
@@ -50,15 +50,8 @@ def check_starts(members: MemberNumbers, formulas: Mapping[str, str], report: Re
         masses = inertia(formulas, model.positions, model.velocities, known)
 
         def is_light(numbers: Mapping[str, Any]) -> Flags:
-            found: Flags = np.array(False)
-            for group in masses.groups:
-                rows = [[values(masses.of(i, j), numbers) for j in group] for i in group]
-                entries = np.broadcast_arrays(*(entry for row in rows for entry in row))
-                matrix = np.stack(entries, axis=-1).reshape(*entries[0].shape, len(rows), len(rows))
-                known = np.isfinite(matrix).all(axis=(-2, -1), keepdims=True)
-                least = np.linalg.eigvalsh(np.where(known, matrix, 0.0))[..., 0]
-                found = found | ~(least > 0.0)
-            return found
+            pivots = np.broadcast_arrays(*values_of(masses.pivots, numbers))
+            return np.asarray(~np.all(np.stack(pivots) > 0.0, axis=0))
 
         rule = "must be positive definite, and is not at the start{}"
         hint = "every motion must have a positive kinetic energy"

@@ -2,7 +2,7 @@ r"""Masses of several coordinates: the kinetic energy ``T = sum_ij M_ij(q) q_i' 
 
 ``d/dt (dT/dq_i') - dT/dq_i = F_i`` is ``sum_j M_ij q_j'' + sum_jk c_ijk q_j' q_k' = F_i`` with
 ``c_ijk = (dM_ij/dq_k + dM_ik/dq_j - dM_jk/dq_i)/2``: terms that a mass which depends on the position has beside the
-forces. They are solved for the accelerations by Cramer's rule, in groups of coordinates that have a mass in common.
+forces. They are solved for the accelerations as formulas, of which common parts are worked out once.
 
 Source: L. D. Landau and E. M. Lifshitz, Mechanics, sections 5 and 10; H. Goldstein, Classical Mechanics, section 1.4.
 """
@@ -18,7 +18,6 @@ from vibsim.formula import (
     ZERO,
     Binary,
     Expression,
-    ExpressionError,
     Name,
     Number,
     derivative,
@@ -29,8 +28,6 @@ from vibsim.formula import (
 from vibsim.formula.tree import paired
 
 MASS = "mass"
-MOST_COUPLED = 3
-"""Coordinates that have masses in common, at most: Cramer's rule for more is longer than what can be compiled."""
 
 
 @dataclass(frozen=True)
@@ -83,48 +80,35 @@ class Inertia:
         return found
 
     def accelerations(self, forces: Sequence[Expression]) -> tuple[Expression, ...]:
-        """Return the accelerations by some forces.
-
-        ExpressionError where too many coordinates have masses in common.
-        """
-        right = [force - self.rest(i) for i, force in enumerate(forces)]
-        found: list[Expression] = [ZERO] * len(right)
-        for group in self.groups:
-            if len(group) > MOST_COUPLED:
-                named = ", ".join(self.positions[i] for i in group[: MOST_COUPLED + 1])
-                rule = f"must not couple more than {MOST_COUPLED} coordinates, couples {named}"
-                rule += ", ..." if len(group) > MOST_COUPLED + 1 else ""
-                raise ExpressionError(MASS, 0, rule, "solve for the accelerations and write these")
-            whole = self._minor(group, group)
-            for i in group:
-                total = ZERO
-                for j in group:
-                    rows, columns = (tuple(n for n in group if n != out) for out in (j, i))
-                    is_odd = (group.index(i) + group.index(j)) % 2
-                    term = self._minor(rows, columns) * right[j]
-                    total = total - term if is_odd else total + term
-                found[i] = total / whole
+        """Return the accelerations by some forces."""
+        found = [force - self.rest(i) for i, force in enumerate(forces)]
+        count, rows = len(found), self._eliminated
+        for k in range(count):
+            for i in range(k + 1, count):
+                if (k, i) in rows:
+                    found[i] -= rows[k, i] / rows[k, k] * found[k]
+        for k in reversed(range(count)):
+            for i in range(k + 1, count):
+                found[k] -= rows.get((k, i), ZERO) * found[i]
+            found[k] = found[k] / rows[k, k]
         return tuple(found)
 
     @cached_property
-    def groups(self) -> list[tuple[int, ...]]:
-        """Coordinates that have masses in common, directly or by others, increasing."""
-        groups = [{i} for i in range(len(self.positions))]
-        for pair in self.entries:
-            met = [group for group in groups if group & set(pair)]
-            groups = [group for group in groups if group not in met] + [set().union(*met)]
-        return [tuple(sorted(group)) for group in groups]
+    def pivots(self) -> tuple[Expression, ...]:
+        """What must be positive: it is where every motion has a positive kinetic energy."""
+        return tuple(self._eliminated[k, k] for k in range(len(self.positions)))
 
-    def _minor(self, rows: tuple[int, ...], columns: tuple[int, ...]) -> Expression:
-        """Return the determinant of some rows and columns, by the first row."""
-        if not rows:
-            return ONE
-        total = ZERO
-        for place, column in enumerate(columns):
-            rest = columns[:place] + columns[place + 1 :]
-            term = self.of(rows[0], column) * self._minor(rows[1:], rest)
-            total = total - term if place % 2 else total + term
-        return total
+    @cached_property
+    def _eliminated(self) -> dict[tuple[int, int], Expression]:
+        """The upper triangle of the matrix after elimination, which needs no other order of its rows."""
+        rows = {(k, k): ZERO for k in range(len(self.positions))} | dict(self.entries)
+        for k in range(len(self.positions)):
+            others = [i for i in range(k + 1, len(self.positions)) if (k, i) in rows]
+            for i in others:
+                factor = rows[k, i] / rows[k, k]
+                for j in others[others.index(i) :]:
+                    rows[i, j] = rows.get((i, j), ZERO) - factor * rows[k, j]
+        return rows
 
     def _slope(self, i: int, j: int, k: int) -> Expression:
         """Return ``dM_ij/dq_k``."""
