@@ -83,8 +83,51 @@ def test_refuses_what_the_loader_refuses(changes: dict[str, Any]) -> None:
     faults_of(**changes)
 
 
+LINE = {"x_i": {"acceleration": "x_(i+1) - x_i"}}
+
+
+@pytest.mark.parametrize(
+    ("repeat", "is_sound"),
+    [
+        ({"i": [1, 5]}, True),
+        ({"n": 16, "i": LINE}, True),
+        ({"n": 16, "i": {"x_i": {"force": "-x_i", "mass": 2}}}, True),
+        ({"i": 5}, False),
+        ({"i": [1, 2, 3]}, False),
+        ({"n": 16}, False),
+        ({"n": 16, "i": 5}, False),
+        ({"n": 16, "i": LINE, "j": LINE}, False),
+        ({"n": 16, "i": {"x_i": {"speed": 1}}}, False),
+    ],
+)
+def test_repeats_are_indices_or_one_chain(repeat: dict[str, Any], is_sound: bool) -> None:
+    coordinates = {} if "n" in repeat else {"coordinates": {"x_{i}": {"acceleration": "-x_{i}"}}}
+    model = {"kind": "system", **coordinates, "repeat": repeat}
+    changes = {"model": model, "initial": {"x_1": 1}, "checks": []}
+    assert VALIDATOR.is_valid(content(**changes)) == is_sound
+    if is_sound:
+        build(**changes)
+    else:
+        faults_of(**changes)
+
+
 def test_accepts_the_first_example() -> None:
     VALIDATOR.validate(parse(EXAMPLE.encode(), "example").data)
+
+
+@pytest.mark.parametrize("collection", ["pendulum_lab", "showcase"])
+def test_accepts_every_experiment_that_is_shipped(collection: str) -> None:
+    for file in (ROOT / "configs" / collection).glob("*.yaml"):
+        VALIDATOR.validate(parse(file.read_bytes(), file.name).data)
+
+
+def test_knows_the_states_of_models_and_not_those_of_systems() -> None:
+    spring = content(model={"kind": "spring"}, initial={"u": 1})
+    assert VALIDATOR.is_valid(spring)
+    assert not VALIDATOR.is_valid(spring | {"initial": {"height": 1}})
+    system = content(model={"kind": "system", "coordinates": ["height"]}, initial={"height": 1})
+    assert VALIDATOR.is_valid(system)
+    assert not VALIDATOR.is_valid(system | {"initial": {"height": [1]}})
 
 
 BY_SHAPE = ("unknown key", "required key", "unknown choice", "must be a mapping", "must be a list")
@@ -101,7 +144,9 @@ def _properties(node: Any) -> list[tuple[str, dict[str, Any]]]:
     found: list[tuple[str, dict[str, Any]]] = []
     if isinstance(node, dict):
         found += list(node.get("properties", {}).items())
-        found += [row for value in node.values() for row in _properties(value)]
+        # a condition describes nothing
+        parts = (value for key, value in node.items() if key not in ("if", "then"))
+        found += [row for value in parts for row in _properties(value)]
     elif isinstance(node, list):
         found += [row for value in node for row in _properties(value)]
     return found

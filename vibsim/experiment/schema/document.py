@@ -152,7 +152,7 @@ Samples: Any = by_form({"mapping": Every, "other": Literal["auto", "common", "al
 
 
 def _initial_schema(models: Iterable[Model]) -> dict[str, Any]:
-    """Describe the initial values of every model's states, for editors."""
+    """Describe the initial values of every model's states, for editors; a system has states of its own."""
     states = {state.name: state for model in models for state in model.states}
     properties = {
         name: {
@@ -162,7 +162,20 @@ def _initial_schema(models: Iterable[Model]) -> dict[str, Any]:
         }
         for name, state in states.items()
     }
-    return {"type": "object", "properties": properties, "additionalProperties": False}
+    others = {"type": ["number", "string"]}
+    return {"type": "object", "properties": properties, "additionalProperties": others}
+
+
+def _states_are_known(models: Iterable[Model]) -> dict[str, Any]:
+    """Describe that what begins with a value is a state of a model, unless the model's are named in the file."""
+    models = tuple(models)
+    named = [model.kind for model in models if model.named is not None]
+    states = sorted({state.name for model in models for state in model.states})
+    kind = {"properties": {"kind": {"enum": named}}, "required": ["kind"]}
+    return {
+        "if": {"properties": {"model": {"not": kind}}},
+        "then": {"properties": {"initial": {"propertyNames": {"enum": states}}}},
+    }
 
 
 UNITS_SCHEMA = {
@@ -177,6 +190,7 @@ class Document(Section):
 
     model_config = ConfigDict(
         json_schema_extra={"oneOf": [{"required": ["levels"]}, {"required": ["tolerance"]}]}
+        | _states_are_known(MODELS.built_in.values())
     )
     stand_ins = MappingProxyType({"title": None, "model": None, "time": None, "schemes": ()})
 
@@ -230,6 +244,11 @@ class _Generator(GenerateJsonSchema):
     def field_title_should_be_set(self, schema: Any) -> bool:
         return False
 
+    def tagged_union_schema(self, schema: Any) -> dict[str, Any]:
+        # which member it is follows from the form of what is written, which another may describe as well
+        found = super().tagged_union_schema(schema)
+        return {"anyOf" if key == "oneOf" else key: value for key, value in found.items()}
+
     def model_schema(self, schema: Any) -> dict[str, Any]:
         found, kind = super().model_schema(schema), schema["cls"]
         kinds = (base for base in kind.mro() if issubclass(base, Section))
@@ -279,5 +298,6 @@ def installed_schema() -> dict[str, Any]:
     }
     doc = Document.__doc__
     found = json_schema(create_model("Document", __base__=Document, __doc__=doc, **fields))
+    found |= _states_are_known(MODELS.values())
     found["$defs"]["SweepSection"]["patternProperties"] = swept_options(SCHEMES.values())
     return found

@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from functools import cache
 from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, BeforeValidator, Field, StrictBool, create_model
+from pydantic import AfterValidator, BeforeValidator, ConfigDict, Field, StrictBool, create_model
 from pydantic_core import PydanticCustomError
 
 from vibsim.experiment.kinds import COORDINATES
@@ -232,6 +232,18 @@ class Coordinate(Section):
     """the force on it"""
 
 
+class Chain(Section):
+    """A number of coordinates, and an index with their formulas (`vibsim.experiment.chain`)."""
+
+    model_config = ConfigDict(
+        extra="allow", json_schema_extra={"minProperties": 2, "maxProperties": 2}
+    )
+    __pydantic_extra__: dict[str, dict[str, Coordinate]]
+
+    n: int
+    """how many coordinates, x_1 to x_n"""
+
+
 def _refuse_coordinates(_: Any) -> Any:
     # what has formulas is written otherwise before (`vibsim.experiment.other_forms`)
     raise refused("each coordinate must have an acceleration, or a force with its mass")
@@ -258,8 +270,8 @@ def model_section(model: Model) -> type[Section]:
         fields["equation"] = (Text | None, Field(default=None, description=words))
         words = "indices with first and last value: every key and entry with {i} in it is written out for each i"
         words += "; or a chain {n: 16, i: {x_i: ...}} with the formulas of each coordinate"
-        ends = tuple[int, int] | int | dict[str, Coordinate]
-        fields["repeat"] = (dict[str, ends] | None, Field(default=None, description=words))
+        repeat = dict[str, tuple[int, int]] | Chain | None
+        fields["repeat"] = (repeat, Field(default=None, description=words))
     for field in model.formulas:
         names = ", ".join((*field.names, "parameters"))
         if model.named is not None:
