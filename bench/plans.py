@@ -70,8 +70,7 @@ def compared(names: Sequence[str]) -> tuple[list[str], dict[str, float]]:
         header += [f"{key}, planned", "measured"]
     caption = (
         f"On one core. Within a factor of {FACTOR}: CPU {agree['cpu']}, clock {agree['wall']}, "
-        f"memory {agree['memory']}, disk {agree['disk']} of {len(names)} experiments. "
-        "Disk is planned before files are compressed, as a bound."
+        f"memory {agree['memory']}, disk {agree['disk']} of {len(names)} experiments."
     )
     figures = {f"plans.{key}": float(count) for key, count in agree.items()}
     return table(caption, header, rows), figures
@@ -100,7 +99,8 @@ def measured(name: str) -> dict[str, float]:
         # of the page no memory is planned
         paths = [p for p in (results / name / "benchmarks").iterdir() if p.stem != "report"]
         jobs = [job for path in paths for job in table_of(path)]
-        written = (path.stat().st_size for path in (results / name).glob("**/*.nc"))
+        files = (path for path in (results / name).glob("**/*") if path.is_file())
+        written = (path.stat().st_size for path in files)
         return {
             "cpu": found.cpu,
             "wall": found.wall,

@@ -64,7 +64,7 @@ def plan() -> dict[str, Any]:
         {
             "jobs": COUNT,
             "member_steps": COUNT,
-            "bytes": COUNT | {"description": "of all files"},
+            "bytes": COUNT | {"description": "of all files, the page among them, estimated"},
             "memory": COUNT | {"description": "bytes of the largest job"},
             "seconds": {
                 "type": "number",

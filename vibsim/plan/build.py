@@ -16,8 +16,8 @@ from vibsim.core.registry import Registry, offers
 from vibsim.experiment import Experiment, canonical
 from vibsim.experiment.cost import (
     JOB_SECONDS,
-    analysis_disk,
     analysis_memory,
+    analysis_written,
     load_of,
     process_memory,
 )
@@ -82,7 +82,7 @@ def build(experiment: Experiment) -> Plan:
         analysis_memory=analysis_memory(loads, experiment.members)
         + forecast.other_memory(experiment, loads),
         process_memory=process_memory(loads, experiment.members),
-        analysis_bytes=analysis_disk(loads, experiment.members, is_bounded(experiment)),
+        analysis_bytes=analysis_written(loads, experiment.members, is_bounded(experiment)),
         extrapolation=extrapolation,
         report=job_digest("report", content, {"analysis": analysis}, DRAWING),
         content=content,
@@ -191,7 +191,7 @@ def _level(
         steps=load.steps,
         every=every,
         member_steps=load.schemes * members * load.steps,
-        bytes=load.disk(members),
+        bytes=load.written(members),
         seconds=round(load.seconds(members), 3),
         shared=round(members * load.shared, 3),
         memory=load.memory(min(members, load.shard)),

@@ -220,7 +220,7 @@ class Plan:
 
     @property
     def bytes(self) -> int:
-        """Size of all files, estimated."""
+        """Size of all files of numbers, estimated."""
         return sum(level.bytes for level in self.levels) + self.analysis_bytes
 
     def analysis_processes(self, cores: int) -> int:

@@ -20,13 +20,11 @@ from vibsim import __version__
 from vibsim.core import netcdf
 from vibsim.core.record import Attribute, Record, Variable
 from vibsim.core.vocabulary import FORMAT
-from vibsim.experiment.cost import PACKED_UP_TO
+from vibsim.experiment.cost import PACKED_FROM, PACKED_UP_TO
 from vibsim.store import seal
 from vibsim.store.atomic import check_room, replacing
 
 CONVENTIONS = "CF-1.11"
-PACKED_FROM = 2**14
-"""Bytes of a variable from which it is compressed."""
 _CHUNK = 2**18
 """Bytes of whole members that are compressed together, and read together, at least one."""
 _OURS = (

@@ -1,7 +1,4 @@
-"""``vibsim check`` and ``vibsim plan``: whether experiments are valid, and what a run would cost, without running it.
-
-Files are counted as they are before compression.
-"""
+"""``vibsim check`` and ``vibsim plan``: whether experiments are valid, and what a run would cost."""
 
 from __future__ import annotations
 
@@ -19,6 +16,7 @@ from vibsim.cli.failure import from_here
 from vibsim.cli.jobs.common import chosen_results
 from vibsim.cli.resources import amount, duration, size
 from vibsim.core.processes import usable_cores
+from vibsim.experiment.cost import PAGE_BYTES
 from vibsim.plan import Plan
 from vibsim.plan.forecast import RUN_SECONDS
 
@@ -60,7 +58,7 @@ def _entry(item: Plan) -> dict[str, Any]:
     totals = {
         "jobs": len(item.batches) + 2 + bool(item.best),
         "member_steps": _steps(item),
-        "bytes": item.bytes,
+        "bytes": item.bytes + PAGE_BYTES,
         "memory": item.memory,
         "seconds": item.seconds,
         "cpu_seconds": RUN_SECONDS + item.cpu_seconds,
@@ -103,10 +101,10 @@ def _lines(item: Plan) -> Iterator[str]:
         numbers = map(str, (level.level, level.steps, level.every, len(level.shards)))
         costs = amount(level.member_steps), size(level.bytes), size(level.memory)
         yield _row((*numbers, *costs, duration(level.seconds)))
-    yield f"    analysis: at most {size(item.analysis_bytes)} of disk, {size(item.analysis_memory)} of memory"
+    yield f"    analysis: about {size(item.analysis_bytes)} of disk, {size(item.analysis_memory)} of memory"
     simulate = "1 simulate job" if len(item.batches) == 1 else f"{len(item.batches)} simulate jobs"
     yield (
-        f"    all: {simulate}, {amount(_steps(item))} member-steps, at most {size(item.bytes)} of disk, "
+        f"    all: {simulate}, {amount(_steps(item))} member-steps, about {size(item.bytes + PAGE_BYTES)} of disk, "
         f"{size(item.memory)} of memory in a job, {duration(item.seconds)} of one core"
     )
     if item.reference_seconds >= SHORT:
@@ -120,9 +118,10 @@ def _row(cells: Sequence[str]) -> str:
 
 
 def _sum(plans: Sequence[Plan], results: Path) -> str:
-    steps, files = sum(map(_steps, plans)), sum(item.bytes for item in plans)
+    steps = sum(map(_steps, plans))
+    files = sum(item.bytes + PAGE_BYTES for item in plans)
     return (
-        f"{len(plans)} experiments: {amount(steps)} member-steps, at most {size(files)} of disk "
+        f"{len(plans)} experiments: {amount(steps)} member-steps, about {size(files)} of disk "
         f"({size(resources.free_bytes(results))} free), {_times(plans)}"
     )
 
