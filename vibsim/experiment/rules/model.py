@@ -202,6 +202,5 @@ def _check_length(model: Model) -> None:
         formulas += tuple(tree(model, value) for row in rows for _, value in row.then)
     if len(parts_of(*formulas)) > MAX_NODES:
         rule = f"the equation that follows, with its slopes and energies, has more than {MAX_NODES} operations"
-        hint = "write a simpler formula, or the energy as `potential` where the model has that; in place of masses "
-        hint += "that depend on each other, write each `acceleration`"
+        hint = "write a simpler formula, or the energy as `potential` where the model has that"
         raise ExpressionError("", 0, rule, hint)
