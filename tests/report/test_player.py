@@ -249,3 +249,27 @@ def test_a_body_on_a_spring_has_its_dashpot_and_its_force_where_it_has_any():
     assert shapes.count("spring") == 1
     assert "arrow" not in shapes
     assert shapes.count("box") == 1
+
+
+def test_a_force_from_a_table_has_its_arrow(tmp_path, monkeypatch):
+    (tmp_path / "push.csv").write_text("\n".join(["t,f", "0,0", "1,2", "2,-1", "3,4", "4,0"]))
+    monkeypatch.chdir(tmp_path)
+    model = {
+        "kind": "system",
+        "force": "-4*u - 0.3*v + input/2",
+        "mass": 1.5,
+        "input": {"table": "push.csv", "x": "t", "h": "f"},
+    }
+    exp = samples.experiment(
+        model=model,
+        initial={"u": 0.1},
+        time={"steps_per_point": 4},
+        levels=[0, 1, 2],
+        schemes=["rk4"],
+        checks=[],
+    )
+    lane = player.lanes(exp, samples.record(exp))[0]
+    arrow = next(part for part in lane.scene.parts if part.look == "pull")
+    # at the points of the table
+    heights = arrow.at[2][np.searchsorted(lane.motion.t, [1.0, 2.0, 3.0])]
+    assert heights / heights[0] == pytest.approx([1.0, -0.5, 2.0])

@@ -13,13 +13,14 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from vibsim.core.array_types import Floats
-from vibsim.formula import parse, values
-from vibsim.models import Model
+from vibsim.formula import derivative, parse, values
+from vibsim.models import Model, table, tree
 from vibsim.models.base import Formula
 
 WIDTH, HEIGHT = 320.0, 220.0
@@ -61,9 +62,21 @@ class Motion:
 
     def value(self, formula: Formula, **instead: float) -> Floats:
         """Return the series of a formula of the model, shape (t,), with other values for some of its names."""
-        numbers = {"t": self.t, **self.states, **self.parameters, **instead}
+        numbers = self.numbers | instead
         expression = parse(formula, tuple(numbers)) if isinstance(formula, str) else formula
         return np.broadcast_to(values(expression, numbers), self.t.shape)
+
+    @cached_property
+    def numbers(self) -> dict[str, Any]:
+        """What a formula of the model may name."""
+        found = {"t": self.t, **self.states, **self.parameters}
+        if self.model.lookup is not None:
+            place = np.broadcast_to(
+                values(tree(self.model, self.model.lookup.place), found), self.t.shape
+            )
+            read = self.model.lookup.table.read(place)
+            found |= zip((table.HEIGHT, table.BEND), read, strict=True)
+        return found
 
     def has(self, name: str) -> bool:
         """Say whether the model has an output of this name."""
@@ -202,9 +215,9 @@ def _road(motion: Motion) -> Floats:
     lookup = motion.model.lookup
     if lookup is None:
         return motion.output("road_height")
-    table = lookup.table
-    places = table.first + table.spacing * np.arange(table.points)
-    return np.interp(motion.number("speed") * motion.t, places, table.heights)
+    row = lookup.table
+    places = row.first + row.spacing * np.arange(row.points)
+    return np.interp(motion.number("speed") * motion.t, places, row.heights)
 
 
 def bouncing_ball(motion: Motion) -> Scene:
@@ -227,8 +240,10 @@ def spring_mass(motion: Motion) -> Scene:
         parts += _dashpot(22.0, x - half, y + 9.0)
     legend = []
     if model.driving is not None:
-        # its power is the force times the velocity
-        force = motion.value(model.driving, **{model.velocity: 1.0})
+        # its power is the force times the velocity, beside which that of damping has a higher power of it
+        force = motion.value(
+            derivative(tree(model, model.driving), model.velocity), **{model.velocity: 0.0}
+        )
         largest = max(float(np.max(np.abs(force))), 1e-300)
         parts.append(Part("arrow", "pull", (x, y, FORCE * force / largest, 0.0)))
         legend.append(("pull", "driving force"))
