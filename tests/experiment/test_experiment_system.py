@@ -89,6 +89,18 @@ def test_masses_in_common_make_a_chain_of_pendulums(count, scheme):
     assert ends == pytest.approx(known.y[:count, -1], abs=close)
 
 
+def test_energy_that_a_written_potential_does_not_conserve_is_not_blamed_on_the_forces():
+    wrong = {"acceleration": "-u", "potential": "u**2/3"}
+    (fault,) = refused(wrong, checks=[{"conserves": "energy"}])
+    assert "by the `potential` that is written" in fault
+
+
+def test_a_place_of_a_sweep_without_one_says_so():
+    asked = {"value": "end", "quantity": "u", "at": {"model.k": 2}, "equals": 1, "atol": 1}
+    (fault,) = refused({"acceleration": "-u"}, checks=[asked])
+    assert "`at` names values of a sweep, and there is none" in fault
+
+
 @pytest.mark.slow
 def test_masses_in_common_that_would_take_minutes_to_compile_are_refused():
     model, _ = links(14)
@@ -238,6 +250,17 @@ def test_an_exact_degree_is_that_of_the_same_equation_of_another_model():
                 "model.mass: must be positive definite, and is not at the start: "
                 "every motion must have a positive kinetic energy"
             ],
+        ),
+        (
+            {"coordinates": ["x", "y"], "equation": {"x": "x'' + x = 0", "y": "y'' + y = 0"}},
+            [
+                "model.equation: must be the equation of one coordinate: "
+                "of several give each its `acceleration`, or `force` and `mass`"
+            ],
+        ),
+        (
+            {"acceleration": "-u", "events": [{"when": "u - 1", "then": {"u'": "-v"}}]},
+            ["model.events[0].then.u': unknown state: write v"],
         ),
         (
             {"force": "-u", "mass": "1 + v"},

@@ -140,7 +140,7 @@ def test_it_is_the_experiment_of_the_usual_form(
     ],
 )
 def test_equations_are_solved(equation: str, name: str, acceleration: float) -> None:
-    found, formula = solved(equation)
+    found, formula = solved(equation, ["m", "b", "k", "F"])
     assert found == name
     numbers = {"m": 5.0, "b": 2.0, "k": 3.0, "F": 7.0, name: 0.5, "v": 0.25, f"v{name}": 0.25}
     assert evaluate(parse(formula, numbers), numbers) == pytest.approx(acceleration, rel=1e-14)
@@ -158,12 +158,13 @@ def test_equations_are_solved(equation: str, name: str, acceleration: float) -> 
         ("sin(u'') = u", "linear in u''"),
         ("0*u'' = u", "vanishes"),
         ("u'' = ", "is empty"),
+        ("u'' + 1e5*c*u' = 0", "unknown name 'c'"),
         ("u''' + u'' = 1", "not allowed"),
     ],
 )
 def test_what_is_no_equation_of_one_coordinate_is_refused(equation: str, rule: str) -> None:
     with pytest.raises(ExpressionError) as caught:
-        solved(equation)
+        solved(equation, ["t"])
     assert rule in caught.value.rule
 
 

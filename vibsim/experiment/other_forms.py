@@ -12,7 +12,7 @@ That happens to the content of a file behind `vibsim.experiment.repeat`:
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -34,7 +34,7 @@ from vibsim.formula import (
     tidied,
     to_formula,
 )
-from vibsim.models.system import velocities_of
+from vibsim.models.system import INPUT, velocities_of
 
 EQUATION = "equation"
 BESIDE_MODEL = "stop", "events"
@@ -131,10 +131,18 @@ class _Writer:
         """Return a system with the acceleration of its only coordinate in place of an equation."""
         path: Path_ = ("model", EQUATION)
         written = model.get(EQUATION)
+        if isinstance(written, Mapping):
+            rule = "must be the equation of one coordinate"
+            hint = "of several give each its `acceleration`, or `force` and `mass`"
+            self.report.add_malformed(path, rule, hint)
+            rest = {key: value for key, value in model.items() if key != EQUATION}
+            return {**rest, "acceleration": dict.fromkeys(map(str, written), "0")}
         if not isinstance(written, str):
             return model
         try:
-            name, acceleration = solved(written)
+            parameters = model.get("parameters")
+            known = [*parameters] if isinstance(parameters, Mapping) else []
+            name, acceleration = solved(written, ["t", INPUT, *map(str, known)])
         except ExpressionError as error:
             self.report.add_malformed(path, error.rule, error.hint, written)
             acceleration, name = "0", "u"
@@ -169,10 +177,11 @@ def _has_formulas(own: Any) -> bool:
     return isinstance(own, Mapping) and not own.keys().isdisjoint(OF_COORDINATE)
 
 
-def solved(equation: str) -> tuple[str, str]:
+def solved(equation: str, others: Sequence[str]) -> tuple[str, str]:
     """Return the coordinate of an equation such as ``m*u'' + k*u = F``, and its acceleration as a formula.
 
-    ExpressionError where it is no equation of one coordinate, linear in the second derivative.
+    ExpressionError where it is no equation of one coordinate, linear in the second derivative, or names something else
+    than the coordinate, its derivatives and `others`.
     """
     sides = equation.split("=")
     if len(sides) != 2:
@@ -194,6 +203,10 @@ def solved(equation: str) -> tuple[str, str]:
     texts = [_DERIVATIVE.sub(named, side) for side in sides]
     words = set(re.findall(r"[A-Za-z_]\w*", " ".join(texts))) - {*FUNCTIONS, *CONSTANTS}
     left, right = (parse(text, words) for text in texts)
+    for other in (*names_in(left), *names_in(right)):
+        if other not in (name, velocity, _SECOND, *others):
+            hint = "give its value in `parameters`"
+            raise ExpressionError(equation, 0, f"unknown name '{other}'", hint)
     factor, rest = ZERO, ZERO
     for term in (*_terms(left), *_terms(Negate(right))):
         slope = derivative(term, _SECOND)

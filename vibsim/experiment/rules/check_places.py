@@ -79,9 +79,9 @@ class Scope:
         known = [*type(at).model_fields, *setting.sweep.keys]
         unknown = [key for key in at.swept if key not in setting.sweep.keys]
         for key in unknown:
-            hint = (
-                nearest(key, known) if known else "`at` names values of a sweep, and there is none"
-            )
+            hint = nearest(key, known)
+            if not known or ("." in key and not setting.sweep.keys):
+                hint = "`at` names values of a sweep, and there is none"
             here.at(key).refuse("unknown key", hint, _written(at.swept[key]), at_key=True)
         if case is not None and not unknown:
             first = here.at(next(iter(at.swept)))

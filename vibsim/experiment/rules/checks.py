@@ -146,11 +146,11 @@ def _check(check: Check, scope: Scope) -> None:
 def _instead_of_energy(scope: Scope) -> str:
     """Say what to write where an energy is not conserved, or is not known to be."""
     section = scope.report.source.data.get("model")
-    if (
-        isinstance(section, Mapping)
-        and section.get("kind") == "system"
-        and "potential" not in section
-    ):
+    if isinstance(section, Mapping) and section.get("kind") == "system":
+        if "potential" in section:
+            return (
+                "by the `potential` that is written: leave it out, and vibsim finds it where it can"
+            )
         return "write its `potential`, if the forces have one that vibsim does not find"
     has_budget = "energy_budget" in scope.setting.quantities
     return "the budget of energy and work is: `converges: energy_budget`" if has_budget else ""

@@ -52,8 +52,11 @@ def read_crossings(
         texts[name] = event.when.strip()
         for state, text in event.then.items():
             if state not in states:
-                rule = "unknown state"
-                report.add((*path, "then", state), rule, nearest(state, states), at_key=True)
+                positions = states[: len(states) // 2]
+                hint = nearest(state, states)
+                if state[-1:] == "'" and state[:-1] in positions:
+                    hint = f"write {states[len(positions) + positions.index(state[:-1])]}"
+                report.add((*path, "then", state), "unknown state", hint, at_key=True)
             elif report.formula((*path, "then", state), text, names) is not None:
                 texts[f"{name.rpartition('.')[0]}.then.{state}"] = text.strip()
     if section.stop is not None:
