@@ -21,7 +21,7 @@ from vibsim.experiment import Experiment
 from vibsim.experiment.schema.checks import ConservesCheck, Drift
 from vibsim.observe.energy_drift import drift_at
 from vibsim.observe.member_block import MemberBlock
-from vibsim.observe.thresholds import LEAST_SAMPLES
+from vibsim.observe.thresholds import LEAST_PERIODS, LEAST_SAMPLES
 
 FIELDS = {
     "drift": Field("how the energy error grows", np.int8, DRIFTS),
@@ -143,14 +143,20 @@ def describe(f: Found, check: ConservesCheck) -> Description:
     if math.isfinite(size):
         most = f"The error is at most {number(size, 4)} of the energy"
     sentence = f"The error of {name} {sentence}. {most}. {expects}"
-    return Description(sentence, _advice(f.reason, drift, check))
+    return Description(sentence, _advice(f, drift, check))
 
 
-def _advice(reason: str, drift: str, check: ConservesCheck) -> str:
-    if reason == "pre_asymptotic":
+def _advice(f: Found, drift: str, check: ConservesCheck) -> str:
+    if f.reason == "pre_asymptotic":
+        until = ""
+        if f.experiment.members == 1:
+            frequency = float(f.model.natural_frequency(f.experiment.model.parameters))
+            if frequency > 0.0:
+                least = LEAST_PERIODS * 2.0 * math.pi / frequency
+                until = f" (until t = {f.notation.number(least, 3)} here)"
         return (
             "Lengthen the run (`time: end`), or store more of it (`samples: all`). To show a drift takes at least four "
-            f"periods of the slowest small oscillation, and {LEAST_SAMPLES} stored samples."
+            f"periods of the slowest small oscillation{until}, and {LEAST_SAMPLES} stored samples."
         )
     other = "leave the check out (`checks:`)"
     if drift in EXPECTED_DRIFTS:

@@ -91,7 +91,12 @@ DIAGNOSES: Words = {
         "End the time interval (`time: end`) before t = {singular:4}, or check the formulas of `model:`. Finer levels "
         "will not help if the motion escapes or a formula has no finite value.",
     ),
-    "non_finite": (NOT_FINITE, START_FINER),
+    "non_finite": (
+        NOT_FINITE,
+        START_FINER
+        + " If a formula of `model:` has no finite value on the way, such as a force over a mass that "
+        "vanishes, finer levels will not help.",
+    ),
     "round_off": (
         "The differences of {what} have reached round-off, so they say nothing about the scheme{before_round_off}.",
         "{other_arithmetic}.",
