@@ -98,7 +98,7 @@ def put_formulas(
             "_dissipation": put(model.dissipation or "0.0"),
             "_driving": put(model.driving or "0.0"),
         }
-    parts = expression.parts_of(*(row for results in formulas.values() for row in results.values()))
+    parts = (part for rows in formulas.values() for part in expression.parts_of(*rows.values()))
     is_rare = is_rare or sum(isinstance(part, Call) for part in parts) > MOST_INLINE
     is_scaled = stepper.scaling is not None
     scaled = ("acceleration", "slopes") if is_scaled else ()

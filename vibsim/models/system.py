@@ -366,8 +366,7 @@ def written(
 ) -> Model:
     """Return the system of formulas, with declared parameters.
 
-    ExpressionError where a formula names something else than its field allows, or masses have no
-    inverse.
+    ExpressionError where a formula names something else than its field allows.
 
     Parameters
     ----------
