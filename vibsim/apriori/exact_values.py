@@ -9,8 +9,7 @@ import numpy as np
 from vibsim.core.array_types import Floats
 from vibsim.formula import values
 from vibsim.models import BUDGET, Model, tree
-from vibsim.models.base import Formula
-from vibsim.models.table import BEND, HEIGHT
+from vibsim.models.base import Formula, looked_up
 from vibsim.simulation.members import Members
 
 
@@ -36,9 +35,7 @@ def known_values(
     def of(formula: Formula) -> Floats:
         return np.broadcast_to(values(tree(model, formula), numbers), t.shape)
 
-    if model.lookup is not None:
-        place = of(model.lookup.place)
-        numbers |= zip((HEIGHT, BEND), model.lookup.table.read(place), strict=True)
+    numbers |= looked_up(model, numbers)
     if name in formulas:
         return of(formulas[name])
     if name in ("energy", "energy_deviation"):

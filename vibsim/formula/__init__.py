@@ -30,7 +30,6 @@ from vibsim.formula.tree import (
     parts_of,
     put,
     rebuilding,
-    rebuilt,
     replacing,
     walk,
 )
@@ -40,5 +39,5 @@ __all__ = [
     "Compare", "Expression", "ExpressionError", "Name", "Negate", "Number", "Pulses", "Switch",
     "bounds", "constant", "derivative", "evaluate", "first_jump", "has_rule", "held", "hidden_pulses", "integral",
     "is_multiple", "is_zero", "literal", "names_in", "parse", "parts_of",
-    "put", "rebuilding", "rebuilt", "replacing", "tidied", "to_formula", "to_statements", "values", "values_of", "walk",
+    "put", "rebuilding", "replacing", "tidied", "to_formula", "to_statements", "values", "values_of", "walk",
 ]  # fmt: skip

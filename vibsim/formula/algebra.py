@@ -21,7 +21,7 @@ from vibsim.formula.tree import (
     literal,
     names_in,
     number,
-    rebuilt,
+    rebuilding,
     replacing,
     walk,
 )
@@ -52,7 +52,7 @@ def tidied(node: Expression) -> Expression:
             return part
         return number(evaluate(part, {}))
 
-    return rebuilt(node, tidy)
+    return rebuilding(tidy)(node)
 
 
 def is_zero(node: Expression) -> bool:

@@ -240,11 +240,6 @@ def _with_operands(node: Expression, operands: tuple[Expression, ...]) -> Expres
     return node
 
 
-def rebuilt(node: Expression, change: Callable[[Expression], Expression]) -> Expression:
-    """Return a formula with `change` applied to every part, to operands before what uses them."""
-    return rebuilding(change)(node)
-
-
 def replacing(formulas: Mapping[str, Expression]) -> Callable[[Expression], Expression]:
     """Return what puts formulas in the places of names."""
     return rebuilding(

@@ -33,7 +33,7 @@ from vibsim.formula import (
     values,
 )
 from vibsim.models.events import Events
-from vibsim.models.table import Lookup
+from vibsim.models.table import BEND, HEIGHT, Lookup
 
 if TYPE_CHECKING:
     from vibsim.models.shared.scales import Scales
@@ -364,6 +364,19 @@ def parameter_names(model: Model) -> tuple[str, ...]:
 def natural_end(model: Model, periods: float, parameters: Numbers) -> Any:
     """Return the time that a number of natural periods (small oscillations) takes, as a number or an array."""
     return periods * (2.0 * math.pi / model.natural_frequency(parameters))
+
+
+def looked_up(
+    model: Model, numbers: Mapping[str, Any], before: Floats | None = None
+) -> dict[str, Floats]:
+    """Return what the table of a model says, by its names in formulas, in what `numbers` say of t and the parameters.
+
+    Nothing where the model looks none up; `before` is that of `Table.read`.
+    """
+    if model.lookup is None:
+        return {}
+    place = values(tree(model, model.lookup.place), numbers)
+    return dict(zip((HEIGHT, BEND), model.lookup.table.read(place, before), strict=True))
 
 
 def table_end(model: Model, parameters: Numbers) -> Any:

@@ -20,8 +20,8 @@ import numpy as np
 
 from vibsim.core.array_types import Floats
 from vibsim.formula import derivative, parse, values
-from vibsim.models import Model, table, tree
-from vibsim.models.base import Formula
+from vibsim.models import Model, tree
+from vibsim.models.base import Formula, looked_up
 
 WIDTH, HEIGHT = 320.0, 220.0
 WEIGHT = 0.45  # length of an arrow as long as the weight, over that of the wire
@@ -70,13 +70,7 @@ class Motion:
     def numbers(self) -> dict[str, Any]:
         """What a formula of the model may name."""
         found = {"t": self.t, **self.states, **self.parameters}
-        if self.model.lookup is not None:
-            place = np.broadcast_to(
-                values(tree(self.model, self.model.lookup.place), found), self.t.shape
-            )
-            read = self.model.lookup.table.read(place)
-            found |= zip((table.HEIGHT, table.BEND), read, strict=True)
-        return found
+        return found | looked_up(self.model, found)
 
     def has(self, name: str) -> bool:
         """Say whether the model has an output of this name."""
@@ -215,9 +209,9 @@ def _road(motion: Motion) -> Floats:
     lookup = motion.model.lookup
     if lookup is None:
         return motion.output("road_height")
-    row = lookup.table
-    places = row.first + row.spacing * np.arange(row.points)
-    return np.interp(motion.number("speed") * motion.t, places, row.heights)
+    table = lookup.table
+    places = table.first + table.spacing * np.arange(table.points)
+    return np.interp(motion.number("speed") * motion.t, places, table.heights)
 
 
 def bouncing_ball(motion: Motion) -> Scene:

@@ -27,6 +27,7 @@ from vibsim.formula import (
     values_of,
 )
 from vibsim.models import Model, tree
+from vibsim.models.base import looked_up
 from vibsim.models.table import BEND, HEIGHT
 from vibsim.simulation.reference.collocation import Force
 
@@ -107,12 +108,7 @@ class Sides:
             **dict(zip(self.model.velocities, v, strict=True)),
             "t": t,
         }
-        lookup = self.model.lookup
-        if lookup is None:
-            return numbers
-        place = values(tree(self.model, lookup.place), numbers)
-        height, bend = lookup.table.read(place, numbers[TABLE])
-        return {**numbers, HEIGHT: height, BEND: bend}
+        return numbers | looked_up(self.model, numbers, numbers.get(TABLE))
 
 
 @cache
