@@ -76,7 +76,7 @@ def test_a_number_of_all_members_names_the_branch_and_one_that_is_not_steady_ask
     data = {
         "title": "Two branches",
         "model": {"kind": "duffing", "delta": 0.1, "beta": 0.04, "gamma": 1.0, "omega": 1.0},
-        "time": {"periods": 8, "steps_per_period": 16, "frequency": "model.omega"},
+        "time": {"periods": 20, "steps_per_period": 16, "frequency": "model.omega"},
         "levels": [1, 2, 3],
         "schemes": ["rk4"],
         "checks": [
@@ -108,7 +108,7 @@ def test_each_branch_is_that_of_an_independent_continuation(branches: Any) -> No
 
     experiment, _, levels = branches
     omegas = list(experiment.sweep.axes[0].values[0])
-    last, before = (np.array(row) for row in continued(omegas, 40))
+    last, before = (np.array(row) for row in continued(omegas, 80))
     block = block_of(experiment, {level: Record.from_xarray(levels[level]) for level in (2, 3, 4)})
 
     def number(name: str) -> tuple[Any, Any]:
@@ -189,6 +189,50 @@ def test_amplitude_and_phase_of_a_linear_oscillator_converge_to_the_closed_form(
         errors.append([abs(row.value - amplitude) for row in verdict.results])
     rates = np.log2(np.array(errors[1:-1]) / np.array(errors[2:]))
     np.testing.assert_allclose(rates[-1], [2.0, 4.0], atol=0.1)
+
+
+@pytest.mark.parametrize("damping", [0.0, 0.05, 0.4])
+def test_the_bound_of_a_motion_that_is_not_steady_yet_reaches_the_steady_one(
+    damping: float,
+) -> None:
+    """What is left of the start after eight periods, at three frequencies, against the closed form."""
+    w = np.array([0.7, 1.4, 2.3])
+    experiment = Experiment.from_dict(
+        {
+            "title": "On its way",
+            "model": {
+                "kind": "oscillator",
+                "damping": {"linear": damping},
+                "force": "cos(omega*t)",
+                "parameters": {"omega": 1.0},
+            },
+            "initial": {"u": 0.3},
+            "time": {
+                "periods": 8,
+                "steps_per_period": 16,
+                "frequency": "model.parameters.omega",
+            },
+            "levels": [1, 2, 3],
+            "schemes": ["rk4"],
+            "sweep": {"model.parameters.omega": w.tolist()},
+            "checks": [
+                {"value": name, "quantity": "u", "above": -9, "at": {"level": "best"}}
+                for name in ("steady_amplitude", "steady_phase")
+            ],
+        }
+    )
+    levels = {level: simulate(experiment, level) for level in experiment.levels}
+    convergence = analyse(experiment, levels)
+    steady = 1.0 / (1.0 - w**2 + 1j * damping * w)
+    for number, exact, size in ((1, np.abs(steady), 1.0), (2, -np.angle(steady), np.abs(steady))):
+        value, bound = (
+            convergence[f"check_check_{number}_{name}"].values[0] for name in ("value", "error_bound")
+        )
+        off = np.abs(value - exact)
+        assert np.all(off <= bound)
+        # what is left of a start at distance |0.3 - steady| and its velocity
+        left = np.exp(-damping * 6 * np.pi / w) * 5.0 * (1.0 + np.abs(steady)) / size
+        assert np.all(bound <= left + 1e-4)
 
 
 @pytest.mark.parametrize(

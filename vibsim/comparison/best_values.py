@@ -19,15 +19,16 @@ from numpy.typing import NDArray
 from vibsim.apriori.formal_orders import even_powers, formal_orders
 from vibsim.comparison import value_numbers
 from vibsim.comparison.comparison_variables import Table
+from vibsim.comparison.extremum import WIDTH, largest_between_samples
 from vibsim.comparison.quantity_comparison import Compared
 from vibsim.comparison.thresholds import (
     IRREGULAR,
-    MISSED_EXTREMUM,
-    OF_A_CROSSING,
+    OF_A_LINE,
     OF_GRID,
     OF_PARABOLA,
 )
 from vibsim.convergence import gci
+from vibsim.convergence.differences import safe_ratio
 from vibsim.convergence.ladder_blocks import batches
 from vibsim.convergence.number_extrapolation import Limit, limit, observed_order
 from vibsim.convergence.thresholds import ORDER_ABOVE_ROUND_OFF
@@ -37,14 +38,19 @@ from vibsim.core.vocabulary import MEMBER
 from vibsim.experiment.value_names import VALUES
 from vibsim.models import Model
 from vibsim.models.events import Crossings, Impact
-from vibsim.observe import oscillation
+from vibsim.observe import oscillation, steady_state
 from vibsim.observe.member_block import MemberBlock
 from vibsim.schemes.orders import depends_on_velocity, is_autonomous
 
+_UPWARD = {"min": np.negative, "max": np.positive, "max_abs": np.abs}
+"""What turns an extremum of a series into its largest value."""
 OF_PEAK_TIMES = (
     "period", "period_error", "frequency", "error_of_frequency", "phase_error_per_period"
 )  # fmt: skip
 """Numbers that are worked out from the times of peaks, but for those of a recurrence."""
+
+
+OF_STEADY_STATE = ("steady_amplitude", "steady_phase")
 
 
 @dataclass(frozen=True)
@@ -104,16 +110,29 @@ def _ladder(name: str, place: value_numbers.Place) -> _Ladder:
         if row.measured_by == "roots" and oscillation.has_recurrence(block, place.levels[-1]):
             relative = relative / np.minimum(block.omega_dt, 1.0) ** 2
         floor = np.broadcast_to(relative * size[..., None], values.shape)
-    missed = block.unseen_at_corner(size)
+    missed, (order, even) = block.unseen_at_corner(size), _promised(name, place)
     if row.measured_by == "points":
-        missed = missed + _missed(name, place, values, floor, size)
+        off = _missed(name, place, values, floor, size)
+        smooth, off_smooth = _between_points(name, place, values)
+        # levels with the same number have the extremum at a common point, unless the series goes on beyond it
+        is_smooth = (off > 0.0) | (np.abs(smooth[..., -1] - values[..., -1]) > off_smooth)
+        is_smooth &= np.isfinite(off_smooth)
+        values = np.where(is_smooth[..., None], smooth, values)
+        missed = missed + np.where(is_smooth, off_smooth, off)
+        order = np.where(is_smooth, order, np.minimum(order, OF_GRID))
+        even = even & is_smooth
     if name in OF_PEAK_TIMES:
         missed = missed + _off_between_points(place) * size
+    if name in OF_STEADY_STATE:
+        left = steady_state.distance(block, place.levels[-1], place.quantity)
+        if name == "steady_phase":
+            left = safe_ratio(left, steady_state.amplitude(block, place.levels[-1], place.quantity))
+        missed = missed + left
     safety = np.full(size.shape, 1.0 if block.model.events is None else IRREGULAR)
     if row.needs_events:
         # an event on the mesh is late by an accident
         safety = np.where(np.isnan(block.left_to_the_mesh), safety, np.nan)
-    return _Ladder(place.levels, values, *_promised(name, place), floor, size, missed, safety)
+    return _Ladder(place.levels, values, order, even, floor, size, missed, safety)
 
 
 def _stacked(rows: Sequence[_Ladder]) -> _Ladder:
@@ -142,10 +161,31 @@ def _missed(
             start, slope = (np.asarray(data[q][..., 0]) for q in (place.quantity, speed))
             at_start = np.abs(values[..., -1] - start) <= near[..., -1]
             same &= ~(at_start & (slope > 0.0 if name == "max" else slope < 0.0))
-    part = MISSED_EXTREMUM * p**2
+    part = OF_A_LINE * p**2
     if isinstance(model.events, Impact | Crossings):
         part = np.where(place.block.eventless, part, p)
     return np.where(same, 0.0, part * size)
+
+
+def _between_points(name: str, place: value_numbers.Place, values: Floats) -> tuple[Floats, Floats]:
+    """Return an extremum of smooth motions at every level, and how far it may be off at the finest one.
+
+    Shapes (scheme, case, level) and (scheme, case). The bound is NaN where there is no series, or events break it. A
+    level with too few samples keeps its value over the grid points.
+    """
+    block, q = place.block, place.quantity
+    found, off = values.copy(), np.full(values.shape, np.nan)
+    for i, record in enumerate(block.records[level] for level in place.levels):
+        if q in record and np.shape(record[q])[-1] >= WIDTH:
+            series = _UPWARD[name](np.asarray(record[q], dtype=np.float64))
+            largest, error = largest_between_samples(series.reshape(-1, series.shape[-1]))
+            sign = -1.0 if name == "min" else 1.0
+            found[..., i] = sign * largest.reshape(block.shape)
+            off[..., i] = error.reshape(block.shape)
+    if isinstance(block.model.events, Impact | Crossings):
+        off[~block.eventless] = np.nan
+    # the limit is made of the level before the finest, too
+    return found, np.where(np.isnan(off[..., -1]), np.nan, np.fmax.reduce(off[..., -2:], axis=-1))
 
 
 def _off_between_points(place: value_numbers.Place) -> Floats:
@@ -164,7 +204,7 @@ def _off_between_points(place: value_numbers.Place) -> Floats:
     dt = block.group.end / block.grid.steps[-1]
     with np.errstate(invalid="ignore", divide="ignore"):
         rate = block.decay + 2.0 * np.pi / period
-        off = rate * OF_A_CROSSING * dt**2
+        off = rate * OF_A_LINE * dt**2
         return np.asarray(2.0 * off / (count * period))
 
 
@@ -178,7 +218,7 @@ def _promised(name: str, place: value_numbers.Place) -> tuple[Floats, Flags]:
     even = even_powers(experiment, quantity, block.columns)
     if VALUES[name].measured_by == "parabola":
         order, even = np.minimum(order, OF_PARABOLA), np.zeros_like(even)
-    elif VALUES[name].measured_by == "points" or name == "relative_energy_error":
+    elif name == "relative_energy_error":
         order, even = np.minimum(order, OF_GRID), np.zeros_like(even)
     return np.broadcast_to(order, block.shape), np.broadcast_to(even, block.shape)
 

@@ -33,10 +33,8 @@ THEORY_ROUNDING = 1e-12  # an error of the theory that is no larger is rounding 
 # Order of a peak that is interpolated by a parabola: its next term vanishes (docs/decisions.md). [derived]
 OF_PARABOLA = 3.0
 OF_GRID = 2.0  # order of an extremum over the points of the grid [derived]
-# An extremum lies half a step from the next grid point at most: the part of w^2 dt^2 that is missed. [derived]
-MISSED_EXTREMUM = 0.125
 # A straight line between two points is off by this part of dt^2 times the second derivative, at most. [derived]
-OF_A_CROSSING = 0.125
+OF_A_LINE = 0.125
 
 # ---- Extrapolated members
 

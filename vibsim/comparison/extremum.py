@@ -1,0 +1,85 @@
+"""The largest value of a smooth function between its samples, by the polynomials through those around a crest."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.polynomial import polynomial
+
+from vibsim.core.array_types import Flags, Floats, Integers
+
+WIDTH, NARROW = 7, 5
+"""Samples that the polynomial goes through, and those of a narrower one, whose distance from it is the error bound."""
+SMOOTH = 0.25
+"""Fifth differences over third ones, below which a function has no corner: that of w dt = 1/2. [derived]"""
+_SIDE = WIDTH // 2
+_NEWTON_STEPS = 4
+
+
+def largest_between_samples(series: Floats) -> tuple[Floats, Floats]:
+    """Return the largest value of functions, and a bound of its error, shape (m,).
+
+    Parameters
+    ----------
+    series
+        At least `WIDTH` samples at equal distances, shape (m, t). NaN where one is not finite.
+    """
+    known = np.asarray(np.isfinite(series).all(axis=-1))
+    series = np.where(known[:, None], series, 0.0)
+    row, place = np.nonzero(_is_crest(series))
+    centre = np.clip(place, _SIDE, series.shape[-1] - 1 - _SIDE)
+    around = series[row[:, None], centre[:, None] + np.arange(-_SIDE, _SIDE + 1)]
+    sample, top = series[row, place], np.max(series, axis=-1)
+    # at a corner a function is half of a second difference above the straight line
+    beyond = 0.5 * _largest_difference(around, 2)
+    may = sample + beyond >= top[row]
+    value, error = _highest(around[may], (place - centre)[may])
+    value = np.minimum(value, (sample + beyond)[may])
+    largest, bound = top, np.zeros(top.shape)
+    np.maximum.at(largest, row[may], value)
+    np.maximum.at(bound, row[may], error)
+    return np.where(known, largest, np.nan), np.where(known, bound, np.nan)
+
+
+def _largest_difference(samples: Floats, order: int) -> Floats:
+    """Return the largest difference of an order, in size, of every row."""
+    return np.asarray(np.max(np.abs(np.diff(samples, order, axis=-1)), axis=-1))
+
+
+def _is_crest(series: Floats) -> Flags:
+    """Mark samples that are above the one before, and not below the one behind."""
+    rises = np.diff(series, axis=-1) > 0.0
+    before = np.pad(rises, ((0, 0), (1, 0)), constant_values=True)
+    behind = np.pad(~rises, ((0, 0), (0, 1)), constant_values=True)
+    return np.asarray(before & behind)
+
+
+def _highest(samples: Floats, crest: Integers) -> tuple[Floats, Floats]:
+    """Return the highest value within one unit of the crests, and how far it may be off.
+
+    That is the distance from the narrower polynomial, where differences fall with their order; else a third difference,
+    as far as a polynomial is from a function with a corner. The samples, of shape (m, WIDTH), have the places -3 to 3,
+    of which `crest` is one.
+    """
+    shift = np.clip(crest, -1, 1)
+    low, high = np.maximum(crest - 1, -_SIDE), np.minimum(crest + 1, _SIDE)
+    wide = _through(samples)
+    first = shift + (WIDTH - NARROW) // 2
+    narrow = _through(np.take_along_axis(samples, first[:, None] + np.arange(NARROW), axis=-1))
+    slope, bend = polynomial.polyder(wide), polynomial.polyder(wide, 2)
+    x = crest.astype(np.float64)
+    for _ in range(_NEWTON_STEPS):
+        s, b = (polynomial.polyval(x, of, tensor=False) for of in (slope, bend))
+        x = np.clip(x - np.divide(s, b, out=np.zeros_like(s), where=b < 0.0), low, high)
+    value, other = (
+        np.asarray(polynomial.polyval(at, of, tensor=False), dtype=np.float64)
+        for at, of in ((x, wide), (x - shift, narrow))
+    )
+    third, fifth = (_largest_difference(samples, order) for order in (3, 5))
+    return value, np.where(fifth < SMOOTH * third, np.abs(value - other), third)
+
+
+def _through(samples: Floats) -> Floats:
+    """Return the coefficients of the polynomials through samples at whole places about 0, lowest power first."""
+    side = samples.shape[-1] // 2
+    places = np.arange(-side, side + 1, dtype=np.float64)
+    return np.linalg.solve(np.vander(places, increasing=True), samples.T)
