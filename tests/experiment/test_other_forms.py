@@ -168,6 +168,13 @@ def test_what_is_no_equation_of_one_coordinate_is_refused(equation: str, rule: s
     assert rule in caught.value.rule
 
 
+def test_an_unknown_name_of_an_equation_is_told_the_nearest_or_where_its_value_belongs() -> None:
+    for name, hint in (("gama", "did you mean 'gamma'?"), ("c", "give its value in `parameters`")):
+        with pytest.raises(ExpressionError) as caught:
+            solved(f"u'' + {name}*u' = 0", ["t", "gamma"])
+        assert caught.value.hint == hint
+
+
 @pytest.mark.parametrize(
     ("text", "told"),
     [

@@ -226,7 +226,8 @@ def test_the_bound_of_a_motion_that_is_not_steady_yet_reaches_the_steady_one(
     steady = 1.0 / (1.0 - w**2 + 1j * damping * w)
     for number, exact, size in ((1, np.abs(steady), 1.0), (2, -np.angle(steady), np.abs(steady))):
         value, bound = (
-            convergence[f"check_check_{number}_{name}"].values[0] for name in ("value", "error_bound")
+            convergence[f"check_check_{number}_{name}"].values[0]
+            for name in ("value", "error_bound")
         )
         off = np.abs(value - exact)
         assert np.all(off <= bound)
