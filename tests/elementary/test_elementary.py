@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from elementary_arguments import EXACT, arguments, error, exact
+from elementary_arguments import EXACT, arguments, errors
 from thinned import thinned
 
 from vibsim import formula
@@ -145,7 +145,7 @@ def worst(name, n):
     rows = zip(*map(np.ndarray.tolist, columns), strict=True)
     rows = [row for row in rows if all(math.isfinite(x) and x != 0.0 for x in row)]
     full = ELEMENTARY[name].full
-    return max((error(full(*row), exact(name, row)), row) for row in rows)
+    return max(zip(errors(name, rows, [full(*row) for row in rows]), rows, strict=True))
 
 
 @pytest.mark.parametrize("name", thinned(EXACT, 2))
