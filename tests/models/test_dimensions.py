@@ -6,7 +6,7 @@ from fractions import Fraction
 
 import pytest
 
-from vibsim.formula import Name, names_in, parse, to_formula
+from vibsim.formula import Name, parse, to_formula
 from vibsim.models.shared.linear_scales import DimensionError, over_scales, powers
 
 KNOWN = {"u": (0, 1, 0), "v": (0, 1, -1), "t": (0, 0, 1)}
@@ -15,7 +15,7 @@ NAMES = ("k", "b", "A", "B", "w", "n", "t0", "a")
 
 def found(*texts):
     trees = tuple(parse(text, (*KNOWN, *NAMES)) for text in texts)
-    names = tuple(name for name in NAMES if any(name in names_in(tree) for tree in trees))
+    names = tuple(name for name in NAMES if any(name in tree.names for tree in trees))
     return powers(trees, KNOWN, names)
 
 

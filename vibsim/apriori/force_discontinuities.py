@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from vibsim.core.array_types import Flags, Floats, Integers
 from vibsim.core.record import Record, Variable
 from vibsim.core.vocabulary import MEMBER
-from vibsim.formula import Name, Switch, names_in, to_formula
+from vibsim.formula import Name, Switch, to_formula
 from vibsim.models import Model
 from vibsim.models.events import Friction
 from vibsim.simulation.members import Members
@@ -89,7 +89,7 @@ def _is_left_to_steps(model: Model, switch: Switch) -> bool:
 def words_of(model: Model, index: int) -> str:
     """Say what happens at a corner: which quantity passes which value."""
     switch = switches_of(model)[index]
-    if any(name.startswith("_") for name in names_in(switch.quantity)):
+    if any(name.startswith("_") for name in switch.quantity.names):
         return "a condition in the formula of the force changes"
     if switch.quantity == Name(model.velocity):
         return f"the velocity {model.velocity} passes zero"
@@ -212,7 +212,7 @@ def _of_time(held: Sides) -> list[bool]:
     moved = {state.name for state in held.model.states}
     found = []
     for row in held.switches:
-        found.append(moved.isdisjoint(names_in(row.quantity)))
+        found.append(moved.isdisjoint(row.quantity.names))
         if not found[-1]:
             moved.add(row.mode)
     return found

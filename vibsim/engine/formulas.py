@@ -113,7 +113,7 @@ def put_energy_with(module: Module, model: Model) -> None:
     """
     potential = tree(model, model.potential_energy)
     line = "kinetic = kinetic_energy(u, v, t, p)"
-    if set(model.velocities) & set(expression.names_in(potential)):
+    if set(model.velocities) & set(potential.names):
         line = "kinetic, potential = energies(u, v, t, p)"
     module.define("energy_with(u, v, t, p, potential)", line, "return kinetic + potential")
 
@@ -182,7 +182,7 @@ def put_functions(
 
 def _looking_up(module: Module, model: Model, formulas: Iterable[Expression]) -> list[str]:
     """Return what a function does first whose formulas look a table up; nothing where they do not."""
-    used = {name for formula in formulas for name in expression.names_in(formula)}
+    used = {name for formula in formulas for name in formula.names}
     if model.lookup is None or not used & {HEIGHT, BEND}:
         return []
     collect(module, looked_up, "looked_up", {})

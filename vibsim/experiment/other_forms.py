@@ -29,7 +29,6 @@ from vibsim.formula import (
     Negate,
     derivative,
     is_zero,
-    names_in,
     parse,
     put,
     tidied,
@@ -204,7 +203,7 @@ def solved(equation: str, others: Sequence[str]) -> tuple[str, str]:
     texts = [_DERIVATIVE.sub(named, side) for side in sides]
     words = set(re.findall(r"[A-Za-z_]\w*", " ".join(texts))) - {*FUNCTIONS, *CONSTANTS}
     left, right = (parse(text, words) for text in texts)
-    for other in (*names_in(left), *names_in(right)):
+    for other in (*left.names, *right.names):
         if other not in (name, velocity, _SECOND, *others):
             hint = nearest(other, list(others))
             if not hint.startswith("did you mean"):
@@ -213,7 +212,7 @@ def solved(equation: str, others: Sequence[str]) -> tuple[str, str]:
     factor, rest = ZERO, ZERO
     for term in (*_terms(left), *_terms(Negate(right))):
         slope = derivative(term, _SECOND)
-        if _SECOND in names_in(slope):
+        if _SECOND in slope.names:
             raise ExpressionError(equation, 0, f"must be linear in {name}''")
         without = tidied(put(term, _SECOND, ZERO))
         factor = factor + slope

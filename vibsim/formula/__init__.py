@@ -26,7 +26,6 @@ from vibsim.formula.tree import (
     Negate,
     Number,
     literal,
-    names_in,
     parts_of,
     put,
     rebuilding,
@@ -38,6 +37,6 @@ __all__ = [
     "CONSTANTS", "FUNCTIONS", "MAX_CHARACTERS", "MAX_DEPTH", "ONE", "ZERO", "Binary", "Call",
     "Compare", "Expression", "ExpressionError", "Name", "Negate", "Number", "Pulses", "Switch",
     "bounds", "constant", "derivative", "evaluate", "first_jump", "has_rule", "held", "hidden_pulses", "integral",
-    "is_multiple", "is_zero", "literal", "names_in", "parse", "parts_of",
+    "is_multiple", "is_zero", "literal", "parse", "parts_of",
     "put", "rebuilding", "replacing", "tidied", "to_formula", "to_statements", "values", "values_of", "walk",
 ]  # fmt: skip

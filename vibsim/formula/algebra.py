@@ -19,7 +19,6 @@ from vibsim.formula.tree import (
     Negate,
     Number,
     literal,
-    names_in,
     number,
     rebuilding,
     replacing,
@@ -48,7 +47,7 @@ def tidied(node: Expression) -> Expression:
     def tidy(part: Expression) -> Expression:
         if isinstance(part, Binary) and part.operator in _OPERATIONS:
             part = _OPERATIONS[part.operator](part.left, part.right)
-        if names_in(part) or isinstance(part, Number):
+        if part.names or isinstance(part, Number):
             return part
         return number(evaluate(part, {}))
 
@@ -82,7 +81,7 @@ def is_multiple(node: Expression, slope: Expression, name: str) -> bool:
 
     # the derivative does not tell of a jump
     jumps = (part for part in walk(node) if is_jump(part))
-    varies = name in names_in(slope) or any(name in names_in(part) for part in jumps)
+    varies = name in slope.names or any(name in part.names for part in jumps)
     return not varies and vanishes(node)
 
 
@@ -105,15 +104,15 @@ def slope_of(node: Expression, name: str, *, with_start: bool = True) -> Express
         case Negate(operand):
             found = inner(operand)
             return None if found is None else Negate(found)
-        case Binary("+" | "-", left, right) if with_start and name not in names_in(right):
+        case Binary("+" | "-", left, right) if with_start and name not in right.names:
             return inner(left)
-        case Binary("+" | "-" as symbol, left, right) if with_start and name not in names_in(left):
+        case Binary("+" | "-" as symbol, left, right) if with_start and name not in left.names:
             found = inner(right)
             return Negate(found) if found is not None and symbol == "-" else found
-        case Binary("*", left, right) if name not in names_in(left):
+        case Binary("*", left, right) if name not in left.names:
             found = inner(right)
             return None if found is None else left * found
-        case Binary("*" | "/" as symbol, left, right) if name not in names_in(right):
+        case Binary("*" | "/" as symbol, left, right) if name not in right.names:
             found = inner(left)
             return None if found is None else _OPERATIONS[symbol](found, right)
     return None

@@ -28,7 +28,6 @@ from vibsim.formula.tree import (
     Negate,
     Number,
     literal,
-    names_in,
     number,
     paired,
     put,
@@ -102,7 +101,7 @@ def _found(node: Expression, name: str) -> Expression | None:
     """Return the integral by the rules; None where they give none."""
 
     def is_free(part: Expression) -> bool:
-        return name not in names_in(part)
+        return name not in part.names
 
     if is_free(node):
         return Binary("*", node, Name(name))
@@ -152,7 +151,7 @@ def _of_power(node: Expression, base: Expression, power: float, name: str) -> Ex
             return _of_linear("max(x, 0)**n/n", x, node, name, n=n) if power > 0.0 else None
     # a spring between two coordinates; the powers of u - 1 are left to points, whose sum does not cancel
     start = put(base, name, ZERO)
-    is_spring = bool(names_in(start)) or values(start, {}) == 0.0
+    is_spring = bool(start.names) or values(start, {}) == 0.0
     if power < 1.0 or not power.is_integer() or not is_spring:
         return None
     return _of_linear("x**n/n", base, node, name, n=n)
@@ -171,7 +170,7 @@ def _of_function(
     if len(others) != 1:
         return None
     (y,) = others
-    are_free = [name not in names_in(argument) for argument in arguments]
+    are_free = [name not in argument.names for argument in arguments]
     if function == "mod" and are_free[1]:
         return _of_linear(MOD, x, node, name, period=y)
     # with the name in one of them alone, the slopes of their difference cannot cancel
@@ -206,7 +205,7 @@ def _of_part(node: Expression, condition: Expression, side: float, name: str) ->
             return None
     inside = sum(isinstance(part, Compare | Call) for part in walk(node))
     rate = slope_of(difference, name) or ZERO
-    slope = math.nan if names_in(rate) else float(values(rate, {}))
+    slope = math.nan if rate.names else float(values(rate, {}))
     whole = _found(node, name) if inside <= MAX_CONDITIONS else None
     if slope == 0.0 or not math.isfinite(slope) or whole is None:
         return None
@@ -235,7 +234,7 @@ def _over_slope(
     if slope is None:
         return None
     quotient, constant = Binary("/", found, slope), Binary("*", node, Name(name))
-    if names_in(slope):
+    if slope.names:
         return Call("where", (Compare("==", slope, ZERO), constant, quotient))
     return quotient if values(slope, {}) != 0.0 else constant
 
@@ -263,13 +262,13 @@ def _has_poles(node: Expression, name: str) -> bool:
     def may(part: Expression) -> bool:
         match part:
             case Binary("/", _, below):
-                return name in names_in(below)
+                return name in below.names
             case Binary("**", base, exponent):
                 power = literal(exponent)
                 is_entire = power is not None and power >= 0.0 and power.is_integer()
-                return name in names_in(base) and not is_entire
+                return name in base.names and not is_entire
             case Call(function, _):
-                return function in POLES and name in names_in(part)
+                return function in POLES and name in part.names
         return False
 
     return any(may(part) for part in walk(node))

@@ -37,7 +37,6 @@ from vibsim.formula.tree import (
     Negate,
     Number,
     folded,
-    names_in,
     rebuilding,
     walk,
 )
@@ -97,7 +96,7 @@ def hidden_pulses(formula: Expression, numbers: Mapping[str, Floats], t: Floats)
     """
     cases, count = len(t), t.shape[1] - 1
     time, width = np.full(cases, np.nan), np.full(cases, np.nan)
-    if "t" not in names_in(formula) or count < 1:
+    if "t" not in formula.names or count < 1:
         return Pulses(time, width)
     # gaps between successive times, flat over members
     flat = {name: np.broadcast_to(x, (cases, count)).ravel() for name, x in numbers.items()}

@@ -264,11 +264,6 @@ def walk(node: Expression) -> Iterator[Expression]:
             waiting += reversed(part.operands)
 
 
-def names_in(formula: Expression) -> KeysView[str]:
-    """Return the names that a formula uses, in the order of their first use."""
-    return formula.names
-
-
 def paired(terms: Sequence[Expression], join: Callable[..., Expression]) -> Expression:
     """Return terms joined in pairs, so that the tree stays flat."""
     while len(terms) > 1:

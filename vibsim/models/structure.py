@@ -34,7 +34,6 @@ from vibsim.formula import (
     Name,
     Negate,
     derivative,
-    names_in,
     parse,
     put,
     values,
@@ -196,20 +195,20 @@ def harmonics(load: Expression) -> tuple[Harmonic, ...] | None:
 
 
 def _harmonic(term: Expression) -> Harmonic | None:
-    if "t" not in names_in(term):
+    if "t" not in term.names:
         return Harmonic(term, ZERO, ZERO)
     match term:
         case Negate(operand):
             inner, factor = _harmonic(operand), parse("-1", ())
-        case Binary("*", left, right) if "t" not in names_in(left):
+        case Binary("*", left, right) if "t" not in left.names:
             inner, factor = _harmonic(right), left
-        case Binary("*", left, right) if "t" not in names_in(right):
+        case Binary("*", left, right) if "t" not in right.names:
             inner, factor = _harmonic(left), right
-        case Binary("/", left, right) if "t" not in names_in(right):
+        case Binary("/", left, right) if "t" not in right.names:
             inner, factor = _harmonic(left), ONE / right
         case Call("cos" | "sin" as name, (angle,)):
             angular = derivative(angle, "t")
-            if "t" in names_in(angular):
+            if "t" in angular.names:
                 return None
             phase = put(angle, "t", ZERO)
             if name == "sin":
@@ -247,7 +246,7 @@ class Loaded:
     @property
     def is_driven(self) -> bool:
         """Whether a load varies in time."""
-        return any(load == _TABULATED or "t" in names_in(load) for load in self.loads)
+        return any(load == _TABULATED or "t" in load.names for load in self.loads)
 
     @property
     def rounding(self) -> float:

@@ -42,7 +42,6 @@ from vibsim.formula import (
     derivative,
     has_rule,
     integral,
-    names_in,
     parse,
     put,
     replacing,
@@ -255,11 +254,11 @@ class Written:
             return paired(terms, operator.add)
         moving, total, forces = {*self.velocities, "t", HEIGHT}, [], []
         for whole in self.forces:
-            still = (term for term in terms_of(whole) if moving.isdisjoint(names_in(term)))
+            still = (term for term in terms_of(whole) if moving.isdisjoint(term.names))
             forces.append(sum(still, ZERO))
         for i, (name, force) in enumerate(zip(self.coordinates, forces, strict=True)):
             for later in self.coordinates[i + 1 :]:
-                if later in names_in(force):
+                if later in force.names:
                     force = put(force, later, ZERO)
             if not has_rule(force, name):
                 return ZERO
@@ -282,7 +281,7 @@ class Written:
 
     def is_constant(self, node: Expression) -> bool:
         """Tell whether a formula names parameters alone."""
-        return {*self.states, "t", HEIGHT}.isdisjoint(names_in(node))
+        return {*self.states, "t", HEIGHT}.isdisjoint(node.names)
 
     def vanishes(self, terms: Any) -> bool:
         """Tell whether a sum is 0 wherever it has a value, and that it has one somewhere."""
@@ -393,7 +392,7 @@ def system(
     is_conservative = motion is None and own.vanishes(own.powers)
     if not is_conservative:
         power: Expression = paired(own.powers, operator.add) if own.powers else ZERO
-        drives = bool({"t", HEIGHT} & set(names_in(power)))
+        drives = bool({"t", HEIGHT} & set(power.names))
         more = {"driving": power} if drives else {"dissipation": -power}
     if motion is not None:
         more |= {"exact": motion.exact, "start": motion.start}
@@ -438,13 +437,13 @@ def system(
 def _is_linear(own: Written) -> bool:
     """Tell whether the acceleration of the only coordinate is a number times it, beside what does not name it."""
     (a,), (u,) = own.accelerations, own.coordinates
-    jumps = (part for part in walk(a) if is_jump(part) and u in names_in(part))
+    jumps = (part for part in walk(a) if is_jump(part) and u in part.names)
     return not any(jumps) and own.is_constant(derivative(a, u))
 
 
 def _has_constant_slopes(own: Written) -> bool:
     """Tell whether the accelerations are linear in all states, with constant coefficients."""
-    slopes = (derivative(a, s) for a in own.accelerations for s in own.states if s in names_in(a))
+    slopes = (derivative(a, s) for a in own.accelerations for s in own.states if s in a.names)
     jumps = (part for a in own.accelerations for part in walk(a) if is_jump(part))
     return all(map(own.is_constant, (*slopes, *jumps)))
 
@@ -452,7 +451,7 @@ def _has_constant_slopes(own: Written) -> bool:
 def _damping(own: Written) -> Damping | None:
     """Return the damping of the only coordinate, where it is linear or quadratic with a constant rate."""
     (a,), (v,) = own.accelerations, own.velocities
-    force = reduce(operator.sub, (term for term in terms_of(a) if v in names_in(term)), ZERO)
+    force = reduce(operator.sub, (term for term in terms_of(a) if v in term.names), ZERO)
     found = damping_of(force, v) if force != ZERO else None
     return Damping(*found) if found is not None and own.is_constant(found[1]) else None
 

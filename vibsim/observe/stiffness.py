@@ -19,7 +19,7 @@ import numpy as np
 
 from vibsim.core.array_types import Floats
 from vibsim.core.record import Record
-from vibsim.formula import derivative, names_in, values
+from vibsim.formula import derivative, values
 from vibsim.models.base import Formula, Model, tree
 from vibsim.observe.common_grid import Grid, take
 from vibsim.observe.thresholds import A_WHILE
@@ -74,7 +74,7 @@ def stiffest(motion: Motion) -> Floats:
 def is_damped(model: Model) -> bool:
     """Tell whether the force depends on velocities."""
     velocities = set(model.velocities)
-    return any(not velocities.isdisjoint(names_in(tree(model, row))) for row in model.accelerations)
+    return any(not velocities.isdisjoint(tree(model, row).names) for row in model.accelerations)
 
 
 def decay_rate(motion: Motion) -> Floats:

@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING
 
 from vibsim.experiment.cost import PLAIN_MEMBER_STEPS, Load, analysis_disk
 from vibsim.experiment.storage import is_bounded
-from vibsim.formula import names_in
 from vibsim.formula.jumps import held
 from vibsim.models import has_solution, tree
 
@@ -89,7 +88,7 @@ def gaps(experiment: Experiment, loads: Sequence[Load]) -> int:
     """Return between how many points of the finest level the force of all members is looked at for a pulse."""
     model = experiment.model.definition
     forces = () if model.loaded is not None else (tree(model, row) for row in model.accelerations)
-    is_driven = any("t" in names_in(force) for force in forces)
+    is_driven = any("t" in force.names for force in forces)
     return min(experiment.members * loads[-1].steps, MOST_GAPS) if is_driven else 0
 
 

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from functools import cache
 from typing import Any, Literal
 
-from vibsim.formula import names_in
 from vibsim.models.base import BUDGET, Model, tree
 from vibsim.models.events import Friction
 
@@ -38,7 +37,7 @@ def _named(model: Model) -> frozenset[str]:
     """Return what the acceleration names; between events, where there are some."""
     events = model.events
     smooth = (events.drive,) if isinstance(events, Friction) else model.accelerations
-    return frozenset(name for formula in smooth for name in names_in(tree(model, formula)))
+    return frozenset(name for formula in smooth for name in tree(model, formula).names)
 
 
 @dataclass(frozen=True)
@@ -108,7 +107,7 @@ def _of_quantities(orders: Orders, model: Model) -> tuple[Mapping[str, float], f
     of_both = min(position, orders.velocity)
     moving = set(model.velocities)
     outputs = {
-        row.name: position if moving.isdisjoint(names_in(tree(model, row.formula))) else of_both
+        row.name: position if moving.isdisjoint(tree(model, row.formula).names) else of_both
         for row in model.outputs
     }
     return {

@@ -27,7 +27,6 @@ from vibsim.formula import (
     Negate,
     Number,
     literal,
-    names_in,
     walk,
 )
 from vibsim.models.base import Model, tree
@@ -45,7 +44,7 @@ def restoring(model: Model) -> Expression:
     states = {state.name for state in model.states}
 
     def is_constant(node: Expression) -> bool:
-        return states.isdisjoint(names_in(node))
+        return states.isdisjoint(node.names)
 
     def reduced(node: Expression) -> Expression:
         match node:
@@ -85,7 +84,7 @@ def is_rational(node: Expression) -> bool:
 @cache
 def _symbol(model: Model, letter: str, k: int) -> str:
     """Return ``letter_k``, with the letter as often as it takes to be no name of the model: ``cc_0`` beside a c_0."""
-    taken = names_in(restoring(model))
+    taken = restoring(model).names
     while any(name.startswith(f"{letter}_") for name in taken):
         letter += letter[0]
     return f"{letter}_{k}"
@@ -94,7 +93,7 @@ def _symbol(model: Model, letter: str, k: int) -> str:
 def _names(model: Model, degree: int) -> tuple[str, ...]:
     """Name everything that a residual may depend on, but dt."""
     states = {state.name for state in model.states}
-    own = [name for name in names_in(restoring(model)) if name not in states and name != "t"]
+    own = [name for name in restoring(model).names if name not in states and name != "t"]
     of_solution = (_symbol(model, _COEFFICIENTS, k) for k in range(degree + 1))
     return ("t", *of_solution, *own, _symbol(model, _FREQUENCY, 0))
 

@@ -15,7 +15,7 @@ from vibsim.core.errors import nearest
 from vibsim.experiment.faults import Report
 from vibsim.experiment.rules.members import MemberNumbers
 from vibsim.experiment.schema.sweep import Axis
-from vibsim.formula import Expression, names_in, values
+from vibsim.formula import Expression, values
 from vibsim.models import Model, tree
 from vibsim.models.shared.free import why_not_free
 
@@ -55,7 +55,7 @@ def check_equation(model: Model, numbers: MemberNumbers, report: Report) -> None
         report.add(KEY, "needs a steady state to start from, which a free linear motion has not")
         return
     forces = [tree(model, formula) for formula in model.accelerations]
-    if not any("t" in names_in(force) for force in forces):
+    if not any("t" in force.names for force in forces):
         return
     for own, end in numbers.some(numbers.count):
         if not np.isfinite(end):

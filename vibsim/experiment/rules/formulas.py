@@ -27,7 +27,6 @@ from vibsim.formula import (
     evaluate,
     is_multiple,
     is_zero,
-    names_in,
     parse,
     values,
     walk,
@@ -265,7 +264,7 @@ def _check_positive(
         field_, *names = key.split(".")
         if field_ == row.name and len(set(names)) == 1:
             formula = parse(text, (*row.names, *declared))
-            if not set(names_in(formula)).issubset(declared):
+            if not set(formula.names).issubset(declared):
                 continue
             value = float(values(formula, declared))
             if not 0.0 < value < np.inf:
@@ -288,15 +287,15 @@ def is_sound(
     read_tree = report.formula(path, text, (*row.names, *known), more, hint)
     if read_tree is None:
         return False
-    if row.terms and not is_zero(read_tree) and set(row.names).isdisjoint(names_in(read_tree)):
+    if row.terms and not is_zero(read_tree) and set(row.names).isdisjoint(read_tree.names):
         rule = f"does not depend on {row.names[0]}: it is a constant force, and no {row.name}"
         report.add(path, rule, f"write ({text})*{row.names[0]}", text)
         return False
     try:
         for part in walk(read_tree):
-            if not names_in(part):
+            if not part.names:
                 evaluate(part, {})
-            if isinstance(part, Binary) and part.operator == "/" and not names_in(part.right):
+            if isinstance(part, Binary) and part.operator == "/" and not part.right.names:
                 # u/0, which is no constant
                 evaluate(Binary("/", ONE, part.right), {})
     except ExpressionError as error:

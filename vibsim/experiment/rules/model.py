@@ -19,7 +19,6 @@ from vibsim.experiment.schema.fields import AT, DECLARED, Section
 from vibsim.formula import (
     ExpressionError,
     derivative,
-    names_in,
     parts_of,
 )
 from vibsim.models import FormulaField, Model, tree
@@ -190,7 +189,7 @@ def _check_length(model: Model) -> None:
     slopes = [
         derivative(formula, name)
         for formula in accelerations
-        for name in names_in(formula)
+        for name in formula.names
         if name in states
     ]
     energies = [tree(model, formula) for formula in (model.kinetic_energy, model.potential_energy)]

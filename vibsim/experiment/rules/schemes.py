@@ -13,7 +13,6 @@ from vibsim.experiment.rules.formulas import MOST_NAMED
 from vibsim.experiment.schema.checks import SOLUTIONS
 from vibsim.experiment.schema.model_and_schemes import TOLERANCE
 from vibsim.experiment.schema.sweep import tolerance_name
-from vibsim.formula import names_in
 from vibsim.models import MODELS, Model, tree
 from vibsim.schemes import FIXED_STEP, Scheme
 from vibsim.schemes.base import EVENTS, MOST_UNKNOWNS, VECTOR
@@ -116,7 +115,7 @@ def _check_forces(method: Scheme, i: int, model: Model, report: Report) -> None:
 
 def _velocities(model: Model) -> str:
     """Name the velocities on which the acceleration depends."""
-    named = {name for row in model.accelerations for name in names_in(tree(model, row))}
+    named = {name for row in model.accelerations for name in tree(model, row).names}
     found = [name for name in model.velocities if name in named] or [model.velocity]
     return ", ".join(found if len(found) < MOST_NAMED else [*found[: MOST_NAMED - 1], "..."])
 

@@ -16,7 +16,6 @@ from vibsim.formula import (
     Compare,
     Expression,
     ExpressionError,
-    names_in,
     parse,
     to_formula,
 )
@@ -115,4 +114,4 @@ def written(texts: Mapping[str, str]) -> dict[str, Any]:
 
 def is_constant(guard: Expression, states: tuple[str, ...]) -> bool:
     """Tell whether a guard depends on no state and not on the time."""
-    return set(names_in(guard)).isdisjoint((*states, "t"))
+    return set(guard.names).isdisjoint((*states, "t"))

@@ -12,7 +12,7 @@ from functools import cache
 import numpy as np
 
 from vibsim.core.array_types import Floats
-from vibsim.formula import ZERO, derivative, names_in, put, values
+from vibsim.formula import ZERO, derivative, put, values
 from vibsim.models.base import Model, Numbers, tree
 
 
@@ -40,10 +40,10 @@ def why_not_free(model: Model) -> str:
     if not model.linear:
         return "is nonlinear"
     force = tree(model, model.acceleration)
-    if "t" in names_in(force):
+    if "t" in force.names:
         return "has a force that depends on time"
     is_linear = model.damping is not None and model.damping.kind == "linear"
-    if model.velocity in names_in(force) and not is_linear:
+    if model.velocity in force.names and not is_linear:
         return "has a damping that is not linear"
     return ""
 

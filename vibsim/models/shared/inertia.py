@@ -21,7 +21,6 @@ from vibsim.formula import (
     Name,
     Number,
     derivative,
-    names_in,
     parse,
     tidied,
 )
@@ -46,7 +45,7 @@ class Inertia:
     @cached_property
     def is_plain(self) -> bool:
         """Whether every coordinate has a mass of its own, which depends on no position."""
-        named = {name for entry in self.entries.values() for name in names_in(entry)}
+        named = {name for entry in self.entries.values() for name in entry.names}
         return all(i == j for i, j in self.entries) and named.isdisjoint(self.positions)
 
     @cached_property
@@ -121,7 +120,7 @@ class Inertia:
             (i, j, k): tidied(derivative(mass, name))
             for (i, j), mass in self.entries.items()
             for k, name in enumerate(self.positions)
-            if name in names_in(mass)
+            if name in mass.names
         }
         return {place: slope for place, slope in found.items() if slope != ZERO}
 

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from vibsim.core.array_types import Complexes, Floats
-from vibsim.formula import Binary, Call, Expression, Negate, derivative, literal, names_in, values
+from vibsim.formula import Binary, Call, Expression, Negate, derivative, literal, values
 from vibsim.models.base import Numbers, State
 
 Term = tuple[Any, Any]
@@ -94,7 +94,7 @@ def exponentials(node: Expression, numbers: Mapping[str, Any]) -> list[Term]:
 
     ValueError where the formula is no such sum (see `is_sum_of_exponentials`).
     """
-    if "t" not in names_in(node):
+    if "t" not in node.names:
         return [(values(node, numbers) + 0j, 0j)]
     match node:
         case Negate(operand):
@@ -104,7 +104,7 @@ def exponentials(node: Expression, numbers: Mapping[str, Any]) -> list[Term]:
             return [*exponentials(left, numbers), *rest]
         case Binary("*", left, right):
             return _product(exponentials(left, numbers), exponentials(right, numbers))
-        case Binary("/", left, right) if "t" not in names_in(right):
+        case Binary("/", left, right) if "t" not in right.names:
             divisor = values(right, numbers)
             return [(c / divisor, s) for c, s in exponentials(left, numbers)]
         case Binary("**", base, exponent) if _is_small_power(exponent):
@@ -130,7 +130,7 @@ def _product(one: list[Term], other: list[Term]) -> list[Term]:
 
 def _of_function(function: str, argument: Expression, numbers: Mapping[str, Any]) -> list[Term]:
     speed = derivative(argument, "t")
-    if "t" in names_in(speed):
+    if "t" in speed.names:
         raise ValueError("no sum of exponentials")
     start = values(argument, {**numbers, "t": 0.0})
     rate = values(speed, numbers)
@@ -146,7 +146,7 @@ def _of_function(function: str, argument: Expression, numbers: Mapping[str, Any]
 
 def is_sum_of_exponentials(node: Expression) -> bool:
     """Tell whether `exponentials` can write a formula, whatever the values of its other names."""
-    others = {name: 0.5 for name in names_in(node) if name != "t"}
+    others = {name: 0.5 for name in node.names if name != "t"}
     try:
         exponentials(node, others)
     except ValueError:

@@ -33,7 +33,6 @@ from vibsim.formula import (
     derivative,
     is_zero,
     literal,
-    names_in,
     parse,
     put,
     tidied,
@@ -99,7 +98,7 @@ def with_scaled_run(
     parameters have; those of the others follow from the forces.
     """
     known = {forces.position: (0, 1, 0), forces.velocity: (0, 1, -1), "t": (0, 0, 1), **given}
-    known |= dict.fromkeys(names_in(forces.mass), (1, 0, 0))
+    known |= dict.fromkeys(forces.mass.names, (1, 0, 0))
     terms = tuple(
         term for term in (forces.spring, forces.damping, forces.force) if not is_zero(term)
     )
@@ -121,7 +120,7 @@ def with_scaled_run(
 
 def _exactly(forces: Forces, scales: Scales) -> dict[str, Formula]:
     """Return what the scales make 1, or -1, and should not come out of a quotient with a rounding error."""
-    found: dict[str, Formula] = dict.fromkeys(names_in(forces.mass), ONE)
+    found: dict[str, Formula] = dict.fromkeys(forces.mass.names, ONE)
     stiffness = stiffness_at_rest(forces)
     if stiffness is None or scales.time != _time_scale(forces.mass, stiffness):
         return found
@@ -146,13 +145,13 @@ def amplitude_and_frequency(force: Expression) -> tuple[Expression, Expression] 
                 parts[:0] = [left, right]
             case Negate(operand):
                 parts[:0] = [operand]
-            case _ if "t" not in names_in(part):
+            case _ if "t" not in part.names:
                 amplitude *= part
             case Call("sin" | "cos", (argument,)) if frequency is None:
                 frequency = derivative(argument, "t")
             case _:
                 return None
-    return None if frequency is None or "t" in names_in(frequency) else (amplitude, frequency)
+    return None if frequency is None or "t" in frequency.names else (amplitude, frequency)
 
 
 def _size(node: Expression) -> Expression:

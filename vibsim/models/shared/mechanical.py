@@ -28,7 +28,6 @@ from vibsim.formula import (
     integral,
     is_multiple,
     is_zero,
-    names_in,
     values,
 )
 from vibsim.models.base import Damping, Formula, Model, Numbers, Parameter, State
@@ -198,7 +197,7 @@ def damping_of(
     if factors.count(speed) != 1 or factors.count(size) != 1:
         return None
     rest = [factor for factor in factors if factor not in (speed, size)]
-    if any(velocity in names_in(factor) for factor in rest):
+    if any(velocity in factor.names for factor in rest):
         return None
     return "quadratic", math.prod(rest, start=ONE)
 

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from vibsim.formula import Expression, Name, names_in, parse, replacing, to_formula, values
+from vibsim.formula import Expression, Name, parse, replacing, to_formula, values
 from vibsim.models.base import Formula, Model, Numbers, parameter_names
 
 T_C, X_C = Name("@t"), Name("@x")
@@ -140,7 +140,7 @@ def _tree(model: Model, formula: Formula) -> Expression:
 
 def _value(model: Model, formula: Formula, numbers: Numbers) -> Any:
     node = _tree(model, formula)
-    shape = np.broadcast_shapes(*(np.shape(numbers[name]) for name in names_in(node)))
+    shape = np.broadcast_shapes(*(np.shape(numbers[name]) for name in node.names))
     return np.broadcast_to(values(node, numbers), shape)
 
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 import re
 
 from vibsim import theory
-from vibsim.formula import Binary, Expression, Name, Negate, literal, names_in, parse
+from vibsim.formula import Binary, Expression, Name, Negate, literal, parse
 from vibsim.report.choice import has_swept_options
 from vibsim.report.tables.table import Cell, Column, Table
 from vibsim.report.types import Experiment
@@ -109,9 +109,9 @@ def is_polynomial(node: Expression) -> bool:
         case Binary("**", base, exponent):
             power = literal(exponent)
             is_whole = power is not None and power >= 0.0 and power.is_integer()
-            return "t" not in names_in(node) or (is_whole and is_polynomial(base))
+            return "t" not in node.names or (is_whole and is_polynomial(base))
         case Binary("/", left, right):
-            return "t" not in names_in(right) and is_polynomial(left)
+            return "t" not in right.names and is_polynomial(left)
         case Binary(_, left, right):
             return is_polynomial(left) and is_polynomial(right)
-    return node == Name("t") or "t" not in names_in(node)
+    return node == Name("t") or "t" not in node.names

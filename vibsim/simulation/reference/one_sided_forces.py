@@ -22,7 +22,6 @@ from vibsim.formula import (
     Switch,
     held,
     hidden_pulses,
-    names_in,
     values,
     values_of,
 )
@@ -55,9 +54,7 @@ class Sides:
         """Which switches look at the time alone; a change of a mode is no motion."""
         moving = {state.name for state in self.model.states} | {BEND}
         return tuple(
-            k
-            for k, switch in enumerate(self.switches)
-            if moving.isdisjoint(names_in(switch.quantity))
+            k for k, switch in enumerate(self.switches) if moving.isdisjoint(switch.quantity.names)
         )
 
     def borders(self, modes: Floats) -> tuple[Floats, Floats]:
@@ -131,7 +128,7 @@ def sides(model: Model, parameters: Mapping[str, Floats]) -> Sides:
 
 def varies_in_time(model: Model) -> bool:
     """Tell whether the force of a model depends on time otherwise than by a table."""
-    return any("t" in names_in(tree(model, row)) for row in model.forces)
+    return any("t" in tree(model, row).names for row in model.forces)
 
 
 def pulses_of_force(
