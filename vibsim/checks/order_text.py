@@ -48,6 +48,7 @@ ON_TABLE = (
     "or a whole fraction of it."
 )
 
+UNSEEN = " No exact solution is known, so convergence to a wrong answer would go unnoticed."
 NOT_FINITE = "The calculation of {what} produced a number that is not finite{place}."
 PROMISED_LESS = " Scheme {scheme} promises no more than order {promised} here"
 NO_SYMMETRY = "Try other `initial:` values or another `time: end`, where nothing cancels by symmetry{or_expect}."
@@ -378,7 +379,7 @@ class _Phrases(OrderContext):
     def unseen(self) -> str:
         if self.has_exact:
             return ""
-        return " No exact solution is known, so convergence to a wrong answer would go unnoticed."
+        return UNSEEN
 
     def first_good(self) -> int:
         """Return the coarsest level that is stable, or from which on none met a number that is not finite."""

@@ -8,6 +8,7 @@ from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 
 from vibsim.checks.order_context import COINCIDE
+from vibsim.checks.order_text import UNSEEN
 from vibsim.convergence import LadderVerdict
 from vibsim.core.record import Record
 from vibsim.report import data, words
@@ -89,7 +90,6 @@ TRUSTED = (
 )
 ROUGH = "The rescaled differences of the levels do not coincide yet, so the estimate of the error is rough."
 BESIDE = " The true error is known here, and the estimate is within {part} % of it."
-UNSEEN = " No exact solution is known, so convergence to a wrong answer would go unnoticed."
 
 
 def title(experiment: Experiment, record: Record, lead: Lead, printed: Collection[str]) -> str:
