@@ -116,7 +116,9 @@ def _ladder(name: str, place: value_numbers.Place) -> _Ladder:
         smooth, off_smooth = _between_points(name, place, values)
         # levels with the same number have the extremum at a common point, unless the series goes on beyond it
         is_smooth = (off > 0.0) | (np.abs(smooth[..., -1] - values[..., -1]) > off_smooth)
-        is_smooth &= np.isfinite(off_smooth)
+        is_smooth = np.where(_is_struck(block), off_smooth < off, is_smooth) & np.isfinite(
+            off_smooth
+        )
         values = np.where(is_smooth[..., None], smooth, values)
         missed = missed + np.where(is_smooth, off_smooth, off)
         order = np.where(is_smooth, order, np.minimum(order, OF_GRID))
@@ -141,6 +143,11 @@ def _stacked(rows: Sequence[_Ladder]) -> _Ladder:
     return _Ladder(rows[0].levels, *(np.stack([getattr(r, name) for r in rows]) for name in names))
 
 
+def _is_struck(block: MemberBlock) -> Flags:
+    """Mark members whose velocity events change, shape (scheme, case)."""
+    return np.logical_not(block.eventless) & isinstance(block.model.events, Impact | Crossings)
+
+
 def _missed(
     name: str, place: value_numbers.Place, values: Floats, floor: Floats, size: Floats
 ) -> Floats:
@@ -161,17 +168,15 @@ def _missed(
             start, slope = (np.asarray(data[q][..., 0]) for q in (place.quantity, speed))
             at_start = np.abs(values[..., -1] - start) <= near[..., -1]
             same &= ~(at_start & (slope > 0.0 if name == "max" else slope < 0.0))
-    part = OF_A_LINE * p**2
-    if isinstance(model.events, Impact | Crossings):
-        part = np.where(place.block.eventless, part, p)
+    part = np.where(_is_struck(place.block), p, OF_A_LINE * p**2)
     return np.where(same, 0.0, part * size)
 
 
 def _between_points(name: str, place: value_numbers.Place, values: Floats) -> tuple[Floats, Floats]:
-    """Return an extremum of smooth motions at every level, and how far it may be off at the finest one.
+    """Return an extremum between the grid points at every level, and how far it may be off at the finest one.
 
-    Shapes (scheme, case, level) and (scheme, case). The bound is NaN where there is no series, or events break it. A
-    level with too few samples keeps its value over the grid points.
+    Shapes (scheme, case, level) and (scheme, case). The bound is NaN where there is no series. A level with too few
+    samples keeps its value over the grid points.
     """
     block, q = place.block, place.quantity
     found, off = values.copy(), np.full(values.shape, np.nan)
@@ -182,8 +187,6 @@ def _between_points(name: str, place: value_numbers.Place, values: Floats) -> tu
             sign = -1.0 if name == "min" else 1.0
             found[..., i] = sign * largest.reshape(block.shape)
             off[..., i] = error.reshape(block.shape)
-    if isinstance(block.model.events, Impact | Crossings):
-        off[~block.eventless] = np.nan
     # the limit is made of the level before the finest, too
     return found, np.where(np.isnan(off[..., -1]), np.nan, np.fmax.reduce(off[..., -2:], axis=-1))
 
