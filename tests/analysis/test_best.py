@@ -125,14 +125,14 @@ def test_extrema_of_a_motion_driven_faster_than_it_swings_are_within_their_bound
     ],
 )
 def test_the_largest_value_between_samples(function, end) -> None:
-    """Against samples a thousand times as dense, from all places within a step."""
+    """Against samples two hundred times as dense, from all places within a step."""
     for step in (0.15, 0.04):
         starts = np.linspace(0.0, step, 9)[:, None]
         count = int(end / step)
         largest, bound = largest_between_samples(function(starts + step * np.arange(count)))
-        dense = step * np.linspace(0.0, count - 1.0, 1000 * (count - 1) + 1)
+        dense = step * np.linspace(0.0, count - 1.0, 200 * (count - 1) + 1)
         exact = np.max(function(starts + dense), axis=-1)
-        assert np.all(np.abs(largest - exact) <= bound + 1e-6 * step**2)
+        assert np.all(np.abs(largest - exact) <= bound + 1e-5 * step**2)
         assert np.all(bound <= 2.0 * step**4)
 
 

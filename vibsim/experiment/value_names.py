@@ -109,8 +109,10 @@ _MARKS: Mapping[str, Mapping[str, Any]] = {
 _TABLE = """\
 end | series | quantity | anywhere best sample | value at the last time, or at `t` or `step`
 at | series | quantity | anywhere best time sample survives | value at the time `t` or after `step` steps
-min | stored | quantity | best points | smallest value over every step; of an output, over the stored times
-max | stored | quantity | best points | largest value over every step; of an output, over the stored times
+min | stored | quantity | best points | smallest value over every step; of an output, over the stored times; \
+at best, between them
+max | stored | quantity | best points | largest value over every step; of an output, over the stored times; \
+at best, between them
 max_abs | extremal | quantity | best points | largest absolute value over every step
 max_abs_interior | deviation | quantity | | the same without the last point
 max_abs_ratio | extremal | none | pair fixed_step | largest absolute value over every step, over that of the \
