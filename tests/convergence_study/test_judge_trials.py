@@ -158,11 +158,62 @@ def test_bounds_hold_of_printed_numbers(limit: float, digits: int, order: int) -
     assert "last digit" not in unprinted.sentence
 
 
-@pytest.mark.parametrize("value", [0.0, 1.0, 0.25, 0.3, 0.0625, 1.0 / 3.0])
+@pytest.mark.parametrize("value", [0.0, 1.0, 0.25, 65.0, 0.0625, 1.0 / 3.0])
 def test_equal_levels_that_may_be_exact_are_not_taken_for_printed_numbers(value: float) -> None:
     verdict = judge(H, [value] * 4)
     assert verdict.error_bound is not None
-    assert verdict.error_bound <= 4e-16
+    assert verdict.error_bound <= 4e-16 * max(value, 1.0) * 4
+
+
+@pytest.mark.parametrize(
+    ("levels", "exact", "within"),
+    [
+        ([1.68] * 3, 1.6804941, 0.0051),  # Simpson's rule, printed with three digits
+        ([0.3] * 3, 0.34, 0.051),
+        ([215.0, 215.0, 214.0, 214.0, 214.0], 214.4, 3.0),  # counted
+        ([335.0] * 3, 334.527, 0.51),
+        (
+            [176804.0, 109774.0, 93022.0, 88835.0, 87788.0],
+            87439.52,
+            1.1,
+        ),  # rounded to whole numbers
+        ([8.0379364312, 8.2336581816, 8.2336581816, 8.2336581816], 8.2352, 0.6),  # of grid points
+    ],
+)
+def test_values_that_come_in_steps_are_no_better_than_a_step(
+    levels: list[float], exact: float, within: float
+) -> None:
+    h = [0.5**k for k in range(len(levels))]
+    verdict = judge(h, levels)
+    assert verdict.best is not None
+    assert verdict.best_bound is not None
+    assert abs(verdict.best - exact) <= verdict.best_bound <= within
+    assert judge(h, levels, exact=exact).reason != "wrong_limit"
+
+
+def test_a_field_of_three_decimals_is_exact_to_these() -> None:
+    fields = [np.round(np.cos(2.0 * np.linspace(0.0, 1.0, n)), 3) for n in (11, 21, 41)]
+    verdict = judge([0.1, 0.05, 0.025], fields)
+    assert verdict.error_bound == pytest.approx(5e-4)
+
+
+@pytest.mark.parametrize("order", [None, 2.0 / 3.0])
+def test_differences_that_grow_decide_nothing(order: float | None) -> None:
+    """Of h^(2/3) and h^(4/3) with opposite signs, as beside a corner: a power 1/2 beside another fits them, too."""
+    n = [24, 32, 48, 96, 128, 192]
+    values = [1.0 + 0.04324188 * (24 / k) ** (2 / 3) - 0.03568779 * (24 / k) ** (4 / 3) for k in n]
+    verdict = judge([1 / k for k in n], values, order=order)
+    assert (verdict.status, verdict.reason) == ("INCONCLUSIVE", "pre_asymptotic")
+    assert verdict.error_bound is None
+
+
+def test_stated_noise_misses_an_exact_value_no_more_often_than_it_differs() -> None:
+    """Three levels of normal noise about it: one in 200 is further away."""
+    rng, missed = np.random.default_rng(4), 0
+    for _ in range(400):
+        found = judge([0.4, 0.2, 0.1], 1.0 + 1e-3 * rng.normal(size=3), exact=1.0, noise=1e-3)
+        missed += found.reason == "wrong_limit"
+    assert missed <= 6
 
 
 def test_averages_of_cells_taken_for_points_are_told_of_in_a_pass() -> None:

@@ -15,6 +15,8 @@ A power *dominates* where no other one has more than a tenth of it. The table of
 | errors that change their sign from level to level are | INCONCLUSIVE ``oscillating`` |
 | anything else | INCONCLUSIVE ``pre_asymptotic`` |
 
+Nothing is decided on an order where the measured one is below half of the least of an expansion.
+
 *Surely* is a probability above ``1 - RISK``. Where it rests on three levels and coarser ones do not fit them, it is one
 above ``1 - RISK_OF_THREE`` for a FAIL, and for a PASS that no exact solution confirms: three levels may fall like a
 power by accident. *Was measured*: the order of the finest levels is nearer to the expected one than to the next order
@@ -207,7 +209,8 @@ def _evaluate(ladder: Ladder, question: Question, left_out: float) -> _Evaluatio
     exact = _is_only_noise(ladder, question.noise_factor)
     away = np.zeros_like(exact)
     if ladder.exact_known:
-        noise = question.noise_factor * ladder.floor[:, -1]
+        # the noise of one level is less than that of a difference by the root of 2
+        noise = np.sqrt(2.0) * question.noise_factor * ladder.floor[:, -1]
         away = exact & (np.sqrt(ladder.gram[:, -1, -1]) > noise)
     cut_short = _is_cut_short(ladder, believed)
     return _Evaluation(question, believed, of_sides, exact, away, ladder.exact_known, cut_short)
@@ -298,7 +301,9 @@ def _reasons(found: _Evaluation, missed: Flags) -> Codes:
     """Return the reasons of the verdicts, as positions in `REASON_NAMES`; see the head of this module."""
     p, (lower, right, higher) = found.posterior, found.sides
     risk = np.where(found.by_three, RISK_OF_THREE, RISK)
-    another = (lower + higher > 1.0 - risk) & (right < risk) & ~found.cut_short
+    # expansions begin with the order 1/2, whatever two powers fit levels that do not approach each other
+    may_decide = ~found.cut_short & ~(found.order < LEAST_WITH_LIMIT)
+    another = (lower + higher > 1.0 - risk) & (right < risk) & may_decide
     if np.any(another):
         another &= most_near_a_power(p) > DEFINITE
     cases = [
@@ -307,7 +312,7 @@ def _reasons(found: _Evaluation, missed: Flags) -> Codes:
         (
             (right > 1.0 - (RISK if found.is_confirmed else risk))
             & found.question.is_met_by(found.order)
-            & ~found.cut_short,
+            & may_decide,
             "asymptotic",
         ),
         (another & (lower > higher), "order_low"),

@@ -20,6 +20,8 @@ FEW_DIGITS = 11
 """Values with no more decimal digits than these were rounded to them: those of a calculation have 15 and more."""
 BINARY = 2.0**20
 """Multiples of its inverse that are whole have few digits anyway: 0.125, 3 or 65 may be results as they are."""
+COUNTED = 100.0
+"""Whole numbers of this size are taken to be counted, or rounded to whole ones."""
 SAMPLED = 64
 """Values of a level whose digits are counted."""
 
@@ -52,7 +54,8 @@ def half_last_digit(values: Floats, few: int = FEW_DIGITS) -> float:
     It is how far each of them is from what it was before it was printed or stored with these digits; else 0.
     """
     sampled = values[:, :: -(-values.shape[1] // SAMPLED)]
-    size = Decimal(repr(float(np.max(np.abs(sampled))))).adjusted()
+    largest = float(np.max(np.abs(sampled)))
+    size = Decimal(repr(largest)).adjusted()
     last = size
     for value in sampled[::-1].flat:
         number = Decimal(repr(float(value))).normalize()
@@ -62,7 +65,22 @@ def half_last_digit(values: Floats, few: int = FEW_DIGITS) -> float:
             return 0.0
     with np.errstate(over="ignore"):
         is_binary = np.all(sampled * BINARY == np.rint(sampled * BINARY))
-    return 0.0 if is_binary else float(Decimal(5).scaleb(last - 1))
+        is_whole = np.all(sampled == np.rint(sampled))
+    if is_binary and not (is_whole and largest >= COUNTED):
+        return 0.0
+    return float(Decimal(5).scaleb(min(last, 0) - 1 if is_whole else last - 1))
+
+
+def step_of_values(values: Floats) -> float:
+    """Return the least difference of successive levels where some are the same to the last bit and others differ.
+
+    Then values come in steps, such as a largest value over grid points, and are off by as much. Shape (n, points); 0
+    where no two are the same, or all.
+    """
+    sizes = np.max(np.abs(np.diff(values, axis=0)), axis=1)
+    return (
+        float(np.min(sizes[sizes > 0.0])) if np.any(sizes > 0.0) and np.any(sizes == 0.0) else 0.0
+    )
 
 
 def measurement(

@@ -8,7 +8,12 @@ import numpy as np
 
 from vibsim.convergence.assessment import DECIDED, Assessment, Question, assess
 from vibsim.convergence.differences import orders_of_steps
-from vibsim.convergence.study.measurement import Measurement, half_last_digit, measurement
+from vibsim.convergence.study.measurement import (
+    Measurement,
+    half_last_digit,
+    measurement,
+    step_of_values,
+)
 from vibsim.convergence.thresholds import (
     LEAST_WITH_LIMIT,
     MISSED,
@@ -21,8 +26,7 @@ from vibsim.core.vocabulary import REASON_NAMES
 FEWEST = 3
 """Levels that show an order."""
 MOST_ROUNDED = 5e-4
-"""Levels that are all the same may be exact where half of their last digit is a larger part: of up to three digits.
-Exact values of more than three digits may be rounded to them."""
+"""Exact values of more than three digits may be rounded to them: half of their last digit is a smaller part."""
 EXACT_DIGITS = 16
 """Exact values with no more decimal digits than these may be rounded to them: whoever writes them down stops there."""
 SEEN = 0.1
@@ -213,15 +217,14 @@ def _decide(
     if np.isfinite(weights).all():
         # added up one by one, so that a member has the same digits alone and among others
         one.best = sum((w * row for w, row in zip(weights, part, strict=True)), 0.0 * part[0])
-        one.rounded = half_last_digit(part) * float(np.sum(np.abs(weights)))
+        unit = max(half_last_digit(part), step_of_values(part))
+        one.rounded = unit * float(np.sum(np.abs(weights)))
     bound_of_best = float(decided.best_bound[k]) * scale
     if one.reason == "wrong_limit" and one.rounded and one.best is not None and truth is not None:
         away = float(np.max(np.abs(_distances(one.best[None], truth, one.is_number, scale))))
         if away <= MISSED * bound_of_best + one.rounded:
             # the exact values, with so many digits, may be what was printed
             one.reason = "round_off"
-    if one.reason == "exact" and one.rounded > MOST_ROUNDED * one.size:
-        one.rounded = 0.0
     one.best_bound = bound_of_best + one.rounded
     if one.exact_known:
         return
