@@ -151,6 +151,16 @@ def test_a_crest_where_a_slope_or_a_curvature_jumps_is_within_its_bound(
     assert np.all(bound <= 2.1 * max(fall, 1.0) * step**power)
 
 
+def test_a_scheme_that_chooses_its_steps_has_no_best_extremum() -> None:
+    """It has no levels that could tell its error."""
+    schemes = ["central", {"kind": "dop853", "tolerance": 1e-6}]
+    _, record = analysed(**(PENDULUM | {"schemes": schemes}))
+    for name in ("theta_max", "omega_min", "wire_force_max"):
+        for what in (f"{name}_richardson", f"{name}_richardson_error"):
+            assert np.isfinite(record[what][0]).all()
+            assert np.isnan(record[what][1]).all(), what
+
+
 def test_numbers_of_the_spring() -> None:
     """Against cos(w t) and -w sin(w t)."""
     w = 2 * math.pi

@@ -112,15 +112,8 @@ def _ladder(name: str, place: value_numbers.Place) -> _Ladder:
         floor = np.broadcast_to(relative * size[..., None], values.shape)
     missed, (order, even) = block.unseen_at_corner(size), _promised(name, place)
     if row.measured_by == "points":
-        off = _missed(name, place, values, floor, size)
-        smooth, off_smooth = _between_points(name, place, values)
-        # levels with the same number have the extremum at a common point, unless the series goes on beyond it
-        is_smooth = (off > 0.0) | (np.abs(smooth[..., -1] - values[..., -1]) > off_smooth)
-        is_smooth = np.where(_is_struck(block), off_smooth < off, is_smooth) & np.isfinite(
-            off_smooth
-        )
-        values = np.where(is_smooth[..., None], smooth, values)
-        missed = missed + np.where(is_smooth, off_smooth, off)
+        values, off, is_smooth = _extrema(name, place, values, floor, size)
+        missed = missed + off
         order = np.where(is_smooth, order, np.minimum(order, OF_GRID))
         even = even & is_smooth
     if name in OF_PEAK_TIMES:
@@ -141,6 +134,23 @@ def _stacked(rows: Sequence[_Ladder]) -> _Ladder:
     """Return ladders of the same levels as one, along a new first axis."""
     names = ("values", "order", "even", "floor", "size", "missed", "safety")
     return _Ladder(rows[0].levels, *(np.stack([getattr(r, name) for r in rows]) for name in names))
+
+
+def _extrema(
+    name: str, place: value_numbers.Place, values: Floats, floor: Floats, size: Floats
+) -> tuple[Floats, Floats, Flags]:
+    """Return an extremum at every level, how far it is off at the finest one, and where it is that of a smooth motion.
+
+    Elsewhere it stays that over grid points: without a series, near a velocity that events change, and where levels
+    with the same number have met it, which the series does not pass.
+    """
+    off = _missed(name, place, values, floor, size)
+    smooth, off_smooth = _between_points(name, place, values)
+    is_smooth = (off > 0.0) | (np.abs(smooth[..., -1] - values[..., -1]) > off_smooth)
+    is_smooth = np.where(_is_struck(place.block), off_smooth < off, is_smooth)
+    is_smooth = is_smooth & np.isfinite(off_smooth) & ~place.block.adaptive[:, None]
+    values = np.where(is_smooth[..., None], smooth, values)
+    return values, np.where(is_smooth, off_smooth, off), is_smooth
 
 
 def _is_struck(block: MemberBlock) -> Flags:
