@@ -99,7 +99,7 @@ def distance(block: MemberBlock, level: int, quantity: str) -> Floats:
 
     What is left of the start changes by a complex factor z in each period. From the last change c it then keeps
     ``c z/(z - 1)``; without damping, as much as at the start. The larger one of the last two such estimates is taken
-    `REST_SAFETY` times. NaN where there are fewer than four periods.
+    `REST_SAFETY` times. NaN where there are fewer than four periods, or if it is infinite.
     """
     rows = [harmonic(block, level, quantity, back) for back in range(4)]
     changes = [now - before for now, before in itertools.pairwise(rows)]
@@ -108,4 +108,5 @@ def distance(block: MemberBlock, level: int, quantity: str) -> Floats:
             np.where(last == 0.0, 0.0, np.abs(last / (1.0 - before / last)))
             for last, before in itertools.pairwise(changes)
         ]
-    return np.asarray(REST_SAFETY * np.maximum(*left))
+    bound = REST_SAFETY * np.maximum(*left)
+    return np.where(np.isfinite(bound), bound, np.nan)

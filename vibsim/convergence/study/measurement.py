@@ -22,6 +22,8 @@ BINARY = 2.0**20
 """Multiples of its inverse that are whole have few digits anyway: 0.125, 3 or 65 may be results as they are."""
 COUNTED = 100.0
 """Whole numbers of this size are taken to be counted, or rounded to whole ones."""
+IN_STEPS = 4
+"""So many of the finest levels show whether values come in steps; coarser ones may be the same because all blew up."""
 SAMPLED = 64
 """Values of a level whose digits are counted."""
 
@@ -72,15 +74,14 @@ def half_last_digit(values: Floats, few: int = FEW_DIGITS) -> float:
 
 
 def step_of_values(values: Floats) -> float:
-    """Return the least difference of successive levels where some are the same to the last bit and others differ.
+    """Return the least difference of the finest levels where two are the same to the last bit and others differ.
 
     Then values come in steps, such as a largest value over grid points, and are off by as much. Shape (n, points); 0
-    where no two are the same, or all.
+    where no two of the finest `IN_STEPS` are the same, or all.
     """
-    sizes = np.max(np.abs(np.diff(values, axis=0)), axis=1)
-    return (
-        float(np.min(sizes[sizes > 0.0])) if np.any(sizes > 0.0) and np.any(sizes == 0.0) else 0.0
-    )
+    sizes = np.max(np.abs(np.diff(values[-IN_STEPS:], axis=0)), axis=1)
+    differ = sizes > 0.0
+    return 0.0 if np.all(differ) or not np.any(differ) else float(np.min(sizes[differ]))
 
 
 def measurement(
