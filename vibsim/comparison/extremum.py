@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import math
+from functools import cache
+
 import numpy as np
 from numpy.polynomial import polynomial
 
@@ -80,6 +83,16 @@ def _highest(samples: Floats, crest: Integers) -> tuple[Floats, Floats]:
 
 def _through(samples: Floats) -> Floats:
     """Return the coefficients of the polynomials through samples at whole places about 0, lowest power first."""
-    side = samples.shape[-1] // 2
-    places = np.arange(-side, side + 1, dtype=np.float64)
-    return np.linalg.solve(np.vander(places, increasing=True), samples.T)
+    terms = zip(_lagrange(samples.shape[-1]), samples.T, strict=True)
+    # added up one by one: a solver of linear equations has other bits on other machines
+    return sum((basis[:, None] * row for basis, row in terms), np.zeros((1, 1)))
+
+
+@cache
+def _lagrange(count: int) -> list[Floats]:
+    """Return Lagrange's polynomials of whole places about 0; those of their integer roots are exact."""
+    places = range(-(count // 2), count // 2 + 1)
+    others = {i: [j for j in places if j != i] for i in places}
+    return [
+        polynomial.polyfromroots(others[i]) / math.prod(i - j for j in others[i]) for i in places
+    ]
