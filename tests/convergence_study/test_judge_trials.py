@@ -162,7 +162,7 @@ def test_bounds_hold_of_printed_numbers(limit: float, digits: int, order: int) -
 def test_equal_levels_that_may_be_exact_are_not_taken_for_printed_numbers(value: float) -> None:
     verdict = judge(H, [value] * 4)
     assert verdict.error_bound is not None
-    assert verdict.error_bound <= 4e-16 * max(value, 1.0) * 4
+    assert verdict.error_bound <= 4e-16 * max(value, 1.0)
 
 
 @pytest.mark.parametrize(

@@ -48,9 +48,8 @@ OF_PEAK_TIMES = (
     "period", "period_error", "frequency", "error_of_frequency", "phase_error_per_period"
 )  # fmt: skip
 """Numbers that are worked out from the times of peaks, but for those of a recurrence."""
-
-
 OF_STEADY_STATE = ("steady_amplitude", "steady_phase")
+"""Numbers that mean the motion that is left when what began with it has died out."""
 
 
 @dataclass(frozen=True)

@@ -80,6 +80,8 @@ class Question:
     """How far from `expected`, or below `at_least`, an order may be."""
     noise_factor: float = NOISE_FACTOR
     """Noise may be so many times `Ladder.floor` where levels are said to differ by nothing else."""
+    limit_factor: float | None = None
+    """The same of the finest level and the exact solution, if it is another number."""
     by_theory: bool = False
     """Whether theory promises the order that is expected."""
 
@@ -209,9 +211,8 @@ def _evaluate(ladder: Ladder, question: Question, left_out: float) -> _Evaluatio
     exact = _is_only_noise(ladder, question.noise_factor)
     away = np.zeros_like(exact)
     if ladder.exact_known:
-        # the noise of one level is less than that of a difference by the root of 2
-        noise = np.sqrt(2.0) * question.noise_factor * ladder.floor[:, -1]
-        away = exact & (np.sqrt(ladder.gram[:, -1, -1]) > noise)
+        factor = question.noise_factor if question.limit_factor is None else question.limit_factor
+        away = exact & (np.sqrt(ladder.gram[:, -1, -1]) > factor * ladder.floor[:, -1])
     cut_short = _is_cut_short(ladder, believed)
     return _Evaluation(question, believed, of_sides, exact, away, ladder.exact_known, cut_short)
 

@@ -102,6 +102,12 @@ def nearest(value: object, choices: Sequence[str]) -> str:
     return listed(choices, written)
 
 
+def likely(value: object, choices: Sequence[str]) -> str:
+    """Ask whether the choice nearest to what a user wrote was meant; empty where none is near."""
+    hint = nearest(value, choices)
+    return hint if hint.startswith("did you mean") else ""
+
+
 def listed(choices: Sequence[str], value: str = "") -> str:
     """List what there is to choose from; of many those that are nearest to a value, or the first."""
     if len(choices) <= MOST_CHOICES:

@@ -9,7 +9,7 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from vibsim.core.errors import Fault, InputError, nearest
+from vibsim.core.errors import Fault, InputError, likely, nearest
 from vibsim.core.home import home
 from vibsim.core.set_option import set_in
 from vibsim.experiment.kinds import Kinds
@@ -268,8 +268,7 @@ def _shipped(name: str) -> str:
 def _nearest_key(value: dict[Any, Any], rule: str) -> str:
     """Name the key that one of a mapping is near to, of those that a rule lists."""
     known = re.split(", | or ", rule.partition(" the key ")[2])
-    hints = (nearest(key, known) for key in value)
-    return next((hint for hint in hints if hint.startswith("did you mean")), "")
+    return next(filter(None, (likely(key, known) for key in value)), "")
 
 
 def _whole_list(path: Path_, rule: str) -> tuple[Path_, str]:

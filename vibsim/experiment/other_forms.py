@@ -16,7 +16,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
-from vibsim.core.errors import nearest
+from vibsim.core.errors import likely
 from vibsim.experiment.faults import Report
 from vibsim.experiment.yaml.parse import Path_, Source
 from vibsim.formula import (
@@ -205,9 +205,7 @@ def solved(equation: str, others: Sequence[str]) -> tuple[str, str]:
     left, right = (parse(text, words) for text in texts)
     for other in (*left.names, *right.names):
         if other not in (name, velocity, _SECOND, *others):
-            hint = nearest(other, list(others))
-            if not hint.startswith("did you mean"):
-                hint = "give its value in `parameters`"
+            hint = likely(other, others) or "give its value in `parameters`"
             raise ExpressionError(equation, 0, f"unknown name '{other}'", hint)
     factor, rest = ZERO, ZERO
     for term in (*_terms(left), *_terms(Negate(right))):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -17,7 +17,7 @@ from vibsim.convergence.study.measurement import (
 from vibsim.convergence.thresholds import (
     LEAST_WITH_LIMIT,
     MISSED,
-    NOISE_FACTOR,
+    STATED_LIMIT_FACTOR,
     STATED_NOISE_FACTOR,
 )
 from vibsim.core.array_types import Flags, Floats, Integers
@@ -156,8 +156,11 @@ def _with_finite(
     measured = measurement(part, h[finite], epsilon[finite], request.noise, exact)
     decided = None
     if len(finite) >= FEWEST:
-        factor = STATED_NOISE_FACTOR if request.noise else NOISE_FACTOR
-        question = Question(request.order, request.at_least, noise_factor=factor)
+        question = Question(request.order, request.at_least)
+        if request.noise:
+            question = replace(
+                question, noise_factor=STATED_NOISE_FACTOR, limit_factor=STATED_LIMIT_FACTOR
+            )
         decided = assess(measured.ladder, question)
     for k, one in enumerate(found):
         truth = None if exact is None else exact[k]

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self
 from pydantic import BeforeValidator, ConfigDict, Discriminator, Field, StrictBool, WithJsonSchema
 from pydantic_core import PydanticCustomError
 
-from vibsim.core.errors import nearest
+from vibsim.core.errors import likely
 from vibsim.core.vocabulary import ORDER_TOLERANCE, REASONS, TYPICAL_NORM, Norm, Status
 from vibsim.experiment.schema.citation import Citation
 from vibsim.experiment.schema.fields import (
@@ -230,9 +230,7 @@ def _order(value: Any) -> Any:
     try:
         found = number(value)
     except PydanticCustomError as error:
-        meant = nearest(value, ["scheme"])
-        hint = meant if meant.startswith("did you mean") else _HALVING
-        raise refused(_ORDER, hint) from error
+        raise refused(_ORDER, likely(value, ["scheme"]) or _HALVING) from error
     if found <= 0.0:
         raise refused(_ORDER, _HALVING)
     return found

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from vibsim.core import regular_files
-from vibsim.core.errors import Fault, InputError, nearest
+from vibsim.core.errors import Fault, InputError, likely
 
 MAX_BYTES = 2**20
 """Of an experiment file."""
@@ -37,8 +37,8 @@ def _alike(path: Path) -> str:
     except OSError:
         return ""
     # an ending that both have makes no names alike
-    hint = nearest(path.stem, stems)
-    return f"{hint[:-2]}{path.suffix}'?" if hint.startswith("did you mean") else ""
+    hint = likely(path.stem, stems)
+    return f"{hint[:-2]}{path.suffix}'?" if hint else ""
 
 
 def content_of(path: Path, most: int) -> bytes:
