@@ -129,9 +129,9 @@ def test_the_largest_value_between_samples(function, end) -> None:
     for step in (0.15, 0.04):
         starts = np.linspace(0.0, step, 9)[:, None]
         count = int(end / step)
-        largest, bound = largest_between_samples(function(starts + step * np.arange(count)))
+        largest, bound = largest_between_samples([function(starts + step * np.arange(count))])
         dense = step * np.linspace(0.0, count - 1.0, 200 * (count - 1) + 1)
-        exact = np.max(function(starts + dense), axis=-1)
+        exact = np.max(function(starts + dense), axis=-1, keepdims=True)
         assert np.all(np.abs(largest - exact) <= bound + 1e-5 * step**2)
         assert np.all(bound <= 2.0 * step**4)
 
@@ -145,7 +145,7 @@ def test_a_crest_where_a_slope_or_a_curvature_jumps_is_within_its_bound(
     step, tip = 0.1, np.linspace(0.0, 1.9, 191)[:, None]
     behind = step * np.arange(20) - tip
     largest, bound = largest_between_samples(
-        1.0 - np.abs(behind) ** power * np.where(behind < 0.0, 1.0, fall)
+        [1.0 - np.abs(behind) ** power * np.where(behind < 0.0, 1.0, fall)]
     )
     assert np.all(np.abs(largest - 1.0) <= bound + 1e-12)
     assert np.all(bound <= 2.1 * max(fall, 1.0) * step**power)

@@ -189,13 +189,15 @@ def _between_points(name: str, place: value_numbers.Place, values: Floats) -> tu
     """
     block, q = place.block, place.quantity
     found, off = values.copy(), np.full(values.shape, np.nan)
-    for i, record in enumerate(block.records[level] for level in place.levels):
-        if q in record and np.shape(record[q])[-1] >= WIDTH:
-            series = _UPWARD[name](np.asarray(record[q], dtype=np.float64))
-            largest, error = largest_between_samples(series.reshape(-1, series.shape[-1]))
-            sign = -1.0 if name == "min" else 1.0
-            found[..., i] = sign * largest.reshape(block.shape)
-            off[..., i] = error.reshape(block.shape)
+    with_series = [i for i, level in enumerate(place.levels) if q in block.records[level]]
+    series = {i: np.asarray(block.records[place.levels[i]][q], np.float64) for i in with_series}
+    enough = [i for i in with_series if series[i].shape[-1] >= WIDTH]
+    if enough:
+        upward = (_UPWARD[name](series[i]) for i in enough)
+        largest, error = largest_between_samples([x.reshape(-1, x.shape[-1]) for x in upward])
+        sign = -1.0 if name == "min" else 1.0
+        found[..., enough] = sign * largest.reshape(*block.shape, -1)
+        off[..., enough] = error.reshape(*block.shape, -1)
     # the limit is made of the level before the finest, too
     return found, np.where(np.isnan(off[..., -1]), np.nan, np.fmax.reduce(off[..., -2:], axis=-1))
 

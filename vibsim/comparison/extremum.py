@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from functools import cache
+from typing import NamedTuple
 
 import numpy as np
 from numpy.polynomial import polynomial
@@ -18,29 +20,45 @@ _SIDE = WIDTH // 2
 _NEWTON_STEPS = 4
 
 
-def largest_between_samples(series: Floats) -> tuple[Floats, Floats]:
-    """Return the largest value of functions, and a bound of its error, shape (m,).
+def largest_between_samples(grids: Sequence[Floats]) -> tuple[Floats, Floats]:
+    """Return the largest value of functions, and a bound of its error, shape (m, grid).
 
     Parameters
     ----------
-    series
-        At least `WIDTH` samples at equal distances, shape (m, t). NaN where one is not finite.
+    grids
+        At least `WIDTH` samples at equal distances, shape (m, t), on every grid. NaN where one is not finite.
     """
-    known = np.asarray(np.isfinite(series).all(axis=-1))
-    series = np.where(known[:, None], series, 0.0)
-    row, place = np.nonzero(_is_crest(series))
-    centre = np.clip(place, _SIDE, series.shape[-1] - 1 - _SIDE)
+    known = np.stack([np.isfinite(series).all(axis=-1) for series in grids])
+    finite = [np.where(k[:, None], x, 0.0) for k, x in zip(known, grids, strict=True)]
+    largest = np.stack([np.max(series, axis=-1) for series in finite])
+    bound = np.zeros(largest.shape)
+    crests = [_crests(series, top) for series, top in zip(finite, largest, strict=True)]
+    grid = np.repeat(np.arange(len(grids)), [len(crest.row) for crest in crests])
+    row, place, limit, around = (np.concatenate(x) for x in zip(*crests, strict=True))
+    value, error = _highest(around, place)
+    np.maximum.at(largest, (grid, row), np.minimum(value, limit))
+    np.maximum.at(bound, (grid, row), error)
+    return np.where(known, largest, np.nan).T, np.where(known, bound, np.nan).T
+
+
+class _Crests(NamedTuple):
+    """Samples that no neighbour exceeds, near which a function may be larger than all samples; shape (crest,)."""
+
+    row: Integers
+    place: Integers  # among the samples around it, of which the middle one is 0
+    limit: Floats  # a smooth function stays below it
+    around: Floats  # shape (crest, WIDTH)
+
+
+def _crests(series: Floats, top: Floats) -> _Crests:
+    """Return the crests of functions with these largest samples."""
+    row, index = np.nonzero(_is_crest(series))
+    centre = np.clip(index, _SIDE, series.shape[-1] - 1 - _SIDE)
     around = series[row[:, None], centre[:, None] + np.arange(-_SIDE, _SIDE + 1)]
-    sample, top = series[row, place], np.max(series, axis=-1)
     # at a corner a function is half of a second difference above the straight line
-    beyond = 0.5 * _largest_difference(around, 2)
-    may = sample + beyond >= top[row]
-    value, error = _highest(around[may], (place - centre)[may])
-    value = np.minimum(value, (sample + beyond)[may])
-    largest, bound = top, np.zeros(top.shape)
-    np.maximum.at(largest, row[may], value)
-    np.maximum.at(bound, row[may], error)
-    return np.where(known, largest, np.nan), np.where(known, bound, np.nan)
+    limit = series[row, index] + 0.5 * _largest_difference(around, 2)
+    may = limit >= top[row]
+    return _Crests(row[may], (index - centre)[may], limit[may], around[may])
 
 
 def _largest_difference(samples: Floats, order: int) -> Floats:
