@@ -207,9 +207,9 @@ SURROUNDINGS: dict[str, list[dict[str, str]]] = {
         {"LC_ALL": "C.utf8", "TZ": "Pacific/Kiritimati", "COLUMNS": "7"},
     ],
     "processor": [
-        {"NPY_DISABLE_CPU_FEATURES": "AVX2 FMA3 AVX512F AVX512_SKX"},
+        {"NPY_DISABLE_CPU_FEATURES": "X86_V3 X86_V4"},
         {"GLIBC_TUNABLES": "glibc.cpu.hwcaps=-AVX2,-AVX,-FMA,-FMA4"},
-        {"OPENBLAS_CORETYPE": "Nehalem", "NPY_DISABLE_CPU_FEATURES": "AVX2"},
+        {"OPENBLAS_CORETYPE": "Nehalem", "NPY_DISABLE_CPU_FEATURES": "X86_V3"},
         {"OPENBLAS_NUM_THREADS": "4", "OMP_NUM_THREADS": "3"},
     ],
 }

@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from vibsim.core.array_types import Flags, Floats, Integers
 from vibsim.core.record import Record, Variable
 from vibsim.core.vocabulary import MEMBER
+from vibsim.elementary import on_arrays
 from vibsim.formula import Name, Switch, to_formula
 from vibsim.models import Model
 from vibsim.models.events import Friction
@@ -71,7 +72,9 @@ class Corners:
         """
         with np.errstate(invalid="ignore", divide="ignore"):
             part = np.fmax(omega_dt, end / steps[-1] / (end - self.least_time))
-            return np.where(self.least <= ROUGH, np.minimum(part, 1.0) ** self.least, 0.0)
+            return np.where(
+                self.least <= ROUGH, on_arrays.power(np.minimum(part, 1.0), self.least), 0.0
+            )
 
 
 @cache
@@ -260,7 +263,7 @@ class _Path:
             place = self.at(s + distance * size / slope)
             before, behind = (self.held.force(modes)(*place) for modes in self.modes)
             gaps.append(np.max(np.abs(behind - before), axis=0))
-        k = np.round(np.log(gaps[0] / gaps[1]) / np.log(FAR / NEAR))
+        k = np.round(on_arrays.log(gaps[0] / gaps[1]) / on_arrays.log(FAR / NEAR))
         exists = (gaps[0] > 0.0) & (k < MOST_SMOOTH)
         return np.where(exists, np.maximum(k, 0.0) + 1.0, np.nan)
 

@@ -33,6 +33,7 @@ from vibsim.convergence.verdict import Judgement
 from vibsim.core.array_types import Codes
 from vibsim.core.record import Record
 from vibsim.core.vocabulary import ERROR_FACTS, REASON_NAMES, TYPICAL_NORM
+from vibsim.elementary import on_arrays
 from vibsim.experiment import Experiment
 from vibsim.experiment.schema.checks import AccurateCheck
 from vibsim.observe.member_block import MemberBlock
@@ -132,7 +133,7 @@ def _level_needed(last: int, found: FinestError, judged: Judgement, check: Accur
     """Return the finer level whose bound is probably as asked, shape (scheme, case); -1 where none is known."""
     with np.errstate(all="ignore"):
         allowed = check.accuracy * (found.size if check.is_relative else 1.0)
-        steps = np.ceil(np.log2(found.bound / allowed) / judged.order)
+        steps = np.ceil(on_arrays.log2(found.bound / allowed) / judged.order)
         # neither round-off nor another limit vanishes with the step
         known = (judged.order > 0.0) & (steps >= 1.0) & (steps <= MOST)
         known &= (found.round_off < allowed) & (judged.reason != code("wrong_limit"))

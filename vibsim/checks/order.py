@@ -46,6 +46,7 @@ from vibsim.convergence.verdict import Judgement
 from vibsim.core.array_types import Codes, Floats
 from vibsim.core.record import Record, Variable
 from vibsim.core.vocabulary import AMPLITUDE, MEMBER, PHASE, TYPICAL_NORM
+from vibsim.elementary import on_arrays
 from vibsim.experiment import Experiment
 from vibsim.experiment.schema.checks import ConvergesCheck
 from vibsim.observe.member_block import MemberBlock
@@ -178,7 +179,7 @@ def _more_levels(q: Comparison, judged: Judgement, order: Floats, tolerance: flo
         observed = away[..., -1] / away[..., -2] if orders.shape[-1] > 1 else promised
         # what was seen once may be an accident; no power falls faster than the next one
         factor = np.maximum(observed, promised)
-        steps = np.ceil(np.log(tolerance / away[..., -1]) / np.log(factor)) + 1
+        steps = np.ceil(on_arrays.log(tolerance / away[..., -1]) / on_arrays.log(factor)) + 1
         # an error that falls faster than the powers do is none of them
         known = early & np.isfinite(steps) & (last <= aim + MOST_ABOVE)
         # how small the promised power still is, behind a higher one, is not in the orders
@@ -205,7 +206,7 @@ def _finest_readable(
     noise = _noise(q, norm, arithmetic)
     with np.errstate(all="ignore"):
         for level in range(FINEST - 1):
-            left = size * np.exp2(p * (at - level - 1))
+            left = size * on_arrays.power(2.0, p * (at - level - 1))
             floor = noise(level + 1) + noise(level + 2)
             clean = (size > 0.0) & (left >= ORDER_ABOVE_ROUND_OFF * floor)
             found[lost & clean] = level + 2
@@ -223,7 +224,11 @@ def _clean_difference(q: Comparison, norm: str, p: Floats) -> tuple[Floats, Floa
     place = np.max(np.where(clean, np.arange(len(levels) - 1), 0), axis=-1)
     size = pick(e.difference, place)
     gap = np.diff(levels)[place]
-    whole = np.where(gap > 1, np.expm1(-p * np.log(2.0)) / np.expm1(-p * gap * np.log(2.0)), 1.0)
+    whole = np.where(
+        gap > 1,
+        on_arrays.expm1(-p * on_arrays.LN_2) / on_arrays.expm1(-p * gap * on_arrays.LN_2),
+        1.0,
+    )
     return size * whole, levels.astype(np.float64)[place]
 
 

@@ -29,6 +29,8 @@ from vibsim.convergence.thresholds import BLOWN_UP, LIMIT_ROUNDING
 from vibsim.core.array_types import Flags, Floats
 from vibsim.core.record import Record
 from vibsim.core.vocabulary import REASON_NAMES
+from vibsim.elementary import on_arrays
+from vibsim.elementary.exponential import log2
 from vibsim.experiment import Experiment
 from vibsim.experiment.schema.checks import StableCheck
 from vibsim.observe import oscillation, predicted_oscillation
@@ -113,16 +115,16 @@ def _measured_growth(block: MemberBlock, level: int) -> Floats:
 def _differs(block: MemberBlock, index: int, measured: Floats, expected: Floats) -> Flags:
     periods = predicted_oscillation.natural_frequency(block) * block.group.end / (2.0 * np.pi)
     with np.errstate(divide="ignore", invalid="ignore"):
-        distance = np.abs(np.log(measured) - np.log(expected)) * periods
-        whole = np.log(expected) * periods
-    late = np.log(4.0 + 2.0 * block.grid.steps[index])
+        distance = np.abs(on_arrays.log(measured) - on_arrays.log(expected)) * periods
+        whole = on_arrays.log(expected) * periods
+    late = on_arrays.log(4.0 + 2.0 * block.grid.steps[index])
     return np.asarray(distance > NEAR * np.abs(whole) + late)
 
 
 def judge(experiment: Experiment, record: Record, check: StableCheck, found: Measured) -> Judged:
     """Compare whether schemes are stable with what a check expects."""
     with np.errstate(divide="ignore", invalid="ignore"):
-        size = np.abs(np.log(found["growth"]))
+        size = np.abs(on_arrays.log(found["growth"]))
     as_expected = found["reason"] == code("match" if check.stable else "unstable")
     away = np.where(np.isnan(size), np.inf, size)
     return Judged(found["reason"], away, np.where(as_expected, PASS, FAIL))
@@ -188,7 +190,7 @@ def _vanishing(f: Found, factors: tuple[float, float]) -> str:
 
 def first_within(limit: float, level: int, omega_dt: float) -> int:
     """Return the coarsest level whose w dt is within a stability limit, from a level that is beyond it."""
-    return level + math.ceil(math.log2(omega_dt / limit) - LIMIT_ROUNDING)
+    return level + math.ceil(log2(omega_dt / limit) - LIMIT_ROUNDING)
 
 
 def _advice(f: Found, level: int, p: float, time: str) -> str:

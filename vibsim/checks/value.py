@@ -27,6 +27,7 @@ from vibsim.convergence.reasons import first_reason
 from vibsim.core.array_types import Flags, Floats
 from vibsim.core.record import Record
 from vibsim.core.vocabulary import is_error_part
+from vibsim.elementary import on_arrays
 from vibsim.experiment import Experiment
 from vibsim.experiment.schema.checks import ValueCheck
 from vibsim.experiment.value_names import VALUES
@@ -429,7 +430,7 @@ def _levels_to_add(f: Found, check: ValueCheck) -> int:
     if not 0.0 < fall < 1.0:
         return FINER
     steps = np.arange(1, MOST_FINER + 1)
-    left = last * fall ** (steps + 1) / (1.0 - fall)
+    left = last * on_arrays.power(fall, steps + 1) / (1.0 - fall)
     limit = numbers[-1] + last * fall / (1.0 - fall)
     # a number that is to equal another one must change by less than it may be off
     enough = (

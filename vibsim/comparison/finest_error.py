@@ -20,6 +20,7 @@ from vibsim.convergence.reasons import is_one_of
 from vibsim.convergence.thresholds import ROUND_OFF_SAFETY
 from vibsim.core.array_types import Flags, Floats
 from vibsim.core.vocabulary import TYPICAL_NORM
+from vibsim.elementary import on_arrays
 
 
 class FinestError(NamedTuple):
@@ -79,7 +80,8 @@ def _of_other_order(q: Comparison, error: Floats, bound: Floats) -> tuple[Floats
     known_to = np.fmax(known_to, np.abs(orders[..., -1] - orders[..., 0]))
     with np.errstate(all="ignore"):
         measured, most = (
-            change / np.expm1(np.maximum(p, 0.0) * ((levels[-1] - levels[-2]) * np.log(2.0)))
+            change
+            / on_arrays.expm1(np.maximum(p, 0.0) * ((levels[-1] - levels[-2]) * on_arrays.LN_2))
             for p in (order, order - known_to)
         )
     return (

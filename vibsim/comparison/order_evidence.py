@@ -28,6 +28,7 @@ from vibsim.convergence.thresholds import ABOVE_ROUND_OFF, HALF_SPACING, ROUND_O
 from vibsim.convergence.verdict import Judgement, judge, judge_together
 from vibsim.core.array_types import Codes, Flags, Floats
 from vibsim.core.vocabulary import NORMS, ORDER_TOLERANCE, TYPICAL_NORM, is_error_part, plain_name
+from vibsim.elementary import on_arrays
 from vibsim.experiment.schema.checks import ConvergesCheck
 from vibsim.models import ENERGIES
 from vibsim.observe import predicted_oscillation
@@ -320,7 +321,7 @@ def _in_theory(q: Comparison, judged: Judgement) -> Flags:
     for found in (phases, growths):
         errors = np.abs(found)
         with np.errstate(divide="ignore", invalid="ignore"):
-            fall = np.log2(safe_ratio(errors[0], errors[1])) / (fine - coarse)
+            fall = on_arrays.log2(safe_ratio(errors[0], errors[1])) / (fine - coarse)
         exact = np.all(errors <= THEORY_ROUNDING, axis=0)
         orders.append(np.where(exact, np.inf, fall))
     with np.errstate(invalid="ignore"):

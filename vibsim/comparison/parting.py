@@ -14,6 +14,7 @@ import numpy as np
 from vibsim.comparison.quantity_comparison import Comparison
 from vibsim.convergence.differences import largest
 from vibsim.core.array_types import Flags, Floats
+from vibsim.elementary import on_arrays
 from vibsim.schemes.base import UNIT_ROUND_OFF
 
 FAR = 0.01
@@ -45,14 +46,14 @@ def parting(q: Comparison, where: Flags) -> Floats:
             continue
         half = distance[np.searchsorted(part, part[far[0]] / 2.0)]
         time = part[far[0]] * np.ravel(q.block.group.end)[case]
-        growth = math.log(distance[far[0]] / half) if 0.0 < half < math.inf else 0.0
-        if growth > HIGHEST_POWER * math.log(2.0):
+        growth = on_arrays.log(distance[far[0]] / half) if 0.0 < half < math.inf else 0.0
+        if growth > HIGHEST_POWER * on_arrays.LN_2:
             found[scheme, case] = time, 2.0 * growth / time
     return found
 
 
 def levels_to_the_end(time: float, rate: float, end: float, order: float) -> float:
     """Return how many finer levels of an order agree to the end; infinite where rounding makes every level part."""
-    if rate * end > math.log(FAR / UNIT_ROUND_OFF):
+    if rate * end > on_arrays.log(FAR / UNIT_ROUND_OFF):
         return math.inf
-    return math.ceil(rate * (end - time) / (order * math.log(2.0)))
+    return math.ceil(rate * (end - time) / (order * on_arrays.LN_2))

@@ -163,7 +163,8 @@ def _blur(block: MemberBlock, times: list[Floats]) -> tuple[Floats, Floats]:
     for time in times:
         behind = np.mod(np.where(np.isfinite(time), time, 0.0), h)
         off.append(np.max((w * behind) * (w * (h - behind)), axis=-1))
-    amplitude = np.stack(off, axis=-1) ** 3 / 720.0
+    largest = np.stack(off, axis=-1)
+    amplitude = largest * largest * largest / 720.0
     return amplitude / w, amplitude
 
 

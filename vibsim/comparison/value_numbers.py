@@ -17,6 +17,7 @@ from vibsim.comparison.solution_distance import discrete_error, exact_series
 from vibsim.convergence.differences import largest, safe_ratio
 from vibsim.core.array_types import Floats
 from vibsim.core.record import Record
+from vibsim.elementary import on_arrays
 from vibsim.observe import oscillation, predicted_oscillation, spectrum, steady_state
 from vibsim.observe.common_grid import whole
 from vibsim.observe.member_block import MemberBlock, energy_at_start, stored_or_nan
@@ -297,7 +298,7 @@ KNOWN: Mapping[str, Number] = {
     ),
     "accepted_steps": _at_level(oscillation.steps_taken),
     "force_evaluations": _at_level(oscillation.force_evaluations),
-    "error_rate": lambda p: np.log2(_fall(_own_norm)(p)),
+    "error_rate": lambda p: on_arrays.log2(_fall(_own_norm)(p)),
     "second_difference_fraction": _second_difference,
     "discrete_error": _of_quantity(discrete_error),
     "error_l1": _error("l1"),

@@ -59,6 +59,7 @@ from vibsim.convergence.thresholds import (
 )
 from vibsim.core.array_types import Codes, Flags, Floats, Integers
 from vibsim.core.vocabulary import ORDER_TOLERANCE
+from vibsim.elementary import on_arrays
 
 DECIDED = "asymptotic", "order_low", "order_high"
 """Reasons of verdicts on an order."""
@@ -255,7 +256,7 @@ def _meets(ladder: Ladder, p: Posterior) -> Flags:
     """Say where the extrapolation by the order of the finest levels is almost the exact solution."""
     order, ratio = p.orders[:, -1], ladder.h[-2] / ladder.h[-1]
     with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
-        step = 1.0 / (ratio**order - 1.0)
+        step = 1.0 / (on_arrays.power(ratio, order) - 1.0)
         distance = norm(np.stack([-step, np.ones_like(step)], axis=-1), ladder.gram[:, -2:, -2:])
         near = distance <= NEAR * step * np.sqrt(ladder.gram[:, -2, -2])
     ends = np.array(p.windows)[np.argmax(p.window, axis=-1), 1]

@@ -8,6 +8,7 @@ from vibsim.convergence.error_model.hypotheses import times
 from vibsim.convergence.error_model.posterior import Ladder, Posterior
 from vibsim.convergence.thresholds import BEST_BOUND, MISSED, MISSED_SHARE
 from vibsim.core.array_types import Flags, Floats
+from vibsim.elementary import on_arrays
 
 
 def best_value(
@@ -26,7 +27,7 @@ def best_value(
     if n == 3:
         p, ratio = of_limit.orders[:, 0], ladder.h[1] / ladder.h[2]
         with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
-            step = np.where(p > 0.0, -1.0 / (ratio**p - 1.0), np.nan)
+            step = np.where(p > 0.0, -1.0 / (on_arrays.power(ratio, p) - 1.0), np.nan)
         other = np.stack([np.zeros_like(step), step], axis=-1) - path
         spread = spread + _square(other, differences)
         path = path + other

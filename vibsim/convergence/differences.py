@@ -15,6 +15,8 @@ import numpy as np
 
 from vibsim.convergence.thresholds import PEAKS, ROUND_OFF_SAFETY, STEEPEST, ZERO_CROSSING
 from vibsim.core.array_types import Floats
+from vibsim.elementary import on_arrays
+from vibsim.elementary.exact import whole_power
 
 SAFE_SQUARES = 1e140
 """Numbers between this and its inverse have squares whose sums neither overflow nor vanish."""
@@ -85,12 +87,14 @@ def _root_of_squares(error: Floats, spacing: Floats) -> Floats:
 
 def gap_ratio(order: Floats | float, gap: int) -> Floats:
     """Return ``R = 2^(p gap)``, the factor by which an error of order p falls over `gap` levels."""
-    return np.asarray(np.exp2(np.asarray(order, dtype=np.float64) * gap))
+    return np.asarray(on_arrays.power(2.0, np.asarray(order, dtype=np.float64) * gap))
 
 
 def error_factor(order: Floats | float, gap: int) -> Floats:
     """Return ``-R/(R - 1)``, which turns a difference into the error of its coarser level."""
-    return np.asarray(1.0 / np.expm1(-np.asarray(order, dtype=np.float64) * gap * np.log(2.0)))
+    return np.asarray(
+        1.0 / on_arrays.expm1(-np.asarray(order, dtype=np.float64) * gap * on_arrays.LN_2)
+    )
 
 
 def target_ratio(order: Floats | float, levels: Sequence[float]) -> Floats:
@@ -99,10 +103,10 @@ def target_ratio(order: Floats | float, levels: Sequence[float]) -> Floats:
     ``(2^(p a) - 1)/(1 - 2^(-p b))`` for the gaps a and b: 2^p where both are 1, and a/b at p = 0.
     """
     first, second, third = levels
-    p = np.asarray(order, dtype=np.float64) * np.log(2.0)
+    p = np.asarray(order, dtype=np.float64) * on_arrays.LN_2
     flat = np.abs(p) < 1e-290
     safe = np.where(flat, 1.0, p)
-    ratio = np.expm1(safe * (second - first)) / -np.expm1(-safe * (third - second))
+    ratio = on_arrays.expm1(safe * (second - first)) / -on_arrays.expm1(-safe * (third - second))
     return np.asarray(np.where(flat, (second - first) / (third - second), ratio))
 
 
@@ -127,7 +131,7 @@ def order_of_ratio(ratio: Floats, levels: Sequence[float]) -> Floats:
     usable = np.isfinite(ratio) & (ratio > 0)
     safe = np.where(usable, ratio, 1.0)
     if second - first == third - second:
-        order = np.log2(safe) / (second - first)
+        order = on_arrays.log2(safe) / (second - first)
         return np.asarray(np.where(usable & (np.abs(order) <= STEEPEST), order, np.nan))
     low, high = np.full(safe.shape, -STEEPEST), np.full(safe.shape, STEEPEST)
     with np.errstate(over="ignore"):
@@ -149,7 +153,7 @@ def local_orders(ratios: Floats, levels: Sequence[float]) -> Floats:
 
 def orders_of_steps(ratios: Floats, h: Floats) -> Floats:
     """Return `local_orders` of levels with the step sizes `h`, shape (n,)."""
-    return local_orders(ratios, (-np.log2(h)).tolist())
+    return local_orders(ratios, (-on_arrays.log2(h)).tolist())
 
 
 def safe_ratio(top: Floats, bottom: Floats) -> Floats:
@@ -229,7 +233,7 @@ def cosines(rows: Sequence[Floats], kind: str, end_included: bool = True) -> Flo
     one = np.ones(1)
     if kind in {"linf", "linf_interior"}:
         sizes = [np.abs(np.nan_to_num(unit(series, largest(series)))) for series in rows]
-        weight = np.maximum.reduce(sizes) ** PEAKS
+        weight = whole_power(np.maximum.reduce(sizes), PEAKS)
         rows = [np.nan_to_num(unit(series, largest(series))) * weight for series in rows]
     units = [np.nan_to_num(unit(series, norm(series, "l2", one, False))) for series in rows]
     found = np.empty((*units[0].shape[:-1], len(units), len(units)))

@@ -13,6 +13,7 @@ import numpy as np
 
 from vibsim.convergence import thresholds as th
 from vibsim.core.array_types import Flags, Floats, Integers
+from vibsim.elementary import on_arrays
 
 
 @dataclass(frozen=True)
@@ -115,7 +116,7 @@ def errors_stay(e: Evidence) -> Flags:
         square = np.sum(e.cosines * sizes[..., :, None] * sizes[..., None, :], axis=(-2, -1))
         steps = e.steps * 2.0 ** (e.levels[-1] - e.levels[0])
         step = np.where(np.isfinite(e.omega_dt[..., -1]), e.omega_dt[..., -1], 1.0 / steps)
-        beside_a_point = e.size * step ** np.fmin(e.corner, e.left_to_the_mesh)
+        beside_a_point = e.size * on_arrays.power(step, np.fmin(e.corner, e.left_to_the_mesh))
         stays = e.error > th.STAYED * np.sqrt(square)
         return np.asarray(stays & ~(e.error <= beside_a_point))
 
@@ -151,7 +152,7 @@ def _would_show(e: Evidence, moved: Floats) -> Flags:
     rate = rate * np.where(e.straight, moved, 1.0)
     # what a short run has accumulated is smaller by (w T)^2
     short = np.where(oscillates, np.minimum(e.span, 1.0) ** 2, 1.0)
-    ordinary = np.minimum(moved, short) * rate**power
+    ordinary = np.minimum(moved, short) * on_arrays.power(rate, power)
     # of what grew without bound nothing is said
     with np.errstate(invalid="ignore"):
         visible = ordinary * e.size >= th.VISIBLE_ERROR * e.blur[..., 0]

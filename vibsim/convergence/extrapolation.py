@@ -42,6 +42,7 @@ from vibsim.convergence.differences import largest as absolute
 from vibsim.convergence.differences import norm, safe_ratio
 from vibsim.convergence.thresholds import SERIES_SAFETY
 from vibsim.core.array_types import Flags, Floats
+from vibsim.elementary.exponential import power
 
 
 @dataclass(frozen=True)
@@ -105,7 +106,7 @@ def _power(h: Fraction, p: float) -> Fraction:
         return Fraction(h ** int(p))
     if float(2 * p).is_integer():
         return Fraction(math.sqrt(h ** int(2 * p)))
-    return Fraction(float(h) ** p)
+    return Fraction(power(float(h), p))
 
 
 def _combined(rows: Sequence[Sequence[Fraction]], i: int, f: Fraction) -> list[Fraction]:

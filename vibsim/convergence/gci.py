@@ -26,6 +26,7 @@ from vibsim.convergence.differences import gap_ratio, order_of_ratio, safe_ratio
 from vibsim.convergence.extrapolation import error_left
 from vibsim.convergence.number_extrapolation import triple_at
 from vibsim.core.array_types import Codes, Flags, Floats
+from vibsim.elementary import on_arrays
 
 CLASSES = (
     "unknown",
@@ -115,14 +116,14 @@ def _fitted(values: Floats, levels: Sequence[int], promised: Floats) -> Floats:
     """Return the index of the best fit of ``u + c h^p``, p between `GCI_LEAST_ORDER` and the promised order."""
     m = min(len(levels), th.GCI_FITTED)
     u = values[..., -m:]
-    h = np.exp2(-(np.array(levels[-m:], dtype=np.float64) - levels[-1]))
+    h = on_arrays.power(2.0, -(np.array(levels[-m:], dtype=np.float64) - levels[-1]))
     mean = np.mean(u, axis=-1)
     least = np.full(mean.shape, np.inf)
     index = np.full(mean.shape, np.nan)
     typical = (np.max(u, axis=-1) - np.min(u, axis=-1)) / (m - 1)
     for part in np.linspace(0.0, 1.0, th.GCI_EXPONENTS):
         p = th.GCI_LEAST_ORDER + part * np.maximum(promised - th.GCI_LEAST_ORDER, 0.0)
-        x = h ** p[..., None]
+        x = on_arrays.power(h, p[..., None])
         away = x - np.mean(x, axis=-1)[..., None]
         slope = np.sum(away * (u - mean[..., None]), axis=-1) / np.sum(away * away, axis=-1)
         rest = u - mean[..., None] - slope[..., None] * away

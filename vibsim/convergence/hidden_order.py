@@ -17,6 +17,7 @@ import numpy as np
 from vibsim.convergence.evidence import Evidence, floor_of_pairs, pick
 from vibsim.convergence.thresholds import EXCLUDED, HALF_SPACING, HIGHER_POWERS
 from vibsim.core.array_types import Flags, Floats, Integers
+from vibsim.elementary import on_arrays
 
 
 def is_promise_hidden(e: Evidence, order: Floats, last: Integers) -> Flags:
@@ -48,7 +49,7 @@ def _most(e: Evidence, rows: Flags, last: int, p: float, r: float) -> Floats:
     size = pick(e.difference[rows], np.full(np.count_nonzero(rows), last))
     noise = floor_of_pairs(e)[rows]
     # the differences of h^p are steeper than those of h^r
-    steeper = np.expm1(p * np.log(2.0)) / np.expm1(r * np.log(2.0))
+    steeper = on_arrays.expm1(p * on_arrays.LN_2) / on_arrays.expm1(r * on_arrays.LN_2)
     least = np.full(size.shape, np.inf)
     for step in (1.0, 2.0):
         for count in range(1, min(last, HIGHER_POWERS) + 1):
@@ -64,6 +65,6 @@ def _most(e: Evidence, rows: Flags, last: int, p: float, r: float) -> Floats:
 def _weights(levels: tuple[int, ...], last: int, powers: Floats) -> Floats:
     """Return weights of the differences up to `last` that keep the first power in that one, and no other power."""
     depth = np.array(levels[last - len(powers) + 1 : last + 2], dtype=np.float64)
-    sizes = np.exp2(-powers[:, None] * (depth - depth[-1]))
+    sizes = on_arrays.power(2.0, -powers[:, None] * (depth - depth[-1]))
     falls = sizes[:, :-1] - sizes[:, 1:]
     return np.asarray(np.linalg.solve(falls / falls[:, -1:], np.eye(len(powers))[0]))

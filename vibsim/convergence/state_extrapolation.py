@@ -30,6 +30,7 @@ import numpy as np
 
 from vibsim.convergence import thresholds as th
 from vibsim.convergence.extrapolation import Entry, error_left, next_row, triangular_scheme
+from vibsim.elementary.exponential import power
 
 LASTING = 2.0**-52
 """Relative error of what every level has in common: parameters, the step, the elementary functions."""
@@ -128,7 +129,7 @@ def tableau(steps: tuple[int, ...], p: int, q: int, round_off: tuple[float, ...]
         for i, row in enumerate(rows)
     )
     amplification = [0.0] + [
-        2.0 * math.factorial(p + 1) * (1.0 + row[0].factor) * float(n) ** p
+        2.0 * math.factorial(p + 1) * (1.0 + row[0].factor) * power(float(n), float(p))
         for row, n in zip(rows[1:], steps[:-1], strict=True)
     ]
     return Tableau(rows, noise, tuple(amplification))

@@ -69,6 +69,7 @@ from vibsim.convergence.reasons import (
     is_open,
 )
 from vibsim.core.array_types import Codes, Flags, Floats, Integers
+from vibsim.elementary import on_arrays
 
 
 @dataclass(frozen=True)
@@ -156,7 +157,7 @@ def _believed(e: Evidence, judged: Flags) -> Decision:
         unit = np.max(sizes, axis=-1, keepdims=True)
         sizes = sizes / unit
         ladder = Ladder(
-            h=np.exp2(-np.array(e.levels, dtype=np.float64)),
+            h=on_arrays.power(2.0, -np.array(e.levels, dtype=np.float64)),
             gram=e.cosines[chosen][:, :count, :count] * sizes[:, :, None] * sizes[:, None, :],
             floor=e.floor[chosen] / unit,
             numbers=e.numbers[chosen],

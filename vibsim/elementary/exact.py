@@ -11,6 +11,7 @@ else in whole numbers, ten bits of the quotient at a time.
 from __future__ import annotations
 
 import math
+from typing import Any
 
 from vibsim.elementary.doubled import nearest_whole, two_product
 from vibsim.elementary.exponential import scaled
@@ -148,3 +149,15 @@ def whole_and_exponent(x: float) -> tuple[int, int]:
     normal = x * _TO_NORMAL if tiny else x
     exponent = int(exponent_of(normal)) - (106 if tiny else 52)
     return int(mantissa_of(normal) * _TWO_52), exponent
+
+
+def whole_power(base: Any, exponent: int) -> Any:
+    """Return a power of a float or an array by multiplication, as kernels have it where the exponent is written."""
+    if exponent == 0:
+        return 1.0
+    result = base
+    for bit in bin(abs(exponent))[3:]:
+        result = result * result
+        if bit == "1":
+            result = result * base
+    return result if exponent > 0 else 1.0 / result

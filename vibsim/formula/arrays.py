@@ -9,12 +9,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
-from importlib import import_module
 from typing import Any
 
 import numpy as np
 
 from vibsim.core.array_types import Floats
+from vibsim.elementary import on_arrays
+from vibsim.elementary.exact import whole_power
 from vibsim.formula.tree import (
     FUNCTIONS,
     OPERATORS,
@@ -32,15 +33,10 @@ from vibsim.formula.tree import (
 Interval = tuple[Floats, Floats]
 
 
-def _by_scipy(name: str) -> Callable[..., Any]:
-    """Return a function of SciPy, which is imported when it is called."""
-    return lambda x: getattr(import_module("scipy.special"), name)(x)
-
-
 _FUNCTIONS: Mapping[str, Callable[..., Any]] = {
-    **{name: getattr(np, name) for name in FUNCTIONS if hasattr(np, name)},
-    **{"erf": _by_scipy("erf"), "erfc": _by_scipy("erfc")},
-    **{"max": np.maximum, "min": np.minimum, "round": np.rint},
+    **{name: on_arrays.named(name) for name in FUNCTIONS},
+    **{"abs": np.abs, "ceil": np.ceil, "floor": np.floor, "sign": np.sign, "sqrt": np.sqrt},
+    **{"max": np.maximum, "min": np.minimum, "mod": np.mod, "round": np.rint},
     "heaviside": lambda x: np.heaviside(x, 0.5),
     "where": lambda condition, yes, no: np.where(condition != 0.0, yes, no),
 }
@@ -78,14 +74,21 @@ def _value_of(numbers: Mapping[str, Any], node: Expression, *operands: Any) -> A
             return np.asarray(numbers[name], dtype=np.float64)
         case Negate():
             return np.negative(*operands)
-        case Binary("**"):
-            return np.power(*operands)
+        case Binary("**", _, exponent):
+            return _raised(operands[0], operands[1], literal(exponent))
         case Binary(symbol):
             return OPERATORS[symbol](*operands)
         case Compare(symbol):
             return np.where(OPERATORS[symbol](*operands), 1.0, 0.0)
         case Call(function):
             return _FUNCTIONS[function](*operands)
+
+
+def _raised(base: Floats, exponent: Floats, written: float | None) -> Any:
+    """Return a power: by multiplication where a whole exponent is written as a number, as in the engine."""
+    if written is not None and written.is_integer():
+        return whole_power(base, int(written))
+    return on_arrays.power(base, exponent)
 
 
 def bounds(expression: Expression, numbers: Mapping[str, Any]) -> Interval:
@@ -151,8 +154,8 @@ def _power(base: Interval, exponent: Interval, number: float | None) -> Interval
         if number < 0:
             return _over((np.ones(()), np.ones(())), _power(base, exponent, -number))
         low, high = _sizes(base) if number % 2 == 0 else base
-        return low**number, high**number
-    low, high = _corners(np.power, base, exponent)
+        return whole_power(low, int(number)), whole_power(high, int(number))
+    low, high = _corners(on_arrays.power, base, exponent)
     has_value = base[0] >= 0.0
     return np.where(has_value, low, -np.inf), np.where(has_value, high, np.inf)
 
@@ -191,7 +194,7 @@ def _called(function: str, inner: Sequence[Interval]) -> Interval:
             return _value(function, a[0], b[0]), _value(function, a[1], b[1])
         case "atan2":
             is_right = inner[1][0] > 0.0
-            low, high = _corners(np.arctan2, *inner)
+            low, high = _corners(on_arrays.atan2, *inner)
             return np.where(is_right, low, -np.pi), np.where(is_right, high, np.pi)
         case "mod":
             return _modulo(*inner)

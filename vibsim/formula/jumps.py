@@ -24,6 +24,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from vibsim.core.array_types import Floats, Integers
+from vibsim.elementary import on_arrays
 from vibsim.formula.algebra import filled, is_zero
 from vibsim.formula.arrays import bounds, values
 from vibsim.formula.derivatives import derivative
@@ -182,7 +183,7 @@ def first_jump(formula: Expression, numbers: Mapping[str, float], end: float) ->
         return np.where(np.isfinite(found), found, 0.0)
 
     k = np.arange(PIECES + 1.0)
-    edges = end / PIECES * (k + np.where(k % PIECES == 0.0, 0.0, UNEVEN * np.sin(1.7 * k)))
+    edges = end / PIECES * (k + np.where(k % PIECES == 0.0, 0.0, UNEVEN * on_arrays.sin(1.7 * k)))
     edges = _with_pulses(formula, numbers, edges)
     with np.errstate(all="ignore"):
         size = np.abs(np.broadcast_to(values(formula, {**numbers, "t": edges}), edges.shape))

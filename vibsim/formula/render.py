@@ -12,6 +12,7 @@ from collections.abc import Mapping
 from itertools import accumulate
 
 from vibsim.elementary import ELEMENTARY
+from vibsim.elementary.exact import whole_power
 from vibsim.formula.parser import ExpressionError, parse
 from vibsim.formula.tree import (
     FUNCTIONS,
@@ -102,14 +103,7 @@ def _power(base: float, exponent: float, written: float | None) -> float:
     """Return a power: by multiplication where a whole exponent is written as a number, as in the engine."""
     if written is None or not exponent.is_integer():
         return _existing(ELEMENTARY["power"].full(base, exponent))
-    if exponent == 0.0:
-        return 1.0
-    result = base
-    for bit in bin(abs(int(exponent)))[3:]:
-        result = result * result
-        if bit == "1":
-            result = result * base
-    return result if exponent > 0.0 else 1.0 / result
+    return float(whole_power(base, int(exponent)))
 
 
 def to_formula(expression: Expression) -> str:

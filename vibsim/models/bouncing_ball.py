@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 
 from vibsim.core.array_types import Floats
+from vibsim.elementary import on_arrays
 from vibsim.models.base import Model, Numbers, Parameter, State
 from vibsim.models.events import Impact
 from vibsim.models.shared.scales import Scales
@@ -37,9 +38,9 @@ def last_impact(initial: Numbers, parameters: Numbers) -> Any:
     _, speed = first_impact(initial, parameters)
     e, slow = parameters["restitution"], parameters["eps_v"]
     with np.errstate(divide="ignore", invalid="ignore"):
-        number = np.ceil(np.log(slow / speed) / np.log(e))
+        number = np.ceil(on_arrays.log(slow / speed) / on_arrays.log(e))
         # the logarithms may miss a speed that is eps_v itself
-        number = np.where(e ** (number - 1.0) * speed <= slow, number - 1.0, number)
+        number = np.where(on_arrays.power(e, number - 1.0) * speed <= slow, number - 1.0, number)
     number = np.where(e == 0, 1.0, np.where(e == 1, np.inf, np.where(slow == 0, np.inf, number)))
     number = np.where(e * speed <= slow, 1.0, number)
     lies = (initial["h"] <= 0) & (np.abs(initial["v"]) <= slow)
@@ -53,7 +54,9 @@ def impact_time(number: Any, initial: Numbers, parameters: Numbers) -> Any:
     with np.errstate(divide="ignore", invalid="ignore"):
         bounces = number - 1.0
         # e + e^2 + ... + e^(number - 1)
-        total = np.where(e < 1, e * -np.expm1(bounces * np.log(e)) / (1.0 - e), bounces)
+        total = np.where(
+            e < 1, e * -on_arrays.expm1(bounces * on_arrays.log(e)) / (1.0 - e), bounces
+        )
     total = np.where((e == 0) | (number <= 1), 0.0, total)
     return np.where(number == 0, 0.0, time + flight * total)
 
@@ -67,7 +70,10 @@ def exact(t: Floats, initial: Numbers, parameters: Numbers) -> dict[str, Floats]
         # the sum of the bounces behind the first impact, in units of the first one over e
         passed = (t - time) * g / (2.0 * speed)
         left = np.where(e < 1, 1.0 - passed * (1.0 - e) / e, 1.0)
-        number = np.where(e < 1, np.floor(np.log(left) / np.log(e)), np.floor(passed)) + 1.0
+        number = (
+            np.where(e < 1, np.floor(on_arrays.log(left) / on_arrays.log(e)), np.floor(passed))
+            + 1.0
+        )
         number = np.where(left <= 0, np.inf, np.maximum(number, 1.0))
         # logarithms may have missed the last impact up to t by one
         sooner = impact_time(np.maximum(number, 1.0), initial, parameters) > t
@@ -75,7 +81,7 @@ def exact(t: Floats, initial: Numbers, parameters: Numbers) -> dict[str, Floats]
         later = impact_time(number + 1.0, initial, parameters) <= t
         number = np.where(later, number + 1.0, number)
         since = t - impact_time(number, initial, parameters)
-        rise = e**number * speed
+        rise = on_arrays.power(e, number) * speed
         h, v = since * (rise - 0.5 * g * since), rise - g * since
     first = (t < time) & (last > 0)
     rests = ~first & ((number >= last) | ~np.isfinite(number))

@@ -33,6 +33,7 @@ from typing import Any
 import numpy as np
 
 from vibsim.core.array_types import Floats
+from vibsim.elementary import on_arrays
 from vibsim.formula import Name, parse
 from vibsim.models.base import (
     Damping,
@@ -100,8 +101,8 @@ def start(parameters: Numbers) -> dict[str, Any]:
     angle, length = np.deg2rad(parameters["Theta"]), 1.0 + np.asarray(parameters["epsilon"])
     zero = np.zeros(np.broadcast_shapes(np.shape(angle), np.shape(length)))
     # 1 - (1 + epsilon) cos(Theta), without the rounding of 1 + epsilon where Theta is 0
-    lifted = 2.0 * length * np.sin(0.5 * angle) ** 2 - parameters["epsilon"]
-    return {"x": length * np.sin(angle), "y": lifted + zero, "vx": zero, "vy": zero}
+    lifted = 2.0 * length * on_arrays.sin(0.5 * angle) ** 2 - parameters["epsilon"]
+    return {"x": length * on_arrays.sin(angle), "y": lifted + zero, "vx": zero, "vy": zero}
 
 
 def vertical_motion(t: Floats, initial: Numbers, parameters: Numbers) -> dict[str, Floats]:
@@ -109,7 +110,7 @@ def vertical_motion(t: Floats, initial: Numbers, parameters: Numbers) -> dict[st
     w = highest_frequency(parameters)
     y, vy = motion(t, w, initial["y"], initial["vy"])
     is_vertical = (np.asarray(initial["x"]) == 0.0) & (np.asarray(initial["vx"]) == 0.0)
-    stays_below = np.hypot(initial["y"], initial["vy"] / w) < 1.0
+    stays_below = on_arrays.hypot(initial["y"], initial["vy"] / w) < 1.0
     zero = np.where(is_vertical & stays_below, 0.0, np.nan) + 0.0 * y
     return {"x": zero, "y": y + zero, "vx": zero, "vy": vy + zero}
 

@@ -25,6 +25,7 @@ from typing import Any
 import numpy as np
 
 from vibsim.core.array_types import Complexes, Floats
+from vibsim.elementary import on_arrays
 from vibsim.formula import (
     ONE,
     ZERO,
@@ -321,7 +322,7 @@ class Loaded:
                 amplitude, angular, phase = (
                     float(values(part, named)) for part in (row.amplitude, row.angular, row.phase)
                 )
-                loads.append((push * amplitude * np.exp(1j * phase), angular))
+                loads.append((push * amplitude * on_arrays.complex_exp(1j * phase), angular))
         q, v = mode_motion(t, w, d, (start[0], start[1]), loads)
         shapes = own.observed @ modes.shapes
         return np.concatenate([shapes @ q, shapes @ v])

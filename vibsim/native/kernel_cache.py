@@ -18,13 +18,15 @@ ENTRY = "kernel"
 """Name of the function that is called."""
 
 
-def load(text: str, kinds: str) -> Kernel:
+def load(text: str, kinds: str, written: Callable[[], str] | None = None) -> Kernel:
     """Return the function ``kernel`` of the module `text`, compiled now or before.
 
     Parameters
     ----------
     kinds
         Kinds of its arguments (`vibsim.native.linking.link`).
+    written
+        Writes the module, where `text` is only what it is made of.
 
     Raises `SimulationError` where the text cannot be compiled.
     """
@@ -37,9 +39,10 @@ def load(text: str, kinds: str) -> Kernel:
         # what finds its kernel needs no compiler
         from vibsim.native.machine import machine_code
 
+        module = written() if written else text
         if folder := private_cache.opened("kernels"):
-            folder.put(f"{name}.py", text.encode())
-        return machine_code(text, ENTRY, kinds)
+            folder.put(f"{name}.py", module.encode())
+        return machine_code(module, ENTRY, kinds)
 
     code = private_cache.cached("kernels", f"{name}.o", make, bytes, bytes)
     return link(code, ENTRY, kinds)

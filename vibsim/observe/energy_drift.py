@@ -31,6 +31,7 @@ from vibsim.convergence.differences import largest, safe_ratio
 from vibsim.convergence.thresholds import ABOVE_ROUND_OFF
 from vibsim.core.array_types import Codes, Flags, Floats
 from vibsim.core.vocabulary import CENTRED, DRIFTS
+from vibsim.elementary import on_arrays
 from vibsim.formula import derivative, values
 from vibsim.models.base import tree
 from vibsim.observe import thresholds as th
@@ -153,7 +154,7 @@ def drift_of(
     # a one-sided velocity at the last point says nothing about the drift
     end = np.fmax.reduce(running[..., :-1], axis=-1)
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        change = np.log(np.abs(ratio))
+        change = on_arrays.log(np.abs(ratio))
         means = _means(running)
         rise, k = _rise(means)
         fall, k_log = _power(np.abs(change))
@@ -268,4 +269,4 @@ def _rise(means: Floats) -> tuple[Floats, Floats]:
     third, second, first = (means[..., i] for i in range(3))
     rise = np.asarray(first - second)
     with np.errstate(divide="ignore", invalid="ignore"):
-        return rise, np.log2(rise / (second - third))
+        return rise, on_arrays.log2(rise / (second - third))

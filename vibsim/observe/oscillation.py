@@ -25,6 +25,7 @@ import numpy as np
 from vibsim.convergence.differences import safe_ratio
 from vibsim.core.array_types import Flags, Floats
 from vibsim.core.record import Record
+from vibsim.elementary import on_arrays
 from vibsim.experiment.storage import FEWEST_EXTREMA
 from vibsim.observe import thresholds as th
 from vibsim.observe.member_block import MemberBlock, stored_or_nan
@@ -47,7 +48,7 @@ def growth_per_period(block: MemberBlock, level: int) -> Floats:
     if fitted is None:
         return found
     with np.errstate(over="ignore"):
-        own = np.exp(fitted.log_growth * (2.0 * np.pi / _step(block, level)))
+        own = on_arrays.exp(fitted.log_growth * (2.0 * np.pi / _step(block, level)))
     return np.where(np.isfinite(own), own, found)
 
 
@@ -73,9 +74,9 @@ def growth_over_run(block: MemberBlock, record: Record) -> Floats:
     intervals = safe_ratio(*np.broadcast_arrays(time, natural))
     # beyond a limit a nonlinear run may have no period: turns that it seems to make backwards in time
     usable = (factor > 0) & (intervals > 0) & (period > 0)
-    log = np.log(np.where(usable, factor, 1.0)) / np.where(usable, intervals, 1.0)
+    log = on_arrays.log(np.where(usable, factor, 1.0)) / np.where(usable, intervals, 1.0)
     with np.errstate(over="ignore"):
-        return np.where(usable, np.exp(log), np.nan)
+        return np.where(usable, on_arrays.exp(log), np.nan)
 
 
 def has_recurrence(block: MemberBlock, level: int) -> bool:
@@ -229,7 +230,7 @@ def fit_recurrence(position: Floats) -> Recurrence:
         # where one root has left all others behind, u^(n+1) = x u^n
         factor = np.sum(ahead * weight * level, axis=-1) / c
         alone = ~both & _is_small(ahead * weight - factor[..., None] * level)
-        log_growth = np.where(alone, np.log(np.abs(factor)), log_growth)
+        log_growth = np.where(alone, on_arrays.log(np.abs(factor)), log_growth)
         angle = np.where(alone, np.where(factor < 0, np.pi, 0.0), angle)
     sound = both | alone
     return Recurrence(np.where(sound, log_growth, np.nan), np.where(sound, angle, np.nan))
@@ -261,4 +262,4 @@ def _roots(total: Floats, product: Floats) -> tuple[Floats, Floats]:
     imaginary = np.where(is_pair, root, 0.0)
     # |1 + z|^2 - 1 without cancellation; of a pair, |x|^2 = q = 1 + total - product
     square = np.where(is_pair, total - product, real * (2.0 + real))
-    return 0.5 * np.log1p(square), np.arctan2(imaginary, 1.0 + real)
+    return 0.5 * on_arrays.log1p(square), on_arrays.atan2(imaginary, 1.0 + real)

@@ -21,6 +21,7 @@ from __future__ import annotations
 import numpy as np
 
 from vibsim.core.array_types import Flags, Floats
+from vibsim.elementary import on_arrays
 from vibsim.observe.common_grid import take
 from vibsim.observe.member_block import MemberBlock
 
@@ -32,7 +33,7 @@ def lines(series: Floats) -> Floats:
     """Return the amplitude of every line of series of shape (..., t), whose last sample is left out; (..., line)."""
     own = np.asarray(series, dtype=np.float64)[..., :-1]
     n = own.shape[-1]
-    window = 1.0 - np.cos(2.0 * np.pi / n * np.arange(n))
+    window = 1.0 - on_arrays.cos(2.0 * np.pi / n * np.arange(n))
     centred = own - np.mean(own, axis=-1, keepdims=True)
     return np.asarray(2.0 / n * np.abs(np.fft.rfft(window * centred, axis=-1)))
 

@@ -24,6 +24,7 @@ import numpy as np
 
 from vibsim.convergence.differences import safe_ratio
 from vibsim.core.array_types import Complexes, Floats
+from vibsim.elementary import on_arrays
 from vibsim.observe.common_grid import take
 from vibsim.observe.member_block import MemberBlock
 
@@ -50,7 +51,9 @@ def harmonic(block: MemberBlock, level: int, quantity: str, back: int = 0) -> Co
     own = take(block.grid, record, quantity)[..., stop - n - 1 : stop]
     angle = 2.0 * np.pi / n * np.arange(n + 1)
     weight = np.where((angle == 0.0) | (angle == angle[-1]), 1.0 / n, 2.0 / n)
-    real, imaginary = (np.sum(own * weight * f(angle), axis=-1) for f in (np.cos, np.sin))
+    real, imaginary = (
+        np.sum(own * weight * f(angle), axis=-1) for f in (on_arrays.cos, on_arrays.sin)
+    )
     return np.asarray(real - 1j * imaginary)
 
 
@@ -85,7 +88,8 @@ def amplitude(block: MemberBlock, level: int, quantity: str) -> Floats:
 
 def phase(block: MemberBlock, level: int, quantity: str) -> Floats:
     """Return the angle by which the harmonic lags behind ``cos(w t)`` [rad]."""
-    return np.asarray(-np.angle(harmonic(block, level, quantity)))
+    found = harmonic(block, level, quantity)
+    return np.asarray(-on_arrays.atan2(found.imag, found.real))
 
 
 def change(block: MemberBlock, level: int, quantity: str) -> Floats:

@@ -32,6 +32,7 @@ import numpy as np
 
 from vibsim.convergence.differences import total
 from vibsim.core.array_types import Floats, Integers
+from vibsim.elementary import on_arrays
 from vibsim.observe import thresholds as th
 
 NUMBERS_AT_A_TIME = 2**18  # numbers of one kind that are worked on at a time
@@ -173,24 +174,24 @@ def _fit_windows(
     radian, h = period[:, None] / (2 * math.pi), of.spacing[:, None]
     phi, slope = guess[rows, centre], np.zeros(centre.shape)
     rise, offset = (np.zeros(centre.shape) for _ in range(2))
-    alpha = 0.5 * np.log(_spread(u) / _spread(of.position[rows, places]))
+    alpha = 0.5 * on_arrays.log(_spread(u) / _spread(of.position[rows, places]))
     moves = np.full(centre.shape, np.inf)
     for _ in range(rounds):
         where = places + (phi + slope * s) / h
         there, speed = of.at(where)
         beyond = np.maximum(-where, where - last)
         weight = np.clip((th.BEYOND_THE_ENDS - beyond) / (0.5 * th.BEYOND_THE_ENDS), 0.0, 1.0)
-        left = (u - offset) * np.exp(-alpha - rise * s) - there
+        left = (u - offset) * on_arrays.exp(-alpha - rise * s) - there
         speed = speed * radian
         by = _least_squares([np.ones(u.shape), there, s * there, speed, s * speed], left, weight)
         # of a factor the whole of the change is taken, however large it is
         gain = np.maximum(by[1], -0.9)
-        offset = offset + by[0] * np.exp(alpha)
-        alpha, rise = alpha + np.log1p(gain), rise + by[2] / (1.0 + gain)
+        offset = offset + by[0] * on_arrays.exp(alpha)
+        alpha, rise = alpha + on_arrays.log1p(gain), rise + by[2] / (1.0 + gain)
         phi, slope = phi + by[3] * radian, slope + by[4] * radian
         moves = np.maximum(np.abs(by[1]) + np.abs(by[2]), np.abs(by[3]) + np.abs(by[4]))
     away = (at - centre) / (half * stride[:, None])
-    found = np.stack([phi + slope * away, np.expm1(alpha + rise * away)])
+    found = np.stack([phi + slope * away, on_arrays.expm1(alpha + rise * away)])
     return np.where(turns & (moves < th.LAST_ROUND_MOVES), found, np.nan)
 
 
@@ -240,7 +241,7 @@ def _guess(
     w = 2 * math.pi / period[:, None]
     middle = 0.5 * (np.max(of.position, axis=-1) + np.min(of.position, axis=-1))[:, None]
     turned, target = (
-        np.unwrap(np.arctan2(-v, w * (u - middle)), axis=-1)
+        np.unwrap(on_arrays.atan2(-v, w * (u - middle)), axis=-1)
         for u, v in ((position, velocity), (of.position, of.velocity))
     )
     found = np.zeros(position.shape)

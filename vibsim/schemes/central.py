@@ -41,6 +41,7 @@ from typing import Any
 
 from vibsim.core.array_types import Floats
 from vibsim.elementary import ELEMENTARY
+from vibsim.elementary.exponential import power
 from vibsim.models.base import Model
 from vibsim.schemes.base import (
     LOW_STARTS,
@@ -272,7 +273,9 @@ def orders(options: Options) -> Orders:
 
 def round_off(options: Options, steps: int) -> float:
     """Return the predicted round-off after `steps` steps, relative to the solution."""
-    return float(UNIT_ROUND_OFF * steps ** ARITHMETICS[str(options["arithmetic"])].growth)
+    return float(
+        UNIT_ROUND_OFF * power(float(steps), ARITHMETICS[str(options["arithmetic"])].growth)
+    )
 
 
 def even_powers(quantity: str, model: Model, options: Options) -> bool:

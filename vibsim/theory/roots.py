@@ -24,6 +24,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from vibsim.core.array_types import Complexes, Flags, Floats
+from vibsim.elementary import on_arrays
 from vibsim.schemes.base import Options, Scheme, Stepper
 from vibsim.theory.arithmetic import bairstow, characteristic
 from vibsim.theory.basis import UnitSteps, decimal, unit_steps
@@ -110,11 +111,11 @@ def dominant(stepper: Stepper, p: ArrayLike) -> tuple[Floats, Floats]:
     """
     found, steps = roots(stepper, p), np.asarray(p, dtype=float)
     with np.errstate(divide="ignore", over="ignore"):
-        other = np.log(found.parasitic)
+        other = on_arrays.log(found.parasitic)
         # parasitic roots are found to a few digits less than the principal pair
         is_other = (other - found.log_growth) * (2.0 * np.pi / steps) > _LARGER
         log_growth = np.where(is_other, other, found.log_growth)
-        factor = np.exp(log_growth * (2.0 * np.pi / steps))
+        factor = on_arrays.exp(log_growth * (2.0 * np.pi / steps))
     return factor, np.where(is_other, found.parasitic_angle, found.angle)
 
 
@@ -144,16 +145,17 @@ def _of_bytes(stepper: Stepper, p: bytes) -> tuple[NDArray[Any], ...]:
         is_complex = excess.high > 0
         angle = np.where(
             is_complex,
-            np.arctan2(root(excess).rounded, 0.5 * trace.rounded),
+            on_arrays.atan2(root(excess).rounded, 0.5 * trace.rounded),
             np.where(trace.high < 0, np.pi, 0.0),
         )
         larger = abs(trace) * 0.5 + root(-excess)
         rate = np.where(
             is_complex,
-            0.5 * np.log1p((determinant - 1.0).rounded),
-            np.log1p((larger - 1.0).rounded),
+            0.5 * on_arrays.log1p((determinant - 1.0).rounded),
+            on_arrays.log1p((larger - 1.0).rounded),
         )
-    columns = (rate, angle, is_complex, np.abs(other), np.abs(np.angle(other)))
+    of_other = on_arrays.complex_size(other), on_arrays.atan2(np.abs(other.imag), other.real)
+    columns = (rate, angle, is_complex, *of_other)
     for column in columns:
         column.flags.writeable = False
     return columns
@@ -199,7 +201,7 @@ def _eigenvalues(matrix: Doubled) -> Complexes:
 
 def _exact_pair(p: Floats) -> Complexes:
     """Return ``exp(+-i p)``, shape (k, 2)."""
-    return np.exp(1j * np.stack([p, -p], axis=-1))
+    return np.asarray(on_arrays.complex_exp(1j * np.stack([p, -p], axis=-1)))
 
 
 @lru_cache(maxsize=256)
@@ -281,7 +283,7 @@ def _largest(stepper: Stepper, p: Floats) -> Floats:
     """Return the logarithm of the largest root: it crosses 0 where `_grows` allows for rounding."""
     found = roots(stepper, p)
     with np.errstate(divide="ignore"):
-        return np.maximum(found.log_growth, np.log(found.parasitic))
+        return np.asarray(np.maximum(found.log_growth, on_arrays.log(found.parasitic)))
 
 
 def _grows(stepper: Stepper, p: Floats) -> Flags:

@@ -12,6 +12,7 @@ import numpy as np
 
 from vibsim.convergence.error_model import priors
 from vibsim.core.array_types import Floats, Integers
+from vibsim.elementary import on_arrays
 
 
 @dataclass(frozen=True)
@@ -91,13 +92,13 @@ def two_powers(signs: tuple[float, ...], promise: Promise | None) -> Terms:
             for distance, share, sign in product(distances, priors.SHARES, signs)
         ]
     lower, higher, share, log_prior = np.array(rows).T
-    return Terms(lower, higher, share, np.log(log_prior))
+    return Terms(lower, higher, share, on_arrays.log(log_prior))
 
 
 def pure(powers: tuple[float, ...]) -> Terms:
     """Return the hypotheses of one power."""
     p = np.array(powers)
-    return Terms(p, p, np.zeros(len(p)), np.full(len(p), -math.log(len(p))))
+    return Terms(p, p, np.zeros(len(p)), np.full(len(p), -on_arrays.log(len(p))))
 
 
 def between(levels: Floats) -> Floats:
@@ -168,7 +169,7 @@ def inverse(covariance: Floats) -> tuple[Floats, Floats]:
             row = row - lower[..., i, j, None] * inverted[..., j, :]
         lower[..., i, i] = np.sqrt(np.maximum(rest, ROUNDED))
         inverted[..., i, :] = row / lower[..., i, i, None]
-        log_det = log_det + 2.0 * np.log(lower[..., i, i] * scale[..., i])
+        log_det = log_det + 2.0 * on_arrays.log(lower[..., i, i] * scale[..., i])
     precision = sum(outer(inverted[..., i, :], inverted[..., i, :]) for i in range(w))
     return precision / outer(scale, scale), log_det
 
@@ -182,8 +183,10 @@ def _sizes(terms: Terms, sizes: Floats) -> tuple[Floats, Floats, Floats]:
 
     Sizes are over that of the finest level of the window; the share is that at the same level.
     """
-    first = sizes ** terms.lower[:, None]
-    second = np.where(terms.share[:, None] == 0.0, 0.0, sizes ** terms.higher[:, None])
+    first = on_arrays.power(sizes, terms.lower[:, None])
+    second = np.where(
+        terms.share[:, None] == 0.0, 0.0, on_arrays.power(sizes, terms.higher[:, None])
+    )
     return first, second, first**2 + (terms.share[:, None] * second) ** 2
 
 
@@ -234,7 +237,7 @@ def _table(
     dimensions = [(n, n if beside is None else 1) for n in (1, 2)]
     roots = np.stack(
         [
-            np.exp((2.0 / d * terms.log_prior - log_det - (n - d) * log_det_beside) / w)
+            on_arrays.exp((2.0 / d * terms.log_prior - log_det - (n - d) * log_det_beside) / w)
             for n, d in dimensions
         ]
     )
@@ -247,7 +250,7 @@ def _table(
     )
     # tr(K^-1 G) is at least the square of the last row over its variance
     last = signal[:, -1, -1] + np.sum(variance[:, -2:], axis=-1)
-    limit = np.log(np.sum((roots * last) ** exponents, axis=1))
+    limit = on_arrays.log(np.sum(on_arrays.power(roots * last, exponents), axis=1))
     table = Table(np.ascontiguousarray(forms), columns, pair, groups, bounds, limit)
     if beside is None or precision_beside is None:
         return table
@@ -292,7 +295,8 @@ def _bounds(
     )
     noise = noise_of_rows(np.maximum.reduceat(variance / t[:, None], start, axis=0))
     precision, _ = inverse(signal + noise)
-    root = np.add.reduceat((roots * t) ** exponents, start, axis=1) ** (1.0 / exponents)
+    root = np.add.reduceat(on_arrays.power(roots * t, exponents), start, axis=1)
+    root = on_arrays.power(root, 1.0 / exponents)
     return np.ascontiguousarray(np.concatenate([root, form(precision).T]))
 
 
@@ -397,10 +401,11 @@ def hypotheses_of(sizes: tuple[float, ...], promise: Promise | None) -> Hypothes
 
 def _limit_of_any_power(sizes: Floats) -> Floats:
     """Return `Hypotheses.any_power`, read off closely spaced powers."""
-    errors = sizes ** np.arange(priors.BIN, priors.HIGHEST + priors.AROUND[-1], priors.BIN)[:, None]
+    powers = np.arange(priors.BIN, priors.HIGHEST + priors.AROUND[-1], priors.BIN)
+    errors = on_arrays.power(sizes, powers[:, None])
     c = between(errors)
     covariance = outer(c, c) + noise_of_rows((priors.MISFIT * errors) ** 2)
     _, log_det = inverse(covariance)
-    largest = np.max(c.shape[-1] * np.log(covariance[:, -1, -1]) - log_det)
+    largest = np.max(c.shape[-1] * on_arrays.log(covariance[:, -1, -1]) - log_det)
     prior = priors.OTHER_PRIOR / priors.HIGHEST * np.sum(np.gradient(priors.AROUND))
-    return np.array([math.log(2.0 * prior) + 0.5 * n * largest for n in (1, 2)])
+    return np.array([on_arrays.log(2.0 * prior) + 0.5 * n * largest for n in (1, 2)])

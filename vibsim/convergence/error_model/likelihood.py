@@ -13,6 +13,7 @@ from vibsim.convergence.error_model import priors
 from vibsim.convergence.error_model.hypotheses import Table, outer, packed
 from vibsim.convergence.error_model.kernel import weigh
 from vibsim.core.array_types import Floats, Integers
+from vibsim.elementary import on_arrays
 
 TINY = 1e-300
 """Less is nothing."""
@@ -27,21 +28,31 @@ def log_gamma(n: Floats) -> Floats:
 
 @lru_cache
 def _log_gammas(count: int) -> Floats:
-    return np.array([math.inf, *(math.lgamma(0.5 * n) for n in range(1, count))])
+    found = np.array([math.inf, 0.5 * on_arrays.log(np.pi), *np.zeros(count - 2)])
+    # log Gamma(x + 1) = log Gamma(x) + log x
+    steps = on_arrays.log(0.5 * np.arange(1.0, count - 2.0))
+    for start in (1, 2):
+        found[start + 2 :: 2] = found[start] + np.cumsum(steps[start - 1 :: 2])
+    return found
 
 
 def scale_free(trace: Floats, log_det: Floats | float, points: Floats, rows: int) -> Floats:
     """Return the evidence of rows of any size; see `vibsim.convergence.error_model`."""
     n = points * rows
     return np.asarray(
-        math.log(0.5) + log_gamma(n) - 0.5 * n * np.log(np.pi * trace) - 0.5 * points * log_det
+        on_arrays.log(0.5)
+        + log_gamma(n)
+        - 0.5 * n * on_arrays.log(np.pi * trace)
+        - 0.5 * points * log_det
     )
 
 
 def log_sum(logs: Floats) -> Floats:
     """Return the log of the sum of exponentials over the last axis."""
     largest = np.max(logs, axis=-1)
-    return np.asarray(largest + np.log(np.sum(np.exp(logs - largest[..., None]), axis=-1)))
+    return np.asarray(
+        largest + on_arrays.log(np.sum(on_arrays.exp(logs - largest[..., None]), axis=-1))
+    )
 
 
 class WindowRows(NamedTuple):
@@ -69,9 +80,9 @@ def window_rows(gram: Floats, points: Floats, *, split: bool) -> WindowRows:
     # one dimension along the last row, which may have any direction, and the others across it, of a Student's t, of
     # which numbers have nothing
     free, one = (points - 1.0) * (w - 1), np.ones_like(points)
-    rest = math.log(2.0) + 0.5 * np.log(last) + scale_free(last, 0.0, points, 1)
-    rest += log_gamma(free + priors.TAIL) - math.lgamma(0.5 * priors.TAIL)
-    rest -= 0.5 * free * np.log(np.pi * last / points)
+    rest = on_arrays.LN_2 + 0.5 * on_arrays.log(last) + scale_free(last, 0.0, points, 1)
+    rest += log_gamma(free + priors.TAIL) - log_gamma(np.array(priors.TAIL))
+    rest -= 0.5 * free * on_arrays.log(np.pi * last / points)
     powers = np.stack([one * w, (free + priors.TAIL) * (free > 0.0)], axis=-1).astype(np.int64)
     along = outer(relative[:, -1], relative[:, -1])
     read = np.where(points[:, None, None] > 1.0, along, relative)
@@ -93,7 +104,7 @@ def highest(table: Table, read: WindowRows) -> Floats:
     if table.beside_bounds is not None:
         bounds = np.min(table.beside_bounds, axis=0)
         least = np.sum(read.squares * bounds, axis=-1) * read.points
-        found -= 0.5 * read.powers[:, 1] * np.log1p(least)
+        found -= 0.5 * read.powers[:, 1] * on_arrays.log1p(least)
     return np.asarray(found)
 
 
@@ -119,7 +130,7 @@ def weights(
     beside, bounds = (_NONE if x is None else x for x in (table.beside, table.beside_bounds))
     pairs, size = int(table.pair[-1]) + 1, len(table.pair)
     found = np.empty((count, 3 + w + 3 * pairs))
-    smallest = np.exp(np.clip((least - read.whole) / half, -600.0, 600.0))
+    smallest = on_arrays.exp(np.clip((least - read.whole) / half, -600.0, 600.0))
     weigh()(
         read.gram, read.read, read.points, read.powers, smallest, read.across, behind,
         table.forms, beside, bounds, table.columns, table.pair, table.groups, table.bounds, pairs,
@@ -128,7 +139,7 @@ def weights(
     # rows that are nowhere near any hypothesis have no weight at all
     none = found[:, 1] <= 0.0
     top, total = np.where(none, 1.0, found[:, 0]), np.where(none, 1.0, found[:, 1])
-    log = np.where(none, -np.inf, read.whole + half * np.log(top) + np.log(total))
+    log = np.where(none, -np.inf, read.whole + half * on_arrays.log(top) + on_arrays.log(total))
     found[:, 2:] /= total[:, None]
     pair_weights = found[:, 3 + w :].reshape(count, 3, pairs)
     return log, pair_weights, found[:, 3 : 3 + w], found[:, 2] * read.last
@@ -164,7 +175,7 @@ def single_power(
     squares = np.zeros((len(gram), levels, levels))
     squares[:, :w, :w] = gram[:, ::-1, ::-1].cumsum(axis=1).cumsum(axis=2)[:, ::-1, ::-1]
     # a and 1/a, a level each
-    a = [sizes[k] ** powers for k in every]
+    a = [on_arrays.power(sizes[k], powers) for k in every]
     b = [1.0 / x for x in a]
 
     def square(x: list[Floats]) -> Floats:
@@ -175,7 +186,11 @@ def single_power(
 
     trace = (sum(squares[:, k, k, None] * b[k] ** 2 for k in every) - square(b) / (m + levels)) / m
     product = np.prod(sizes[:levels])
-    log_det = levels * math.log(m) + math.log(1.0 + levels / m) + 2.0 * powers * math.log(product)
+    log_det = (
+        levels * on_arrays.log(m)
+        + on_arrays.log(1.0 + levels / m)
+        + 2.0 * powers * on_arrays.log(product)
+    )
     gains, spread = np.zeros((*powers.shape, w)), np.zeros_like(powers)
     if not known:
         # any limit will do: K^-1 1, and its sum
@@ -183,7 +198,7 @@ def single_power(
         of_limit = [(x**2 - x * mean) / m for x in b]
         whole = sum(of_limit)
         trace = trace - square(of_limit) / whole
-        log_det = log_det + np.log(whole)
+        log_det = log_det + on_arrays.log(whole)
         of_levels = [x / (m + levels) - y * mean / whole for x, y in zip(b, of_limit, strict=True)]
         gains = np.cumsum(np.stack(of_levels[:w], axis=-1), axis=-1)
         left = m / (m + levels) + mean**2 / whole
@@ -202,9 +217,11 @@ def any_size(gram: Floats, points: Floats) -> Floats:
     found = []
     for part in priors.COHERENCES:
         variance = part**2 * own[:, :-1] / n
-        log = -0.5 * (n - 1.0) * np.log(2.0 * np.pi * variance) - 0.5 * np.log(own[:, :-1])
+        log = -0.5 * (n - 1.0) * on_arrays.log(2.0 * np.pi * variance) - 0.5 * on_arrays.log(
+            own[:, :-1]
+        )
         found.append(log - np.where(n > 1.0, 0.5 * np.maximum(across, 0.0) / variance, 0.0))
-    log = log_sum(np.stack(found, axis=-1)) + math.log(0.5 / len(found))
+    log = log_sum(np.stack(found, axis=-1)) + on_arrays.log(0.5 / len(found))
     return np.concatenate([log, scale_free(own[:, -1:], 0.0, n, 1)], axis=-1)
 
 
@@ -226,22 +243,25 @@ def noise(sizes: Floats, gram: Floats, points: Floats, floor: Floats) -> Floats:
         levels[:, 1:, 1:] = gram.cumsum(axis=1).cumsum(axis=2)
     found = []
     for growth in priors.GROWTHS:
-        variance = (sizes / sizes[-1]) ** (-2.0 * growth)
-        weights, log_det = 1.0 / variance, np.sum(np.log(variance))
+        variance = on_arrays.power(sizes / sizes[-1], -2.0 * growth)
+        weights, log_det = 1.0 / variance, np.sum(on_arrays.log(variance))
         own = levels[:, : len(sizes), : len(sizes)]
         trace = np.sum(np.diagonal(own, axis1=1, axis2=2) * weights, axis=-1)
         if not known:
             trace -= np.sum(own * outer(weights, weights), axis=(1, 2)) / np.sum(weights)
-            log_det += np.log(np.sum(weights))
+            log_det += on_arrays.log(np.sum(weights))
         trace = np.maximum(trace, TINY)
-        size = 0.5 * np.log10(trace / count) - np.log10(np.maximum(floor[:, -1], TINY))
-        decades = size / math.log10(priors.PREDICTION)
-        expected = -0.5 * decades**2 - math.log(
-            math.sqrt(2.0 * np.pi) * math.log(priors.PREDICTION)
+        size = 0.5 * on_arrays.log10(trace / count) - on_arrays.log10(
+            np.maximum(floor[:, -1], TINY)
         )
-        of_size = np.logaddexp(expected, math.log(priors.UNEXPECTED) - priors.PRICE)
+        decades = size / on_arrays.log10(priors.PREDICTION)
+        expected = -0.5 * decades**2 - on_arrays.log(
+            math.sqrt(2.0 * np.pi) * on_arrays.log(priors.PREDICTION)
+        )
+        unexpected = np.full_like(expected, on_arrays.log(priors.UNEXPECTED) - priors.PRICE)
+        of_size = log_sum(np.stack([expected, unexpected], axis=-1))
         found.append(scale_free(trace, log_det, points, count) + of_size)
-    return log_sum(np.stack(found, axis=-1)) - math.log(len(found))
+    return np.asarray(log_sum(np.stack(found, axis=-1)) - on_arrays.log(len(found)))
 
 
 def noise_of_finest(floor: Floats, last: Floats) -> tuple[Floats, Floats]:
@@ -251,5 +271,5 @@ def noise_of_finest(floor: Floats, last: Floats) -> tuple[Floats, Floats]:
     """
     share = floor / np.sqrt(np.maximum(last, TINY))
     noisy = np.clip(share / (0.3 * priors.FINEST_NOISE[1]), priors.UNEXPECTED, 0.999)
-    drowned = np.where(share > 1.0, math.log(priors.UNEXPECTED) - priors.PRICE, 0.0)
-    return np.log(1.0 - noisy) + drowned, np.log(noisy) + drowned
+    drowned = np.where(share > 1.0, on_arrays.log(priors.UNEXPECTED) - priors.PRICE, 0.0)
+    return on_arrays.log(1.0 - noisy) + drowned, on_arrays.log(noisy) + drowned

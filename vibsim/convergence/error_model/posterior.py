@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
 
@@ -32,6 +31,7 @@ from vibsim.convergence.error_model.likelihood import (
     window_rows,
 )
 from vibsim.core.array_types import Flags, Floats, Integers
+from vibsim.elementary import on_arrays
 
 LEFT_OUT = 1e-11
 """Part of all evidence that may be left out: bounds of errors change by less than a digit, probabilities not at all."""
@@ -168,7 +168,10 @@ class _Fit:
         ]
         # half of what may be left out is that of whole tables, half that of single hypotheses
         part = 0.5 * left_out / len(self.windows)
-        self.of_table, self.of_one = math.log(part / TABLES), math.log(part / MOST_HYPOTHESES)
+        self.of_table, self.of_one = (
+            on_arrays.log(part / TABLES),
+            on_arrays.log(part / MOST_HYPOTHESES),
+        )
         # rounding is part of every row; that of a level is relative to what differs from there on
         squares = np.diagonal(ladder.gram, axis1=1, axis2=2)[:, : n - 1]
         largest = np.maximum.accumulate(squares[:, ::-1], axis=-1)[:, ::-1]
@@ -217,10 +220,12 @@ class _Fit:
         shapes = self.points > 1.0
         own = np.where(shapes, priors.OWN_SHAPE, 0.0)
         with np.errstate(divide="ignore"):
-            one, several = (noisy[0] + np.log(priors.JITTER_PRIOR * x) for x in (1.0 - own, own))
-            alike = noisy[0] + np.log(priors.ONE_SHAPE * shapes)
+            one, several = (
+                noisy[0] + on_arrays.log(priors.JITTER_PRIOR * x) for x in (1.0 - own, own)
+            )
+            alike = noisy[0] + on_arrays.log(priors.ONE_SHAPE * shapes)
         tables += [
-            (table, one + math.log(p))
+            (table, one + on_arrays.log(p))
             for table, p in zip(of_window.factors, priors.JITTER_PRIORS, strict=True)
         ]
         tables += [(of_window.factors_with_shape, several), (of_window.one_shape, alike)]
@@ -229,12 +234,12 @@ class _Fit:
             self.add_table(index, table, prior, read, behind)
         self.add_any_power(index, sizes, inside, behind, noisy[0], of_window.any_power)
         for i, table in enumerate(of_window.alternating):
-            prior = noisy[i] + math.log(priors.ALTERNATING)
+            prior = noisy[i] + on_arrays.log(priors.ALTERNATING)
             self.add_table(index, table, prior, read, behind[:, :0], name="alternating")
 
     def matters(self, most: Floats) -> tuple[Rows, Floats]:
         """Return the ladders of which a table with evidence up to this may matter, and what hypothesis would not."""
-        whole = self.unit + np.log(self.total)
+        whole = self.unit + on_arrays.log(self.total)
         keep = most > whole + self.of_table
         return slice(None) if np.all(keep) else np.flatnonzero(keep), whole + self.of_one
 
@@ -265,7 +270,7 @@ class _Fit:
 
     def weight(self, rows: Rows, log: Floats, name: str) -> Floats:
         """Add hypotheses of some ladders to a sum, and return their weights."""
-        found = np.exp(np.minimum(log - self.unit[rows], LARGEST_LOG))
+        found = on_arrays.exp(np.minimum(log - self.unit[rows], LARGEST_LOG))
         self.total[rows] += found
         if name != "window":
             self.values[name][rows] += found
@@ -298,11 +303,11 @@ class _Fit:
         """
         sizes, floor = self.ladder.h[end - 1 :] / self.ladder.h[end], self.ladder.floor[:, end:]
         order = np.clip(self.orders[:, end - 2, None], priors.POWERS[0], priors.HIGHEST)
-        falls = between(sizes**order)
+        falls = between(on_arrays.power(sizes, order))
         own = np.sqrt(np.diagonal(self.differences, axis1=1, axis2=2)[:, end - 1 :])
         expected = np.maximum(own[:, :1] * falls[:, 1:] / falls[:, :1], TINY)
         largest = np.max(own[:, 1:], axis=-1, initial=0.0)
-        hidden = np.fmin(np.log(np.maximum(largest, floor[:, 0])[:, None] / expected), 0.0)
+        hidden = np.fmin(on_arrays.log(np.maximum(largest, floor[:, 0])[:, None] / expected), 0.0)
         rows = self.differences[:, end:, end:]
         return noise(self.ladder.h[end:], rows, self.points, floor), self.points * np.sum(
             hidden, axis=-1
@@ -367,11 +372,11 @@ class _Fit:
         log, gains, squares = single_power(
             sizes, np.maximum(order[:, None] + priors.AROUND, TINY), inside, points
         )
-        log += np.log(priors.OTHER_PRIOR / priors.HIGHEST * np.gradient(priors.AROUND))
+        log += on_arrays.log(priors.OTHER_PRIOR / priors.HIGHEST * np.gradient(priors.AROUND))
         total = log_sum(log)
         path, squared = np.zeros((len(order), w)), np.zeros(len(order))
         if not self.ladder.exact_known:
-            weight = np.exp(log - total[:, None])
+            weight = on_arrays.exp(log - total[:, None])
             rest = behind[rows] * inside[:, -1:, -1]
             path = -np.sum(weight[..., None] * gains, axis=1)
             squares += rest[:, -1:] - 2.0 * np.sum(gains * rest[:, None, :-1], axis=-1)

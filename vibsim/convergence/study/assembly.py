@@ -16,6 +16,7 @@ from vibsim.convergence.study.verdict import LadderVerdict, Level
 from vibsim.convergence.thresholds import GCI_TRUSTED
 from vibsim.core.array_types import Floats
 from vibsim.core.vocabulary import ORDER_TOLERANCE, REASONS
+from vibsim.elementary import on_arrays
 
 ROUNDING_SAID = 0.1
 """The rounding of printed digits is spoken of where it is so large a part of the bound of the error."""
@@ -124,7 +125,7 @@ def _gci(one: Outcome, h: Floats) -> float:
     ratio = h[one.finite[-2]] / h[one.finite[-1]]
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         relative = np.abs(one.differences[-1]) / np.float64(one.size)
-        return float(GCI_TRUSTED * relative / np.expm1(one.order * np.log(ratio)))
+        return float(GCI_TRUSTED * relative / on_arrays.expm1(one.order * on_arrays.log(ratio)))
 
 
 def _table(one: Outcome, h: Floats) -> Iterator[Level]:

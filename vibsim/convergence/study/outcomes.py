@@ -22,6 +22,7 @@ from vibsim.convergence.thresholds import (
 )
 from vibsim.core.array_types import Flags, Floats, Integers
 from vibsim.core.vocabulary import REASON_NAMES
+from vibsim.elementary import on_arrays
 
 FEWEST = 3
 """Levels that show an order."""
@@ -259,7 +260,7 @@ def _estimate(one: Outcome, h: Floats, decided: Assessment, k: int) -> tuple[flo
             order, last = float(orders[first]), first + 2
     if not np.isfinite(weights).all() and order >= LEAST_WITH_LIMIT:
         fine = last if last > 0 else len(h) - 1
-        part = 1.0 / np.expm1(order * np.log(h[fine - 1] / h[fine]))
+        part = 1.0 / on_arrays.expm1(order * on_arrays.log(h[fine - 1] / h[fine]))
         weights = np.zeros(len(h))
         weights[[fine - 1, fine]] = -part, 1.0 + part
     return order, slice(first, last + 1), weights

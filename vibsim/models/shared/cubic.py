@@ -22,6 +22,7 @@ from typing import Any
 import numpy as np
 
 from vibsim.core.array_types import Floats
+from vibsim.elementary import on_arrays
 from vibsim.models.shared.elliptic import agm_quarter_period, jacobi
 from vibsim.models.shared.linear_motion import damped_motion
 
@@ -122,7 +123,7 @@ def _dn(
     # slope = S cos(2 phi) and sqrt(2 beta) |v| = S sin(2 phi), where sn = sin(phi): from d = u/A neither sn near the
     # outer turning point nor cn near the inner one would have a digit
     swing = np.sqrt(2.0 * beta) * np.abs(v)
-    both = np.hypot(slope, swing)  # S
+    both = on_arrays.hypot(slope, swing)  # S
     large = np.sqrt(0.5 + 0.5 * np.abs(slope) / both)
     small = 0.5 * swing / (both * large)
     s = np.where(slope > 0.0, small, large)[:, None]

@@ -23,6 +23,7 @@ from typing import Any
 import numpy as np
 
 from vibsim.core.array_types import Flags, Floats
+from vibsim.elementary import on_arrays
 from vibsim.models.base import Numbers
 
 _MEANS = ((0.1, 5), (1e-5, 6), (1e-11, 7), (1e-30, 8), (0.0, 12))
@@ -92,7 +93,7 @@ def jacobi(u: Floats, complement: Floats) -> tuple[Floats, Floats, Floats, Float
     each = np.broadcast_to(complement, u.shape)
     sn, cn, dn, turns = (x.reshape(u.shape) for x in _reduced(u.reshape(-1, 1), each.reshape(-1)))
     sign = _sign(turns)
-    return sign * sn, sign * cn, dn, np.arctan2(sn, cn) + np.pi * turns
+    return sign * sn, sign * cn, dn, on_arrays.atan2(sn, cn) + np.pi * turns
 
 
 def _sign(half_turns: Floats) -> Floats:
@@ -112,8 +113,8 @@ def _reduced(u: Floats, complement: Floats) -> tuple[Floats, Floats, Floats, Flo
     if separatrix.any():
         # K is infinite, and there is no half period
         at = u[separatrix]
-        sech = 1.0 / np.cosh(np.clip(at, -700.0, 700.0))
-        found[:, separatrix] = np.tanh(at), sech, sech, np.zeros_like(at)
+        sech = 1.0 / on_arrays.cosh(np.clip(at, -700.0, 700.0))
+        found[:, separatrix] = on_arrays.tanh(at), sech, sech, np.zeros_like(at)
     sn, cn, dn, turns = found
     return sn, cn, dn, turns
 
@@ -129,7 +130,7 @@ def _general(u: Floats, complement: Floats, steps: int) -> tuple[Floats, ...]:
     half_turns = np.rint(u / period)
     u = u - period * half_turns
     angle = u * a[:, None]
-    sin, cos = np.sin(angle), np.cos(angle)
+    sin, cos = on_arrays.sin(angle), on_arrays.cos(angle)
     small = np.abs(sin) < 1e-100  # sn u = u to the last digit, and 1/u would soon overflow
     ratio = cos / np.where(small, 1.0, sin)
     c, dn = a[:, None] * ratio, np.ones_like(u)
@@ -153,8 +154,8 @@ def _energy(initial: Numbers, parameters: Numbers) -> tuple[Floats, ...]:
     turns = np.rint(theta / (2.0 * np.pi))
     half = 0.5 * (theta - 2.0 * np.pi * turns)
     speed = omega / (2.0 * w)
-    cosine = np.cos(half)
-    return w, turns, np.sin(half), cosine, speed, (cosine - speed) * (cosine + speed)
+    cosine = on_arrays.cos(half)
+    return w, turns, on_arrays.sin(half), cosine, speed, (cosine - speed) * (cosine + speed)
 
 
 def pendulum_motion(t: Floats, initial: Numbers, parameters: Numbers) -> dict[str, Floats]:
@@ -169,7 +170,7 @@ def pendulum_motion(t: Floats, initial: Numbers, parameters: Numbers) -> dict[st
     rows = (*shape[:-1], 1)
     w, turns, sine, cosine, speed, complement = (np.broadcast_to(x, rows).ravel() for x in start)
     t = np.broadcast_to(t, shape).reshape(-1, shape[-1])
-    k = np.hypot(sine, speed)
+    k = on_arrays.hypot(sine, speed)
     theta, omega = np.empty_like(t, order="C"), np.empty_like(t, order="C")
     swings = complement >= 0.0
     for move, mask in ((_libration, swings), (_rotation, ~swings)):
@@ -188,7 +189,7 @@ def _libration(t: Floats, *start: Floats) -> tuple[Floats, Floats]:
     phase = _incomplete(sine / size, speed / size, complement)
     sn, cn, dn, half = _reduced(w[:, None] * t + phase[:, None], complement)
     sign = _sign(half)
-    return 2.0 * np.arctan2(k[:, None] * (sign * sn), dn), (2.0 * w * k)[:, None] * (sign * cn)
+    return 2.0 * on_arrays.atan2(k[:, None] * (sign * sn), dn), (2.0 * w * k)[:, None] * (sign * cn)
 
 
 def _rotation(t: Floats, *start: Floats) -> tuple[Floats, Floats]:
@@ -198,7 +199,7 @@ def _rotation(t: Floats, *start: Floats) -> tuple[Floats, Floats]:
     inverse = -complement / (k * k)  # 1 - 1/k^2
     phase = _incomplete(sign * sine, cosine, inverse)
     sn, cn, dn, half = _reduced((w * k)[:, None] * t + phase[:, None], inverse)
-    amplitude = np.arctan2(sn, cn) + np.pi * half
+    amplitude = on_arrays.atan2(sn, cn) + np.pi * half
     return (2.0 * sign)[:, None] * amplitude, (2.0 * sign * w * k)[:, None] * dn
 
 
@@ -208,7 +209,7 @@ def pendulum_period(initial: Numbers, parameters: Numbers) -> Any:
     Infinite on the separatrix; NaN at rest. Units of time of the parameters; the shape of the arguments.
     """
     w, _, sine, _, speed, complement = _energy(initial, parameters)
-    k = np.hypot(sine, speed)
+    k = on_arrays.hypot(sine, speed)
     swings = complement >= 0.0
     with np.errstate(invalid="ignore", over="ignore"):
         quarter = agm_quarter_period(

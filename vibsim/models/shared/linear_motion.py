@@ -11,6 +11,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from vibsim.core.array_types import Complexes, Floats
+from vibsim.elementary import on_arrays
+from vibsim.elementary.on_arrays import complex_exp, complex_expm1, complex_product, complex_size
 from vibsim.formula import Binary, Call, Expression, Negate, derivative, literal, values
 from vibsim.models.base import Numbers, State
 
@@ -42,7 +44,7 @@ def harmonic(states: tuple[State, State], frequency: Callable[[Numbers], Any]) -
 
 def motion(t: Floats, w: Any, u_0: Any, v_0: Any) -> tuple[Floats, Floats]:
     """Return position and velocity at times `t`: vibration text (B), equation (2), for any initial velocity."""
-    cos, sin = np.cos(w * t), np.sin(w * t)
+    cos, sin = on_arrays.cos(w * t), on_arrays.sin(w * t)
     return u_0 * cos + v_0 / w * sin, v_0 * cos - u_0 * w * sin
 
 
@@ -65,17 +67,20 @@ def damped_motion(
     with np.errstate(all="ignore"):
         square = stiffness - half * half
         q = np.sqrt(np.abs(square))
-        decay = np.exp(-half * t)
+        decay = on_arrays.exp(-half * t)
         # half - q and half + q: the smaller one from their product, without cancellation
         large = half + np.copysign(q, half)
         small_rate = stiffness / large
         least, most = np.minimum(large, small_rate), np.maximum(large, small_rate)
-        fast, slow = np.exp(-most * t), np.exp(-least * t)
+        fast, slow = on_arrays.exp(-most * t), on_arrays.exp(-least * t)
         angle = q * t
         # sin(x)/x and its hyperbolic twin are 1 where the damping is critical
         small = np.abs(angle) < 1e-8
-        even, wave = decay * np.cos(angle), np.where(small, decay * t, decay * np.sin(angle) / q)
-        loss = np.expm1(-2.0 * angle)
+        even, wave = (
+            decay * on_arrays.cos(angle),
+            np.where(small, decay * t, decay * on_arrays.sin(angle) / q),
+        )
+        loss = on_arrays.expm1(-2.0 * angle)
         rise = np.where(small, decay * t, -0.5 * slow * loss / q)
         # C + half S and C - half S: above critical damping one of them cancels as a sum
         is_near, width = 2.0 * angle < 1.0, 2.0 * q
@@ -125,7 +130,7 @@ def _is_small_power(exponent: Expression) -> bool:
 def _product(one: list[Term], other: list[Term]) -> list[Term]:
     if len(one) * len(other) > MOST_TERMS:
         raise ValueError("too many exponentials")
-    return [(a * b, p + q) for a, p in one for b, q in other]
+    return [(complex_product(a, b), p + q) for a, p in one for b, q in other]
 
 
 def _of_function(function: str, argument: Expression, numbers: Mapping[str, Any]) -> list[Term]:
@@ -135,12 +140,15 @@ def _of_function(function: str, argument: Expression, numbers: Mapping[str, Any]
     start = values(argument, {**numbers, "t": 0.0})
     rate = values(speed, numbers)
     if function == "exp":
-        return [(np.exp(start) + 0j, rate + 0j)]
+        return [(on_arrays.exp(start) + 0j, rate + 0j)]
     if function in ("sinh", "cosh"):
         sign = 0.5 if function == "cosh" else -0.5
-        return [(0.5 * np.exp(start) + 0j, rate + 0j), (sign * np.exp(-start) + 0j, -rate + 0j)]
+        return [
+            (0.5 * on_arrays.exp(start) + 0j, rate + 0j),
+            (sign * on_arrays.exp(-start) + 0j, -rate + 0j),
+        ]
     # of a pair of conjugates one does: only the real part of the answer is taken
-    turned = np.exp(1j * start) * (1.0 if function == "cos" else -1j)
+    turned = complex_product(complex_exp(1j * start), 1.0 if function == "cos" else -1j)
     return [(0.5 * turned, 1j * rate), (0.5 * np.conj(turned), -1j * rate)]
 
 
@@ -179,9 +187,10 @@ def forced_motion(
     with np.errstate(all="ignore"):
         for c, s in terms:
             a, b, e = large * t, small * t, s * t
-            u = u + np.real(c * t * t * divided_twice(a, b, e))
+            u = u + np.real(complex_product(c * t * t, divided_twice(a, b, e)))
             # u' - l u is the answer of the first-order equation that is left; the smaller root cancels less
-            v = v + np.real(c * t * (divided(a, e) + b * divided_twice(a, b, e)))
+            rest = divided(a, e) + complex_product(b, divided_twice(a, b, e))
+            v = v + np.real(complex_product(c * t, rest))
     return np.asarray(u), np.asarray(v)
 
 
@@ -192,13 +201,14 @@ def divided(a: Any, b: Any) -> Complexes:
     most, gap = np.where(is_first, a, b), np.where(is_first, a - b, b - a)
     is_zero = gap == 0.0
     safe = np.where(is_zero, 1.0, gap)
-    return np.asarray(np.exp(most) * np.where(is_zero, 1.0, -np.expm1(-safe) / safe))
+    quotient = np.where(is_zero, 1.0, -complex_expm1(-safe) / safe)
+    return np.asarray(complex_product(complex_exp(most), quotient))
 
 
 def divided_twice(a: Any, b: Any, c: Any) -> Complexes:
     """Return the second divided difference of the exponential at three complex numbers, which may coincide."""
     a, b, c = np.broadcast_arrays(a, b, c)
-    ab, bc, ca = np.abs(a - b), np.abs(b - c), np.abs(c - a)
+    ab, bc, ca = complex_size(a - b), complex_size(b - c), complex_size(c - a)
     # the two that are farthest apart: the difference of their quotients loses no digits
     order = [(ab >= bc) & (ab >= ca), bc >= ca]
     first, last, middle = (
@@ -218,15 +228,16 @@ def _close(a: Complexes, b: Complexes, c: Complexes) -> Complexes:
     mean = (a + b + c) / 3.0
     x, y, z = a - mean, b - mean, c - mean
     # 1 - e1 X + e2 X^2 - e3 X^3 generates 1/sum h_k X^k, with e1 = 0
-    e2, e3 = x * y + y * z + z * x, x * y * z
+    xy = complex_product(x, y)
+    e2, e3 = xy + complex_product(y + x, z), complex_product(xy, z)
     h = [np.ones_like(mean), np.zeros_like(mean), -e2]
     total = h[0] / 2.0 + h[2] / 24.0
     factorial = 24.0
     for k in range(3, SERIES_TERMS):
-        h.append(-e2 * h[k - 2] + e3 * h[k - 3])
+        h.append(complex_product(e3, h[k - 3]) - complex_product(e2, h[k - 2]))
         factorial *= k + 2
         total = total + h[k] / factorial
-    return np.asarray(np.exp(mean) * total)
+    return np.asarray(complex_product(complex_exp(mean), total))
 
 
 class Swings(NamedTuple):
@@ -249,9 +260,9 @@ def swings(w: Any, c: Any, u_0: Any, v_0: Any) -> Swings:
     sticks = np.abs(u_0) <= c
     direction = np.where(v_0 == 0, np.where(sticks, 0.0, -np.sign(u_0)), np.sign(v_0))
     away = u_0 + direction * c
-    radius = np.where(direction == 0, 0.0, np.hypot(away, v_0 / w))
+    radius = np.where(direction == 0, 0.0, on_arrays.hypot(away, v_0 / w))
     # the velocity vanishes where the oscillation is at its end on the side of `direction`
-    start = np.arctan2(np.abs(v_0) / w, direction * away)
+    start = on_arrays.atan2(np.abs(v_0) / w, direction * away)
     turn = np.where(direction == 0, u_0, direction * (radius - c))
     with np.errstate(divide="ignore", invalid="ignore"):
         count = np.ceil((np.abs(turn) - c) / (2.0 * c))
@@ -274,12 +285,12 @@ def friction_motion(t: Floats, w: Any, c: Any, u_0: Any, v_0: Any) -> tuple[Floa
         side = np.sign(s.turn) * np.where(done % 2 == 0, 1.0, -1.0)
         # a piece that begins at rest at x slides towards the origin, about -s c = sign(x) c
         late = phase - s.angle - np.pi * done
-        u = side * (c + (size - c) * np.cos(late))
-        v = -side * (size - c) * w * np.sin(late)
+        u = side * (c + (size - c) * on_arrays.cos(late))
+        v = -side * (size - c) * w * on_arrays.sin(late)
         first = phase < s.angle
         early = phase - s.angle
-        u = np.where(first, s.direction * (s.radius * np.cos(early) - c), u)
-        v = np.where(first, -s.direction * s.radius * w * np.sin(early), v)
+        u = np.where(first, s.direction * (s.radius * on_arrays.cos(early) - c), u)
+        v = np.where(first, -s.direction * s.radius * w * on_arrays.sin(early), v)
         rests = ~first & (done >= s.count)
         u = np.where(rests, side * size, u)
         u = np.where(s.direction == 0, u_0, u)

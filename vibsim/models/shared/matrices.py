@@ -23,6 +23,7 @@ from typing import Any
 import numpy as np
 
 from vibsim.core.array_types import Complexes, Floats, Integers
+from vibsim.elementary import on_arrays
 
 SERIES_BELOW = 1.0
 """Size of z below which ``(e^z - 1)/z`` and the like are summed as series."""
@@ -171,7 +172,7 @@ def highest_frequency(mass: Any, stiffness: Any) -> float:
     from scipy.sparse.linalg import LinearOperator, eigsh
 
     inverse = LinearOperator(mass.shape, factored(mass).solve)
-    begin = np.cos(np.arange(mass.shape[0]))
+    begin = on_arrays.cos(np.arange(mass.shape[0]))
     (square,) = eigsh(
         stiffness, k=1, M=mass, Minv=inverse, which="LM", v0=begin, return_eigenvectors=False
     )
@@ -192,7 +193,7 @@ def _series(z: Complexes, order: int) -> Complexes:
 def _driven(r: Complexes, drive: complex, t: Complexes) -> tuple[Complexes, Complexes]:
     """Return ``g(r) = (e^(i W t) - e^(r t))/(i W - r)`` with ``drive = i W``, and its derivative by r."""
     z = (drive - r) * t
-    decay, swing = np.exp(r * t), np.exp(drive * t)
+    decay, swing = on_arrays.complex_exp(r * t), on_arrays.complex_exp(drive * t)
     is_small = np.abs(z) < SERIES_BELOW
     safe, small = np.where(is_small, 1.0, z), np.where(is_small, z, 0.0)
     first = np.where(is_small, decay * _series(small, 1), (swing - decay) / safe)
@@ -244,7 +245,7 @@ def mode_motion(
         return found
 
     def decaying(r: Complexes) -> Complexes:
-        found: Complexes = np.exp(r * time)
+        found: Complexes = on_arrays.complex_exp(r * time)
         return found
 
     one = decaying(first)

@@ -1,0 +1,138 @@
+"""The elementary functions on arrays: what is computed of numbers that are stored has the same bits on every machine.
+
+Those of numpy and of the C library differ in the last digit between processors. Here the texts of this folder are
+compiled, one kernel for each function: a loop without branches, which becomes vector instructions, and behind it one
+over the numbers for which that has no value.
+"""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from vibsim.elementary import (
+    ELEMENTARY,
+    circular,
+    doubled,
+    error_function,
+    exact,
+    exponential,
+    hyperbolic,
+    inverse,
+)
+from vibsim.native.kernel_cache import Kernel, load
+
+_TEXTS = (circular, doubled, error_function, exact, exponential, hyperbolic, inverse)
+_LOOP = """
+@entry
+def kernel({names}, found):
+    for i in range(found.shape[0]):
+        found[i] = {fast}({entries})
+    for i in range(found.shape[0]):
+        if found[i] != found[i]:
+            found[i] = {full}({entries})
+"""
+
+
+def named(name: str) -> Callable[..., Any]:
+    """Return a function of `vibsim.elementary.ELEMENTARY` for numbers and arrays, which broadcast."""
+
+    def function(*arguments: Any) -> Any:
+        if all(isinstance(x, int | float) for x in arguments):
+            return ELEMENTARY[name].full(*map(float, arguments))
+        arrays = [np.asarray(x, dtype=np.float64) for x in arguments]
+        if len(arrays) > 1:
+            arrays = list(np.broadcast_arrays(*arrays))
+        found = np.empty(arrays[0].shape)
+        _kernel(name)(*(np.ascontiguousarray(x).reshape(-1) for x in arrays), found.reshape(-1))
+        return found[()]
+
+    return function
+
+
+acos, asin, atan, atan2, cos, sin, tan = map(
+    named, ("acos", "asin", "atan", "atan2", "cos", "sin", "tan")
+)
+cosh, sinh, tanh, hypot, power = map(named, ("cosh", "sinh", "tanh", "hypot", "power"))
+exp, expm1, log, log1p, log2, log10 = map(named, ("exp", "expm1", "log", "log1p", "log2", "log10"))
+LN_2 = exponential.log(2.0)
+
+
+def complex_of(real: Any, imaginary: Any) -> Any:
+    """Return complex numbers with these parts, of which one may be infinite."""
+    found = np.empty(np.broadcast_shapes(np.shape(real), np.shape(imaginary)), dtype=complex)
+    found.real, found.imag = real, imaginary
+    return found[()]
+
+
+def complex_product(a: Any, b: Any) -> Any:
+    """Return the product of complex numbers; that of numpy is rounded once less where the processor can do so."""
+    x, y, u, v = np.real(a), np.imag(a), np.real(b), np.imag(b)
+    return complex_of(x * u - y * v, x * v + y * u)
+
+
+def complex_exp(z: Any) -> Any:
+    """Return ``e^z`` of complex numbers."""
+    size, angle = exp(np.real(z)), np.imag(z)
+    return complex_of(size * cos(angle), size * sin(angle))
+
+
+def complex_expm1(z: Any) -> Any:
+    """Return ``e^z - 1`` of complex numbers, without cancellation near 0."""
+    x, angle = np.real(z), np.imag(z)
+    half = sin(0.5 * angle)
+    return complex_of(expm1(x) * cos(angle) - 2.0 * half * half, exp(x) * sin(angle))
+
+
+def complex_size(z: Any) -> Any:
+    """Return the absolute value of complex numbers."""
+    return hypot(np.real(z), np.imag(z))
+
+
+@cache
+def _kernel(name: str) -> Kernel:
+    """Return the function that fills an array with values."""
+    function = ELEMENTARY[name]
+    names = function.full.__code__.co_varnames[: function.full.__code__.co_argcount]
+    loop = _LOOP.format(
+        names=", ".join(names),
+        entries=", ".join(f"{x}[i]" for x in names),
+        fast=function.fast.__name__,
+        full=function.full.__name__,
+    )
+    # to write the module down takes longer than to load what was made of it
+    return load(_texts() + loop, "f1 " * (len(names) + 1), lambda: _module() + loop)
+
+
+@cache
+def _texts() -> str:
+    """Return the text of all functions as it stands in their files."""
+    return "\n".join(Path(str(module.__file__)).read_text(encoding="utf-8") for module in _TEXTS)
+
+
+@cache
+def _module() -> str:
+    """Return all functions as a module that can be compiled."""
+    constants = {
+        name: value
+        for module in _TEXTS
+        for name, value in vars(module).items()
+        if isinstance(value, int | float | tuple) and not name.startswith("__")
+    }
+    parts = [f"{name} = {value!r}" for name, value in constants.items()]
+    functions = (x for x in ast.parse(_texts()).body if isinstance(x, ast.FunctionDef))
+    return "\n".join(["import math", *parts, *map(_plain, functions)])
+
+
+def _plain(function: ast.FunctionDef) -> str:
+    """Return the text of a function without what is for readers, marked by how it is compiled."""
+    has_loop = any(isinstance(node, ast.For | ast.While) for node in ast.walk(function))
+    function.body, function.returns = function.body[1:], None
+    for argument in function.args.args:
+        argument.annotation = None
+    return f"@{'called' if has_loop else 'compiled'}\n{ast.unparse(function)}"
