@@ -156,7 +156,7 @@ def _beside(block: MemberBlock, compared: Compared) -> Table:
             for k, name in enumerate(table.beside):
                 # a value of the motion as a whole is of no quantity
                 own = place if VALUES[name].of != "none" else replace(place, quantity="")
-                values, _ = best_values.value(name, own)
+                values, _, _ = best_values.value(name, own)
                 found[ids.index(row_id(i, j)), :, k] = values[names.index(row.scheme)]
     words = "numbers beside each row of a published table"
     return {"published_beside": Variable.of(("check", "case", "beside"), found, words)}

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -236,7 +237,8 @@ def describe(f: Found, check: ValueCheck) -> Description:
     which = f" ({_at(f, check, int(places[0]))}{more})" if len(places) else ""
     verb = "is" if len(places) == 1 else "are"
     left = f"{len(places)} of {len(about)} members {verb} not resolved well enough{which}"
-    advice = f"A{value.finer_levels(f)} to shrink the errors."
+    causes = (value.to_know(replace(f, case=int(place)), check) for place in places)
+    advice = next(filter(None, causes), "") or f"A{value.finer_levels(f)} to shrink the errors."
     return Description(f"{finding}{doubted}, because {left}.", advice, finding)
 
 

@@ -22,6 +22,7 @@ from vibsim.checks.notation import PLAIN, ROUND_OFF, Notation
 from vibsim.checks.outcome import Judged
 from vibsim.checks.sentences import NOT_FINITE, Description, Found, add_levels, cost_in_words
 from vibsim.comparison import best_values, value_numbers
+from vibsim.comparison.best_values import OF_STEADY_STATE
 from vibsim.comparison.quantity_comparison import Compared
 from vibsim.convergence.reasons import first_reason
 from vibsim.core.array_types import Flags, Floats
@@ -32,6 +33,7 @@ from vibsim.experiment import Experiment
 from vibsim.experiment.schema.checks import ValueCheck
 from vibsim.experiment.value_names import VALUES
 from vibsim.observe.member_block import MemberBlock
+from vibsim.observe.steady_state import LEAST_PERIODS
 from vibsim.schemes.base import is_on_the_mesh
 from vibsim.simulation.scaled import has_time_unit
 
@@ -80,6 +82,8 @@ def compare(check: ValueCheck, number: Floats) -> tuple[Flags, Floats]:
         return number > check.above, check.above - number
     wanted = math.nan if check.equals is None else check.equals
     away = np.abs(number - wanted)
+    if check.number.is_angle:
+        away = np.abs(away - 2.0 * np.pi * np.round(away / (2.0 * np.pi)))
     return away <= check.allowed, away - check.allowed
 
 
@@ -89,7 +93,8 @@ def measure(block: MemberBlock, compared: Compared, check: ValueCheck) -> Measur
     place = value_numbers.Place(
         block, compared, check.quantity or "", at.level, at.t, at.step, at.event
     )
-    value, bound = (np.broadcast_to(one, block.shape) for one in best_values.value(name, place))
+    found = best_values.value(name, place)
+    value, bound, missed = (np.broadcast_to(one, block.shape) for one in found)
     fulfilled, _ = compare(check, value)
     numbers = np.full((*block.shape, len(levels)), np.nan)
     is_open = np.isnan(bound) & row.has_limit(at.level)
@@ -97,7 +102,7 @@ def measure(block: MemberBlock, compared: Compared, check: ValueCheck) -> Measur
         numbers = _by_level(name, place)
     if check.take is not None and row.has_limit(at.level):
         # every member has a part in the number of all
-        bound = np.where(np.isnan(bound), REACH * _last_change(numbers), bound)
+        bound = np.where(np.isnan(bound), REACH * _last_change(numbers) + missed, bound)
     own = row.own_levels(levels) or tuple(levels)
     level = place.level if place.level in own else own[-1]
     needed, first = _prospects(check, numbers[..., : len(own)], own, int(level), fulfilled, is_open)
@@ -174,7 +179,7 @@ def judge(experiment: Experiment, record: Record, check: ValueCheck, found: Meas
 
     A limit of several levels that misses what is asked by less than its bound may be right: nothing is decided then.
     Nor is it where the time of an event meets what is asked, but may be further away, or where any number does whose
-    bound is unknown and that finer levels may still move out.
+    bound is unknown and that finer levels may still move out, or of which no level can bound the error.
     """
     name, number, bound = check.value, found["value"], found["error_bound"]
     row, is_limit = check.number, check.number.has_limit(check.at.level)
@@ -188,7 +193,7 @@ def judge(experiment: Experiment, record: Record, check: ValueCheck, found: Meas
         # a time that the levels leave open agrees by chance, perhaps of another event
         holds &= bound <= np.maximum(-away, 0.0 if check.equals is None else check.allowed)
     elif is_limit:
-        holds &= ~(np.isnan(bound) & (found["levels_needed"] == MOVING))
+        holds &= ~(np.isnan(bound) & (found["levels_needed"] == MOVING)) & ~np.isinf(bound)
     cases = [
         ((_failed(record, check) & ~survives) | infinite, "non_finite"),
         (
@@ -347,12 +352,10 @@ def describe(f: Found, check: ValueCheck) -> Description:
             advice = f"Add finer `levels:` until there are {check.number.finer_levels + 1}."
         case _:
             sentence = f"{subject} is {brief}; it may or may not be {expected}."
-            advice = f"Set `events: located` for scheme {f.scheme_name}."
-            if not _is_on_the_mesh(f, check):
-                advice = (
-                    f"A{finer_levels(f)} to shrink the error bound, or ask for the number of one level "
-                    "(`at: {level: ...}`)."
-                )
+            advice = to_know(f, check) or (
+                f"A{finer_levels(f)} to shrink the error bound, or ask for the number of one level "
+                "(`at: {level: ...}`)."
+            )
     found = f.fact("value")
     digits = _digits(found, _room(check, found), FEWEST_DIGITS, MOST_DIGITS)
     return Description(sentence, advice, _measured(f, check, digits))
@@ -388,7 +391,7 @@ def _measured(f: Found, check: ValueCheck, digits: int = MOST_DIGITS) -> str:
         phrase += " (it grows at every step)"
     if not check.number.has_limit(check.at.level):
         return phrase
-    if math.isnan(bound):
+    if not math.isfinite(bound):
         return f"{phrase}, with an unknown error{_why_unknown(f, check)}"
     return f"{phrase}, with an error of at most {f.notation.number(bound, 2)}"
 
@@ -397,6 +400,10 @@ def _why_unknown(f: Found, check: ValueCheck) -> str:
     """Say why nothing bounds the error of a number, where one cause is sure."""
     if _is_on_the_mesh(f, check):
         return ", because events are left to the mesh"
+    if np.isfinite(pulse := _pulse_time(f)):
+        return f", because the force has a pulse near t = {f.notation.number(pulse, 4)} that no level sees"
+    if _has_few_periods(f, check):
+        return f", because the run has fewer than {LEAST_PERIODS} periods of the force"
     numbers = _by_level_of(f)
     if len(numbers) >= FEWEST and np.all(np.isfinite(numbers)):
         return ", because its changes do not shrink steadily from level to level"
@@ -413,6 +420,26 @@ def _is_on_the_mesh(f: Found, check: ValueCheck) -> bool:
     """Say whether a number is of events that are left to the mesh."""
     options = options_of(f.experiment, columns_of(f.record), f.scheme, f.case)
     return check.number.needs_events and is_on_the_mesh(options)
+
+
+def to_know(f: Found, check: ValueCheck) -> str:
+    """Say what to change where no finer level can bound the error of a number; empty elsewhere."""
+    if _is_on_the_mesh(f, check):
+        return f"Set `events: located` for scheme {f.scheme_name}."
+    if np.isfinite(_pulse_time(f)):
+        return "Use steps shorter than the pulse, or write a wider pulse of the same impulse."
+    return f"Give {LEAST_PERIODS} or more `periods:`." if _has_few_periods(f, check) else ""
+
+
+def _pulse_time(f: Found) -> float:
+    """Return when the force has a pulse that no level sees; NaN where there is none."""
+    return float(f.record["pulse_time"][f.case]) if "pulse_time" in f.record else math.nan
+
+
+def _has_few_periods(f: Found, check: ValueCheck) -> bool:
+    """Say whether a run is too short to tell a steady motion from what is left of its start."""
+    periods = f.experiment.time.periods
+    return check.value in OF_STEADY_STATE and periods is not None and periods < LEAST_PERIODS
 
 
 def finer_levels(f: Found, count: int = FINER) -> str:

@@ -63,15 +63,16 @@ class Scalar:
     words: str
 
 
-def value(name: str, place: value_numbers.Place) -> tuple[Floats, Floats]:
-    """Return the number `name` at `place`, and the bound of its error, shape (scheme, case).
+def value(name: str, place: value_numbers.Place) -> tuple[Floats, Floats, Floats]:
+    """Return the number `name` at `place`, the bound of its error, and what of that no level shows, (scheme, case).
 
-    The bound is NaN where the number is not a limit, or nothing is known of its error.
+    The bound is NaN where the number is not a limit, or its levels bound nothing; infinite where no level can.
     """
     if not VALUES[name].has_limit(place.level):
-        return value_numbers.value(name, place), place.missing
-    found = _ladder(name, place).limit()
-    return found.value, found.bound
+        return value_numbers.value(name, place), place.missing, np.zeros(place.block.shape)
+    ladder = _ladder(name, place)
+    found = ladder.limit()
+    return found.value, found.bound, ladder.missed
 
 
 @dataclass(frozen=True)
@@ -84,13 +85,14 @@ class _Ladder:
     even: Flags
     floor: Floats
     size: Floats  # that such a number has: of the solution, or of the number itself
-    missed: Floats  # what no level shows: of an extremum between points, of a corner of the force
-    safety: Floats  # on the bound; NaN where none can be trusted
+    missed: Floats  # what no level shows: of an extremum between points, of a corner of the force; may be infinite
+    safety: Floats  # on the bound
 
     def limit(self) -> Limit:
         """Return the limit."""
         found = limit(self.values, self.levels, self.order, self.even, self.floor)
-        return replace(found, bound=self.safety * found.bound + self.missed)
+        bound = self.safety * found.bound + self.missed
+        return replace(found, bound=np.where(np.isinf(self.missed), np.inf, bound))
 
 
 def _ladder(name: str, place: value_numbers.Place) -> _Ladder:
@@ -101,6 +103,9 @@ def _ladder(name: str, place: value_numbers.Place) -> _Ladder:
         rows = [value_numbers.value(name, replace(place, level=lv)) for lv in place.levels]
     values = np.stack(rows, axis=-1)
     values[block.adaptive] = np.nan
+    if row.is_angle:
+        turns = (values - values[..., -1:]) / (2.0 * np.pi)
+        values -= 2.0 * np.pi * np.round(turns)
     size = _size(name, place, values)
     if comparison is not None and row.is_sample:
         floor = comparison.floor
@@ -125,7 +130,8 @@ def _ladder(name: str, place: value_numbers.Place) -> _Ladder:
     safety = np.full(size.shape, 1.0 if block.model.events is None else IRREGULAR)
     if row.needs_events:
         # an event on the mesh is late by an accident
-        safety = np.where(np.isnan(block.left_to_the_mesh), safety, np.nan)
+        missed = np.where(np.isnan(block.left_to_the_mesh), missed, np.inf)
+    missed = np.where(np.isfinite(block.missed.time), np.inf, missed)
     return _Ladder(place.levels, values, order, even, floor, size, missed, safety)
 
 
@@ -296,9 +302,10 @@ def table(block: MemberBlock, compared: Compared) -> Table:
         ]
         one = _stacked([_ladder(r.value, p) for r, p in zip(rows, places, strict=True)])
         best = one.limit()
+        bound = np.where(np.isinf(best.bound), np.nan, best.bound)
         numbers = {
             "richardson": (best.value, "extrapolated over the levels"),
-            "richardson_error": (best.bound, "bound of the error of the extrapolated value"),
+            "richardson_error": (bound, "bound of the error of the extrapolated value"),
         }
         if not block.lean:
             kinds = gci.classify(one.values, one.levels, one.floor)

@@ -58,6 +58,8 @@ class Value:
     measured_by: Literal["", "parabola", "points", "roots"] = ""
     """What its error comes from beside that of the steps: a peak interpolated by a parabola, extrema over the points of
     the grid, or the recurrence of the steps, whose round-off is eps/(w dt)^2 (peaks where there is none)."""
+    is_angle: bool = False
+    """Whether whole turns make no difference."""
     has_own_size: bool = False
     """Whether its round-off is relative to itself."""
 
@@ -103,6 +105,7 @@ _MARKS: Mapping[str, Mapping[str, Any]] = {
     "points": {"measured_by": "points"},
     "roots": {"measured_by": "roots"},
     "own_size": {"has_own_size": True},
+    "angle": {"is_angle": True},
     "force": {"needs_force": True},
 }
 """Further fields of `Value`, by the words of the fourth column of the table."""
@@ -135,7 +138,7 @@ amplitude | none | position | best parabola own_size | half the height from the 
 amplitude_error | none | none | best parabola | last amplitude over the first one, less one
 steady_amplitude | series | quantity | force best own_size | A of the harmonic A cos(w t - phase) with the frequency w \
 of the force, over its last period
-steady_phase | series | none | force best | phase of that harmonic [rad], from -pi to pi: the lag behind cos(w t)
+steady_phase | series | none | force best angle | phase of that harmonic [rad], from -pi to pi: the lag behind cos(w t)
 steady_change | series | none | force | how far that harmonic is from that of the period before, over its amplitude
 section_period | none | count | force | after how many periods of the force the state is the same again, to 1e-3, \
 in the second half of the run; 0 where it never is

@@ -87,6 +87,12 @@ def take(grid: Grid, record: Record, name: str) -> Floats:
     return laid_out(record[name][..., : (len(grid.t) - 1) * stride + 1 : stride])
 
 
+def take_all(grid: Grid, record: Record, name: str) -> Floats:
+    """Return variable `name` of a level Record at all its samples up to the end of the common grid, shape (..., t)."""
+    stride = grid.strides[grid.levels.index(whole(record, "level"))]
+    return laid_out(record[name][..., : (len(grid.t) - 1) * stride + 1])
+
+
 def whole(record: Record, name: str) -> int:
     """Return a whole number among the attributes of a Record."""
     return int(np.asarray(record.attrs[name]).item())

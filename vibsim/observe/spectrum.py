@@ -9,8 +9,7 @@ two, exactly but for what its negative frequency leaves there, of the size 1/k^3
 
     r = |X_(k+1)|/|X_k|,    w = 2 pi/T (k + (2 r - 1)/(r + 1)).
 
-Every level is sampled at the times that all levels have. What is faster than half their frequency appears at another
-one (aliasing).
+Every level has its own samples. What is faster than half their frequency appears at another one (aliasing).
 
 Source: F. J. Harris, On the use of windows for harmonic analysis, Proc. IEEE 66 (1978) 51-83; T. Grandke, Interpolation
 algorithms for discrete Fourier transforms of weighted signals, IEEE Trans. Instrum. Meas. 32 (1983) 350-355.
@@ -22,7 +21,7 @@ import numpy as np
 
 from vibsim.core.array_types import Flags, Floats
 from vibsim.elementary import on_arrays
-from vibsim.observe.common_grid import take
+from vibsim.observe.common_grid import take_all
 from vibsim.observe.member_block import MemberBlock
 
 FIRST_LINE = 3
@@ -63,4 +62,4 @@ def peak_frequency(block: MemberBlock, level: int, quantity: str) -> Floats:
     if quantity not in record:
         return np.full(block.shape, np.nan)
     duration = block.grid.spacing * (len(block.grid.t) - 1)
-    return highest(take(block.grid, record, quantity)) * (2.0 * np.pi / duration)
+    return highest(take_all(block.grid, record, quantity)) * (2.0 * np.pi / duration)

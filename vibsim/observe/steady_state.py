@@ -8,8 +8,7 @@ With n + 1 samples ``u_j`` of the period, at ``t_j = T - P + j P/n``, and half t
 
 where the end T is a whole number of periods P = 2 pi/w, so that ``w t_j = 2 pi j/n`` but for whole turns. Of a periodic
 motion the sum is exact up to the harmonics n - 1, n + 1, ..., which are smaller than any power of the sampling step.
-Every level is sampled at the times that all levels have, so that the number means the same at each, steady or not: the
-levels differ by the error of the scheme alone.
+Every level has its own samples: with those that all levels have, few at the coarsest, such harmonics would count.
 
 Source: A. H. Nayfeh, D. T. Mook, Nonlinear Oscillations (Wiley, 1979), section 4.1, for the response of driven
 oscillators; L. N. Trefethen, J. A. C. Weideman, The exponentially convergent trapezoidal rule, SIAM Review 56 (2014)
@@ -25,11 +24,13 @@ import numpy as np
 from vibsim.convergence.differences import safe_ratio
 from vibsim.core.array_types import Complexes, Floats
 from vibsim.elementary import on_arrays
-from vibsim.observe.common_grid import take
+from vibsim.observe.common_grid import take, take_all
 from vibsim.observe.member_block import MemberBlock
 
 SAME_STATE = 1e-3
 """How near a state must come to itself to be the same, of the largest value that it has."""
+LEAST_PERIODS = 4
+"""Whose changes tell what is left of the start."""
 REST_SAFETY = 2.0
 """Two modes, or the two conjugate factors of one, make an estimate too small: enough for 98 of 100. [calibrated]"""
 
@@ -45,10 +46,12 @@ def samples_a_period(block: MemberBlock) -> int:
 def harmonic(block: MemberBlock, level: int, quantity: str, back: int = 0) -> Complexes:
     """Return ``A exp(-i phase)`` of the last period but `back`, shape (scheme, case); NaN where there is none."""
     record, n = block.records[level], samples_a_period(block)
-    stop = len(block.grid.t) - back * n
-    if quantity not in record or n == 0 or stop <= n:
+    if quantity not in record or n == 0 or len(block.grid.t) - back * n <= n:
         return np.full(block.shape, np.nan, dtype=np.complex128)
-    own = take(block.grid, record, quantity)[..., stop - n - 1 : stop]
+    n *= block.grid.strides[block.grid.levels.index(level)]
+    series = take_all(block.grid, record, quantity)
+    stop = series.shape[-1] - back * n
+    own = series[..., stop - n - 1 : stop]
     angle = 2.0 * np.pi / n * np.arange(n + 1)
     weight = np.where((angle == 0.0) | (angle == angle[-1]), 1.0 / n, 2.0 / n)
     real, imaginary = (
@@ -103,9 +106,9 @@ def distance(block: MemberBlock, level: int, quantity: str) -> Floats:
 
     What is left of the start changes by a complex factor z in each period. From the last change c it then keeps
     ``c z/(z - 1)``; without damping, as much as at the start. The larger one of the last two such estimates is taken
-    `REST_SAFETY` times. NaN where there are fewer than four periods, or if it is infinite.
+    `REST_SAFETY` times. Infinite where there are fewer than `LEAST_PERIODS`.
     """
-    rows = [harmonic(block, level, quantity, back) for back in range(4)]
+    rows = [harmonic(block, level, quantity, back) for back in range(LEAST_PERIODS)]
     changes = [now - before for now, before in itertools.pairwise(rows)]
     with np.errstate(divide="ignore", invalid="ignore"):
         left = [
@@ -113,4 +116,4 @@ def distance(block: MemberBlock, level: int, quantity: str) -> Floats:
             for last, before in itertools.pairwise(changes)
         ]
     bound = REST_SAFETY * np.maximum(*left)
-    return np.where(np.isfinite(bound), bound, np.nan)
+    return np.where(np.isfinite(bound), bound, np.inf)

@@ -1,0 +1,128 @@
+"""Numbers whose error no finer level shows, and numbers that need the samples of their own level."""
+
+from __future__ import annotations
+
+import json
+import math
+from typing import Any
+
+import pytest
+from analysis.spring_runs import Run, judged
+
+from vibsim.experiment import Experiment
+from vibsim.simulation import simulate_record
+
+PULSE = {
+    "model": {"kind": "oscillator", "spring": "u", "force": "1000 if 3.301 < t < 3.304 else 0"},
+    "initial": {"u": 1.0},
+    "time": {"end": 6.0},
+    "levels": [6, 7, 8, 9],
+    "schemes": ["newmark"],
+}
+DRIVEN = {
+    "model": {
+        **{"kind": "oscillator", "spring": "u", "damping": {"linear": 0.1}},
+        **{"force": "cos(w*t)", "parameters": {"w": 2.0}},
+    },
+    "initial": {"u": 2.0},
+    "time": {"periods": 3, "steps_per_period": 32, "frequency": "model.parameters.w"},
+    "levels": [0, 1, 2, 3],
+    "schemes": ["rk4"],
+}
+BOUNCES = {
+    "model": {
+        "kind": "oscillator",
+        "spring": "u",
+        "events": [{"when": "u", "then": {"v": "0.9*v"}}],
+    },
+    "initial": {"u": 1.0},
+    "time": {"end": 12.0},
+    "levels": [5, 6, 7, 8],
+    "schemes": [{"kind": "rk4", "events": "mesh"}],
+}
+
+
+def run(content: dict[str, Any], *checks: dict[str, Any]) -> Run:
+    experiment = Experiment.from_dict({"title": "test", **content, "checks": list(checks)})
+    return judged(experiment, {n: simulate_record(experiment, n) for n in experiment.levels})
+
+
+BEST = {"at": {"level": "best"}}
+AMPLITUDE = {"value": "steady_amplitude", "quantity": "u"}
+LARGEST_AMPLITUDE = {**AMPLITUDE, "over": "model.parameters.w", "take": "largest"}
+LARGEST_TIME = {
+    **{"value": "event_time", "at": {"event": 3, "level": "best"}},
+    **{"over": "initial.u", "take": "largest"},
+}
+
+
+@pytest.mark.parametrize(
+    ("content", "check", "why", "advice"),
+    [
+        (PULSE, {"value": "end", **BEST, "quantity": "u", "equals": 0.96, "atol": 0.02}, "pulse", "wider"),
+        (PULSE, {"value": "max_abs", **BEST, "quantity": "v", "below": 1.1}, "pulse", "wider"),
+        (DRIVEN, {**AMPLITUDE, **BEST, "below": 0.5}, "fewer than 4 periods", "4 or more `periods:`"),
+        (
+            {**DRIVEN, "sweep": {"model.parameters.w": [2.0, 3.0]}},
+            {**LARGEST_AMPLITUDE, "above": 1.0},
+            "an unknown error",
+            "4 or more `periods:`",
+        ),
+        (
+            {**BOUNCES, "sweep": {"initial.u": [1.0, 2.0]}},
+            {**LARGEST_TIME, "equals": 2.5 * math.pi, "rtol": 1e-3},
+            "an unknown error",
+            "`events: located`",
+        ),
+    ],
+)  # fmt: skip
+def test_what_no_level_shows_is_not_decided(
+    content: dict[str, Any], check: dict[str, Any], why: str, advice: str
+) -> None:
+    [found] = run(content, check).summary["checks"]
+    assert found["status"] == "INCONCLUSIVE"
+    text = json.dumps(found)
+    assert why in text
+    assert advice in text
+
+
+def test_a_frequency_is_that_of_the_samples_of_its_own_level() -> None:
+    """At the coarsest level a period has 1.7 steps, at the finest one 53."""
+    content = {
+        **{"model": {"kind": "spring"}, "initial": {"u": 1.0}, "time": {"end": 120.0}},
+        **{"levels": [5, 6, 7, 8, 9, 10], "schemes": ["rk4"]},
+    }
+    check = {"value": "peak_frequency", "quantity": "u", "equals": 1.0, "atol": 0.01}
+    found = run(content, check, {**check, **BEST}).verdicts
+    assert [one.status for one in found] == ["PASS", "PASS"]
+
+
+def test_a_harmonic_is_that_of_the_samples_of_its_own_level() -> None:
+    """Eight samples of a period mix its strong seventh harmonic in. Truth: DOP853 to 1e-12, 512 samples a period."""
+    content = {
+        "model": {
+            **{"kind": "oscillator", "spring": "u**3", "damping": {"linear": 0.3}},
+            **{"force": "2*cos(w*t)", "parameters": {"w": 0.3}},
+        },
+        "initial": {"u": 1.0},
+        "time": {"periods": 20, "steps_per_period": 8, "frequency": "model.parameters.w"},
+        **{"levels": [2, 3, 4, 5, 6], "schemes": ["rk4"]},
+    }
+    check = {**AMPLITUDE, "equals": 1.432149, "atol": 1e-4}
+    found = run(content, check, {**check, **BEST}).verdicts
+    assert [one.status for one in found] == ["PASS", "PASS"]
+
+
+def test_a_phase_is_an_angle() -> None:
+    """``u = -cos(2 t)/3`` lags by pi, or by -pi."""
+    content = {
+        "model": {
+            **{"kind": "oscillator", "spring": "u", "force": "cos(w*t)", "parameters": {"w": 2.0}},
+        },
+        "initial": {"u": -1.0 / 3.0},
+        "time": {"periods": 6, "steps_per_period": 32, "frequency": "model.parameters.w"},
+        **{"levels": [0, 1, 2, 3], "schemes": ["central", "rk4", "newmark"]},
+    }
+    check = {"value": "steady_phase", "quantity": "u", "equals": math.pi, "atol": 0.01}
+    found = run(content, check, {**check, **BEST}).verdicts
+    assert [one.status for one in found] == ["PASS", "PASS"]
