@@ -44,7 +44,8 @@ def named(name: str) -> Callable[..., Any]:
 
     def function(*arguments: Any) -> Any:
         if all(isinstance(x, int | float) for x in arguments):
-            return ELEMENTARY[name].full(*map(float, arguments))
+            # of numpy, whose division by zero is infinite
+            return np.float64(ELEMENTARY[name].full(*map(float, arguments)))
         arrays = [np.asarray(x, dtype=np.float64) for x in arguments]
         if len(arrays) > 1:
             arrays = list(np.broadcast_arrays(*arrays))

@@ -66,7 +66,9 @@ def common_values(
             rule = f"has the dimensions {_listed(level.dims)}, the coarsest level has {_listed(first.dims)}"
             raise refused(f"level {i} (from the coarsest)", level.name or "values", rule)
     refined = _refined(first.dims, dims)
-    arrays = [_transposed(level, first.dims) for level in levels]
+    arrays = [
+        _finite_throughout(_transposed(level, first.dims), first.dims, fixed) for level in levels
+    ]
     coords: dict[str, NDArray[Any]] = {}
     notes, parts, interpolated = [], [], False
     for axis, dim in enumerate(first.dims):
@@ -103,6 +105,12 @@ def _refined(known: Sequence[str], dims: Sequence[str] | None) -> Sequence[str]:
                 "dims", dim, f"is no dimension of the values, which have {_listed(known)}"
             )
     return dims
+
+
+def _finite_throughout(values: Floats, dims: Sequence[str], fixed: Sequence[str]) -> Floats:
+    """Return values, NaN throughout where one is not finite: the common points alone may not show it."""
+    axes = tuple(axis for axis, dim in enumerate(dims) if dim not in fixed)
+    return np.where(np.all(np.isfinite(values), axis=axes, keepdims=True), values, np.nan)
 
 
 def _transposed(level: GridValues, dims: Sequence[str]) -> Floats:
