@@ -165,7 +165,8 @@ def test_round_off_is_exact_and_noise_moves_the_floor() -> None:
     assert judge(H, noisy, order=2).reason != "exact"
     single = [np.float32(2.0 + 1e-7 * k) for k in range(5)]
     assert judge(H, single, order=2).reason == "exact", "single precision has its own round-off"
-    assert judge(H, [float(x) for x in single], order=2).reason != "exact"
+    assert judge(H, [float(x) for x in single], order=2).reason == "exact", "it is recognised"
+    assert judge(H, [2.0 + 1e-7 * k for k in range(5)], order=2).reason != "exact"
 
 
 def test_constant_levels_are_exact_with_no_error() -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 import xarray
@@ -274,3 +276,62 @@ def test_printed_numbers_do_not_miss_what_they_were_rounded_from(
     assert judge(h, values, exact=exact).status != "FAIL"
     assert judge(h, values, exact=exact + 0.1).reason == "wrong_limit"
     assert judge(h[:3], [3.0, 3.0, 3.0], exact=3.001).reason == "wrong_limit"
+
+
+@pytest.mark.parametrize(
+    ("h", "values", "asked"),
+    [
+        ([0.18, 0.06, 0.02], [0.260, 0.263, 0.264], {"order": 2}),  # of 0.2638 - 0.12 h^2
+        ([0.18, 0.06, 0.02], [0.260, 0.263, 0.264], {"order": 1}),
+        ([0.18, 0.06, 0.02], [0.260, 0.263, 0.264], {}),
+        ([0.2, 0.1, 0.05, 0.025], [0.366, 0.357, 0.355, 0.354], {"order": 1}),
+        ([0.2, 0.05, 0.0125], [0.678, 0.656, 0.654], {"order": 2, "exact": 0.6538}),
+        ([0.2, 0.1, 0.05], [0.3692, 0.3626, 0.3612], {"order": 2, "exact": 0.36082}),
+        (
+            [0.2, 0.2 / 3, 0.2 / 9, 0.2 / 27],
+            [-0.627, -0.652, -0.657, -0.658],
+            {"order": 1, "exact": -0.6589844},
+        ),
+    ],
+)
+def test_no_order_is_read_off_rounded_digits(
+    h: list[float], values: list[float], asked: dict[str, float]
+) -> None:
+    """Half a unit of the last digit makes 1 of these orders, or 2."""
+    assert judge(h, values, **asked).status == "INCONCLUSIVE"
+
+
+def test_an_order_that_rounding_does_not_change_passes_with_an_interval_that_holds_it() -> None:
+    h = [0.4, 0.2, 0.1, 0.05]
+    verdict = judge(h, [round(1.0 + 0.52 * x**2, 4) for x in h], order=2)
+    assert verdict.status == "PASS"
+    assert verdict.order_low <= 2.0 <= verdict.order_high
+
+
+@pytest.mark.parametrize("printed", [False, True])
+def test_single_precision_that_is_stored_as_double_is_recognised(printed: bool) -> None:
+    """The errors of RK4 for u' = -u end in the rounding of single precision."""
+    h = [0.2 * 0.5**k for k in range(6)]
+    exact = [math.exp(-2.0)]
+    levels = []
+    for x in h:
+        factor = 1.0 - x + x**2 / 2.0 - x**3 / 6.0 + x**4 / 24.0
+        single = np.float32(factor ** round(2.0 / x))
+        levels.append(float(str(single)) if printed else float(single))
+    verdict = judge(h, levels, order=4)
+    assert abs(levels[-1] - exact[0]) <= verdict.error_bound
+    assert judge(h, levels, order=4, exact=exact[0]).reason != "wrong_limit"
+
+
+@pytest.mark.parametrize("bad", [math.nan, math.inf])
+def test_a_value_that_is_not_finite_counts_wherever_it_is(bad: float) -> None:
+    """Also at a point that no other level has; of members, in the one that has it."""
+    levels = [np.sin(np.linspace(0.0, 1.0, n + 1)) * (1.0 + 1.0 / n**2) for n in (10, 20, 40, 80)]
+    h = [1 / 10, 1 / 20, 1 / 40, 1 / 80]
+    assert judge(h, levels, order=2).status == "PASS"
+    both = [xarray.DataArray(np.stack([u, u]), dims=("case", "x")) for u in levels]
+    both[-1][1, 3] = bad
+    levels[-1][3] = bad
+    assert judge(h, levels, order=2).reason == "non_finite"
+    found = judge(h, both, order=2, members=True)
+    assert [one.reason for one in found] == ["asymptotic", "non_finite"]

@@ -56,6 +56,8 @@ from vibsim.convergence.thresholds import (
     NOISE_FACTOR,
     RISK,
     RISK_OF_THREE,
+    STATED_LIMIT_FACTOR,
+    STATED_NOISE_FACTOR,
 )
 from vibsim.core.array_types import Codes, Flags, Floats, Integers
 from vibsim.core.vocabulary import ORDER_TOLERANCE
@@ -95,6 +97,11 @@ class Question:
         if self.expected is not None:
             return np.asarray(~(np.abs(order - self.expected) > margin))
         return np.asarray(~(order < (self.at_least or -np.inf) - margin))
+
+    @property
+    def with_stated_noise(self) -> Question:
+        """What is asked where the noise of levels is known, and no prediction."""
+        return replace(self, noise_factor=STATED_NOISE_FACTOR, limit_factor=STATED_LIMIT_FACTOR)
 
     @property
     def promise(self) -> Promise | None:

@@ -10,6 +10,7 @@ import numpy as np
 from vibsim.convergence.error_model.posterior import Ladder
 from vibsim.core.array_types import Floats
 
+SINGLE = float(np.finfo(np.float32).eps)
 LARGEST = 1e150
 """Scaled values do not exceed it: their squares are numbers."""
 FURTHEST = 1e100
@@ -24,6 +25,8 @@ COUNTED = 100.0
 """Whole numbers of this size are taken to be counted, or rounded to whole ones."""
 IN_STEPS = 4
 """So many of the finest levels show whether values come in steps; coarser ones may be the same because all blew up."""
+SINGLE_DIGITS = 7
+"""Fewer digits are printed for another reason than that single precision has no more."""
 SAMPLED = 64
 """Values of a level whose digits are counted."""
 
@@ -84,6 +87,23 @@ def step_of_values(values: Floats) -> float:
     return 0.0 if np.all(differ) or not np.any(differ) else float(np.min(sizes[differ]))
 
 
+def is_single(values: Floats) -> bool:
+    """Say whether finite values, shape (n, points), are those of single precision, as they are or as it prints them."""
+    sampled = values[:, :: -(-values.shape[1] // SAMPLED)].ravel()
+    with np.errstate(over="ignore"):
+        single = sampled.astype(np.float32)
+    if np.all(single == sampled):
+        # a few bits may be those of a result as it is
+        bits = np.frexp(sampled)[0] * BINARY
+        return bool(np.any(bits != np.rint(bits)))
+    digits = 0
+    for value, near in zip(sampled.tolist(), single, strict=True):
+        if float(str(near)) != value:
+            return False
+        digits = max(digits, len(Decimal(repr(value)).normalize().as_tuple().digits))
+    return digits >= SINGLE_DIGITS
+
+
 def measurement(
     values: Floats, h: Floats, epsilon: Floats, noise: float | None, exact: Floats | None
 ) -> Measurement:
@@ -115,6 +135,8 @@ def measurement(
         rows = np.concatenate([rows, true_error[:, None]], axis=1)
     with np.errstate(over="ignore"):
         gram = np.matmul(rows, np.swapaxes(rows, 1, 2)) / points
+    single = np.array([is_single(rows) for rows in values])[:, None]
+    epsilon = np.where(single, np.maximum(epsilon, SINGLE), epsilon)
     floor = 0.5 * epsilon * norms
     if noise is not None:
         floor = np.maximum(floor, noise / scale[:, None])

@@ -2,24 +2,21 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+import math
+from dataclasses import dataclass, field, fields, replace
 
 import numpy as np
 
 from vibsim.convergence.assessment import DECIDED, Assessment, Question, assess
 from vibsim.convergence.differences import orders_of_steps
+from vibsim.convergence.reasons import is_one_of
 from vibsim.convergence.study.measurement import (
     Measurement,
     half_last_digit,
     measurement,
     step_of_values,
 )
-from vibsim.convergence.thresholds import (
-    LEAST_WITH_LIMIT,
-    MISSED,
-    STATED_LIMIT_FACTOR,
-    STATED_NOISE_FACTOR,
-)
+from vibsim.convergence.thresholds import LEAST_WITH_LIMIT, MISSED
 from vibsim.core.array_types import Flags, Floats, Integers
 from vibsim.core.vocabulary import REASON_NAMES
 from vibsim.elementary import on_arrays
@@ -30,6 +27,8 @@ MOST_ROUNDED = 5e-4
 """Exact values of more than three digits may be rounded to them: half of their last digit is a smaller part."""
 EXACT_DIGITS = 16
 """Exact values with no more decimal digits than these may be rounded to them: whoever writes them down stops there."""
+MOST_UNITS = 8.0
+"""Exact values that are further from the finest level, in half units of its last digit, were not missed by rounding."""
 SEEN = 0.1
 """The rounding of exact values is seen where it is so large a part of the error of the finest level."""
 
@@ -159,10 +158,10 @@ def _with_finite(
     if len(finite) >= FEWEST:
         question = Question(request.order, request.at_least)
         if request.noise:
-            question = replace(
-                question, noise_factor=STATED_NOISE_FACTOR, limit_factor=STATED_LIMIT_FACTOR
-            )
+            question = question.with_stated_noise
         decided = assess(measured.ladder, question)
+        if not request.noise:
+            _doubt_few_digits(decided, measured, part, question)
     for k, one in enumerate(found):
         truth = None if exact is None else exact[k]
         _measure(one, measured, k, part[k], truth)
@@ -174,6 +173,33 @@ def _with_finite(
         if finite[-1] < n - 1:
             one.error = one.error_bound = np.nan
     return found
+
+
+def _doubt_few_digits(
+    decided: Assessment, measured: Measurement, part: Floats, question: Question
+) -> None:
+    """Take back what was decided of values of few digits, if noise as large as their rounding decides otherwise.
+
+    What is decided in both cases has an interval that holds both.
+    """
+    half = np.array([half_last_digit(rows) for rows in part])
+    near = decided.error * measured.scale <= MOST_UNITS * half
+    doubtful = is_one_of(decided.reason, *DECIDED) | (
+        near & is_one_of(decided.reason, "wrong_limit")
+    )
+    rows = np.flatnonzero((half > 0.0) & doubtful)
+    if not len(rows):
+        return
+    ladder = measured.ladder.some(rows)
+    # of a rounding all values within half a unit are equally probable
+    rounding = (half / math.sqrt(3.0) / measured.scale)[rows, None]
+    ladder = replace(ladder, floor=np.maximum(ladder.floor, rounding))
+    doubted = assess(ladder, question.with_stated_noise)
+    same = doubted.reason == decided.reason[rows]
+    decided.low[rows] = np.fmin(decided.low[rows], doubted.low)
+    decided.high[rows] = np.fmax(decided.high[rows], doubted.high)
+    for one in fields(Assessment):
+        getattr(decided, one.name)[rows[~same]] = getattr(doubted, one.name)[~same]
 
 
 def _measure(
