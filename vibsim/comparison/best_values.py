@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from vibsim.apriori.formal_orders import even_powers, formal_orders
 from vibsim.comparison import value_numbers
 from vibsim.comparison.comparison_variables import Table
-from vibsim.comparison.extremum import WIDTH, largest_between_samples
+from vibsim.comparison.extremum import WIDTH, largest_between_samples, rise_of_others
 from vibsim.comparison.quantity_comparison import Compared
 from vibsim.comparison.thresholds import (
     IRREGULAR,
@@ -28,7 +28,7 @@ from vibsim.comparison.thresholds import (
     OF_PARABOLA,
 )
 from vibsim.convergence import gci
-from vibsim.convergence.differences import safe_ratio
+from vibsim.convergence.differences import error_factor, safe_ratio
 from vibsim.convergence.ladder_blocks import batches
 from vibsim.convergence.number_extrapolation import Limit, limit, observed_order
 from vibsim.convergence.thresholds import ORDER_ABOVE_ROUND_OFF
@@ -117,7 +117,7 @@ def _ladder(name: str, place: value_numbers.Place) -> _Ladder:
     missed, (order, even) = block.unseen_at_corner(size), _promised(name, place)
     if row.measured_by == "points":
         values, off, is_smooth = _extrema(name, place, values, floor, size)
-        missed = missed + off
+        missed = missed + off + _rise_of_others(name, place, order)
         order = np.where(is_smooth, order, np.minimum(order, OF_GRID))
         even = even & is_smooth
     if name in OF_PEAK_TIMES:
@@ -206,6 +206,19 @@ def _between_points(name: str, place: value_numbers.Place, values: Floats) -> tu
         off[..., enough] = error.reshape(*block.shape, -1)
     # the limit is made of the level before the finest, too
     return found, np.where(np.isnan(off[..., -1]), np.nan, np.fmax.reduce(off[..., -2:], axis=-1))
+
+
+def _rise_of_others(name: str, place: value_numbers.Place, order: Floats) -> Floats:
+    """Return how much larger another extremum than that of the finest level may be in the limit, (scheme, case)."""
+    block, q = place.block, place.quantity
+    records = [block.records[level] for level in place.levels[-2:]]
+    if len(records) < 2 or any(q not in r or np.shape(r[q])[-1] < WIDTH for r in records):
+        return np.zeros(block.shape)
+    series = [_UPWARD[name](np.asarray(r[q], dtype=np.float64)) for r in records]
+    rows = [np.nan_to_num(x.reshape(-1, x.shape[-1]), posinf=0.0, neginf=0.0) for x in series]
+    gap = place.levels[-1] - place.levels[-2]
+    fall = np.where(np.isfinite(order), -1.0 - error_factor(np.maximum(order, 1.0), gap), 0.0)
+    return rise_of_others(rows[0], rows[1], fall.reshape(-1)).reshape(block.shape)
 
 
 def _off_between_points(place: value_numbers.Place) -> Floats:
