@@ -83,14 +83,17 @@ def common_grid(records: Mapping[int, Record]) -> Grid:
 
 def take(grid: Grid, record: Record, name: str) -> Floats:
     """Return variable `name` of a level Record on the common grid, shape (..., t), time outermost in memory."""
-    stride = grid.strides[grid.levels.index(whole(record, "level"))]
+    stride = _stride(grid, record)
     return laid_out(record[name][..., : (len(grid.t) - 1) * stride + 1 : stride])
 
 
 def take_all(grid: Grid, record: Record, name: str) -> Floats:
     """Return variable `name` of a level Record at all its samples up to the end of the common grid, shape (..., t)."""
-    stride = grid.strides[grid.levels.index(whole(record, "level"))]
-    return laid_out(record[name][..., : (len(grid.t) - 1) * stride + 1])
+    return laid_out(record[name][..., : (len(grid.t) - 1) * _stride(grid, record) + 1])
+
+
+def _stride(grid: Grid, record: Record) -> int:
+    return grid.strides[grid.levels.index(whole(record, "level"))]
 
 
 def whole(record: Record, name: str) -> int:
