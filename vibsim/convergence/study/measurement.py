@@ -11,6 +11,7 @@ from vibsim.convergence.error_model.posterior import Ladder
 from vibsim.core.array_types import Floats
 
 SINGLE = float(np.finfo(np.float32).eps)
+"""Relative spacing of single precision."""
 LARGEST = 1e150
 """Scaled values do not exceed it: their squares are numbers."""
 FURTHEST = 1e100
