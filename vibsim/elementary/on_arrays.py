@@ -8,6 +8,7 @@ over the numbers for which that has no value.
 from __future__ import annotations
 
 import ast
+import sys
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
@@ -28,6 +29,10 @@ from vibsim.elementary import (
 from vibsim.native.kernel_cache import Kernel, load
 
 _TEXTS = (circular, doubled, error_function, exact, exponential, hyperbolic, inverse)
+MOST_PLAIN = 20_000
+"""Numbers that take as long in plain Python as LLVM takes to be loaded, which also takes 60 MB. [measured]"""
+_PLAIN = {"numbers": 0}
+"""How many there were in this process."""
 _LOOP = """
 @entry
 def kernel({names}, found):
@@ -37,6 +42,14 @@ def kernel({names}, found):
         if found[i] != found[i]:
             found[i] = {full}({entries})
 """
+
+
+def _is_plain(count: int) -> bool:
+    """Say whether so many numbers more are worked out in plain Python, with the same bits, since LLVM is not loaded."""
+    if "llvmlite" in sys.modules:
+        return False
+    _PLAIN["numbers"] += count
+    return _PLAIN["numbers"] <= MOST_PLAIN
 
 
 def named(name: str) -> Callable[..., Any]:
@@ -49,6 +62,10 @@ def named(name: str) -> Callable[..., Any]:
         arrays = [np.asarray(x, dtype=np.float64) for x in arguments]
         if len(arrays) > 1:
             arrays = list(np.broadcast_arrays(*arrays))
+        if _is_plain(arrays[0].size):
+            rows = zip(*(x.ravel().tolist() for x in arrays), strict=True)
+            values = [ELEMENTARY[name].full(*row) for row in rows]
+            return np.array(values, dtype=np.float64).reshape(arrays[0].shape)[()]
         found = np.empty(arrays[0].shape)
         _kernel(name)(*(np.ascontiguousarray(x).reshape(-1) for x in arrays), found.reshape(-1))
         return found[()]

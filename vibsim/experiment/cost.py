@@ -85,8 +85,8 @@ SHARD_BYTES = 320 * 10**6
 LARGEST_SHARD = 2**20
 """Members of a shard at most."""
 
-ANALYSIS_MEMORY = 135 * 10**6
-"""Bytes of an analysis without its arrays, with the process that watches over it."""
+ANALYSIS_MEMORY = 185 * 10**6
+"""Bytes of an analysis without its arrays, with LLVM and the process that watches over it."""
 ANALYSED = 3.8
 """Bytes that an analysis holds at its peak for each byte that it reads of the members at hand."""
 PART_SAMPLES = 2**16
