@@ -194,6 +194,8 @@ def test_fields_of_two_dimensions_are_compared_at_common_points() -> None:
     assert judge(H, fields, order=2, exact=given.values).error == pytest.approx(size)
     fine = plane(64, 32, 0.0)
     assert judge(H, fields, order=2, exact=fine).error == pytest.approx(size)
+    with pytest.raises(InputError, match=r"must be a function of x, y, takes \(t\)"):
+        judge(H, fields, exact=lambda t: t)
     with pytest.raises(InputError, match="exact: coordinates x: must be given at the 9 common"):
         judge(H, fields, exact=given.assign_coords(x=x + 0.1))
 

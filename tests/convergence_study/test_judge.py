@@ -299,6 +299,11 @@ def test_a_measured_order_away_from_the_one_that_dominates_is_explained() -> Non
         assert ("the measured order" in found.sentence) == bool(told)
 
 
+def test_sizes_near_the_ends_of_double_precision_have_no_finer_one() -> None:
+    advice = [judge([4 * s, 2 * s, s], [1.0, 2.0, 2.3], order=2).advice for s in (1.0, 5e-324)]
+    assert advice == ["Add a finer level, such as h = 0.5.", "Add a finer level."]
+
+
 def test_every_reason_has_a_sentence() -> None:
     from vibsim.convergence.study.sentences import SENTENCES, Setting, describe
 

@@ -243,14 +243,25 @@ def test_exact_values_and_noise(table: Callable[..., str], capsys: Capture) -> N
 def test_a_report_that_cannot_be_written_hides_no_verdict(
     table: Callable[..., str], tmp_path: Path, capsys: Capture
 ) -> None:
-    (tmp_path / "taken").write_text("a file")
-    folder = tmp_path / "taken/report"
-    command = ["judge", table(TABLE), "--h", "dt", "--quantity", "u", "--report", str(folder)]
+    (tmp_path / "report.html").mkdir()
+    command = ["judge", table(TABLE), "--h", "dt", "--quantity", "u", "--report", str(tmp_path)]
     assert main(command) == 1
     captured = capsys.readouterr()
     assert "1 quantity, 1 passed: PASS" in captured.out
-    assert str(tmp_path / "taken") in captured.err
+    assert str(tmp_path / "report.html") in captured.err
     assert "report:" not in captured.out
+
+
+@pytest.mark.parametrize("place", ["taken", "taken/report"])
+def test_a_report_goes_to_a_folder(
+    place: str, table: Callable[..., str], tmp_path: Path, capsys: Capture
+) -> None:
+    (tmp_path / "taken").write_text("a file")
+    command = ["judge", table(TABLE), "--h", "dt", "--report", str(tmp_path / place)]
+    assert main(command) == 2
+    captured = capsys.readouterr()
+    assert captured.out == ""
+    assert "must be a folder, " in captured.err
 
 
 @pytest.mark.slow

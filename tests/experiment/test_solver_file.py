@@ -180,7 +180,25 @@ def test_a_module_that_is_nowhere_is_refused(
     assert "no_such_module_here: cannot be found" in faults(heat, capsys)[0]
     (heat.parent / "no_such_module_here.py").write_text("raise SystemExit('imported')")
     # found, and not imported
-    assert main(["check", str(heat)]) == 0
+    assert "has no function solve" in faults(heat, capsys)[0]
+
+
+def test_a_function_and_a_program_beside_the_file_must_be_there(
+    heat: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    module = heat.parent / "slab.py"
+    heat.write_text(TEXT.replace(f"command: {COMMAND}", "python: slab:slove"))
+    module.write_text("from heat import other as given\n\ndef solve(h, kappa):\n    pass\n")
+    (told,) = faults(heat, capsys)
+    rule = "slab.py has no function slove: did you mean 'solve'?"
+    assert told == f"3: solver.python: slab:slove: {rule}"
+    module.write_text(module.read_text() + "slove = solve\n")
+    for name in ("solve", "given", "slove"):
+        heat.write_text(TEXT.replace(f"command: {COMMAND}", f"python: slab:{name}"))
+        assert main(["check", str(heat)]) == 0
+    heat.write_text(TEXT.replace("./heat", "./haet"))
+    capsys.readouterr()
+    assert faults(heat, capsys)[0].endswith(": ./haet: there is no such file")
 
 
 def test_levels_are_counted_from_the_coarsest(heat: Path) -> None:
@@ -217,6 +235,7 @@ def test_numbers_are_handed_over_as_they_are_written(heat: Path) -> None:
 
 
 def test_a_value_is_one_argument_whatever_is_in_it(heat: Path) -> None:
+    (heat.parent / "my heat").write_text("a program")
     values = "['a b', '$(touch x); \"q', '{h} *']"
     found = from_file(
         changed(

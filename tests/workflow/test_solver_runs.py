@@ -333,10 +333,10 @@ def test_a_level_that_fails_is_named_with_its_sizes(study: Study, mode: str, tol
 
 
 def test_a_program_that_is_not_there_is_named(study: Study) -> None:
-    study.write("absent", BROKEN.replace("python solver.py", "./no_such_program"))
+    study.write("absent", BROKEN.replace("python solver.py", "no_such_program"))
     status, error = study.make("absent", 0)
     assert status == 1
-    assert "./no_such_program: the program cannot be started (No such file or dir" in error
+    assert "no_such_program: the program cannot be started (No such file or dir" in error
 
 
 def made_by(study: Study, module: str, text: str) -> subprocess.CompletedProcess[str]:
@@ -360,7 +360,7 @@ def test_a_function_that_raises_is_named_with_its_traceback(study: Study) -> Non
     [
         (
             "has_another",
-            "def solved(h, rate=1):\n    return None\n",
+            "def solved(h, rate=1):\n    def solve(): return None\n",
             "has_another has no function solve: did you mean 'solved'?\n",
         ),
         (

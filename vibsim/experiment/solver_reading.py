@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import math
 import shlex
 from collections.abc import Iterator, Mapping, Sequence
@@ -333,6 +334,14 @@ def _check_files(experiment: SolverExperiment, report: Report) -> None:
         return
     for i, name in enumerate(experiment.solver.inputs):
         _check_file(experiment.folder / name, (SOLVER, "inputs", i), "", report)
+    if experiment.solver.kind == "python":
+        _check_function(experiment, report)
+    elif experiment.solver.kind == "command":
+        program = shlex.split(experiment.solver.text)[0]
+        # what has no folder is looked for where it runs, which may be another machine
+        if "/" in program and not list(placeholders(program)):
+            place = (SOLVER, "command")
+            _check_file(experiment.folder / program, place, f"{program}: ", report)
     if experiment.solver.kind != "files":
         return
     seen: dict[str, str] = {}
@@ -346,6 +355,27 @@ def _check_files(experiment: SolverExperiment, report: Report) -> None:
                 report.add((SOLVER, "files"), f"{path} {rule}", f"of {where}")
                 continue
             _check_file(experiment.folder / path, (SOLVER, "files"), f"{path}: ", report)
+
+
+def _check_function(experiment: SolverExperiment, report: Report) -> None:
+    """Check that a module beside the experiment file has the function; it is read, and not run."""
+    module, _, name = experiment.solver.text.partition(":")
+    file = experiment.folder.joinpath(*module.split(".")).with_suffix(".py")
+    try:
+        nodes = list(ast.walk(ast.parse(file.read_bytes())))
+    except (OSError, SyntaxError, ValueError):
+        return  # an installed module, or a fault that Python tells with its line
+    functions = [node.name for node in nodes if isinstance(node, ast.FunctionDef | ast.ClassDef)]
+    assigned = {node.id for node in nodes if isinstance(node, ast.Name)}
+    imported = {
+        alias.asname or alias.name
+        for node in nodes
+        if isinstance(node, ast.ImportFrom)
+        for alias in node.names
+    }
+    if not {name, "*"} & {*functions, *assigned, *imported}:
+        rule, hint = f"{file.name} has no function {name}", nearest(name, functions)
+        report.add((SOLVER, "python"), rule, hint, experiment.solver.text)
 
 
 def _check_file(path: Path, place: Path_, subject: str, report: Report) -> None:

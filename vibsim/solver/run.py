@@ -56,6 +56,8 @@ def make(
     written = [path for path in map(Path, dict.fromkeys(files.values())) if path.exists()]
     if not written:
         raise VibsimError("the command ended well, but did not write the file that {output} names")
+    if written[0].is_dir():
+        raise VibsimError(f"the command made a folder of {written[0]}, and must write a file")
     if not written[0].is_file() or not written[0].stat().st_size:
         raise VibsimError(f"the command wrote an empty file to {written[0]}")
     return level_output.read(written[0], quantities)

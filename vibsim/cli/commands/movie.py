@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 from vibsim.cli import level_member
 from vibsim.cli.chosen_plans import one_plan_of
-from vibsim.cli.jobs.common import chosen_results, refusal
+from vibsim.cli.jobs.common import check_folder, chosen_results, refusal
 from vibsim.cli.level_member import chosen
 from vibsim.core.errors import VibsimError
 from vibsim.core.home import called
@@ -165,8 +165,7 @@ def _check_times(options: Namespace, runs: Sequence[Run]) -> None:
 
 def _check_folder(folder: Path, count: int) -> None:
     """Refuse a folder with frames that would stay beside the new ones."""
-    if folder.exists() and not folder.is_dir():
-        raise refusal("--frames-to", folder, "must be a folder, this is a file")
+    check_folder("--frames-to", folder)
     frame = re.compile(r"frame_(\d{4,})\.png")
     numbers = (frame.fullmatch(path.name) for path in folder.glob("frame_*.png"))
     if any(number is not None and int(number[1]) >= count for number in numbers):

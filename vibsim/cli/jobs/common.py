@@ -33,15 +33,22 @@ COMPARED = ("convergence.nc", "summary.json")
 def chosen_results(options: Namespace) -> Path:
     """Return the results folder that was asked for, else the default one."""
     folder: Path = options.results or default_results()
+    check_folder("--results", folder)
+    return folder.absolute()
+
+
+def check_folder(option: str, folder: Path) -> None:
+    """Refuse what is no folder, and cannot become one: a file, or a place within one."""
     try:
-        is_other = folder.exists() and not folder.is_dir()
+        there = next(path for path in (folder, *folder.absolute().parents) if path.exists())
+        is_folder = there.is_dir()
     except OSError as error:
         # a name that is too long, a folder on the way that may not be entered
         rule = f"cannot be used: {error.strerror}"
-        raise refusal("--results", f"{str(folder)[:80]} ...", rule) from None
-    if is_other:
-        raise refusal("--results", folder, "must be a folder, this is a file")
-    return folder.absolute()
+        raise refusal(option, f"{str(folder)[:80]} ...", rule) from None
+    if not is_folder:
+        this = "this" if there == folder else there
+        raise refusal(option, folder, f"must be a folder, {this} is a file")
 
 
 def one_plan(options: Namespace) -> tuple[Plan, Path]:

@@ -83,7 +83,7 @@ SENTENCES: Mapping[str, tuple[str, str]] = MappingProxyType(
         ),
         "pre_asymptotic": (
             "The levels of {quantity} do not show a settled order yet{estimate}.",
-            "Add a finer level, such as {size} = {finer}.",
+            "Add a finer level{such_as}.",
         ),
         "noisy": (
             "The finest levels of {quantity} differ by little more than {noise}, so they do not show a settled order"
@@ -93,7 +93,7 @@ SENTENCES: Mapping[str, tuple[str, str]] = MappingProxyType(
         "growing": (
             "The differences of {quantity} grow towards the finer levels{estimate}.",
             "Check that {size} is a step size, not a number of cells or steps, and that each level has its own. If so, "
-            "add a finer level, such as {size} = {finer}.",
+            "add a finer level{such_as}.",
         ),
         "round_off": (
             "The differences of {quantity} have reached {floor}, so they do not show its order{estimate}.",
@@ -101,7 +101,7 @@ SENTENCES: Mapping[str, tuple[str, str]] = MappingProxyType(
         ),
         "oscillating": (
             "The differences of {quantity} change sign from level to level, so no order can be read from them.",
-            "Add a finer level, such as {size} = {finer}, or judge another quantity.",
+            "Add a finer level{such_as}, or judge another quantity.",
         ),
         "non_smooth": (
             "The differences of {quantity} follow no power of {size}{estimate}.",
@@ -109,7 +109,7 @@ SENTENCES: Mapping[str, tuple[str, str]] = MappingProxyType(
         ),
         "too_few_levels": (
             "{count} too few to judge the convergence of {quantity}. Three are needed, and four are better.",
-            "Add a level, such as {size} = {finer}.",
+            "Add a level{such_as}.",
         ),
         "not_applicable": (
             "{quantity} has no order to judge.",
@@ -177,7 +177,9 @@ def _joined(parts: Sequence[str]) -> str:
 def _phrases(facts: LadderVerdict, setting: Setting) -> dict[str, Any]:
     kind, own = setting.interpolation or ("", 0)
     h, count = [level.h for level in facts.levels], len(facts.levels)
-    finer = h[-1] * (h[-1] / h[-2] if count > 1 else 0.5)
+    finer = number(h[-1] * (h[-1] / h[-2] if count > 1 else 0.5), 6)
+    # of sizes near the ends of double precision there may be none
+    such_as = f", such as {facts.size_name} = {finer}" if 0.0 < float(finer) < h[-1] else ""
     not_finite = [level.h for level in facts.levels if level.value is None]
     if facts.expected is not None:
         wanted, as_expected = f"{facts.expected:g}", ", as expected"
@@ -197,11 +199,11 @@ def _phrases(facts: LadderVerdict, setting: Setting) -> dict[str, Any]:
         "floor": "the stated noise" if setting.noise else "round-off or other noise",
         "not_finite": f"{facts.size_name} = {listed(not_finite)}",
         "these": "this level" if len(not_finite) == 1 else "these levels",
-        "estimate": f" (the last estimate is {number(facts.order, 3)})"
+        "estimate": f" (the last estimate is {number(round(facts.order, 3) + 0.0, 3)})"
         if facts.order is not None
         else "",
         "size": facts.size_name,
-        "finer": number(finer, 6),
+        "such_as": such_as,
         "count": "One level is" if count == 1 else f"{count} levels are",
         "kind": kind,
         "own": own,
