@@ -25,6 +25,7 @@ from vibsim.checks.sentences import Description, Found
 from vibsim.convergence.reasons import code, is_one_of
 from vibsim.core.array_types import Flags, Floats
 from vibsim.core.record import Record
+from vibsim.core.vocabulary import LEVELS_OF_AN_ORDER
 from vibsim.experiment import Experiment
 from vibsim.experiment.schema.checks import ValueCheck
 
@@ -147,7 +148,7 @@ def judge(experiment: Experiment, record: Record, check: ValueCheck, found: Meas
     schemes = len(record["scheme"])
     places, reasons = np.full(schemes, about[0]), np.full(schemes, code("match"))
     table = {name: np.full(schemes, np.nan) for name in ("value", "error_bound", *FACTS)}
-    enough = len(record["level"]) >= value.FEWEST
+    enough = len(record["level"]) >= LEVELS_OF_AN_ORDER
     for s in range(schemes):
         broken = is_one_of(own.reason[s, about], "non_finite", "not_applicable")
         broken |= (own.reason[s, about] == code("too_few_levels")) & np.isnan(
@@ -237,7 +238,7 @@ def describe(f: Found, check: ValueCheck) -> Description:
     which = f" ({_at(f, check, int(places[0]))}{more})" if len(places) else ""
     verb = "is" if len(places) == 1 else "are"
     left = f"{len(places)} of {len(about)} members {verb} not resolved well enough{which}"
-    causes = (value.to_know(replace(f, case=int(place)), check) for place in places)
+    causes = (value.advice_on_bound(replace(f, case=int(place)), check) for place in places)
     advice = next(filter(None, causes), "") or f"A{value.finer_levels(f)} to shrink the errors."
     return Description(f"{finding}{doubted}, because {left}.", advice, finding)
 

@@ -27,7 +27,7 @@ from vibsim.comparison.quantity_comparison import Compared
 from vibsim.convergence.reasons import first_reason
 from vibsim.core.array_types import Flags, Floats
 from vibsim.core.record import Record
-from vibsim.core.vocabulary import is_error_part
+from vibsim.core.vocabulary import LEVELS_OF_AN_ORDER, is_error_part
 from vibsim.elementary import on_arrays
 from vibsim.experiment import Experiment
 from vibsim.experiment.schema.checks import ValueCheck
@@ -61,8 +61,6 @@ UNKNOWN, SETTLED, MOVING = -1, 0, 1
 """What finer levels do to a number that misses what is asked: not known, too little, perhaps enough."""
 REACH = 3.0
 """All finer levels together change a number by no more than so many times its last change (an order of 1/2 by 2.4)."""
-FEWEST = 3
-"""Fewer levels do not show how large an error is."""
 FINER, MOST_FINER = 2, 12
 """So many finer levels are advised where nothing tells how many are needed, and so many at most."""
 UNPROVED = (
@@ -203,7 +201,7 @@ def judge(experiment: Experiment, record: Record, check: ValueCheck, found: Meas
         (holds, "match"),
         (
             may_be_right,
-            "too_few_levels" if len(record["level"]) < FEWEST else "pre_asymptotic",
+            "too_few_levels" if len(record["level"]) < LEVELS_OF_AN_ORDER else "pre_asymptotic",
         ),
     ]
     reason = first_reason(cases, "mismatch")
@@ -352,7 +350,7 @@ def describe(f: Found, check: ValueCheck) -> Description:
             advice = f"Add finer `levels:` until there are {check.number.finer_levels + 1}."
         case _:
             sentence = f"{subject} is {brief}; it may or may not be {expected}."
-            advice = to_know(f, check) or (
+            advice = advice_on_bound(f, check) or (
                 f"A{finer_levels(f)} to shrink the error bound, or ask for the number of one level "
                 "(`at: {level: ...}`)."
             )
@@ -405,7 +403,7 @@ def _why_unknown(f: Found, check: ValueCheck) -> str:
     if _has_few_periods(f, check):
         return f", because the run has fewer than {LEAST_PERIODS} periods of the force"
     numbers = _by_level_of(f)
-    if len(numbers) >= FEWEST and np.all(np.isfinite(numbers)):
+    if len(numbers) >= LEVELS_OF_AN_ORDER and np.all(np.isfinite(numbers)):
         return ", because its changes do not shrink steadily from level to level"
     return ", because there is one level only" if len(f.experiment.levels) == 1 else ""
 
@@ -422,7 +420,7 @@ def _is_on_the_mesh(f: Found, check: ValueCheck) -> bool:
     return check.number.needs_events and is_on_the_mesh(options)
 
 
-def to_know(f: Found, check: ValueCheck) -> str:
+def advice_on_bound(f: Found, check: ValueCheck) -> str:
     """Say what to change where no finer level can bound the error of a number; empty elsewhere."""
     if _is_on_the_mesh(f, check):
         return f"Set `events: located` for scheme {f.scheme_name}."
@@ -450,7 +448,7 @@ def finer_levels(f: Found, count: int = FINER) -> str:
 def _levels_to_add(f: Found, check: ValueCheck) -> int:
     """Return how many finer levels make a number as asked if its changes fall on as the last two did."""
     numbers = _by_level_of(f)
-    if len(numbers) < FEWEST:
+    if len(numbers) < LEVELS_OF_AN_ORDER:
         return FINER
     before, last = np.diff(numbers[-3:])
     fall = last / before if before else 0.0

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from vibsim.apriori.formal_orders import even_powers, formal_orders
 from vibsim.comparison import value_numbers
 from vibsim.comparison.comparison_variables import Table
-from vibsim.comparison.extremum import WIDTH, largest_between_samples, rise_of_others
+from vibsim.comparison.extremum_of_levels import extremum_of_levels
 from vibsim.comparison.quantity_comparison import Compared
 from vibsim.comparison.thresholds import (
     IRREGULAR,
@@ -28,22 +28,18 @@ from vibsim.comparison.thresholds import (
     OF_PARABOLA,
 )
 from vibsim.convergence import gci
-from vibsim.convergence.differences import error_factor, safe_ratio
+from vibsim.convergence.differences import safe_ratio
 from vibsim.convergence.ladder_blocks import batches
 from vibsim.convergence.number_extrapolation import Limit, limit, observed_order
-from vibsim.convergence.thresholds import ORDER_ABOVE_ROUND_OFF
 from vibsim.core.array_types import Flags, Floats
 from vibsim.core.record import Variable, flags
 from vibsim.core.vocabulary import MEMBER
 from vibsim.experiment.value_names import VALUES
 from vibsim.models import Model
-from vibsim.models.events import Crossings, Impact
 from vibsim.observe import oscillation, steady_state
 from vibsim.observe.member_block import MemberBlock
 from vibsim.schemes.orders import depends_on_velocity, is_autonomous
 
-_UPWARD = {"min": np.negative, "max": np.positive, "max_abs": np.abs}
-"""What turns an extremum of a series into its largest value."""
 OF_PEAK_TIMES = (
     "period", "period_error", "frequency", "error_of_frequency", "phase_error_per_period"
 )  # fmt: skip
@@ -116,8 +112,8 @@ def _ladder(name: str, place: value_numbers.Place) -> _Ladder:
         floor = np.broadcast_to(relative * size[..., None], values.shape)
     missed, (order, even) = block.unseen_at_corner(size), _promised(name, place)
     if row.measured_by == "points":
-        values, off, is_smooth = _extrema(name, place, values, floor, size)
-        missed = missed + off + _rise_of_others(name, place, order)
+        values, off, is_smooth = extremum_of_levels(name, place, values, floor, size, order)
+        missed = missed + off
         order = np.where(is_smooth, order, np.minimum(order, OF_GRID))
         even = even & is_smooth
     if name in OF_PEAK_TIMES:
@@ -139,86 +135,6 @@ def _stacked(rows: Sequence[_Ladder]) -> _Ladder:
     """Return ladders of the same levels as one, along a new first axis."""
     names = ("values", "order", "even", "floor", "size", "missed", "safety")
     return _Ladder(rows[0].levels, *(np.stack([getattr(r, name) for r in rows]) for name in names))
-
-
-def _extrema(
-    name: str, place: value_numbers.Place, values: Floats, floor: Floats, size: Floats
-) -> tuple[Floats, Floats, Flags]:
-    """Return an extremum at every level, how far it is off at the finest one, and where it is that of a smooth motion.
-
-    Elsewhere it stays that over grid points: without a series, near a velocity that events change, and where levels
-    with the same number have met it, which the series does not pass.
-    """
-    off = _missed(name, place, values, floor, size)
-    smooth, off_smooth = _between_points(name, place, values)
-    is_smooth = (off > 0.0) | (np.abs(smooth[..., -1] - values[..., -1]) > off_smooth)
-    is_smooth = np.where(_is_struck(place.block), off_smooth < off, is_smooth)
-    is_smooth = is_smooth & np.isfinite(off_smooth) & ~place.block.adaptive[:, None]
-    values = np.where(is_smooth[..., None], smooth, values)
-    return values, np.where(is_smooth, off_smooth, off), is_smooth
-
-
-def _is_struck(block: MemberBlock) -> Flags:
-    """Mark members whose velocity events change, shape (scheme, case)."""
-    return np.logical_not(block.eventless) & isinstance(block.model.events, Impact | Crossings)
-
-
-def _missed(
-    name: str, place: value_numbers.Place, values: Floats, floor: Floats, size: Floats
-) -> Floats:
-    """Return how much of an extremum lies between grid points: ``w^2 dt^2/8`` of its size at most.
-
-    Where impacts change a velocity, a state turns without rest, and ``w dt`` may be missed. How much differs from level
-    to level by accident, which no extrapolation takes away. Nothing is missed where the levels have the same number,
-    unless it is that of a start from which the position moves on beyond it.
-    """
-    model, data, near = place.block.model, place.block.finest, ORDER_ABOVE_ROUND_OFF * floor
-    p = np.minimum(place.block.omega_dt[:, -1], 1.0)
-    changes = np.abs(np.diff(values[..., -3:], axis=-1))
-    with np.errstate(invalid="ignore"):
-        same = np.all(changes <= near[..., -1:], axis=-1)
-        states = dict(zip(model.positions, model.velocities, strict=True))
-        speed = states.get(place.quantity, "")
-        if name in ("min", "max") and speed in data and place.quantity in data:
-            start, slope = (np.asarray(data[q][..., 0]) for q in (place.quantity, speed))
-            at_start = np.abs(values[..., -1] - start) <= near[..., -1]
-            same &= ~(at_start & (slope > 0.0 if name == "max" else slope < 0.0))
-    part = np.where(_is_struck(place.block), p, OF_A_LINE * p**2)
-    return np.where(same, 0.0, part * size)
-
-
-def _between_points(name: str, place: value_numbers.Place, values: Floats) -> tuple[Floats, Floats]:
-    """Return an extremum between the grid points at every level, and how far it may be off at the finest one.
-
-    Shapes (scheme, case, level) and (scheme, case). The bound is NaN where there is no series. A level with too few
-    samples keeps its value over the grid points.
-    """
-    block, q = place.block, place.quantity
-    found, off = values.copy(), np.full(values.shape, np.nan)
-    with_series = [i for i, level in enumerate(place.levels) if q in block.records[level]]
-    series = {i: np.asarray(block.records[place.levels[i]][q], np.float64) for i in with_series}
-    enough = [i for i in with_series if series[i].shape[-1] >= WIDTH]
-    if enough:
-        upward = (_UPWARD[name](series[i]) for i in enough)
-        largest, error = largest_between_samples([x.reshape(-1, x.shape[-1]) for x in upward])
-        sign = -1.0 if name == "min" else 1.0
-        found[..., enough] = sign * largest.reshape(*block.shape, -1)
-        off[..., enough] = error.reshape(*block.shape, -1)
-    # the limit is made of the level before the finest, too
-    return found, np.where(np.isnan(off[..., -1]), np.nan, np.fmax.reduce(off[..., -2:], axis=-1))
-
-
-def _rise_of_others(name: str, place: value_numbers.Place, order: Floats) -> Floats:
-    """Return how much larger another extremum than that of the finest level may be in the limit, (scheme, case)."""
-    block, q = place.block, place.quantity
-    records = [block.records[level] for level in place.levels[-2:]]
-    if len(records) < 2 or any(q not in r or np.shape(r[q])[-1] < WIDTH for r in records):
-        return np.zeros(block.shape)
-    series = [_UPWARD[name](np.asarray(r[q], dtype=np.float64)) for r in records]
-    rows = [np.nan_to_num(x.reshape(-1, x.shape[-1]), posinf=0.0, neginf=0.0) for x in series]
-    gap = place.levels[-1] - place.levels[-2]
-    fall = np.where(np.isfinite(order), -1.0 - error_factor(np.maximum(order, 1.0), gap), 0.0)
-    return rise_of_others(rows[0], rows[1], fall.reshape(-1)).reshape(block.shape)
 
 
 def _off_between_points(place: value_numbers.Place) -> Floats:

@@ -17,6 +17,7 @@ from vibsim.comparison.solution_distance import discrete_error, exact_series
 from vibsim.convergence.differences import largest, safe_ratio
 from vibsim.core.array_types import Floats
 from vibsim.core.record import Record
+from vibsim.core.vocabulary import LEVELS_OF_AN_ORDER
 from vibsim.elementary import on_arrays
 from vibsim.observe import oscillation, predicted_oscillation, spectrum, steady_state
 from vibsim.observe.common_grid import whole
@@ -230,7 +231,7 @@ def _along(p: Place, found: Floats) -> Floats:
 def _of_triple(of: Callable[[Comparison], Floats]) -> Number:
     def take(p: Place) -> Floats:
         q = p.comparison()
-        return p.missing if q is None or len(p.levels) < 3 else _along(p, of(q))
+        return p.missing if q is None or len(p.levels) < LEVELS_OF_AN_ORDER else _along(p, of(q))
 
     return take
 

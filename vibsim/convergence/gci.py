@@ -26,6 +26,7 @@ from vibsim.convergence.differences import gap_ratio, order_of_ratio, safe_ratio
 from vibsim.convergence.extrapolation import error_left
 from vibsim.convergence.number_extrapolation import triple_at
 from vibsim.core.array_types import Codes, Flags, Floats
+from vibsim.core.vocabulary import LEVELS_OF_AN_ORDER
 from vibsim.elementary import on_arrays
 
 CLASSES = (
@@ -47,7 +48,7 @@ def classify(values: Floats, levels: Sequence[int], floor: Floats) -> Codes:
     -1 < R < 0, diverging beyond.
     """
     found = np.full(values.shape[:-1], UNKNOWN, dtype=np.int8)
-    if len(levels) < 3:
+    if len(levels) < LEVELS_OF_AN_ORDER:
         return found
     found[np.all(np.isfinite(values[..., -3:]), axis=-1)] = ROUND_OFF
     for i in range(len(levels) - 2):

@@ -15,6 +15,7 @@ import numpy as np
 from vibsim.convergence.error_model.posterior import Ladder
 from vibsim.convergence.reasons import STATUS_OF, code
 from vibsim.core.array_types import Floats, Integers
+from vibsim.core.vocabulary import LEVELS_OF_AN_ORDER
 
 LADDERS = 4096
 """So many ladders at most are put beside each other; one row of more is worked on by itself."""
@@ -46,7 +47,7 @@ def in_blocks(
     )
     found = _nothing(count, n)
     reason = found["reason"] = np.full(count, code("non_finite"))
-    if n < 3:
+    if n < LEVELS_OF_AN_ORDER:
         reason[finite] = code("too_few_levels")
     else:
         every = np.flatnonzero(finite)

@@ -69,6 +69,7 @@ from vibsim.convergence.reasons import (
     is_open,
 )
 from vibsim.core.array_types import Codes, Flags, Floats, Integers
+from vibsim.core.vocabulary import LEVELS_OF_AN_ORDER
 from vibsim.elementary import on_arrays
 
 
@@ -103,7 +104,7 @@ def judge(e: Evidence) -> Judgement:
     ]
     order, low, high = (np.full(shape, np.nan) for _ in range(3))
     first, last = (np.full(shape, -1) for _ in range(2))
-    if len(e.levels) < 3:
+    if len(e.levels) < LEVELS_OF_AN_ORDER:
         cases.append((np.ones(shape, dtype=bool), "too_few_levels"))
     else:
         judged = e.applicable & ~undefined & ~fails & ~growing

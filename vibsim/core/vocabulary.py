@@ -49,6 +49,8 @@ RESTRICTIONS: tuple[Restriction, ...] = get_args(Restriction)
 """Ways to bring the levels of a study to common points."""
 ORDER_TOLERANCE = 0.1
 """How far from the promised order a measured one may be where a check does not say."""
+LEVELS_OF_AN_ORDER = 3
+"""Fewer levels show no order, and not how large their error is."""
 BY_TOLERANCE = "tolerance"
 """Name and kind of the verdict that an experiment with a tolerance has beside those of its checks."""
 

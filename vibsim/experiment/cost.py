@@ -85,12 +85,8 @@ SHARD_BYTES = 320 * 10**6
 LARGEST_SHARD = 2**20
 """Members of a shard at most."""
 
-ANALYSIS_MEMORY = 135 * 10**6
-"""Bytes of an analysis without its arrays, with the process that watches over it."""
-LLVM_MEMORY = 45 * 10**6
-"""Bytes of LLVM in an analysis that judges no orders; in those that do, it is part of what is measured per member."""
-FEWEST_FOR_ORDERS = 3
-"""Levels that show an order."""
+ANALYSIS_MEMORY = 180 * 10**6
+"""Bytes of an analysis without its arrays, with LLVM and the process that watches over it."""
 ANALYSED = 3.8
 """Bytes that an analysis holds at its peak for each byte that it reads of the members at hand."""
 PART_SAMPLES = 2**16
@@ -254,8 +250,7 @@ def analysis_memory(loads: Sequence[Load], members: int) -> int:
     """Return the bytes that an analysis in one process holds at its peak; `loads` are those of every level."""
     written = _packed(analysis_disk(loads, members, is_lean=False), loads[0].extrema)
     result = RESULT * loads[0].schemes * members
-    llvm = LLVM_MEMORY if len(loads) < FEWEST_FOR_ORDERS else 0
-    return ANALYSIS_MEMORY + llvm + _part_memory(loads, members) + result + written
+    return ANALYSIS_MEMORY + _part_memory(loads, members) + result + written
 
 
 def process_memory(loads: Sequence[Load], members: int) -> int:

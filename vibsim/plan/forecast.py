@@ -11,6 +11,7 @@ import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+from vibsim.core.vocabulary import LEVELS_OF_AN_ORDER
 from vibsim.experiment.cost import PLAIN_MEMBER_STEPS, Load, analysis_disk
 from vibsim.experiment.storage import is_bounded
 from vibsim.formula.jumps import held
@@ -33,8 +34,8 @@ NUMBER_SECONDS = (1.2e-6, 0.05e-6)
 """Of one stored number of the series that follow from the states: in plain Python, and compiled."""
 GAP_SECONDS, GAP_BYTES = 1e-6, 300
 """Of an analysis that looks for a pulse of a force between two points of the finest level."""
-JUDGED_BYTES = 70 * 10**6
-"""Of an analysis that judges orders, from three levels on: the error model, compiled."""
+JUDGED_BYTES = 25 * 10**6
+"""Of an analysis that judges orders: the error model, compiled."""
 LEVEL_BYTES, FEW_LEVELS, MANY_LEVELS = 25 * 10**6, 4, 7
 """Beside these, of each further level from the first number of levels to the second."""
 VARIABLE_BYTES, FEW_SERIES = 2 * 10**6, 12
@@ -94,7 +95,7 @@ def gaps(experiment: Experiment, loads: Sequence[Load]) -> int:
 
 def other_memory(experiment: Experiment, loads: Sequence[Load]) -> int:
     """Return the bytes that an analysis holds beside the levels and what it writes."""
-    judges = JUDGED_BYTES if len(loads) > 2 else 0
+    judges = JUDGED_BYTES if len(loads) >= LEVELS_OF_AN_ORDER else 0
     judges += LEVEL_BYTES * max(min(len(loads), MANY_LEVELS) - FEW_LEVELS, 0)
     series = VARIABLE_BYTES * max(loads[0].series - FEW_SERIES, 0)
     return judges + series + GAP_BYTES * gaps(experiment, loads)

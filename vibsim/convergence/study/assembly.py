@@ -9,13 +9,13 @@ import numpy as np
 
 from vibsim.convergence.differences import orders_of_steps
 from vibsim.convergence.study.common_points import CommonValues
-from vibsim.convergence.study.outcomes import FEWEST, Outcome, Request
+from vibsim.convergence.study.outcomes import Outcome, Request
 from vibsim.convergence.study.refinement import Refinement
 from vibsim.convergence.study.sentences import Setting, describe
 from vibsim.convergence.study.verdict import LadderVerdict, Level
 from vibsim.convergence.thresholds import GCI_TRUSTED
 from vibsim.core.array_types import Floats
-from vibsim.core.vocabulary import ORDER_TOLERANCE, REASONS
+from vibsim.core.vocabulary import LEVELS_OF_AN_ORDER, ORDER_TOLERANCE, REASONS
 from vibsim.elementary import on_arrays
 
 ROUNDING_SAID = 0.1
@@ -120,7 +120,7 @@ def _gci(one: Outcome, h: Floats) -> float:
     """
     if one.reason == "exact" and not np.any(one.differences):
         return 0.0
-    if not one.order > 0.0 or len(one.finite) < FEWEST or one.finite[-1] < len(h) - 1:
+    if not one.order > 0.0 or len(one.finite) < LEVELS_OF_AN_ORDER or one.finite[-1] < len(h) - 1:
         return np.nan
     ratio = h[one.finite[-2]] / h[one.finite[-1]]
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):

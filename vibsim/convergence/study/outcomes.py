@@ -18,11 +18,9 @@ from vibsim.convergence.study.measurement import (
 )
 from vibsim.convergence.thresholds import LEAST_WITH_LIMIT, MISSED
 from vibsim.core.array_types import Flags, Floats, Integers
-from vibsim.core.vocabulary import REASON_NAMES
+from vibsim.core.vocabulary import LEVELS_OF_AN_ORDER, REASON_NAMES
 from vibsim.elementary import on_arrays
 
-FEWEST = 3
-"""Levels that show an order."""
 MOST_ROUNDED = 5e-4
 """Exact values of more than three digits may be rounded to them: half of their last digit is a smaller part."""
 EXACT_DIGITS = 16
@@ -155,13 +153,13 @@ def _with_finite(
     part = values[:, finite]
     measured = measurement(part, h[finite], epsilon[finite], request.noise, exact)
     decided = None
-    if len(finite) >= FEWEST:
+    if len(finite) >= LEVELS_OF_AN_ORDER:
         question = Question(request.order, request.at_least)
         if request.noise:
             question = question.with_stated_noise
         decided = assess(measured.ladder, question)
         if not request.noise:
-            _doubt_few_digits(decided, measured, part, question)
+            _allow_for_rounding(decided, measured, part, question)
     for k, one in enumerate(found):
         truth = None if exact is None else exact[k]
         _measure(one, measured, k, part[k], truth)
@@ -175,7 +173,7 @@ def _with_finite(
     return found
 
 
-def _doubt_few_digits(
+def _allow_for_rounding(
     decided: Assessment, measured: Measurement, part: Floats, question: Question
 ) -> None:
     """Take back what was decided of values of few digits, if noise as large as their rounding decides otherwise.

@@ -22,7 +22,7 @@ LEFT, RIGHT, ABOVE, BELOW, HEIGHT = 0.6, 0.35, 0.2, 0.38, 1.0
 WIDE = 3.3  # width of a panel over time [inch]
 SIZE = 8.0  # of letters [point]
 MOST_LEVELS = 12  # with more of them every second one is named
-FEWEST = 2  # round numbers on a scale: one alone does not tell how large a curve is
+FEWEST_TICKS = 2  # round numbers on a scale: one alone does not tell how large a curve is
 DASHED: dict[str, Any] = {"color": INK, "linewidth": 0.8, "linestyle": (0, (4, 3))}
 ALIKE = np.array([1.0 - 1e-11, 1.0 + 1e-11])
 """Growth factors between these differ by rounding only: a scale need not tell them apart."""
@@ -55,10 +55,10 @@ def panel(figure: Figure, title: str, x_name: str, width: float = 2.5) -> Axes:
 
 
 def round_ticks(axis: Any, most: int = 4) -> None:
-    """Put about `most` round numbers on a linear axis; `FEWEST` at least."""
+    """Put about `most` round numbers on a linear axis; `FEWEST_TICKS` at least."""
     from matplotlib.ticker import FuncFormatter, MaxNLocator
 
-    axis.set_major_locator(MaxNLocator(most, steps=[1, 2, 5, 10], min_n_ticks=FEWEST))
+    axis.set_major_locator(MaxNLocator(most, steps=[1, 2, 5, 10], min_n_ticks=FEWEST_TICKS))
     axis.set_major_formatter(FuncFormatter(lambda value, _: words.number(value, "value")))
 
 

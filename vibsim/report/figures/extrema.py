@@ -20,7 +20,7 @@ from vibsim.report.figures.panels import note, stacked
 from vibsim.report.style import Picture
 from vibsim.report.types import Axes, Experiment
 
-FEWEST = 3  # peaks that show how a period changes
+FEWEST_PEAKS = 3  # peaks that show how a period changes
 MOST_CURVES = 6  # most curves; more lie on one another
 MOST_MARKERS = 40  # most numbers of one curve that get a marker each
 MARKED = 60  # most local frequencies of one curve that get a marker each

@@ -154,7 +154,7 @@ def _of_every_quantity(
     if series:
         if equation.conservative:
             yield "energy", [energy.running(record, case)]
-        beside: Drawn = [extrema.local(experiment, record, series, extrema.FEWEST)]
+        beside: Drawn = [extrema.local(experiment, record, series, extrema.FEWEST_PEAKS)]
         if not data.swept(record) and equation.is_alone:
             beside.append(plane.phase(experiment, record, series))
         yield "phase and amplitude", beside

@@ -31,7 +31,7 @@ from vibsim.report.types import Axes, Experiment
 LEFT, RIGHT, HEIGHT = 5.4, 3.9, 2.75
 """Widths of the left picture and of the right one, and their height [inch]."""
 FEW = 300  # of more members a histogram of the orders says more than dots
-FEWEST = 2  # errors that a picture over the step needs
+FEWEST_ERRORS = 2  # errors that a picture over the step needs
 MOST_SCHEMES = 6  # schemes that the right picture can tell apart
 SIZES = {
     "l1": "mean error", "l2": "root-mean-square error", "linf": "largest error",
@@ -156,7 +156,7 @@ def against_step(record: Record, lead: Lead) -> Picture | None:
             error = np.where(np.isfinite(true), true, estimate)
             due = data.basis_of_order(record, quantity)
             _slope(ax, dt, error, data.formal_order(record, member, quantity), due)
-    if sum(style.finite(part).size for part in drawn) < FEWEST:
+    if sum(style.finite(part).size for part in drawn) < FEWEST_ERRORS:
         return None
     high = max(float(part[np.isfinite(part)].max()) for part in drawn)
     style.fit_log_axis(ax, "y", *drawn, least=1e-18, room=2.5, most=5)

@@ -26,7 +26,7 @@ MANY_PERIODS = 10.0
 PERIODS = 4.0  # in the window at first
 MOST_POINTS = 24_000  # of all curves together, about 300 kB
 POINTS_A_PERIOD = 24  # of a curve; of a longer run fewer curves are drawn, and then fewer points
-FEWEST, MOST = 2, 5  # panels
+FEWEST_PANELS, MOST_PANELS = 2, 5  # panels
 TALL, STRIP = 0.95, 0.4  # height of a panel and of the strip below [inch]
 SPARSE = 12.0  # samples a period below which they have dots, and what they are compared with is smooth between them
 BEYOND = 1.25  # how much of a panel lies above the largest value that is compared with
@@ -56,7 +56,7 @@ def long_series(record: Record, quantity: str, member: Member) -> Picture | None
     span = float(t[-1] - t[0])
     period = moments.period(t, compared)
     curves = MOST_POINTS / (POINTS_A_PERIOD * span / period)
-    rows = _rows(record, quantity, member, int(np.clip(curves / 2, FEWEST, MOST)))
+    rows = _rows(record, quantity, member, int(np.clip(curves / 2, FEWEST_PANELS, MOST_PANELS)))
     is_short = span <= MANY_PERIODS * period
     if (
         is_short

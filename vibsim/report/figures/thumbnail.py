@@ -26,7 +26,7 @@ CURVES = 3  # most curves in one picture
 CELLS = 48, 24  # most cells of a map across and up
 SHADES = 7  # colours of a map
 FLAT = 1e-2  # a number that varies by less than this part of its size makes no curve and no map
-FEWEST = 8  # swept values that make a response curve; of fewer the solutions are drawn
+FEWEST_VALUES = 8  # swept values that make a response curve; of fewer the solutions are drawn
 WIDE = 1e3  # a number whose largest value exceeds its median by this factor is drawn on a logarithmic scale
 BEYOND = 1.5
 """What leaves the smallest of several solutions by more than this factor is cut off."""
@@ -96,7 +96,7 @@ def _solutions(record: Record, position: str, member: Member, layout: Along | Gr
 def _response(record: Record, along: Along, names: Sequence[str]) -> Lines:
     """Return a number over the swept key, a curve for each of the other values; nothing where none varies."""
     key = along.key
-    if key.distinct.size < FEWEST:
+    if key.distinct.size < FEWEST_VALUES:
         return []
     for name in names:
         values = np.abs(data.known(record, name, MEMBER, level=-1)[0])

@@ -41,7 +41,7 @@ from vibsim.simulation.reference.piecewise_collocation import ENDLESS, SLIDING, 
 
 METHOD = "collocation at 12 Gauss points of a step, halved until two solutions agree"
 PIECEWISE = f"{METHOD}; a step ends at every corner of the force"
-FEWEST, MOST = 8, 2**11
+FEWEST_STEPS, MOST_STEPS = 8, 2**11
 """Steps over the whole interval; where there are corners, of a motion without any."""
 COMPARED_TIMES = 5 * 64
 """At so many equal times, and at t = 0, two solutions are compared: four of five lie within a step, where its
@@ -240,8 +240,8 @@ def _accepted(refined: _Refined) -> Chosen:
     times = np.arange(COMPARED_TIMES + 1) / COMPARED_TIMES
     left, accepted = np.arange(len(refined.end)), []
     before, gap, slow = None, np.full(len(left), np.inf), np.zeros(len(left), dtype=np.int64)
-    steps = FEWEST
-    while steps <= MOST and len(left):
+    steps = FEWEST_STEPS
+    while steps <= MOST_STEPS and len(left):
         solved, hopeless = refined.next(steps)
         now, goes_on = solved.at(times), ~hopeless
         if before is not None:
@@ -257,7 +257,7 @@ def _accepted(refined: _Refined) -> Chosen:
             missed = refined.missed(solved, is_there)
             is_there &= missed == 0.0
             # no steps will be short enough
-            goes_on &= ~((missed > 0.0) & (missed * MOST < refined.end))
+            goes_on &= ~((missed > 0.0) & (missed * MOST_STEPS < refined.end))
             if is_there.any():
                 accepted.append((left[is_there], of_members(solved, is_there)))
                 bounds[:, left[is_there]] = (error + rounding * size)[:, is_there]

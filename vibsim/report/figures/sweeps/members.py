@@ -27,7 +27,7 @@ from vibsim.report.words import power
 
 Masks = dict[str, Flags]
 """Which members come to each verdict, shape (case,)."""
-FEWEST, BARS = 60, 50  # of fewer members a histogram says nothing; bars of one
+FEWEST_MEMBERS, BARS = 60, 50  # of fewer members a histogram says nothing; bars of one
 MOST_ROWS = 6  # most schemes that have a row of histograms
 MOST_PANELS = 6  # most keys that have a panel; the members' table has all
 MOST_POINTS = 4000  # most members that are drawn as points
@@ -38,7 +38,7 @@ MESH = 160, 60  # cells that members are counted in, along and up
 
 def histograms(experiment: Experiment, record: Record, quantity: str) -> Picture | None:
     """Draw the spread of order, error and period error, one row per scheme; None for few members."""
-    if len(record["case"]) < FEWEST:
+    if len(record["case"]) < FEWEST_MEMBERS:
         return None
     schemes, letter = record.words("scheme")[:MOST_ROWS], words.symbol(quantity)
     error, away = finest_level.error(record, quantity), finest_level.deviation(record, quantity)

@@ -64,7 +64,7 @@ def _crests(series: Floats, top: Floats) -> _Crests:
     return _Crests(row[may], centre[may], (index - centre)[may], limit[may], around[may])
 
 
-def rise_of_others(coarse: Floats, fine: Floats, fall: Floats) -> Floats:
+def rise_of_other_crests(coarse: Floats, fine: Floats, fall: Floats) -> Floats:
     """Return how much larger than the crest that is the largest on a fine grid another one may be in the limit.
 
     Each crest moves on from a coarse to a fine grid and beyond it; those that do so alike are no danger.

@@ -1,0 +1,125 @@
+"""An extremum of a motion at every level: between the grid points where the motion is smooth, and how far it is off."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from vibsim.comparison import value_numbers
+from vibsim.comparison.largest_between_samples import (
+    WIDTH,
+    largest_between_samples,
+    rise_of_other_crests,
+)
+from vibsim.comparison.thresholds import OF_A_LINE
+from vibsim.convergence.differences import error_factor
+from vibsim.convergence.thresholds import ORDER_ABOVE_ROUND_OFF
+from vibsim.core.array_types import Flags, Floats
+from vibsim.models.events import Crossings, Impact
+from vibsim.observe.member_block import MemberBlock
+
+_UPWARD = {"min": np.negative, "max": np.positive, "max_abs": np.abs}
+"""What turns an extremum of a series into its largest value."""
+Series = dict[int, Floats]
+"""Of levels, by their positions, whose largest values are sought, shape (scheme x case, t)."""
+
+
+def extremum_of_levels(
+    name: str,
+    place: value_numbers.Place,
+    over_points: Floats,
+    floor: Floats,
+    size: Floats,
+    order: Floats,
+) -> tuple[Floats, Floats, Flags]:
+    """Return an extremum at every level, how far it is off at the finest one, and where it is that of a smooth motion.
+
+    Elsewhere it stays that over grid points: without a series, near a velocity that events change, and where levels
+    with the same number have met it, which the series does not pass.
+
+    Parameters
+    ----------
+    name
+        ``min``, ``max`` or ``max_abs``.
+    over_points
+        The extremum over the grid points, shape (scheme, case, level), as its `floor`.
+    size
+        Of the solution, shape (scheme, case).
+    order
+        With which the extremum converges, shape (scheme, case).
+    """
+    off = _off_over_points(name, place, over_points, floor, size)
+    series = _upward(name, place)
+    smooth, off_smooth = _between_points(name, series, over_points)
+    is_smooth = (off > 0.0) | (np.abs(smooth[..., -1] - over_points[..., -1]) > off_smooth)
+    is_smooth = np.where(_is_struck(place.block), off_smooth < off, is_smooth)
+    is_smooth = is_smooth & np.isfinite(off_smooth) & ~place.block.adaptive[:, None]
+    found = np.where(is_smooth[..., None], smooth, over_points)
+    off = np.where(is_smooth, off_smooth, off) + _rise_of_other_crests(series, place.levels, order)
+    return found, off, is_smooth
+
+
+def _upward(name: str, place: value_numbers.Place) -> Series:
+    """Return the series of the levels that have one with enough samples, turned so that the extremum is the largest."""
+    found = {}
+    for i, level in enumerate(place.levels):
+        record = place.block.records[level]
+        if place.quantity in record and np.shape(record[place.quantity])[-1] >= WIDTH:
+            series = np.asarray(record[place.quantity], dtype=np.float64)
+            found[i] = _UPWARD[name](series).reshape(-1, series.shape[-1])
+    return found
+
+
+def _is_struck(block: MemberBlock) -> Flags:
+    """Mark members whose velocity events change, shape (scheme, case)."""
+    return np.logical_not(block.eventless) & isinstance(block.model.events, Impact | Crossings)
+
+
+def _off_over_points(
+    name: str, place: value_numbers.Place, values: Floats, floor: Floats, size: Floats
+) -> Floats:
+    """Return how much of an extremum lies between grid points: ``w^2 dt^2/8`` of its size at most.
+
+    Where impacts change a velocity, a state turns without rest, and ``w dt`` may be missed. How much differs from level
+    to level by accident, which no extrapolation takes away. Nothing is missed where the levels have the same number,
+    unless it is that of a start from which the position moves on beyond it.
+    """
+    model, data, near = place.block.model, place.block.finest, ORDER_ABOVE_ROUND_OFF * floor
+    p = np.minimum(place.block.omega_dt[:, -1], 1.0)
+    changes = np.abs(np.diff(values[..., -3:], axis=-1))
+    with np.errstate(invalid="ignore"):
+        same = np.all(changes <= near[..., -1:], axis=-1)
+        states = dict(zip(model.positions, model.velocities, strict=True))
+        speed = states.get(place.quantity, "")
+        if name in ("min", "max") and speed in data and place.quantity in data:
+            start, slope = (np.asarray(data[q][..., 0]) for q in (place.quantity, speed))
+            at_start = np.abs(values[..., -1] - start) <= near[..., -1]
+            same &= ~(at_start & (slope > 0.0 if name == "max" else slope < 0.0))
+    part = np.where(_is_struck(place.block), p, OF_A_LINE * p**2)
+    return np.where(same, 0.0, part * size)
+
+
+def _between_points(name: str, series: Series, over_points: Floats) -> tuple[Floats, Floats]:
+    """Return an extremum between the grid points at every level, and how far it may be off at the finest one.
+
+    Shapes (scheme, case, level) and (scheme, case). The bound is NaN where there is no series. A level with too few
+    samples keeps its value over the grid points.
+    """
+    found, off = over_points.copy(), np.full(over_points.shape, np.nan)
+    if series:
+        largest, error = largest_between_samples(list(series.values()))
+        shape, levels = (*over_points.shape[:-1], -1), list(series)
+        found[..., levels] = (-1.0 if name == "min" else 1.0) * largest.reshape(shape)
+        off[..., levels] = error.reshape(shape)
+    # the limit is made of the level before the finest, too
+    return found, np.where(np.isnan(off[..., -1]), np.nan, np.fmax.reduce(off[..., -2:], axis=-1))
+
+
+def _rise_of_other_crests(series: Series, levels: tuple[int, ...], order: Floats) -> Floats:
+    """Return how much larger another extremum than that of the finest level may be in the limit, (scheme, case)."""
+    finest = len(levels) - 1
+    if not {finest - 1, finest} <= set(series):
+        return np.zeros(order.shape)
+    coarse, fine = (np.nan_to_num(series[i], posinf=0.0, neginf=0.0) for i in (finest - 1, finest))
+    gap = levels[finest] - levels[finest - 1]
+    fall = np.where(np.isfinite(order), -1.0 - error_factor(np.maximum(order, 1.0), gap), 0.0)
+    return rise_of_other_crests(coarse, fine, fall.reshape(-1)).reshape(order.shape)
