@@ -11,7 +11,7 @@ import samples
 from vibsim.report import choice, style
 from vibsim.report.data import Member
 from vibsim.report.figures import drawing, moments, solution
-from vibsim.report.figures.long_series import MOST, PERIODS, long_series
+from vibsim.report.figures.long_series import MOST_PANELS, PERIODS, long_series
 
 
 def made(periods=40, schemes=("central",), levels=(0, 1, 2), steps=20, **changes):
@@ -91,7 +91,7 @@ def test_every_point_of_a_curve_is_in_the_page():
 @pytest.mark.slow
 def test_there_are_at_most_so_many_panels():
     picture, _ = drawn(periods=12, levels=tuple(range(8)), steps=8)
-    assert len(picture.figure.axes) == MOST + 1
+    assert len(picture.figure.axes) == MOST_PANELS + 1
 
 
 def test_few_samples_a_period_are_dots_on_a_smooth_exact_solution():

@@ -192,6 +192,9 @@ def judge(experiment: Experiment, record: Record, check: ValueCheck, found: Meas
         holds &= bound <= np.maximum(-away, 0.0 if check.equals is None else check.allowed)
     elif is_limit:
         holds &= ~(np.isnan(bound) & (found["levels_needed"] == MOVING)) & ~np.isinf(bound)
+        if check.equals is None:
+            # a limit of a range is met only where all numbers within the bound are
+            holds &= ~(bound > -away)
     cases = [
         ((_failed(record, check) & ~survives) | infinite, "non_finite"),
         (
