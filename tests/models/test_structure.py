@@ -14,6 +14,8 @@ from scipy.sparse import coo_array
 
 from vibsim.core.errors import InputError
 from vibsim.experiment import Experiment
+from vibsim.experiment.tables.content import TableError
+from vibsim.experiment.tables.matrix import read
 from vibsim.models.shared.matrices import Matrix, all_modes, lowest_modes, mode_motion
 from vibsim.simulation import simulate
 
@@ -30,6 +32,7 @@ TWO: dict[str, Any] = {
     "observe": {"x": 1, "y": 2},
     "start": {"displacement": [1, -0.2], "velocity": {"1": 0.3}},
 }
+EQUAL = {"mass": [1, 1], "stiffness": [4, 4]}
 REST = {
     "title": "Two masses",
     "time": {"end": 12, "base_steps": 40},
@@ -168,6 +171,8 @@ def test_a_sweep_of_the_load_has_the_response_of_each_frequency():
         ({"damping": {"1": 2}}, "model.damping", "must be the name of a file, rows"),
         ({"start": {"velocity": 3}}, "model.start.velocity", "must be the name of a file, a list"),
         ({"damping_ratios": "x"}, "model.damping_ratios", "must be a number"),
+        ({"damping_ratios": [0.1, 0.2], **EQUAL}, "model.damping_ratios", "the same frequency"),
+        ({"damping_ratios": [0.1], **EQUAL}, "model.damping_ratios", "are 0.1 and 0"),
     ],
 )
 def test_what_is_no_structure_is_refused(changed, key, rule):
@@ -176,6 +181,13 @@ def test_what_is_no_structure_is_refused(changed, key, rule):
     faults = [fault for fault in error.value.faults if fault.key.startswith(key)]
     assert faults, error.value
     assert rule in faults[0].rule
+
+
+def test_a_pattern_has_no_numbers(tmp_path):
+    file = tmp_path / "pattern.mtx"
+    file.write_text("%%MatrixMarket matrix coordinate pattern general\n2 2 2\n1 1\n2 2\n")
+    with pytest.raises(TableError, match="holds a pattern alone, without the numbers"):
+        read(file)
 
 
 def loaded(folder: Path, *, load: str, text: str, end: float = 3.0) -> Experiment:

@@ -55,7 +55,9 @@ def _from_matrix_market(content: bytes) -> Any:
     from scipy.io import mminfo, mmread
 
     try:
-        rows, columns, _, form, *_ = mminfo(io.BytesIO(content))
+        rows, columns, _, form, field, _ = mminfo(io.BytesIO(content))
+        if field == "pattern":
+            raise TableError("holds a pattern alone, without the numbers of the matrix")
         # before anything of that size is allocated
         _check_counts(rows, columns)
         if form == "array" and rows * columns > MOST_DENSE**2:

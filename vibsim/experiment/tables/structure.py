@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -22,6 +23,8 @@ MATRICES = ("mass", "stiffness", "damping")
 STARTS = ("start.displacement", "start.velocity")
 SYMMETRIC = 1e-12
 """A matrix is symmetric whose entries differ by no more, to the largest one: files are rounded."""
+SAME_FREQUENCY = 1e-9
+"""Frequencies that differ by a smaller part are the same: an eigensolver finds any mixture of their shapes."""
 FLAT = 1e-9
 """An observed displacement below this part of the largest entry of a mode cannot scale it."""
 
@@ -180,6 +183,8 @@ def assemble(spec: StructureSpec, folder: Path, ratio: float | None = None) -> A
         if size > MOST_MODES:
             rule = f"modes are found of up to {MOST_MODES} degrees of freedom, there are {size}"
         own.add("damping_ratios", rule, "or take rayleigh" if size > MOST_MODES else "")
+    elif not own.faults:
+        _check_ratios(structure, spec.ratios, own)
     loads = [key for key in spec.arrays if key.startswith(f"{LOAD}.")]
     shapes = np.array([own.vector(key, size) for key in loads]).reshape(len(loads), size)
     histories = own.histories()
@@ -198,6 +203,20 @@ def assemble(spec: StructureSpec, folder: Path, ratio: float | None = None) -> A
         histories=histories,
     )
     return own
+
+
+def _check_ratios(structure: Structure, ratios: Sequence[float], own: Assembly) -> None:
+    """Refuse ratios that differ between modes of the same frequency: no shape belongs to either of them."""
+    if not any(ratios):
+        return
+    w = structure.modes.frequencies
+    of_modes = np.concatenate([ratios, np.zeros(len(w) - len(ratios))])
+    differ = (np.diff(w) <= SAME_FREQUENCY * w[1:]) & (np.diff(of_modes) != 0.0)
+    for i in np.flatnonzero(differ).tolist():
+        rule = (
+            f"modes {i + 1} and {i + 2} have the same frequency, so their ratios must be the same"
+        )
+        own.add("damping_ratios", f"{rule}, are {of_modes[i]:g} and {of_modes[i + 1]:g}")
 
 
 def _check_stiffness(structure: Structure, own: Assembly) -> None:
