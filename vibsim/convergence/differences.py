@@ -10,6 +10,7 @@ Source: pendulum lecture, section 2.5. Series have the shape (..., t); time is t
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import pairwise
 
 import numpy as np
 
@@ -147,6 +148,8 @@ def order_of_ratio(ratio: Floats, levels: Sequence[float]) -> Floats:
 def local_orders(ratios: Floats, levels: Sequence[float]) -> Floats:
     """Return the order of every three successive of n levels, shape (..., n-2), from the ratios of the differences."""
     triples = [levels[i : i + 3] for i in range(len(levels) - 2)]
+    if len({b - a for a, b in pairwise(levels)}) == 1 and triples:
+        return order_of_ratio(ratios, triples[0])
     orders = [order_of_ratio(ratios[..., i], triple) for i, triple in enumerate(triples)]
     return np.stack(orders, axis=-1) if orders else np.empty((*ratios.shape[:-1], 0))
 

@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 
+from vibsim.core.array_types import Floats
 from vibsim.elementary import (
     ELEMENTARY,
     circular,
@@ -54,23 +55,38 @@ def _is_plain(count: int) -> bool:
 
 def named(name: str) -> Callable[..., Any]:
     """Return a function of `vibsim.elementary.ELEMENTARY` for numbers and arrays, which broadcast."""
+    full = ELEMENTARY[name].full
 
     def function(*arguments: Any) -> Any:
         if all(isinstance(x, int | float) for x in arguments):
             # of numpy, whose division by zero is infinite
-            return np.float64(ELEMENTARY[name].full(*map(float, arguments)))
-        arrays = [np.asarray(x, dtype=np.float64) for x in arguments]
+            return np.float64(full(*map(float, arguments)))
+        arrays = [np.asarray(x, dtype=np.float64, order="C") for x in arguments]
         if len(arrays) > 1:
-            arrays = list(np.broadcast_arrays(*arrays))
-        if _is_plain(arrays[0].size):
-            rows = zip(*(x.ravel().tolist() for x in arrays), strict=True)
-            values = [ELEMENTARY[name].full(*row) for row in rows]
-            return np.array(values, dtype=np.float64).reshape(arrays[0].shape)[()]
+            arrays = _of_one_shape(arrays)
         found = np.empty(arrays[0].shape)
-        _kernel(name)(*(np.ascontiguousarray(x).reshape(-1) for x in arrays), found.reshape(-1))
+        flat = found.reshape(-1)
+        if _is_plain(found.size):
+            rows = zip(*(x.ravel().tolist() for x in arrays), strict=True)
+            flat[:] = [full(*row) for row in rows]
+        else:
+            _kernel(name)(*[x.reshape(-1) for x in arrays], flat)
         return found[()]
 
     return function
+
+
+def _of_one_shape(arrays: list[Floats]) -> list[Floats]:
+    """Return arrays that broadcast as arrays of the same shape, each with entries of its own in a row."""
+    shape = np.broadcast(*arrays).shape
+    found = []
+    for array in arrays:
+        if array.shape != shape:
+            # several times as fast as `np.broadcast_to`, and few numbers are many calls
+            array, given = np.empty(shape), array
+            array[...] = given
+        found.append(array)
+    return found
 
 
 acos, asin, atan, atan2, cos, sin, tan = map(

@@ -32,18 +32,18 @@ def link(code: bytes, name: str, kinds: str) -> Callable[..., None]:
     engine.add_object_file(binding.ObjectFileRef.from_data(code))
     engine.finalize_object()
     _KEPT.append(engine)
-    words = kinds.split()
+    dims = [int(word[1:] or 0) for word in kinds.split()]
     types: list[Any] = []
-    for word in words:
-        dims = int(word[1:] or 0)
-        types += [ctypes.c_void_p] + [ctypes.c_int64] * dims if dims else [_TYPES[word]]
+    for word, of_array in zip(kinds.split(), dims, strict=True):
+        types += [ctypes.c_void_p] + [ctypes.c_int64] * of_array if of_array else [_TYPES[word]]
     function = ctypes.CFUNCTYPE(None, *types)(engine.get_function_address(name))
 
     def call(*values: Any) -> None:
         flat: list[Any] = []
-        for word, value in zip(words, values, strict=True):
-            if len(word) > 1:
-                flat += (_address(value), *value.shape)
+        for of_array, value in zip(dims, values, strict=True):
+            if of_array:
+                flat.append(_address(value))
+                flat.extend(value.shape)
             else:
                 flat.append(value)
         function(*flat)

@@ -17,6 +17,7 @@ from vibsim.elementary import on_arrays
 
 TINY = 1e-300
 """Less is nothing."""
+LN_HALF = on_arrays.log(0.5)
 _NONE = np.empty((1, 0))
 
 
@@ -40,10 +41,7 @@ def scale_free(trace: Floats, log_det: Floats | float, points: Floats, rows: int
     """Return the evidence of rows of any size; see `vibsim.convergence.error_model`."""
     n = points * rows
     return np.asarray(
-        on_arrays.log(0.5)
-        + log_gamma(n)
-        - 0.5 * n * on_arrays.log(np.pi * trace)
-        - 0.5 * points * log_det
+        LN_HALF + log_gamma(n) - 0.5 * n * on_arrays.log(np.pi * trace) - 0.5 * points * log_det
     )
 
 
@@ -241,27 +239,24 @@ def noise(sizes: Floats, gram: Floats, points: Floats, floor: Floats) -> Floats:
         levels[:, :count, :count] = gram[:, ::-1, ::-1].cumsum(axis=1).cumsum(axis=2)[:, ::-1, ::-1]
     else:
         levels[:, 1:, 1:] = gram.cumsum(axis=1).cumsum(axis=2)
-    found = []
-    for growth in priors.GROWTHS:
-        variance = on_arrays.power(sizes / sizes[-1], -2.0 * growth)
-        weights, log_det = 1.0 / variance, np.sum(on_arrays.log(variance))
-        own = levels[:, : len(sizes), : len(sizes)]
-        trace = np.sum(np.diagonal(own, axis1=1, axis2=2) * weights, axis=-1)
-        if not known:
-            trace -= np.sum(own * outer(weights, weights), axis=(1, 2)) / np.sum(weights)
-            log_det += on_arrays.log(np.sum(weights))
-        trace = np.maximum(trace, TINY)
-        size = 0.5 * on_arrays.log10(trace / count) - on_arrays.log10(
-            np.maximum(floor[:, -1], TINY)
-        )
-        decades = size / on_arrays.log10(priors.PREDICTION)
-        expected = -0.5 * decades**2 - on_arrays.log(
-            math.sqrt(2.0 * np.pi) * on_arrays.log(priors.PREDICTION)
-        )
-        unexpected = np.full_like(expected, on_arrays.log(priors.UNEXPECTED) - priors.PRICE)
-        of_size = log_sum(np.stack([expected, unexpected], axis=-1))
-        found.append(scale_free(trace, log_det, points, count) + of_size)
-    return np.asarray(log_sum(np.stack(found, axis=-1)) - on_arrays.log(len(found)))
+    variance = on_arrays.power(sizes / sizes[-1], -2.0 * np.array(priors.GROWTHS)[:, None])
+    weights, log_det = 1.0 / variance, np.sum(on_arrays.log(variance), axis=-1)
+    own = levels[:, : len(sizes), : len(sizes)]
+    # of every growth and ladder
+    trace = np.sum(np.diagonal(own, axis1=1, axis2=2) * weights[:, None], axis=-1)
+    if not known:
+        whole = np.sum(weights, axis=-1)
+        trace -= np.sum(own * outer(weights, weights)[:, None], axis=(-2, -1)) / whole[:, None]
+        log_det += on_arrays.log(whole)
+    trace = np.maximum(trace, TINY)
+    size = 0.5 * on_arrays.log10(trace / count) - on_arrays.log10(np.maximum(floor[:, -1], TINY))
+    decades = size / on_arrays.log10(priors.PREDICTION)
+    ln_width = on_arrays.log(math.sqrt(2.0 * np.pi) * on_arrays.log(priors.PREDICTION))
+    expected = -0.5 * decades**2 - ln_width
+    unexpected = np.full_like(expected, on_arrays.log(priors.UNEXPECTED) - priors.PRICE)
+    of_size = log_sum(np.stack([expected, unexpected], axis=-1))
+    found = scale_free(trace, log_det[:, None], points, count) + of_size
+    return np.asarray(log_sum(np.stack(list(found), axis=-1)) - on_arrays.log(len(found)))
 
 
 def noise_of_finest(floor: Floats, last: Floats) -> tuple[Floats, Floats]:
