@@ -36,7 +36,7 @@ from vibsim.core.record import Variable, flags
 from vibsim.core.vocabulary import MEMBER
 from vibsim.experiment.value_names import VALUES
 from vibsim.models import Model
-from vibsim.observe import oscillation, steady_state
+from vibsim.observe import oscillation, spectrum, steady_state
 from vibsim.observe.member_block import MemberBlock
 from vibsim.schemes.orders import depends_on_velocity, is_autonomous
 
@@ -118,6 +118,8 @@ def _ladder(name: str, place: value_numbers.Place) -> _Ladder:
         even = even & is_smooth
     if name in OF_PEAK_TIMES:
         missed = missed + _off_between_points(place) * size
+    if name == "peak_frequency":
+        missed = missed + spectrum.off(block, place.levels[-1], place.quantity)
     if name in OF_STEADY_STATE:
         left = steady_state.distance(block, place.levels[-1], place.quantity)
         if name == "steady_phase":
