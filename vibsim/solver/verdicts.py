@@ -142,8 +142,10 @@ def _order(
         "levels": [places[0], places[-1]] if places else None,
         "h_used": list(found.h_used),
     }
-    away = math.inf if found.order is None else abs(found.order - (wanted or found.order))
-    return facts, away
+    if found.reason == "exact":
+        # no order that could be hard to reach
+        return facts, 0.0
+    return facts, math.inf if found.order is None else abs(found.order - (wanted or found.order))
 
 
 def _accuracy(

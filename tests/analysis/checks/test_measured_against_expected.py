@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from spring_runs import spring
 from level_records import experiment, level_records, standard_error
 
 from vibsim.analysis import Verdict, analyse_records, summarise, verdicts
@@ -403,3 +404,12 @@ def test_the_floor_is_measured_in_the_norm_of_the_check() -> None:
 
 def test_every_value_of_the_registry_is_worked_out() -> None:
     assert set(values.KNOWN) == set(VALUES)
+
+
+def test_what_is_exact_is_not_the_hardest() -> None:
+    """Its page would show round-off in place of an order."""
+    check = {"converges": "energy_deviation"}
+    run = spring(["crank_nicolson", "rk4", "central"], check, levels=(0, 1, 2, 3))
+    results = run.verdicts[0].results
+    assert {result.reason for result in results} == {"exact", "asymptotic"}
+    assert results[-1].scheme == "crank_nicolson"
