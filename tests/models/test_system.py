@@ -47,6 +47,18 @@ def test_frequencies_are_those_of_the_modes(count):
         np.testing.assert_allclose(found, [modes(count, x)[0][-1] for x in k], rtol=1e-13)
 
 
+def test_velocities_that_turn_the_motion_change_its_frequencies():
+    """A charge in a magnetic field on a spring: ``sqrt((B/2)^2 + k) -+ B/2``; damping that couples changes none."""
+    texts = {"acceleration.x": "B*vy - k*x - c*vx + c*vy", "acceleration.y": "-B*vx - k*y + c*vx"}
+    model = written(("x", "y"), texts, ("B", "k", "c"))
+    b, k = np.array([1.3, 4.0, 0.0]), np.array([0.4, 1.0, 2.0])
+    own = {"parameters.B": b, "parameters.k": k, "parameters.c": np.zeros(3)}
+    for found, sign in ((model.natural_frequency(own), -1.0), (model.highest_frequency(own), 1.0)):
+        np.testing.assert_allclose(found, np.sqrt(0.25 * b**2 + k) + sign * 0.5 * b, rtol=1e-12)
+    own |= {"parameters.B": np.zeros(3), "parameters.c": np.full(3, 0.2)}
+    np.testing.assert_allclose(model.natural_frequency(own), np.sqrt(k), rtol=1e-12)
+
+
 @pytest.mark.parametrize(("text", "known"), [("u", False), ("-u + 1/p", True), ("0*u", False)])
 def test_a_frequency_that_is_none_is_no_number(text, known):
     model = written(("u",), {"acceleration.u": text}, ("p",))

@@ -46,11 +46,15 @@ FIELDS = {
     "growth": Field("growth factor of the amplitude per period"),
     "predicted_growth": Field("growth factor of the amplitude per period by theory"),
     "omega_dt": Field("highest w dt"),
+    "excess": Field("largest value of the position over the largest exact one"),
     "level": LEVEL,
 }
 
 ALIKE = 0.15
 """Two levels fail at one time that fail within this part of it: the finer one sees it at most a step earlier."""
+FAR = 1000.0
+"""A solution of linear equations that is so many times larger than theory lets it become is unstable: theory knows a
+single oscillation, without damping, and the square of its growth is allowed."""
 NEAR = 0.1
 """How far the logarithm of a growth may be from the predicted one, as a part of it."""
 
@@ -69,7 +73,8 @@ def measure(block: MemberBlock, compared: Compared, check: StableCheck) -> Measu
     expected = predicted_oscillation.dominant_growth(block, level)
     contradicted = ~broken & predicted_oscillation.is_simple(block) & beyond
     contradicted &= _differs(block, index, found, expected)
-    unstable = (broken & ~escaped) | beyond | grown
+    far = _is_beyond_theory(block, index, expected)
+    unstable = (broken & ~escaped) | beyond | grown | far
     cases = [(contradicted, "mismatch"), (unstable, "unstable"), (escaped, "non_finite")]
     reason = first_reason(cases, "match")
     return {
@@ -78,6 +83,7 @@ def measure(block: MemberBlock, compared: Compared, check: StableCheck) -> Measu
         "growth": found,
         "predicted_growth": expected,
         "omega_dt": p,
+        "excess": growth[..., index],
         "level": level,
     }
 
@@ -88,6 +94,16 @@ def _removed(growth: Floats, index: int) -> Flags:
         return np.zeros(growth.shape[:-1], dtype=bool)
     coarse = min(index, growth.shape[-1] - 2)
     return np.asarray(growth[..., coarse + 1] < 0.5 * growth[..., coarse])
+
+
+def _is_beyond_theory(block: MemberBlock, index: int, growth_per_period: Floats) -> Flags:
+    """Say where a solution of linear equations is far larger than the growth per period allows, shape (s, c)."""
+    if not (block.model.linear or block.model.superposed):
+        return np.zeros(block.shape, dtype=bool)
+    periods = block.fastest[:, index] * block.grid.steps[index] / (2.0 * np.pi)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        allowed = np.fmax(2.0 * on_arrays.log(growth_per_period) * periods, 0.0)
+        return np.asarray(on_arrays.log(block.growth[..., index] / FAR) > allowed)
 
 
 def _breaks_down_alike(block: MemberBlock) -> Flags:
@@ -151,6 +167,8 @@ def describe(f: Found, check: StableCheck) -> Description:
         sentence += " This is its limit, at which the amplitude grows in proportion to the time."
     else:
         sentence += growth_in_words(f, *factors)
+    if f.reason == "unstable" and (excess := f.fact("excess")) > FAR:
+        sentence += f" The solution becomes {number(excess, 2)} times as large as the exact one."
     if f.reason == "match" and _always_grows(f):
         sentence += _vanishing(f, factors)
     if time:

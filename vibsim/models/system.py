@@ -30,7 +30,7 @@ from typing import Any
 
 import numpy as np
 
-from vibsim.core.array_types import Floats
+from vibsim.core.array_types import Flags, Floats
 from vibsim.formula import (
     CONSTANTS,
     FUNCTIONS,
@@ -305,21 +305,44 @@ class Written:
         }
         return {place: entry for place, entry in found.items() if entry != ZERO}
 
+    @cached_property
+    def couplings(self) -> dict[tuple[int, int], Expression]:
+        """Entries of ``-da/dv`` beside the diagonal that are not 0, by row and column."""
+        found = {
+            (i, j): -derivative(a, name)
+            for i, a in enumerate(self.own_accelerations)
+            for j, name in enumerate(self.velocities)
+            if i != j
+        }
+        return {place: entry for place, entry in found.items() if entry != ZERO}
+
     def frequencies(self, parameters: Numbers) -> Floats:
-        """Return the angular frequencies of small oscillations, increasing, NaN behind the last, shape (..., n)."""
+        """Return the angular frequencies of small oscillations, increasing, NaN behind the last, shape (..., n).
+
+        Velocities that couple like those in a magnetic field or a rotating frame, with opposite signs, take part;
+        damping does not.
+        """
         numbers = {row.name: np.asarray(parameters[row.key], float) for row in self.parameters}
         shape = np.broadcast_shapes(*(number.shape for number in numbers.values()))
         at_origin = dict.fromkeys((*self.states, "t", HEIGHT), np.zeros(()))
-        matrix = np.zeros((*shape, len(self.coordinates), len(self.coordinates)))
-        entries = values_of(list(self.stiffness.values()), numbers | at_origin)
-        for (i, j), entry in zip(self.stiffness, entries, strict=True):
-            matrix[..., i, j] = entry
+        count = len(self.coordinates)
+        stiffness, coupling = np.zeros((2, *shape, count, count))
+        for matrix, formulas in ((stiffness, self.stiffness), (coupling, self.couplings)):
+            entries = values_of(list(formulas.values()), numbers | at_origin)
+            for (i, j), entry in zip(formulas, entries, strict=True):
+                matrix[..., i, j] = entry
         # of a matrix that is not finite nothing is known
-        is_known = np.isfinite(matrix).all(axis=(-2, -1), keepdims=True)
-        squares = np.linalg.eigvals(np.where(is_known, matrix, 0.0))
+        is_known = np.isfinite(stiffness).all(axis=(-2, -1), keepdims=True)
+        squares = np.linalg.eigvals(np.where(is_known, stiffness, 0.0))
         largest = np.max(np.abs(squares), axis=-1, keepdims=True)
         is_one = (squares.real > 1e-12 * largest) & (np.abs(squares.imag) <= 1e-9 * largest)
-        return np.sort(np.sqrt(np.where(is_one, squares.real, np.nan)), axis=-1)
+        found = np.sort(np.sqrt(np.where(is_one, squares.real, np.nan)), axis=-1)
+        if not self.couplings:
+            return found
+        turning = np.where(coupling * np.swapaxes(coupling, -1, -2) < 0.0, coupling, 0.0)
+        is_known = is_known[..., 0, 0] & np.isfinite(turning).all(axis=(-2, -1))
+        turns = (is_known & np.any(turning, axis=(-2, -1)))[..., None]
+        return np.where(turns, _of_first_order(stiffness, turning, turns), found)
 
     def natural_frequency(self, parameters: Numbers) -> Any:
         """Return the lowest one; NaN where there is none."""
@@ -328,6 +351,18 @@ class Written:
     def highest_frequency(self, parameters: Numbers) -> Any:
         """Return the highest one; NaN where there is none."""
         return np.fmax.reduce(self.frequencies(parameters), axis=-1)
+
+
+def _of_first_order(stiffness: Floats, turning: Floats, known: Flags) -> Floats:
+    """Return the frequencies of ``x'' + G x' + K x = 0``, increasing, NaN behind the last, shape (..., n)."""
+    still = np.zeros_like(stiffness)
+    rows = [[still, still + np.eye(stiffness.shape[-1])], [-stiffness, -turning]]
+    matrix = np.where(known[..., None], np.block(rows), 0.0)
+    rates = np.linalg.eigvals(matrix)
+    largest = np.max(np.abs(rates), axis=-1, keepdims=True)
+    is_one = (rates.imag > 1e-6 * largest) & (np.abs(rates.real) <= 1e-9 * largest)
+    found = np.sort(np.where(is_one, rates.imag, np.nan), axis=-1)
+    return np.asarray(found[..., : stiffness.shape[-1]])
 
 
 def terms_of(node: Expression) -> Iterator[Expression]:

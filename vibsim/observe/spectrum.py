@@ -25,8 +25,8 @@ from vibsim.observe.common_grid import take_all
 from vibsim.observe.member_block import MemberBlock
 
 OF_NEGATIVE = 0.1
-"""What the negative frequency of a cosine on line k moves its frequency by at most, in lines, times k^3. [measured: 0.081
-on line 3, 0.071 from line 10 on]"""
+"""What the negative frequency of a cosine on line k moves its frequency by at most, in lines, times k^3. [measured:
+0.08 on line 3, 0.07 from line 10 on]"""
 FIRST_LINE = 3
 """The lowest line whose frequency is reported: below it, a negative frequency is too near."""
 
@@ -70,7 +70,9 @@ def peak_frequency(block: MemberBlock, level: int, quantity: str) -> Floats:
 def off(block: MemberBlock, level: int, quantity: str) -> Floats:
     """Return how far `peak_frequency` may be off on every level alike, for its negative frequency, (scheme, case)."""
     unit = _between_lines(block)
-    return np.asarray(OF_NEGATIVE * unit * on_arrays.power(unit / peak_frequency(block, level, quantity), 3.0))
+    return np.asarray(
+        OF_NEGATIVE * unit * on_arrays.power(unit / peak_frequency(block, level, quantity), 3.0)
+    )
 
 
 def _between_lines(block: MemberBlock) -> Floats:

@@ -15,9 +15,11 @@ from vibsim.comparison import solution_distance
 from vibsim.convergence.verdict import judge
 from vibsim.core.record import Variable
 from vibsim.core.vocabulary import REASON_NAMES
+from vibsim.experiment import Experiment
 from vibsim.schemes import SCHEMES
 from vibsim.schemes.base import Orders
 from vibsim.schemes.runge_kutta import Tableau, from_tableau
+from vibsim.simulation import simulate_record
 from vibsim.theory import rounding_bound
 
 LIMIT = 2.0
@@ -48,6 +50,26 @@ def test_just_above_the_limit_the_growth_is_the_predicted_one() -> None:
     for text in (at.text, ladder.text):
         assert f"{predicted:.6g} (predicted)" in text
         assert f"{measured:.6g} (measured)" in text
+
+
+def test_damping_beyond_a_limit_is_no_stability() -> None:
+    """``c dt`` is 5 at level 3, beyond the real limit 2.785 of RK4; w dt is 0.05. Forward Euler's growth stays none."""
+    content = {
+        **{
+            "title": "test",
+            "model": {"kind": "oscillator", "spring": "u", "damping": {"linear": 100}},
+        },
+        **{"initial": {"u": 1.0}, "time": {"end": 2.0, "base_steps": 5}, "schemes": ["rk4"]},
+        **{"levels": [3, 4, 5], "checks": [{"stable": True, "level": n} for n in (3, 4)]},
+    }
+    experiment = Experiment.from_dict(content)
+    run = judged(experiment, {n: simulate_record(experiment, n) for n in experiment.levels})
+    assert [v.reason for v in run.verdicts] == ["unstable", "match"]
+    assert "times as large as the exact one" in run.verdicts[0].text
+    time = {"end": 40.0, "base_steps": 2000}
+    grows = spring(["forward_euler"], {"stable": True, "level": 0}, levels=(0, 1, 2), time=time)
+    assert grows.record["check_check_1_excess"][0, 0] > 1000.0
+    assert grows.verdicts[0].reason == "match"
 
 
 @pytest.mark.parametrize(
