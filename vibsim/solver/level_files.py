@@ -10,7 +10,7 @@ from typing import Any, NoReturn
 import numpy as np
 from numpy.typing import NDArray
 
-from vibsim.convergence.study.grid_values import GridValues, plain_coordinate, real
+from vibsim.convergence.study.grid_values import GridValues, plain_coordinate, real, units_in
 from vibsim.core import netcdf, regular_files
 from vibsim.core.errors import Fault, InputError, nearest
 from vibsim.solver.level_tables import Study, check_sizes
@@ -148,13 +148,33 @@ def grid_values(
         along: Sequence[str] = getattr(_variable(dataset, wanted), "dimensions", ())
         if wanted not in places and len(along) == 1 and along[0] in places:
             places[along[0]] = wanted
-    points = {name: _points(variable, dataset, dim, name) for dim, name in places.items()}
-    coords = {name: found for name, found in points.items() if found is not None}
-    units = str(getattr(variable, "units", ""))
-    return GridValues(values, tuple(places.values()), coords, name, epsilon, units)
+    found = {name: _coordinate(variable, dataset, dim, name) for dim, name in places.items()}
+    coords = {name: _points(row) for name, row in found.items() if row is not None}
+    units = {name: units_in(_attributes(row)) for name, row in found.items() if row is not None}
+    return GridValues(
+        values,
+        tuple(places.values()),
+        coords,
+        name,
+        epsilon,
+        units_in(_attributes(variable))[0],
+        {name: unit for name, unit in units.items() if unit[0]},
+    )
 
 
-def _points(variable: Any, dataset: Any, dim: str, wanted: str) -> NDArray[Any] | None:
+def _attributes(variable: Any) -> dict[str, Any]:
+    """Return the attributes of a variable of a dataset."""
+    return {name: variable.getncattr(name) for name in variable.ncattrs()}
+
+
+def _points(coordinate: Any) -> NDArray[Any]:
+    """Return the numbers or labels of a coordinate."""
+    points = np.ma.asarray(coordinate[...])
+    is_float = points.dtype.kind == "f"
+    return np.ma.filled(points, np.nan) if is_float else plain_coordinate(np.asarray(points))
+
+
+def _coordinate(variable: Any, dataset: Any, dim: str, wanted: str) -> Any | None:
     """Return the coordinate of a dimension of a variable; None where it has none.
 
     It is the variable of a name that is wanted, by default that of the dimension, in the group of the values or in the
@@ -166,9 +186,5 @@ def _points(variable: Any, dataset: Any, dim: str, wanted: str) -> NDArray[Any] 
     for scope, name in product(scopes, (wanted, dim, *named)):
         found = scope.get(name)
         if found is not None and found.dimensions == (dim,):
-            points = np.ma.asarray(found[...])
-            is_float = points.dtype.kind == "f"
-            return (
-                np.ma.filled(points, np.nan) if is_float else plain_coordinate(np.asarray(points))
-            )
+            return found
     return None

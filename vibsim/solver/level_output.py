@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from vibsim.convergence.study.grid_values import GridValues, grid_values
+from vibsim.convergence.study.grid_values import NO_UNIT, GridValues, grid_values, units_in
 from vibsim.core.array_types import Floats
 from vibsim.core.errors import InputError, VibsimError, nearest
 from vibsim.core.record import Record, Variable, attributes
@@ -142,10 +141,13 @@ def record(
             if lengths.setdefault(dim, length) != length or is_other:
                 raise VibsimError(f"{name}: has other points along {dim} than another quantity")
             if points is not None and known is None:
-                coords[dim] = plain((dim,), points, f"coordinate {dim}")
+                unit, calendar = one.units_of_coords.get(dim, (NO_UNIT, ""))
+                more = {"calendar": calendar} if calendar else {}
+                text = attributes(f"coordinate {dim}", unit, **more)
+                coords[dim] = Variable((dim,), np.asarray(points), text)
     variables = {}
     for name, one in values.items():
-        text = attributes(name, one.units or "1", **{EPSILON: one.epsilon})
+        text = attributes(name, one.units or NO_UNIT, **{EPSILON: one.epsilon})
         variables[name] = Variable(one.dims, one.values, text)
     return Record(coords, variables)
 
@@ -161,5 +163,13 @@ def stored(found: Record, name: str) -> GridValues:
     epsilon = variable.attrs[EPSILON]
     assert isinstance(epsilon, float)
     coords = {dim: found[dim] for dim in variable.dims if dim in found.coords}
-    values = GridValues(np.asarray(variable.values), variable.dims, coords, name, epsilon)
-    return replace(values, units=str(variable.attrs["units"]))
+    units = {dim: units_in(found.coords[dim].attrs) for dim in coords}
+    return GridValues(
+        np.asarray(variable.values),
+        variable.dims,
+        coords,
+        name,
+        epsilon,
+        units_in(variable.attrs)[0],
+        {dim: unit for dim, unit in units.items() if unit[0]},
+    )

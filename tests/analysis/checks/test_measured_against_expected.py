@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from spring_runs import spring
 from level_records import experiment, level_records, standard_error
+from spring_runs import spring
 
 from vibsim.analysis import Verdict, analyse_records, summarise, verdicts
 from vibsim.comparison import value_numbers as values

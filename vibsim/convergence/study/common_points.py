@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibsim.convergence.study import restriction
+from vibsim.convergence.study.coordinate_units import in_common_units
 from vibsim.convergence.study.grid_values import GridValues, grid_values, real
 from vibsim.convergence.study.refusal import refused
 from vibsim.core.array_types import Floats
@@ -61,6 +62,7 @@ def common_values(
     InputError
         Where the levels have no common points.
     """
+    levels = in_common_units(levels)
     first = levels[0]
     for i, level in enumerate(levels):
         if set(level.dims) != set(first.dims) or len(level.dims) != len(first.dims):

@@ -13,6 +13,8 @@ from vibsim.convergence.study.refusal import refused
 from vibsim.core.array_types import Floats
 
 DOUBLE = float(np.finfo(np.float64).eps)
+NO_UNIT = "1"
+"""The unit of a number without one, by CF conventions."""
 
 
 @dataclass(frozen=True)
@@ -27,7 +29,9 @@ class GridValues:
     epsilon: float = DOUBLE
     """Distance of neighbouring numbers near 1 in the precision that the values were computed in."""
     units: str = ""
-    """As the user gave them; nothing depends on them."""
+    """As the user gave them."""
+    units_of_coords: Mapping[str, tuple[str, str]] = field(default_factory=dict)
+    """Of those coordinates that have any, with the calendar of dates."""
 
 
 def grid_values(value: Any, key: str) -> GridValues:
@@ -51,14 +55,28 @@ def grid_values(value: Any, key: str) -> GridValues:
         own = {str(n): c for n, c in value.coords.items() if tuple(map(str, c.dims)) == (str(n),)}
         coords = {name: plain_coordinate(np.asarray(own[name])) for name in dims if name in own}
         numbers, epsilon = real(np.asarray(value), key)
-        units = str(getattr(value, "attrs", {}).get("units", ""))
-        return GridValues(numbers, dims, coords, str(value.name or ""), epsilon, units)
+        units = {name: units_in(own[name].attrs) for name in coords}
+        return GridValues(
+            numbers,
+            dims,
+            coords,
+            str(value.name or ""),
+            epsilon,
+            units_in(getattr(value, "attrs", {}))[0],
+            {name: unit for name, unit in units.items() if unit[0]},
+        )
     try:
         array = value if isinstance(value, np.ma.MaskedArray) else np.asarray(value)
     except ValueError:
         raise refused(key, value, "must be a number or an array of numbers") from None
     numbers, epsilon = real(array, key)
     return GridValues(numbers, tuple(f"axis {i}" for i in range(array.ndim)), {}, "", epsilon)
+
+
+def units_in(attributes: Mapping[Any, Any]) -> tuple[str, str]:
+    """Return unit and calendar of a variable with these attributes; empty without a unit."""
+    unit = str(attributes.get("units", ""))
+    return ("" if unit == NO_UNIT else unit), str(attributes.get("calendar", "standard"))
 
 
 def real(array: NDArray[Any], key: str) -> tuple[Floats, float]:
