@@ -50,7 +50,7 @@ def test_every_assessment_has_a_verdict(
     constant = [2.0, 2.0, 2.0, 2.0]
     series = [np.array([x, 2 * x, 3 * x]) for x in falling]
     for values in (falling, swinging, constant, series):
-        for more in ({}, {"order": 2.0}, {"at_least": 1.0}, {"exact": 2.0}, {"noise": 1e-3}):
+        for more in ({}, {"order": 2.0}, {"at_least": 1.0}, {"exact": 2.5}, {"noise": 1e-3}):
             verdict = judge(H, values, **more)
             assert (verdict.status, verdict.reason) == (REASONS[reason], reason)
             assert verdict.sentence.endswith(".")

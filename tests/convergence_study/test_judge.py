@@ -299,6 +299,26 @@ def test_a_measured_order_away_from_the_one_that_dominates_is_explained() -> Non
         assert ("the measured order" in found.sentence) == bool(told)
 
 
+@pytest.mark.parametrize(
+    ("ulps", "reason"), [(4, "exact"), (60, "round_off"), (4000, "wrong_limit")]
+)
+def test_rounding_that_adds_up_is_no_wrong_limit(ulps: int, reason: str) -> None:
+    """Simpson's rule on a cubic, and RK4 with 4000 steps, end some ten units of the last digit away."""
+    values = [0.7357588823428847] * 3
+    assert judge(H[:3], values, order=4, exact=values[0] + ulps * 1.1e-16).reason == reason
+
+
+@pytest.mark.parametrize("points", [1, 101])
+def test_stated_noise_is_that_of_all_levels(points: int) -> None:
+    """Many steps of first order, each smaller than the noise of two levels, are no noise."""
+    rng = np.random.default_rng(20)
+    h = 1.0 / np.arange(10.0, 21.0)
+    drifting = [np.full(points, 1.0 + x) for x in h]
+    assert judge(h, drifting, order=2, noise=0.0025).reason != "exact"
+    noisy = [1.0 + rng.normal(scale=0.0025, size=points) for _ in h]
+    assert judge(h, noisy, order=2, noise=0.0025).reason == "exact"
+
+
 def test_sizes_near_the_ends_of_double_precision_have_no_finer_one() -> None:
     advice = [judge([4 * s, 2 * s, s], [1.0, 2.0, 2.3], order=2).advice for s in (1.0, 5e-324)]
     assert advice == ["Add a finer level, such as h = 0.5.", "Add a finer level."]

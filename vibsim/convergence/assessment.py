@@ -51,6 +51,7 @@ from vibsim.convergence.likely_powers import (
 from vibsim.convergence.reasons import code, first_reason, is_one_of
 from vibsim.convergence.thresholds import (
     DEFINITE,
+    FURTHER_APART,
     HALF_SPACING,
     LEAST_WITH_LIMIT,
     NOISE_FACTOR,
@@ -216,7 +217,7 @@ def _decide_block(ladder: Ladder, factors: Floats, question: Question) -> dict[s
 def _evaluate(ladder: Ladder, question: Question, left_out: float) -> _Evaluation:
     believed = posterior(ladder, question.promise, left_out=left_out)
     of_sides = np.stack(sides(believed, question.expected, question.at_least, question.tolerance))
-    exact = _is_only_noise(ladder, question.noise_factor)
+    exact = _is_only_noise(ladder, question)
     away = np.zeros_like(exact)
     if ladder.exact_known:
         factor = question.noise_factor if question.limit_factor is None else question.limit_factor
@@ -354,12 +355,25 @@ def _numbers(
     }
 
 
-def _is_only_noise(ladder: Ladder, factor: float) -> Flags:
-    """Say where all levels differ by no more than the noise that is expected of them."""
-    n = len(ladder.h)
-    d = np.sqrt(np.diagonal(ladder.gram, axis1=1, axis2=2))[:, : n - 1]
-    allowed = factor * (ladder.floor[:, :-1] + ladder.floor[:, 1:])
-    return np.asarray(np.all(d <= allowed, axis=-1))
+def _is_only_noise(ladder: Ladder, question: Question) -> Flags:
+    """Say where all levels differ by no more than the noise that is expected of them.
+
+    Noise that is stated has its size, and none of two levels more: many small steps would add up to anything. Over many
+    points its mean is known better than that of a number.
+    """
+    n, factor = len(ladder.h), np.full(len(ladder.gram), question.noise_factor)
+    furthest = 1
+    if question.limit_factor is not None:
+        factor = 1.0 + (factor - 1.0) / np.sqrt(ladder.points)
+        furthest = n - 1
+    found = np.ones(len(ladder.gram), dtype=bool)
+    for gap in range(1, furthest + 1):
+        for i in range(n - gap):
+            square = np.sum(ladder.gram[:, i : i + gap, i : i + gap], axis=(1, 2))
+            between = np.sqrt(np.maximum(square, 0.0))
+            noise = ladder.floor[:, i] + ladder.floor[:, i + gap]
+            found &= between <= factor * noise * (FURTHER_APART if gap > 1 else 1.0)
+    return found
 
 
 def _least_noise(ladder: Ladder) -> Floats:

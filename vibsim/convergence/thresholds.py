@@ -55,6 +55,9 @@ MISSED, MISSED_SHARE = 3.0, 0.5
 # Noise may be so many times its prediction where levels are said to differ by nothing else; the same of noise that a
 # user states, which differences of normal noise exceed in one of 200. [convention]
 NOISE_FACTOR, STATED_NOISE_FACTOR = 10.0, 2.0
+# Levels that are no neighbours may differ by so many times more, since there are more of them: of ten normal numbers
+# two are more than 5 standard deviations apart in one of 70 cases. [derived]
+FURTHER_APART = 1.25
 # So many times the stated noise a level is away from an exact solution that it misses: the noise of one level is less
 # than that of a difference by the root of 2, so that the risk is the same. [derived]
 STATED_LIMIT_FACTOR = 2.0 * STATED_NOISE_FACTOR / math.sqrt(2.0)

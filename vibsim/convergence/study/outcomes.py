@@ -27,6 +27,8 @@ EXACT_DIGITS = 16
 """Exact values with no more decimal digits than these may be rounded to them: whoever writes them down stops there."""
 MOST_UNITS = 8.0
 """Exact values that are further from the finest level, in half units of its last digit, were not missed by rounding."""
+ADDED_UP = 200.0
+"""Over that of storing them, what rounding errors of values may add up to in a calculation: 100 units of precision."""
 SEEN = 0.1
 """The rounding of exact values is seen where it is so large a part of the error of the finest level."""
 
@@ -164,7 +166,8 @@ def _with_finite(
         truth = None if exact is None else exact[k]
         _measure(one, measured, k, part[k], truth)
         if decided is not None:
-            _decide(one, decided, k, measured, part[k], truth)
+            rounding = 0.0 if request.noise else ADDED_UP * measured.ladder.floor[k, -1]
+            _decide(one, decided, k, measured, part[k], truth, rounding)
         if len(finite) < n:
             # levels that are not finite decide, whatever the others say; the error is that of the finest level
             one.reason = "non_finite"
@@ -235,8 +238,12 @@ def _decide(
     measured: Measurement,
     part: Floats,
     truth: Floats | None,
+    rounding: float,
 ) -> None:
-    """Add what was decided of member `k`, whose finite levels are `part` and whose exact values are `truth`."""
+    """Add what was decided of member `k`, whose finite levels are `part` and whose exact values are `truth`.
+
+    `rounding` is what rounding errors of the finest level may add up to, over its scale.
+    """
     scale = float(measured.scale[k])
     one.reason = REASON_NAMES[int(decided.reason[k])]
     one.order, used, weights = _estimate(one, measured.ladder.h, decided, k)
@@ -247,6 +254,8 @@ def _decide(
         one.best = sum((w * row for w, row in zip(weights, part, strict=True)), 0.0 * part[0])
         unit = max(half_last_digit(part), step_of_values(part))
         one.rounded = unit * float(np.sum(np.abs(weights)))
+    if one.reason == "wrong_limit" and abs(one.error) <= rounding * scale:
+        one.reason = "round_off"
     bound_of_best = float(decided.best_bound[k]) * scale
     if one.reason == "wrong_limit" and one.rounded and one.best is not None and truth is not None:
         away = float(np.max(np.abs(_distances(one.best[None], truth, one.is_number, scale))))
