@@ -459,3 +459,19 @@ def test_a_crest_that_another_one_overtakes_is_within_its_bound(kind: str) -> No
     _, record = analysed(**content)
     away = abs(float(record["u_max_richardson"][0, 0]) - exact)
     assert 1e-4 < away <= float(record["u_max_richardson_error"][0, 0])
+
+
+def test_a_largest_size_is_not_negative() -> None:
+    """Extrapolated, an energy error that vanishes with dt may come out below 0."""
+    content = {
+        "model": {
+            "kind": "system",
+            "coordinates": ["x", "y"],
+            "acceleration": {"x": "-x - 2*x*y", "y": "-y - x**2 + y**2"},
+        },
+        "initial": {"y": -0.15, "vx": 0.5},
+        **{"time": {"end": 40}, "levels": [8, 9, 10, 11], "schemes": ["central"]},
+    }
+    about = {"value": "max_abs", "quantity": "energy_deviation", "at": {"level": "best"}}
+    [found] = judged(about | {"below": 1e-3}, **content)
+    assert 0.0 <= found.results[0].value < 1e-4

@@ -165,6 +165,12 @@ DIAGNOSES: Words = {
         "the steps on both sides use the same value there. Expect order 1{beside_corner}.",
         "{end_before_corner}",
     ),
+    "non_smooth, irregular": (
+        "The error of {what} has no regular expansion, because {jump} within a step ({corner.words} at t = "
+        "{corner.time:4}), in another part of it on each level. Order {expected} is what it allows, and the levels "
+        "do not show it.",
+        "End the time interval (`time: end`) before t = {corner.time:4}, or choose steps that have a grid point there.",
+    ),
     "non_smooth, corner": (
         CANNOT_SHOW + "{jump} within a step ({corner.words} at t = {corner.time:4}). Expect order "
         "{corner.power}{beside_corner}.",
@@ -296,6 +302,7 @@ def _diagnosis(s: OrderContext) -> str:
             "mesh": is_on_the_mesh(s.options),
             "table": s.has_corners,
             "jump at a point": corner is not None and corner.on_a_point,
+            "irregular": corner is not None and not less and s.expected <= corner.power,
             "corner": corner is not None,
         },
         "pre_asymptotic": {

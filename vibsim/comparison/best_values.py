@@ -68,7 +68,9 @@ def value(name: str, place: value_numbers.Place) -> tuple[Floats, Floats, Floats
         return value_numbers.value(name, place), place.missing, np.zeros(place.block.shape)
     ladder = _ladder(name, place)
     found = ladder.limit()
-    return found.value, found.bound, ladder.missed
+    # what is no smaller than 0 has no smaller limit
+    least = 0.0 if name == "max_abs" else -np.inf
+    return np.maximum(found.value, least), found.bound, ladder.missed
 
 
 @dataclass(frozen=True)

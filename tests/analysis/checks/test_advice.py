@@ -314,7 +314,12 @@ def test_a_scheme_of_an_order_is_not_asked_for_where_it_is_one() -> None:
     corner = Corner("the force changes", 0.5, 1.0)
     high = advise(story(reason="non_smooth", corner=corner))
     assert "or take a scheme (`schemes:`) of order 1." in high
-    low = advise(story(reason="non_smooth", corner=corner, promised=1.0, expected=1.0))
+    allowed = story(reason="non_smooth", corner=corner, promised=1.0, expected=1.0)
+    assert "Order 1 is what it allows" in tell(allowed)
+    low = advise(allowed)
+    assert low.endswith("before t = 0.5, or choose steps that have a grid point there.")
+    on_a_point = corner._replace(on_a_point=True)
+    low = advise(story(reason="non_smooth", corner=on_a_point, promised=1.0, expected=1.0))
     assert low == "End the time interval (`time: end`) before t = 0.5 to see order 1."
 
 
