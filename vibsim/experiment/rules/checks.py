@@ -365,7 +365,9 @@ def _check_value(row: Value, quantity: str | None, best: bool, scope: Scope) -> 
         rule = f"required key is missing: {row.name} is of a quantity"
         place.refuse(rule, "choose from " + ", ".join(choices))
     else:
-        _is_quantity(quantity, choices, place, row.name)
+        only_there = best and quantity in _allowed(row, scope.setting, False)
+        what = f"{row.name} at `level: best`" if only_there else row.name
+        _is_quantity(quantity, choices, place, what)
     _is_comparable(row, quantity, scope.at("value"))
 
 
