@@ -148,15 +148,17 @@ def describe(f: Found, check: ConservesCheck) -> Description:
 
 def _advice(f: Found, drift: str, check: ConservesCheck) -> str:
     if f.reason == "pre_asymptotic":
+        longer = "Lengthen the run (`time: end`), or store more of it (`samples: all`)."
         until = ""
         if f.experiment.members == 1:
             frequency = float(f.model.natural_frequency(f.experiment.model.parameters))
-            if frequency > 0.0:
-                least = LEAST_PERIODS * 2.0 * math.pi / frequency
-                until = f" (until t = {f.notation.number(least, 3)} here)"
+            least = LEAST_PERIODS * 2.0 * math.pi / frequency if frequency > 0.0 else 0.0
+            if 0.0 < least < f.experiment.time.end:
+                return longer
+            until = f" (until t = {f.notation.number(least, 3)} here)" if least else ""
         return (
-            "Lengthen the run (`time: end`), or store more of it (`samples: all`). To show a drift takes at least four "
-            f"periods of the slowest small oscillation{until}, and {LEAST_SAMPLES} stored samples."
+            f"{longer} To show a drift takes at least four periods of the slowest small oscillation{until}, and "
+            f"{LEAST_SAMPLES} stored samples."
         )
     other = "leave the check out (`checks:`)"
     if drift in EXPECTED_DRIFTS:

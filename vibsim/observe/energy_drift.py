@@ -13,8 +13,9 @@ smooths the stairs in which a drift climbs under an oscillation, and the oscilla
 - ``bounded``: m1 is above m2 by less than `STILL` of M(T), or it creeps only: k below `CREEP`, m1 above m2 by less
   than `STILL_CREEPS` (finer sampling of the same maximum); and so does the range of the deviation so far, which a drift
   widens from the start on, where M stands until the drift has overtaken an oscillation to the other side;
-- ``linear``, ``quadratic``: k, of M or of that range, within `NEAR_POWER` of 1 or 2; the range must still widen in the
-  last T/8, by `STILL_WIDENS` of what a drift would: an oscillation whose middle moves slowly widens it for a while;
+- ``linear``, ``quadratic``: k, of M or of that range, within `NEAR_POWER` of 1 or 2; the range, and M where it has
+  risen by less than `SMALL_RISE` of itself, must still grow in the last T/8, by `STILL_WIDENS` of what a drift would:
+  an oscillation whose middle moves slowly, or one of several frequencies, widens them for a while;
 - else ``unclear``.
 
 A drift so slow that a run shows less than `STILL` of it is called bounded: a longer run decides.
@@ -160,9 +161,12 @@ def drift_of(
         fall, k_log = _power(np.abs(change))
         last, left = change[..., -2], np.abs(ratio * energy[..., None])[..., -2]
         gone = (left < th.SMALLEST_NORMAL) & (np.abs(energy) > th.SMALLEST_NORMAL)
+        last_rise = _last_rise(running)
     size = np.where(np.isfinite(end) & (end > 0), end, 1.0)
     allowed = np.broadcast_to(ABOVE_ROUND_OFF * floor, end.shape)
-    still, has_stopped = _is_still(rise, k, size), np.zeros(end.shape, dtype=bool)
+    still = _is_still(rise, k, size)
+    # a small rise may be the last stair of an oscillation with several frequencies
+    has_stopped = (rise < th.SMALL_RISE * size) & (last_rise < th.STILL_WIDENS * rise)
     if deviation is not None:
         # M stands still until a drift has overtaken an oscillation to the other side, and is of no power then
         widens = still | ~(_is_near(k, 1) | _is_near(k, 2))
@@ -170,7 +174,8 @@ def drift_of(
         so_far = _range(deviation)
         of_range = _means(so_far)
         widens &= ~_is_still(*_rise(of_range), size)
-        has_stopped = widens & (_last_rise(so_far) < th.STILL_WIDENS * _rise(of_range)[0])
+        stops = _last_rise(so_far) < th.STILL_WIDENS * _rise(of_range)[0]
+        has_stopped = np.where(widens, stops, has_stopped)
         means = np.where(widens[..., None], of_range, means)
         rise, k = _rise(means)
         still &= ~widens

@@ -50,6 +50,9 @@ LEAST_PER_PERIOD = 16.0
 STILL = 0.01  # rise of M from one window to the next, as a part of itself, that is none [checked]
 STILL_CREEPS = 0.2  # largest rise of a maximum that is found more exactly with time only [checked]
 CREEP = -0.5  # largest k of such a rise [checked]
+SMALL_RISE = (
+    0.1  # rise of M as a part of itself from which on it need not go on until the end [chosen]
+)
 STILL_WIDENS = 0.5  # least part of a drift's rise by which the range of a drift widens in the last T/8 [checked]
 NEAR_POWER = 0.25  # distance of k from 1 or 2: a quarter of what separates them [derived]
 # ln(E/E(0)) beyond which exponential and linear growth differ in k by more than rounding: by about 0.1 at 0.2.

@@ -68,3 +68,26 @@ def test_a_symplectic_or_symmetric_scheme_keeps_its_energy_bounded(scheme: str, 
     told = found(scheme, level, theta=2.0)
     assert told["bounded"] == ("PASS", "match")
     assert {told[drift][0] for drift in ("none", "linear", "quadratic")} == {"FAIL"}
+
+
+def test_the_stairs_of_several_frequencies_are_no_drift() -> None:
+    """Henon and Heiles' system: over 20 times as long the largest error of the energy is that of 16 periods."""
+    data: dict[str, Any] = {
+        "title": "t",
+        "model": {
+            "kind": "system",
+            "coordinates": ["x", "y"],
+            "acceleration": {"x": "-x - 2*x*y", "y": "-y - x**2 + y**2"},
+        },
+        "initial": {"y": -0.15, "vx": 0.5},
+        "time": {"end": 40.0},
+        "levels": [11],
+        "schemes": ["central", "pefrl"],
+        "checks": [{"conserves": "energy", "drift": drift} for drift in DRIFTS],
+    }
+    experiment = Experiment.from_dict(data)
+    told = verdicts(experiment, analyse(experiment, [simulate(experiment, 11)]))
+    for one in told[2:]:
+        assert one.status != "PASS"
+    assert told[1].reason == "pre_asymptotic"
+    assert told[1].advice == "Lengthen the run (`time: end`), or store more of it (`samples: all`)."
