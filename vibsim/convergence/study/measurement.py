@@ -8,7 +8,7 @@ from decimal import Decimal
 import numpy as np
 
 from vibsim.convergence.error_model.posterior import Ladder
-from vibsim.core.array_types import Floats
+from vibsim.core.array_types import Flags, Floats
 
 SINGLE = float(np.finfo(np.float32).eps)
 """Relative spacing of single precision."""
@@ -42,6 +42,8 @@ class Measurement:
     """A power of two for each member, so that squares neither overflow nor vanish, shape (member,)."""
     norms: Floats
     """Root mean square of the values of every level, shape (member, n)."""
+    are_single: Flags
+    """Whether the finest level is one of single precision, shape (member,)."""
 
 
 def scale_of(values: Floats) -> Floats:
@@ -137,7 +139,7 @@ def measurement(
     with np.errstate(over="ignore"):
         gram = np.matmul(rows, np.swapaxes(rows, 1, 2)) / points
     single = np.array([is_single(rows) for rows in values])[:, None]
-    epsilon = np.where(single, np.maximum(epsilon, SINGLE), epsilon)
+    epsilon = np.where(single, np.maximum(epsilon, SINGLE), np.broadcast_to(epsilon, norms.shape))
     floor = 0.5 * epsilon * norms
     if noise is not None:
         floor = np.maximum(floor, noise / scale[:, None])
@@ -148,4 +150,4 @@ def measurement(
         numbers=np.full(len(values), points == 1),
         exact_known=exact is not None,
     )
-    return Measurement(ladder, scale, norms * scale[:, None])
+    return Measurement(ladder, scale, norms * scale[:, None], epsilon[:, -1] >= SINGLE)

@@ -11,6 +11,7 @@ from vibsim.convergence.assessment import DECIDED, Assessment, Question, assess
 from vibsim.convergence.differences import orders_of_steps
 from vibsim.convergence.reasons import is_one_of
 from vibsim.convergence.study.measurement import (
+    SINGLE,
     Measurement,
     half_last_digit,
     measurement,
@@ -29,6 +30,8 @@ MOST_UNITS = 8.0
 """Exact values that are further from the finest level, in half units of its last digit, were not missed by rounding."""
 ADDED_UP = 200.0
 """Over that of storing them, what rounding errors of values may add up to in a calculation: 100 units of precision."""
+ADDED_UP_IN_SINGLE = 10.0
+"""The same in units of single precision, as bounds count it: steps of float32 are often seen beside the error."""
 SEEN = 0.1
 """The rounding of exact values is seen where it is so large a part of the error of the finest level."""
 
@@ -252,7 +255,8 @@ def _decide(
     if np.isfinite(weights).all():
         # added up one by one, so that a member has the same digits alone and among others
         one.best = sum((w * row for w, row in zip(weights, part, strict=True)), 0.0 * part[0])
-        unit = max(half_last_digit(part), step_of_values(part))
+        added_up = ADDED_UP_IN_SINGLE * SINGLE * measured.norms[k, -1] * measured.are_single[k]
+        unit = max(half_last_digit(part), step_of_values(part), float(added_up))
         one.rounded = unit * float(np.sum(np.abs(weights)))
     if one.reason == "wrong_limit" and abs(one.error) <= rounding * scale:
         one.reason = "round_off"
