@@ -308,6 +308,24 @@ def test_rounding_that_adds_up_is_no_wrong_limit(ulps: int, reason: str) -> None
     assert judge(H[:3], values, order=4, exact=values[0] + ulps * 1.1e-16).reason == reason
 
 
+def test_bounds_hold_where_rounding_in_single_precision_adds_up() -> None:
+    """Euler's method for u' = -k u with up to 2048 steps of float32."""
+
+    def euler(k: float, n: int) -> np.float32:
+        u, part = np.float32(1.0), np.float32(k / n)
+        for _ in range(n):
+            u -= part * u
+        return u
+
+    counts, missed = (256, 512, 1024, 2048), 0
+    for k in np.linspace(0.3, 2.3, 12):
+        found = judge([1.0 / n for n in counts], [euler(k, n) for n in counts])
+        assert found.best is not None
+        assert found.best_bound is not None
+        missed += abs(found.best - np.exp(-k)) > found.best_bound
+    assert missed == 0
+
+
 @pytest.mark.parametrize("points", [1, 101])
 def test_stated_noise_is_that_of_all_levels(points: int) -> None:
     """Many steps of first order, each smaller than the noise of two levels, are no noise."""
