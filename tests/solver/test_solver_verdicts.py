@@ -192,3 +192,22 @@ def test_levels_without_common_points_are_named(tmp_path: Path) -> None:
 
     with pytest.raises(VibsimError, match="u: level 2 beside level 0: x: coordinates: the levels"):
         analysis.judge_members(found, shifted)
+
+
+def test_stored_levels_keep_the_units_of_their_coordinates(tmp_path: Path) -> None:
+    """Euler's method for u' = -u/60 s; the coarsest level counts minutes, and the others seconds."""
+    found = experiment(tmp_path, "[{converges: u, order: 1}]", u="{coordinates: [t]}")
+
+    def read(member: int) -> list[Any]:
+        levels = []
+        for i, h in enumerate(found.sizes[found.step]):
+            n = round(1.0 / h)
+            t, unit = (np.linspace(0.0, 60.0, n + 1), "s") if i else (h * np.arange(n + 1), "min")
+            u = (1.0 - h) ** np.arange(n + 1)
+            level = GridValues(u, ("t",), {"t": t}, "u", units_of_coords={"t": (unit, "standard")})
+            levels.append(level_output.record(found, i, member, {"u": level}))
+        return levels
+
+    verdict = analysis.judge_members(found, read)[0].results[0].verdict
+    assert verdict.status == "PASS"
+    assert len(verdict.coords["t"]) == 5
