@@ -298,21 +298,19 @@ class Written:
     @cached_property
     def stiffness(self) -> dict[tuple[int, int], Expression]:
         """Entries of ``-da/dx`` that are not 0, by row and column."""
-        found = {
-            (i, j): -derivative(a, name)
-            for i, a in enumerate(self.own_accelerations)
-            for j, name in enumerate(self.coordinates)
-        }
-        return {place: entry for place, entry in found.items() if entry != ZERO}
+        return self.falls(self.coordinates)
 
     @cached_property
     def couplings(self) -> dict[tuple[int, int], Expression]:
-        """Entries of ``-da/dv`` beside the diagonal that are not 0, by row and column."""
+        """Entries of ``-da/dv`` that are not 0, by row and column."""
+        return self.falls(self.velocities)
+
+    def falls(self, states: Sequence[str]) -> dict[tuple[int, int], Expression]:
+        """Return minus the derivatives of the accelerations by some states that are not 0, by row and column."""
         found = {
             (i, j): -derivative(a, name)
             for i, a in enumerate(self.own_accelerations)
-            for j, name in enumerate(self.velocities)
-            if i != j
+            for j, name in enumerate(states)
         }
         return {place: entry for place, entry in found.items() if entry != ZERO}
 
@@ -337,11 +335,12 @@ class Written:
         largest = np.max(np.abs(squares), axis=-1, keepdims=True)
         is_one = (squares.real > 1e-12 * largest) & (np.abs(squares.imag) <= 1e-9 * largest)
         found = np.sort(np.sqrt(np.where(is_one, squares.real, np.nan)), axis=-1)
-        if not self.couplings:
-            return found
+        # damping couples with the same sign, and so does the diagonal
         turning = np.where(coupling * np.swapaxes(coupling, -1, -2) < 0.0, coupling, 0.0)
         is_known = is_known[..., 0, 0] & np.isfinite(turning).all(axis=(-2, -1))
         turns = (is_known & np.any(turning, axis=(-2, -1)))[..., None]
+        if not turns.any():
+            return found
         return np.where(turns, _of_first_order(stiffness, turning, turns), found)
 
     def natural_frequency(self, parameters: Numbers) -> Any:

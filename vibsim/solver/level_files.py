@@ -148,17 +148,16 @@ def grid_values(
         along: Sequence[str] = getattr(_variable(dataset, wanted), "dimensions", ())
         if wanted not in places and len(along) == 1 and along[0] in places:
             places[along[0]] = wanted
-    found = {name: _coordinate(variable, dataset, dim, name) for dim, name in places.items()}
-    coords = {name: _points(row) for name, row in found.items() if row is not None}
-    units = {name: units_in(_attributes(row)) for name, row in found.items() if row is not None}
+    rows = ((name, _coordinate(variable, dataset, dim, name)) for dim, name in places.items())
+    found = {name: row for name, row in rows if row is not None}
     return GridValues(
         values,
         tuple(places.values()),
-        coords,
+        {name: _points(row) for name, row in found.items()},
         name,
         epsilon,
         units_in(_attributes(variable))[0],
-        {name: unit for name, unit in units.items() if unit[0]},
+        {name: units_in(_attributes(row)) for name, row in found.items()},
     )
 
 

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from vibsim.convergence.study.coordinate_units import SINCE
 from vibsim.convergence.study.grid_values import NO_UNIT, GridValues, grid_values, units_in
 from vibsim.core.array_types import Floats
 from vibsim.core.errors import InputError, VibsimError, nearest
@@ -142,8 +143,8 @@ def record(
                 raise VibsimError(f"{name}: has other points along {dim} than another quantity")
             if points is not None and known is None:
                 unit, calendar = one.units_of_coords.get(dim, (NO_UNIT, ""))
-                more = {"calendar": calendar} if calendar else {}
-                text = attributes(f"coordinate {dim}", unit, **more)
+                more = {"calendar": calendar} if SINCE in unit else {}
+                text = attributes(f"coordinate {dim}", unit or NO_UNIT, **more)
                 coords[dim] = Variable((dim,), np.asarray(points), text)
     variables = {}
     for name, one in values.items():
@@ -163,7 +164,6 @@ def stored(found: Record, name: str) -> GridValues:
     epsilon = variable.attrs[EPSILON]
     assert isinstance(epsilon, float)
     coords = {dim: found[dim] for dim in variable.dims if dim in found.coords}
-    units = {dim: units_in(found.coords[dim].attrs) for dim in coords}
     return GridValues(
         np.asarray(variable.values),
         variable.dims,
@@ -171,5 +171,5 @@ def stored(found: Record, name: str) -> GridValues:
         name,
         epsilon,
         units_in(variable.attrs)[0],
-        {dim: unit for dim, unit in units.items() if unit[0]},
+        {dim: units_in(found.coords[dim].attrs) for dim in coords},
     )

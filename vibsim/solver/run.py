@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import importlib
-import inspect
 import os
 import signal
 import subprocess
 import sys
 import traceback
-from collections.abc import Callable
 from contextlib import chdir
 from functools import partial
 from pathlib import Path
@@ -18,6 +16,7 @@ from typing import Any
 from vibsim.convergence.study.grid_values import GridValues
 from vibsim.core.errors import VibsimError, nearest
 from vibsim.core.processes import end_with
+from vibsim.core.signatures import misfit
 from vibsim.experiment.solver import OUTPUTS, SolverExperiment
 from vibsim.solver import level_output
 
@@ -104,25 +103,14 @@ def _called(experiment: SolverExperiment, level: int, member: int) -> Any:
             if not callable(getattr(found, name, None)):
                 raise VibsimError(f"{module} has no function {name}: {nearest(name, dir(found))}")
             function = getattr(found, name)
-            _check_arguments(text, function, arguments)
+            if misfits := misfit(function, **arguments):
+                takes, why = misfits
+                rule = "it gets sizes and parameters by name, and returns an xarray.Dataset"
+                called = f"{text} is called with {', '.join(arguments)}, but takes {takes} ({why})"
+                raise VibsimError(f"{called}: {rule}")
             return function(**arguments)
         except VibsimError:
             raise
         except (Exception, SystemExit) as error:
             traceback.print_exc(file=sys.stdout)
             raise VibsimError(f"{text} raised {type(error).__name__}: {error}") from None
-
-
-def _check_arguments(text: str, function: Callable[..., Any], arguments: dict[str, Any]) -> None:
-    """Refuse a function that cannot be called with the sizes and parameters of the experiment."""
-    try:
-        takes = inspect.signature(function)
-    except (TypeError, ValueError):
-        return  # functions of extension modules may not tell
-    try:
-        takes.bind(**arguments)
-    except TypeError as error:
-        rule = "it gets sizes and parameters by name, and returns an xarray.Dataset"
-        raise VibsimError(
-            f"{text} is called with {', '.join(arguments)}, but takes {takes} ({error}): {rule}"
-        ) from None

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import inspect
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -15,6 +14,7 @@ from vibsim.convergence.study.coordinate_units import in_common_units
 from vibsim.convergence.study.grid_values import GridValues, grid_values, real
 from vibsim.convergence.study.refusal import refused
 from vibsim.core.array_types import Floats
+from vibsim.core.signatures import misfit
 
 GAUSS = 5
 """Points of the quadrature that makes the average of a function over a cell, in each dimension."""
@@ -170,26 +170,15 @@ def _at_common_points(
     return values
 
 
-def _check_arguments(exact: Callable[..., Any], dims: Sequence[str]) -> None:
-    """Refuse a function that cannot be called with a coordinate for each dimension."""
-    try:
-        takes = inspect.signature(exact)
-    except (TypeError, ValueError):
-        return  # functions of extension modules may not tell
-    try:
-        takes.bind(*dims)
-    except TypeError:
-        rule = f"must be a function of {_listed(dims)}, takes {takes}"
-        raise refused("exact", "a function", rule) from None
-
-
 def _of_function(exact: Callable[..., Any], common: CommonValues, dims: Sequence[str]) -> Floats:
     missing = [dim for dim in dims if dim not in common.coords]
     if missing or not dims:
         rule = "is a function, and the values have no coordinates that it could be given"
         hint = "give values, or xarray objects with coordinates"
         raise refused("exact", _listed(dims), rule, hint)
-    _check_arguments(exact, dims)
+    if misfits := misfit(exact, *dims):
+        rule = f"must be a function of {_listed(dims)}, takes {misfits[0]}"
+        raise refused("exact", "a function", rule)
     points = [np.asarray(common.coords[dim], dtype=np.float64) for dim in dims]
     if common.kind != "mean":
         grids = np.meshgrid(*points, indexing="ij", sparse=True)

@@ -43,7 +43,7 @@ def in_common_units(levels: Sequence[GridValues]) -> list[GridValues]:
         coords = dict(level.coords)
         for dim, unit in level.units_of_coords.items():
             of_first = first.units_of_coords.get(dim, unit)
-            if unit == of_first:
+            if unit == of_first or not (unit[0] and of_first[0]):
                 continue
             change = _change(unit, of_first)
             if change is None:

@@ -31,7 +31,7 @@ class GridValues:
     units: str = ""
     """As the user gave them."""
     units_of_coords: Mapping[str, tuple[str, str]] = field(default_factory=dict)
-    """Of those coordinates that have any, with the calendar of dates."""
+    """Empty of coordinates without one; with the calendar of dates."""
 
 
 def grid_values(value: Any, key: str) -> GridValues:
@@ -55,7 +55,6 @@ def grid_values(value: Any, key: str) -> GridValues:
         own = {str(n): c for n, c in value.coords.items() if tuple(map(str, c.dims)) == (str(n),)}
         coords = {name: plain_coordinate(np.asarray(own[name])) for name in dims if name in own}
         numbers, epsilon = real(np.asarray(value), key)
-        units = {name: units_in(own[name].attrs) for name in coords}
         return GridValues(
             numbers,
             dims,
@@ -63,7 +62,7 @@ def grid_values(value: Any, key: str) -> GridValues:
             str(value.name or ""),
             epsilon,
             units_in(getattr(value, "attrs", {}))[0],
-            {name: unit for name, unit in units.items() if unit[0]},
+            {name: units_in(own[name].attrs) for name in coords},
         )
     try:
         array = value if isinstance(value, np.ma.MaskedArray) else np.asarray(value)
