@@ -373,3 +373,99 @@ def test_lanes_have_the_same_bits(events):
     ):
         assert a.tobytes() == b.tobytes()
     assert plain.events.event_count[0] > 6
+
+
+PRESSED = written(
+    {
+        "spring": "u",
+        "force": "2 + swing*cos(t)",
+        "events.1.rising": "u - 1",
+        "events.1.then.v": "-e*v",
+    },
+    ("swing", "e"),
+)
+"""A body that a spring and a force press against a stop."""
+LIFTED = written(
+    {"force": "cos(t) - 0.5", "spring": "0", "events.1.falling": "u", "events.1.then.v": "-e*v"},
+    ("e",),
+)
+"""A body that its force presses against a stop, lifts from it, and presses again."""
+LEAVES = 2.0 * math.pi - math.pi / 3.0
+
+
+@pytest.mark.parametrize("kind", thinned(FIXED_STEP, 2))
+def test_a_body_that_is_pressed_against_a_stop_stays_there_however_it_bounces(kind):
+    for e in (0.0, 0.05, 0.3, 0.6):
+        way = go(PRESSED, kind, {"e": e, "swing": 0.1}, (0.0, 0.0), 20.0, 800)
+        np.testing.assert_allclose(way.states[:, 0, -1], (1.0, 0.0), atol=1e-12)
+        # the first impact is that of u'' + u = 2 + cos(t)/10, and flights end like a geometric series
+        assert 1.0 <= way.events.rest_time[0] < 1.1 + 4.0 * e / (1.0 - e)
+
+
+@pytest.mark.parametrize("lane", ["plain", "scalar"])
+@pytest.mark.parametrize("kind", ["rk4", "central", "gauss4", "ab3"])
+def test_a_body_leaves_its_stop_with_the_order_of_the_scheme_when_its_force_turns(kind, lane):
+    order = FIXED_STEP[kind].formal_order("u", LIFTED, FIXED_STEP[kind].defaults())
+    rest = 0.5 * LEAVES - math.sin(LEAVES)
+    wanted = math.cos(LEAVES) - math.cos(7.0) - 0.25 * (49.0 - LEAVES**2) + rest * (7.0 - LEAVES)
+    found = []
+    for steps in (100, 200, 400):
+        way = go(LIFTED, kind, {"e": 0.0}, (0.1, 0.0), 7.0, steps, lane=lane)
+        assert way.events.event_count[0] == 1.0
+        assert math.isnan(way.events.rest_time[0])
+        found.append(abs(way.states[0, 0, -1] - wanted))
+    assert abs(math.log2(found[1] / found[2]) - order) < 0.3 or found[2] < 1e-9, found
+    assert found[2] < 1e-4
+
+
+def test_who_begins_at_rest_on_a_stop_stays_without_an_event():
+    way = go(LIFTED, "rk4", {"e": 0.5}, (0.0, 0.0), 1.0, 32)
+    assert way.position[0, -1] > 0.1
+    pressed = written(
+        {"spring": "0", "force": "-1", "events.1.falling": "u", "events.1.then.v": "-e*v"}, ("e",)
+    )
+    way = go(pressed, "rk4", {"e": 0.5}, (0.0, 0.0), 1.0, 32)
+    assert way.events.event_count[0] == 0.0
+    assert way.events.rest_time[0] == 0.0
+    assert not way.states.any()
+
+
+def test_a_kick_takes_a_body_off_its_stop():
+    texts = {"spring": "0", "force": "-1", "events.1.falling": "u", "events.1.then.v": "0"}
+    texts |= {"events.2.rising": "t - 2.5", "events.2.then.v": "v + 1"}
+    way = go(written(texts, ()), "rk4", {}, (0.5, 0.0), 3.0, 96, n_events=4)
+    np.testing.assert_allclose(way.events.event_time[0, :2], (1.0, 2.5), atol=1e-12)
+    np.testing.assert_allclose(way.states[:, 0, -1], (0.5 - 0.125, 0.5), atol=1e-12)
+
+
+@pytest.mark.parametrize("kind", ["rk4", "central", "newmark"])
+def test_a_coordinate_at_rest_on_a_stop_does_not_stop_the_others(kind):
+    forces = {"acceleration.x": "-1", "acceleration.y": "-y"}
+    bounces = {"events.1.falling": "x", "events.1.then.vx": "-0.7*vx"}
+    both = go(system(("x", "y"), forces | bounces, ()), kind, {}, (0.05, 1.0, 0.0, 0.0), 12.0, 512)
+    assert abs(both.states[0, 0, -1]) < 1e-12
+    assert both.states[1, 0, -1] == pytest.approx(math.cos(12.0), abs=1e-3)
+    assert math.isnan(both.events.rest_time[0])
+
+
+def test_bodies_that_go_on_together_have_one_event():
+    together = {f"events.1.then.v{x}": "(vx + vy)/2" for x in "xy"}
+    free = {"acceleration.x": "0", "acceleration.y": "0", "events.1.falling": "y - x"}
+    model = system(("x", "y"), free | together, ())
+    way = go(model, "rk4", {}, (0.0, 1.0, 1.0, -0.5), 5.0, 64)
+    assert way.events.event_count[0] == 1.0
+    np.testing.assert_allclose(way.states[:, 0, -1], (1.75, 1.75, 0.25, 0.25), atol=1e-12)
+
+
+def test_bounces_without_end_between_two_bodies_break_the_calculation_down():
+    """They would rest on each other, with a force that nobody has written."""
+    heavy = {"acceleration.x": "-1", "acceleration.y": "-1"}
+    heavy |= {"events.1.falling": "x", "events.1.then.vx": "-0.5*vx"}
+    heavy |= {"events.2.falling": "y - x - 0.1"}
+    heavy |= {"events.2.then.vx": "(vx + vy)/2 - 0.25*(vx - vy)"}
+    heavy |= {"events.2.then.vy": "(vx + vy)/2 + 0.25*(vx - vy)"}
+    way = go(system(("x", "y"), heavy, ()), "rk4", {}, (0.5, 1.0, 0.0, 0.0), 8.0, 256)
+    assert np.isnan(way.states[:, 0, -1]).all()
+    sound = way.states[:, 0, : int(np.argmax(np.isnan(way.states[0, 0])))]
+    assert sound[0].min() > -1e-12
+    assert (sound[1] - sound[0]).min() > 0.1 - 1e-12

@@ -90,7 +90,7 @@ DIAGNOSES: Words = {
     "non_finite, always": (
         NOT_FINITE,
         "End the time interval (`time: end`) before t = {singular:4}, or check the formulas of `model:`. Finer levels "
-        "will not help if the motion escapes or a formula has no finite value.",
+        "will not help if the motion escapes, a formula has no finite value, or events follow each other without end.",
     ),
     "non_finite": (
         NOT_FINITE,

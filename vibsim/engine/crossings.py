@@ -1,10 +1,15 @@
 """The events that a user writes as formulas (`vibsim.models.events.Crossings`): guards that change their signs.
 
-Modes: 0 where the motion has ended; else 1 and, for every guard k that is above 0, 2**k more. An event is *watched*
-while the guard is on the side from which its crossing counts. It goes over to the other side by a crossing, which is an
-event where it is watched; else that is noted where a smooth piece ends. Behind an event the guard that has fired is 0
-but for rounding, and its rate tells the side into which the motion goes: a body that bounces off is watched again, one
-that goes through is not before it has come back. A guard that a jump of the state steps over has no event.
+Modes: 0 where the motion has ended; else 1 and, for every guard k of n that is above 0, 2**k more, and 2**(n + k) more
+where a coordinate is in *contact* with the fixed stop of which it is the guard. An event is *watched* while the guard
+is on the side from which its crossing counts. It goes over to the other side by a crossing, which is an event where it
+is watched; else that is noted where a smooth piece ends. Behind an event the guard that has fired is 0 but for
+rounding, and its rate tells the side into which the motion goes: a body that bounces off is watched again, one that
+goes through is not before it has come back. A guard that a jump of the state steps over has no event.
+
+Flights between a body and a stop become ever shorter where it loses speed. Where one is too short to be told from 0, or
+there are too many, the body stays: its coordinate rests on the stop, while all others move on, until the force on it
+turns away from the stop. Guards that are no fixed stops have no such rest: the member breaks down.
 
 A kernel of such a model binds these functions; they know the model by ``guards``, ``guard_rates``, ``crossed`` and
 ``is_end``, and a loop over the guards is written out.
@@ -13,29 +18,93 @@ A kernel of such a model binds these functions; they know the model by ``guards`
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from vibsim.engine.kernel_stubs import P, unbound
 from vibsim.engine.text import Module, collect
+from vibsim.formula import Binary, Expression, Name, Number, derivative
+from vibsim.models import Model
+from vibsim.models.base import tree
 from vibsim.models.events import Crossings
 
 # bound by the kernel (`vibsim.engine.kernel_stubs`)
-crossed = energies = first_crossed = guard_rates = guards = is_end = is_ended_by = mode_of = unbound
-nearest_watched = sides_behind = sides_followed = sides_of = unbound
+contact_with = contacts_behind = contacts_of = crossed = energies = first_crossed = unbound
+guard_bends = guard_rates = guards = is_end = is_ended_by = is_unresolved = least_pressure = unbound
+mode_of = nearest_watched = placed = sides_behind = sides_followed = sides_of = unbound
+size_of = stopped = unbound
 
 AT_ONCE = 2.0**-50
 """Within this part of the time two events are at the same time."""
+LEAST_HEIGHT = 32.0
+"""Twice the factor on the rounding of a guard up to which a flight over it is not resolved: rounding adds up."""
 
 
-def put_rows(module: Module, events: Crossings, *, is_located: bool) -> None:
+def fixed_stops(model: Model, events: Crossings) -> dict[int, int]:
+    """Return rows whose guard is a place of one coordinate and that change its velocity alone, with the coordinate."""
+    found, moving = {}, {*model.positions, *model.velocities, "t"}
+    for k, row in enumerate(events.rows):
+        read = moving & set(tree(model, row.guard).names)
+        for i, names in enumerate(zip(model.positions, model.velocities, strict=True)):
+            if (read, [name for name, _ in row.then]) == ({names[0]}, [names[1]]):
+                found[k] = i
+    return found
+
+
+def coordinates_with_stops(model: Model, events: Crossings) -> list[int]:
+    """Return the coordinates that may rest on a fixed stop."""
+    return sorted(set(fixed_stops(model, events).values()))
+
+
+def put_free(module: Module, model: Model, events: Crossings) -> None:
+    """Write for each coordinate with stops what is 0 where it rests on one, else 1."""
+    stops, count = fixed_stops(model, events), len(events.rows)
+    collect(module, is_in_contact, is_in_contact.__name__, {})
+    for i in coordinates_with_stops(model, events):
+        touching = [f"is_in_contact(mode, {_contact(k, count)})" for k in stops if stops[k] == i]
+        module.define(f"free_{i}(mode)", f"return 0.0 if {' or '.join(touching)} else 1.0")
+
+
+def places(model: Model, events: Crossings) -> dict[str, Expression]:
+    """Return the formulas of where bodies rest on fixed stops: on the side of their guards that they have left."""
+    found: dict[str, Expression] = {}
+    for k, i in fixed_stops(model, events).items():
+        guard, name = tree(model, events.rows[k].guard), model.positions[i]
+        beyond = Binary("/", guard, derivative(guard, name))
+        found[f"place_{k}"] = Binary("-", Name(name), Binary("*", Number(2.0), beyond))
+    return found
+
+
+def _components(name: str, model: Model) -> list[str]:
+    """Return the texts of all components of positions or velocities."""
+    return [f"{name}[{i}]" for i in range(model.coordinates)] if model.coordinates > 1 else [name]
+
+
+def _joined(components: Sequence[str]) -> str:
+    """Return the text of positions or velocities with these components."""
+    return f"vector({', '.join(components)})" if len(components) > 1 else components[0]
+
+
+def _contact(k: int, count: int) -> float:
+    """Return the place in the mode of the contact with stop k of so many rows."""
+    return 2.0 ** (count + k)
+
+
+def put_rows(module: Module, model: Model, events: Crossings, *, is_located: bool) -> None:
     """Write what goes through all guards, and what tells one event from another.
 
     On the mesh a guard that is noticed late may have turned back: an event happens where it still goes its way, and the
-    motion ends whatever it does.
+    motion ends whatever it does. Nothing is in contact there.
     """
-    for text in (side_of, is_watched, nearer, free_side, has_just_left, side_behind, on_its_side):
+    for text in (
+        *(side_of, is_watched, nearer, free_side, has_just_left, side_behind, on_its_side),
+        *(is_in_contact, rests, is_too_short),
+    ):
         collect(module, text, text.__name__, {})
     rows = [(k, row, f"{2.0**k}", f"{float(row.direction)}") for k, row in enumerate(events.rows)]
+    stops = fixed_stops(model, events) if is_located else {}
+    _put_contacts(module, model, events, stops)
+    apart = {k: f"not is_in_contact(mode, {_contact(k, len(rows))})" for k in stops}
 
     def total(line: str) -> str:
         return "return 1.0 + " + " + ".join(
@@ -46,28 +115,39 @@ def put_rows(module: Module, events: Crossings, *, is_located: bool) -> None:
     module.define(
         "nearest_watched(mode, g)",
         "least = math.inf",
-        *(f"least = nearer(least, side_of(mode, {s}), g[{k}], {d})" for k, _, s, d in rows),
+        *(
+            line
+            for k, _, s, d in rows
+            for line in (
+                f"if {apart.get(k, 'True')}:",
+                f"    least = nearer(least, side_of(mode, {s}), g[{k}], {d})",
+            )
+        ),
         "return least",
     )
-    fires = "side_of(mode, {s}) * g[{k}] < 0.0 and is_watched(side_of(mode, {s}), {d})"
-    goes_on = "" if is_located else " and side_of(mode, {s}) * r[{k}] < 0.0"
+    fires = "{apart} and side_of(mode, {s}) * g[{k}] < 0.0 and is_watched(side_of(mode, {s}), {d})"
+    goes_on = " and side_of(mode, {s}) * r[{k}] < 0.0"
+    # what is beyond 0 by rounding and goes back was not the first
+    tests = [(row, fires + ("" if row.ends else goes_on)) for row in events.rows]
+    tests += [(row, fires) for row in events.rows] if is_located else []
     module.define(
         "first_crossed(mode, g, r)",
         *(
             line
-            for k, row, s, d in rows
+            for (k, row, s, d), (_, test) in zip(rows * 2, tests, strict=False)
             for line in (
-                f"if {(fires + ('' if row.ends else goes_on)).format(k=k, s=s, d=d)}:",
+                f"if {test.format(k=k, s=s, d=d, apart=apart.get(k, 'True'))}:",
                 f"    return {float(k)}",
             )
         ),
         "return -1.0",
     )
     module.define(
-        "sides_behind(mode, fired, g, b, h, r, t)",
+        "sides_behind(mode, fired, g, b, h, r, q, t)",
         total(
             "{place} * side_behind(side_of(mode, {place}), fired == {k}.0 or "
-            "has_just_left(side_of(mode, {place}), g[{k}], b[{k}], t), g[{k}], h[{k}], r[{k}], {direction})"
+            "has_just_left(side_of(mode, {place}), g[{k}], b[{k}], t), g[{k}], h[{k}], r[{k}], "
+            "q[{k}], {direction})"
         ),
     )
     module.define(
@@ -86,6 +166,83 @@ def put_rows(module: Module, events: Crossings, *, is_located: bool) -> None:
             for line in (f"if k == {k}.0:", f"    return crossed_{k}(u, v, t, p)")
         ),
         f"return crossed_{rows[-1][0]}(u, v, t, p)",
+    )
+
+
+def _put_contacts(
+    module: Module, model: Model, events: Crossings, stops: Mapping[int, int]
+) -> None:
+    """Write what begins, keeps and ends the contact of coordinates with these stops."""
+    count = len(events.rows)
+    every = 2.0**count
+    module.define("contacts_of(mode)", f"return {every} * math.floor((mode - 1.0) / {every})")
+    rows = [
+        (k, f"side_of(mode, {2.0**k})", f"is_in_contact(mode, {_contact(k, count)})") for k in stops
+    ]
+    pressed = [
+        line
+        for k, side, touching in rows
+        for line in (
+            f"    if {touching} and not -{side} * q[{k}] > least:",
+            f"        least = -{side} * q[{k}]",
+        )
+    ]
+    module.define(
+        "least_pressure(mode, u, v, t, p)",
+        "least = math.inf",
+        *((f"if mode > {every}:", "    q = guard_bends(u, v, t, p)", *pressed) if rows else ()),
+        "return least",
+    )
+    terms = [
+        f"{_contact(k, count)} * rests(fired == {float(k)} or h[{k}] == 0.0 or {touching} and h[{k}] == g[{k}], "
+        f"{side}, r[{k}], q[{k}], {float(events.rows[k].direction)})"
+        for k, side, touching in rows
+    ]
+    module.define(
+        "contacts_behind(mode, fired, g, h, r, q)", f"return {' + '.join(['0.0', *terms])}"
+    )
+    module.define(
+        "is_unresolved(mode, fired, g, b, q)",
+        *(
+            line
+            for k in range(count)
+            for line in (
+                f"if fired == {float(k)}:",
+                f"    return is_too_short(side_of(mode, {2.0**k}), g[{k}], b[{k}], q[{k}])",
+            )
+        ),
+        "return False",
+    )
+    module.define(
+        "contact_with(fired)",
+        *(
+            line
+            for k in stops
+            for line in (f"if fired == {float(k)}:", f"    return {_contact(k, count)}")
+        ),
+        "return 0.0",
+    )
+    still = _components("v", model)
+    on_stop = {}
+    for k, i in stops.items():
+        still[i] = f"{_components('v', model)[i]} * free_{i}(mode)"
+        on_stop[k] = _components("u", model)
+        on_stop[k][i] = f"place_{k}(u, v, t, p)"
+    module.define("stopped(v, mode)", f"return {_joined(still)}")
+    module.define(
+        "placed(fired, u, v, t, p)",
+        *(
+            line
+            for k in stops
+            for line in (f"if fired == {float(k)}:", f"    return {_joined(on_stop[k])}")
+        ),
+        "return u",
+    )
+    held = [f"free_{i}(mode) == 0.0" for i in range(model.coordinates)]
+    is_every = len(set(stops.values())) == model.coordinates
+    module.define(
+        "is_at_rest(mode)",
+        "return mode == 0.0" + (f" or ({' and '.join(held)})" if is_every else ""),
     )
 
 
@@ -123,7 +280,7 @@ def has_just_left(side: float, value: float, rate: float, t: float) -> bool:
 
 
 def side_behind(
-    side: float, fired: bool, value: float, ahead: float, rate: float, direction: float
+    side: float, fired: bool, value: float, ahead: float, rate: float, bend: float, direction: float
 ) -> float:
     """Return 1 for a guard that is above 0 behind an event, else 0.
 
@@ -133,10 +290,13 @@ def side_behind(
         The one before.
     fired
         Whether the event is its own, or its own was at the same time.
-    value, ahead, rate
-        The guard before the event; the guard and its rate behind it.
+    value, ahead, rate, bend
+        The guard before the event; the guard and its derivatives behind it.
     """
     if fired and abs(ahead) <= abs(value):
+        if rate == 0.0 and side * bend >= 0.0:
+            # it stays at 0 or goes back: what it is beyond 0 by rounding is no crossing
+            return 0.5 - 0.5 * side
         return free_side(0.0, rate, side, direction)
     if ahead == value and is_watched(side, direction):
         # it may have crossed at the same time: its event comes next
@@ -151,15 +311,49 @@ def on_its_side(side: float, value: float, direction: float) -> float:
     return 0.5 + 0.5 * side
 
 
+def is_in_contact(mode: float, place: float) -> bool:
+    """Tell whether a coordinate is in contact with a stop, from its `place` in the mode."""
+    return math.floor((mode - 1.0) / place) % 2 == 1
+
+
+def rests(is_there: bool, side: float, rate: float, bend: float, direction: float) -> float:
+    """Return 1 for a guard whose coordinate rests on the stop and is pressed against it, else 0.
+
+    Parameters
+    ----------
+    is_there
+        Whether the guard is 0.
+    rate, bend
+        Its first derivative by time, and the second one without the stop.
+    """
+    stays = is_there and rate == 0.0 and side * bend < 0.0 and is_watched(side, direction)
+    return 1.0 if stays else 0.0
+
+
+def is_too_short(side: float, value: float, rate: float, bend: float) -> bool:
+    """Tell whether a guard that seems to have crossed 0 is on its way back, behind an event of its own.
+
+    It was beyond 0 by rounding already, and does not reach the side from which it came: ``rate^2/(2 bend)`` is how far
+    it would get.
+    """
+    return side * rate > 0.0 and rate * rate <= LEAST_HEIGHT * abs(bend * value)
+
+
 def first_mode(u: float, v: float, t: float, p: P) -> float:
     """Return the mode at the beginning."""
-    return sides_of(guards(u, v, t, p), guard_rates(u, v, t, p))
+    g, r = guards(u, v, t, p), guard_rates(u, v, t, p)
+    mode = sides_of(g, r)
+    return mode + contacts_behind(mode, -1.0, g, g, r, guard_bends(u, v, t, p))
 
 
 def guard(u: float, v: float, t: float, p: P) -> float:
-    """Return a number that falls below 0 where the first guard that is watched crosses 0."""
+    """Return a number that falls below 0 where a guard that is watched crosses 0, or a coordinate leaves its stop."""
     mode = mode_of(p)
-    return 1.0 if mode == 0.0 else nearest_watched(mode, guards(u, v, t, p))
+    if mode == 0.0:
+        return 1.0
+    least = nearest_watched(mode, guards(u, v, t, p))
+    pressure = least_pressure(mode, u, v, t, p)
+    return pressure if pressure < least else least
 
 
 def guard_on_mesh(u: float, v: float, t: float, p: P) -> float:
@@ -174,7 +368,7 @@ def guard_on_mesh(u: float, v: float, t: float, p: P) -> float:
 def followed(u: float, v: float, t: float, p: P) -> float:
     """Return the mode at the end of a smooth piece: guards that are not watched may have crossed 0."""
     mode = mode_of(p)
-    return 0.0 if mode == 0.0 else sides_followed(mode, guards(u, v, t, p))
+    return 0.0 if mode == 0.0 else sides_followed(mode, guards(u, v, t, p)) + contacts_of(mode)
 
 
 def held(v: float) -> float:
@@ -187,19 +381,37 @@ def landed(u: float, v: float) -> tuple[float, float]:
     return u, v
 
 
-def settled(u: float, v: float, t: float, before: float, p: P) -> tuple[float, float, float]:
+def settled(
+    u: float, v: float, t: float, before: float, is_last: bool, p: P
+) -> tuple[float, float, float]:
     """Return position, velocity and mode behind an event."""
     mode = mode_of(p)
-    g = guards(u, v, t, p)
-    b = guard_rates(u, v, t, p)
+    g, b, q = guards(u, v, t, p), guard_rates(u, v, t, p), guard_bends(u, v, t, p)
     fired = first_crossed(mode, g, b)
+    if fired < 0.0:
+        return u, v, sides_followed(mode, g) + contacts_behind(mode, fired, g, g, b, q)
     if is_end(fired):
         return u, v, 0.0
+    if is_last or is_unresolved(mode, fired, g, b, q):
+        contact = contact_with(fired)
+        if contact == 0.0:
+            return u * math.nan, v * math.nan, mode
+        return placed(fired, u, v, t, p), stopped(v, mode + contact), mode + contact
     ahead, own = crossed(fired, u, v, t, p)
     h, r = guards(ahead, own, t, p), guard_rates(ahead, own, t, p)
     if is_ended_by(g, h):
         return ahead, own, 0.0
-    return ahead, own, sides_behind(mode, fired, g, b, h, r, t)
+    bends = guard_bends(ahead, own, t, p)
+    contacts = contacts_behind(mode, fired, g, h, r, bends)
+    if contacts > contacts_of(mode):
+        ahead = placed(fired, ahead, own, t, p)
+    return ahead, own, sides_behind(mode, fired, g, b, h, r, bends, t) + contacts
+
+
+def is_counted(before: float, after: float, came: Any, goes: Any) -> bool:
+    """Tell an event from a coordinate that leaves its stop, whose state does not change."""
+    changed = size_of(goes[0] - came[0], goes[1] - came[1])
+    return after == 0.0 or changed > 0.0 or not contacts_of(after) < contacts_of(before)
 
 
 def spent(u: float, ahead: float) -> float:

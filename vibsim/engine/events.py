@@ -20,8 +20,10 @@ from vibsim.engine.kernel_stubs import P, State, called, unbound
 
 # bound by the kernel (`vibsim.engine.kernel_stubs`)
 GATHER = LOCATED = WORK = True
-first_mode = first_of = followed = guard = guard_on_mesh = held = landed = lost = unbound
-mode_of = powers = settled = spent = start = start_of = step = turning = with_mode = unbound
+first_mode = first_of = followed = guard = guard_on_mesh = held = is_at_rest = is_counted = unbound
+landed = lost = mode_of = powers = settled = spent = start = start_of = step = turning = (
+    with_mode
+) = unbound
 
 # Columns of `stats` behind those of `vibsim.engine.gather`. HALTED and HALTED_GRID: the mode before the body came to
 # rest, and the grid point behind, since it may leave the other way, which is a turn. LOST: what sliding or impacts have
@@ -38,7 +40,7 @@ _COLUMNS = (
 )
 
 MOST_EVENTS = 256
-"""Events of a step; a member with more comes to rest until the next grid point."""
+"""Events of a step; behind the last one the body rests, until its force says otherwise."""
 MOST_TRIALS = 200
 """Trials for the time of an event: every third halves the interval."""
 SHARP = 2.0**-52
@@ -60,7 +62,7 @@ def begun(stats: Any, case: int, u: float, v: float, p: P) -> P:
         stats[case, LOST] = 0.0
         stats[case, DONE] = 0.0
         stats[case, TAKEN] = 0.0
-        if mode == 0.0:
+        if is_at_rest(mode):
             stats[case, REST_TIME] = 0.0
     return with_mode(p, mode, 0.0)
 
@@ -97,7 +99,7 @@ def passed(
             note_piece(record, variant, (u, v, ahead, own, t - dt, dt), p)
         if guard_on_mesh(ahead, own, t, p) < 0.0:
             before, came = mode_of(p), (ahead, own)
-            ahead, own, mode = settled(ahead, own, t, u, p)
+            ahead, own, mode = settled(ahead, own, t, u, False, p)
             if GATHER:
                 note_event(record, t, t, came, before, (ahead, own), mode, p)
             p = with_mode(p, mode, t)
@@ -115,7 +117,7 @@ def across(
 ) -> tuple[float, float, P, int]:
     """Return position, velocity and parameters at step `n` behind all events since step n - 1, and their number."""
     t, end = (n - 1) * dt, n * dt
-    for count in range(MOST_EVENTS):
+    for count in range(2 * MOST_EVENTS):
         left = end - t
         ahead, own = leap(variant, u, v, t, left, p)
         if not (left > 0.0 and guard(ahead, own, end, p) < 0.0):
@@ -130,16 +132,11 @@ def across(
         # the last event of a step may lie on its end
         t = t + tau if tau < left else end
         before = mode_of(p)
-        u, v, mode = settled(ahead, own, t, math.inf, p)
+        u, v, mode = settled(ahead, own, t, math.inf, count >= MOST_EVENTS - 1, p)
         if GATHER:
             note_event(record, t, end, (ahead, own), before, (u, v), mode, p)
         p = with_mode(p, mode, t)
-    if GATHER:
-        stats, _, case = record
-        stats[case, LOST] = stats[case, LOST] + lost((u, v), (u, v - v), t, p)
-        stats[case, REST_TIME] = t
-        stats[case, HALTED] = math.nan
-    return u, v - v, with_mode(p, 0.0, end), MOST_EVENTS
+    return u * math.nan, v * math.nan, p, 2 * MOST_EVENTS
 
 
 @called
@@ -239,11 +236,15 @@ def note_event(
     stats, counts, case = record
     stats[case, LOST] = stats[case, LOST] + lost(came, goes, t, p)
     u = first_of(goes[0])
-    since, point = t, grid
-    if before == 0.0:
-        since, point, before = stats[case, REST_TIME], stats[case, HALTED_GRID], stats[case, HALTED]
-    elif after == 0.0:
+    since, point, resting = t, grid, stats[case, REST_TIME]
+    counted = is_counted(before, after, came, goes)
+    if is_at_rest(before):
+        since, point, before = resting, stats[case, HALTED_GRID], stats[case, HALTED]
+    elif is_at_rest(after):
         stats[case, HALTED], stats[case, HALTED_GRID] = before, grid
+    stats[case, REST_TIME] = t if is_at_rest(after) else math.nan
+    if not counted:
+        return
     if stats[case, EVENT_COUNT] == 0.0:
         stats[case, FIRST_EVENT] = t
     stats[case, LAST_EVENT] = t
@@ -251,7 +252,6 @@ def note_event(
     if place < stats.shape[1]:
         stats[case, place] = t
     stats[case, EVENT_COUNT] += 1.0
-    stats[case, REST_TIME] = t if after == 0.0 else math.nan
     kind = turning(before, after, first_of(came[1]), first_of(goes[1]))
     if kind != 0.0:
         note_turning(stats, counts, case, since, point, u, kind)

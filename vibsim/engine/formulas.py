@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Collection, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from functools import partial
 from inspect import signature
 from typing import Any
@@ -11,6 +11,7 @@ from typing import Any
 from vibsim import formula as expression
 from vibsim.core.errors import SimulationError
 from vibsim.elementary import ELEMENTARY
+from vibsim.engine.crossings import coordinates_with_stops, fixed_stops, places, put_free
 from vibsim.engine.text import Module, collect
 from vibsim.formula import Binary, Call, Compare, Expression, Name, Number
 from vibsim.formula.algebra import filled
@@ -23,7 +24,11 @@ from vibsim.schemes.base import Stepper
 MOST_INLINE = 64
 """Calls of functions up to which each becomes part of the formula: each then takes 0.1 s to compile, and 3 MB."""
 _MODE = "mode"
-_TUPLES = ("guards", "guard_rates")
+_FREE = "_free_"
+"""Before the number of a coordinate: 0 where it rests on a stop, else 1."""
+_OF_CONTACTS = ("acceleration", "slopes", "guard_bends")
+"""Functions whose formulas depend on what rests on a stop."""
+_TUPLES = ("guards", "guard_rates", "guard_bends")
 """Functions that return a tuple, however many results they have."""
 _MARK = "_"
 """Behind the names of states and parameters in a kernel."""
@@ -73,6 +78,8 @@ def put_formulas(
     if "drive" in of_events:
         held = Binary("*", Name(_MODE), of_events["limit"]["_limit"])
         accelerations = [Binary("-", of_events["drive"]["_drive"], held)]
+    if isinstance(model.events, Crossings):
+        accelerations = [put(formula) for formula in _with_stops(model, model.events)]
     formulas = {
         "acceleration": {f"_result_{i}": formula for i, formula in enumerate(accelerations)},
         **of_events,
@@ -102,6 +109,8 @@ def put_formulas(
     is_rare = is_rare or sum(isinstance(part, Call) for part in parts) > MOST_INLINE
     is_scaled = stepper.scaling is not None
     scaled = ("acceleration", "slopes") if is_scaled else ()
+    if isinstance(model.events, Crossings):
+        put_free(module, model, model.events)
     put_functions(module, model, suffix, formulas, is_rare=is_rare, scaled=scaled)
     put_parameters(module, model, 2 if is_scaled else 0, tabulated=stepper.tabulated)
 
@@ -158,6 +167,11 @@ def put_functions(
         lines = list(unpack)
         if model.events is not None and function in ("acceleration", "slopes"):
             lines += [f"{_MODE} = p[{len(names)}]", f"t = t + p[{len(names) + 1}]"]
+        if isinstance(model.events, Crossings) and function in _OF_CONTACTS:
+            lines += [
+                f"{_FREE}{i} = free_{i}(p[{len(names)}])"
+                for i in coordinates_with_stops(model, model.events)
+            ]
         lines += _looking_up(module, model, results.values())
         bind = expression.rebuilding(partial(_with_functions, module, suffix, is_rare))
         ready = {result: bind(formula) for result, formula in results.items()}
@@ -225,6 +239,30 @@ def put_parameters(module: Module, model: Model, more: int = 0, *, tabulated: bo
     module.define("parameters_of(parameters, table, case)", f"return ({values},)")
 
 
+def _with_stops(model: Model, events: Crossings) -> list[Expression]:
+    """Return the accelerations, which vanish where a coordinate rests on a stop."""
+    stopped = coordinates_with_stops(model, events)
+    formulas = [tree(model, formula) for formula in model.accelerations]
+    return [
+        Binary("*", formula, Name(f"{_FREE}{i}")) if i in stopped else formula
+        for i, formula in enumerate(formulas)
+    ]
+
+
+def _bends(model: Model, events: Crossings, rates: Sequence[Expression]) -> list[Expression]:
+    """Return the second derivatives of the guards by time: those of stops as if nothing rested on them.
+
+    That of a guard with velocities in it would need the derivatives of the forces: it is 0.
+    """
+    held, stops = _with_stops(model, events), fixed_stops(model, events)
+    found: list[Expression] = []
+    for k, (row, speed) in enumerate(zip(events.rows, rates, strict=True)):
+        is_of_positions = not set(model.velocities) & set(tree(model, row.guard).names)
+        bend = rate(model, speed, None if k in stops else held)
+        found.append(bend if is_of_positions else Number(0.0))
+    return found
+
+
 def _of_events(
     model: Model, put: Callable[[Formula], Expression]
 ) -> dict[str, dict[str, Expression]]:
@@ -239,12 +277,17 @@ def _of_events(
             return {"impact_of": {name: put(formula) for name, formula in results.items()}}
         case Crossings(rows):
             guards = [tree(model, row.guard) for row in rows]
+            rates = [rate(model, guard) for guard in guards]
             found = {
-                "guards": {f"_guard_{k}": put(guard) for k, guard in enumerate(guards)},
-                "guard_rates": {
-                    f"_rate_{k}": put(rate(model, guard)) for k, guard in enumerate(guards)
-                },
+                name: {f"{result}_{k}": put(formula) for k, formula in enumerate(formulas)}
+                for name, result, formulas in (
+                    ("guards", "_guard", guards),
+                    ("guard_rates", "_rate", rates),
+                    ("guard_bends", "_bend", _bends(model, model.events, rates)),
+                )
             }
+            for name, place in places(model, model.events).items():
+                found[name] = {"_place": put(place)}
             states = [state.name for state in model.states]
             for k, row in enumerate(rows):
                 new = dict(row.then)

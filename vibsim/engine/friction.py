@@ -57,12 +57,26 @@ def landed(u: float, v: float) -> tuple[float, float]:
     return u, 0.0
 
 
-def settled(u: float, v: float, t: float, before: float, p: P) -> tuple[float, float, float]:
+def settled(
+    u: float, v: float, t: float, before: float, is_last: bool, p: P
+) -> tuple[float, float, float]:
     """Return position, velocity and mode behind an event; on the mesh the velocity is what it has become."""
+    if is_last:
+        return u, 0.0, 0.0
     direction = slip(u, t, p)
     if direction == 0.0 or v == 0.0:
         return u, 0.0, direction
     return u, v, 1.0 if v > 0.0 else -1.0
+
+
+def is_counted(before: float, after: float, came: Any, goes: Any) -> bool:
+    """Tell whether a change of the mode is an event: each is."""
+    return True
+
+
+def is_at_rest(mode: float) -> bool:
+    """Tell whether the body sticks."""
+    return mode == 0.0
 
 
 def spent(u: float, ahead: float) -> float:

@@ -44,7 +44,9 @@ def landed(u: float, v: float) -> tuple[float, float]:
     return 0.0, v
 
 
-def settled(u: float, v: float, t: float, before: float, p: P) -> tuple[float, float, float]:
+def settled(
+    u: float, v: float, t: float, before: float, is_last: bool, p: P
+) -> tuple[float, float, float]:
     """Return position, velocity and mode behind an impact.
 
     On the mesh a body that falls is below the ground already. It stays there and rises from there, since a body that
@@ -53,9 +55,19 @@ def settled(u: float, v: float, t: float, before: float, p: P) -> tuple[float, f
     """
     restitution, near, slow = impact_of(u, v, t, p)
     speed = restitution * abs(v)
-    if not speed > slow or before < near:
+    if is_last or not speed > slow or before < near:
         return 0.0, 0.0, 0.0
     return u, speed, 1.0
+
+
+def is_counted(before: float, after: float, came: Any, goes: Any) -> bool:
+    """Tell whether a change of the mode is an event: each is."""
+    return True
+
+
+def is_at_rest(mode: float) -> bool:
+    """Tell whether the body lies on the ground."""
+    return mode == 0.0
 
 
 def spent(u: float, ahead: float) -> float:

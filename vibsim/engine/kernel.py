@@ -243,13 +243,15 @@ def _put_events(module: Module, model: Model, stepper: Stepper) -> None:
     module.define("start_of(p)", f"return p[{first + 1}]")
     module.define("with_mode(p, mode, start)", f"return ({', '.join(places)},)")
     if isinstance(model.events, Crossings):
-        crossings.put_rows(module, model.events, is_located=stepper.events != "mesh")
+        crossings.put_rows(module, model, model.events, is_located=stepper.events != "mesh")
     kind = _OF_EVENTS[type(model.events)]
     for name in (
         *("first_mode", "guard", "guard_on_mesh", "landed", "settled", "followed", "held"),
-        *("turning", "spent", "lost"),
+        *("is_counted", "turning", "spent", "lost"),
     ):
         collect(module, getattr(kind, name), name, {})
+    if kind is not crossings:
+        collect(module, kind.is_at_rest, "is_at_rest", {})
 
 
 def _module(lane: str, settings: Mapping[str, object]) -> Module:

@@ -49,16 +49,19 @@ velocity are vectors (`vibsim.engine.coordinates`); q and w are either:
 ``first_mode(u, v, t, p)``                                      the mode at the beginning
 ``guard(u, v, t, p)``, ``guard_on_mesh``                        falls below 0 at the event that ends the present mode
 ``landed(u, v)``                                                the state at a located event, without its rounding
-``settled(u, v, t, before, p)``                                 position, velocity and mode behind an event; `before`:
-                                                                position a step before, infinite if located
+``settled(u, v, t, before, is_last, p)``                        position, velocity and mode behind an event; `before`:
+                                                                position a step before, infinite if located; `is_last`:
+                                                                a step has no room for more
+``is_counted(before, after, came, goes)``                       whether a change of mode and state counts as an event
+``is_at_rest(mode)``                                            whether all coordinates rest
 ``followed(u, v, t, p)``                                        the mode at the end of a smooth piece, without an event
 ``held(v)``                                                     the velocity of a member at rest that had this one
 ``spent(u, ahead)``, ``lost(came, goes, t, p)``                 what a smooth piece, and an event between two states,
                                                                 costs in units of ``cost``
 ``turning(before, after, v, own)``                              1 for an event between two modes and velocities that is
                                                                 a peak, -1 for a trough, 0 for neither
-``guards(u, v, t, p)``, ``guard_rates``                         the formulas of `vibsim.models.events.Crossings`, and
-                                                                how fast they change
+``guards(u, v, t, p)``, ``guard_rates``, ``guard_bends``        the formulas of `vibsim.models.events.Crossings`, and
+                                                                their first and second derivatives by time
 ``crossed(k, u, v, t, p)``, ``is_end(k)``                       the state behind event k, and whether it ends the motion
 ``is_ended_by(g, h)``                                           whether a jump of the guards from g to h ends the motion
 ==============================================================  =======================================================

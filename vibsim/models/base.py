@@ -9,7 +9,7 @@ from __future__ import annotations
 import keyword
 import math
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache
 from typing import TYPE_CHECKING, Any, Literal
@@ -336,9 +336,11 @@ def speeds(
     yield from zip(named, accelerations, strict=True)
 
 
-def rate(model: Model, formula: Expression) -> Expression:
-    """Return how fast a formula changes along a motion of the model."""
-    pushes = (tree(model, acceleration) for acceleration in model.accelerations)
+def rate(
+    model: Model, formula: Expression, accelerations: Sequence[Expression] | None = None
+) -> Expression:
+    """Return how fast a formula changes along a motion of the model, or along one with other accelerations."""
+    pushes = accelerations or [tree(model, acceleration) for acceleration in model.accelerations]
     total: Expression = Number(0.0)
     for name, speed in speeds(model.positions, model.velocities, pushes):
         slope = derivative(formula, name)
