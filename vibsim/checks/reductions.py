@@ -194,7 +194,11 @@ def _reduced(
     error = np.zeros(len(about))
     if check.number.has_limit(check.at.level):
         error = np.asarray(found["error_bound"], dtype=np.float64)[scheme, about]
-        error = np.where(np.isnan(error), np.inf, error)
+        is_open = np.isnan(error)
+        if check.number.is_angle:
+            # beyond pi it goes on at the other end of all angles
+            is_open |= error > np.pi - np.abs(numbers)
+        error = np.where(is_open, np.inf, error)
     key = _key(record, check)
     sweep = experiment.sweep
     if check.take == "monotone" and sweep is not None and sweep.follow == check.over:

@@ -59,6 +59,8 @@ DIRECTION_ASKED = {1.0: "rising", -1.0: "falling", 0.0: "neither rising nor fall
 """What is asked of a direction, by the number that stands for it."""
 UNKNOWN, SETTLED, MOVING = -1, 0, 1
 """What finer levels do to a number that misses what is asked: not known, too little, perhaps enough."""
+OF_RUN = (*OF_STEADY_STATE, "peak_frequency")
+"""Numbers whose error comes from the length of the run as well."""
 REACH = 3.0
 """All finer levels together change a number by no more than so many times its last change (an order of 1/2 by 2.4)."""
 FINER, MOST_FINER = 2, 12
@@ -176,6 +178,7 @@ def judge(experiment: Experiment, record: Record, check: ValueCheck, found: Meas
     """Compare a measured number with what the check asks of it.
 
     A limit of several levels that misses what is asked by less than its bound may be right: nothing is decided then.
+    Nor is whether an angle is below or above another one where its bound goes through pi.
     Nor is it where the time of an event meets what is asked, but may be further away, or where any number does whose
     bound is unknown and that finer levels may still move out, or of which no level can bound the error.
     """
@@ -186,15 +189,13 @@ def judge(experiment: Experiment, record: Record, check: ValueCheck, found: Meas
     # of a stability limit infinity is a value; on the separatrix there is no period, and nothing went wrong
     does_not_exist = np.isnan(number) | (np.isinf(number) & (name == "exact_period"))
     infinite = np.isinf(number) & (name != "stability_limit") & ~does_not_exist
-    may_be_right = ~(away > bound) & is_limit
-    if is_limit and row.needs_events:
-        # a time that the levels leave open agrees by chance, perhaps of another event
-        holds &= bound <= np.maximum(-away, 0.0 if check.equals is None else check.allowed)
-    elif is_limit:
-        holds &= ~(np.isnan(bound) & (found["levels_needed"] == MOVING)) & ~np.isinf(bound)
-        if check.equals is None:
-            # a limit of a range is met only where all numbers within the bound are
-            holds &= ~(bound > -away)
+    may_be_right = ~(np.minimum(away, _to_the_cut(check, number)) > bound) & is_limit
+    # a time that the levels leave open agrees by chance, perhaps of another event; a limit of a range is met only where
+    # all numbers within the bound are
+    is_strict = row.needs_events or check.equals is None
+    is_unknown = np.isnan(bound) & (row.needs_events | (found["levels_needed"] == MOVING))
+    is_wide = np.isinf(bound) | ((bound > _room(check, number)) & is_strict)
+    holds &= ~((is_unknown | is_wide) & is_limit)
     cases = [
         ((_failed(record, check) & ~survives) | infinite, "non_finite"),
         (
@@ -352,7 +353,8 @@ def describe(f: Found, check: ValueCheck) -> Description:
             )
             advice = f"Add finer `levels:` until there are {check.number.finer_levels + 1}."
         case _:
-            sentence = f"{subject} is {brief}; it may or may not be {expected}."
+            through = _through_the_cut(f, check)
+            sentence = f"{subject} is {brief}{through}; it may or may not be {expected}."
             advice = advice_on_bound(f, check) or (
                 f"A{finer_levels(f)} to shrink the error bound, or ask for the number of one level "
                 "(`at: {level: ...}`)."
@@ -364,13 +366,21 @@ def describe(f: Found, check: ValueCheck) -> Description:
 
 def is_proved(check: ValueCheck, value: float, bound: float) -> bool:
     """Say of a number that is as asked whether no other one within its bound would be otherwise."""
-    return not (check.number.has_limit(check.at.level) and bound > _room(check, value))
+    return not (check.number.has_limit(check.at.level) and bool(bound > _room(check, value)))
 
 
-def _room(check: ValueCheck, value: float) -> float:
-    """Return how far a number may be from what is asked, or is from a limit."""
+def _room(check: ValueCheck, value: Any) -> Any:
+    """Return how far numbers may be from what is asked, or are from a limit."""
     key, wanted = border(check)
-    return float(check.allowed if key == "equals" else abs(value - wanted))
+    away = np.abs(value - wanted)
+    return check.allowed if key == "equals" else np.minimum(away, _to_the_cut(check, value))
+
+
+def _to_the_cut(check: ValueCheck, value: Any) -> Any:
+    """Return how far angles are from -pi and pi, beyond which they begin anew; infinite where that decides nothing."""
+    key, wanted = border(check)
+    is_cut = check.number.is_angle and key != "equals" and abs(wanted) < np.pi
+    return np.pi - np.abs(value) if is_cut else math.inf
 
 
 def _digits(number: float, room: float, least: int, most: int) -> int:
@@ -397,6 +407,16 @@ def _measured(f: Found, check: ValueCheck, digits: int = MOST_DIGITS) -> str:
     return f"{phrase}, with an error of at most {f.notation.number(bound, 2)}"
 
 
+def _through_the_cut(f: Found, check: ValueCheck) -> str:
+    """Say of an angle that those within its bound go on at the other end of all angles; empty elsewhere."""
+    found, bound = f.fact("value"), f.fact("error_bound")
+    if not (math.isfinite(bound) and bound > _to_the_cut(check, found)):
+        return ""
+    ends = (f.notation.number(end, FEWEST_DIGITS) for end in (found - bound, found + bound))
+    cut = "pi" if found > 0.0 else "-pi"
+    return f", an angle between {' and '.join(ends)}, which goes through {cut}"
+
+
 def _why_unknown(f: Found, check: ValueCheck) -> str:
     """Say why nothing bounds the error of a number, where one cause is sure."""
     if _is_on_the_mesh(f, check):
@@ -405,6 +425,8 @@ def _why_unknown(f: Found, check: ValueCheck) -> str:
         return f", because the force has a pulse near t = {f.notation.number(pulse, 4)} that no level sees"
     if _has_few_periods(f, check):
         return f", because the run has fewer than {LEAST_PERIODS} periods of the force"
+    if check.value == "peak_frequency" and math.isinf(f.fact("error_bound")):
+        return ", because the lines around the highest one are not those of a cosine"
     numbers = _by_level_of(f)
     if len(numbers) >= LEVELS_OF_AN_ORDER and np.all(np.isfinite(numbers)):
         return ", because its changes do not shrink steadily from level to level"
@@ -429,7 +451,13 @@ def advice_on_bound(f: Found, check: ValueCheck) -> str:
         return f"Set `events: located` for scheme {f.scheme_name}."
     if np.isfinite(_pulse_time(f)):
         return "Use steps shorter than the pulse, or write a wider pulse of the same impulse."
-    return f"Give {LEAST_PERIODS} or more `periods:`." if _has_few_periods(f, check) else ""
+    if _has_few_periods(f, check):
+        return f"Give {LEAST_PERIODS} or more `periods:`."
+    numbers = np.array(_by_level_of(f))
+    if check.value in OF_RUN and REACH * _last_change(numbers) < f.fact("error_bound"):
+        key = "periods" if f.experiment.time.periods is not None else "end"
+        return f"Make the run longer (`time: {key}`): finer levels do not shrink the error bound."
+    return ""
 
 
 def _pulse_time(f: Found) -> float:

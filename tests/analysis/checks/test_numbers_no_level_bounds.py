@@ -141,3 +141,41 @@ def test_a_phase_is_an_angle() -> None:
     check = {"value": "steady_phase", "quantity": "u", "equals": math.pi, "atol": 0.01}
     found = run(content, check, {**check, **BEST}).verdicts
     assert [one.status for one in found] == ["PASS", "PASS"]
+
+
+NEAR_PI = {
+    "model": {
+        **{"kind": "oscillator", "spring": "u", "damping": {"linear": 0.002}},
+        **{"force": "cos(w*t)", "parameters": {"w": 2.2}},
+    },
+    "initial": {"u": 0.1},
+    "time": {"periods": 20, "steps_per_period": 16, "frequency": "model.parameters.w"},
+    **{"levels": [2, 3, 4], "schemes": ["rk4"]},
+}
+PHASE = {"value": "steady_phase", "quantity": "u", **BEST}
+
+
+def test_an_angle_whose_bound_goes_through_pi_is_neither_below_nor_above() -> None:
+    """Its number is -2.60, with a bound of 1.1; the phase of the steady motion is 3.1404."""
+    asked = ({"below": 0.0}, {"above": 0.0}, {"above": -1.0}, {"equals": 3.1404, "atol": 0.01})
+    *undecided, around = run(NEAR_PI, *({**PHASE, **one} for one in asked)).verdicts
+    for verdict in undecided:
+        assert verdict.status == "INCONCLUSIVE"
+        assert "an angle between -3.7" in verdict.text
+        assert "which goes through -pi" in verdict.text
+        assert "Make the run longer (`time: periods`)" in verdict.advice
+    assert around.status == "INCONCLUSIVE"
+    assert "goes through" not in around.text
+
+
+def test_an_angle_is_within_all_angles_wherever_its_bound_goes() -> None:
+    asked = ({"above": -4.0}, {"below": 4.0}, {"below": -4.0})
+    found = run(NEAR_PI, *({**PHASE, **one} for one in asked)).verdicts
+    assert [one.status for one in found] == ["PASS", "PASS", "FAIL"]
+
+
+def test_the_largest_of_angles_is_open_where_one_goes_through_pi() -> None:
+    over = {"over": "model.parameters.w", "take": "smallest"}
+    content = {**NEAR_PI, "sweep": {"model.parameters.w": [2.2, 2.4]}}
+    found = run(content, {**PHASE, **over, "below": 0.0}, {**PHASE, **over, "above": 0.0}).verdicts
+    assert [one.status for one in found] == ["INCONCLUSIVE", "INCONCLUSIVE"]
