@@ -17,15 +17,90 @@ from vibsim.observe import spectrum
 FILE = home() / "configs" / "showcase" / "duffing_periods.yaml"
 
 
-@pytest.mark.parametrize("line", [20.0, 20.5, 33.1, 47.77, 60.999])
+@pytest.mark.parametrize("line", [3.0, 3.4, 20.0, 20.5, 33.1, 47.77, 60.999])
 @pytest.mark.parametrize("phase", [0.0, 1.0, 2.5])
 def test_the_frequency_of_a_cosine_is_found_between_the_lines(line: float, phase: float) -> None:
-    """To the part that its negative frequency leaves, of the size 1/k^3; a mean and a weaker cosine do not matter."""
+    """To round-off; a mean does not matter, and a weaker cosine little."""
     t = np.linspace(0.0, 1.0, 257)
     series = 5.0 + 3.0 * np.cos(2.0 * np.pi * line * t + phase)
-    assert abs(float(spectrum.highest(series)) - line) < 2.0 / line**3
+    found, bound = spectrum.highest(series)
+    assert abs(found - line) < 1e-11 * line
+    assert bound < 1e-6
     beside = series + 0.1 * np.cos(2.0 * np.pi * 100.0 * t)
-    assert abs(float(spectrum.highest(beside)) - line) < 1e-3
+    found, bound = spectrum.highest(beside)
+    assert abs(found - line) < 1e-4
+    assert abs(found - line) < bound < 2e-2
+
+
+TIME = np.linspace(0.0, 1.0, 513)
+"""Of a series in the unit of its time, where a line is a whole turn."""
+CASES = 200
+
+
+def cosine(line: float, phase: float, decay: float = 0.0) -> np.ndarray:
+    return np.exp(-decay * TIME) * np.cos(2.0 * np.pi * line * TIME + phase)
+
+
+def decays(random: np.random.Generator) -> tuple[np.ndarray, float]:
+    """From hardly damped to gone after a tenth of the time, but not within a period."""
+    line = random.uniform(4.0, 40.0)
+    decay = min(10.0 ** random.uniform(-1.0, 1.4), 0.4 * line)
+    return 2.0 + cosine(line, random.uniform(0.0, 6.0), decay), line
+
+
+def driven(random: np.random.Generator) -> tuple[np.ndarray, float]:
+    """A steady cosine and what is left of the start, no larger."""
+    line, phase = random.uniform(4.0, 30.0), random.uniform(0.0, 6.0)
+    start = cosine(
+        line * random.uniform(0.3, 2.5), random.uniform(0.0, 6.0), random.uniform(0.3, 30.0)
+    )
+    return cosine(line, phase) + random.uniform(0.0, 0.9) * start, line
+
+
+def two_tones(near: float, far: float) -> Any:
+    """Two steady cosines, so many lines apart."""
+
+    def series(random: np.random.Generator) -> tuple[np.ndarray, float]:
+        line, apart = random.uniform(5.0, 40.0), random.uniform(near, far) * random.choice([-1, 1])
+        other = line + apart if line + apart > 2.0 else line - apart
+        size = 10.0 ** random.uniform(-2.0, -0.1)
+        first, second = random.uniform(0.0, 6.0, 2)
+        return cosine(line, first) + size * cosine(other, second), line
+
+    return series
+
+
+@pytest.mark.parametrize(
+    ("series", "misses", "typical", "widest"),
+    [
+        (decays, 0, 1e-6, 1e-6),
+        (driven, 2, 0.02, 3.0),
+        (two_tones(4.0, 20.0), 0, 0.01, 0.5),
+        (two_tones(1.0, 4.0), 2, 0.3, np.inf),
+        (two_tones(0.05, 1.0), 2, 0.2, 2.0),
+    ],
+)
+def test_the_bound_of_a_frequency_covers_a_decay_and_other_lines(
+    series: Any, misses: int, typical: float, widest: float
+) -> None:
+    """Of random cases as good as all; bounds in lines."""
+    random = np.random.default_rng(5)
+    rows, lines = zip(*(series(random) for _ in range(CASES)), strict=True)
+    found, bound = spectrum.highest(np.stack(rows))
+    off = np.abs(found - np.array(lines))
+    assert np.count_nonzero(~(off <= bound + 1e-10)) <= misses
+    assert np.median(bound) < typical
+    assert np.max(bound) <= widest
+
+
+def test_a_frequency_has_the_same_bits_alone_and_beside_others() -> None:
+    random = np.random.default_rng(6)
+    rows = np.stack([make(random)[0] for make in (decays, driven) for _ in range(8)])
+    # as a Record has them, with the time outermost
+    together = spectrum.highest(np.asfortranarray(rows))
+    alone = [spectrum.highest(np.asfortranarray(row[None])) for row in rows]
+    for i, of_all in enumerate(together):
+        np.testing.assert_array_equal(of_all, [one[i][0] for one in alone])
 
 
 def test_the_amplitude_of_a_line_is_that_of_the_cosine() -> None:
@@ -40,8 +115,8 @@ def test_the_amplitude_of_a_line_is_that_of_the_cosine() -> None:
 def test_no_frequency_is_told_where_there_is_no_such_line() -> None:
     t = np.linspace(0.0, 1.0, 65)
     rows = np.stack([np.cos(2 * np.pi * t), np.where(t > 0.5, np.nan, 0.0), np.exp(-t)])
-    assert np.isnan(spectrum.highest(rows)).all()
-    assert np.isnan(spectrum.highest(rows[..., :5])).all()
+    for found in (rows, rows[..., :5]):
+        assert np.isnan(spectrum.highest(found)[0]).all()
 
 
 def test_the_spectrum_has_the_frequency_error_of_the_scheme() -> None:
