@@ -52,7 +52,7 @@ BESIDE = 2
 def lines(series: Floats) -> Floats:
     """Return the amplitude of every line of series of shape (..., t), whose last sample is left out; (..., line)."""
     own = np.ascontiguousarray(series, dtype=np.float64)[..., :-1]
-    return np.asarray(np.hypot(*_parts(own, np.mean(own, axis=-1, keepdims=True))))
+    return np.asarray(on_arrays.hypot(*_parts(own, np.mean(own, axis=-1, keepdims=True))))
 
 
 def _parts(own: Floats, mean: Floats) -> Floats:
@@ -77,7 +77,9 @@ def highest(series: Floats) -> tuple[Floats, Floats]:
     top = np.argmax(np.where(known[:, None], found, 0.0), axis=-1)
     known &= (top >= FIRST_LINE) & (top < found.shape[-1] - 1)
     # the largest power of two within a quarter of a period: the same part of the run on every level
-    shifts = np.exp2(np.frexp(np.maximum(n // (4 * np.maximum(top, 1)), 1))[1] - 1).astype(int)
+    shifts = np.ldexp(1.0, np.frexp(np.maximum(n // (4 * np.maximum(top, 1)), 1))[1] - 1).astype(
+        int
+    )
     for shift in np.unique(shifts[known]).tolist():
         own = known & (shifts == shift)
         place[own], off[own] = _of_one_shift(rows[own], shift, top[own])
