@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibsim.analysis.motion_variables import motion
-from vibsim.apriori.force_discontinuities import corner_variables, switches_of
+from vibsim.apriori.force_discontinuities import corner_variables
 from vibsim.checks.kinds import check_variables, definition
 from vibsim.checks.order import phase_at_start
 from vibsim.checks.tolerance import bounds
@@ -110,8 +110,7 @@ def analyse_records(experiment: Experiment, records: Mapping[int, Record]) -> Re
         if is_shown and not block.lean:
             table |= over_time(q)
     table |= _scalars(block) | check_variables(block, found) | motion(block, found)
-    if switches_of(block.model):
-        table |= corner_variables(block.corners)
+    table |= corner_variables(block.model, block.corners)
     if varies_in_time(block.model):
         table |= missed_variables(block.missed)
     if is_damped(block.model):

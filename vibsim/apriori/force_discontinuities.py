@@ -6,7 +6,7 @@ for a jump of the force, 2 for ``abs(u)``, 3 for quadratic damping ``abs(v) v`` 
 point only a jump of the force matters: of its two values a step that begins there and one that ends there take the
 same. Switches
 (`vibsim.formula.jumps`) are followed along the samples of the finest level; k is read off the difference of the
-two formulas on either side.
+two formulas on either side. The corners of tables are known beforehand (`vibsim.apriori.table_corners`).
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from vibsim.apriori.table_corners import TableCorners, has_tables, is_on_a_point, table_corners
 from vibsim.core.array_types import Flags, Floats, Integers
 from vibsim.core.record import Record, Variable
 from vibsim.core.vocabulary import MEMBER
@@ -29,8 +30,6 @@ from vibsim.models.events import Friction
 from vibsim.simulation.members import Members
 from vibsim.simulation.reference.one_sided_forces import TABLE, Sides, sides
 
-ON_A_POINT = 1e-6
-"""Part of a step within which a corner is at its end. [convention]"""
 FAR, NEAR = 1.0 / 16.0, 1.0 / 128.0
 """Distances from the corner at which both formulas are compared, over the largest value of the quantity.
 [convention]"""
@@ -56,6 +55,8 @@ class Corners:
     least_time: Floats
     near_a_point: Flags
     """Whether the roughest corner lies within a step of the finest level beside a point that all levels share."""
+    tables: TableCorners
+    """Those of the tables of the force; all above are of formulas."""
 
     def unseen(self, end: Floats, steps: Sequence[int], omega_dt: Floats) -> Floats:
         """Return which part of its size a quantity may be off by at a jump or corner of the force, (scheme, case).
@@ -70,17 +71,22 @@ class Corners:
         steps
             Of every level, the finest last.
         """
+        dt = end / steps[-1]
         with np.errstate(invalid="ignore", divide="ignore"):
-            part = np.fmax(omega_dt, end / steps[-1] / (end - self.least_time))
-            return np.where(
-                self.least <= ROUGH, on_arrays.power(np.minimum(part, 1.0), self.least), 0.0
-            )
+            part = np.minimum(np.fmax(omega_dt, dt / (end - self.least_time)), 1.0)
+            part = np.where(self.least <= ROUGH, on_arrays.power(part, self.least), 0.0)
+        return part + self.tables.unseen(end, dt, omega_dt)
 
 
 @cache
 def switches_of(model: Model) -> tuple[Switch, ...]:
-    """Return the switches of a model's force but for those of its table, which `has_corners` is about."""
+    """Return the switches of a model's force but for that of its table."""
     return tuple(row for row in sides(model, {}).switches if row.mode != TABLE)
+
+
+def may_have_corners(model: Model) -> bool:
+    """Tell whether steps may have corners of the force inside: of its formulas, or of its tables."""
+    return bool(switches_of(model)) or has_tables(model)
 
 
 def _is_left_to_steps(model: Model, switch: Switch) -> bool:
@@ -108,13 +114,14 @@ def corners_of(model: Model, finest: Record, group: Members, dt: Floats) -> Corn
     """
     states = np.stack([np.asarray(finest[state.name], dtype=float) for state in model.states])
     _, schemes, cases, samples = states.shape
+    numbers = {row.name: group.parameters[row.key] for row in model.parameters}
+    tables = table_corners(model, numbers, group.end, dt)
     none = np.full((schemes, cases), np.nan)
     if not switches_of(model) or samples < 2:
         nowhere = np.zeros(none.shape, dtype=bool)
-        return Corners(none, none, np.full(none.shape, -1), none, none, nowhere)
+        return Corners(none, none, np.full(none.shape, -1), none, none, nowhere, tables)
     number = np.arange(samples) * int(np.asarray(finest.attrs["every"]).item())
     t = number * (group.end / int(np.asarray(finest.attrs["steps"]).item()))[:, None]
-    numbers = {row.name: group.parameters[row.key] for row in model.parameters}
     held = sides(model, {name: np.repeat(x, samples) for name, x in numbers.items()})
     with np.errstate(all="ignore"):
         changed = _has_event(finest, t, schemes)
@@ -124,7 +131,7 @@ def corners_of(model: Model, finest: Record, group: Members, dt: Floats) -> Corn
     )
     away = np.abs(time - np.round(time / dt) * dt)
     near = away < group.end / int(np.asarray(finest.attrs["steps"]).item())
-    return Corners(power, time, switch, least, least_time, near)
+    return Corners(power, time, switch, least, least_time, near, tables)
 
 
 def _has_event(finest: Record, t: Floats, schemes: int) -> Flags:
@@ -204,12 +211,6 @@ def _of_scheme(
     return power, time, np.asarray(switch, dtype=np.int64), least, least_time
 
 
-def is_on_a_point(t: Floats, dt: Floats) -> Flags:
-    """Tell whether times are grid points of step dt."""
-    place = t / dt
-    return np.asarray(np.abs(place - np.round(place)) <= ON_A_POINT)
-
-
 def _of_time(held: Sides) -> list[bool]:
     """Tell of every switch whether time alone moves it."""
     moved = {state.name for state in held.model.states}
@@ -268,14 +269,20 @@ class _Path:
         return np.where(exists, np.maximum(k, 0.0) + 1.0, np.nan)
 
 
-def corner_variables(corners: Corners) -> dict[str, Variable]:
-    """Return the corners as variables of the convergence Record."""
-    rows: dict[str, tuple[NDArray[Any], str, str]] = {
-        "time": (corners.time, "first time at which the force has a corner within a step", "s"),
-        "power": (corners.power, "power of dt that this corner leaves of errors", "1"),
-        "switch": (corners.switch.astype(np.int16), "number of its condition, or -1", "1"),
-    }
-    return {
-        f"corner_{name}": Variable.of(MEMBER, values, words, unit)
-        for name, (values, words, unit) in rows.items()
-    }
+def corner_variables(model: Model, corners: Corners) -> dict[str, Variable]:
+    """Return the corners as variables of the convergence Record; none where the force cannot have any."""
+    found: dict[str, Variable] = {}
+    if switches_of(model):
+        rows: dict[str, tuple[NDArray[Any], str, str]] = {
+            "time": (corners.time, "first time at which the force has a corner within a step", "s"),
+            "power": (corners.power, "power of dt that this corner leaves of errors", "1"),
+            "switch": (corners.switch.astype(np.int16), "number of its condition, or -1", "1"),
+        }
+        found |= {
+            f"corner_{name}": Variable.of(MEMBER, values, words, unit)
+            for name, (values, words, unit) in rows.items()
+        }
+    if has_tables(model):
+        words = "first time at which a table of the force has a corner within a step"
+        found["table_corner_time"] = Variable.of(("case",), corners.tables.time, words, "s")
+    return found

@@ -19,7 +19,7 @@ from vibsim.core.record import Record
 from vibsim.core.vocabulary import PHASE, is_error_part, whole_of
 from vibsim.experiment import Experiment, sweep_columns
 from vibsim.formula import values
-from vibsim.models import Model, tree
+from vibsim.models import tree
 from vibsim.models.shared.free import free_oscillation, why_not_free
 from vibsim.schemes import Options, Scheme
 from vibsim.schemes.base import ORDER_AT_CORNERS, is_on_the_mesh
@@ -210,17 +210,12 @@ def even_powers(experiment: Experiment, quantity: str, columns: Columns) -> Flag
     return np.asarray(even != 0)
 
 
-def has_corners(model: Model) -> bool:
-    """Tell whether steps have corners of a force from a table inside."""
-    return model.lookup is not None and not model.lookup.is_met
+def left_to_the_mesh(experiment: Experiment, columns: Columns, has_corners: Flags) -> Floats:
+    """Return the power that is left where it depends on the mesh what a step sees, shape (scheme, 1 or case).
 
-
-def left_to_the_mesh(experiment: Experiment, columns: Columns) -> Floats:
-    """Return the power that is left where it depends on the mesh what a step sees, shape (scheme, case).
-
-    It is 1 where events are left to the mesh, and 2 where steps have corners of the force inside: how much of an error
-    belongs to that power is then the accident of where they lie between two points. NaN stands where errors have a
-    regular expansion.
+    It is 1 where events are left to the mesh, and 2 where steps have corners of a table inside (`has_corners`, shape
+    (case,)): how much of an error belongs to that power is then the accident of where they lie between two points. NaN
+    stands where errors have a regular expansion.
     """
     model = experiment.model.definition
 
@@ -231,9 +226,11 @@ def left_to_the_mesh(experiment: Experiment, columns: Columns) -> Floats:
         order = scheme.formal_order(model.position, model, options)
         return ORDER_AT_CORNERS if order >= ORDER_AT_CORNERS else math.nan
 
-    if model.events is None and not has_corners(model):
+    if model.events is not None:
+        return _each(experiment, columns, left)
+    if not has_corners.any():
         return np.full((len(experiment.schemes), 1), np.nan)
-    return _each(experiment, columns, left)
+    return np.where(has_corners, _each(experiment, columns, left), np.nan)
 
 
 def relative_floors(

@@ -9,16 +9,16 @@ from typing import NamedTuple
 import numpy as np
 
 from vibsim import theory
-from vibsim.apriori.force_discontinuities import is_on_a_point, words_of
+from vibsim.apriori.force_discontinuities import words_of
 from vibsim.apriori.formal_orders import (
     columns_of,
-    has_corners,
     is_promised,
     options_of,
     orders_in,
     special_orders,
     stability_limits,
 )
+from vibsim.apriori.table_corners import is_on_a_point
 from vibsim.checks.accurate import error_in_words
 from vibsim.checks.phase_amplitude_text import parts_in_words
 from vibsim.checks.sentences import Found, cost_in_words, growth_in_words
@@ -92,8 +92,8 @@ class OrderContext:
         """Level that failed or is beyond the stability limit."""
         self.failures = _failures(record, scheme, case)
 
-        self.has_corners = has_corners(f.model)
-        """Whether steps have corners of a force from a table inside."""
+        self.table_corner = self._stored("table_corner_time", case)
+        """The first time at which a table of the force has a corner within a step."""
         self.corner = _corner(f)
         self.pulse = self._stored("pulse_time", case), self._stored("pulse_width", case)
         """Time and length of a pulse of the force that no level sees."""

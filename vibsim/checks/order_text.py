@@ -44,8 +44,8 @@ START_FINER = "Start `levels:` at {first_good} or finer ({cost_of_first}), or sh
 CANNOT_SHOW = "{subject} cannot show order {expected}, because "
 ON_MESH = "Set `events: located` for scheme {scheme}."
 ON_TABLE = (
-    "Choose steps in `time:` that end at every point of the table. The coarsest dt must be the spacing over the speed, "
-    "or a whole fraction of it."
+    "Choose steps in `time:` that end at every point of the table. The time of each point (on a road, its place over "
+    "the speed) must be a whole multiple of the coarsest dt. At t = {table_corner:4} it is not."
 )
 
 UNSEEN = " No exact solution is known, so convergence to a wrong answer would go unnoticed."
@@ -300,7 +300,7 @@ def _diagnosis(s: OrderContext) -> str:
         "non_smooth": {
             "pulse": s.cause == "pulse",
             "mesh": is_on_the_mesh(s.options),
-            "table": s.has_corners,
+            "table": not math.isnan(s.table_corner),
             "jump at a point": corner is not None and corner.on_a_point,
             "irregular": corner is not None and not less and s.expected <= corner.power,
             "corner": corner is not None,
@@ -313,7 +313,7 @@ def _diagnosis(s: OrderContext) -> str:
         },
         "order_low": {
             "mesh": is_on_the_mesh(s.options),
-            "table": s.has_corners,
+            "table": not math.isnan(s.table_corner),
             "promise, damping": has_promise and less and s.kind == BACKWARD_DAMPING,
             "promise, start": has_promise and less and s.centred >= s.expected - s.tolerance,
             "promise": has_promise and less,

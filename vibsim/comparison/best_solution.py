@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from vibsim.apriori.force_discontinuities import corners_of, switches_of
+from vibsim.apriori.force_discontinuities import corners_of, may_have_corners
 from vibsim.comparison.extrapolate_members import (
     Extrapolated,
     Method,
@@ -81,7 +81,7 @@ def extrapolated(
             parts.append((extrapolate_members(method, start, grid.steps, t, pairs, noise), where))
         rows.append(in_order(parts))
     model = experiment.model.definition
-    if not switches_of(model):
+    if not may_have_corners(model):
         return rows
     corners = corners_of(model, finest, group, grid.dt[0])
     unseen = corners.unseen(group.end, grid.steps, np.asarray(finest["omega_dt"]))

@@ -127,7 +127,7 @@ def _ladder(name: str, place: value_numbers.Place) -> _Ladder:
         if name == "steady_phase":
             left = safe_ratio(left, steady_state.amplitude(block, place.levels[-1], place.quantity))
         missed = missed + left
-    safety = np.full(size.shape, 1.0 if block.model.events is None else IRREGULAR)
+    safety = np.broadcast_to(block.safety(IRREGULAR), size.shape)
     if row.needs_events:
         # an event on the mesh is late by an accident
         missed = np.where(np.isnan(block.left_to_the_mesh), missed, np.inf)

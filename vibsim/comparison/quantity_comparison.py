@@ -84,8 +84,7 @@ class Comparison:
         value, bound = extrapolate_series(
             self.values, block.grid.levels, order, even, largest=block.lean
         )
-        if block.model.events is not None:
-            bound = th.IRREGULAR * bound
+        bound = block.safety(th.IRREGULAR)[:, None] * bound
         unseen = block.unseen_at_corner(self.scale)[..., None]
         return value, bound + ROUND_OFF_SAFETY * self.floor[..., -1:] + unseen
 

@@ -142,6 +142,11 @@ class MemberBlock:
         position = self.model.positions[self.model.velocities.index(plain)]
         return np.asarray(np.maximum(own, sizes[position] * rate))
 
+    def safety(self, irregular: float) -> Floats:
+        """Return the factor on what levels bound, shape (c,): `irregular` where events or tables divide steps."""
+        has_places = self.corners.tables.exist | (self.model.events is not None)
+        return np.where(has_places, irregular, 1.0)
+
     def unseen_at_corner(self, size: Floats) -> Floats:
         """Return how far a quantity of a size may be off at a corner of the force, shape (s, c); 0 without a corner."""
         part = self.corners.unseen(self.group.end, self.grid.steps, self.omega_dt[:, -1])
@@ -186,6 +191,8 @@ def block_of(experiment: Experiment, records: Mapping[int, Record]) -> MemberBlo
     else:
         exact = {name: laid_out(values) for name, values in group.exact(model, t).items()}
     motion = Motion(model, grid, finest, group, exact)
+    corners = corners_of(model, finest, group, grid.dt[0])
+    left = left_to_the_mesh(experiment, columns, corners.tables.exist)
     return MemberBlock(
         experiment=experiment,
         records=records,
@@ -204,8 +211,8 @@ def block_of(experiment: Experiment, records: Mapping[int, Record]) -> MemberBlo
         failed=failed,
         stability_limit=stability_limits(experiment, columns),
         adaptive=np.array([scheme.adaptive for scheme in experiment.schemes]),
-        left_to_the_mesh=np.where(eventless, np.nan, left_to_the_mesh(experiment, columns)),
-        corners=corners_of(model, finest, group, grid.dt[0]),
+        left_to_the_mesh=np.where(eventless, np.nan, left),
+        corners=corners,
         missed=missed_pulses(model, finest, group),
         growth=_growth(model, rows, grid, exact),
         eventless=eventless,

@@ -211,7 +211,7 @@ def story(**changes: Any) -> _Phrases:
         "special": math.nan,
         "centred": math.nan,
         "has_promise": True,
-        "has_corners": False,
+        "table_corner": math.nan,
         "has_exact": True,
         "corner": None,
         "parts": "",

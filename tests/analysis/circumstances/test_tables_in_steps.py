@@ -89,7 +89,7 @@ def test_corners_within_steps_are_told(folder: Path) -> None:
     assert claimed.status != "PASS"
     assert rk4.reason in ("asymptotic", "non_smooth", "pre_asymptotic")
     # an error of first order is the scheme's own
-    left = left_to_the_mesh(made, {})
+    left = left_to_the_mesh(made, {}, np.array([True]))
     assert left.tolist()[:2] == [[2.0], [2.0]]
     assert np.isnan(left[2])
 
@@ -112,3 +112,84 @@ def test_the_road_is_an_output(folder: Path) -> None:
         assert found["road_height"].values[0, 0] == pytest.approx(heights, abs=1e-15)
         absolute = found["u"] + found["road_height"]
         assert found["absolute_position"].values == pytest.approx(absolute.values, abs=1e-16)
+
+
+LOADED = {"kind": "structure", "stiffness": [4], "damping": [0.1]}
+
+
+def loaded(points: list[tuple[float, float]], folder: Path, **changes: Any) -> Experiment:
+    """Return a mass on a spring, at rest, under a load with these points."""
+    rows = [f"{t},{p}" for t, p in points]
+    (folder / "load.csv").write_text("\n".join(["t,p", *rows]) + "\n")
+    checks = [{"converges": name, "order": "scheme"} for name in ("u1", "vu1")]
+    model = {**LOADED, "load": {1: {"table": "load.csv"}}}
+    given = {"model": model, "initial": {}, "levels": [0, 1, 2, 3], **changes}
+    return experiment(32, ["newmark", "central"], checks, **{"time": time(32), **given})
+
+
+def time(steps: int) -> dict[str, Any]:
+    return {"end": 10, "base_steps": steps}
+
+
+def end_of(points: list[tuple[float, float]]) -> np.ndarray[Any, Any]:
+    """Return the state at t = 10, exact on every piece of the load."""
+    t, p = np.transpose(points)
+    a, w = 0.05, np.sqrt(4.0 - 0.05**2)
+    state = np.zeros(2)
+    for k, (begin, end) in enumerate(zip(t[:-1], np.minimum(t[1:], 10.0), strict=True)):
+        if begin >= end:
+            break
+        s = (p[k + 1] - p[k]) / (t[k + 1] - t[k])
+        # u = (p - c u')/k moves along the load
+        along, h = np.array([(p[k] - 0.1 * s / 4.0) / 4.0, s / 4.0]), end - begin
+        free = state - along
+        c = np.array([free[0], (free[1] + a * free[0]) / w])
+        turned = c[0] * np.cos(w * h) + c[1] * np.sin(w * h)
+        turning = w * (c[1] * np.cos(w * h) - c[0] * np.sin(w * h))
+        u, v = np.exp(-a * h) * np.array([turned, turning - a * turned])
+        state = np.array([u + along[0] + along[1] * h, v + along[1]])
+    return state
+
+
+RAMP = [(0.0, 0.0), (2.61, 3.0), (11.0, 0.0)]
+ZIGZAG = [(0.0, 0.0), *((t, (-1.0) ** i * t) for i, t in enumerate((0.93, 2.2, 2.9, 4.1, 7.7)))]
+
+
+@pytest.mark.usefixtures("with_series")
+@pytest.mark.parametrize("points", [RAMP, [*ZIGZAG, (11.0, 0.0)]])
+def test_points_of_a_load_within_steps_are_told_and_bounded(folder: Path, points: Any) -> None:
+    made = loaded(points, folder)
+    record = analyse(made, [simulate(made, level) for level in made.levels])
+    found = list(verdicts(made, record))
+    assert {(v.status, v.reason) for v in found} == {("INCONCLUSIVE", "non_smooth")}
+    assert f"At t = {points[1][0]:.4g} it is not" in found[0].advice
+    for name, exact in zip(("u1", "vu1"), end_of(points), strict=True):
+        off = np.abs(record[f"{name}_end_richardson"].values[:, 0] - exact)
+        bound = record[f"{name}_end_richardson_error"].values[:, 0]
+        assert (off <= bound).all(), (name, off, bound)
+        assert (bound < 0.25).all(), bound
+
+
+def test_no_point_of_a_load_is_within_a_step_that_ends_there(folder: Path) -> None:
+    made = loaded([(0.0, 0.0), (2.5, 3.0), (11.0, 0.0)], folder)
+    record = analyse(made, [simulate(made, level) for level in made.levels])
+    assert np.isnan(record["table_corner_time"].values).all()
+    found = [(v.status, v.reason) for v in verdicts(made, record)]
+    assert found == [("PASS", "asymptotic")] * 2
+
+
+def test_a_point_on_a_straight_line_is_no_corner(folder: Path) -> None:
+    points = [(0.0, 0.0), (0.7, 0.07), (1.1, 0.11), (2.5, 0.25), (11.0, 9.0)]
+    made = loaded(points, folder)
+    record = analyse(made, [simulate(made, level) for level in made.levels])
+    assert np.isnan(record["table_corner_time"].values).all()
+
+
+def test_members_have_corners_of_their_own(folder: Path) -> None:
+    """With 32 steps to t = 8 the point at 2.5 is a grid point, with as many to t = 9 it is none."""
+    points = [(0.0, 0.0), (2.5, 3.0), (11.0, 0.0)]
+    made = loaded(points, folder, sweep={"time.end": [8.0, 9.0]})
+    record = analyse(made, [simulate(made, level) for level in made.levels])
+    times = record["table_corner_time"].values
+    assert np.isnan(times[0])
+    assert times[1] == 2.5

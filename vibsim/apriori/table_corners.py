@@ -1,0 +1,114 @@
+"""Where a force that is looked up in tables has corners within steps: tables of systems and load histories alike.
+
+Between two points such a force is a straight line. A step across a point at which the slope changes by s has an error
+of the impulse of ``s dt^2/8`` at most, another part of it on each level; the sum over all such points bounds what no
+level shows. Steps that end at a point have no such error there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from vibsim.core.array_types import Flags, Floats
+from vibsim.formula import values
+from vibsim.models import Model, tree
+
+ON_A_POINT = 1e-6
+"""Part of a step within which a corner is at its end. [convention]"""
+STRAIGHT = 1e-9
+"""A slope that changes by less than this part of the largest one is the rounding of a straight line. [convention]"""
+OF_A_STEP = 0.5
+"""Part of ``s dt^2`` that an extrapolation over levels, with their weights, may be off by. [convention]"""
+
+
+@dataclass(frozen=True)
+class TableCorners:
+    """The corners within steps of the coarsest level, of every member, shape (case,)."""
+
+    time: Floats
+    """The first one; NaN where there is none."""
+    turns: Floats
+    """All changes of slope together over the largest change."""
+    rate: Floats
+    """The same over the largest force, 1/s."""
+
+    @property
+    def exist(self) -> Flags:
+        """Which members have any."""
+        return np.isfinite(self.time)
+
+    def unseen(self, end: Floats, dt: Floats, omega_dt: Floats) -> Floats:
+        """Return which part of its size a quantity may be off by, shape (case,), with steps of the finest level.
+
+        An impulse J makes the velocity wrong by J and the position by J/w. A force of size p which turns by s moves
+        them by p/w^2, and s/w^2, at least.
+        """
+        with np.errstate(invalid="ignore", divide="ignore"):
+            angle = np.fmax(omega_dt, dt / (end - self.time))
+            part = OF_A_STEP * angle * np.fmax(angle * self.turns, dt * self.rate)
+        return np.where(self.exist, part, 0.0)
+
+
+def is_on_a_point(t: Floats, dt: Floats) -> Flags:
+    """Tell whether times are grid points of step dt."""
+    place = t / dt
+    return np.asarray(np.abs(place - np.round(place)) <= ON_A_POINT)
+
+
+def has_tables(model: Model) -> bool:
+    """Tell whether a force of a model is looked up in a table that may have points within steps."""
+    if model.loaded is not None:
+        return bool(model.loaded.structure.histories)
+    return model.lookup is not None and not model.lookup.is_met
+
+
+def table_corners(
+    model: Model, parameters: Mapping[str, Floats], end: Floats, dt: Floats
+) -> TableCorners:
+    """Find the corners of tables within steps of length dt.
+
+    `parameters` are those of the members by name, each of shape (case,), as are `end` and `dt`.
+    """
+    found = np.full((3, len(end)), np.nan)
+    if has_tables(model):
+        for case in range(len(end)):
+            own = {name: x[case] for name, x in parameters.items()}
+            found[:, case] = _of_member(model, own, float(end[case]), float(dt[case]))
+    return TableCorners(*found)
+
+
+def _of_member(
+    model: Model, parameters: Mapping[str, float], end: float, dt: float
+) -> tuple[float, float, float]:
+    """Return what `TableCorners` holds of one member."""
+    first, total, sharpest, largest = np.inf, 0.0, 0.0, 0.0
+    for t, force in _histories(model, parameters):
+        slopes = np.diff(force) / np.diff(t)
+        turns, at = np.abs(np.diff(slopes)), t[1:-1]
+        is_due = (at > 0.0) & (at < end) & ~is_on_a_point(at, np.asarray(dt))
+        is_due &= turns > STRAIGHT * np.max(np.abs(slopes))
+        largest = max(largest, float(np.max(np.abs(force))))
+        if is_due.any():
+            first = min(first, float(at[is_due][0]))
+            total += float(np.sum(turns[is_due]))
+            sharpest = max(sharpest, float(np.max(turns[is_due])))
+    return (first, total / sharpest, total / largest) if total else (np.nan, np.nan, np.nan)
+
+
+def _histories(model: Model, parameters: Mapping[str, float]) -> Iterator[tuple[Floats, Floats]]:
+    """Yield the times of the points of every table, and the force there but for a factor that all points share."""
+    if model.loaded is not None:
+        own = model.loaded.structure
+        for number, (t, force) in own.histories:
+            yield t, force * np.max(np.abs(own.shapes[number]))
+    elif model.lookup is not None:
+        table = model.lookup.table
+        speed = float(values(tree(model, model.lookup.place), {**parameters, "t": 1.0}))
+        if speed > 0.0:
+            yield (
+                (table.first + table.spacing * np.arange(table.points, dtype=np.float64)) / speed,
+                table.bends,
+            )
