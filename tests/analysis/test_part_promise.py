@@ -168,6 +168,7 @@ def test_a_member_that_does_not_oscillate_is_not_judged() -> None:
     for verdict in run.verdicts:
         reasons = {row.case: row.reason for row in verdict.results}
         assert {reasons[2], reasons[3]} == {"not_applicable"}
+        assert "Start `levels:` finer" in verdict.advice
         assert "not_applicable" not in (reasons[0], reasons[1])
 
 

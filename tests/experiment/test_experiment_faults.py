@@ -813,3 +813,21 @@ def test_names_that_the_workflow_cannot_take_are_refused(name: str) -> None:
     with pytest.raises(InputError, match="the name of the experiment"):
         Experiment.from_dict(content(), name=name)
     assert Experiment.from_dict(content(), name="x" * 19).name == "x" * 19
+
+
+@pytest.mark.parametrize(
+    ("name", "rule", "hint"),
+    [
+        ("w", "must be a parameter of the model", "did you mean 'model.omega'?"),
+        ("beta", "(rad s-1), but beta is in m-2 s-2", "choose from model.omega"),
+    ],
+)
+def test_the_frequency_of_a_force_is_a_parameter_in_radians_per_second(
+    name: str, rule: str, hint: str
+) -> None:
+    time = {"periods": 20, "steps_per_period": 16, "frequency": f"model.{name}"}
+    with pytest.raises(InputError) as error:
+        build(model={"kind": "duffing"}, initial={}, time=time, schemes=["rk4"], checks=[])
+    (fault,) = error.value.faults
+    assert rule in fault.rule
+    assert hint in fault.hint

@@ -191,11 +191,19 @@ def test_what_is_exact_must_be_known(monkeypatch: pytest.MonkeyPatch) -> None:
     assert fault.rule == "the energy of pendulum is not conserved"
 
 
+BOUNCES = {"events": [{"when": "u - 0.5", "then": {"v": "-v"}}]}
+
+
 @pytest.mark.parametrize(
     ("section", "hint"),
     [
         ({"kind": "oscillator", "damping": {"linear": 0.1}}, "`converges: energy_budget`"),
         ({"kind": "system", "acceleration": "-u*exp(u*sin(u)**3)"}, "write its `potential`"),
+        ({"kind": "system", "acceleration": "-u", **BOUNCES}, "its events may change it"),
+        (
+            {"kind": "system", "acceleration": "-u", "potential": "u**2/2", **BOUNCES},
+            "its events may change it; the budget of energy and work is: `converges: energy_budget`",
+        ),
     ],
 )
 def test_an_energy_that_is_not_conserved_has_what_is_in_its_place(

@@ -156,3 +156,24 @@ def test_settings_hold_for_a_solver_of_the_user_too(tmp_path: Path) -> None:
     assert plan.settings == ("refine.h=[0.2, 0.1, 0.05]",)
     with pytest.raises(InputError, match=r"--set refine.h=x: refine.h"):
         load(Choice("adhoc", file, settings=("refine.h=x",)))
+
+
+@pytest.mark.parametrize(
+    ("text", "setting", "key", "rule"),
+    [
+        ("[6, 7, 8]", "levels[0]=9", "levels[0]", "increasing order"),
+        ("[6, 7, 8]", "levels[2]=1", "levels[2]", "increasing order"),
+        ("{from: 6, to: 8}", "levels.from=9", "levels.from", "must be at most 'to', which is 8"),
+        ("{from: 6, to: 8}", "levels.to=5", "levels.to", "must be at least 'from', which is 6"),
+    ],
+)
+def test_levels_out_of_order_are_the_fault_of_the_setting(
+    file: Path, text: str, setting: str, key: str, rule: str
+) -> None:
+    file.write_text(TEXT.replace("[6, 7, 8]", text))
+    with pytest.raises(InputError) as error:
+        Experiment.from_yaml(file, settings=[setting])
+    (fault,) = error.value.faults
+    assert f"--set {setting}" in fault.file
+    assert (fault.key, fault.line) == (key, 0)
+    assert rule in fault.rule

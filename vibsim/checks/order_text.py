@@ -11,6 +11,7 @@ from collections.abc import Mapping
 from itertools import pairwise
 
 from vibsim.checks.order_context import COINCIDE, OrderContext
+from vibsim.checks.phase_amplitude_text import NO_PART, PART_ADVICE
 from vibsim.checks.sentences import (
     WRONG_LIMIT,
     Description,
@@ -21,7 +22,7 @@ from vibsim.checks.sentences import (
 from vibsim.comparison.parting import levels_to_the_end
 from vibsim.convergence.study.sentences import higher_part, opposite_part
 from vibsim.convergence.thresholds import HALF_SPACING
-from vibsim.core.vocabulary import order_interval
+from vibsim.core.vocabulary import is_error_part, order_interval
 from vibsim.experiment.schema.checks import ConvergesCheck
 from vibsim.experiment.schema.fields import MAX_LEVEL
 from vibsim.schemes.base import is_on_the_mesh
@@ -136,6 +137,10 @@ DIAGNOSES: Words = {
     "not_applicable, still": (
         "{subject} does not change after the start, or too little for an error to show. There is nothing to judge.",
         "Choose `initial:` values, a force or a `time: end` so that {what} changes from one common time to the next.",
+    ),
+    "not_applicable, part": (
+        f"{{subject}} {NO_PART}.",
+        PART_ADVICE,
     ),
     "not_applicable": (
         "{subject} does not exist here, so there is nothing to judge.",
@@ -296,7 +301,10 @@ def _diagnosis(s: OrderContext) -> str:
     finer = {
         "unstable": {"beyond the limit": s.is_beyond_limit},
         "non_finite": {"from the start": s.singular == 0.0, "always": not math.isnan(s.singular)},
-        "not_applicable": {"adaptive": "tolerance" in s.options},
+        "not_applicable": {
+            "adaptive": "tolerance" in s.options,
+            "part": is_error_part(s.quantity),
+        },
         "non_smooth": {
             "pulse": s.cause == "pulse",
             "mesh": is_on_the_mesh(s.options),

@@ -14,6 +14,15 @@ NEAR = 0.125
 """How near to a whole or half order a stated one must be to be reported."""
 FROM_THE_START = 0.5
 """A shift is there from the start where that of the first step is at least this part of the largest."""
+NO_PART = (
+    "could not be measured: each level must oscillate with at least 6 common times in a period, and be like the true "
+    "motion but for a shift in time and a factor"
+)
+"""Why a part of an error is not there, behind its name; common times are those of the coarsest level."""
+PART_ADVICE = (
+    "Start `levels:` finer, and use a `time: end` of a period or more. If the motion does not oscillate, check the "
+    "position itself."
+)
 NAMES = {1.0: "first", 2.0: "second", 3.0: "third", 4.0: "fourth", 5.0: "fifth", 6.0: "sixth"}
 
 

@@ -20,6 +20,7 @@ from vibsim.apriori.formal_orders import columns_of, options_of
 from vibsim.checks.fields import Field, Measured, name_of
 from vibsim.checks.notation import PLAIN, ROUND_OFF, Notation
 from vibsim.checks.outcome import Judged
+from vibsim.checks.phase_amplitude_text import NO_PART, PART_ADVICE
 from vibsim.checks.sentences import NOT_FINITE, Description, Found, add_levels, cost_in_words
 from vibsim.comparison import best_values, value_numbers
 from vibsim.comparison.best_values import OF_STEADY_STATE
@@ -341,6 +342,8 @@ def describe(f: Found, check: ValueCheck) -> Description:
         case "not_applicable" if check.at.event is not None:
             sentence = f"{subject} does not exist: fewer events happen until the end."
             advice = "Ask for an earlier `event:`, or make `time: end` later."
+        case "not_applicable" if check.quantity is not None and is_error_part(check.quantity):
+            sentence, advice = f"{subject} {NO_PART}.", PART_ADVICE
         case "not_applicable":
             sentence = f"{subject} does not exist here, or was not stored."
             advice = (

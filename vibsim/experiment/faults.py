@@ -118,6 +118,11 @@ class Report:
         shown = path if origin is None or (is_repeated and isinstance(path[-1], str)) else origin
         return Fault(file, line, dotted(shown), shorten(written), rule, hint)
 
+    def is_set(self, path: Path_) -> bool:
+        """Tell whether the value at `path` comes from a setting of the command line, not from the file."""
+        place = self.source.place(path)
+        return place is not None and bool(place.setting)
+
     def add_malformed(
         self, path: Path_, rule: str, hint: str = "", value: object = None, at_key: bool = False
     ) -> None:

@@ -145,6 +145,11 @@ def _check(check: Check, scope: Scope) -> None:
 
 def _instead_of_energy(scope: Scope) -> str:
     """Say what to write where an energy is not conserved, or is not known to be."""
+    budget = "the budget of energy and work is: `converges: energy_budget`"
+    has_budget = "energy_budget" in scope.setting.quantities
+    model = scope.setting.model
+    if has_budget and model is not None and model.events is not None:
+        return f"its events may change it; {budget}"
     section = scope.report.source.data.get("model")
     if isinstance(section, Mapping) and section.get("kind") == "system":
         if "potential" in section:
@@ -152,8 +157,7 @@ def _instead_of_energy(scope: Scope) -> str:
                 "by the `potential` that is written: leave it out, and vibsim finds it where it can"
             )
         return "write its `potential`, if the forces have one that vibsim does not find"
-    has_budget = "energy_budget" in scope.setting.quantities
-    return "the budget of energy and work is: `converges: energy_budget`" if has_budget else ""
+    return budget if has_budget else ""
 
 
 def _quantity_of_schemes(name: str, key: str, schemes: Sequence[str] | None, scope: Scope) -> None:

@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from itertools import pairwise
 
-from vibsim.core.errors import nearest
+from vibsim.core.errors import listed, nearest
 from vibsim.experiment.data import TimeSpec
 from vibsim.experiment.faults import MISSING, Report
 from vibsim.experiment.rules.members import SLACK
@@ -15,6 +15,8 @@ from vibsim.experiment.schema.document import LevelRange, TimeSection
 from vibsim.experiment.yaml.parse import Path_
 from vibsim.models import Model, natural_end, table_end
 
+ANGULAR = ("rad s-1", "1")
+"""Units of an angular frequency: what a user declares and what is dimensionless has the unit 1."""
 WHOLE_NUMBER = 1e-12
 """How far, relative to it, a number may be from a whole number that is meant."""
 
@@ -68,7 +70,7 @@ def time_spec(
     if steps is None or model is None or not are_known(model, parameters):
         return None
     if section.frequency is not None:
-        return _by_force(section, steps, parameters, report)
+        return _by_force(section, steps, model, parameters, report)
     end = float(natural_end(model, section.periods, parameters))
     if not (math.isfinite(end) and end > 0.0):
         report.add(("time", "periods"), "the model has no natural period with these parameters")
@@ -77,7 +79,11 @@ def time_spec(
 
 
 def _by_force(
-    section: TimeSection, steps: int, parameters: Mapping[str, float], report: Report
+    section: TimeSection,
+    steps: int,
+    model: Model,
+    parameters: Mapping[str, float],
+    report: Report,
 ) -> TimeSpec | None:
     """Return the time of whole periods of a parameter of the model, with whole steps in each."""
     assert section.periods is not None
@@ -89,10 +95,17 @@ def _by_force(
             report.add(("time", name), rule, value=value)
             return None
     key = str(section.frequency).removeprefix("model.")
+    units = {row.key: row.unit for row in model.parameters}
+    some = [name for name in parameters if units.get(name) == ANGULAR[0]]
+    some = some or [name for name in parameters if units.get(name) in ANGULAR]
+    known = [f"model.{name}" for name in some]
     if f"model.{key}" != section.frequency or key not in parameters:
-        known = [f"model.{name}" for name in parameters]
         rule = "must be a parameter of the model"
         report.add(("time", "frequency"), rule, nearest(str(section.frequency), known))
+        return None
+    if units[key] not in ANGULAR:
+        rule = f"must be an angular frequency (rad s-1), but {key} is in {units[key]}"
+        report.add(("time", "frequency"), rule, listed(known) if known else "")
         return None
     if not (math.isfinite(parameters[key]) and parameters[key] > 0.0):
         rule = "must be an angular frequency greater than 0"
@@ -145,7 +158,9 @@ def rising_levels(
 ) -> tuple[int, ...]:
     """Return the levels of a section, which stands at `path`; none where it is missing or faulty."""
     if isinstance(section, LevelRange):
-        if section.from_ > section.to:
+        if section.from_ > section.to and report.is_set((*path, "from")):
+            report.add((*path, "from"), f"must be at most 'to', which is {section.to}")
+        elif section.from_ > section.to:
             report.add((*path, "to"), f"must be at least 'from', which is {section.from_}")
         return tuple(range(section.from_, section.to + 1))
     levels = section or ()
@@ -155,5 +170,9 @@ def rising_levels(
         is_same = levels[i] == levels[i - 1]
         word = "must not be repeated" if is_same else "must be in increasing order"
         hint = f"write {sorted(levels)}: a higher level has smaller steps" if is_reversed else ""
-        report.add((*path, i), f"levels {word}", hint, levels[i])
+        is_earlier = report.is_set((*path, i - 1)) and not report.is_set((*path, i))
+        if is_earlier:
+            hint = hint or f"the next one is {levels[i]}"
+        own = i - 1 if is_earlier else i
+        report.add((*path, own), f"levels {word}", hint, levels[own])
     return () if falling else levels
