@@ -39,10 +39,9 @@ from vibsim.models import centred
 from vibsim.models.events import TREATMENTS
 from vibsim.observe.common_grid import SAME_AT_EVERY_LEVEL
 from vibsim.observe.member_block import MemberBlock, block_of
-from vibsim.observe.missed_pulses import missed_variables
+from vibsim.observe.missed_pulses import may_miss_pulses, missed_variables
 from vibsim.observe.stiffness import applies as motion_decides
 from vibsim.observe.stiffness import is_damped
-from vibsim.simulation.reference.one_sided_forces import varies_in_time
 from vibsim.simulation.scaled import in_scales
 
 if TYPE_CHECKING:
@@ -111,7 +110,7 @@ def analyse_records(experiment: Experiment, records: Mapping[int, Record]) -> Re
             table |= over_time(q)
     table |= _scalars(block) | check_variables(block, found) | motion(block, found)
     table |= corner_variables(block.model, block.corners)
-    if varies_in_time(block.model):
+    if may_miss_pulses(block.model):
         table |= missed_variables(block.missed)
     if is_damped(block.model):
         words = "largest rate at which damping takes a velocity away"

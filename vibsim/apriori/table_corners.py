@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from vibsim.core.array_types import Flags, Floats
-from vibsim.formula import values
+from vibsim.formula import Pulses, values
 from vibsim.models import Model, tree
 
 ON_A_POINT = 1e-6
@@ -22,6 +22,11 @@ STRAIGHT = 1e-9
 """A slope that changes by less than this part of the largest one is the rounding of a straight line. [convention]"""
 OF_A_STEP = 0.5
 """Part of ``s dt^2`` that an extrapolation over levels, with their weights, may be off by. [convention]"""
+
+PULSE_RATIO = 2.0
+"""A pulse leaves the values at the grid points around it by more than so many times their range, ..."""
+SMALLEST_PULSE = 1e-3
+"""... and by this part of the largest force. [convention]"""
 
 
 @dataclass(frozen=True)
@@ -98,12 +103,34 @@ def _of_member(
     return (first, total / sharpest, total / largest) if total else (np.nan, np.nan, np.nan)
 
 
+def table_pulses(model: Model, parameters: Mapping[str, Floats], end: Floats, steps: int) -> Pulses:
+    """Find the highest pulse of a table between the points of a level with so many steps, of every member."""
+    time, width = np.full((2, len(end)), np.nan)
+    for case in range(len(end) if has_tables(model) else 0):
+        own, highest = {name: x[case] for name, x in parameters.items()}, 0.0
+        grid = np.arange(steps + 1) * (end[case] / steps)
+        for t, force in _histories(model, own):
+            seen, before = np.interp(grid, t, force), np.searchsorted(grid, t[1:-1]) - 1
+            around = seen[np.clip(before + np.arange(-1, 3)[:, None], 0, steps)]
+            low, high = np.min(around, axis=0), np.max(around, axis=0)
+            excess = np.maximum(force[1:-1] - high, low - force[1:-1])
+            least = np.maximum(PULSE_RATIO * (high - low), SMALLEST_PULSE * np.max(np.abs(force)))
+            is_pulse = (before >= 0) & (before < steps) & (excess > least)
+            i = int(np.argmax(np.where(is_pulse, excess, 0.0)))
+            if is_pulse[i] and excess[i] > highest:
+                highest, time[case] = float(excess[i]), t[i + 1]
+                width[case] = 0.5 * (t[i + 2] - t[i])
+    return Pulses(time, width)
+
+
 def _histories(model: Model, parameters: Mapping[str, float]) -> Iterator[tuple[Floats, Floats]]:
     """Yield the times of the points of every table, and the force there but for a factor that all points share."""
     if model.loaded is not None:
         own = model.loaded.structure
         for number, (t, force) in own.histories:
-            yield t, force * np.max(np.abs(own.shapes[number]))
+            # a single straight line has no corner
+            if len(t) > 2:
+                yield t, force * np.max(np.abs(own.shapes[number]))
     elif model.lookup is not None:
         table = model.lookup.table
         speed = float(values(tree(model, model.lookup.place), {**parameters, "t": 1.0}))

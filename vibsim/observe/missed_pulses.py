@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
+from vibsim.apriori.table_corners import has_tables, table_pulses
 from vibsim.core.array_types import Flags, Floats
 from vibsim.core.record import Record, Variable
 from vibsim.formula import Pulses
@@ -28,17 +30,32 @@ class Missed:
 
 def missed_pulses(model: Model, finest: Record, group: Members) -> Missed:
     """Find a pulse of the force between the points of the finest level, whose points hold those of all others."""
-    cases = len(group.end)
+    parameters = {
+        row.name: np.asarray(group.parameters[row.key], dtype=float) for row in model.parameters
+    }
+    steps = int(np.asarray(finest.attrs["steps"]).item())
+    own = table_pulses(model, parameters, group.end, steps)
+    of_table = np.isfinite(own.time)
     if not varies_in_time(model):
-        nothing = np.full(cases, np.nan)
-        return Missed(nothing, nothing, np.zeros(cases, dtype=bool))
+        return Missed(own.time, own.width, of_table)
+    found = _of_formulas(model, finest, group, parameters)
+    both = Pulses(found.time, found.width).and_others(own)
+    return Missed(both.time, both.width, found.jumps | (np.isnan(found.time) & of_table))
+
+
+def may_miss_pulses(model: Model) -> bool:
+    """Tell whether the force of a model may have pulses in time, by formulas or by tables."""
+    return varies_in_time(model) or has_tables(model)
+
+
+def _of_formulas(
+    model: Model, finest: Record, group: Members, parameters: Mapping[str, Floats]
+) -> Missed:
+    cases = len(group.end)
     states = np.stack([np.asarray(finest[state.name], dtype=float) for state in model.states])
     # of the first scheme that is finite throughout
     scheme = np.argmax(np.isfinite(states).all(axis=(0, -1)), axis=0)
     samples = states.shape[-1] - 1
-    parameters = {
-        row.name: np.asarray(group.parameters[row.key], dtype=float) for row in model.parameters
-    }
 
     def pulses(t: Floats, *, smooth: bool) -> Pulses:
         """Find a pulse of every member between times of shape (case, gap + 1)."""

@@ -178,8 +178,11 @@ def test_no_point_of_a_load_is_within_a_step_that_ends_there(folder: Path) -> No
     assert found == [("PASS", "asymptotic")] * 2
 
 
-def test_a_point_on_a_straight_line_is_no_corner(folder: Path) -> None:
-    points = [(0.0, 0.0), (0.7, 0.07), (1.1, 0.11), (2.5, 0.25), (11.0, 9.0)]
+STRAIGHT = [(0.0, 0.0), (0.7, 0.07), (1.1, 0.11), (2.5, 0.25), (11.0, 9.0)]
+
+
+@pytest.mark.parametrize("points", [STRAIGHT, [(0.0, 0.0), (11.0, 1.0)]])
+def test_a_point_on_a_straight_line_is_no_corner(folder: Path, points: Any) -> None:
     made = loaded(points, folder)
     record = analyse(made, [simulate(made, level) for level in made.levels])
     assert np.isnan(record["table_corner_time"].values).all()
@@ -193,3 +196,11 @@ def test_members_have_corners_of_their_own(folder: Path) -> None:
     times = record["table_corner_time"].values
     assert np.isnan(times[0])
     assert times[1] == 2.5
+
+
+def test_a_pulse_of_a_load_between_the_points_of_every_level_is_told(folder: Path) -> None:
+    points = [(0.0, 0.0), (3.001, 0.0), (3.002, 1000.0), (3.003, 0.0), (11.0, 0.0)]
+    made = loaded(points, folder, initial={"u1": 1.0})
+    for verdict in judged(made):
+        assert (verdict.status, verdict.reason) == ("INCONCLUSIVE", "non_smooth")
+        assert "a pulse about 0.001 long near t = 3.002" in verdict.text
