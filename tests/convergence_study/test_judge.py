@@ -471,7 +471,51 @@ def simpson(n: int) -> float:
     return float(np.exp(-x * x) @ [1, *[4, 2] * (n - 1), 4, 1]) / (6 * n)
 
 
+def midpoint(n: int) -> float:
+    return float(np.mean(np.exp(-(((np.arange(n) + 0.5) / n) ** 2))))
+
+
+def compound(n: int) -> float:
+    """Return exp(1) as Euler's method has it, for u' = u."""
+    return float((1.0 + 1.0 / n) ** n)
+
+
 ERF = 0.5 * math.sqrt(math.pi) * math.erf(1.0)
+
+
+@pytest.mark.parametrize("count", range(4, 13))
+@pytest.mark.parametrize("order", [None, "promised"])
+@pytest.mark.parametrize(("rule", "p"), [(midpoint, 2), (simpson, 4), (compound, 1)])
+def test_more_levels_of_a_number_make_no_worse_bound(
+    rule: Callable[[int], float], p: int, order: str | None, count: int
+) -> None:
+    cells = [16 * 2**k for k in range(count)]
+    values = [rule(n) for n in cells]
+    error = values[-1] - (math.e if rule is compound else ERF)
+    verdict = judge([1 / n for n in cells], values, order=p if order else None)
+    bound = verdict.error_bound or math.nan
+    assert abs(error) <= bound
+    # until round-off, which adds up in sums
+    if abs(error) > 100 * np.finfo(float).eps:
+        assert bound <= 1.2 * abs(error)
+
+
+def test_bounds_hold_where_the_finest_levels_are_noisy() -> None:
+    """Noise that nothing predicts, of a tenth to ten times the error at the level where it begins."""
+    rng = np.random.default_rng(712)
+    held = []
+    for _ in range(60):
+        count, p = int(rng.integers(7, 12)), float(rng.choice([1, 2, 4]))
+        h = 0.5 ** np.arange(count)
+        a, b, noisy = rng.normal(), rng.normal(), int(rng.integers(1, 4))
+        values = 1.0 + a * h**p + b * h ** (p + 1.0)
+        size = abs(a) * h[-noisy] ** p * 10.0 ** rng.uniform(-1.0, 1.0)
+        values[-noisy:] += size * rng.normal(size=noisy)
+        verdict = judge(h.tolist(), values.tolist())
+        if verdict.error_bound is not None:
+            held.append(abs(values[-1] - 1.0) <= verdict.error_bound)
+    assert len(held) > 40
+    assert np.mean(held) >= 0.95
 
 
 @pytest.mark.parametrize("digits", [4, 6, 8, 10, 12, 14])

@@ -149,29 +149,32 @@ def times(matrices: Floats, vectors: Floats) -> Floats:
 
 def inverse(covariance: Floats) -> tuple[Floats, Floats]:
     """Return inverse and log determinant of covariances, entry by entry, which gives the same bits everywhere."""
-    # by Cholesky, L L^T, of matrices scaled so that sizes of rows do not matter
-    scale = np.sqrt(np.diagonal(covariance, axis1=-2, axis2=-1))
-    a = covariance / outer(scale, scale)
-    w = a.shape[-1]
+    # By Cholesky, L L^T, of matrices scaled so that sizes of rows do not matter. Entries are arrays of all matrices.
+    scale = np.sqrt(np.moveaxis(np.diagonal(covariance, axis1=-2, axis2=-1), -1, 0))
+    size = outer(np.moveaxis(scale, 0, -1), np.moveaxis(scale, 0, -1))
+    a = np.ascontiguousarray(np.moveaxis(covariance / size, (-2, -1), (0, 1)))
+    w = len(a)
     # of L^-1: row i is (e_i - sum_j L_ij row_j)/L_ii
     lower, inverted = np.zeros_like(a), np.zeros_like(a)
-    log_det = np.zeros_like(scale[..., 0])
+    log_det = np.zeros_like(scale[0])
     for i in range(w):
-        row = np.zeros_like(a[..., 0, :])
-        row[..., i] = 1.0
-        rest = a[..., i, i]
+        inverted[i, i] = 1.0
+        rest = a[i, i]
         for j in range(i):
-            entry = a[..., i, j]
+            entry = a[i, j]
             for k in range(j):
-                entry = entry - lower[..., i, k] * lower[..., j, k]
-            lower[..., i, j] = entry / lower[..., j, j]
-            rest = rest - lower[..., i, j] ** 2
-            row = row - lower[..., i, j, None] * inverted[..., j, :]
-        lower[..., i, i] = np.sqrt(np.maximum(rest, ROUNDED))
-        inverted[..., i, :] = row / lower[..., i, i, None]
-        log_det = log_det + 2.0 * on_arrays.log(lower[..., i, i] * scale[..., i])
-    precision = sum(outer(inverted[..., i, :], inverted[..., i, :]) for i in range(w))
-    return precision / outer(scale, scale), log_det
+                entry = entry - lower[i, k] * lower[j, k]
+            lower[i, j] = entry / lower[j, j]
+            rest = rest - lower[i, j] ** 2
+            inverted[i, : j + 1] -= lower[i, j] * inverted[j, : j + 1]
+        lower[i, i] = np.sqrt(np.maximum(rest, ROUNDED))
+        inverted[i, : i + 1] /= lower[i, i]
+        log_det = log_det + 2.0 * on_arrays.log(lower[i, i] * scale[i])
+    precision = np.zeros_like(a)
+    for i in range(w):
+        own = inverted[i, : i + 1]
+        precision[: i + 1, : i + 1] += own[:, None] * own[None]
+    return np.moveaxis(precision, (0, 1), (-2, -1)) / size, log_det
 
 
 ROUNDED = 1e-16
