@@ -186,6 +186,10 @@ def test_fields_of_two_dimensions_are_compared_at_common_points() -> None:
     assert judge(H, swapped, order=2).order == pytest.approx(verdict.order)
     known = judge(H, fields, order=2, exact=lambda x, y: np.sin(x) * np.cos(y))
     assert known.status == "PASS"
+    by_name = judge(H, fields, order=2, exact=lambda y, x: np.sin(x) * np.cos(y))
+    assert by_name == known, "arguments named like the coordinates may come in any order"
+    by_place = judge(H, fields, order=2, exact=lambda a, b: np.sin(a) * np.cos(b))
+    assert by_place == known, "others come in the order of the dimensions"
     x, y = nodes(8), nodes(4)
     size = np.sqrt(np.mean((H[-1] ** 2 * np.exp(x)[:, None] * y) ** 2))
     assert known.error == pytest.approx(size)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 
@@ -18,3 +18,12 @@ def misfit(function: Callable[..., Any], *args: Any, **named: Any) -> tuple[str,
     except TypeError as error:
         return str(takes), str(error)
     return None
+
+
+def takes_by_name(function: Callable[..., Any], names: Sequence[str]) -> bool:
+    """Say whether a function has parameters of all these names, and needs no others."""
+    try:
+        known = inspect.signature(function).parameters
+    except (TypeError, ValueError):
+        return False
+    return set(names) <= set(known) and misfit(function, **dict.fromkeys(names)) is None

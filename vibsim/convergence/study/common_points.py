@@ -14,7 +14,7 @@ from vibsim.convergence.study.coordinate_units import in_common_units
 from vibsim.convergence.study.grid_values import GridValues, grid_values, real
 from vibsim.convergence.study.refusal import refused
 from vibsim.core.array_types import Floats
-from vibsim.core.signatures import misfit
+from vibsim.core.signatures import misfit, takes_by_name
 
 GAUSS = 5
 """Points of the quadrature that makes the average of a function over a cell, in each dimension."""
@@ -123,9 +123,10 @@ def _transposed(level: GridValues, dims: Sequence[str]) -> Floats:
 def exact_values(exact: Any, common: CommonValues, *, members: bool = False) -> Floats:
     """Return the exact values at the common points, shape (*points).
 
-    `exact` is a number, an array, an xarray object, or a function of the coordinates, which it gets in the order of the
-    dimensions, as arrays that can be broadcast. Where averages of cells are compared, the function is averaged over
-    each cell. Of `members` the first dimension is no coordinate of that function.
+    `exact` is a number, an array, an xarray object, or a function of the coordinates, which it gets as arrays that can
+    be broadcast: by name where its parameters have the names of the dimensions, else in the order of these. Where
+    averages of cells are compared, the function is averaged over each cell. Of `members` the first dimension is no
+    coordinate of that function.
 
     Raises
     ------
@@ -176,13 +177,18 @@ def _of_function(exact: Callable[..., Any], common: CommonValues, dims: Sequence
         rule = "is a function, and the values have no coordinates that it could be given"
         hint = "give values, or xarray objects with coordinates"
         raise refused("exact", _listed(dims), rule, hint)
-    if misfits := misfit(exact, *dims):
+    by_name = takes_by_name(exact, dims)
+    if not by_name and (misfits := misfit(exact, *dims)):
         rule = f"must be a function of {_listed(dims)}, takes {misfits[0]}"
         raise refused("exact", "a function", rule)
+
+    def at(grids: Sequence[Floats]) -> Any:
+        return exact(**dict(zip(dims, grids, strict=True))) if by_name else exact(*grids)
+
     points = [np.asarray(common.coords[dim], dtype=np.float64) for dim in dims]
     if common.kind != "mean":
         grids = np.meshgrid(*points, indexing="ij", sparse=True)
-        return real(np.asarray(exact(*grids)), "exact")[0]
+        return real(np.asarray(at(grids)), "exact")[0]
     nodes, weights = np.polynomial.legendre.leggauss(GAUSS)
     flat = []
     for x in points:
@@ -196,7 +202,7 @@ def _of_function(exact: Callable[..., Any], common: CommonValues, dims: Sequence
         middle, half = 0.5 * (edges[1:] + edges[:-1]), 0.5 * np.diff(edges)
         flat.append((middle[:, None] + half[:, None] * nodes).ravel())
     grids = np.meshgrid(*flat, indexing="ij", sparse=True)
-    found, _ = real(np.asarray(exact(*grids)), "exact")
+    found, _ = real(np.asarray(at(grids)), "exact")
     found = np.broadcast_to(found, [len(x) for x in flat])
     for axis, x in enumerate(points):
         shape = (*found.shape[:axis], len(x), GAUSS, *found.shape[axis + 1 :])

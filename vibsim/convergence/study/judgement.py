@@ -76,7 +76,8 @@ def judge(
         The order that is expected, or the lowest one that is. Without both any order passes that may be believed.
     exact
         The exact result, if it is known: a number; an array or xarray object at the points that are compared; or a
-        function of the coordinates, in the order of the dimensions.
+        function of the coordinates. If its parameters have the names of the dimensions, they may come in any order;
+        otherwise it gets the coordinates in the order of the dimensions.
     noise
         How noisy each level is (an iteration that stops early, printed digits): the root mean square of the noise.
         Without it the levels are taken to be exact up to rounding.
