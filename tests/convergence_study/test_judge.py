@@ -9,6 +9,7 @@ import subprocess
 import sys
 from collections.abc import Callable
 from dataclasses import FrozenInstanceError, replace
+from decimal import Decimal
 from pathlib import Path
 from typing import Any
 
@@ -531,6 +532,21 @@ def test_an_exact_value_that_is_written_with_few_digits_is_no_wrong_limit(
     said = "agree with all digits of the exact value" in verdict.sentence
     assert said >= (abs(values[-1] - ERF) < abs(exact - ERF))
     assert abs(values[-1] - (ERF if said else exact)) <= verdict.error_bound
+
+
+def test_zeros_at_the_end_of_an_exact_value_are_digits_where_they_are_seen() -> None:
+    h = [0.1, 0.05, 0.025, 0.0125]
+    values = [
+        -0.44357554757127554,
+        -0.4461202306407154,
+        -0.4467527962921832,
+        -0.4469107056676419,
+    ]
+    verdict = judge(h, values, order=2, exact=Decimal("-0.4470"))
+    assert verdict.status == "PASS"
+    assert "agree with all digits of the exact value" in verdict.sentence
+    assert judge(h, values, order=2, exact=Decimal("-0.44700")).reason == "wrong_limit"
+    assert judge(h, values, order=2, exact=-0.4470).reason == "wrong_limit"
 
 
 @pytest.mark.parametrize("exact", [0.7469, 0.746825, 0.74682414, 0.7, 0.75])

@@ -8,6 +8,7 @@ import shutil
 import sys
 from argparse import Namespace
 from collections.abc import Mapping, Sequence
+from decimal import Decimal, InvalidOperation
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
@@ -76,9 +77,9 @@ def _studies(options: Namespace) -> list[Study]:
     return level_tables.read(first, options.h.strip(), [name.strip() for name in quantities])
 
 
-def _exact(entries: Sequence[str] | None, known: Sequence[str]) -> Mapping[str, float]:
+def _exact(entries: Sequence[str] | None, known: Sequence[str]) -> Mapping[str, Decimal]:
     """Return the exact values by quantity, from ``QUANTITY=VALUE``."""
-    found: dict[str, float] = {}
+    found: dict[str, Decimal] = {}
     for entry in entries or ():
         name, has_value, text = entry.rpartition("=")
         name = name.strip()
@@ -89,15 +90,16 @@ def _exact(entries: Sequence[str] | None, known: Sequence[str]) -> Mapping[str, 
         if name in found:
             _refuse("--exact", name, "is given twice")
         try:
-            found[name] = float(text)
-        except ValueError:
-            found[name] = math.nan
-        if not math.isfinite(found[name]):
+            # the digits as they are written say how far the value may be rounded
+            found[name] = Decimal(text)
+        except InvalidOperation:
+            found[name] = Decimal("nan")
+        if not found[name].is_finite() or not math.isfinite(float(found[name])):
             _refuse("--exact", entry, "its value must be a finite number")
     return found
 
 
-def _judged(study: Study, options: Namespace, exact: float | None) -> LadderVerdict:
+def _judged(study: Study, options: Namespace, exact: Decimal | None) -> LadderVerdict:
     from vibsim.convergence.study.judgement import verdicts
 
     try:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from decimal import Decimal
 from typing import Any, Literal, overload
 
 import numpy as np
@@ -10,6 +11,7 @@ import numpy as np
 from vibsim.convergence.study.assembly import verdict
 from vibsim.convergence.study.common_points import common_values, exact_values
 from vibsim.convergence.study.grid_values import GridValues, grid_values
+from vibsim.convergence.study.measurement import half_written
 from vibsim.convergence.study.outcomes import Request, outcomes
 from vibsim.convergence.study.refinement import refinement
 from vibsim.convergence.study.refusal import chosen, finite_number, refused
@@ -75,9 +77,10 @@ def judge(
     order, at_least
         The order that is expected, or the lowest one that is. Without both any order passes that may be believed.
     exact
-        The exact result, if it is known: a number; an array or xarray object at the points that are compared; or a
-        function of the coordinates. If its parameters have the names of the dimensions, they may come in any order;
-        otherwise it gets the coordinates in the order of the dimensions.
+        The exact result, if it is known: a number, or a `decimal.Decimal` of the digits as they are written; an array
+        or xarray object at the points that are compared; or a function of the coordinates. If its parameters have the
+        names of the dimensions, they may come in any order; otherwise it gets the coordinates in the order of the
+        dimensions.
     noise
         How noisy each level is (an iteration that stops early, printed digits): the root mean square of the noise.
         Without it the levels are taken to be exact up to rounding.
@@ -198,8 +201,11 @@ def verdicts(
         dims = [dims]
     fixed = levels[0].dims[:1] if members else ()
     common = common_values(levels, kind, dims, fixed)
+    half = None
+    if isinstance(exact, Decimal):
+        half, exact = half_written(exact), float(exact)
+    request = Request(quantity or levels[0].name or "u", order, at_least, noise, half)
     truth = None if exact is None else exact_values(exact, common, members=members)
-    request = Request(quantity or levels[0].name or "u", order, at_least, noise)
     shape, n = common.values.shape[1:], len(steps.h)
     count, inner = (shape[0], shape[1:]) if members else (1, shape)
     ladders = np.swapaxes(common.values.reshape(n, count, -1), 0, 1)

@@ -79,6 +79,12 @@ def half_last_digit(values: Floats, few: int = FEW_DIGITS) -> float:
     return float(Decimal(5).scaleb(min(last, 0) - 1 if is_whole else last - 1))
 
 
+def half_written(number: Decimal) -> float:
+    """Return half a unit of the last digit of a finite number as it is written: zeros at its end count."""
+    last = number.as_tuple().exponent
+    return float(Decimal(5).scaleb(last - 1)) if isinstance(last, int) else 0.0
+
+
 def step_of_values(values: Floats) -> float:
     """Return the least difference of the finest levels where two are the same to the last bit and others differ.
 

@@ -44,6 +44,8 @@ class Request:
     order: float | None
     at_least: float | None
     noise: float | None
+    half_of_exact: float | None = None
+    """Half a unit of the last digit of the exact value as it was written; None where only its value is known."""
 
 
 @dataclass
@@ -110,7 +112,7 @@ def outcomes(
         found |= dict(zip(members.tolist(), some, strict=True))
     if exact is not None:
         for i, one in found.items():
-            half = _rounding_of_exact(one, exact[i])
+            half = _rounding_of_exact(one, exact[i], request.half_of_exact)
             if not half:
                 continue
             (levels,) = _with_finite(request, h, values[i : i + 1], epsilon, None, finite[i])
@@ -121,11 +123,12 @@ def outcomes(
     return [found[i] for i in range(len(values))]
 
 
-def _rounding_of_exact(one: Outcome, exact: Floats) -> float:
+def _rounding_of_exact(one: Outcome, exact: Floats, half: float | None) -> float:
     """Return half a unit of the last digit of exact values, if that may be why nothing else was decided; else 0."""
     if one.reason not in ("wrong_limit", "pre_asymptotic", "round_off", "oscillating"):
         return 0.0
-    half = half_last_digit(exact[None], EXACT_DIGITS)
+    if half is None:
+        half = half_last_digit(exact[None], EXACT_DIGITS)
     at_most = MOST_ROUNDED * float(np.max(np.abs(exact)))
     return half if SEEN * abs(one.error) <= half <= at_most else 0.0
 
