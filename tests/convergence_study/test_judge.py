@@ -534,6 +534,21 @@ def test_an_exact_value_that_is_written_with_few_digits_is_no_wrong_limit(
     assert abs(values[-1] - (ERF if said else exact)) <= verdict.error_bound
 
 
+def test_step_sizes_of_few_digits_are_suspected_where_they_may_move_the_order() -> None:
+    cells = [15, 30, 60, 120]
+    values = [midpoint(n) for n in cells]
+    rounded = [0.067, 0.033, 0.017, 0.0083]
+    known = judge(rounded, values, order=2, exact=ERF)
+    assert known.status == "PASS"
+    assert "higher order is still seen" not in known.sentence
+    assert "step sizes are rounded" in known.sentence
+    unknown = judge(rounded, values, order=2)
+    assert unknown.status == "INCONCLUSIVE"
+    assert unknown.advice.startswith("Give h with more digits")
+    assert "rounded" not in judge([1 / n for n in cells], values, order=2).sentence
+    assert "rounded" not in judge([0.4, 0.2, 0.1], [1.3, 1.2, 1.15], order=2).sentence
+
+
 def test_zeros_at_the_end_of_an_exact_value_are_digits_where_they_are_seen() -> None:
     h = [0.1, 0.05, 0.025, 0.0125]
     values = [

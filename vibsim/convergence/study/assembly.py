@@ -9,6 +9,7 @@ import numpy as np
 
 from vibsim.convergence.differences import orders_of_steps
 from vibsim.convergence.study.common_points import CommonValues
+from vibsim.convergence.study.measurement import rounding_of_sizes
 from vibsim.convergence.study.outcomes import Outcome, Request
 from vibsim.convergence.study.refinement import Refinement
 from vibsim.convergence.study.sentences import Setting, describe
@@ -69,11 +70,23 @@ def verdict(
         sizes=steps.names,
         is_proportional=steps.is_proportional,
         interpolation=(common.kind, common.interpolation_order or 0) if hidden else None,
+        are_sizes_rounded=_moved_by_sizes(one, h) > ORDER_TOLERANCE,
         notes=common.notes,
         parts=(*common.parts, *_rounding(one)),
     )
     sentence, advice = describe(found, setting)
     return replace(found, sentence=sentence, advice=advice)
+
+
+def _moved_by_sizes(one: Outcome, h: Floats) -> float:
+    """Return how far the rounding of step sizes moves the order of the finest three levels at most; 0 without one."""
+    if len(one.ratios) == 0 or not one.ratios[-1] > 0.0:
+        return 0.0
+    finest, ratio = h[one.finite[-3:]], one.ratios[-1:]
+    halves = rounding_of_sizes(h)[one.finite[-3:]]
+    changed = [orders_of_steps(ratio, finest + part)[0] for part in np.diag(halves)]
+    moved = float(np.sum(np.abs(np.array(changed) - orders_of_steps(ratio, finest)[0])))
+    return moved if np.isfinite(moved) else 0.0
 
 
 def _known(value: float) -> float | None:

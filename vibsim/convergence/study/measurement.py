@@ -85,6 +85,19 @@ def half_written(number: Decimal) -> float:
     return float(Decimal(5).scaleb(last - 1)) if isinstance(last, int) else 0.0
 
 
+def rounding_of_sizes(h: Floats) -> Floats:
+    """Return half a unit of the last digit of step sizes, if all may be rounded to as many digits; else 0, shape (n,).
+
+    Sizes in one ratio are as they are written: rounding would change it.
+    """
+    ratios = h[1:] / h[:-1]
+    numbers = [Decimal(repr(float(size))).normalize() for size in h]
+    digits = max(len(number.as_tuple().digits) for number in numbers)
+    if digits >= FEW_DIGITS or np.ptp(ratios) <= SINGLE * np.max(ratios):
+        return np.zeros_like(h)
+    return np.array([float(Decimal(5).scaleb(x.adjusted() - digits)) for x in numbers])
+
+
 def step_of_values(values: Floats) -> float:
     """Return the least difference of the finest levels where two are the same to the last bit and others differ.
 

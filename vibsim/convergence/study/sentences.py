@@ -34,6 +34,8 @@ class Setting:
     """Whether all of them are proportional to the first."""
     interpolation: tuple[str, int] | None = None
     """Kind and order of an interpolation that hides the order."""
+    are_sizes_rounded: bool = False
+    """Whether the digits of the sizes are so few that their rounding may move the order by more than the tolerance."""
     notes: tuple[str, ...] = ()
     """What else may be wrong, where it does not pass with an expected order above 1."""
     parts: tuple[str, ...] = ()
@@ -51,6 +53,10 @@ LOOK_FOR = (
     "stops too early"
 )
 NOT_FINER = "Use coarser levels, or compute {quantity} with less noise."
+ROUNDED = (
+    "If the step sizes are rounded to the digits that they have, that alone may move the order."
+)
+MORE_DIGITS = "Give {size} with more digits, such as 1/n for n cells. If it has no more, add a finer level{such_as}."
 SENTENCES: Mapping[str, tuple[str, str]] = MappingProxyType(
     {
         "asymptotic": ("{quantity} converges with order {order}{as_expected}.", ""),
@@ -134,9 +140,10 @@ def describe(facts: LadderVerdict, setting: Setting) -> tuple[str, str]:
     elif facts.order is not None and facts.order < 0.0 and _is_growth(facts, setting):
         key = "growing"
     phrases = _phrases(facts, setting)
+    is_moved = key == "pre_asymptotic" or bool(_higher_part(facts))
     sentence, advice = (template.format_map(phrases) for template in SENTENCES[key])
     more = [
-        _higher_part(facts),
+        ROUNDED if is_moved and setting.are_sizes_rounded else _higher_part(facts),
         opposite_part(
             facts.reason, facts.order, facts.expected if facts.at_least is None else facts.at_least
         ),
@@ -152,6 +159,8 @@ def describe(facts: LadderVerdict, setting: Setting) -> tuple[str, str]:
         # points that are not the same have an error of order 1 of their own
         confirmed = (facts.expected or 0.0) > 1.0 + ORDER_TOLERANCE
         return _joined([sentence, *more, *(() if confirmed else setting.notes)]), ""
+    if is_moved and setting.are_sizes_rounded:
+        advice = MORE_DIGITS.format_map(phrases)
     return _joined([sentence, *more]), _joined([advice, *setting.notes])
 
 
