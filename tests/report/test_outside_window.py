@@ -76,7 +76,7 @@ def test_coarse_levels_are_called_too_coarse() -> None:
 
 
 def test_levels_of_the_same_order_before_those_that_are_used_are_not_called_too_coarse() -> None:
-    _, record = made(range(6, 15))
+    _, record = made(range(6, 19))
     orders = record["u_observed_order"][0, 0, :, record.words("norm").index(TYPICAL_NORM)]
     assert abs(orders[0] - 2.0) < 0.02
     assert notes(record)[0] == "not needed"
