@@ -19,6 +19,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from functools import cache
 from typing import Any
 
 from vibsim.engine.kernel_stubs import P, unbound
@@ -30,7 +31,9 @@ from vibsim.models.events import Crossings
 
 # bound by the kernel (`vibsim.engine.kernel_stubs`)
 contact_with = contacts_behind = contacts_of = crossed = energies = first_crossed = unbound
-guard_bends = guard_rates = guards = is_end = is_ended_by = is_unresolved = least_pressure = unbound
+guard_curvatures = guard_rates = guards = is_end = is_ended_by = is_unresolved = least_pressure = (
+    unbound
+)
 mode_of = nearest_watched = placed = sides_behind = sides_followed = sides_of = unbound
 size_of = stopped = unbound
 
@@ -40,6 +43,7 @@ LEAST_HEIGHT = 32.0
 """Twice the factor on the rounding of a guard up to which a flight over it is not resolved: rounding adds up."""
 
 
+@cache
 def fixed_stops(model: Model, events: Crossings) -> dict[int, int]:
     """Return rows whose guard is a place of one coordinate and that change its velocity alone, with the coordinate."""
     found, moving = {}, {*model.positions, *model.velocities, "t"}
@@ -128,13 +132,13 @@ def put_rows(module: Module, model: Model, events: Crossings, *, is_located: boo
     fires = "{apart} and side_of(mode, {s}) * g[{k}] < 0.0 and is_watched(side_of(mode, {s}), {d})"
     goes_on = " and side_of(mode, {s}) * r[{k}] < 0.0"
     # what is beyond 0 by rounding and goes back was not the first
-    tests = [(row, fires + ("" if row.ends else goes_on)) for row in events.rows]
-    tests += [(row, fires) for row in events.rows] if is_located else []
+    tests = [(own, fires + ("" if own[1].ends else goes_on)) for own in rows]
+    tests += [(own, fires) for own in rows] if is_located else []
     module.define(
         "first_crossed(mode, g, r)",
         *(
             line
-            for (k, row, s, d), (_, test) in zip(rows * 2, tests, strict=False)
+            for (k, _, s, d), test in tests
             for line in (
                 f"if {test.format(k=k, s=s, d=d, apart=apart.get(k, 'True'))}:",
                 f"    return {float(k)}",
@@ -158,15 +162,8 @@ def put_rows(module: Module, model: Model, events: Crossings, *, is_located: boo
     module.define("is_end(k)", f"return {' or '.join(ends) or 'k != k'}")
     jumped = [f"(h[{k}] < 0.0 and h[{k}] != g[{k}])" for k, row, *_ in rows if row.ends]
     module.define("is_ended_by(g, h)", f"return {' or '.join(jumped) or 'False'}")
-    module.define(
-        "crossed(k, u, v, t, p)",
-        *(
-            line
-            for k, *_ in rows[:-1]
-            for line in (f"if k == {k}.0:", f"    return crossed_{k}(u, v, t, p)")
-        ),
-        f"return crossed_{rows[-1][0]}(u, v, t, p)",
-    )
+    behind = [f"crossed_{k}(u, v, t, p)" for k, *_ in rows]
+    _put_choice(module, "crossed(k, u, v, t, p)", dict(enumerate(behind[:-1])), behind[-1])
 
 
 def _put_contacts(
@@ -190,7 +187,11 @@ def _put_contacts(
     module.define(
         "least_pressure(mode, u, v, t, p)",
         "least = math.inf",
-        *((f"if mode > {every}:", "    q = guard_bends(u, v, t, p)", *pressed) if rows else ()),
+        *(
+            (f"if mode > {every}:", "    q = guard_curvatures(u, v, t, p)", *pressed)
+            if rows
+            else ()
+        ),
         "return least",
     )
     terms = [
@@ -201,27 +202,11 @@ def _put_contacts(
     module.define(
         "contacts_behind(mode, fired, g, h, r, q)", f"return {' + '.join(['0.0', *terms])}"
     )
-    module.define(
-        "is_unresolved(mode, fired, g, b, q)",
-        *(
-            line
-            for k in range(count)
-            for line in (
-                f"if fired == {float(k)}:",
-                f"    return is_too_short(side_of(mode, {2.0**k}), g[{k}], b[{k}], q[{k}])",
-            )
-        ),
-        "return False",
-    )
-    module.define(
-        "contact_with(fired)",
-        *(
-            line
-            for k in stops
-            for line in (f"if fired == {float(k)}:", f"    return {_contact(k, count)}")
-        ),
-        "return 0.0",
-    )
+    short = {
+        k: f"is_too_short(side_of(mode, {2.0**k}), g[{k}], b[{k}], q[{k}])" for k in range(count)
+    }
+    _put_choice(module, "is_unresolved(k, mode, g, b, q)", short, "False")
+    _put_choice(module, "contact_with(k)", {k: f"{_contact(k, count)}" for k in stops}, "0.0")
     still = _components("v", model)
     on_stop = {}
     for k, i in stops.items():
@@ -229,21 +214,20 @@ def _put_contacts(
         on_stop[k] = _components("u", model)
         on_stop[k][i] = f"place_{k}(u, v, t, p)"
     module.define("stopped(v, mode)", f"return {_joined(still)}")
-    module.define(
-        "placed(fired, u, v, t, p)",
-        *(
-            line
-            for k in stops
-            for line in (f"if fired == {float(k)}:", f"    return {_joined(on_stop[k])}")
-        ),
-        "return u",
-    )
+    places_of = {k: _joined(components) for k, components in on_stop.items()}
+    _put_choice(module, "placed(k, u, v, t, p)", places_of, "u")
     held = [f"free_{i}(mode) == 0.0" for i in range(model.coordinates)]
     is_every = len(set(stops.values())) == model.coordinates
     module.define(
         "is_at_rest(mode)",
         "return mode == 0.0" + (f" or ({' and '.join(held)})" if is_every else ""),
     )
+
+
+def _put_choice(module: Module, head: str, results: Mapping[int, str], otherwise: str) -> None:
+    """Write a function of the number k of a row, and more: the result that stands under that number."""
+    chosen = (f"if k == {float(k)}: return {result}" for k, result in results.items())
+    module.define(head, *chosen, f"return {otherwise}")
 
 
 def side_of(mode: float, place: float) -> float:
@@ -280,7 +264,13 @@ def has_just_left(side: float, value: float, rate: float, t: float) -> bool:
 
 
 def side_behind(
-    side: float, fired: bool, value: float, ahead: float, rate: float, bend: float, direction: float
+    side: float,
+    fired: bool,
+    value: float,
+    ahead: float,
+    rate: float,
+    curvature: float,
+    direction: float,
 ) -> float:
     """Return 1 for a guard that is above 0 behind an event, else 0.
 
@@ -290,11 +280,11 @@ def side_behind(
         The one before.
     fired
         Whether the event is its own, or its own was at the same time.
-    value, ahead, rate, bend
+    value, ahead, rate, curvature
         The guard before the event; the guard and its derivatives behind it.
     """
     if fired and abs(ahead) <= abs(value):
-        if rate == 0.0 and side * bend >= 0.0:
+        if rate == 0.0 and side * curvature >= 0.0:
             # it stays at 0 or goes back: what it is beyond 0 by rounding is no crossing
             return 0.5 - 0.5 * side
         return free_side(0.0, rate, side, direction)
@@ -316,34 +306,34 @@ def is_in_contact(mode: float, place: float) -> bool:
     return math.floor((mode - 1.0) / place) % 2 == 1
 
 
-def rests(is_there: bool, side: float, rate: float, bend: float, direction: float) -> float:
+def rests(is_there: bool, side: float, rate: float, curvature: float, direction: float) -> float:
     """Return 1 for a guard whose coordinate rests on the stop and is pressed against it, else 0.
 
     Parameters
     ----------
     is_there
         Whether the guard is 0.
-    rate, bend
+    rate, curvature
         Its first derivative by time, and the second one without the stop.
     """
-    stays = is_there and rate == 0.0 and side * bend < 0.0 and is_watched(side, direction)
+    stays = is_there and rate == 0.0 and side * curvature < 0.0 and is_watched(side, direction)
     return 1.0 if stays else 0.0
 
 
-def is_too_short(side: float, value: float, rate: float, bend: float) -> bool:
+def is_too_short(side: float, value: float, rate: float, curvature: float) -> bool:
     """Tell whether a guard that seems to have crossed 0 is on its way back, behind an event of its own.
 
-    It was beyond 0 by rounding already, and does not reach the side from which it came: ``rate^2/(2 bend)`` is how far
-    it would get.
+    It was beyond 0 by rounding already, and does not reach the side from which it came: ``rate^2/(2 curvature)`` is how
+    far it would get.
     """
-    return side * rate > 0.0 and rate * rate <= LEAST_HEIGHT * abs(bend * value)
+    return side * rate > 0.0 and rate * rate <= LEAST_HEIGHT * abs(curvature * value)
 
 
 def first_mode(u: float, v: float, t: float, p: P) -> float:
     """Return the mode at the beginning."""
     g, r = guards(u, v, t, p), guard_rates(u, v, t, p)
     mode = sides_of(g, r)
-    return mode + contacts_behind(mode, -1.0, g, g, r, guard_bends(u, v, t, p))
+    return mode + contacts_behind(mode, -1.0, g, g, r, guard_curvatures(u, v, t, p))
 
 
 def guard(u: float, v: float, t: float, p: P) -> float:
@@ -386,13 +376,13 @@ def settled(
 ) -> tuple[float, float, float]:
     """Return position, velocity and mode behind an event."""
     mode = mode_of(p)
-    g, b, q = guards(u, v, t, p), guard_rates(u, v, t, p), guard_bends(u, v, t, p)
+    g, b, q = guards(u, v, t, p), guard_rates(u, v, t, p), guard_curvatures(u, v, t, p)
     fired = first_crossed(mode, g, b)
     if fired < 0.0:
         return u, v, sides_followed(mode, g) + contacts_behind(mode, fired, g, g, b, q)
     if is_end(fired):
         return u, v, 0.0
-    if is_last or is_unresolved(mode, fired, g, b, q):
+    if is_last or is_unresolved(fired, mode, g, b, q):
         contact = contact_with(fired)
         if contact == 0.0:
             return u * math.nan, v * math.nan, mode
@@ -401,14 +391,14 @@ def settled(
     h, r = guards(ahead, own, t, p), guard_rates(ahead, own, t, p)
     if is_ended_by(g, h):
         return ahead, own, 0.0
-    bends = guard_bends(ahead, own, t, p)
-    contacts = contacts_behind(mode, fired, g, h, r, bends)
+    curvatures = guard_curvatures(ahead, own, t, p)
+    contacts = contacts_behind(mode, fired, g, h, r, curvatures)
     if contacts > contacts_of(mode):
         ahead = placed(fired, ahead, own, t, p)
-    return ahead, own, sides_behind(mode, fired, g, b, h, r, bends, t) + contacts
+    return ahead, own, sides_behind(mode, fired, g, b, h, r, curvatures, t) + contacts
 
 
-def is_counted(before: float, after: float, came: Any, goes: Any) -> bool:
+def counts_as_event(before: float, after: float, came: Any, goes: Any) -> bool:
     """Tell an event from a coordinate that leaves its stop, whose state does not change."""
     changed = size_of(goes[0] - came[0], goes[1] - came[1])
     return after == 0.0 or changed > 0.0 or not contacts_of(after) < contacts_of(before)

@@ -20,7 +20,9 @@ from vibsim.engine.kernel_stubs import P, State, called, unbound
 
 # bound by the kernel (`vibsim.engine.kernel_stubs`)
 GATHER = LOCATED = WORK = True
-first_mode = first_of = followed = guard = guard_on_mesh = held = is_at_rest = is_counted = unbound
+first_mode = first_of = followed = guard = guard_on_mesh = held = is_at_rest = counts_as_event = (
+    unbound
+)
 landed = lost = mode_of = powers = settled = spent = start = start_of = step = turning = (
     with_mode
 ) = unbound
@@ -237,7 +239,7 @@ def note_event(
     stats[case, LOST] = stats[case, LOST] + lost(came, goes, t, p)
     u = first_of(goes[0])
     since, point, resting = t, grid, stats[case, REST_TIME]
-    counted = is_counted(before, after, came, goes)
+    counted = counts_as_event(before, after, came, goes)
     if is_at_rest(before):
         since, point, before = resting, stats[case, HALTED_GRID], stats[case, HALTED]
     elif is_at_rest(after):

@@ -26,9 +26,9 @@ MOST_INLINE = 64
 _MODE = "mode"
 _FREE = "_free_"
 """Before the number of a coordinate: 0 where it rests on a stop, else 1."""
-_OF_CONTACTS = ("acceleration", "slopes", "guard_bends")
+_OF_CONTACTS = ("acceleration", "slopes", "guard_curvatures")
 """Functions whose formulas depend on what rests on a stop."""
-_TUPLES = ("guards", "guard_rates", "guard_bends")
+_TUPLES = ("guards", "guard_rates", "guard_curvatures")
 """Functions that return a tuple, however many results they have."""
 _MARK = "_"
 """Behind the names of states and parameters in a kernel."""
@@ -249,7 +249,7 @@ def _with_stops(model: Model, events: Crossings) -> list[Expression]:
     ]
 
 
-def _bends(model: Model, events: Crossings, rates: Sequence[Expression]) -> list[Expression]:
+def _curvatures(model: Model, events: Crossings, rates: Sequence[Expression]) -> list[Expression]:
     """Return the second derivatives of the guards by time: those of stops as if nothing rested on them.
 
     That of a guard with velocities in it would need the derivatives of the forces: it is 0.
@@ -258,8 +258,8 @@ def _bends(model: Model, events: Crossings, rates: Sequence[Expression]) -> list
     found: list[Expression] = []
     for k, (row, speed) in enumerate(zip(events.rows, rates, strict=True)):
         is_of_positions = not set(model.velocities) & set(tree(model, row.guard).names)
-        bend = rate(model, speed, None if k in stops else held)
-        found.append(bend if is_of_positions else Number(0.0))
+        curvature = rate(model, speed, None if k in stops else held)
+        found.append(curvature if is_of_positions else Number(0.0))
     return found
 
 
@@ -283,7 +283,7 @@ def _of_events(
                 for name, result, formulas in (
                     ("guards", "_guard", guards),
                     ("guard_rates", "_rate", rates),
-                    ("guard_bends", "_bend", _bends(model, model.events, rates)),
+                    ("guard_curvatures", "_curvature", _curvatures(model, model.events, rates)),
                 )
             }
             for name, place in places(model, model.events).items():

@@ -69,7 +69,7 @@ def settled(
     return u, v, 1.0 if v > 0.0 else -1.0
 
 
-def is_counted(before: float, after: float, came: Any, goes: Any) -> bool:
+def counts_as_event(before: float, after: float, came: Any, goes: Any) -> bool:
     """Tell whether a change of the mode is an event: each is."""
     return True
 

@@ -247,7 +247,7 @@ def _put_events(module: Module, model: Model, stepper: Stepper) -> None:
     kind = _OF_EVENTS[type(model.events)]
     for name in (
         *("first_mode", "guard", "guard_on_mesh", "landed", "settled", "followed", "held"),
-        *("is_counted", "turning", "spent", "lost"),
+        *("counts_as_event", "turning", "spent", "lost"),
     ):
         collect(module, getattr(kind, name), name, {})
     if kind is not crossings:

@@ -52,7 +52,7 @@ velocity are vectors (`vibsim.engine.coordinates`); q and w are either:
 ``settled(u, v, t, before, is_last, p)``                        position, velocity and mode behind an event; `before`:
                                                                 position a step before, infinite if located; `is_last`:
                                                                 a step has no room for more
-``is_counted(before, after, came, goes)``                       whether a change of mode and state counts as an event
+``counts_as_event(before, after, came, goes)``                  whether a change of mode and state counts as an event
 ``is_at_rest(mode)``                                            whether all coordinates rest
 ``followed(u, v, t, p)``                                        the mode at the end of a smooth piece, without an event
 ``held(v)``                                                     the velocity of a member at rest that had this one
@@ -60,7 +60,7 @@ velocity are vectors (`vibsim.engine.coordinates`); q and w are either:
                                                                 costs in units of ``cost``
 ``turning(before, after, v, own)``                              1 for an event between two modes and velocities that is
                                                                 a peak, -1 for a trough, 0 for neither
-``guards(u, v, t, p)``, ``guard_rates``, ``guard_bends``        the formulas of `vibsim.models.events.Crossings`, and
+``guards(u, v, t, p)``, ``guard_rates``, ``guard_curvatures``   the formulas of `vibsim.models.events.Crossings`, and
                                                                 their first and second derivatives by time
 ``crossed(k, u, v, t, p)``, ``is_end(k)``                       the state behind event k, and whether it ends the motion
 ``is_ended_by(g, h)``                                           whether a jump of the guards from g to h ends the motion
