@@ -346,7 +346,7 @@ def test_sizes_near_the_ends_of_double_precision_have_no_finer_one() -> None:
 def test_every_reason_has_a_sentence() -> None:
     from vibsim.convergence.study.sentences import SENTENCES, Setting, describe
 
-    assert set(SENTENCES) == {*REASONS, "interpolation", "growing", "noisy"}
+    assert set(SENTENCES) == {*REASONS, "interpolation", "growing", "noisy", "contradicted"}
     for reason, status in REASONS.items():
         for count in (1, 2, 3):
             levels = judge((0.4, 0.2, 0.1)[:count], [np.nan] * count).levels

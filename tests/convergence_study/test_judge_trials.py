@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -335,3 +336,65 @@ def test_a_value_that_is_not_finite_counts_wherever_it_is(bad: float) -> None:
     assert judge(h, levels, order=2).reason == "non_finite"
     found = judge(h, both, order=2, members=True)
     assert [one.reason for one in found] == ["asymptotic", "non_finite"]
+
+
+@pytest.mark.parametrize("off", [1e-2, 1.0, -1.0])
+@pytest.mark.parametrize("shape", [1.0, np.linspace(0.5, 1.0, 6)])
+@pytest.mark.parametrize("known", [False, True])
+@pytest.mark.parametrize("count", [5, 6])
+def test_a_finest_level_that_contradicts_the_others_is_not_set_aside(
+    off: float, shape: Any, known: bool, count: int
+) -> None:
+    """The last run stopped a step early, say: an order of the others is no verdict on all."""
+    h = [0.1 / 2**k for k in range(count)]
+    values = [shape * (1.0 + x**2 + 0.3 * x**3) for x in h]
+    values[-1] = values[-1] + off
+    for question in ({"order": 2.0}, {"at_least": 2.0}, {}, {"order": 1.0}):
+        verdict = judge(h, values, exact=shape if known else None, **question)
+        assert verdict.status == "INCONCLUSIVE"
+        assert "but finer ones contradict them" in verdict.sentence
+        assert verdict.advice.startswith("Check the step size, the last step and the input")
+
+
+def test_noise_that_ends_a_window_is_no_contradiction() -> None:
+    h = [0.1 / 2**k for k in range(7)]
+    values = [1.0 + x**2 + 5e-6 * math.sin(2.3e4 * x) for x in h]
+    verdict = judge(h, values, order=2)
+    assert (verdict.status, verdict.h_used[-1] > h[-1]) == ("PASS", True)
+    assert "do not show this order" in verdict.sentence
+
+
+@pytest.mark.parametrize("limit", [0.1022, 10.02, 0.2022])
+def test_numbers_of_as_many_digits_are_known_to_those_of_the_finest_level(limit: float) -> None:
+    """From 0.097 to 0.102 the last of five digits changes its place: a unit of the coarsest level is too small."""
+    h, rng = [3.0**-k for k in range(4)], np.random.default_rng(8)
+    for _ in range(20):
+        true = limit * (1.0 + 1e-4 * rng.uniform(-20.0, 20.0))
+        values = [float(f"{true * (1.0 - 0.045 * x**2):.5g}") for x in h]
+        verdict = judge(h, values, order=2)
+        if verdict.status == "PASS":
+            assert abs(verdict.best - true) <= verdict.best_bound
+            assert abs(values[-1] - true) <= verdict.error_bound
+
+
+@pytest.mark.parametrize("question", [{}, {"at_least": 1.0}, {"order": 2.0}])
+@pytest.mark.parametrize("exact", [0.2635, -100.0])
+def test_an_exact_value_far_from_all_levels_is_missed_whatever_the_order(
+    question: dict[str, float], exact: float
+) -> None:
+    """A wave equation whose coefficient is 2 % too large: the levels show an order, but not surely which."""
+    h = [1.0 / n for n in (20, 60, 180, 540)]
+    values = [0.29915139, 0.29491939, 0.29445536, 0.29440035]
+    assert judge(h, values, exact=exact, **question).reason == "wrong_limit"
+
+
+def test_an_exact_value_may_be_far_from_levels_that_do_not_approach_each_other() -> None:
+    """Levels that have only begun to fall may go anywhere."""
+    assert judge([1.0, 0.5, 0.25, 0.125], [0.0, 1.0, 2.0, 2.5], exact=100.0).status != "FAIL"
+
+
+@pytest.mark.parametrize("printed", [10.5, 10.4, 0.125])
+def test_a_number_is_no_wrong_limit_of_what_is_printed_like_it(printed: float) -> None:
+    places = len(str(printed).partition(".")[2])
+    exact = printed - 0.4 * 10.0**-places
+    assert judge([0.16, 0.08, 0.04, 0.02], [printed] * 4, order=2, exact=exact).status != "FAIL"

@@ -7,6 +7,7 @@ A power *dominates* where no other one has more than a tenth of it. The table of
 | a value that is not finite | FAIL ``non_finite`` |
 | fewer than three levels | INCONCLUSIVE ``too_few_levels`` |
 | all differences are noise as expected, but not the distance from the exact solution | FAIL ``wrong_limit`` |
+| they fall like the lowest power at least, and the exact solution is far away (`_is_far`) | FAIL ``wrong_limit`` |
 | the levels surely show an expansion with another limit than the exact solution (`is_missed`) | FAIL ``wrong_limit`` |
 | all differences are noise as expected | PASS ``exact`` |
 | a power within the tolerance of the expected one dominates, surely, and was measured | PASS ``asymptotic`` |
@@ -15,7 +16,8 @@ A power *dominates* where no other one has more than a tenth of it. The table of
 | errors that change their sign from level to level are | INCONCLUSIVE ``oscillating`` |
 | anything else | INCONCLUSIVE ``pre_asymptotic`` |
 
-Nothing is decided on an order where the measured one is below half of the least of an expansion.
+Nothing is decided on an order where the measured one is below half of the least of an expansion, and none where levels
+behind the window contradict it (`_is_contradicted`).
 
 *Surely* is a probability above ``1 - RISK``. Where it rests on three levels and coarser ones do not fit them, it is one
 above ``1 - RISK_OF_THREE`` for a FAIL, and for a PASS that no exact solution confirms: three levels may fall like a
@@ -37,6 +39,7 @@ import numpy as np
 from vibsim.convergence.best_value import best_value, is_missed, norm
 from vibsim.convergence.error_model.hypotheses import Promise
 from vibsim.convergence.error_model.posterior import LEFT_OUT, Ladder, Posterior, posterior
+from vibsim.convergence.error_model.priors import GROWTHS
 from vibsim.convergence.ladder_blocks import in_blocks
 from vibsim.convergence.likely_powers import (
     OUTSIDE,
@@ -53,7 +56,10 @@ from vibsim.convergence.thresholds import (
     DEFINITE,
     FURTHER_APART,
     HALF_SPACING,
+    LEAST_CANDIDATE,
     LEAST_WITH_LIMIT,
+    LEVELS_OF_A_FALL,
+    MISSED_FAR,
     NOISE_FACTOR,
     RISK,
     RISK_OF_THREE,
@@ -162,7 +168,7 @@ class _Evaluation:
     posterior: Posterior
     sides: Floats  # probabilities of a lower, an expected and a higher power, shape (3, ladder)
     exact: Flags
-    away: Flags  # only noise, and not the exact solution
+    away: Flags  # surely not the exact solution, whatever the order is
     is_confirmed: bool  # whether an exact solution is known
     cut_short: Flags  # whether noise that may be far less than predicted ends the window: nothing is decided
 
@@ -221,7 +227,8 @@ def _evaluate(ladder: Ladder, question: Question, left_out: float) -> _Evaluatio
     away = np.zeros_like(exact)
     if ladder.exact_known:
         factor = question.noise_factor if question.limit_factor is None else question.limit_factor
-        away = exact & (np.sqrt(ladder.gram[:, -1, -1]) > factor * ladder.floor[:, -1])
+        away = np.sqrt(ladder.gram[:, -1, -1]) > factor * ladder.floor[:, -1]
+        away &= exact | _is_far(ladder)
     cut_short = _is_cut_short(ladder, believed)
     return _Evaluation(question, believed, of_sides, exact, away, ladder.exact_known, cut_short)
 
@@ -290,7 +297,8 @@ def _with_less_noise(ladder: Ladder, found: _Evaluation, question: Question) -> 
     first = replace(found.some(rows), cut_short=none)
     less = replace(ladder.some(rows), floor=_least_noise(ladder)[rows])
     other = replace(_evaluate(less, question, LEFT_OUT), cut_short=none)
-    own, others = (_reasons(one, none) for one in (first, other))
+    own = _reasons(ladder.some(rows), first, none)
+    others = _reasons(less, other, none)
     excluded = _probability(own, other) < RISK
     added = ~is_one_of(own, *DECIDED) & is_one_of(others, *DECIDED)
     added &= _probability(others, first) >= RISK
@@ -307,12 +315,48 @@ def _probability(codes: Codes, found: _Evaluation) -> Floats:
     return np.where(is_one_of(codes, *DECIDED), right, 1.0)
 
 
-def _reasons(found: _Evaluation, missed: Flags) -> Codes:
+def _is_far(ladder: Ladder) -> Flags:
+    """Say where differences fall at least like the lowest power of an expansion, and the exact solution is far away.
+
+    Then less is to come than that power leaves, and both together are much less than the distance.
+    """
+    n = len(ladder.h)
+    if n < LEVELS_OF_A_FALL:
+        return np.zeros(len(ladder.gram), dtype=bool)
+    sizes = np.sqrt(np.diagonal(ladder.gram, axis1=1, axis2=2))
+    powers = on_arrays.power(ladder.h, LEAST_CANDIDATE)
+    rates = sizes[:, : n - 1] / (powers[:-1] - powers[1:])
+    to_come = rates[:, -1] * powers[-1]
+    moved = np.sum(sizes[:, : n - 1], axis=1)
+    falls = np.all(rates[:, 1:] <= rates[:, :-1], axis=1)
+    return np.asarray(falls & (sizes[:, -1] > MISSED_FAR * (moved + to_come)))
+
+
+def _is_contradicted(ladder: Ladder, found: _Evaluation) -> Flags:
+    """Say where levels behind the most probable window differ by more than those at its end, and than predicted noise.
+
+    What a window leaves out behind it is noise. Noise that begins with more than the last difference in the window, or
+    that grows faster than round-off, would be seen there: a level behind it is wrong, or those before it are.
+    """
+    sizes = np.sqrt(np.diagonal(ladder.gram, axis1=1, axis2=2))[:, : len(ladder.h) - 1]
+    last = likely_window(found.posterior)[1]
+    at_end = np.take_along_axis(sizes, last[:, None] - 1, axis=1)
+    is_behind = np.arange(sizes.shape[1]) >= last[:, None]
+    finer = np.where(
+        is_behind, ladder.h[np.minimum(last + 1, len(ladder.h) - 1)][:, None] / ladder.h[1:], 1.0
+    )
+    at_most = at_end * on_arrays.power(finer, GROWTHS[-1])
+    noise = found.question.noise_factor * (ladder.floor[:, :-1] + ladder.floor[:, 1:])
+    return np.asarray(np.any(is_behind & (sizes > np.maximum(at_most, noise)), axis=1))
+
+
+def _reasons(ladder: Ladder, found: _Evaluation, missed: Flags) -> Codes:
     """Return the reasons of the verdicts, as positions in `REASON_NAMES`; see the head of this module."""
     p, (lower, right, higher) = found.posterior, found.sides
     risk = np.where(found.by_three, RISK_OF_THREE, RISK)
     # expansions begin with the order 1/2, whatever two powers fit levels that do not approach each other
     may_decide = ~found.cut_short & ~(found.order < LEAST_WITH_LIMIT)
+    may_decide &= ~_is_contradicted(ladder, found)
     another = (lower + higher > 1.0 - risk) & (right < risk) & may_decide
     if np.any(another):
         another &= most_near_a_power(p) > DEFINITE
@@ -346,7 +390,7 @@ def _numbers(
         ends = zip(interval(of_limit, order), (low, high), strict=True)
         low, high = (np.where(missed, a, b) for a, b in ends)
     return {
-        "reason": _reasons(found, missed),
+        "reason": _reasons(ladder, found, missed),
         "order": order,
         "low": np.where(exact, np.nan, low),
         "high": np.where(exact, np.nan, high),

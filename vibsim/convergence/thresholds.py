@@ -52,6 +52,9 @@ BEST_BOUND = 3.0
 # A limit is missed that is so many bounds of the best value away from it, and at least so large a part of the estimated
 # error of the finest level. [calibrated]
 MISSED, MISSED_SHARE = 3.0, 0.5
+# Whatever the order, an exact solution is missed that is so many times further away than all that so many levels or
+# more have moved, and have to move, by differences that fall. [convention]
+MISSED_FAR, LEVELS_OF_A_FALL = 5.0, 4
 # Noise may be so many times its prediction where levels are said to differ by nothing else; the same of noise that a
 # user states, which differences of normal noise exceed in one of 200. [convention]
 NOISE_FACTOR, STATED_NOISE_FACTOR = 10.0, 2.0

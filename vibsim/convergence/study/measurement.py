@@ -56,27 +56,37 @@ def scale_of(values: Floats) -> Floats:
     return np.asarray(np.ldexp(1.0, np.frexp(np.where(size > 0.0, size, 1.0))[1] - 1))
 
 
-def half_last_digit(values: Floats, few: int = FEW_DIGITS) -> float:
-    """Return half a unit of the last decimal place of finite values, shape (n, points), of no more than `few` digits.
+def half_last_digits(values: Floats, few: int = FEW_DIGITS, *, of_binary: bool = False) -> Floats:
+    """Return half a unit of the last decimal digit of the values of each level, shape (n,).
 
-    It is how far each of them is from what it was before it was printed or stored with these digits; else 0.
+    It is how far values are from what they were before they were printed or stored with no more than `few` digits; else
+    0. All values may have as many decimal places, or as many digits: the last digit of larger ones is then at another
+    place, and the larger unit counts. Finite values have the shape (n, points).
+
+    Binary fractions have few digits anyway: without `of_binary` they are taken as they are.
     """
-    sampled = values[:, :: -(-values.shape[1] // SAMPLED)]
-    largest = float(np.max(np.abs(sampled)))
-    size = Decimal(repr(largest)).adjusted()
-    last = size
+    none, sampled = np.zeros(len(values)), values[:, :: -(-values.shape[1] // SAMPLED)]
+    largest, digits = float(np.max(np.abs(sampled))), 1
+    size = last = Decimal(repr(largest)).adjusted()
     for value in sampled[::-1].flat:
         number = Decimal(repr(float(value))).normalize()
         if number:
             last = min(last, int(number.as_tuple().exponent))
+            digits = max(digits, len(number.as_tuple().digits))
         if size - last >= few:
-            return 0.0
+            return none
     with np.errstate(over="ignore"):
-        is_binary = np.all(sampled * BINARY == np.rint(sampled * BINARY))
+        are_binary = sampled * BINARY == np.rint(sampled * BINARY)
         is_whole = np.all(sampled == np.rint(sampled))
-    if is_binary and not (is_whole and largest >= COUNTED):
-        return 0.0
-    return float(Decimal(5).scaleb(min(last, 0) - 1 if is_whole else last - 1))
+    if np.all(are_binary) and not (largest >= COUNTED if is_whole else of_binary):
+        return none
+    units = np.full(len(values), min(last, 0) if is_whole else last)
+    if not is_whole:
+        # the digits of 0.5 or 1 may be all that they have
+        own = np.max(np.where(are_binary, 0.0, np.abs(sampled)), axis=1)
+        sizes = [Decimal(repr(x)).adjusted() if x else last for x in own.tolist()]
+        units = np.maximum(units, np.array(sizes) - digits + 1)
+    return np.array([float(Decimal(5).scaleb(unit - 1)) for unit in units.tolist()])
 
 
 def half_written(number: Decimal) -> float:

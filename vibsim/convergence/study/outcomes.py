@@ -13,7 +13,7 @@ from vibsim.convergence.reasons import is_one_of
 from vibsim.convergence.study.measurement import (
     SINGLE,
     Measurement,
-    half_last_digit,
+    half_last_digits,
     measurement,
     step_of_values,
 )
@@ -128,7 +128,7 @@ def _rounding_of_exact(one: Outcome, exact: Floats, half: float | None) -> float
     if one.reason not in ("wrong_limit", "pre_asymptotic", "round_off", "oscillating"):
         return 0.0
     if half is None:
-        half = half_last_digit(exact[None], EXACT_DIGITS)
+        half = float(half_last_digits(exact[None], EXACT_DIGITS)[0])
     at_most = MOST_ROUNDED * float(np.max(np.abs(exact)))
     return half if SEEN * abs(one.error) <= half <= at_most else 0.0
 
@@ -189,17 +189,17 @@ def _allow_for_rounding(
 
     What is decided in both cases has an interval that holds both.
     """
-    half = np.array([half_last_digit(rows) for rows in part])
-    near = decided.error * measured.scale <= MOST_UNITS * half
+    half = np.array([half_last_digits(rows) for rows in part])
+    near = decided.error * measured.scale <= MOST_UNITS * half[:, -1]
     doubtful = is_one_of(decided.reason, *DECIDED) | (
         near & is_one_of(decided.reason, "wrong_limit")
     )
-    rows = np.flatnonzero((half > 0.0) & doubtful)
+    rows = np.flatnonzero((half[:, -1] > 0.0) & doubtful)
     if not len(rows):
         return
     ladder = measured.ladder.some(rows)
     # of a rounding all values within half a unit are equally probable
-    rounding = (half / math.sqrt(3.0) / measured.scale)[rows, None]
+    rounding = (half / math.sqrt(3.0) / measured.scale[:, None])[rows]
     ladder = replace(ladder, floor=np.maximum(ladder.floor, rounding))
     doubted = assess(ladder, question.with_stated_noise)
     same = doubted.reason == decided.reason[rows]
@@ -259,10 +259,13 @@ def _decide(
         # added up one by one, so that a member has the same digits alone and among others
         one.best = sum((w * row for w, row in zip(weights, part, strict=True)), 0.0 * part[0])
         added_up = ADDED_UP_IN_SINGLE * SINGLE * measured.norms[k, -1] * measured.are_single[k]
-        unit = max(half_last_digit(part), step_of_values(part), float(added_up))
-        one.rounded = unit * float(np.sum(np.abs(weights)))
-    if one.reason == "wrong_limit" and abs(one.error) <= rounding * scale:
-        one.reason = "round_off"
+        units = np.maximum(half_last_digits(part), max(step_of_values(part), float(added_up)))
+        one.rounded = float(np.sum(units * np.abs(weights)))
+    if one.reason == "wrong_limit":
+        # what was printed as 10.5 was 10.46
+        half = float(half_last_digits(part, of_binary=True)[-1])
+        if abs(one.error) <= max(rounding * scale, half):
+            one.reason = "round_off"
     bound_of_best = float(decided.best_bound[k]) * scale
     if one.reason == "wrong_limit" and one.rounded and one.best is not None and truth is not None:
         away = float(np.max(np.abs(_distances(one.best[None], truth, one.is_number, scale))))

@@ -96,6 +96,12 @@ SENTENCES: Mapping[str, tuple[str, str]] = MappingProxyType(
             "{estimate}.",
             NOT_FINER,
         ),
+        "contradicted": (
+            "The levels of {quantity} down to {size} = {last_used} fit order {order}, but finer ones contradict them: "
+            "they differ by more than the levels before them.",
+            "Check the step size, the last step and the input of the finest runs. If they are right, add a finer level"
+            "{such_as}.",
+        ),
         "growing": (
             "The differences of {quantity} grow towards the finer levels{estimate}.",
             "Check that {size} is a step size, not a number of cells or steps, and that each level has its own. If so, "
@@ -129,7 +135,7 @@ SENTENCES: Mapping[str, tuple[str, str]] = MappingProxyType(
     }
 )
 """Reason to the templates of sentence and advice; ``interpolation`` is a case of ``not_applicable``, ``noisy`` is a
-case of ``pre_asymptotic``, ``growing`` of that and of ``round_off``."""
+case of ``pre_asymptotic``, as is ``contradicted``, and ``growing`` of that and of ``round_off``."""
 
 
 def describe(facts: LadderVerdict, setting: Setting) -> tuple[str, str]:
@@ -137,6 +143,8 @@ def describe(facts: LadderVerdict, setting: Setting) -> tuple[str, str]:
     key = "interpolation" if setting.interpolation else facts.reason
     if key == "pre_asymptotic" and _is_noise_seen(facts, setting):
         key = "noisy"
+    elif key == "pre_asymptotic" and _is_contradicted(facts):
+        key = "contradicted"
     elif facts.order is not None and facts.order < 0.0 and _is_growth(facts, setting):
         key = "growing"
     phrases = _phrases(facts, setting)
@@ -147,7 +155,7 @@ def describe(facts: LadderVerdict, setting: Setting) -> tuple[str, str]:
         opposite_part(
             facts.reason, facts.order, facts.expected if facts.at_least is None else facts.at_least
         ),
-        _interval(facts),
+        "" if key == "contradicted" else _interval(facts),
         _error(facts),
         _best(facts),
         _together(setting),
@@ -168,6 +176,15 @@ def _is_noise_seen(facts: LadderVerdict, setting: Setting) -> bool:
     """Say whether the finest difference may be the stated noise: a finer level would show no more."""
     finest = facts.levels[-2:][0].difference
     return finest is not None and abs(finest) <= NOISE_SEEN * setting.noise
+
+
+def _is_contradicted(facts: LadderVerdict) -> bool:
+    """Say whether finer levels than those that fit an order differ by more than the finest two of these."""
+    if not facts.h_used:
+        return False
+    sizes = [abs(level.difference or 0.0) for level in facts.levels[:-1]]
+    last = [level.h for level in facts.levels].index(facts.h_used[-1])
+    return max(sizes[last:], default=0.0) > sizes[last - 1]
 
 
 def _is_growth(facts: LadderVerdict, setting: Setting) -> bool:
@@ -201,6 +218,7 @@ def _phrases(facts: LadderVerdict, setting: Setting) -> dict[str, Any]:
     return {
         "quantity": facts.quantity,
         "order": order_with_interval(facts),
+        "last_used": number(facts.h_used[-1], 6) if facts.h_used else "",
         "as_expected": as_expected,
         "wanted": wanted,
         "value": "value" if facts.is_number else "values",
