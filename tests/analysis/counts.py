@@ -25,7 +25,7 @@ from synthetic import Ladder as Truth
 from vibsim.comparison import order_evidence
 from vibsim.convergence.assessment import Question, assess
 from vibsim.convergence.error_model.posterior import Ladder
-from vibsim.core.vocabulary import REASON_NAMES, STATUSES
+from vibsim.core.vocabulary import REASON_NAMES, REASONS
 
 HEAD = """\
 | seed | decided by | right PASS | false PASS | mixed PASS | false FAIL | decidable left open |
@@ -109,8 +109,9 @@ def tally(seed: int, folder: Path, number: int = 42, size: int = 55) -> tuple[Co
         ladder = ladder_of(group, read)
         for order in ORDERS:
             a = assess(ladder, Question(order))
-            for truth, status, reason in zip(group.ladders, a.status, a.reason, strict=True):
-                by_model.add(truth, order, STATUSES[status], REASON_NAMES[reason])
+            for truth, place in zip(group.ladders, a.reason, strict=True):
+                reason = REASON_NAMES[place]
+                by_model.add(truth, order, REASONS[reason], reason)
     return by_pipeline, by_model
 
 

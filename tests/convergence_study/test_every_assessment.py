@@ -11,7 +11,7 @@ from vibsim import judge
 from vibsim.convergence.assessment import Assessment
 from vibsim.convergence.error_model.posterior import Ladder
 from vibsim.convergence.study import outcomes
-from vibsim.core.vocabulary import REASON_NAMES, REASONS, STATUSES
+from vibsim.core.vocabulary import REASON_NAMES, REASONS
 
 H = [0.4, 0.2, 0.1, 0.05]
 
@@ -23,7 +23,6 @@ def decided(ladder: Ladder, reason: str, *, known: bool) -> Assessment:
     weights = np.full((*shape, n), 0.0 if known else np.nan)
     weights[..., -1] += 1.0
     return Assessment(
-        status=np.full(shape, STATUSES.index(REASONS[reason]), dtype=np.int8),
         reason=np.full(shape, REASON_NAMES.index(reason), dtype=np.int8),
         order=number,
         low=0.5 * number,

@@ -59,21 +59,13 @@ def _by_level(block: MemberBlock, of: Callable[[MemberBlock, int], Floats]) -> F
 
 def _theory(block: MemberBlock) -> Table:
     """Return growth, frequency and phase error, predicted and measured."""
-    known, oscillation_measured = predicted_oscillation, oscillation
+    known, seen = predicted_oscillation, oscillation
     rows: tuple[tuple[str, str, str, Callable[..., Floats], Callable[..., Floats]], ...] = (
-        ("growth", GROWTH, "1", known.growth_per_period, oscillation_measured.growth_of_motion),
-        (
-            "frequency",
-            "angular frequency",
-            "rad s-1",
-            known.frequency,
-            oscillation_measured.frequency,
-        ),
-        ("phase_error", EARLY, "s", known.phase_error, oscillation_measured.phase_error),
+        ("growth", GROWTH, "1", known.growth_per_period, seen.growth_of_motion),
+        ("frequency", "angular frequency", "rad s-1", known.frequency, seen.frequency),
+        ("phase_error", EARLY, "s", known.phase_error, seen.phase_error),
     )
-    by_recurrence = all(
-        oscillation_measured.has_recurrence(block, level) for level in block.grid.levels
-    )
+    by_recurrence = all(seen.has_recurrence(block, level) for level in block.grid.levels)
     method = RECURRENCE if by_recurrence else PEAKS
     predicted: Table = {}
     measured: Table = {}

@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from vibsim.apriori.table_corners import TableCorners, has_tables, is_on_a_point, table_corners
+from vibsim.apriori.table_corners import has_tables, is_on_a_point, table_corners
 from vibsim.core.array_types import Flags, Floats, Integers
 from vibsim.core.record import Record, Variable
 from vibsim.core.vocabulary import MEMBER
@@ -37,13 +37,18 @@ HALVINGS = 40
 """Halvings of a step that find the place of a corner. [convention]"""
 ROUGH = 2.0
 """Power that a corner of the force itself leaves: one of its slope leaves less than most schemes do. [convention]"""
+OF_A_STEP = 0.5
+"""Part of ``s dt^2`` that an extrapolation over levels may be off by where the slope turns by s. [convention]"""
 MOST_SMOOTH = 8
 """A jump of a higher derivative than this one is none. [convention]"""
 
 
 @dataclass(frozen=True)
 class Corners:
-    """The roughest corner that steps feel of every scheme and member, at its first passage; shape (scheme, case)."""
+    """The roughest corner that steps feel of every scheme and member, at its first passage; shape (scheme, case).
+
+    Those of tables are apart from those of formulas: they are at the same times for every scheme, shape (case,).
+    """
 
     power: Floats
     """The highest power of dt that stays regular, k + 1; NaN where there is no corner."""
@@ -55,14 +60,25 @@ class Corners:
     least_time: Floats
     near_a_point: Flags
     """Whether the roughest corner lies within a step of the finest level beside a point that all levels share."""
-    tables: TableCorners
-    """Those of the tables of the force; all above are of formulas."""
+    table_time: Floats
+    """The first corner of a table within a step of the coarsest level; NaN where there is none."""
+    table_turns: Floats
+    """All changes of the slope of tables together over the largest change."""
+    table_rate: Floats
+    """The same over the largest force, 1/s."""
+
+    @property
+    def of_tables(self) -> Flags:
+        """Which members have corners of tables within steps, shape (case,)."""
+        return np.isfinite(self.table_time)
 
     def unseen(self, end: Floats, steps: Sequence[int], omega_dt: Floats) -> Floats:
         """Return which part of its size a quantity may be off by at a jump or corner of the force, (scheme, case).
 
         Beside a point that all levels share they make the same error there, which no level shows. Within a step of the
-        finest level it is ``(w dt)^(k+1)`` at most, or that part of the time since, where that is shorter.
+        finest level it is ``(w dt)^(k+1)`` at most, or that part of the time since, where that is shorter. Of a table,
+        an impulse J makes the velocity wrong by J and the position by J/w. A force of size p which turns by s moves
+        them by p/w^2, and s/w^2, at least.
 
         Parameters
         ----------
@@ -75,7 +91,9 @@ class Corners:
         with np.errstate(invalid="ignore", divide="ignore"):
             part = np.minimum(np.fmax(omega_dt, dt / (end - self.least_time)), 1.0)
             part = np.where(self.least <= ROUGH, on_arrays.power(part, self.least), 0.0)
-        return part + self.tables.unseen(end, dt, omega_dt)
+            angle = np.fmax(omega_dt, dt / (end - self.table_time))
+            turned = OF_A_STEP * angle * np.fmax(angle * self.table_turns, dt * self.table_rate)
+        return part + np.where(self.of_tables, turned, 0.0)
 
 
 @cache
@@ -119,7 +137,7 @@ def corners_of(model: Model, finest: Record, group: Members, dt: Floats) -> Corn
     none = np.full((schemes, cases), np.nan)
     if not switches_of(model) or samples < 2:
         nowhere = np.zeros(none.shape, dtype=bool)
-        return Corners(none, none, np.full(none.shape, -1), none, none, nowhere, tables)
+        return Corners(none, none, np.full(none.shape, -1), none, none, nowhere, *tables)
     number = np.arange(samples) * int(np.asarray(finest.attrs["every"]).item())
     t = number * (group.end / int(np.asarray(finest.attrs["steps"]).item()))[:, None]
     held = sides(model, {name: np.repeat(x, samples) for name, x in numbers.items()})
@@ -131,7 +149,7 @@ def corners_of(model: Model, finest: Record, group: Members, dt: Floats) -> Corn
     )
     away = np.abs(time - np.round(time / dt) * dt)
     near = away < group.end / int(np.asarray(finest.attrs["steps"]).item())
-    return Corners(power, time, switch, least, least_time, near, tables)
+    return Corners(power, time, switch, least, least_time, near, *tables)
 
 
 def _has_event(finest: Record, t: Floats, schemes: int) -> Flags:
@@ -284,5 +302,5 @@ def corner_variables(model: Model, corners: Corners) -> dict[str, Variable]:
         }
     if has_tables(model):
         words = "first time at which a table of the force has a corner within a step"
-        found["table_corner_time"] = Variable.of(("case",), corners.tables.time, words, "s")
+        found["table_corner_time"] = Variable.of(("case",), corners.table_time, words, "s")
     return found

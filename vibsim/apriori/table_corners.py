@@ -8,7 +8,6 @@ level shows. Steps that end at a point have no such error there.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -20,41 +19,10 @@ ON_A_POINT = 1e-6
 """Part of a step within which a corner is at its end. [convention]"""
 STRAIGHT = 1e-9
 """A slope that changes by less than this part of the largest one is the rounding of a straight line. [convention]"""
-OF_A_STEP = 0.5
-"""Part of ``s dt^2`` that an extrapolation over levels, with their weights, may be off by. [convention]"""
-
 PULSE_RATIO = 2.0
 """A pulse leaves the values at the grid points around it by more than so many times their range, ..."""
 SMALLEST_PULSE = 1e-3
 """... and by this part of the largest force. [convention]"""
-
-
-@dataclass(frozen=True)
-class TableCorners:
-    """The corners within steps of the coarsest level, of every member, shape (case,)."""
-
-    time: Floats
-    """The first one; NaN where there is none."""
-    turns: Floats
-    """All changes of slope together over the largest change."""
-    rate: Floats
-    """The same over the largest force, 1/s."""
-
-    @property
-    def exist(self) -> Flags:
-        """Which members have any."""
-        return np.isfinite(self.time)
-
-    def unseen(self, end: Floats, dt: Floats, omega_dt: Floats) -> Floats:
-        """Return which part of its size a quantity may be off by, shape (case,), with steps of the finest level.
-
-        An impulse J makes the velocity wrong by J and the position by J/w. A force of size p which turns by s moves
-        them by p/w^2, and s/w^2, at least.
-        """
-        with np.errstate(invalid="ignore", divide="ignore"):
-            angle = np.fmax(omega_dt, dt / (end - self.time))
-            part = OF_A_STEP * angle * np.fmax(angle * self.turns, dt * self.rate)
-        return np.where(self.exist, part, 0.0)
 
 
 def is_on_a_point(t: Floats, dt: Floats) -> Flags:
@@ -72,9 +40,10 @@ def has_tables(model: Model) -> bool:
 
 def table_corners(
     model: Model, parameters: Mapping[str, Floats], end: Floats, dt: Floats
-) -> TableCorners:
-    """Find the corners of tables within steps of length dt.
+) -> Floats:
+    """Find the corners of tables within steps of length dt: the first one, and how much they turn, shape (3, case).
 
+    That is all changes of slope together, over the largest change and over the largest force; NaN without a corner.
     `parameters` are those of the members by name, each of shape (case,), as are `end` and `dt`.
     """
     found = np.full((3, len(end)), np.nan)
@@ -82,13 +51,13 @@ def table_corners(
         for case in range(len(end)):
             own = {name: x[case] for name, x in parameters.items()}
             found[:, case] = _of_member(model, own, float(end[case]), float(dt[case]))
-    return TableCorners(*found)
+    return found
 
 
 def _of_member(
     model: Model, parameters: Mapping[str, float], end: float, dt: float
 ) -> tuple[float, float, float]:
-    """Return what `TableCorners` holds of one member."""
+    """Return what `table_corners` finds of one member."""
     first, total, sharpest, largest = np.inf, 0.0, 0.0, 0.0
     for t, force in _histories(model, parameters):
         slopes = np.diff(force) / np.diff(t)

@@ -359,12 +359,8 @@ class _Phrases(OrderContext):
         word = "more slowly" if self.reason == "order_low" else "faster"
         expected = self.notation.number(self.expected)
         hidden = opposite_part(self.reason, self.order, self.expected)
-        return " ".join(
-            filter(
-                None,
-                [f"{self.subject} converges {word} than order {expected}{with_order}.", hidden],
-            )
-        )
+        sentence = f"{self.subject} converges {word} than order {expected}{with_order}."
+        return f"{sentence} {hidden}".rstrip()
 
     def whose(self) -> str:
         """Say whose the order is: the scheme's, or that of the check alone, where theory has none or another one."""
@@ -392,9 +388,7 @@ class _Phrases(OrderContext):
         )
 
     def unseen(self) -> str:
-        if self.has_exact:
-            return ""
-        return UNSEEN
+        return "" if self.has_exact else UNSEEN
 
     def first_good(self) -> int:
         """Return the coarsest level that is stable, or from which on none met a number that is not finite."""

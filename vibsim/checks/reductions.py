@@ -141,9 +141,9 @@ def is_as_asked(check: ValueCheck, low: float, high: float) -> bool | None:
 
 def judge(experiment: Experiment, record: Record, check: ValueCheck, found: Measured) -> Judged:
     """Compare a number with what the check asks of it: that of every member, or one of all of them."""
-    if check.take is None:
-        return value.judge(experiment, record, check, found)
     own = value.judge(experiment, record, check, found)
+    if check.take is None:
+        return own
     about = np.flatnonzero(about_members(record, check))
     schemes = len(record["scheme"])
     places, reasons = np.full(schemes, about[0]), np.full(schemes, code("match"))

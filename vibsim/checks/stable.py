@@ -69,7 +69,7 @@ def measure(block: MemberBlock, compared: Compared, check: StableCheck) -> Measu
     at_limit = _is_at_limit(p, limit)
     grown = (growth[..., index] > BLOWN_UP) & (at_limit | ~_removed(growth, index))
     escaped = broken & ~beyond & _breaks_down_alike(block)
-    found = _measured_growth(block, level)
+    found = oscillation.growth_of_motion(block, level)
     expected = predicted_oscillation.dominant_growth(block, level)
     contradicted = ~broken & predicted_oscillation.is_simple(block) & beyond
     contradicted &= _differs(block, index, found, expected)
@@ -116,18 +116,6 @@ def _breaks_down_alike(block: MemberBlock) -> Flags:
     return np.asarray(np.all(block.failed[..., -2:], axis=-1) & alike)
 
 
-def _measured_growth(block: MemberBlock, level: int) -> Floats:
-    """Return the growth per period, where a run is too short for that the one over all of it.
-
-    NaN below two peaks, and of several coordinates.
-    """
-    found = oscillation.growth_of_motion(block, level)
-    if len(block.model.positions) > 1:
-        return found
-    whole = oscillation.growth_over_run(block, block.records[level])
-    return np.where(np.isfinite(found), found, whole)
-
-
 def _differs(block: MemberBlock, index: int, measured: Floats, expected: Floats) -> Flags:
     periods = predicted_oscillation.natural_frequency(block) * block.group.end / (2.0 * np.pi)
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -169,7 +157,8 @@ def describe(f: Found, check: StableCheck) -> Description:
         sentence += growth_in_words(f, *factors)
     if f.reason == "unstable" and (excess := f.fact("excess")) > FAR:
         sentence += f" The solution becomes {number(excess, 2)} times as large as the exact one."
-    if f.reason == "match" and _always_grows(f):
+    if f.reason == "match" and _limit(f) == 0.0:
+        # a scheme that grows at every step has no limit of its own
         sentence += _vanishing(f, factors)
     if time:
         sentence += f" It produced a number that is not finite or too large at t = {time}."
@@ -188,11 +177,6 @@ def _limit(f: Found) -> Floats:
     """Return the limit of w dt of a scheme; 0 where none is known."""
     known = "stability_limit" in f.record
     return np.asarray(f.record["stability_limit"][f.scheme, f.case] if known else 0.0)
-
-
-def _always_grows(f: Found) -> bool:
-    """Tell whether a scheme has no limit of stability of its own, so that it grows at every step."""
-    return bool(_limit(f) == 0.0)
 
 
 def _vanishing(f: Found, factors: tuple[float, float]) -> str:

@@ -23,7 +23,6 @@ from vibsim.checks.outcome import Judged
 from vibsim.checks.phase_amplitude_text import NO_PART, PART_ADVICE
 from vibsim.checks.sentences import NOT_FINITE, Description, Found, add_levels, cost_in_words
 from vibsim.comparison import best_values, value_numbers
-from vibsim.comparison.best_values import OF_STEADY_STATE
 from vibsim.comparison.quantity_comparison import Compared
 from vibsim.convergence.reasons import first_reason
 from vibsim.core.array_types import Flags, Floats
@@ -60,8 +59,6 @@ DIRECTION_ASKED = {1.0: "rising", -1.0: "falling", 0.0: "neither rising nor fall
 """What is asked of a direction, by the number that stands for it."""
 UNKNOWN, SETTLED, MOVING = -1, 0, 1
 """What finer levels do to a number that misses what is asked: not known, too little, perhaps enough."""
-OF_RUN = (*OF_STEADY_STATE, "peak_frequency")
-"""Numbers whose error comes from the length of the run as well."""
 REACH = 3.0
 """All finer levels together change a number by no more than so many times its last change (an order of 1/2 by 2.4)."""
 FINER, MOST_FINER = 2, 12
@@ -71,8 +68,6 @@ UNPROVED = (
 )
 FEWEST_DIGITS, MOST_DIGITS = 4, 10
 """Significant digits of a number that was measured."""
-FEWEST_ASKED, MOST_ASKED = 6, 15
-"""The same of a number that is asked for: most that are typed have no more than the first."""
 
 
 def compare(check: ValueCheck, number: Floats) -> tuple[Flags, Floats]:
@@ -363,8 +358,8 @@ def describe(f: Found, check: ValueCheck) -> Description:
                 "(`at: {level: ...}`)."
             )
     found = f.fact("value")
-    digits = _digits(found, _room(check, found), FEWEST_DIGITS, MOST_DIGITS)
-    return Description(sentence, advice, _measured(f, check, digits))
+    brief = _measured(f, check, _digits(found, _room(check, found)))
+    return Description(sentence, advice, brief)
 
 
 def is_proved(check: ValueCheck, value: float, bound: float) -> bool:
@@ -386,13 +381,13 @@ def _to_the_cut(check: ValueCheck, value: Any) -> Any:
     return np.pi - np.abs(value) if is_cut else math.inf
 
 
-def _digits(number: float, room: float, least: int, most: int) -> int:
+def _digits(number: float, room: float) -> int:
     """Return how many digits of a number tell it from others that are so far away, and one more."""
     if not (math.isfinite(number) and number != 0.0 and room > 0.0):
-        return most
+        return MOST_DIGITS
     # a whole number is not rounded
     whole, finer = (math.log10(abs(number) / unit) for unit in (1.0, room))
-    return min(max(least, 1 + math.floor(whole), 2 + math.ceil(finer)), most)
+    return min(max(FEWEST_DIGITS, 1 + math.floor(whole), 2 + math.ceil(finer)), MOST_DIGITS)
 
 
 def _measured(f: Found, check: ValueCheck, digits: int = MOST_DIGITS) -> str:
@@ -457,7 +452,7 @@ def advice_on_bound(f: Found, check: ValueCheck) -> str:
     if _has_few_periods(f, check):
         return f"Give {LEAST_PERIODS} or more `periods:`."
     numbers = np.array(_by_level_of(f))
-    if check.value in OF_RUN and REACH * _last_change(numbers) < f.fact("error_bound"):
+    if check.number.rests_on_run and REACH * _last_change(numbers) < f.fact("error_bound"):
         key = "periods" if f.experiment.time.periods is not None else "end"
         return f"Make the run longer (`time: {key}`): finer levels do not shrink the error bound."
     return ""
@@ -470,8 +465,9 @@ def _pulse_time(f: Found) -> float:
 
 def _has_few_periods(f: Found, check: ValueCheck) -> bool:
     """Say whether a run is too short to tell a steady motion from what is left of its start."""
-    periods = f.experiment.time.periods
-    return check.value in OF_STEADY_STATE and periods is not None and periods < LEAST_PERIODS
+    periods, row = f.experiment.time.periods, check.number
+    is_steady = row.needs_force and row.rests_on_run
+    return is_steady and periods is not None and periods < LEAST_PERIODS
 
 
 def finer_levels(f: Found, count: int = FINER) -> str:

@@ -136,7 +136,9 @@ class Wording:
 
     def _swept_values(self) -> str:
         """Name the swept values of the members that the check is about; empty where it is about every one."""
-        swept = {} if self._measured is None else self._measured.swept
+        return self._listed({} if self._measured is None else self._measured.swept)
+
+    def _listed(self, swept: Mapping[str, Any]) -> str:
         return ", ".join(
             f"{key} = {self.notation.number(value) if isinstance(value, float) else value}"
             for key, value in swept.items()
@@ -144,13 +146,10 @@ class Wording:
 
     def _place(self, result: Result, brackets: bool = False) -> str:
         """Name the scheme, and of a sweep the member with its swept values, these perhaps in brackets."""
-        columns, head, swept = columns_of(self.record), f"scheme {result.scheme}", []
-        for key, values in columns.items():
-            one = values[self.record.place("case", result.case)]
-            swept.append(f"{key} = {self.notation.number(one) if isinstance(one, float) else one}")
-        if not swept:
+        head, place = f"scheme {result.scheme}", self.record.place("case", result.case)
+        listed = self._listed({key: x[place] for key, x in columns_of(self.record).items()})
+        if not listed:
             return head
-        listed = ", ".join(swept)
         return f"{head}, case {result.case}{f' ({listed})' if brackets else f', {listed}'}"
 
     def advice(self, status: str, result: Result, counts: Mapping[str, int]) -> str:

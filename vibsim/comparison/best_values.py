@@ -21,12 +21,7 @@ from vibsim.comparison import value_numbers
 from vibsim.comparison.comparison_variables import Table
 from vibsim.comparison.extremum_of_levels import extremum_of_levels
 from vibsim.comparison.quantity_comparison import Compared
-from vibsim.comparison.thresholds import (
-    IRREGULAR,
-    OF_A_LINE,
-    OF_GRID,
-    OF_PARABOLA,
-)
+from vibsim.comparison.thresholds import IRREGULAR, OF_A_LINE, OF_GRID, OF_PARABOLA
 from vibsim.convergence import gci
 from vibsim.convergence.differences import safe_ratio
 from vibsim.convergence.ladder_blocks import batches
@@ -44,8 +39,6 @@ OF_PEAK_TIMES = (
     "period", "period_error", "frequency", "error_of_frequency", "phase_error_per_period"
 )  # fmt: skip
 """Numbers that are worked out from the times of peaks, but for those of a recurrence."""
-OF_STEADY_STATE = ("steady_amplitude", "steady_phase")
-"""Numbers that mean the motion that is left when what began with it has died out."""
 
 
 @dataclass(frozen=True)
@@ -114,19 +107,14 @@ def _ladder(name: str, place: value_numbers.Place) -> _Ladder:
         floor = np.broadcast_to(relative * size[..., None], values.shape)
     missed, (order, even) = block.unseen_at_corner(size), _promised(name, place)
     if row.measured_by == "points":
-        values, off, is_smooth = extremum_of_levels(name, place, values, floor, size, order)
-        missed = missed + off
+        values, error, is_smooth = extremum_of_levels(name, place, values, floor, size, order)
+        missed = missed + error
         order = np.where(is_smooth, order, np.minimum(order, OF_GRID))
         even = even & is_smooth
     if name in OF_PEAK_TIMES:
-        missed = missed + _off_between_points(place) * size
-    if name == "peak_frequency":
-        missed = missed + spectrum.off(block, place.levels[-1], place.quantity)
-    if name in OF_STEADY_STATE:
-        left = steady_state.distance(block, place.levels[-1], place.quantity)
-        if name == "steady_phase":
-            left = safe_ratio(left, steady_state.amplitude(block, place.levels[-1], place.quantity))
-        missed = missed + left
+        missed = missed + _error_of_period(place) * size
+    if row.rests_on_run:
+        missed = missed + _of_run(name, place)
     safety = np.broadcast_to(block.safety(IRREGULAR), size.shape)
     if row.needs_events:
         # an event on the mesh is late by an accident
@@ -137,11 +125,11 @@ def _ladder(name: str, place: value_numbers.Place) -> _Ladder:
 
 def _stacked(rows: Sequence[_Ladder]) -> _Ladder:
     """Return ladders of the same levels as one, along a new first axis."""
-    names = ("values", "order", "even", "floor", "size", "missed", "safety")
+    _, *names = vars(rows[0])
     return _Ladder(rows[0].levels, *(np.stack([getattr(r, name) for r in rows]) for name in names))
 
 
-def _off_between_points(place: value_numbers.Place) -> Floats:
+def _error_of_period(place: value_numbers.Place) -> Floats:
     """Return the relative error of a period that is the mean time between peaks, shape (scheme, case).
 
     A peak is where the straight line between two velocities is 0, which is off by ``dt^2/8 |u'''/u''|`` at most. That
@@ -157,8 +145,17 @@ def _off_between_points(place: value_numbers.Place) -> Floats:
     dt = block.group.end / block.grid.steps[-1]
     with np.errstate(invalid="ignore", divide="ignore"):
         rate = block.decay + 2.0 * np.pi / period
-        off = rate * OF_A_LINE * dt**2
-        return np.asarray(2.0 * off / (count * period))
+        error_of_peak = rate * OF_A_LINE * dt**2
+        return np.asarray(2.0 * error_of_peak / (count * period))
+
+
+def _of_run(name: str, place: value_numbers.Place) -> Floats:
+    """Return how far a number may be off because the run is no longer, shape (scheme, case)."""
+    at = place.block, place.levels[-1], place.quantity
+    if name == "peak_frequency":
+        return spectrum.error_by_other_lines(*at)
+    left = steady_state.distance(*at)
+    return left if name == "steady_amplitude" else safe_ratio(left, steady_state.amplitude(*at))
 
 
 def _promised(name: str, place: value_numbers.Place) -> tuple[Floats, Flags]:

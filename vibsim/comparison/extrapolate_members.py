@@ -9,7 +9,7 @@ other rounding errors, and the difference of the two runs says what this motion 
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -179,9 +179,7 @@ def noise_of(
     steps: Sequence[int],
     every: Sequence[int],
     levels: Sequence[Pair],
-    *,
-    threads: int = 1,
-    lane: str | None = None,
+    run: Callable[..., Pair] = level_at,
 ) -> Floats | None:
     """Measure what the motion makes of rounding errors, relative to their prediction for a motion of size 1.
 
@@ -192,8 +190,8 @@ def noise_of(
     steps, every, levels
         Number of steps of every level, the stride of its samples, and position and velocity, each of shape (t, case).
         The coarsest may have been sampled more often than the rest, a whole number of times.
-    threads, lane
-        Of the engine; the lane is chosen by the size of the work where None.
+    run
+        `level_at`, with threads and lane of the engine.
 
     Returns
     -------
@@ -205,8 +203,7 @@ def noise_of(
         return None
     turned = rate_of(start) * start.end
     if np.all(turned <= RESOLVED_STEP * steps[0]):
-        sampling = steps[0], every[0], levels[0]
-        found = _distance_of_twin(method, start, *sampling, threads=threads, lane=lane)
+        found = _distance_of_twin(method, start, steps[0], every[0], levels[0], run)
         return found[:: (len(found) - 1) // (len(levels[-1][0]) - 1)]
     noise = np.full(levels[-1][0].shape, np.nan)
     left = np.arange(len(turned))
@@ -214,8 +211,8 @@ def noise_of(
         is_resolved = turned[left] <= RESOLVED_STEP * n
         now, left = left[is_resolved], left[~is_resolved]
         if len(now):
-            sampling = n, stride, (u[:, now], v[:, now])
-            found = _distance_of_twin(method, start.of(now), *sampling, threads=threads, lane=lane)
+            part = u[:, now], v[:, now]
+            found = _distance_of_twin(method, start.of(now), n, stride, part, run)
             noise[:, now] = found[:: (len(u) - 1) // (len(noise) - 1)]
         if not len(left):
             break
@@ -228,13 +225,11 @@ def _distance_of_twin(
     steps: int,
     every: int,
     level: Pair,
-    *,
-    threads: int,
-    lane: str | None,
+    run: Callable[..., Pair],
 ) -> Floats:
     """Return how far apart a level and its twin have been so far, over the predicted round-off, shape (t, case)."""
     assert method.twin is not None
-    twin = level_at(method, start, steps, every, method.twin, threads=threads, lane=lane)
+    twin = run(method, start, steps, every, method.twin)
     u, v = level
     du, dv = twin[0][: len(u)] - u, twin[1][: len(u)] - v
     distance = np.fmax(np.abs(du), np.abs(dv) / rate_of(start))

@@ -47,15 +47,15 @@ def extremum_of_levels(
     order
         With which the extremum converges, shape (scheme, case).
     """
-    off = _off_over_points(name, place, over_points, floor, size)
+    error = _error_over_points(name, place, over_points, floor, size)
     series = _upward(name, place)
-    smooth, off_smooth = _between_points(name, series, over_points)
-    is_smooth = (off > 0.0) | (np.abs(smooth[..., -1] - over_points[..., -1]) > off_smooth)
-    is_smooth = np.where(_is_struck(place.block), off_smooth < off, is_smooth)
-    is_smooth = is_smooth & np.isfinite(off_smooth) & ~place.block.adaptive[:, None]
+    smooth, error_smooth = _between_points(name, series, over_points)
+    is_smooth = (error > 0.0) | (np.abs(smooth[..., -1] - over_points[..., -1]) > error_smooth)
+    is_smooth = np.where(_is_struck(place.block), error_smooth < error, is_smooth)
+    is_smooth = is_smooth & np.isfinite(error_smooth) & ~place.block.adaptive[:, None]
     found = np.where(is_smooth[..., None], smooth, over_points)
-    off = np.where(is_smooth, off_smooth, off) + _rise_of_other_crests(series, place.levels, order)
-    return found, off, is_smooth
+    rise = _rise_of_other_crests(series, place.levels, order)
+    return found, np.where(is_smooth, error_smooth, error) + rise, is_smooth
 
 
 def _upward(name: str, place: value_numbers.Place) -> Series:
@@ -74,7 +74,7 @@ def _is_struck(block: MemberBlock) -> Flags:
     return np.logical_not(block.eventless) & isinstance(block.model.events, Impact | Crossings)
 
 
-def _off_over_points(
+def _error_over_points(
     name: str, place: value_numbers.Place, values: Floats, floor: Floats, size: Floats
 ) -> Floats:
     """Return how much of an extremum lies between grid points: ``w^2 dt^2/8`` of its size at most.
@@ -104,14 +104,15 @@ def _between_points(name: str, series: Series, over_points: Floats) -> tuple[Flo
     Shapes (scheme, case, level) and (scheme, case). The bound is NaN where there is no series. A level with too few
     samples keeps its value over the grid points.
     """
-    found, off = over_points.copy(), np.full(over_points.shape, np.nan)
+    found, errors = over_points.copy(), np.full(over_points.shape, np.nan)
     if series:
         largest, error = largest_between_samples(list(series.values()))
         shape, levels = (*over_points.shape[:-1], -1), list(series)
         found[..., levels] = (-1.0 if name == "min" else 1.0) * largest.reshape(shape)
-        off[..., levels] = error.reshape(shape)
+        errors[..., levels] = error.reshape(shape)
     # the limit is made of the level before the finest, too
-    return found, np.where(np.isnan(off[..., -1]), np.nan, np.fmax.reduce(off[..., -2:], axis=-1))
+    two = errors[..., -2:]
+    return found, np.where(np.isnan(two[..., -1]), np.nan, np.fmax.reduce(two, axis=-1))
 
 
 def _rise_of_other_crests(series: Series, levels: tuple[int, ...], order: Floats) -> Floats:

@@ -159,11 +159,11 @@ def _blur(block: MemberBlock, times: list[Floats]) -> tuple[Floats, Floats]:
     """
     w = (2.0 * np.pi / np.broadcast_to(period_scale(block), block.shape))[..., None]
     h = np.broadcast_to(block.grid.spacing, block.shape)[..., None]
-    off = []
+    rows = []
     for time in times:
         behind = np.mod(np.where(np.isfinite(time), time, 0.0), h)
-        off.append(np.max((w * behind) * (w * (h - behind)), axis=-1))
-    largest = np.stack(off, axis=-1)
+        rows.append(np.max((w * behind) * (w * (h - behind)), axis=-1))
+    largest = np.stack(rows, axis=-1)
     amplitude = largest * largest * largest / 720.0
     return amplitude / w, amplitude
 

@@ -120,7 +120,6 @@ class Question:
 class Decision:
     """What was decided of ladders; arrays of shape (ladder,)."""
 
-    status: Codes  # index into `vocabulary.STATUSES`
     reason: Codes  # index into `vocabulary.REASON_NAMES`
     order: Floats  # the order of the finest three levels that the verdict rests on; NaN where there is none
     low: Floats  # lower end of the interval of the order

@@ -131,10 +131,10 @@ def _fitted(values: Floats, levels: Sequence[int], promised: Floats) -> Floats:
         # three numbers are fitted
         sigma = np.sqrt(np.sum(rest * rest, axis=-1) / (m - 3))
         error = np.abs(slope) * x[..., -1]
-        off = np.abs(rest[..., -1])
+        misfit = np.abs(rest[..., -1])
         good = sigma < typical
-        rough = th.GCI_CAUTIOUS * sigma / typical * (error + sigma + off)
-        now = np.where(good, th.GCI_TRUSTED * error + sigma + off, rough)
+        rough = th.GCI_CAUTIOUS * sigma / typical * (error + sigma + misfit)
+        now = np.where(good, th.GCI_TRUSTED * error + sigma + misfit, rough)
         better = sigma < least
         least, index = np.where(better, sigma, least), np.where(better, now, index)
     return np.where(typical > 0, index, 0.0 * typical)

@@ -13,7 +13,7 @@ from typing import TypeVar
 import numpy as np
 
 from vibsim.convergence.error_model.posterior import Ladder
-from vibsim.convergence.reasons import STATUS_OF, code
+from vibsim.convergence.reasons import code
 from vibsim.core.array_types import Floats, Integers
 from vibsim.core.vocabulary import LEVELS_OF_AN_ORDER
 
@@ -37,7 +37,7 @@ def batches(rows: Sequence[Row], ladders: int) -> Iterator[Sequence[Row]]:
 def in_blocks(
     ladder: Ladder, work: Callable[[Ladder, Floats], dict[str, np.ndarray]]
 ) -> dict[str, np.ndarray]:
-    """Return status, reason and the numbers of ladders.
+    """Return the reasons and the numbers of ladders.
 
     `work` gets finite ladders of three levels and more, over their sizes, and the factors on their differences.
     """
@@ -45,8 +45,8 @@ def in_blocks(
     finite = np.all(np.isfinite(ladder.gram), axis=(-2, -1)) & np.all(
         np.isfinite(ladder.floor), axis=-1
     )
-    found = _nothing(count, n)
-    reason = found["reason"] = np.full(count, code("non_finite"))
+    reason = np.full(count, code("non_finite"), dtype=np.int8)
+    found = _nothing(count, n) | {"reason": reason}
     if n < LEVELS_OF_AN_ORDER:
         reason[finite] = code("too_few_levels")
     else:
@@ -57,7 +57,7 @@ def in_blocks(
             for name, value in work(part, factors).items():
                 in_units = name in ("error", "error_bound", "best_bound")
                 found[name][rows] = value * size if in_units else value
-    return {**found, "status": STATUS_OF[reason], "reason": reason.astype(np.int8)}
+    return found
 
 
 def _nothing(count: int, levels: int) -> dict[str, np.ndarray]:
@@ -65,8 +65,8 @@ def _nothing(count: int, levels: int) -> dict[str, np.ndarray]:
     names = ("order", "low", "high", "error", "error_bound", "best_bound")
     unknown = {name: np.full(count, np.nan) for name in names}
     window = {"first": np.zeros(count, dtype=np.int64), "last": np.full(count, levels - 1)}
-    flags = {"sure": np.ones(count, dtype=bool)}
-    return {**unknown, **window, **flags, "weights": np.full((count, levels), np.nan)}
+    weights = np.full((count, levels), np.nan)
+    return {**unknown, **window, "sure": np.ones(count, dtype=bool), "weights": weights}
 
 
 def _scaled(ladder: Ladder, rows: Integers) -> tuple[Ladder, Floats, Floats]:

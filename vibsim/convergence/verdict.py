@@ -60,14 +60,7 @@ from vibsim.convergence.evidence import (
     unresolved,
 )
 from vibsim.convergence.hidden_order import is_promise_hidden
-from vibsim.convergence.reasons import (
-    INCONCLUSIVE,
-    STATUS_OF,
-    code,
-    first_reason,
-    is_one_of,
-    is_open,
-)
+from vibsim.convergence.reasons import STATUS_OF, code, first_reason, is_one_of, is_open
 from vibsim.core.array_types import Codes, Flags, Floats, Integers
 from vibsim.core.vocabulary import LEVELS_OF_AN_ORDER
 from vibsim.elementary import on_arrays
@@ -138,7 +131,6 @@ def _believed(e: Evidence, judged: Flags) -> Decision:
     """Return what the error model says of the ladders that it is asked about, and of all others that they are noise."""
     shape, n = judged.shape, len(e.levels)
     found = Decision(
-        status=np.full(shape, INCONCLUSIVE, dtype=np.int8),
         reason=np.full(shape, code("round_off"), dtype=np.int8),
         order=np.full(shape, np.nan),
         low=np.full(shape, np.nan),

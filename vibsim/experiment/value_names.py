@@ -62,6 +62,8 @@ class Value:
     """Whether whole turns make no difference."""
     has_own_size: bool = False
     """Whether its round-off is relative to itself."""
+    rests_on_run: bool = False
+    """Whether a longer run makes its limit more accurate: by what is left of the start, or by other lines."""
 
     def has_limit(self, level: int | str | None) -> bool:
         """Tell whether it is asked for as the limit of the numbers of the levels, not of the extrapolated solution."""
@@ -107,6 +109,7 @@ _MARKS: Mapping[str, Mapping[str, Any]] = {
     "own_size": {"has_own_size": True},
     "angle": {"is_angle": True},
     "force": {"needs_force": True},
+    "run": {"rests_on_run": True},
 }
 """Further fields of `Value`, by the words of the fourth column of the table."""
 _TABLE = """\
@@ -136,13 +139,14 @@ predicted_phase_error | none | time | linear fixed_step survives | the same by t
 phase_error_slope | none | time | period | slope of the time by which a peak comes early over the number of its period
 amplitude | none | position | best parabola own_size | half the height from the last trough to the last peak
 amplitude_error | none | none | best parabola | last amplitude over the first one, less one
-steady_amplitude | series | quantity | force best own_size | A of the harmonic A cos(w t - phase) with the frequency w \
-of the force, over its last period
-steady_phase | series | none | force best angle | phase of that harmonic [rad], from -pi to pi: the lag behind cos(w t)
+steady_amplitude | series | quantity | force best run own_size | A of the harmonic A cos(w t - phase) with the \
+frequency w of the force, over its last period
+steady_phase | series | none | force best run angle | phase of that harmonic [rad], from -pi to pi: the lag \
+behind cos(w t)
 steady_change | series | none | force | how far that harmonic is from that of the period before, over its amplitude
 section_period | none | count | force | after how many periods of the force the state is the same again, to 1e-3, \
 in the second half of the run; 0 where it never is
-peak_frequency | series | frequency | best own_size | angular frequency of the highest line in the spectrum of the \
+peak_frequency | series | frequency | best run own_size | angular frequency of the highest line in the spectrum of the \
 stored series
 growth_factor | none | none | best parabola own_size | last peak over the first peak
 growth_per_period | none | none | best roots own_size survives | factor by which the amplitude grows in a period

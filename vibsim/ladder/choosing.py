@@ -12,6 +12,7 @@ import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -70,11 +71,10 @@ class _Run:
     def add_level(self, steps: int, points: int) -> None:
         """Run one level more, and look at so many times."""
         lane = "plain" if steps * len(self.case) <= PLAIN_STEPS else None
-        level = level_at(self.method, self.start, steps, steps // points, lane=lane)
-        every = [steps // points]
-        noise = noise_of(self.method, self.start, [steps], every, [level], lane=lane)
+        run, every = partial(level_at, lane=lane), steps // points
+        level = run(self.method, self.start, steps, every)
         self.levels.append(level)
-        self.noise.append(noise)
+        self.noise.append(noise_of(self.method, self.start, [steps], [every], [level], run))
 
     def bounds(self, steps: Sequence[int], points: int, levels: Sequence[Pair]) -> Floats:
         """Return the largest bound of each member by the last levels; infinite without one."""

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 
@@ -79,18 +81,14 @@ def climb(
     """Do the same as `solve`, with t = 0 before the other times."""
     if any(n % points for n in steps):
         raise ValueError(f"{points} equal times are no samples of levels with {steps} steps")
-    levels, noise = _levels(method, start, steps, points, threads, lane)
+    run = partial(level_at, threads=threads, lane=lane)
+    levels, noise = _levels(method, start, steps, points, run)
     t = (np.arange(points + 1) / points)[:, None]
     return extrapolate_members(method, start, steps, t, levels, noise)
 
 
 def _levels(
-    method: Method,
-    start: Start,
-    steps: tuple[int, ...],
-    points: int,
-    threads: int,
-    lane: str | None,
+    method: Method, start: Start, steps: tuple[int, ...], points: int, run: Callable[..., Pair]
 ) -> tuple[list[Pair], Floats | None]:
     """Return every level at `points` equal times and t = 0, and the measured noise, of shape (t, case)."""
     finer = 1
@@ -98,11 +96,8 @@ def _levels(
         finer *= 2
     every = [n // points for n in steps]
     every[0] //= finer
-    levels = [
-        level_at(method, start, n, stride, threads=threads, lane=lane)
-        for n, stride in zip(steps, every, strict=True)
-    ]
-    noise = noise_of(method, start, steps, every, levels, threads=threads, lane=lane)
+    levels = [run(method, start, n, stride) for n, stride in zip(steps, every, strict=True)]
+    noise = noise_of(method, start, steps, every, levels, run)
     u, v = levels[0]
     levels[0] = u[::finer], v[::finer]
     return levels, noise
@@ -112,7 +107,7 @@ def _end_of_one(
     method: Method, start: Start, steps: tuple[int, ...], lane: str | None
 ) -> Extrapolated:
     """Return the end of one member: the numbers of `climb` from floats, for which numpy would take ten times longer."""
-    levels, noise = _levels(method, start, steps, 1, 1, lane)
+    levels, noise = _levels(method, start, steps, 1, partial(level_at, lane=lane))
     pairs = [(float(u[-1, 0]), float(v[-1, 0])) for u, v in levels]
     rate, end = float(rate_of(start)[0]), float(start.end[0])
     (u, v), (x, y), larger = start.initial[0].tolist(), pairs[-1], FLOATS.larger

@@ -144,7 +144,7 @@ class MemberBlock:
 
     def safety(self, irregular: float) -> Floats:
         """Return the factor on what levels bound, shape (c,): `irregular` where events or tables divide steps."""
-        has_places = self.corners.tables.exist | (self.model.events is not None)
+        has_places = self.corners.of_tables | (self.model.events is not None)
         return np.where(has_places, irregular, 1.0)
 
     def unseen_at_corner(self, size: Floats) -> Floats:
@@ -192,7 +192,7 @@ def block_of(experiment: Experiment, records: Mapping[int, Record]) -> MemberBlo
         exact = {name: laid_out(values) for name, values in group.exact(model, t).items()}
     motion = Motion(model, grid, finest, group, exact)
     corners = corners_of(model, finest, group, grid.dt[0])
-    left = left_to_the_mesh(experiment, columns, corners.tables.exist)
+    left = left_to_the_mesh(experiment, columns, corners.of_tables)
     return MemberBlock(
         experiment=experiment,
         records=records,

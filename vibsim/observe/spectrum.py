@@ -71,7 +71,7 @@ def highest(series: Floats) -> tuple[Floats, Floats]:
     """
     whole = np.ascontiguousarray(series, dtype=np.float64)
     rows = whole.reshape(-1, whole.shape[-1])
-    n, place, off = rows.shape[-1] - 1, np.full(len(rows), np.nan), np.full(len(rows), np.inf)
+    n, place, error = rows.shape[-1] - 1, np.full(len(rows), np.nan), np.full(len(rows), np.inf)
     found = lines(rows)
     known: Flags = np.asarray(np.isfinite(found).all(axis=-1))
     top = np.argmax(np.where(known[:, None], found, 0.0), axis=-1)
@@ -82,9 +82,9 @@ def highest(series: Floats) -> tuple[Floats, Floats]:
     )
     for shift in np.unique(shifts[known]).tolist():
         own = known & (shifts == shift)
-        place[own], off[own] = _of_one_shift(rows[own], shift, top[own])
+        place[own], error[own] = _of_one_shift(rows[own], shift, top[own])
     shape = whole.shape[:-1]
-    return place.reshape(shape), off.reshape(shape)
+    return place.reshape(shape), error.reshape(shape)
 
 
 def _of_one_shift(rows: Floats, shift: int, top: Integers) -> tuple[Floats, Floats]:
@@ -111,9 +111,9 @@ def _of_one_shift(rows: Floats, shift: int, top: Integers) -> tuple[Floats, Floa
     with np.errstate(divide="ignore", invalid="ignore"):
         root = np.sqrt(apart)
         unresolved = np.where(apart > 0.0, OF_UNRESOLVED * apart_wide / root, 0.0)
-    off = np.maximum(apart, np.minimum(root, unresolved))
-    is_known = np.isfinite(off)
-    return np.where(np.isfinite(place), place, top), np.where(is_known, off, np.inf)
+    error = np.maximum(apart, np.minimum(root, unresolved))
+    known = np.where(np.isfinite(error), error, np.inf)
+    return np.where(np.isfinite(place), place, top), known
 
 
 def _angle(shifted: Sequence[Floats]) -> Floats:
@@ -144,7 +144,7 @@ def peak_frequency(block: MemberBlock, level: int, quantity: str) -> Floats:
     return _of_highest(block, level, quantity)[0]
 
 
-def off(block: MemberBlock, level: int, quantity: str) -> Floats:
+def error_by_other_lines(block: MemberBlock, level: int, quantity: str) -> Floats:
     """Return how far `peak_frequency` may be off on every level alike, for what other lines do, (scheme, case)."""
     return _of_highest(block, level, quantity)[1]
 
@@ -155,5 +155,5 @@ def _of_highest(block: MemberBlock, level: int, quantity: str) -> tuple[Floats, 
         return np.full(block.shape, np.nan), np.full(block.shape, np.inf)
     duration = block.grid.spacing * (len(block.grid.t) - 1)
     unit = 2.0 * np.pi / duration
-    place, off_by = highest(take_all(block.grid, record, quantity))
-    return np.asarray(place * unit), np.asarray(off_by * unit)
+    place, error = highest(take_all(block.grid, record, quantity))
+    return np.asarray(place * unit), np.asarray(error * unit)

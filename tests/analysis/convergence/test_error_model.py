@@ -29,7 +29,7 @@ from vibsim.convergence.error_model.hypotheses import (
 )
 from vibsim.convergence.error_model.posterior import Ladder, posterior
 from vibsim.core.array_types import Floats
-from vibsim.core.vocabulary import REASON_NAMES, STATUSES
+from vibsim.core.vocabulary import REASON_NAMES, REASONS
 
 HALVED = 0.1 * 0.5 ** np.arange(4)
 UNEVEN = np.array([0.1, 0.07, 0.04, 0.03, 0.01])
@@ -68,7 +68,8 @@ def series(h: Floats, *terms: tuple[float, float, Floats]) -> list[Floats]:
 
 
 def found(a: Assessment) -> tuple[str, str]:
-    return STATUSES[a.status[0]], REASON_NAMES[a.reason[0]]
+    reason = REASON_NAMES[a.reason[0]]
+    return REASONS[reason], reason
 
 
 PASSES, FAILS, OPEN = "PASS", "FAIL", "INCONCLUSIVE"
@@ -165,7 +166,7 @@ def of_all(ladders: list[Ladder], question: Question) -> list[tuple[str, str]]:
     """Return what is found of ladders of the same steps, which costs little more than that of one."""
     rows = {name: np.concatenate([getattr(one, name) for one in ladders]) for name in ROWS}
     a = assess(replace(ladders[0], **rows), question)
-    return [(STATUSES[i], REASON_NAMES[j]) for i, j in zip(a.status, a.reason, strict=True)]
+    return [(REASONS[reason], reason) for reason in (REASON_NAMES[j] for j in a.reason)]
 
 
 ROWS = ("gram", "floor", "numbers")
@@ -522,8 +523,9 @@ def counted(
             a = assess(given, Question(p))
             total["judged"] += len(group.ladders)
             for i, one in enumerate(group.ladders):
-                status, mine = STATUSES[a.status[i]], abs(one.order - p) <= TOLERANCE
-                passed = status == PASSES and REASON_NAMES[a.reason[i]] != "exact"
+                reason, mine = REASON_NAMES[a.reason[i]], abs(one.order - p) <= TOLERANCE
+                status = REASONS[reason]
+                passed = status == PASSES and reason != "exact"
                 total["right"] += passed and mine
                 total["mixed_pass"] += passed and math.isnan(one.order)
                 total["false_pass"] += passed and not mine and not math.isnan(one.order)

@@ -168,10 +168,7 @@ class _Fit:
         ]
         # half of what may be left out is that of whole tables, half that of single hypotheses
         part = 0.5 * left_out / len(self.windows)
-        self.of_table, self.of_one = (
-            on_arrays.log(part / TABLES),
-            on_arrays.log(part / MOST_HYPOTHESES),
-        )
+        self.of_table, self.of_one = (on_arrays.log(part / x) for x in (TABLES, MOST_HYPOTHESES))
         # rounding is part of every row; that of a level is relative to what differs from there on
         squares = np.diagonal(ladder.gram, axis1=1, axis2=2)[:, : n - 1]
         largest = np.maximum.accumulate(squares[:, ::-1], axis=-1)[:, ::-1]
@@ -183,7 +180,9 @@ class _Fit:
         # sums over hypotheses of their evidence, over that of differences that all have a size of their own
         self.unit = np.sum(self.alone_rows, axis=-1)
         if ladder.exact_known:
-            self.unit = self.unit + self.error_of(0)
+            # the true error of the coarsest level may have any size, too
+            squared = np.maximum(self.rows(0, 0, with_exact=True)[:, 0, 0], TINY)
+            self.unit = self.unit + (scale_free(squared, 0.0, self.points, 1) - priors.PRICE)
         self.of_ends = {end: self.beyond(end) for end in range(2, n)}
         self.total, self.every = np.ones(count), np.arange(count)
         pairs, windows = len(terms.first_of_pairs), len(self.windows)
@@ -263,17 +262,15 @@ class _Fit:
         if not np.any(np.isfinite(log)):
             return
         if name == "window":
-            weight = self.add(index, rows, log + prior[rows], path=path, path_squared=squared)
+            weight = self.add(index, rows, log + prior[rows], path, squared)
             self.values["pairs"][rows] += weight[:, None, None] * pairs
         else:
-            self.weight(rows, log + prior[rows], name)
+            self.values[name][rows] += self.weight(rows, log + prior[rows])
 
-    def weight(self, rows: Rows, log: Floats, name: str) -> Floats:
-        """Add hypotheses of some ladders to a sum, and return their weights."""
+    def weight(self, rows: Rows, log: Floats) -> Floats:
+        """Return the weights of hypotheses of some ladders, and count them among all."""
         found = on_arrays.exp(np.minimum(log - self.unit[rows], LARGEST_LOG))
         self.total[rows] += found
-        if name != "window":
-            self.values[name][rows] += found
         return np.asarray(found)
 
     def rows(self, start: int, end: int, *, with_exact: bool = False) -> Floats:
@@ -320,22 +317,9 @@ class _Fit:
         last = np.maximum(self.differences[:, end - 1, end - 1], TINY)
         return np.asarray(np.concatenate([with_rest[:, start:end], own], axis=-1) / last[:, None])
 
-    def error_of(self, level: int) -> Floats:
-        """Return the evidence of the true error of a level, if that may have any size."""
-        squared = self.rows(level, level, with_exact=True)[:, 0, 0]
-        return scale_free(np.maximum(squared, TINY), 0.0, self.points, 1) - priors.PRICE
-
-    def add(
-        self,
-        index: int,
-        rows: Rows,
-        log: Floats,
-        *,
-        path: Floats,
-        path_squared: Floats,
-    ) -> Floats:
+    def add(self, index: int, rows: Rows, log: Floats, path: Floats, squared: Floats) -> Floats:
         """Add hypotheses on the rows of a window of some ladders, and return their weights."""
-        weight = self.weight(rows, log, "window")
+        weight = self.weight(rows, log)
         self.values["window"][rows, index] += weight
         if not self.ladder.exact_known:
             (start, end), n = self.windows[index], len(self.ladder.h)
@@ -344,9 +328,9 @@ class _Fit:
             whole[:, end:] = 1.0
             # the limit is known no better than the noise behind the window
             if end < n - 1:
-                path_squared = path_squared + self.differences[rows, end, end]
+                squared = squared + self.differences[rows, end, end]
             self.values["path"][rows, index] += weight[:, None] * whole
-            self.values["path_squared"][rows, index] += weight * path_squared
+            self.values["path_squared"][rows, index] += weight * squared
         return weight
 
     def add_any_power(
@@ -381,7 +365,7 @@ class _Fit:
             path = -np.sum(weight[..., None] * gains, axis=1)
             squares += rest[:, -1:] - 2.0 * np.sum(gains * rest[:, None, :-1], axis=-1)
             squared = np.sum(weight * squares, axis=-1)
-        weight = self.add(index, rows, total + prior[rows], path=path, path_squared=squared)
+        weight = self.add(index, rows, total + prior[rows], path, squared)
         nearest = self.nearest[rows, self.windows[index][1] - 2]
         self.values["any_power"][self.every[rows], nearest] += weight
 
@@ -396,7 +380,7 @@ class _Fit:
                 self.points,
                 ladder.floor[:, k:],
             )
-            self.weight(slice(None), log, "noise")
+            self.values["noise"] += self.weight(slice(None), log)
 
     def posterior(self) -> Posterior:
         """Return what is believed, after all hypotheses were added."""

@@ -68,7 +68,11 @@ def common_values(
         if set(level.dims) != set(first.dims) or len(level.dims) != len(first.dims):
             rule = f"has the dimensions {_listed(level.dims)}, the coarsest level has {_listed(first.dims)}"
             raise refused(f"level {i} (from the coarsest)", level.name or "values", rule)
-    refined = _refined(first.dims, dims)
+    refined = first.dims if dims is None else dims
+    for dim in refined:
+        if dim not in first.dims:
+            rule = f"is no dimension of the values, which have {_listed(first.dims)}"
+            raise refused("dims", dim, rule)
     arrays = [
         _finite_throughout(_transposed(level, first.dims), first.dims, fixed) for level in levels
     ]
@@ -97,17 +101,6 @@ def common_values(
 
 def _listed(dims: Sequence[str]) -> str:
     return ", ".join(dims) or "none (a number)"
-
-
-def _refined(known: Sequence[str], dims: Sequence[str] | None) -> Sequence[str]:
-    if dims is None:
-        return known
-    for dim in dims:
-        if dim not in known:
-            raise refused(
-                "dims", dim, f"is no dimension of the values, which have {_listed(known)}"
-            )
-    return dims
 
 
 def _finite_throughout(values: Floats, dims: Sequence[str], fixed: Sequence[str]) -> Floats:

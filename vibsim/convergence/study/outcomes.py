@@ -28,10 +28,10 @@ EXACT_DIGITS = 16
 """Exact values with no more decimal digits than these may be rounded to them: whoever writes them down stops there."""
 MOST_UNITS = 8.0
 """Exact values that are further from the finest level, in half units of its last digit, were not missed by rounding."""
-ADDED_UP = 200.0
-"""Over that of storing them, what rounding errors of values may add up to in a calculation: 100 units of precision."""
-ADDED_UP_IN_SINGLE = 10.0
-"""The same in units of single precision, as bounds count it: steps of float32 are often seen beside the error."""
+MOST_ADDED_UP, ADDED_UP = 100.0, 10.0
+"""What rounding errors add up to in a calculation, in units of the precision of the values: at most, and usually.
+
+Bounds count the latter for single precision, whose steps are often seen beside the error."""
 SEEN = 0.1
 """The rounding of exact values is seen where it is so large a part of the error of the finest level."""
 
@@ -172,8 +172,7 @@ def _with_finite(
         truth = None if exact is None else exact[k]
         _measure(one, measured, k, part[k], truth)
         if decided is not None:
-            rounding = 0.0 if request.noise else ADDED_UP * measured.ladder.floor[k, -1]
-            _decide(one, decided, k, measured, part[k], truth, rounding)
+            _decide(one, decided, k, measured, part[k], truth, bool(request.noise))
         if len(finite) < n:
             # levels that are not finite decide, whatever the others say; the error is that of the finest level
             one.reason = "non_finite"
@@ -244,12 +243,9 @@ def _decide(
     measured: Measurement,
     part: Floats,
     truth: Floats | None,
-    rounding: float,
+    is_noise_stated: bool,
 ) -> None:
-    """Add what was decided of member `k`, whose finite levels are `part` and whose exact values are `truth`.
-
-    `rounding` is what rounding errors of the finest level may add up to, over its scale.
-    """
+    """Add what was decided of member `k`, whose finite levels are `part` and whose exact values are `truth`."""
     scale = float(measured.scale[k])
     one.reason = REASON_NAMES[int(decided.reason[k])]
     one.order, used, weights = _estimate(one, measured.ladder.h, decided, k)
@@ -258,13 +254,15 @@ def _decide(
     if np.isfinite(weights).all():
         # added up one by one, so that a member has the same digits alone and among others
         one.best = sum((w * row for w, row in zip(weights, part, strict=True)), 0.0 * part[0])
-        added_up = ADDED_UP_IN_SINGLE * SINGLE * measured.norms[k, -1] * measured.are_single[k]
+        added_up = ADDED_UP * SINGLE * measured.norms[k, -1] * measured.are_single[k]
         units = np.maximum(half_last_digits(part), max(step_of_values(part), float(added_up)))
         one.rounded = float(np.sum(units * np.abs(weights)))
     if one.reason == "wrong_limit":
+        # the floor is that of storing numbers, half a unit
+        most = 0.0 if is_noise_stated else 2.0 * MOST_ADDED_UP * measured.ladder.floor[k, -1]
         # what was printed as 10.5 was 10.46
         half = float(half_last_digits(part, of_binary=True)[-1])
-        if abs(one.error) <= max(rounding * scale, half):
+        if abs(one.error) <= max(most * scale, half):
             one.reason = "round_off"
     bound_of_best = float(decided.best_bound[k]) * scale
     if one.reason == "wrong_limit" and one.rounded and one.best is not None and truth is not None:

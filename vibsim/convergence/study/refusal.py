@@ -28,14 +28,8 @@ def finite_number(
     key: str, value: Any, *, above: float | None = None, least: float | None = None
 ) -> float:
     """Return a finite number; InputError where it is none, or not within its bounds."""
-    bound = (
-        f" above {above:g}"
-        if above is not None
-        else f" from {least:g}"
-        if least is not None
-        else ""
-    )
-    rule = f"must be a finite number{bound}"
+    bound = f"above {above:g}" if above is not None else f"from {least:g}"
+    rule = f"must be a finite number {bound}"
     if isinstance(value, bool | str) or value is None:
         raise refused(key, value, rule)
     try:

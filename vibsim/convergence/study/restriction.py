@@ -40,19 +40,15 @@ class Restriction:
     """Weighted sums of the values of a level along a dimension."""
 
     indices: Integers
-    """Shape (m, q)."""
-    weights: Floats
+    """Shape (m, q), or (m,) where each common point is one of the level."""
+    weights: Floats | None = None
     """Shape (m, q)."""
 
     def of(self, values: Floats, axis: int) -> Floats:
         """Return the sums of `values`, whose dimension `axis` then has m points."""
-        if self.indices.shape == (values.shape[axis], 1) and np.all(
-            np.diff(self.indices[:, 0]) == 1
-        ):
-            return values
-        if self.indices.shape[1] == 1:
-            return np.take(values, self.indices[:, 0], axis)
         taken = np.take(values, self.indices, axis)
+        if self.weights is None:
+            return taken
         weights = self.weights.reshape(self.weights.shape + (1,) * (values.ndim - axis - 1))
         with np.errstate(over="ignore", invalid="ignore"):
             return np.asarray(np.sum(taken * weights, axis=axis + 1))
@@ -132,9 +128,7 @@ def spacing_tolerance(points: NDArray[Any], epsilon: float) -> float:
 
 
 def _everything(coordinate: Coordinate, levels: int, length: int) -> Common:
-    indices = np.arange(length)[:, None]
-    one = Restriction(indices, np.ones(indices.shape))
-    return Common((one,) * levels, coordinate)
+    return Common((Restriction(np.arange(length)),) * levels, coordinate)
 
 
 def _all_equal(coordinates: Sequence[Coordinate]) -> bool:
@@ -202,9 +196,7 @@ def _every_kth(dim: str, lengths: Sequence[int]) -> Common:
         rule = "the points of the coarsest level are not among those of the finer ones"
         hint = "give coordinates, or use restrict: linear or cubic"
         raise refused(dim, f"lengths {list(lengths)}", rule, hint)
-    base = np.arange(first)[:, None]
-    found = tuple(Restriction(base * k, np.ones(base.shape)) for k in factors)
-    return Common(found, None, note=note)
+    return Common(tuple(Restriction(np.arange(first) * k) for k in factors), None, note=note)
 
 
 def _along(dim: str) -> str:
@@ -232,8 +224,7 @@ def _subset(dim: str, coordinates: Sequence[Coordinate], lengths: Sequence[int])
     part = ""
     if count < lengths[0]:
         part = f"The levels have {there.sum()} of the {lengths[0]} points of the coarsest one in common along {dim}."
-    found = tuple(Restriction(i[there][:, None], np.ones((count, 1))) for i in places)
-    return Common(found, coarse[there], part=part)
+    return Common(tuple(Restriction(i[there]) for i in places), coarse[there], part=part)
 
 
 def _nearest(targets: NDArray[Any], points: NDArray[Any]) -> tuple[Integers, Floats]:
@@ -275,7 +266,7 @@ def _interpolations(
     if not inside.any():
         raise refused(dim, "coordinates", "the levels cover no common range")
     targets = coarse[inside]
-    found = [Restriction(np.flatnonzero(inside)[:, None], np.ones((len(targets), 1)))]
+    found = [Restriction(np.flatnonzero(inside))]
     interpolated = False
     for fine, tolerance in zip(points[1:], tolerances[1:], strict=True):
         if len(fine) < width:
