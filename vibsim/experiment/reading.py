@@ -24,7 +24,6 @@ from vibsim.experiment.rules.figures import check_figures
 from vibsim.experiment.rules.model import Equation, are_known
 from vibsim.experiment.rules.model import equation as read_equation
 from vibsim.experiment.rules.scaling import Numbers, characteristic
-from vibsim.experiment.rules.starts import check_starts
 from vibsim.experiment.rules.structure import check_histories
 from vibsim.experiment.rules.sweep import read_sweep
 from vibsim.experiment.rules.timing import rising_levels
@@ -242,7 +241,7 @@ def _check_members(
     members.check_jumps(numbers, equation.formulas, report)
     if sweep.follow is not None:
         continuation.check_equation(model, numbers, report)
-    check_starts(numbers, equation.formulas, report)
+    members.check_starts(numbers, equation.formulas, report)
 
 
 def check_names(experiment: str, collection: str, report: Report) -> None:
