@@ -30,7 +30,9 @@ def write_out_chain(report: Report) -> None:
     """Bring a chain in the content that `report` speaks of to the form of `repeat`; faults are noted."""
     data = report.source.data
     section = data.get("model") if isinstance(data, Mapping) else None
-    written = section.get(REPEAT) if isinstance(section, Mapping) else None
+    if not isinstance(section, Mapping):
+        return
+    written = section.get(REPEAT)
     if not isinstance(written, Mapping) or COUNT not in written or len(written) != 2:
         return
     (index,) = (key for key in written if key != COUNT)
