@@ -162,21 +162,31 @@ def commands() -> Iterator[Command]:
     text = "Judge whether the results of any solver converge."
     yield "judge", "commands.judge", text, tuple(_judge())
     text = "List what there is to choose from, or print the JSON Schema of experiment files."
-    yield "list", "commands.listing", text, tuple(_list())
+    name = _row("name", _word, "NAME", "one entry, in full", nargs="?")
+    yield "list", "commands.listing", text, (("what", {"choices": LISTS}), name)
     text = "Write a commented experiment file to begin with, and the JSON Schema for editors."
     yield "new", "commands.new", text, tuple(_new())
     text = "Show which settings, verdicts and numbers of two experiments or two results differ."
-    yield "diff", "commands.diff", text, (RESULTS, *_diff())
+    what = "experiment, FILE.yaml, or a folder of results"
+    sides = [_row(*side, what) for side in (("first", _word, "A"), ("second", _word, "B"))]
+    yield "diff", "commands.diff", text, (RESULTS, *sides)
     text = "Explain the reason of a verdict: what it means and what would settle the question."
-    yield "explain", "commands.explain", text, tuple(_explain())
+    what = "the reason of a verdict, such as order_low (default: list all of them)"
+    reason = _row("reason", _word, "REASON", what, nargs="?")
+    yield "explain", "commands.explain", text, (reason,)
     text = "Print the theory of a scheme on u'' + w^2 u = 0 as formulas in w dt."
     yield "theory", "commands.theory", text, tuple(_theory())
     text = "Open a report in the browser; print its path where there is none."
-    yield "open", "commands.open", text, (RESULTS, *_open())
+    what = "experiment whose report is opened (default: the index over all results)"
+    page = _row("experiment", _word, "EXPERIMENT", what, nargs="?")
+    yield "open", "commands.open", text, (RESULTS, page)
     text = "Write the movie of an experiment that has been run: MP4, WebM or GIF, or numbered PNG frames."
     yield "movie", "commands.movie", text, (RESULTS, SETTINGS, *_movie())
     text = "Print what a shell needs to complete commands, options and names."
-    yield "completion", "commands.completion", text, tuple(_completion())
+    what = "the shell; `words` is what its script asks"
+    words = _row("words", str, "WORD", "the command line so far", nargs="*")
+    shell = "shell", {"choices": SHELLS, "help": what}
+    yield "completion", "commands.completion", text, (shell, words)
     text = "Simulate levels of an experiment."
     yield "simulate", "jobs.simulate", text, (ONE, THREADS, *OF_JOBS, *_simulate(), ALLOW)
     text = "Compare the levels of an experiment: convergence.nc and summary.json."
@@ -213,36 +223,6 @@ def _verify() -> Iterator[_Row]:
     yield SETTINGS
     yield _flag("--files", "compare files with the manifest, and recompute nothing")
     yield from (CORES, ALLOW)
-
-
-def _list() -> Iterator[_Row]:
-    """Yield the options of ``vibsim list``."""
-    yield "what", {"choices": LISTS}
-    yield _row("name", _word, "NAME", "one entry, in full", nargs="?")
-
-
-def _diff() -> Iterator[_Row]:
-    """Yield the options of ``vibsim diff``."""
-    text = "experiment, FILE.yaml, or a folder of results"
-    yield from (_row("first", _word, "A", text), _row("second", _word, "B", text))
-
-
-def _explain() -> Iterator[_Row]:
-    """Yield the options of ``vibsim explain``."""
-    text = "the reason of a verdict, such as order_low (default: list all of them)"
-    yield _row("reason", _word, "REASON", text, nargs="?")
-
-
-def _open() -> Iterator[_Row]:
-    """Yield the options of ``vibsim open``."""
-    text = "experiment whose report is opened (default: the index over all results)"
-    yield _row("experiment", _word, "EXPERIMENT", text, nargs="?")
-
-
-def _completion() -> Iterator[_Row]:
-    """Yield the options of ``vibsim completion``."""
-    yield "shell", {"choices": SHELLS, "help": "the shell; `words` is what its script asks"}
-    yield _row("words", str, "WORD", "the command line so far", nargs="*")
 
 
 def _simulate() -> Iterator[_Row]:

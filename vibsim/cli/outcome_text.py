@@ -11,7 +11,8 @@ from vibsim.core.set_option import set_options
 from vibsim.core.vocabulary import SEVERITY, order_interval
 
 Entry = Mapping[str, Any]
-"""The summary of an experiment, or one of its checks; or a failed job."""
+"""The summary of an experiment, one without checks and with an ``error`` where it has none; or one of its checks; or a
+failed job."""
 _NARROWEST = 30
 """Columns that a text has at least, however narrow the terminal."""
 

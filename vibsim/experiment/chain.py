@@ -17,7 +17,7 @@ from typing import Any
 from vibsim.experiment.faults import Report
 from vibsim.experiment.other_forms import OF_COORDINATE
 from vibsim.experiment.repeat import REPEAT
-from vibsim.experiment.yaml.parse import Path_, Source
+from vibsim.experiment.yaml.parse import Path_
 from vibsim.models.system import MOST
 
 COUNT = "n"
@@ -26,18 +26,18 @@ REPEATED = "outputs", "potential", "kinetic", "exact"
 _BEYOND = re.compile(r"(\w+)\{\w+\s*([+-])\s*(\d{1,4})\}")
 
 
-def with_chain(source: Source, report: Report) -> Source:
-    """Return the content with a chain as `repeat` writes it, of which `report` then speaks; faults are noted."""
-    data = source.data
+def write_out_chain(report: Report) -> None:
+    """Bring a chain in the content that `report` speaks of to the form of `repeat`; faults are noted."""
+    data = report.source.data
     section = data.get("model") if isinstance(data, Mapping) else None
     if not isinstance(section, Mapping):
-        return source
+        return
     written = section.get(REPEAT)
     if not isinstance(written, Mapping) or COUNT not in written or len(written) != 2:
-        return source
+        return
     (index,) = (key for key in written if key != COUNT)
     if not isinstance(written[index], Mapping) or not re.fullmatch(r"[A-Za-z]\w*", str(index)):
-        return source
+        return
     writer = _Writer(index, report)
     count = _count(written[COUNT], report)
     chain = writer.coordinates(written[index])
@@ -49,11 +49,8 @@ def with_chain(source: Source, report: Report) -> Source:
     if isinstance(others, Mapping):
         model["coordinates"] = {**chain, **others}
     else:
-        rule, hint = (
-            f"must hold formulas beside a chain of `{REPEAT}`",
-            "e.g. {y: {acceleration: -y}}",
-        )
-        report.add_malformed(("model", "coordinates"), rule, hint)
+        rule = f"must hold formulas beside a chain of `{REPEAT}`"
+        report.add_malformed(("model", "coordinates"), rule, "e.g. {y: {acceleration: -y}}")
         model = {key: value for key, value in model.items() if key not in OF_COORDINATE}
         names = others if isinstance(others, list | tuple) else ()
         model["coordinates"] = {**chain, **{str(name): {"acceleration": "0"} for name in names}}
@@ -66,8 +63,8 @@ def with_chain(source: Source, report: Report) -> Source:
     content = {**data, "model": model}
     if isinstance(data.get("initial"), Mapping):
         content["initial"] = writer.value(("initial",), data["initial"])
-    report.source = replace(source, data=content, origins={**source.origins, **writer.origins})
-    return report.source
+    origins = {**report.source.origins, **writer.origins}
+    report.source = replace(report.source, data=content, origins=origins)
 
 
 def _count(written: Any, report: Report) -> int:

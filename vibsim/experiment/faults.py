@@ -43,20 +43,17 @@ _FORMS = {
 }
 """How each rule for the values of a sweep is written."""
 
-_EXAMPLES: Mapping[Path_, str] = {
+_EXAMPLES: Mapping[object, str] = {
     ("levels",): "e.g. [6, 7, 8, 9], or {from: 6, to: 9}",
     ("time",): "e.g. {end: 10.0}",
     ("model", "rayleigh"): "e.g. {alpha: 0.1, beta: 0.001}",
     ("model", "observe"): "e.g. {tip: 10, stretch: {1: -1, 2: 1}}",
     ("checks",): "begin each one with `- `",
     ("model", "events"): "begin each one with `- `",
-}
-"""How a list or a mapping is written, where the rule alone would help nobody."""
-_EXAMPLES_ANYWHERE: Mapping[object, str] = {
     "expect": "e.g. {status: FAIL, reason: order_low}",
     "then": "e.g. {v: -0.8*v}",
 }
-"""The same of keys that stand in entries of a list."""
+"""How a list or a mapping is written, where the rule alone would help nobody: by its path, or by its key anywhere."""
 
 _MEANT = {"tolerance": "atol", "tol": "atol", "at_least": "above", "at_most": "below"}
 """A key that other programs or other checks have, and the one that has its meaning here."""
@@ -194,7 +191,7 @@ class Report:
         if kind == "literal_error":
             hint = nearest(value, re.findall(r"'([^']*)'", context["expected"]))
         if kind in ("tuple_type", "dict_type", "model_type", "model_attributes_type"):
-            hint = _EXAMPLES.get(path) or _EXAMPLES_ANYWHERE.get(path[-1], hint)
+            hint = _EXAMPLES.get(path) or _EXAMPLES.get(path[-1], hint)
         if kind in ("missing", "too_long", "tuple_type"):
             path, rule = _whole_list(path, rule)
         # a list with wrong items is too short only for pydantic, which counts the right ones

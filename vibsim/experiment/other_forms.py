@@ -18,7 +18,7 @@ from typing import Any
 
 from vibsim.core.errors import likely
 from vibsim.experiment.faults import Report
-from vibsim.experiment.yaml.parse import Path_, Source
+from vibsim.experiment.yaml.parse import Path_
 from vibsim.formula import (
     CONSTANTS,
     FUNCTIONS,
@@ -44,12 +44,12 @@ _SECOND = "_second_derivative"
 _DERIVATIVE = re.compile(r"([A-Za-z_]\w*)('{1,2})(?!')")
 
 
-def with_other_forms(source: Source, report: Report) -> Source:
-    """Return the content with the model in its usual form, of which `report` then speaks; faults are noted."""
-    data = source.data
+def write_usual_form(report: Report) -> None:
+    """Bring the model in the content that `report` speaks of to its usual form; faults are noted."""
+    source, data = report.source, report.source.data
     if not isinstance(data, Mapping) or not isinstance(section := data.get("model"), Mapping):
-        return source
-    writer = _Writer(source, report)
+        return
+    writer = _Writer(report)
     model = writer.of_structure(section) if section.get("kind") == "structure" else dict(section)
     if section.get("kind") == "system":
         model = writer.of_equation(writer.of_coordinates(model))
@@ -65,14 +65,13 @@ def with_other_forms(source: Source, report: Report) -> Source:
             report.add_malformed((key,), rule, "`kind: system` does", at_key=True)
     origins = {**source.origins, **writer.origins}
     report.source = replace(source, data={**rest, "model": model}, origins=origins)
-    return report.source
 
 
 class _Writer:
     """Writes a section ``model`` anew, and remembers where its parts stand in the file."""
 
-    def __init__(self, source: Source, report: Report) -> None:
-        self.source, self.report = source, report
+    def __init__(self, report: Report) -> None:
+        self.source, self.report = report.source, report
         self.origins: dict[Path_, Path_] = {}
 
     def moved(self, model: dict[str, Any], key: str, value: Any, path: Path_) -> dict[str, Any]:

@@ -10,13 +10,13 @@ from pathlib import Path
 from typing import Any
 
 from vibsim.core.errors import Fault, InputError, nearest
-from vibsim.experiment.chain import with_chain
+from vibsim.experiment.chain import write_out_chain
 from vibsim.experiment.collection import collection_of
 from vibsim.experiment.data import ExperimentSpec, ModelSpec, Sweep, TimeSpec
 from vibsim.experiment.faults import MISSING, Report, shorten
 from vibsim.experiment.kinds import Kinds
-from vibsim.experiment.other_forms import with_other_forms
-from vibsim.experiment.repeat import with_repeats
+from vibsim.experiment.other_forms import write_usual_form
+from vibsim.experiment.repeat import write_out_repeats
 from vibsim.experiment.rules import continuation, members, size_limits, timing, unlikely
 from vibsim.experiment.rules import schemes as scheme_rules
 from vibsim.experiment.rules.checks import check_published, finish_checks
@@ -24,7 +24,6 @@ from vibsim.experiment.rules.figures import check_figures
 from vibsim.experiment.rules.model import Equation, are_known
 from vibsim.experiment.rules.model import equation as read_equation
 from vibsim.experiment.rules.scaling import Numbers, characteristic
-from vibsim.experiment.rules.starts import check_starts
 from vibsim.experiment.rules.structure import check_histories
 from vibsim.experiment.rules.sweep import read_sweep
 from vibsim.experiment.rules.timing import rising_levels
@@ -130,10 +129,13 @@ def build(
     """
     report = Report(source, kinds)
     check_names(name, collection, report)
-    source = with_other_forms(with_repeats(with_chain(source, report), report), report)
-    document = read_document(source, report)
+    # each brings its part of the content to the form that the next one reads
+    write_out_chain(report)
+    write_out_repeats(report)
+    write_usual_form(report)
+    document = read_document(report)
     folder = file.parent if file else Path()
-    equation, numbers, setting = _equation_and_setting(document, source, folder, report)
+    equation, numbers, setting = _equation_and_setting(document, folder, report)
     size_limits.check(setting, report)
     _check_output(document, setting, report)
     checks = _checks(document, setting, report)
@@ -166,23 +168,23 @@ def build(
 
 
 def _equation_and_setting(
-    document: Any, source: Source, folder: Path, report: Report
+    document: Any, folder: Path, report: Report
 ) -> tuple[Equation, Numbers, size_limits.Setting]:
     """Return the equation, its numbers with what they are scaled by, and what checks and limits need to know."""
-    swept = sorted(set(_keys(source.data.get("sweep"))))
+    data = report.source.data
+    swept = sorted(set(_keys(data.get("sweep"))))
     # a model section with a fault elsewhere still names its model
-    of_kind = report.kinds.model_of(source.data.get("model"))
+    of_kind = report.kinds.model_of(data.get("model"))
     equation = read_equation(document.model, of_kind, swept, folder, report)
     model, parameters = equation.model, equation.parameters
-    levels = _levels(document, source, report)
+    levels = _levels(document, report)
     schemes = tuple(scheme_rules.finish_schemes(document.schemes, model, report))
     knows_schemes = scheme_rules.are_known(document.schemes, report.kinds)
     time = timing.time_spec(document.time, model, parameters, report)
     # the states of a structure are known with its matrices alone
     known = None if of_kind is STRUCTURE else of_kind
     initial = _initial(document.initial, model or known, parameters, report)
-    order = source.data.get("sweep")
-    sweep, is_whole = read_sweep(document, order, model, schemes, not knows_schemes, report)
+    sweep, is_whole = read_sweep(document, model, schemes, not knows_schemes, report)
     if is_whole:
         _check_members(equation, initial, time, sweep, report)
     numbers = Numbers(parameters, initial, time)
@@ -193,11 +195,11 @@ def _equation_and_setting(
         time=numbers.time,
         levels=levels,
         schemes=schemes,
-        names=tuple(dict.fromkeys(scheme_names(source.data.get("schemes")))),
+        names=tuple(dict.fromkeys(scheme_names(data.get("schemes")))),
         sweep=sweep,
         knows_sweep=is_whole,
         samples=document.samples.every if isinstance(document.samples, Every) else document.samples,
-        by_tolerance=source.data.get("tolerance") is not None,
+        by_tolerance=data.get("tolerance") is not None,
         knows_schemes=knows_schemes,
     )
     return equation, numbers, setting
@@ -239,7 +241,7 @@ def _check_members(
     members.check_jumps(numbers, equation.formulas, report)
     if sweep.follow is not None:
         continuation.check_equation(model, numbers, report)
-    check_starts(numbers, equation.formulas, report)
+    members.check_starts(numbers, equation.formulas, report)
 
 
 def check_names(experiment: str, collection: str, report: Report) -> None:
@@ -261,9 +263,10 @@ def _keys(section: Any) -> Iterator[str]:
             yield from _keys(value)
 
 
-def _levels(document: Any, source: Source, report: Report) -> tuple[int, ...]:
+def _levels(document: Any, report: Report) -> tuple[int, ...]:
     """Return the levels; none where the section is missing or faulty, or a tolerance stands for it."""
-    given = [key for key in ("levels", "tolerance") if source.data.get(key) is not None]
+    data = report.source.data
+    given = [key for key in ("levels", "tolerance") if data.get(key) is not None]
     if not given:
         report.add(("levels",), MISSING, "e.g. {from: 6, to: 9}, or tolerance in its place")
     elif len(given) > 1:

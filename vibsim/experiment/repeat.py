@@ -17,7 +17,7 @@ from typing import Any
 
 from vibsim.core.errors import nearest
 from vibsim.experiment.faults import Report
-from vibsim.experiment.yaml.parse import Path_, Source
+from vibsim.experiment.yaml.parse import Path_
 
 REPEAT = "repeat"
 MOST_VALUES = 1000
@@ -26,34 +26,26 @@ _INDEX = re.compile(r"\{\s*([A-Za-z]\w*)\s*(?:([+-])\s*(\d{1,4}))?\s*\}")
 _BRACE = re.compile(r"[{}]")
 
 
-def with_repeats(source: Source, report: Report) -> Source:
-    """Return the content with every repeated key written out, of which `report` then speaks.
-
-    What is wrong with an index is noted.
-    """
-    data = source.data
+def write_out_repeats(report: Report) -> None:
+    """Write out every repeated key of the content that `report` speaks of; what is wrong with an index is noted."""
+    source, data = report.source, report.source.data
     section = data.get("model") if isinstance(data, Mapping) else None
     if not isinstance(section, Mapping) or section.get(REPEAT) is None:
-        return source
+        return
     indices = _indices(section[REPEAT], report)
+    starts = data.get("initial")
     if not indices:
         # what holds an index is no formula then
-        starts = data.get("initial")
-        held = (
-            [key for key in starts if _BRACE.search(str(key))]
-            if isinstance(starts, Mapping)
-            else []
-        )
-        report.faulty.update(("initial", key) for key in held)
-        return source
+        held = starts if isinstance(starts, Mapping) else ()
+        report.faulty.update(("initial", key) for key in held if _BRACE.search(str(key)))
+        return
     writer = _Writer(indices, report)
     model = {key: value for key, value in section.items() if key != REPEAT}
     found = {**data, "model": writer.mapping(("model",), model, ("model",))}
-    if isinstance(data.get("initial"), Mapping):
-        found["initial"] = writer.mapping(("initial",), data["initial"], ("initial",))
+    if isinstance(starts, Mapping):
+        found["initial"] = writer.mapping(("initial",), starts, ("initial",))
     written = {out: source.origin(path) or path for out, path in writer.origins.items()}
     report.source = replace(source, data=found, origins={**source.origins, **written})
-    return report.source
 
 
 def _indices(written: Any, report: Report) -> dict[str, range]:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 from vibsim.core.errors import Fault, InputError
@@ -39,16 +39,8 @@ def with_settings(source: Source, settings: Sequence[str]) -> Source:
     return replace(source, settings=(*source.settings, *settings))
 
 
-@dataclass(frozen=True)
-class _Refusal:
-    """Makes the error of a setting."""
-
-    file: str
-    key: str
-    value: str
-
-    def error(self, rule: str, hint: str = "") -> InputError:
-        return InputError([Fault(self.file, 0, self.key, self.value, rule, hint)])
+class _SettingError(Exception):
+    """The rule that a setting breaks, and how to keep it."""
 
 
 def _with_one(source: Source, text: str) -> Source:
@@ -56,30 +48,33 @@ def _with_one(source: Source, text: str) -> Source:
     key = key.strip()
     file = set_in(source.file, shorten(text))
     if not is_given or not key:
-        raise _Refusal(file, "", "").error(FORM)
-    refuse = _Refusal(file, shorten(key), shorten(value))
+        raise InputError([Fault(file, 0, "", "", FORM)])
     assert source.top is not None
-    path = _path(source.top, key, refuse)
-    top = _put(source.top, path, replace(_node(value, refuse), setting=text), text)
+    try:
+        path = _path(source.top, key)
+        node = replace(_node(value), setting=text)
+    except _SettingError as error:
+        raise InputError([Fault(file, 0, shorten(key), shorten(value), *error.args)]) from None
+    top = _put(source.top, path, node, text)
     return replace(source, data=top.value, top=top)
 
 
-def _node(value: str, refuse: _Refusal) -> Node:
+def _node(value: str) -> Node:
     """Return what a value means, read as behind a key of a file."""
     try:
-        found = parse(f"{_VALUE}: {value}".encode(), refuse.file)
+        found = parse(f"{_VALUE}: {value}".encode(), "")
         faults = found.faults
     except InputError as error:
         faults = error.faults
     if faults:
-        raise refuse.error(faults[0].rule.partition(", first on line")[0], faults[0].hint)
+        raise _SettingError(faults[0].rule.partition(", first on line")[0], faults[0].hint)
     top = found.top
     if top is None or top.children is None or top.children.keys() != {_VALUE}:
-        raise refuse.error("must be one value")
+        raise _SettingError("must be one value")
     return top.children[_VALUE]
 
 
-def _path(top: Node, key: str, refuse: _Refusal) -> Path_:
+def _path(top: Node, key: str) -> Path_:
     """Return the place that a key means in the content of a file: a key there may itself have dots."""
     path: Path_ = ()
     node: Node | None = top
@@ -87,13 +82,13 @@ def _path(top: Node, key: str, refuse: _Refusal) -> Path_:
     while rest:
         if index := _INDEX.match(rest):
             place = int(index[1])
-            _check_index(node, path, place, refuse)
+            _check_index(node, path, place)
             path, rest = (*path, place), rest[index.end() :]
         else:
             name = _name(node, path, rest)
             if not name:
-                raise refuse.error(FORM)
-            _check_name(node, path, refuse)
+                raise _SettingError(FORM)
+            _check_name(node, path)
             path, rest = (*path, name), rest.removeprefix(name).removeprefix(".")
         node = (node.children or {}).get(path[-1]) if node else None
     return path
@@ -108,23 +103,23 @@ def _name(node: Node | None, path: Path_, rest: str) -> str:
     return max(known, key=len) if known else found[0] if found else ""
 
 
-def _check_index(node: Node | None, path: Path_, place: int, refuse: _Refusal) -> None:
+def _check_index(node: Node | None, path: Path_, place: int) -> None:
     where = dotted(path)
     if node is None or not isinstance(node.value, list):
-        raise refuse.error(f"{where or 'the file'} is no list")
+        raise _SettingError(f"{where or 'the file'} is no list")
     count = len(node.value)
     if place >= count:
         there = f"choose from [0] to [{count - 1}]" if count else "it is empty"
-        raise refuse.error(f"{where} has no entry [{place}]", there)
+        raise _SettingError(f"{where} has no entry [{place}]", there)
 
 
-def _check_name(node: Node | None, path: Path_, refuse: _Refusal) -> None:
+def _check_name(node: Node | None, path: Path_) -> None:
     where = dotted(path)
     if node is None or node.value is None or node.keys is not None or _is_scheme(path, node):
         return
     if isinstance(node.value, list):
-        raise refuse.error(f"{where} is a list", f"name an entry by its number, e.g. {where}[0]")
-    raise refuse.error(f"{where} is a value and has no keys")
+        raise _SettingError(f"{where} is a list", f"name an entry by its number, e.g. {where}[0]")
+    raise _SettingError(f"{where} is a value and has no keys")
 
 
 def _is_scheme(path: Path_, node: Node) -> bool:

@@ -47,9 +47,9 @@ def read_solver(source: Source, collection: str, file: Path) -> SolverExperiment
     """Validate what `source` holds and fill in every default; InputError with every fault of the file."""
     report, name = Report(source), file.stem
     check_names(name, collection, report)
-    document = read_document(source, report, SolverDocument)
+    document = read_document(report, SolverDocument)
     numbers, sizes = _sizes(document.refine, report)
-    sweep, whole = _sweep(document.sweep, source, report)
+    sweep, whole = _sweep(document.sweep, report)
     # as written, faulty or not: nothing more is said about placeholders of what is faulty
     refined, swept = _keys(source.data.get("refine")), list(_written(source.data.get("sweep")))
     size_names = [name for name in refined if name != "levels"]
@@ -144,14 +144,13 @@ def _by_formula(
 # ---- the sweep
 
 
-def _sweep(section: Any, source: Source, report: Report) -> tuple[Sweep | None, tuple[str, ...]]:
+def _sweep(section: Any, report: Report) -> tuple[Sweep | None, tuple[str, ...]]:
     """Return the sweep, None without one, and the names whose values are all written as whole numbers."""
     if section is None:
         return None, ()
-    order = source.data["sweep"]
-    raw = dict(_written(order))
+    raw = dict(_written(report.source.data["sweep"]))
     types = {name: Text if _is_text(values) else Number for name, values in raw.items()}
-    axes = [axis for axis in SweepReader(types, report).axes(section, order) if axis is not None]
+    axes = [axis for axis in SweepReader(types, report).axes(section) if axis is not None]
     if not raw:
         report.add(("sweep",), "must not be empty")
     return Sweep.model_construct(axes=tuple(axes)), tuple(filter(lambda n: _is_whole(raw[n]), raw))

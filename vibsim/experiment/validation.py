@@ -17,14 +17,14 @@ from vibsim.experiment.faults import MISSING, Report
 from vibsim.experiment.schema.document import Document, OneOf
 from vibsim.experiment.schema.fields import STAND_IN, Section
 from vibsim.experiment.units import Units
-from vibsim.experiment.yaml.parse import Path_, Source
+from vibsim.experiment.yaml.parse import Path_
 
 _FAULTY: Any = object()
 """In place of a value that is left out."""
 
 
-def read_document(source: Source, report: Report, kind: type[Section] = Document) -> Any:
-    """Return the content of a file, and note the faults of its values.
+def read_document(report: Report, kind: type[Section] = Document) -> Any:
+    """Return the content of the file that `report` speaks of, and note the faults of its values.
 
     Returns
     -------
@@ -36,25 +36,25 @@ def read_document(source: Source, report: Report, kind: type[Section] = Document
     fields = kind.model_fields
     # a section without content is one that is left out, where it may be
     optional = {key for key, field in fields.items() if not field.is_required()}
-    data = {k: v for k, v in source.data.items() if v is not None or k not in optional}
+    data = {k: v for k, v in report.source.data.items() if v is not None or k not in optional}
     if kind is not Document:
-        return _Reader(source, report, None).section((), data, kind)
+        return _Reader(report, None).section((), data, kind)
     units = Units(data, report)
     if isinstance(data.get("units"), dict):
         data["units"] = units.defined
-    return _Reader(source, report, units).section((), data, Document)
+    return _Reader(report, units).section((), data, Document)
 
 
 def read_value(path: Path_, written: Any, annotation: Any, report: Report) -> Any:
     """Return a value that stands in no file, and note its faults; None where it has any."""
-    reader = _Reader(report.source, report, Units({}, report))
+    reader = _Reader(report, Units({}, report))
     found = reader.value(path, written, _Form(annotation), keeps_rest=False)
     return None if found is _FAULTY else found
 
 
 class _Reader:
-    def __init__(self, source: Source, report: Report, units: Units | None) -> None:
-        self.source, self.report, self.units = source, report, units
+    def __init__(self, report: Report, units: Units | None) -> None:
+        self.report, self.units = report, units
 
     def section(self, path: Path_, written: Mapping[str, Any], kind: type[Section]) -> Any:
         """Return the section of a `kind` that a mapping describes."""
@@ -91,7 +91,7 @@ class _Reader:
             return _FAULTY
         form = form.of(written)
         if form.one_of and (made := form.one_of.section_of(written, self.report.kinds)):
-            form = _form(made)
+            form = _form_of(made)
         if form.section is not None and isinstance(written, Mapping):
             return self.section(path, written, form.section)
         if form.entries is None or (written is None and form.is_optional):
@@ -133,7 +133,7 @@ class _Reader:
         """Return a number of a printed table as text: its digits count, not its value."""
         is_number = isinstance(written, int | float) and not isinstance(written, bool)
         is_printed = is_number and path[0] == "published" and path[-1] == "printed"
-        place = self.source.place(path) if is_printed else None
+        place = self.report.source.place(path) if is_printed else None
         return place.text if place else written
 
 
@@ -172,7 +172,7 @@ class _Form:
     @cached_property
     def validator(self) -> TypeAdapter[Any]:
         """Made on first use: most of what may be written is not."""
-        return _validator(self.annotation)
+        return _adapter_of(self.annotation)
 
     def of(self, written: Any) -> _Form:
         """Return what of a union describes what is written; the union itself where nothing does."""
@@ -182,14 +182,8 @@ class _Form:
         return member.of(written) if member else self
 
 
-@cache
-def _validator(annotation: Any) -> TypeAdapter[Any]:
-    return TypeAdapter(annotation)
-
-
-@cache
-def _form(annotation: Any) -> _Form:
-    return _Form(annotation)
+_form_of = cache(_Form)
+_adapter_of = cache(TypeAdapter)
 
 
 @cache

@@ -92,92 +92,84 @@ _MARKS: Mapping[str, Mapping[str, Any]] = {
     "mesh": {"at": ("level", "case")},
     "pair": {"finer_levels": 1},
     "triple": {"finer_levels": 2},
-    "best": {"best": True},
-    "time": {"needs_time": True},
     "solution": {"needs_exact": "solution"},
     "period": {"needs_exact": "period"},
-    "linear": {"needs_linear": True},
-    "fixed_step": {"fixed_step": True},
-    "rational": {"needs_rational": True},
-    "events": {"needs_events": True},
-    "sample": {"is_sample": True},
-    "work": {"is_count_of_work": True},
-    "survives": {"survives_failure": True},
     "parabola": {"measured_by": "parabola"},
     "points": {"measured_by": "points"},
     "roots": {"measured_by": "roots"},
-    "own_size": {"has_own_size": True},
-    "angle": {"is_angle": True},
-    "force": {"needs_force": True},
-    "run": {"rests_on_run": True},
 }
-"""Further fields of `Value`, by the words of the fourth column of the table."""
+"""Further fields of `Value`, by the words of the fourth column of the table; any other word is a field that is true."""
 _TABLE = """\
-end | series | quantity | anywhere best sample | value at the last time, or at `t` or `step`
-at | series | quantity | anywhere best time sample survives | value at the time `t` or after `step` steps
-min | stored | quantity | best points | smallest value over every step; of an output, over the stored times; \
-at best, between them
-max | stored | quantity | best points | largest value over every step; of an output, over the stored times; \
-at best, between them
+end | series | quantity | anywhere best is_sample | value at the last time, or at `t` or `step`
+at | series | quantity | anywhere best needs_time is_sample survives_failure | value at the time `t` or after `step` \
+steps
+min | stored | quantity | best points | smallest value over every step; of an output, over the stored times; at best, \
+between them
+max | stored | quantity | best points | largest value over every step; of an output, over the stored times; at best, \
+between them
 max_abs | extremal | quantity | best points | largest absolute value over every step
 max_abs_interior | deviation | quantity | | the same without the last point
-max_abs_ratio | extremal | none | pair fixed_step | largest absolute value over every step, over that of the \
-next finer level
+max_abs_ratio | extremal | none | pair fixed_step | largest absolute value over every step, over that of the next \
+finer level
 max_abs_interior_ratio | deviation | none | pair fixed_step | the same without the last point
 running_max | running | quantity | anywhere | largest absolute value over every step up to `t` or `step`, or the end
 relative_running_max | running | none | anywhere | the same, over |E(0)|
-period | none | time | best parabola own_size | period, from interpolated peaks
+period | none | time | best parabola has_own_size | period, from interpolated peaks
 period_grid | none | time | | period, from peaks at grid points
-exact_period | none | time | exact_motion period survives | period of the exact solution
+exact_period | none | time | exact_motion period survives_failure | period of the exact solution
 period_error | none | none | best period parabola | period over the exact period, less one
-frequency | none | frequency | best roots own_size | angular frequency of the computed motion
+frequency | none | frequency | best roots has_own_size | angular frequency of the computed motion
 error_of_frequency | none | none | best period roots | angular frequency over that of the exact solution, less one
-predicted_frequency | none | frequency | linear fixed_step survives | angular frequency by the theory of the scheme
+predicted_frequency | none | frequency | needs_linear fixed_step survives_failure | angular frequency by the theory of \
+the scheme
 phase_error_per_period | none | time | best period roots | time by which the peaks come early, per period; negative \
 where they come late
-predicted_phase_error | none | time | linear fixed_step survives | the same by the theory of the scheme
+predicted_phase_error | none | time | needs_linear fixed_step survives_failure | the same by the theory of the scheme
 phase_error_slope | none | time | period | slope of the time by which a peak comes early over the number of its period
-amplitude | none | position | best parabola own_size | half the height from the last trough to the last peak
+amplitude | none | position | best parabola has_own_size | half the height from the last trough to the last peak
 amplitude_error | none | none | best parabola | last amplitude over the first one, less one
-steady_amplitude | series | quantity | force best run own_size | A of the harmonic A cos(w t - phase) with the \
-frequency w of the force, over its last period
-steady_phase | series | none | force best run angle | phase of that harmonic [rad], from -pi to pi: the lag \
-behind cos(w t)
-steady_change | series | none | force | how far that harmonic is from that of the period before, over its amplitude
-section_period | none | count | force | after how many periods of the force the state is the same again, to 1e-3, \
-in the second half of the run; 0 where it never is
-peak_frequency | series | frequency | best run own_size | angular frequency of the highest line in the spectrum of the \
-stored series
-growth_factor | none | none | best parabola own_size | last peak over the first peak
-growth_per_period | none | none | best roots own_size survives | factor by which the amplitude grows in a period
-predicted_growth_per_period | none | none | linear fixed_step survives | the same by the theory of the scheme
+steady_amplitude | series | quantity | needs_force best rests_on_run has_own_size | A of the harmonic A cos(w t - phase) with \
+the frequency w of the force, over its last period
+steady_phase | series | none | needs_force best rests_on_run is_angle | phase of that harmonic [rad], from -pi to pi: the \
+lag behind cos(w t)
+steady_change | series | none | needs_force | how far that harmonic is from that of the period before, over its \
+amplitude
+section_period | none | count | needs_force | after how many periods of the force the state is the same again, to \
+1e-3, in the second half of the run; 0 where it never is
+peak_frequency | series | frequency | best rests_on_run has_own_size | angular frequency of the highest line in the spectrum of \
+the stored series
+growth_factor | none | none | best parabola has_own_size | last peak over the first peak
+growth_per_period | none | none | best roots has_own_size survives_failure | factor by which the amplitude grows in a \
+period
+predicted_growth_per_period | none | none | needs_linear fixed_step survives_failure | the same by the theory of the \
+scheme
 relative_energy_error | none | none | best | max |E(t) - E(0)| / |E(0)| over every step
-relative_energy_error_d2t | none | none | | the same with the centred difference of the position as velocity, \
-without the end points
-event_count | none | count | events | number of events, where the motion is not smooth
-event_time | none | time | numbered events best own_size | time of the event with the number `event`, from 1
-first_event_time | none | time | events best own_size | time of the first event
-last_event_time | none | time | events best own_size | time of the last event
-rest_time | none | time | events best own_size | time from which the body was at rest to the end, or of its stop
-accepted_steps | none | count | work | number of steps taken
-force_evaluations | none | count | work | number of evaluations of the acceleration; of an implicit scheme those of \
-one iteration per step
-stability_limit | none | none | all_levels fixed_step survives | largest stable w dt of the scheme, \
-infinite where there is none
-exact_degree | none | count | all_levels fixed_step rational survives | highest degree up to which the scheme \
-reproduces polynomials in t as solutions of the model, 8 at most
+relative_energy_error_d2t | none | none | | the same with the centred difference of the position as velocity, without \
+the end points
+event_count | none | count | needs_events | number of events, where the motion is not smooth
+event_time | none | time | numbered needs_events best has_own_size | time of the event with the number `event`, from 1
+first_event_time | none | time | needs_events best has_own_size | time of the first event
+last_event_time | none | time | needs_events best has_own_size | time of the last event
+rest_time | none | time | needs_events best has_own_size | time from which the body was at rest to the end, or of its \
+stop
+accepted_steps | none | count | is_count_of_work | number of steps taken
+force_evaluations | none | count | is_count_of_work | number of evaluations of the acceleration; of an implicit scheme \
+those of one iteration per step
+stability_limit | none | none | all_levels fixed_step survives_failure | largest stable w dt of the scheme, infinite \
+where there is none
+exact_degree | none | count | all_levels fixed_step needs_rational survives_failure | highest degree up to which the \
+scheme reproduces polynomials in t as solutions of the model, 8 at most
 error_l1 | convergent | l1 | best solution | L1 norm of the true error
 error_l2 | convergent | l2 | best solution | L2 norm of the true error
 error_linf | convergent | quantity | best solution | largest true error
 error_linf_interior | convergent | quantity | best solution | largest true error without the last point
-error_rate | states | none | pair solution fixed_step | log2 of the L2 norm of the true error over that of the \
-next finer level, each over its own stored points
-second_difference_fraction | none | none | mesh solution linear | [D_tD_t u] over u'' of the exact position at \
+error_rate | states | none | pair solution fixed_step | log2 of the L2 norm of the true error over that of the next \
+finer level, each over its own stored points
+second_difference_fraction | none | none | mesh solution needs_linear | [D_tD_t u] over u'' of the exact position at \
 the points of the level, least squares
-discrete_error | states | quantity | linear fixed_step | largest difference from the exact solution of the \
+discrete_error | states | quantity | needs_linear fixed_step | largest difference from the exact solution of the \
 scheme's own steps
-error_estimate_defect | convergent | none | pair solution fixed_step | max |estimate - true error| over max \
-|true error|
+error_estimate_defect | convergent | none | pair solution fixed_step | max |estimate - true error| over max |true error|
 observed_order | convergent | none | triple fixed_step | order of a triple of levels, L2 norm
 ratio | convergent | none | triple fixed_step | ratio of the differences of a triple, L2 norm
 coincidence | convergent | none | triple fixed_step | how well rescaled differences coincide
@@ -190,7 +182,7 @@ def _value(line: str) -> Value:
     name, of, measure, marks, description = (cell.strip() for cell in line.split("|", 4))
     fields: dict[str, Any] = {"of": of, "measure": measure}
     for mark in marks.split():
-        fields |= _MARKS[mark]
+        fields |= _MARKS.get(mark, {mark: True})
     return Value(name, description, **fields)
 
 

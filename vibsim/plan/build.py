@@ -8,7 +8,7 @@ which samples it keeps. The start of a job costs as much as many cheap levels, w
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import cache
 from typing import Any
 
@@ -56,15 +56,14 @@ def build(experiment: Experiment) -> Plan:
     levels = tuple(_level(experiment, content, level, values) for level in experiment.levels)
     groups, trajectories = _groups(levels), experiment.trajectories
     loads = [load_of(experiment, level) for level in experiment.levels]
-    made: dict[str, Any] = {
-        "levels": [[shard.digest for shard in level.shards] for level in levels]
-    }
-    settings = digested_settings(experiment.settings)
-    analysis = job_digest("analyse", in_numbers(analysed(content)), made | settings)
+    before = made_from(levels, experiment.settings)
+    analysis = job_digest("analyse", in_numbers(analysed(content)), before)
     reference = round(forecast.reference_seconds(experiment), 3)
     extrapolation = ""
     if experiment.output == "best":
-        extrapolation = job_digest("extrapolate", in_numbers(extrapolated(content)), made)
+        extrapolation = job_digest(
+            "extrapolate", in_numbers(extrapolated(content)), made_from(levels)
+        )
     return Plan(
         collection=experiment.collection,
         name=experiment.name,
@@ -96,9 +95,10 @@ def build(experiment: Experiment) -> Plan:
     )
 
 
-def digested_settings(settings: tuple[str, ...]) -> dict[str, Any]:
-    """Return what the digest of an analysis has of the settings that its results tell of; of none, nothing."""
-    return {"settings": list(settings)} if settings else {}
+def made_from(levels: Iterable[LevelJob], settings: Sequence[str] = ()) -> dict[str, Any]:
+    """Return what a digest has of the levels that a job reads, and of the settings that its results tell of, if any."""
+    found = {"levels": [[shard.digest for shard in level.shards] for level in levels]}
+    return {**found, "settings": list(settings)} if settings else found
 
 
 def job_digest(

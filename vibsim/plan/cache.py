@@ -46,10 +46,9 @@ def load(choice: Choice, resolve: Resolver | None = None, *, cached: bool = Fals
     InputError
         When the file is refused.
     """
-    word = str(choice.file) if choice.case is None else f"{choice.file}@{choice.case}"
 
     def build() -> Plan:
-        return replace(_built(choice, resolve), file=word, settings=choice.settings)
+        return replace(_built(choice, resolve), file=choice.word, settings=choice.settings)
 
     def dump(plan: Plan) -> bytes | None:
         # a file that changed while it was read is not kept under the digest of the old bytes
@@ -58,7 +57,7 @@ def load(choice: Choice, resolve: Resolver | None = None, *, cached: bool = Fals
 
     def load_cached(content: bytes) -> Plan | None:
         try:
-            plan = from_json(content.decode(), word, choice.key)
+            plan = from_json(content.decode(), choice.word, choice.key)
         except (ValueError, RecursionError):
             return None
         return plan if _has_inputs(plan, choice) else None

@@ -194,10 +194,7 @@ class Plan:
 
     def level(self, level: int) -> LevelJob:
         """Return the jobs of `level`; KeyError where the experiment has no such level."""
-        for job in self.levels:
-            if job.level == level:
-                return job
-        raise KeyError(level)
+        return {job.level: job for job in self.levels}[level]
 
     def made_by(self, batch: Batch) -> tuple[ShardJob, ...]:
         """Return the files that a job makes, one for each of its levels."""

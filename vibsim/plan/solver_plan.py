@@ -17,7 +17,7 @@ from vibsim.core.errors import Fault, InputError
 from vibsim.core.vocabulary import FORMAT
 from vibsim.experiment.solver import SolverExperiment
 from vibsim.plan import code_digest
-from vibsim.plan.build import digested_settings, job_digest
+from vibsim.plan.build import job_digest, made_from
 from vibsim.plan.digests import analysed, digest_of, solved
 from vibsim.plan.jobs import Batch, LevelJob, Plan, ShardJob, shard_path
 from vibsim.plan.versions import DRAWING, NUMERICAL, versions
@@ -56,12 +56,8 @@ def build(experiment: SolverExperiment) -> Plan:
             of_members = [inputs] * experiment.members
         shards = _shards(experiment, level, of_members, package)
         levels.append(_level(level=level, memory=memory, shards=shards))
-    made: dict[str, Any] = {
-        "levels": [[shard.digest for shard in level.shards] for level in levels]
-    }
-    analysis = job_digest(
-        "judge_levels", analysed(content), made | digested_settings(experiment.settings)
-    )
+    before = made_from(levels, experiment.settings)
+    analysis = job_digest("judge_levels", analysed(content), before)
     return Plan(
         collection=experiment.collection,
         name=experiment.name,

@@ -16,14 +16,10 @@ from vibsim.plan import code_digest
 from vibsim.plan.digests import digest_of
 from vibsim.plan.jobs import Batch, Plan
 
-PAGE_MEMORY = 300
-"""Megabytes of a job that makes a page: twice of what those of the default run take."""
-PAGE_DISK = 100
-"""Megabytes that such a job writes at most: ten times of what those of the default run write."""
 UNKNOWN_DISK = 1000
 """Megabytes of a job whose files have no estimate, a solver of the user: as Snakemake assumes."""
 PAGE_SECONDS = 30.0
-"""Seconds of such a job: several times of what those of the default run take."""
+"""Seconds of a job that makes a page: several times of what those of the default run take."""
 ANALYSED_SECONDS = 20e-9
 """Seconds of one core that an analysis takes for each byte of level files."""
 FINISHED_SECONDS = 4.0
@@ -231,9 +227,11 @@ class Names:
         """Return the megabytes that an extrapolation writes: it has the size of a level."""
         return _disk(self.plans[wildcards.experiment].levels[-1].bytes)
 
-    page_memory = PAGE_MEMORY
+    page_memory = 300
+    """Megabytes of a job that makes a page: twice of what those of the default run take."""
     page_minutes = _minutes(PAGE_SECONDS)
-    page_disk = PAGE_DISK
+    page_disk = 100
+    """Megabytes that such a job writes at most: ten times of what those of the default run write."""
 
     def memory(self, megabytes: int) -> Callable[[Any, int], int]:
         """Return what gives the memory of a job: with that of its executor, and more where it was not enough before."""

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from argparse import Namespace
 from collections.abc import Iterable, Sequence
+from importlib import import_module
 from itertools import chain
 
 BASH = """\
@@ -37,6 +38,13 @@ complete -c vibsim -a '(__vibsim_words)'
 """
 SCRIPTS = {"bash": BASH, "zsh": ZSH, "fish": FISH}
 WORDS = "words"
+_NAMES = {
+    "REASON": ("vibsim.core.vocabulary", "REASONS"),
+    **dict.fromkeys(("model", "models"), ("vibsim.models", "MODELS")),
+    **dict.fromkeys(("scheme", "schemes"), ("vibsim.schemes", "SCHEMES")),
+    "checks": ("vibsim.experiment.value_names", "VALUES"),
+}
+"""Where the names stand that an option or a place may hold, by what it is called."""
 
 
 def completion(options: Namespace) -> int:
@@ -100,28 +108,13 @@ def _of(settings: dict[str, object], name: str, given: Sequence[str]) -> Iterabl
     choices = settings.get("choices")
     if isinstance(choices, Iterable):
         return [str(choice) for choice in choices]
-    metavar = settings.get("metavar")
+    metavar = str(settings.get("metavar"))
     # an entry of a list is named behind the list
     what = given[0] if name == "name" and given else name
     if metavar in ("EXPERIMENT", "A", "B") or what in ("experiments", "like"):
         return _experiments()
-    if metavar == "REASON":
-        from vibsim.core.vocabulary import REASONS
-
-        return REASONS
-    if what in ("model", "models"):
-        from vibsim.models import MODELS
-
-        return MODELS
-    if what in ("scheme", "schemes"):
-        from vibsim.schemes import SCHEMES
-
-        return SCHEMES
-    if what == "checks":
-        from vibsim.experiment.value_names import VALUES
-
-        return VALUES
-    return []
+    module, names = _NAMES.get(metavar) or _NAMES.get(what, ("", ""))
+    return list(getattr(import_module(module), names)) if module else []
 
 
 def _experiments() -> list[str]:

@@ -37,10 +37,13 @@ def explain(options: Namespace) -> int:
 
 
 def _lines(word: str) -> Iterator[str]:
-    status = REASONS[word]
+    status, width = REASONS[word], min(terminal.columns(), _WIDEST)
     yield f"{terminal.painted(word, 'bold')}: {terminal.painted(status, status)}"
-    for head, text in meanings(word):
-        yield from _paragraphs(text, head)
+    for head, (meaning, needs) in meanings(word):
+        yield ""
+        for title, text in (("meaning", f"{head}{meaning}"), ("needed", needs)):
+            label, indent = title.ljust(9), " " * 9
+            yield textwrap.fill(text, width, initial_indent=label, subsequent_indent=indent)
     yield "\nMore: docs/verdicts.md, section Reasons"
 
 
@@ -61,12 +64,3 @@ def meanings(word: str) -> Iterator[tuple[str, Reason]]:
     promised = reason(word, "converges", is_promised=True)
     if promised != own:
         yield "Where the scheme promises that order: ", promised
-
-
-def _paragraphs(found: tuple[str, str], head: str) -> Iterator[str]:
-    meaning, needs = found
-    width = min(terminal.columns(), _WIDEST)
-    yield ""
-    for title, text in (("meaning", f"{head}{meaning}"), ("needed", needs)):
-        label, indent = title.ljust(9), " " * 9
-        yield textwrap.fill(text, width, initial_indent=label, subsequent_indent=indent)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import sys
 import webbrowser
 from argparse import Namespace
-from pathlib import Path
 
 from vibsim.cli.chosen_plans import one_plan_of
 from vibsim.cli.jobs.common import chosen_results
@@ -13,7 +12,6 @@ from vibsim.cli.level_member import OUTDATED, are_outdated
 from vibsim.core.errors import VibsimError
 from vibsim.core.home import called
 from vibsim.core.set_option import command_to_run
-from vibsim.plan import Plan
 from vibsim.store import read_json
 
 
@@ -33,15 +31,12 @@ def open_(options: Namespace) -> int:
         command = called("vibsim run" if word is None else command_to_run(word))
         raise VibsimError(f"{page}: there is no report yet: {command}")
     if plan is not None:
-        _note_where_outdated(plan, results / plan.summary)
+        summary = results / plan.summary
+        if summary.is_file() and are_outdated(plan, read_json(summary, name=plan.key)):
+            print(OUTDATED, file=sys.stderr)
     try:
         is_open = webbrowser.open(page.as_uri())
     except webbrowser.Error:
         is_open = False
     print(page if not is_open else f"opened {page}")
     return 0
-
-
-def _note_where_outdated(plan: Plan, summary: Path) -> None:
-    if summary.is_file() and are_outdated(plan, read_json(summary, name=plan.key)):
-        print(OUTDATED, file=sys.stderr)

@@ -9,9 +9,11 @@ from __future__ import annotations
 import math
 import re
 from argparse import Namespace
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
+from dataclasses import dataclass
 from fractions import Fraction
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from vibsim.cli.jobs.common import refusal
@@ -50,20 +52,19 @@ def theory_rows(scheme: Scheme, options: Options, terms: int, *, latex: bool) ->
     """Yield the theory of a scheme with equal steps; each series has `terms` terms."""
     from vibsim.theory import operators, symbolic
 
-    stepper = scheme.stepper(options)
-    write = _latex if latex else _plain
-
+    stepper, notation = scheme.stepper(options), _Notation(latex)
+    write = notation.number
     changed = (f"{k} = {v}" for k, v in options.items() if v != scheme.defaults()[k])
     yield "scheme", "; ".join((f"{scheme.kind}: {scheme.title}", *changed))
     yield "problem", "u'' + w^2 u = 0, u(0) = I, u'(0) = V; p = w dt"
     yield "stability limit", stable_until(scheme, options)
-    yield "roots", f"{_characteristic(operators.recurrence(stepper), write)} = 0"
+    yield "roots", f"{_characteristic(operators.recurrence(stepper), notation)} = 0"
     try:
-        yield from [*_series_rows(scheme, options, terms, write)]
+        yield from [*_series_rows(scheme, options, terms, notation)]
     except ValueError:
         reason = "the numerical frequency does not tend to w as dt tends to 0"
         yield "series", f"not written: {reason}, so the scheme is not one for this equation"
-    yield from _in_operators(stepper, write, latex=latex)
+    yield from _in_operators(stepper, notation)
     try:
         parts = symbolic.two_roots(stepper)
     except ValueError as reason:
@@ -72,16 +73,16 @@ def theory_rows(scheme: Scheme, options: Options, terms: int, *, latex: bool) ->
     yield "solution", "u_n = r^n (I cos(n th) + (u_1/r - I cos(th)) sin(n th)/sin(th)), with"
     yield "", f"r = {write(parts.growth)}"
     yield "", f"cos(th) = {write(parts.cosine)}"
-    yield "", f"u_1 = {_sum(zip(parts.first, ('I', 'V dt'), strict=True), write)}"
+    yield "", f"u_1 = {notation.sum(zip(parts.first, ('I', 'V dt'), strict=True))}"
 
 
 def _series_rows(
-    scheme: Scheme, options: Options, terms: int, write: Callable[[Any], str]
+    scheme: Scheme, options: Options, terms: int, notation: _Notation
 ) -> Iterator[Row]:
     """Yield what is known as series in p; ValueError where the frequency does not begin with w."""
     from vibsim.theory import operators, symbolic
 
-    stepper = scheme.stepper(options)
+    stepper, write = scheme.stepper(options), notation.number
 
     def series(formula: Any) -> str:
         return f"{write(formula)} + O({write(symbolic.symbol('p') ** (2 * terms))})"
@@ -95,14 +96,14 @@ def _series_rows(
     has_parasites = len(operators.recurrence(stepper)) > 3
     late = ", once parasitic roots have died out" if has_parasites else ""
     yield "error", f"u(t) - u_n = I ({error}) + O({following}) at a time t, for V = 0{late}"
-    yield "limits", _limits(scheme, options, stepper, write)
+    yield "limits", _limits(scheme, options, stepper, notation)
 
 
-def _limits(scheme: Scheme, options: Options, stepper: Stepper, write: Callable[[Any], str]) -> str:
+def _limits(scheme: Scheme, options: Options, stepper: Stepper, notation: _Notation) -> str:
     """Say what the frequency tends to for small steps, and where the scheme begins to grow."""
     from vibsim.theory import roots, stability_limit, symbolic
 
-    small = f"w~/w -> {write(symbolic.frequency_series(stepper, 1))} as p -> 0"
+    small = f"w~/w -> {notation.number(symbolic.frequency_series(stepper, 1))} as p -> 0"
     limit = stability_limit(scheme, options)
     if not 0.0 < limit < math.inf:
         return small
@@ -113,25 +114,23 @@ def _limits(scheme: Scheme, options: Options, stepper: Stepper, write: Callable[
     return f"{small}; w~ dt -> {turned} and w~/w -> {angle / limit:.6g} as p -> {limit:.6g}"
 
 
-def _characteristic(factors: Sequence[Any], write: Callable[[Any], str]) -> str:
+def _characteristic(factors: Sequence[Any], notation: _Notation) -> str:
     """Write the characteristic polynomial, without roots that are 0, by powers of x."""
     from vibsim.theory.symbolic import symbol
 
     powers = [symbol("x") ** k for k in reversed(range(len(factors)))]
-    return _sum(zip(factors, [*map(write, powers[:-1]), ""], strict=True), write)
+    return notation.sum(zip(factors, [*map(notation.number, powers[:-1]), ""], strict=True))
 
 
-def _in_operators(stepper: Stepper, write: Callable[[Any], str], *, latex: bool) -> Iterator[Row]:
+def _in_operators(stepper: Stepper, notation: _Notation) -> Iterator[Row]:
     """Yield a scheme with and without its velocity, and what the operators mean that were needed."""
     from vibsim.theory import operators
 
-    def equation(found: operators.Equation) -> str:
-        return _equation(found, write, latex=latex)
-
+    equation = notation.equation
     first, *others = operators.recurrence(stepper)
-    times = [_at("u", Fraction(1 - k), latex=latex) for k in range(len(others) + 1)]
-    right = _sum(zip((-factor for factor in others), times[1:], strict=True), write)
-    yield "without v", f"{_sum([(first, times[0])], write)} = {right}"
+    times = [notation.at("u", Fraction(1 - k)) for k in range(len(others) + 1)]
+    right = notation.sum(zip((-factor for factor in others), times[1:], strict=True))
+    yield "without v", f"{notation.sum([(first, times[0])])} = {right}"
     rows = [equation(operators.without_velocity(stepper))]
     with suppress(ValueError):
         rows.append(f"with all at one time: {equation(operators.at_one_time(stepper))}")
@@ -139,89 +138,87 @@ def _in_operators(stepper: Stepper, write: Callable[[Any], str], *, latex: bool)
     with suppress(ValueError):
         rows.append(", ".join(map(equation, operators.with_velocity(stepper))))
         yield "with v", rows[-1]
-    definitions = {
-        _operator(name, latex=latex): re.sub(r"\^\(([^)]*)\)", r"^{\1}", means) if latex else means
-        for name, means in operators.NOTATION.items()
-    }
+    definitions = {notation.operator(name): means for name, means in operators.NOTATION.items()}
+    if notation.is_latex:
+        braces = partial(re.sub, r"\^\(([^)]*)\)", r"^{\1}")
+        definitions = {name: braces(means) for name, means in definitions.items()}
     used = [name for name in definitions if any(f"{name} " in row for row in rows)]
-    yield (
-        "operators",
-        "; ".join(f"{_at(f'[{x} u]', Fraction(0), latex=latex)} = {definitions[x]}" for x in used),
-    )
+    texts = (f"{notation.at(f'[{x} u]', Fraction(0))} = {definitions[x]}" for x in used)
+    yield "operators", "; ".join(texts)
 
 
-def _equation(equation: Equation, write: Callable[[Any], str], *, latex: bool) -> str:
-    """Write terms with their operators, in one pair of brackets where they belong to one time."""
-    from vibsim.theory.symbolic import symbol
+@dataclass(frozen=True)
+class _Notation:
+    """How formulas are written: plainly, or as LaTeX."""
 
-    places = {term.place for side in equation for term in side}
+    is_latex: bool
 
-    def term(one: Term) -> str:
-        names = [_operator(name, latex=latex) for name in one.operators]
-        powers = (("w", one.powers[0]), ("dt", one.powers[1]))
-        scale = [write(symbol(name) ** power) for name, power in powers if power]
-        here = " ".join((*names, one.of))
+    def number(self, formula: Any) -> str:
+        """Write a formula or a number."""
+        from sympy import latex, sstr
+
+        write = latex if self.is_latex else sstr
+        written = str(write(_short(formula), order="rev-lex", full_prec=False))
+        return written if self.is_latex else written.replace("**", "^").replace("*", " ")
+
+    def sum(self, terms: Iterable[tuple[Any, str]]) -> str:
+        """Write a sum of coefficients times what they are of, which may be nothing; those that are 0 are left out."""
+        written = ""
+        for factor, of in terms:
+            if factor == 0:
+                continue
+            number = self.number(factor)
+            is_less = number.startswith("-")
+            if is_less:
+                number = self.number(-factor)
+            if of and number == "1":
+                number = ""
+            elif of and not number.isalnum():
+                number = f"({number})"
+            sign = "-" if is_less else "+"
+            written += f" {sign} " if written else sign.strip("+")
+            written += f"{number} {of}".strip()
+        return written
+
+    def at(self, what: str, place: Fraction) -> str:
+        """Write something at the time ``n + place``."""
+        time = "n" + (f"{'+' if place > 0 else '-'}{abs(place)}" if place else "")
+        if self.is_latex:
+            return f"{what}^{{{time}}}"
+        return f"{what}^{time if place == 0 else f'({time})'}"
+
+    def operator(self, name: str) -> str:
+        """Write the name of an operator."""
+        if not self.is_latex:
+            return name
+        head, _, index = name.partition("_")
+        if not index:
+            return rf"\mathrm{{{name}}}\,"
+        below = index.rstrip("+-")
+        above = index.removeprefix(below)
+        return f"{head}_{{{below}}}" + (f"^{{{above}}}" if above else "")
+
+    def equation(self, equation: Equation) -> str:
+        """Write terms with their operators, in one pair of brackets where they belong to one time."""
+        from vibsim.theory.symbolic import symbol
+
+        places = {term.place for side in equation for term in side}
+
+        def term(one: Term) -> str:
+            names = [self.operator(name) for name in one.operators]
+            powers = (("w", one.powers[0]), ("dt", one.powers[1]))
+            scale = [self.number(symbol(name) ** power) for name, power in powers if power]
+            here = " ".join((*names, one.of))
+            if len(places) > 1:
+                here = self.at(f"[{here}]" if names else one.of, one.place)
+            return " ".join((*scale, here))
+
+        left, right = (
+            self.sum((one.factor, term(one)) for one in side) or "0" for side in equation
+        )
         if len(places) > 1:
-            here = _at(f"[{here}]" if names else one.of, one.place, latex=latex)
-        return " ".join((*scale, here))
-
-    left, right = (
-        _sum(((one.factor, term(one)) for one in side), write) or "0" for side in equation
-    )
-    if len(places) > 1:
-        return f"{left} = {right}"
-    return _at(f"[{left} = {right}]", places.pop(), latex=latex)
-
-
-def _operator(name: str, *, latex: bool) -> str:
-    if not latex:
-        return name
-    head, _, index = name.partition("_")
-    if not index:
-        return rf"\mathrm{{{name}}}\,"
-    below = index.rstrip("+-")
-    return f"{head}_{{{below}}}" + (f"^{{{index.removeprefix(below)}}}" if below != index else "")
-
-
-def _at(what: str, place: Fraction, *, latex: bool) -> str:
-    """Write something at the time ``n + place``."""
-    time = "n" + (f"{'+' if place > 0 else '-'}{abs(place)}" if place else "")
-    if latex:
-        return f"{what}^{{{time}}}"
-    return f"{what}^{time if place == 0 else f'({time})'}"
-
-
-def _sum(terms: Iterable[tuple[Any, str]], write: Callable[[Any], str]) -> str:
-    """Write a sum of coefficients times what they are of, which may be nothing; those that are 0 are left out."""
-    written = ""
-    for factor, of in terms:
-        if factor == 0:
-            continue
-        number = write(factor)
-        is_less = number.startswith("-")
-        if is_less:
-            number = write(-factor)
-        if of and number == "1":
-            number = ""
-        elif of and not number.isalnum():
-            number = f"({number})"
-        sign = "-" if is_less else "+"
-        written += f" {sign} " if written else sign.strip("+")
-        written += f"{number} {of}".strip()
-    return written
-
-
-def _plain(formula: Any) -> str:
-    from sympy import sstr
-
-    written = str(sstr(_short(formula), order="rev-lex", full_prec=False))
-    return written.replace("**", "^").replace("*", " ")
-
-
-def _latex(formula: Any) -> str:
-    from sympy import latex
-
-    return str(latex(_short(formula), order="rev-lex", full_prec=False))
+            return f"{left} = {right}"
+        return self.at(f"[{left} = {right}]", places.pop())
 
 
 def _short(formula: Any) -> Any:

@@ -201,7 +201,7 @@ def _check(ended: snakemake.Outcome) -> None:
 def _show(
     options: Namespace,
     plans: Sequence[Plan],
-    summaries: list[outcome.Entry],
+    summaries: list[outcome_text.Entry],
     ended: snakemake.Outcome,
     results: Path,
     worked: bool,

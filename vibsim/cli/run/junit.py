@@ -6,17 +6,16 @@ failed or a result is damaged, is an error.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element, SubElement
 
 from vibsim.cli.jobs.common import refusal
+from vibsim.cli.outcome_text import Entry
 from vibsim.cli.terminal import clean
 from vibsim.store import write_text
 
-Entry = Mapping[str, Any]
 JOBS = "jobs of the workflow"
 """Name of the suite of jobs that failed."""
 

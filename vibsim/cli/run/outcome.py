@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 from vibsim.cli import made_files, resources, results_folder
+from vibsim.cli.outcome_text import Entry
 from vibsim.cli.run.snakemake import Job
 from vibsim.core.errors import FileError
 from vibsim.core.vocabulary import FORMAT, worst
@@ -15,8 +15,6 @@ from vibsim.plan import Plan
 from vibsim.store import read_json
 
 _LOG_LINES = 12
-Entry = Mapping[str, Any]
-"""The summary of an experiment, one without checks and with an ``error`` where it has none; or a failed job."""
 
 
 def collect(plan: Plan, results: Path) -> Entry:

@@ -1,4 +1,5 @@
-"""What must hold for every member: its tables are long enough, and what its equation differentiates does not jump.
+"""What must hold for every member: its tables are long enough, what its equation differentiates does not jump, and it
+begins outside of its stop, with masses that are positive there.
 
 A derivative of what jumps would leave out an impulse without a word. A voltage that is switched on is the most common
 case: V' vanishes before and behind it, and the current would stay 0.
@@ -7,20 +8,34 @@ case: V' vanishes before and behind it, and the current would stay 0.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from vibsim.core.array_types import Floats
+from vibsim.core.array_types import Flags, Floats
 from vibsim.experiment.data import AnyExperiment, TimeSpec
 from vibsim.experiment.faults import Report
 from vibsim.experiment.schema.fields import TABLE, FrozenDict
 from vibsim.experiment.schema.sweep import Axis
 from vibsim.experiment.sweep_columns import columns_of
-from vibsim.formula import Expression, derivative, first_jump, parse, parts_of, put, values
+from vibsim.experiment.yaml.parse import Path_
+from vibsim.formula import (
+    Expression,
+    derivative,
+    first_jump,
+    parse,
+    parts_of,
+    put,
+    values,
+    values_of,
+)
 from vibsim.models import FormulaField, Model, tree
+from vibsim.models.base import rate
+from vibsim.models.events import Crossings
+from vibsim.models.shared.crossings import STOP
+from vibsim.models.shared.inertia import MASS, inertia
 from vibsim.models.table import Lookup
 
 CHUNK = 2**16
@@ -54,9 +69,8 @@ class MemberNumbers:
 
     def members(self) -> Iterator[tuple[dict[str, Any], Floats]]:
         """Yield parts of the members that differ in what matters: their swept numbers, and their ends."""
-        count = self.count
-        for start in range(0, count, CHUNK):
-            yield self._part(start, min(start + CHUNK, count))
+        for start, stop in _chunks(self.count):
+            yield self._part(start, stop)
 
     def some(self, most: int) -> Iterator[tuple[dict[str, float], float]]:
         """Yield the parameters by name and the ends of at most so many of these members, evenly spread over them."""
@@ -68,9 +82,7 @@ class MemberNumbers:
 
     def starts(self) -> Iterator[tuple[int, dict[str, Any], dict[str, Any]]]:
         """Yield the number of some members, what formulas name of them at t = 0, and their swept values, for all."""
-        count = math.prod(axis.count for axis in self.axes)
-        for start in range(0, count, CHUNK):
-            stop = min(start + CHUNK, count)
+        for start, stop in _chunks(math.prod(axis.count for axis in self.axes)):
             swept = columns_of(self.axes, start, stop)
             begins = self.model.start(self._parameters(swept)) if self.model.start else self.initial
             numbers: dict[str, Any] = {"t": 0.0, **self._by_name(swept)}
@@ -113,6 +125,10 @@ class MemberNumbers:
     def _by_name(self, found: Mapping[str, Any]) -> dict[str, Any]:
         given = self._parameters(found)
         return {row.name: given[row.key] for row in self.model.parameters}
+
+
+def _chunks(count: int) -> Iterator[tuple[int, int]]:
+    yield from ((start, min(start + CHUNK, count)) for start in range(0, count, CHUNK))
 
 
 def _matters(key: str) -> bool:
@@ -232,3 +248,42 @@ def _jump(formula: Expression, members: MemberNumbers, along: Expression) -> flo
             at = at if at > 1e-9 * end else 0.0
             return float(values(along, {**numbers, "t": at}))
     return None
+
+
+def check_starts(members: MemberNumbers, formulas: Mapping[str, str], report: Report) -> None:
+    """Refuse a stop that holds at t = 0 already, and a matrix of masses that is not positive definite there."""
+    model = members.model
+
+    def refuse(
+        is_wrong: Callable[[Mapping[str, Any]], Flags], path: Path_, rule: str, hint: str
+    ) -> None:
+        """Refuse the first member of which something is wrong; `rule` has a place for its name."""
+        for count, numbers, swept in members.starts():
+            wrong = np.broadcast_to(is_wrong(numbers), (count,))
+            if wrong.any():
+                who = named(swept, int(np.argmax(wrong)))
+                report.add(path, rule.format(f" (where {who})" if who else ""), hint)
+                return
+
+    rows = model.events.rows if isinstance(model.events, Crossings) else ()
+    for guard in (tree(model, row.guard) for row in rows if row.ends):
+        slope = rate(model, guard)
+
+        def holds(numbers: Mapping[str, Any], guard: Any = guard, slope: Any = slope) -> Flags:
+            # at the border the motion may go in
+            now, ahead = values(guard, numbers), values(slope, numbers)
+            return np.asarray((now < 0.0) | ((now == 0.0) & (ahead < 0.0)))
+
+        rule = "holds at the start already{}: nothing would move"
+        refuse(holds, ("model", STOP), rule, "begin outside of it")
+    if any(key.split(".")[0] == MASS for key in formulas) and model.formulas:
+        known = tuple(row.name for row in model.parameters)
+        masses = inertia(formulas, model.positions, model.velocities, known)
+
+        def is_light(numbers: Mapping[str, Any]) -> Flags:
+            pivots = np.broadcast_arrays(*values_of(masses.pivots, numbers))
+            return np.asarray(~np.all(np.stack(pivots) > 0.0, axis=0))
+
+        rule = "must be positive definite, and is not at the start{}"
+        hint = "every motion must have a positive kinetic energy"
+        refuse(is_light, ("model", MASS), rule, hint)

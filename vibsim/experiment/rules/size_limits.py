@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 
 from vibsim.experiment.cost import Load, load_of
 from vibsim.experiment.data import ExperimentSpec, SchemeSpec, Sweep, TimeSpec
@@ -102,24 +102,15 @@ class Setting:
         has_events = self.model is not None and self.model.events is not None
         d2t = bool(self.own) and not has_events
         samples = steps // self.stride(level) + 1
+        load = partial(Load, self.scheme_count, steps, samples, chain=self.sweep.chain)
         if is_lean(self.samples, self.steps(self.levels[0]), self.trajectories):
-            return Load(self.scheme_count, steps, samples, _LEAN, d2t=d2t, chain=self.sweep.chain)
+            return load(_LEAN, d2t=d2t)
         known = len(quantities(self.model)) if self.model else 0
         # with the running maximum of the energy deviation
         series = max(known, _SMALLEST_MODEL) + 1 + (_D2T if d2t else 0)
         extrema = extrema_kept(self.trajectories)
         events = events_kept(self.trajectories) if has_events else 0
-        return Load(
-            self.scheme_count,
-            steps,
-            samples,
-            series,
-            exact=2,
-            extrema=extrema,
-            events=events,
-            d2t=True,
-            chain=self.sweep.chain,
-        )
+        return load(series, exact=2, extrema=extrema, events=events, d2t=True)
 
 
 def check(setting: Setting, report: Report) -> None:

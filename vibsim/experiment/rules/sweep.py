@@ -49,13 +49,12 @@ def _table_keys(model: Model) -> set[str]:
 
 def read_sweep(
     document: Any,
-    order: Any,
     model: Model | None,
     schemes: Sequence[SchemeSpec],
     lacks_scheme: bool,
     report: Report,
 ) -> tuple[Sweep, bool]:
-    """Return what is sound of the sweep of a document, whose keys stand in some `order`, and whether that is all.
+    """Return what is sound of the sweep of a document, and whether that is all.
 
     What is malformed was left out of the document. Where a scheme is at fault (`lacks_scheme`), nothing is said about
     options of unknown schemes.
@@ -65,7 +64,7 @@ def read_sweep(
         return Sweep(axes=()), _is_wellformed(report)
     types = sweep_types(model, ((scheme.name, scheme.method) for scheme in schemes))
     reader = SweepReader(types, report, document.time, model, lacks_scheme)
-    found = reader.axes(section, order)
+    found = reader.axes(section)
     sound = tuple(axis for axis in found if axis is not None)
     is_whole = _is_wellformed(report) and len(sound) == len(found)
     if is_whole and not sound:
@@ -104,10 +103,10 @@ class SweepReader:
     first: dict[str, Path_] = field(default_factory=dict)
     """Where each key is swept first."""
 
-    def axes(self, section: Any, order: Any) -> list[Axis | None]:
-        """Return the axes of a section whose keys stand in some `order`."""
+    def axes(self, section: Any) -> list[Axis | None]:
+        """Return the axes of a section, in the order of the file."""
         found: list[Axis | None] = []
-        for key in order:
+        for key in self.report.source.data["sweep"]:
             if key == "zip" and section.zip is not None:
                 found.append(self.zipped(section.zip))
             elif key == "sample" and section.sample is not None:

@@ -81,12 +81,9 @@ def _repeated(report: Report) -> None:
 
 def _set_and_swept(report: Report) -> None:
     """Note a value of the command line that no member has, because the file sweeps its key."""
-    found: Any = report.source.data.get("sweep")
     keys: set[str] = set()
     for part in ((), ("zip",), ("sample", "over")):
-        section = found
-        for key in part:
-            section = section.get(key) if isinstance(section, Mapping) else None
+        section = _part(report.source.data, ("sweep", *part))
         keys |= set(section) if isinstance(section, Mapping) else set()
     for text in report.source.settings:
         key = text.partition("=")[0].strip()
@@ -107,6 +104,13 @@ def _turned(model: Model) -> Iterator[str]:
                 yield from (side.name for side in sides or (angle,) if isinstance(side, Name))
 
 
+def _part(found: Any, path: Path_) -> Any:
+    """Return what stands at a place of the content of a file; None where nothing does."""
+    for key in path:
+        found = found.get(key) if isinstance(found, Mapping) else None
+    return found
+
+
 def _plain(data: Mapping[str, Any], name: str) -> Iterator[tuple[Path_, list[float]]]:
     """Yield the places of an initial value, in its section and in the sweep, with what are plain numbers there."""
     for path in (
@@ -115,9 +119,7 @@ def _plain(data: Mapping[str, Any], name: str) -> Iterator[tuple[Path_, list[flo
         ("sweep", "zip", f"initial.{name}"),
         ("sweep", "sample", "over", f"initial.{name}"),
     ):
-        found: Any = data
-        for key in path:
-            found = found.get(key) if isinstance(found, Mapping) else None
+        found = _part(data, path)
         if isinstance(found, Mapping):
             # of a rule the first two numbers are values
             found = [x for rule in found.values() if isinstance(rule, list) for x in rule[:2]]

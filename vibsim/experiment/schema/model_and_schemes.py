@@ -132,24 +132,24 @@ def scheme_names(data: Any) -> Iterator[str]:
 MAX_DECLARED, MOST_TERMS = 50, 1000
 
 
-def _declared(names: Mapping[str, float]) -> Mapping[str, float]:
-    if len(names) > MAX_DECLARED:
-        raise refused(f"must not have more than {MAX_DECLARED} parameters, has {len(names)}")
-    return names
+def _at_most(limit: int, what: str) -> AfterValidator:
+    """Refuse a mapping of more than `limit` entries."""
+
+    def check(found: Mapping[str, Any]) -> Mapping[str, Any]:
+        if len(found) > limit:
+            raise refused(f"must not have more than {limit} {what}, has {len(found)}")
+        return found
+
+    return AfterValidator(check)
 
 
-def _few(formulas: Mapping[str, str]) -> Mapping[str, str]:
-    if len(formulas) > MOST:
-        raise refused(f"must not have more than {MOST} formulas, has {len(formulas)}")
-    return formulas
-
-
-Declared = Annotated[dict[str, Number], AfterValidator(_declared)]
+Declared = Annotated[dict[str, Number], _at_most(MAX_DECLARED, "parameters")]
+_few = _at_most(MOST, "formulas")
 
 
 def _formulas(of_one: Any) -> Any:
     """Return the type of some formulas by their names."""
-    return Annotated[dict[str, of_one], Field(min_length=1), AfterValidator(_few)]
+    return Annotated[dict[str, of_one], Field(min_length=1), _few]
 
 
 def _formula_type(model: Model, field: FormulaField) -> Any:
