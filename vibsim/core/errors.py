@@ -88,24 +88,28 @@ def nearest(value: object, choices: Sequence[str]) -> str:
     if not choices:
         return ""
     written = str(value)
-    close: Sequence[str] = difflib.get_close_matches(written, choices, n=1, cutoff=_CLOSE)
-    if not close:
-        # by capital letters alone, or a part of the name
-        small = {choice.casefold(): choice for choice in reversed(choices)}
-        alike = difflib.get_close_matches(written.casefold(), list(small), n=1, cutoff=_CLOSE)
-        close = [small[found] for found in alike]
-    if not close and len(written) > 1:
-        longer = [choice for choice in choices if written.casefold() in choice.casefold()]
-        close, choices = longer if len(longer) == 1 else [], longer or choices
-    if close:
-        return f"did you mean '{close[0]}'?"
-    return listed(choices, written)
+    return likely(value, choices) or listed(_with_part(written, choices) or choices, written)
 
 
 def likely(value: object, choices: Sequence[str]) -> str:
     """Ask whether the choice nearest to what a user wrote was meant; empty where none is near."""
-    hint = nearest(value, choices)
-    return hint if hint.startswith("did you mean") else ""
+    written = str(value)
+    close: Sequence[str] = difflib.get_close_matches(written, choices, n=1, cutoff=_CLOSE)
+    if not close:
+        # by capital letters alone
+        small = {choice.casefold(): choice for choice in reversed(choices)}
+        alike = difflib.get_close_matches(written.casefold(), list(small), n=1, cutoff=_CLOSE)
+        close = [small[found] for found in alike]
+    if not close:
+        longer = _with_part(written, choices)
+        close = longer if len(longer) == 1 else []
+    return f"did you mean '{close[0]}'?" if close else ""
+
+
+def _with_part(written: str, choices: Sequence[str]) -> list[str]:
+    """Return the choices of which more than one letter was written."""
+    part = written.casefold()
+    return [choice for choice in choices if len(part) > 1 and part in choice.casefold()]
 
 
 def listed(choices: Sequence[str], value: str = "") -> str:

@@ -128,16 +128,16 @@ predicted_phase_error | none | time | needs_linear fixed_step survives_failure |
 phase_error_slope | none | time | period | slope of the time by which a peak comes early over the number of its period
 amplitude | none | position | best parabola has_own_size | half the height from the last trough to the last peak
 amplitude_error | none | none | best parabola | last amplitude over the first one, less one
-steady_amplitude | series | quantity | needs_force best rests_on_run has_own_size | A of the harmonic A cos(w t - phase) \
-with the frequency w of the force, over its last period
+steady_amplitude | series | quantity | needs_force best rests_on_run has_own_size | A of the harmonic \
+A cos(w t - phase) with the frequency w of the force, over its last period
 steady_phase | series | none | needs_force best rests_on_run is_angle | phase of that harmonic [rad], from -pi to pi: \
 the lag behind cos(w t)
 steady_change | series | none | needs_force | how far that harmonic is from that of the period before, over its \
 amplitude
 section_period | none | count | needs_force | after how many periods of the force the state is the same again, to \
 1e-3, in the second half of the run; 0 where it never is
-peak_frequency | series | frequency | best rests_on_run has_own_size | angular frequency of the highest line in the spectrum \
-of the stored series
+peak_frequency | series | frequency | best rests_on_run has_own_size | angular frequency of the highest line in the \
+spectrum of the stored series
 growth_factor | none | none | best parabola has_own_size | last peak over the first peak
 growth_per_period | none | none | best roots has_own_size survives_failure | factor by which the amplitude grows in a \
 period

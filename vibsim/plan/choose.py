@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from vibsim.core.errors import MOST_CHOICES, Fault, InputError, listed, nearest
+from vibsim.core.errors import MOST_CHOICES, Fault, InputError, listed, likely, nearest
 from vibsim.experiment.collection import ADHOC, ENDINGS, collection_of
 
 DEFAULT = ("pendulum_lab", "showcase")
@@ -107,7 +107,7 @@ def _find(word: str, known: list[Choice], root: Path) -> Found:
     names += [c.name for c in known]
     rule = "is no experiment, no collection and no YAML file"
     hint = nearest(word, names) if known else ""
-    if len(names) > MOST_CHOICES and not hint.startswith("did you mean"):
+    if len(names) > MOST_CHOICES and not likely(word, names):
         hint = "`vibsim list experiments` shows all"
     own = f"{word.removeprefix(f'{ADHOC}/')}{ENDINGS[0]}"
     if word.startswith(f"{ADHOC}/") or Path(own).is_file():
