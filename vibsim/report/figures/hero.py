@@ -463,10 +463,8 @@ def _histogram_of_orders(found: _Orders, text: str) -> Axes:
     ax = _panel(RIGHT, "members (logarithmic)")
     shown, known, checked = found.shown(found.order), found.known, found.is_checked
     borders = np.linspace(*found.limits, 41)
-    parts, colours = (
-        [shown[known & checked], shown[known & ~checked]],
-        [style.COLOURS[0], style.PALE],
-    )
+    parts = [shown[known & checked], shown[known & ~checked]]
+    colours = [style.COLOURS[0], style.PALE]
     ax.hist(parts, borders.tolist(), color=colours, stacked=True, zorder=2)
     for value in found.due:
         ax.axvspan(value - found.allowed, value + found.allowed, **style.ALLOWED)

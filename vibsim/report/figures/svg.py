@@ -93,7 +93,7 @@ def _place(x: float, y: float, width: float, height: float) -> str:
 class Writer(RendererBase):  # type: ignore[misc, unused-ignore]
     """What matplotlib draws on: elements of SVG, and how far the words among them reach."""
 
-    def __init__(self, width: float, height: float, name: str, *, has_paper: bool = True) -> None:
+    def __init__(self, width: float, height: float, name: str, *, has_paper: bool) -> None:
         super().__init__()
         self._has_paper = has_paper
         self._size = (width, height)
@@ -343,7 +343,7 @@ class Writer(RendererBase):  # type: ignore[misc, unused-ignore]
         self._write(x, y, s, size, aligned, to_hex(rgba), angle, wide, more)
 
     def _write(
-        self, x: float, y: float, text: str, size: float, aligned: str = "left", colour: str = "#000000",
+        self, x: float, y: float, text: str, size: float, aligned: str, colour: str,
         angle: float = 0.0, wide: float | None = None, more: str = "",
     ) -> None:  # fmt: skip
         """Write a line of text where its alignment says, and note how far it reaches."""

@@ -47,10 +47,8 @@ def collect(
     """
     everyone = members.table(record, choice.position(experiment))
     listed, others = _of_numbers(experiment, record, everyone, first)
-    printed, scales = (
-        published.tables(experiment, record, summary),
-        scales_table(experiment, record),
-    )
+    printed = published.tables(experiment, record, summary)
+    scales = scales_table(experiment, record)
     broken = checks.failures(summary, record)
     every = [*printed, *listed, *others, scales, checks.checks(summary), broken]
     every += [source_figures.table(sources), everyone]

@@ -168,7 +168,8 @@ def _context(record: Record, shown: list[Lane]) -> dict[str, Any]:
     last = shown[0].end
     unit = data.unit(record, f"{position}_finest")
     return {
-        "data": _json(content),
+        # no text in it can end the script element
+        "data": markup(json.dumps(content, separators=(",", ":")).replace("<", "\\u003c")),
         "stages": [(lane.title, markup(_still(lane))) for lane in shown],
         "legend": shown[0].scene.legend,
         "frames": t.size - 1,
@@ -238,9 +239,3 @@ def _label(part: Part) -> str:
     place = scenes.place_of_label(part.shape, scenes.values_of(part, 0))
     at = ' display="none"' if place is None else f' x="{place[0]:.1f}" y="{place[1]:.1f}"'
     return f'<text class="{escape(part.look)}"{at}>{escape(part.label)}</text>'
-
-
-def _json(content: Any) -> str:
-    """Return data for a script element, which no text can end."""
-    text = json.dumps(content, separators=(",", ":"))
-    return markup(text.replace("<", "\\u003c"))

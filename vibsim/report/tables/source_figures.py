@@ -2,22 +2,21 @@
 
 from __future__ import annotations
 
+import csv
+import re
 from collections.abc import Iterable, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING
+from urllib.parse import quote
 
+from vibsim.core import regular_files
 from vibsim.report.tables.table import Column, Table
 
 if TYPE_CHECKING:
     from vibsim.experiment.schema.figures import FigureOfSource
     from vibsim.report.style import Picture
-import csv
-import re
-from contextlib import suppress
-from dataclasses import dataclass
-from pathlib import Path
-from urllib.parse import quote
-
-from vibsim.core import regular_files
 
 PLAYER = "player"
 """What is shown by the player of the page and not drawn."""

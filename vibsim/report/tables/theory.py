@@ -137,19 +137,15 @@ def _predictions(
         from_theory, measured = (
             known(record, f"{who}_{kind}", OF_LEVEL) for who in ("theory", "measured")
         )
-        noise, less = (
-            step * sizes.get(kind, np.fmax(np.abs(from_theory), 1.0)),
-            float(kind == "growth"),
-        )
+        noise = step * sizes.get(kind, np.fmax(np.abs(from_theory), 1.0))
+        less = float(kind == "growth")
         filled += [
             (Column(f"{text}: predicted", measure, "close"), _written(from_theory - less, noise)),
             (Column("measured", measure, "close"), _written(measured - less, noise)),
             (Column("difference", measure, "brief"), _beyond(measured - from_theory, noise)),
         ]
-    caption, there = (
-        f"Theory beside measurement: {caption}",
-        np.isfinite(known(record, "theory_growth", OF_LEVEL)),
-    )
+    caption = f"Theory beside measurement: {caption}"
+    there = np.isfinite(known(record, "theory_growth", OF_LEVEL))
     table = by_level(record, f"theory_{name}", caption, data.everyone(record), filled, there=there)
     found = table.without_empty(["difference"])
     agree = ". Where no difference is shown, the two agree to round-off"

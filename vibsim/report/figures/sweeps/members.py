@@ -88,7 +88,7 @@ def _legend(ax: Axes, texts: dict[str, str], **place: Any) -> None:
 
 
 def _histogram(
-    ax: Axes, values: Floats, status: NDArray[Any], band: tuple[float, float] | None = None
+    ax: Axes, values: Floats, status: NDArray[Any], band: tuple[float, float] | None
 ) -> int:
     """Draw a histogram stacked by verdict, logarithmic without a band; return how many members have no such number."""
     usable = np.isfinite(values) & (values > 0.0 if band is None else True)
