@@ -53,6 +53,7 @@ from vibsim.convergence.likely_powers import (
 )
 from vibsim.convergence.reasons import code, first_reason, is_one_of
 from vibsim.convergence.thresholds import (
+    ABOVE_ROUND_OFF,
     DEFINITE,
     FURTHER_APART,
     HALF_SPACING,
@@ -317,7 +318,8 @@ def _probability(codes: Codes, found: _Evaluation) -> Floats:
 def _is_far(ladder: Ladder) -> Flags:
     """Say where differences fall at least like the lowest power of an expansion, and the exact solution is far away.
 
-    Then less is to come than that power leaves, and both together are much less than the distance.
+    They must be no round-off. Then less is to come than that power leaves, and both together are much less than the
+    distance.
     """
     n = len(ladder.h)
     if n < LEVELS_OF_A_FALL:
@@ -327,7 +329,9 @@ def _is_far(ladder: Ladder) -> Flags:
     rates = sizes[:, : n - 1] / (powers[:-1] - powers[1:])
     to_come = rates[:, -1] * powers[-1]
     moved = np.sum(sizes[:, : n - 1], axis=1)
+    round_off = ladder.floor[:, :-1] + ladder.floor[:, 1:]
     falls = np.all(rates[:, 1:] <= rates[:, :-1], axis=1)
+    falls &= np.all(sizes[:, : n - 1] > ABOVE_ROUND_OFF * round_off, axis=1)
     return np.asarray(falls & (sizes[:, -1] > MISSED_FAR * (moved + to_come)))
 
 

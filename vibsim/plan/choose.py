@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from vibsim.core.errors import MOST_CHOICES, Fault, InputError, listed, likely, nearest
+from vibsim.core.errors import MOST_CHOICES, Fault, InputError, likely, listed, nearest
 from vibsim.experiment.collection import ADHOC, ENDINGS, collection_of
 
 DEFAULT = ("pendulum_lab", "showcase")
