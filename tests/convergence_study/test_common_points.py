@@ -255,3 +255,17 @@ def test_missing_values_are_not_finite() -> None:
     verdict = judge(H, values, order=2)
     assert verdict.reason == "non_finite"
     assert "h = 0.03125" in verdict.sentence
+
+
+def test_linear_interpolation_that_may_hide_an_order_is_named() -> None:
+    cells, levels = (12, 18, 27, 40, 60), []
+    for n in cells:
+        x = (np.arange(n) + 0.5) / n
+        values = np.sin(2.0 * x) + np.exp(-x) + (1.0 + 0.3 * np.cos(2.0 * x)) / n
+        levels.append(xarray.DataArray(values, {"x": x}, ["x"]))
+    h = [1.0 / n for n in cells]
+    verdict = judge(h, levels, order=1, restrict="linear")
+    assert verdict.status == "INCONCLUSIVE"
+    assert verdict.advice.endswith("may hide the order. Use restrict: cubic.")
+    cubic = judge(h, levels, order=1, restrict="cubic")
+    assert (cubic.status, cubic.advice) == ("PASS", "")

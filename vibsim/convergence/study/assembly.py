@@ -71,7 +71,7 @@ def verdict(
         is_proportional=steps.is_proportional,
         interpolation=(common.kind, common.interpolation_order or 0) if hidden else None,
         are_sizes_rounded=_moved_by_sizes(one, h) > ORDER_TOLERANCE,
-        notes=common.notes,
+        notes=(*common.notes, *_interpolated_linearly(common, reason)),
         parts=(*common.parts, *_rounding(one)),
     )
     sentence, advice = describe(found, setting)
@@ -103,6 +103,14 @@ def _hidden(request: Request, common: CommonValues, one: Outcome) -> bool:
     # the error of the values falls at least as fast as that of values and interpolation together
     enough = request.at_least is not None and request.at_least <= least
     return not (enough and one.reason == "asymptotic")
+
+
+def _interpolated_linearly(common: CommonValues, reason: str) -> tuple[str, ...]:
+    """Say what may hide an order: the error of linear interpolation depends on where between two points it is made."""
+    is_open = reason in ("pre_asymptotic", "oscillating", "round_off")
+    if common.kind == "linear" and common.interpolation_order is not None and is_open:
+        return ("The error of linear interpolation may hide the order. Use restrict: cubic.",)
+    return ()
 
 
 def _rounding(one: Outcome) -> tuple[str, ...]:
