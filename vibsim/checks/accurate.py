@@ -148,8 +148,10 @@ def judge(experiment: Experiment, record: Record, check: AccurateCheck, found: M
     # as far below the error as the bound is above it
     least = np.maximum(2.0 * error - bound, 0.0)
     decides = is_true | is_one_of(order_reason, *ORDER_KNOWN)
+    # a coarse level may be unstable beside a finest one that follows the solution
+    is_unstable = is_one_of(order_reason, "unstable") & ~(is_true & (error < size))
     cases = [
-        (is_one_of(order_reason, "unstable", "non_finite"), order_reason),
+        (is_unstable | is_one_of(order_reason, "non_finite"), order_reason),
         ((found["basis"] == NONE) | ~(allowed > 0.0), "not_applicable"),
         (decides & (bound < allowed), "match"),
         (decides & (least > allowed), "mismatch"),

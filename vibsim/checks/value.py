@@ -101,7 +101,10 @@ def measure(block: MemberBlock, compared: Compared, check: ValueCheck) -> Measur
         bound = np.where(np.isnan(bound), REACH * _last_change(numbers) + missed, bound)
     own = row.own_levels(levels) or tuple(levels)
     level = place.level if place.level in own else own[-1]
-    needed, first = _prospects(check, numbers[..., : len(own)], own, int(level), fulfilled, is_open)
+    left = np.where(is_open, missed, 0.0)
+    needed, first = _prospects(
+        check, numbers[..., : len(own)], own, int(level), fulfilled, is_open, left
+    )
     needed = np.where(fulfilled & ~is_open, UNKNOWN, needed)
     return {
         "value": value,
@@ -147,12 +150,14 @@ def _prospects(
     level: int,
     fulfilled: Flags,
     is_open: Flags,
+    left: Floats,
 ) -> tuple[Any, Any]:
     """Return what finer levels than `level` do to a number, and the first at which it is as asked, -1 for none.
 
     The first is `SETTLED`, `MOVING` or `UNKNOWN`; of a number that is `fulfilled`, `MOVING` where finer levels may move
     it out again, else `UNKNOWN`. `numbers` are of every level, shape (scheme, case, level). Where `is_open` and the
-    changes do not shrink, each of `MOST_FINER` finer levels may change a number by as much again.
+    changes do not shrink, each of `MOST_FINER` finer levels may change a number by as much again; it may be off by
+    what is `left` besides, which no level shows.
     """
     holds, away = compare(check, numbers)
     helps = holds & (np.array(levels) > level)
@@ -163,9 +168,9 @@ def _prospects(
             last = _last_change(numbers)
             change = np.abs(np.diff(numbers[..., -3:], axis=-1))
             shrinks = change[..., -1] <= REACH / (1.0 + REACH) * change[..., 0]
-            reach = np.where(is_open & ~shrinks, MOST_FINER, REACH) * last
+            reach = np.where(is_open & ~shrinks, MOST_FINER, REACH) * last + left
             code[away[..., -1] <= reach] = MOVING
-            code[(away[..., -1] > reach) | (last == 0.0)] = SETTLED
+            code[(away[..., -1] > reach) | (reach == 0.0)] = SETTLED
             code[fulfilled] = np.where(reach > -away[..., -1], MOVING, UNKNOWN)[fulfilled]
     return code, np.where(fulfilled, -1, first)
 

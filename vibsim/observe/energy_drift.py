@@ -15,7 +15,8 @@ smooths the stairs in which a drift climbs under an oscillation, and the oscilla
   widens from the start on, where M stands until the drift has overtaken an oscillation to the other side;
 - ``linear``, ``quadratic``: k, of M or of that range, within `NEAR_POWER` of 1 or 2; the range, and M where it has
   risen by less than `SMALL_RISE` of itself, must still grow in the last T/8, by `STILL_WIDENS` of what a drift would:
-  an oscillation whose middle moves slowly, or one of several frequencies, widens them for a while;
+  an oscillation whose middle moves slowly, or one of several frequencies, widens them for a while. A drift that is
+  seen in the range alone, or in a small rise of M, moves both ends of the range the same way;
 - else ``unclear``.
 
 A drift so slow that a run shows less than `STILL` of it is called bounded: a longer run decides.
@@ -166,7 +167,11 @@ def drift_of(
     allowed = np.broadcast_to(ABOVE_ROUND_OFF * floor, end.shape)
     still = _is_still(rise, k, size)
     # a small rise may be the last stair of an oscillation with several frequencies
-    has_stopped = (rise < th.SMALL_RISE * size) & (last_rise < th.STILL_WIDENS * rise)
+    stops = last_rise < th.STILL_WIDENS * rise
+    if deviation is not None:
+        moves = _moves(deviation)
+        stops |= ~moves
+    has_stopped = (rise < th.SMALL_RISE * size) & stops
     if deviation is not None:
         # M stands still until a drift has overtaken an oscillation to the other side, and is of no power then
         widens = still | ~(_is_near(k, 1) | _is_near(k, 2))
@@ -175,7 +180,7 @@ def drift_of(
         of_range = _means(so_far)
         widens &= ~_is_still(*_rise(of_range), size)
         stops = _last_rise(so_far) < th.STILL_WIDENS * _rise(of_range)[0]
-        has_stopped = np.where(widens, stops, has_stopped)
+        has_stopped = np.where(widens, stops | ~moves, has_stopped)
         means = np.where(widens[..., None], of_range, means)
         rise, k = _rise(means)
         still &= ~widens
@@ -229,6 +234,18 @@ def _range(deviation: Floats) -> Floats:
     inner[..., 0], inner[..., -1] = 0.0, inner[..., -2]
     highest, lowest = (f.accumulate(inner, axis=-1) for f in (np.maximum, np.minimum))
     return np.asarray(highest - lowest)
+
+
+def _moves(deviation: Floats) -> Flags:
+    """Say whether both ends of the range move the same way from the third quarter to the last, as those of a drift do.
+
+    An oscillation of several frequencies may grow to one side for a while, and stay on the other one.
+    """
+    n = deviation.shape[-1] - 1
+    third, last = deviation[..., n // 2 : 3 * n // 4], deviation[..., 3 * n // 4 : max(n, 1)]
+    high, low = (f(last, axis=-1) - f(third, axis=-1) for f in (np.max, np.min))
+    slower, faster = (f(np.abs(high), np.abs(low)) for f in (np.minimum, np.maximum))
+    return np.asarray((high * low > 0.0) & (slower >= th.BOTH_MOVE * faster))
 
 
 def _last_rise(values: Floats) -> Floats:

@@ -54,6 +54,7 @@ SMALL_RISE = (
     0.1  # rise of M as a part of itself from which on it need not go on until the end [chosen]
 )
 STILL_WIDENS = 0.5  # least part of a drift's rise by which the range of a drift widens in the last T/8 [checked]
+BOTH_MOVE = 0.5  # a drift moves both ends of its range alike: the slower by this part of the faster [chosen]
 NEAR_POWER = 0.25  # distance of k from 1 or 2: a quarter of what separates them [derived]
 # ln(E/E(0)) beyond which exponential and linear growth differ in k by more than rounding: by about 0.1 at 0.2.
 # [derived]

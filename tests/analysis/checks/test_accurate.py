@@ -486,3 +486,14 @@ def test_bounds_of_errors_hold(content: Content, levels: list[int]) -> None:
     assert len(above) > 50
     assert np.mean(above) >= 0.99
     assert np.mean(both) >= 0.95
+
+
+@pytest.mark.parametrize(("relative", "reason"), [(0.01, "match"), (1e-4, "mismatch")])
+def test_a_coarse_level_that_is_unstable_does_not_hide_a_finest_one_that_is_accurate(
+    relative: float, reason: str
+) -> None:
+    """A spring of w = 5 with 8 steps of w dt = 2.5, and 512 of 0.04."""
+    content = {**SPRING, "model": {"kind": "spring", "w": 5.0}, "time": {"end": 4.0}}
+    content["levels"] = [3, 6, 7, 8, 9]
+    (found,) = asked(content, {"accurate": "u", "relative": relative})
+    assert found.reason == reason

@@ -213,3 +213,20 @@ def test_the_largest_of_angles_is_open_where_one_goes_through_pi() -> None:
     content = {**NEAR_PI, "sweep": {"model.parameters.w": [2.2, 2.4]}}
     found = run(content, {**PHASE, **over, "below": 0.0}, {**PHASE, **over, "above": 0.0}).verdicts
     assert [one.status for one in found] == ["INCONCLUSIVE", "INCONCLUSIVE"]
+
+
+def test_a_steady_phase_of_an_unknown_bound_counts_what_is_left_of_the_start() -> None:
+    """A linear oscillator after five periods: the phase is 2.8855, the levels agree on 2.9386."""
+    content = {
+        "model": {
+            **{"kind": "duffing", "delta": 0.2167597473603224, "beta": 0.0},
+            **{"gamma": 0.5534031305937521, "omega": 1.4962223256710279},
+        },
+        "initial": {"u": 0.8783914406293662},
+        "time": {"periods": 5, "steps_per_period": 20, "frequency": "model.omega"},
+        "levels": [1, 2, 3, 4],
+        "schemes": ["rk4"],
+    }
+    for claim in ({"above": 2.90779}, {"below": 2.9}):
+        [found] = run(content, {"value": "steady_phase", "quantity": "u", **BEST, **claim}).verdicts
+        assert found.status == "INCONCLUSIVE"
