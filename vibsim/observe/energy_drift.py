@@ -242,10 +242,13 @@ def _moves(deviation: Floats) -> Flags:
     An oscillation of several frequencies may grow to one side for a while, and stay on the other one.
     """
     n = deviation.shape[-1] - 1
-    third, last = deviation[..., n // 2 : 3 * n // 4], deviation[..., 3 * n // 4 : max(n, 1)]
-    high, low = (f(last, axis=-1) - f(third, axis=-1) for f in (np.max, np.min))
+    if n < th.LEAST_SAMPLES:
+        return np.ones(deviation.shape[:-1], dtype=bool)
+    third, last = deviation[..., n // 2 : 3 * n // 4], deviation[..., 3 * n // 4 : n]
+    with np.errstate(over="ignore", invalid="ignore"):
+        high, low = (f(last, axis=-1) - f(third, axis=-1) for f in (np.max, np.min))
     slower, faster = (f(np.abs(high), np.abs(low)) for f in (np.minimum, np.maximum))
-    return np.asarray((high * low > 0.0) & (slower >= th.BOTH_MOVE * faster))
+    return np.asarray((np.sign(high) == np.sign(low)) & (slower >= th.BOTH_MOVE * faster))
 
 
 def _last_rise(values: Floats) -> Floats:
