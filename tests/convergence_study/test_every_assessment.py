@@ -33,6 +33,7 @@ def decided(ladder: Ladder, reason: str, *, known: bool) -> Assessment:
         error_bound=2e-3 * number,
         weights=weights,
         best_bound=1e-3 * number,
+        contradicted=np.full(shape, known),
     )
 
 

@@ -127,6 +127,9 @@ class Decision:
     high: Floats  # upper end
     first: Integers  # coarsest level that the verdict rests on, as a position
     last: Integers  # finest one
+    contradicted: (
+        Flags  # whether finer levels than those contradict the order: nothing is decided on it
+    )
 
 
 @dataclass(frozen=True)
@@ -171,6 +174,7 @@ class _Evaluation:
     away: Flags  # surely not the exact solution, whatever the order is
     is_confirmed: bool  # whether an exact solution is known
     cut_short: Flags  # whether noise that may be far less than predicted ends the window: nothing is decided
+    contradicted: Flags  # whether levels behind the window contradict it: nothing is decided
 
     @property
     def by_three(self) -> Flags:
@@ -184,7 +188,8 @@ class _Evaluation:
 
     def some(self, rows: Integers) -> _Evaluation:
         """Return what was found of some of the ladders."""
-        parts = {name: getattr(self, name)[rows] for name in ("exact", "away", "cut_short")}
+        flags = "exact", "away", "cut_short", "contradicted"
+        parts = {name: getattr(self, name)[rows] for name in flags}
         posterior, of_sides = self.posterior.some(rows), self.sides[:, rows]
         return replace(self, posterior=posterior, sides=of_sides, **parts)
 
@@ -192,6 +197,7 @@ class _Evaluation:
         """Take what was found of some ladders from some rows of another one."""
         self.posterior.replace(ladders, other.posterior, rows)
         self.sides[:, ladders] = other.sides[:, rows]
+        self.contradicted[ladders] = other.contradicted[rows]
 
 
 def _assess_block(ladder: Ladder, factors: Floats, question: Question) -> dict[str, np.ndarray]:
@@ -229,8 +235,16 @@ def _evaluate(ladder: Ladder, question: Question, left_out: float) -> _Evaluatio
         factor = question.noise_factor if question.limit_factor is None else question.limit_factor
         away = np.sqrt(ladder.gram[:, -1, -1]) > factor * ladder.floor[:, -1]
         away &= exact | _is_far(ladder)
-    cut_short = _is_cut_short(ladder, believed)
-    return _Evaluation(question, believed, of_sides, exact, away, ladder.exact_known, cut_short)
+    return _Evaluation(
+        question,
+        believed,
+        of_sides,
+        exact,
+        away,
+        is_confirmed=ladder.exact_known,
+        cut_short=_is_cut_short(ladder, believed),
+        contradicted=_is_contradicted(ladder, believed, question),
+    )
 
 
 def _is_sure(ladder: Ladder, found: _Evaluation, question: Question) -> Flags:
@@ -297,8 +311,8 @@ def _with_less_noise(ladder: Ladder, found: _Evaluation, question: Question) -> 
     first = replace(found.some(rows), cut_short=none)
     less = replace(ladder.some(rows), floor=_least_noise(ladder)[rows])
     other = replace(_evaluate(less, question, LEFT_OUT), cut_short=none)
-    own = _reasons(ladder.some(rows), first, none)
-    others = _reasons(less, other, none)
+    own = _reasons(first, none)
+    others = _reasons(other, none)
     excluded = _probability(own, other) < RISK
     added = ~is_one_of(own, *DECIDED) & is_one_of(others, *DECIDED)
     added &= _probability(others, first) >= RISK
@@ -335,31 +349,30 @@ def _is_far(ladder: Ladder) -> Flags:
     return np.asarray(falls & (sizes[:, -1] > MISSED_FAR * (moved + to_come)))
 
 
-def _is_contradicted(ladder: Ladder, found: _Evaluation) -> Flags:
+def _is_contradicted(ladder: Ladder, believed: Posterior, question: Question) -> Flags:
     """Say where levels behind the most probable window differ by more than those at its end, and than predicted noise.
 
     What a window leaves out behind it is noise. Noise that begins with more than the last difference in the window, or
     that grows faster than round-off, would be seen there: a level behind it is wrong, or those before it are.
     """
     sizes = np.sqrt(np.diagonal(ladder.gram, axis1=1, axis2=2))[:, : len(ladder.h) - 1]
-    last = likely_window(found.posterior)[1]
+    last = likely_window(believed)[1]
     at_end = np.take_along_axis(sizes, last[:, None] - 1, axis=1)
     is_behind = np.arange(sizes.shape[1]) >= last[:, None]
     finer = np.where(
         is_behind, ladder.h[np.minimum(last + 1, len(ladder.h) - 1)][:, None] / ladder.h[1:], 1.0
     )
     at_most = at_end * on_arrays.power(finer, GROWTHS[-1])
-    noise = found.question.noise_factor * (ladder.floor[:, :-1] + ladder.floor[:, 1:])
+    noise = question.noise_factor * (ladder.floor[:, :-1] + ladder.floor[:, 1:])
     return np.asarray(np.any(is_behind & (sizes > np.maximum(at_most, noise)), axis=1))
 
 
-def _reasons(ladder: Ladder, found: _Evaluation, missed: Flags) -> Codes:
+def _reasons(found: _Evaluation, missed: Flags) -> Codes:
     """Return the reasons of the verdicts, as positions in `REASON_NAMES`; see the head of this module."""
     p, (lower, right, higher) = found.posterior, found.sides
     risk = np.where(found.by_three, RISK_OF_THREE, RISK)
     # expansions begin with the order 1/2, whatever two powers fit levels that do not approach each other
-    may_decide = ~found.cut_short & ~(found.order < LEAST_WITH_LIMIT)
-    may_decide &= ~_is_contradicted(ladder, found)
+    may_decide = ~(found.cut_short | found.contradicted | (found.order < LEAST_WITH_LIMIT))
     another = (lower + higher > 1.0 - risk) & (right < risk) & may_decide
     if np.any(another):
         another &= most_near_a_power(p) > DEFINITE
@@ -393,12 +406,13 @@ def _numbers(
         ends = zip(interval(of_limit, order), (low, high), strict=True)
         low, high = (np.where(missed, a, b) for a, b in ends)
     return {
-        "reason": _reasons(ladder, found, missed),
+        "reason": _reasons(found, missed),
         "order": order,
         "low": np.where(exact, np.nan, low),
         "high": np.where(exact, np.nan, high),
         "first": np.where(exact, 0, first),
         "last": np.where(exact, n - 1, last),
+        "contradicted": found.contradicted,
     }
 
 

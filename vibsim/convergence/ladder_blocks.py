@@ -66,7 +66,8 @@ def _nothing(count: int, levels: int) -> dict[str, np.ndarray]:
     unknown = {name: np.full(count, np.nan) for name in names}
     window = {"first": np.zeros(count, dtype=np.int64), "last": np.full(count, levels - 1)}
     weights = np.full((count, levels), np.nan)
-    return {**unknown, **window, "sure": np.ones(count, dtype=bool), "weights": weights}
+    flags = {"contradicted": np.zeros(count, dtype=bool), "sure": np.ones(count, dtype=bool)}
+    return {**unknown, **window, **flags, "weights": weights}
 
 
 def _scaled(ladder: Ladder, rows: Integers) -> tuple[Ladder, Floats, Floats]:

@@ -137,6 +137,7 @@ def _believed(e: Evidence, judged: Flags) -> Decision:
         high=np.full(shape, np.nan),
         first=np.zeros(shape, dtype=np.int64),
         last=np.full(shape, n - 1),
+        contradicted=np.zeros(shape, dtype=bool),
     )
     rows = np.concatenate([e.difference, e.error[..., None]], axis=-1)
     keys = np.stack([np.isfinite(e.error), _expected(e), _is_theory(e)], axis=-1)

@@ -70,6 +70,7 @@ def verdict(
         sizes=steps.names,
         is_proportional=steps.is_proportional,
         interpolation=(common.kind, common.interpolation_order or 0) if hidden else None,
+        is_contradicted=one.is_contradicted,
         are_sizes_rounded=_moved_by_sizes(one, h) > ORDER_TOLERANCE,
         notes=(*common.notes, *_interpolated_linearly(common, reason)),
         parts=(*common.parts, *_rounding(one)),

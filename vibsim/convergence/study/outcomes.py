@@ -73,6 +73,8 @@ class Outcome:
     high: float = np.nan
     used: tuple[int, ...] = ()
     """Positions of the levels that the order rests on."""
+    is_contradicted: bool = False
+    """Whether finer levels contradict that order."""
     error: float = np.nan
     error_bound: float = np.nan
     best: Floats | None = None
@@ -251,6 +253,7 @@ def _decide(
     one.order, used, weights = _estimate(one, measured.ladder.h, decided, k)
     one.used = tuple(one.finite[used].tolist())
     one.low, one.high = float(decided.low[k]), float(decided.high[k])
+    one.is_contradicted = bool(decided.contradicted[k])
     if np.isfinite(weights).all():
         # added up one by one, so that a member has the same digits alone and among others
         one.best = sum((w * row for w, row in zip(weights, part, strict=True)), 0.0 * part[0])

@@ -34,6 +34,8 @@ class Setting:
     """Whether all of them are proportional to the first."""
     interpolation: tuple[str, int] | None = None
     """Kind and order of an interpolation that hides the order."""
+    is_contradicted: bool = False
+    """Whether finer levels than those of an order contradict it."""
     are_sizes_rounded: bool = False
     """Whether the digits of the sizes are so few that their rounding may move the order by more than the tolerance."""
     notes: tuple[str, ...] = ()
@@ -143,7 +145,7 @@ def describe(facts: LadderVerdict, setting: Setting) -> tuple[str, str]:
     key = "interpolation" if setting.interpolation else facts.reason
     if key == "pre_asymptotic" and _is_noise_seen(facts, setting):
         key = "noisy"
-    elif key == "pre_asymptotic" and _is_contradicted(facts):
+    elif key == "pre_asymptotic" and setting.is_contradicted:
         key = "contradicted"
     elif facts.order is not None and facts.order < 0.0 and _is_growth(facts, setting):
         key = "growing"
@@ -176,15 +178,6 @@ def _is_noise_seen(facts: LadderVerdict, setting: Setting) -> bool:
     """Say whether the finest difference may be the stated noise: a finer level would show no more."""
     finest = facts.levels[-2:][0].difference
     return finest is not None and abs(finest) <= NOISE_SEEN * setting.noise
-
-
-def _is_contradicted(facts: LadderVerdict) -> bool:
-    """Say whether finer levels than those that fit an order differ by more than the finest two of these."""
-    if not facts.h_used:
-        return False
-    sizes = [abs(level.difference or 0.0) for level in facts.levels[:-1]]
-    last = [level.h for level in facts.levels].index(facts.h_used[-1])
-    return max(sizes[last:], default=0.0) > sizes[last - 1]
 
 
 def _is_growth(facts: LadderVerdict, setting: Setting) -> bool:
