@@ -457,7 +457,10 @@ def advice_on_bound(f: Found, check: ValueCheck) -> str:
     if _has_few_periods(f, check):
         return f"Give {LEAST_PERIODS} or more `periods:`."
     numbers = np.array(_by_level_of(f))
-    if check.number.rests_on_run and REACH * _last_change(numbers) < f.fact("error_bound"):
+    bound = f.fact("error_bound")
+    # without a bound, what is asked is so far away that the levels do not decide
+    away = bound if np.isfinite(bound) else _room(check, f.fact("value"))
+    if check.number.rests_on_run and REACH * _last_change(numbers) < away:
         key = "periods" if f.experiment.time.periods is not None else "end"
         return f"Make the run longer (`time: {key}`): finer levels do not shrink the error bound."
     return ""

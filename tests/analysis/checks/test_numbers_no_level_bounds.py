@@ -230,3 +230,4 @@ def test_a_steady_phase_of_an_unknown_bound_counts_what_is_left_of_the_start() -
     for claim in ({"above": 2.90779}, {"below": 2.9}):
         [found] = run(content, {"value": "steady_phase", "quantity": "u", **BEST, **claim}).verdicts
         assert found.status == "INCONCLUSIVE"
+        assert "Make the run longer (`time: periods`)" in found.advice
