@@ -28,6 +28,7 @@ from vibsim.core.record import Record
 from vibsim.core.vocabulary import LEVELS_OF_AN_ORDER
 from vibsim.experiment import Experiment
 from vibsim.experiment.schema.checks import ValueCheck
+from vibsim.experiment.value_names import OF_ONE_MEMBER
 
 FACTS: Mapping[str, Field] = {
     "low": Field("least value that the reduced number can have"),
@@ -42,7 +43,7 @@ RISES, FALLS, NEITHER = 1.0, -1.0, 0.0
 DIRECTIONS = {RISES: "rises", FALLS: "falls", NEITHER: "neither rises nor falls throughout"}
 
 
-TAKEN = {
+IN_WORDS: Mapping[str, str] = {
     "largest": "largest",
     "smallest": "smallest",
     "mean": "mean",
@@ -288,7 +289,7 @@ def _finding(f: Found, check: ValueCheck, one: Reduced, about: Any) -> str:
         return f"The {which} {what} over {count} members is at {here}{span}"
     error = max(one.high - one.value, one.value - one.low)
     finding = f"The {take} {what} over {count} members is {number(one.value, 10)} {unit}".rstrip()
-    finding += "" if take == "mean" else f", at {here}"
+    finding += f", at {here}" if take in OF_ONE_MEMBER else ""
     if not check.number.has_limit(check.at.level):
         return finding
     if math.isinf(error):

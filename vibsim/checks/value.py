@@ -31,7 +31,7 @@ from vibsim.core.vocabulary import LEVELS_OF_AN_ORDER, is_error_part
 from vibsim.elementary import on_arrays
 from vibsim.experiment import Experiment
 from vibsim.experiment.schema.checks import ValueCheck
-from vibsim.experiment.value_names import VALUES
+from vibsim.experiment.value_names import OF_THE_SAME_KIND, VALUES
 from vibsim.observe.member_block import MemberBlock
 from vibsim.observe.steady_state import LEAST_PERIODS
 from vibsim.schemes.base import is_on_the_mesh
@@ -244,7 +244,7 @@ def unit_of(experiment: Experiment, record: Record, check: ValueCheck) -> str:
 def unit_of_number(check: ValueCheck, known: Mapping[str, str], position: str, time: str) -> str:
     """Return the unit of the number of a check, from those of quantities and that of time; empty where it has none."""
     measure = check.number.measure
-    if check.take is not None and check.take not in ("largest", "smallest", "mean"):
+    if check.take not in OF_THE_SAME_KIND:
         # a swept value has its own unit, a direction none
         return ""
     of_time = {"time": "s", "frequency": "rad s-1", "l1": "s", "l2": "sqrt(s)"}

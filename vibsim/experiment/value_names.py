@@ -8,6 +8,14 @@ from types import MappingProxyType
 from typing import Any, Literal
 
 AtPart = Literal["t", "step", "event", "level", "scheme", "case"]
+Take = Literal[
+    "largest", "smallest", "mean", "where", "where_largest", "where_smallest", "monotone"
+]
+"""Which number of all members a check is about."""
+OF_ONE_MEMBER = (None, "largest", "smallest")
+"""Those that are the number of one member."""
+OF_THE_SAME_KIND = (*OF_ONE_MEMBER, "mean")
+"""Those that have the unit of a member's number, and digits of their own; others are swept values and directions."""
 MOST_EVENTS = 512
 """Events whose times are kept of a scheme and member."""
 

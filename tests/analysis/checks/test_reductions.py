@@ -21,6 +21,7 @@ from vibsim.checks.reductions import REDUCTIONS
 from vibsim.core.errors import InputError
 from vibsim.experiment import Experiment
 from vibsim.experiment.experiment import canonical, restore
+from vibsim.experiment.value_names import OF_ONE_MEMBER, OF_THE_SAME_KIND
 from vibsim.report.text.assertions import about
 
 pytestmark = pytest.mark.usefixtures("without_series")
@@ -102,6 +103,17 @@ def test_true_numbers_lie_between_the_bounds_and_reach_them(take: str) -> None:
         if not e.any():
             assert found.low == found.high == pytest.approx(found.value, rel=1e-15)
             assert not found.open.any()
+
+
+@pytest.mark.parametrize("take", REDUCTIONS)
+def test_what_is_taken_is_listed_as_the_kind_of_number_that_it_is(take: str) -> None:
+    """Units, digits, figures and the member that a sentence names follow from these lists."""
+    random = np.random.default_rng(22)
+    x, key = random.normal(size=(30, 5)) + 9.0, np.arange(5.0)
+    found = np.array([REDUCTIONS[take](row, 0.0 * row, key).value for row in x])
+    shifted = np.array([REDUCTIONS[take](row + 2.0, 0.0 * row, key).value for row in x])
+    assert np.allclose(shifted, found + 2.0) == (take in OF_THE_SAME_KIND)
+    assert np.all(np.any(x == found[:, None], axis=1)) == (take in OF_ONE_MEMBER)
 
 
 # ---- the closed form

@@ -11,14 +11,12 @@ from typing import Any
 from vibsim.experiment.faults import Report
 from vibsim.experiment.rules.size_limits import Setting
 from vibsim.experiment.schema.checks import AccurateCheck, Check, ConvergesCheck, ValueCheck
-from vibsim.experiment.value_names import VALUES
+from vibsim.experiment.value_names import OF_THE_SAME_KIND, VALUES
 from vibsim.experiment.yaml.parse import Path_
 from vibsim.formula import Binary, Call, Name, walk
 from vibsim.models import Model, tree
 
 TURN = 2.0 * math.pi
-DIGITS = (None, "largest", "smallest", "mean")
-"""Numbers that have digits of their own, by what is taken of all members."""
 EXACT_DIGITS = 9
 """Numbers that are written with so many digits are meant to be compared to 1e-9 of them."""
 
@@ -45,7 +43,9 @@ def note_unlikely(checks: Sequence[Check | None], setting: Setting, report: Repo
             ):
                 rule = f"{len(setting.levels)} of them decide no order"
                 report.note(("levels",), rule, "three are needed, and four are better")
-            case ValueCheck(equals=float(number), rtol=None, atol=None) if inner.take in DIGITS:
+            case ValueCheck(equals=float(number), rtol=None, atol=None) if (
+                inner.take in OF_THE_SAME_KIND
+            ):
                 _digits((*path, "equals"), inner.value, number, report)
 
 

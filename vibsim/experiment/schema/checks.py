@@ -30,11 +30,8 @@ from vibsim.experiment.schema.fields import (
     tagged,
     whole,
 )
-from vibsim.experiment.value_names import MOST_EVENTS, VALUES, Value
+from vibsim.experiment.value_names import MOST_EVENTS, VALUES, Take, Value
 
-Take = Literal[
-    "largest", "smallest", "mean", "where", "where_largest", "where_smallest", "monotone"
-]
 Drift = Literal["none", "bounded", "linear", "quadratic"]
 SOLUTIONS = ("exact", "discrete")
 """What a scheme may be compared with beside another scheme; no scheme has such a name."""

@@ -15,6 +15,7 @@ from vibsim.checks.value import unit_of, unit_of_norm, what
 from vibsim.core.array_types import Floats
 from vibsim.core.record import Record
 from vibsim.core.vocabulary import OF_LEVEL, TYPICAL_NORM
+from vibsim.experiment.value_names import OF_ONE_MEMBER
 from vibsim.report import style, words
 from vibsim.report.data import Member, at, norm_index, norm_unit, pretty_unit, unit, whole
 from vibsim.report.evidence import frame
@@ -27,7 +28,7 @@ def picture(
     experiment: Experiment, record: Record, check: ValueCheck, name: str, member: Member
 ) -> Picture | None:
     """Draw a number by level, or how far it is from the one that it should equal; None where no level has one."""
-    if check.take not in (None, "largest", "smallest"):
+    if check.take not in OF_ONE_MEMBER:
         # no number of one member is the one that is asked for
         return None
     found = _values(experiment, record, check, name, member)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from vibsim.checks.accurate import rule
-from vibsim.checks.reductions import TAKEN
+from vibsim.checks.reductions import IN_WORDS
 from vibsim.checks.value import what
 from vibsim.checks.verdict_text import expectation, expected_verdict
 from vibsim.core.vocabulary import TYPICAL_NORM
@@ -124,7 +124,7 @@ def subject(check: Measurement) -> str:
     parts = [f"{key} {value}" for key, value in places if value is not None]
     where = ", ".join([*parts, *swept_values(check)])
     if check.take is not None:
-        statement = f"{TAKEN[check.take]} {statement} over {check.over}"
+        statement = f"{IN_WORDS[check.take]} {statement} over {check.over}"
     statement = f"{statement}{(f' ({where})' if is_sampled else f' at {where}') if where else ''}"
     return statement.replace("level best", "the limit of the levels")
 
