@@ -14,7 +14,7 @@ from vibsim.checks.sentences import cost_in_words
 from vibsim.comparison.order_evidence import CAUSES
 from vibsim.core.record import Record
 from vibsim.experiment import Experiment
-from vibsim.experiment.cost import load_of
+from vibsim.experiment.cost import level_cost
 from vibsim.simulation import simulate_record
 
 pytestmark = pytest.mark.usefixtures("without_series")
@@ -275,10 +275,10 @@ def test_costs_are_those_of_the_plan() -> None:
     experiment = Experiment.from_dict(data)
     words = cost_in_words(experiment, [9, 10])
     assert words.startswith(f"{2 * (512 + 1024)} steps, less than 0.1 s on one core, ")
-    memory = max(load_of(experiment, level).memory(1) for level in (9, 10))
+    memory = max(level_cost(experiment, level).memory(1) for level in (9, 10))
     assert words.endswith(f"{memory / 1e6:.0f} MB of memory")
     large = cost_in_words(experiment, [30])
-    seconds = load_of(experiment, 30).seconds(1)
+    seconds = level_cost(experiment, 30).seconds(1)
     assert seconds > 10
     assert f"{seconds:.2g} s" in large or " min" in large
 

@@ -12,12 +12,12 @@ from typing import Any
 import pytest
 from experiment_files import build, faults_of, only_fault
 
-from vibsim.experiment.cost import Load
+from vibsim.experiment.cost import LevelCost
 from vibsim.experiment.storage import FEWEST_EXTREMA, MOST_EXTREMA
 from vibsim.experiment.sweep_columns import line
 from vibsim.plan.build import build as build_plan
 
-ALL = Load(
+ALL = LevelCost(
     schemes=1, steps=2**28, samples=2**28 + 1, series=8, exact=2, extrema=MOST_EXTREMA, d2t=True
 )
 MEMORY = ALL.memory(1)

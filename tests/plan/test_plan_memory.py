@@ -13,7 +13,7 @@ import netCDF4
 import pytest
 
 from vibsim.cli import main
-from vibsim.experiment.cost import COMPARED_FILE, analysis_disk, load_of
+from vibsim.experiment.cost import COMPARED_FILE, analysis_disk, level_cost
 from vibsim.plan import Choice, LevelJob, Plan, load
 
 HEAD = "title: x\nmodel: {kind: pendulum}\ninitial: {theta: 1.0}\ntime: {end: 20.0}\n"
@@ -123,7 +123,7 @@ def test_the_size_of_a_comparison_with_series_is_as_planned(tmp_path: Path) -> N
     size = (tmp_path / plan.convergence).stat().st_size
     assert packed > 0.5 * values
     # memory holds what there is to write; what is compressed takes less of the disk
-    loads = [load_of(plan.experiment, level.level) for level in plan.levels]
+    loads = [level_cost(plan.experiment, level.level) for level in plan.levels]
     held = analysis_disk(loads, plan.cases, is_lean=False)
     assert held == pytest.approx(values + COMPARED_FILE, rel=0.2)
     assert 0.3 * held < size < 0.8 * held

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from vibsim.experiment import Experiment, cost
-from vibsim.experiment.cost import load_of
+from vibsim.experiment.cost import level_cost
 from vibsim.plan import Choice, Plan, load
 
 Plans = Callable[..., Plan]
@@ -149,7 +149,7 @@ def test_the_size_of_a_shard_knows_nothing_of_the_number_of_members(plan_of: Pla
 @pytest.mark.parametrize("schemes", [1, 3])
 @pytest.mark.parametrize("samples", [17, 1025, 2**20])
 def test_a_shard_is_some_seconds_in_bounded_memory(level: int, schemes: int, samples: int) -> None:
-    load = cost.Load(schemes, 2**level, samples, 6)
+    load = cost.LevelCost(schemes, 2**level, samples, 6)
     members = load.shard
     assert members & (members - 1) == 0
     work = members * schemes * 2**level * cost.MANY_SECONDS
@@ -164,19 +164,19 @@ def test_a_shard_is_some_seconds_in_bounded_memory(level: int, schemes: int, sam
 def test_more_evaluations_take_more_time_and_so_smaller_shards() -> None:
     ladder = [cost.work(evaluations, True) for evaluations in (1, 2, 4)]
     ladder += [cost.work(evaluations, False) for evaluations in (1, 2)]
-    loads = [cost.Load(1, 2**10, 17, 3, work=w, iterated=i) for w, i in ladder]
+    loads = [cost.LevelCost(1, 2**10, 17, 3, work=w, iterated=i) for w, i in ladder]
     for one, other in itertools.pairwise(loads):
         assert one.seconds(1) < other.seconds(1)
         assert one.seconds(2**16) < other.seconds(2**16)
         assert one.shard >= other.shard
-    assert loads[0].shard == cost.Load(1, 2**10, 17, 3).shard
+    assert loads[0].shard == cost.LevelCost(1, 2**10, 17, 3).shard
     assert loads[0].shard > loads[-1].shard
 
 
 def test_members_that_are_stepped_one_by_one_take_more_time_and_so_smaller_shards() -> None:
     for explicit, alone in itertools.product((True, False), (cost.COUPLED, cost.EVENTFUL)):
         free, bound = (cost.work(1, explicit, factor) for factor in (None, alone))
-        loads = [cost.Load(1, 2**10, 17, 3, work=w, iterated=i) for w, i in (free, bound)]
+        loads = [cost.LevelCost(1, 2**10, 17, 3, work=w, iterated=i) for w, i in (free, bound)]
         assert loads[0].seconds(2**16) < loads[1].seconds(2**16)
         assert loads[0].shard >= loads[1].shard
 
@@ -193,7 +193,7 @@ def test_several_coordinates_are_stepped_one_by_one(kind: str, factor: float) ->
         "levels": [5, 6, 7],
         "schemes": ["central"],
     }
-    load = load_of(Experiment.from_dict(content, name="n", collection="c"), 7)
+    load = level_cost(Experiment.from_dict(content, name="n", collection="c"), 7)
     assert (load.work, load.iterated) == ((0.0, factor) if factor else (1.0, 0.0))
 
 

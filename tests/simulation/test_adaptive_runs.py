@@ -14,7 +14,7 @@ from vibsim.core.errors import SimulationError
 from vibsim.core.record import Record
 from vibsim.engine import integrate
 from vibsim.experiment import Experiment
-from vibsim.experiment.cost import load_of
+from vibsim.experiment.cost import level_cost
 from vibsim.models import MODELS
 from vibsim.schemes import SCHEMES
 from vibsim.schemes.adaptive import TOLERANCE, seconds
@@ -283,7 +283,7 @@ def test_runs_are_kept_within_bounds(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_the_plan_counts_what_a_run_costs(kind: str) -> None:
     other = {"kind": "central", "label": "other"}
     plain, *loads = (
-        load_of(experiment("central", scheme, time={"end": 100.0}), 7)
+        level_cost(experiment("central", scheme, time={"end": 100.0}), 7)
         for scheme in (other, *({"kind": kind, "tolerance": x} for x in (1e-4, 1e-10)))
     )
     assert plain.own == 0.0

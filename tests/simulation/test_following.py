@@ -11,7 +11,7 @@ import yaml
 from vibsim import Experiment, analyse, simulate, verdicts
 from vibsim.core.errors import InputError
 from vibsim.experiment import canonical, restore
-from vibsim.experiment.cost import Load, load_of
+from vibsim.experiment.cost import LevelCost, level_cost
 from vibsim.plan import build
 from vibsim.report.text import experiment_file
 from vibsim.simulation import simulate_record
@@ -80,11 +80,13 @@ def test_a_chain_is_made_as_a_whole() -> None:
     np.testing.assert_array_equal(part["u"], whole["u"][:, 4:])
     for chain in (1, 3, 25, 1000):
         for steps in (100, 10**5, 10**9):
-            load = Load(schemes=1, steps=steps, samples=100, series=7, chain=chain)
+            load = LevelCost(schemes=1, steps=steps, samples=100, series=7, chain=chain)
             assert load.shard % chain == 0
             assert load.shard & (load.shard - 1) == 0 or chain > 1
     more = {**DUFFING["sweep"], "model.gamma": [1.0 / n for n in range(1, 50)]}
-    assert load_of(experiment, 1).shard == load_of(changed(schemes=["rk4"], sweep=more), 1).shard
+    assert (
+        level_cost(experiment, 1).shard == level_cost(changed(schemes=["rk4"], sweep=more), 1).shard
+    )
     assert all(
         s.start % 4 == 0 for level in build.build(changed(sweep=more)).levels for s in level.shards
     )

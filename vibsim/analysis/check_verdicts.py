@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from vibsim.checks import tolerance
+from vibsim.checks import experiment_tolerance
 from vibsim.checks.kinds import definition, judge
 from vibsim.checks.outcome import Outcome, Results, compared_reason, truth
 from vibsim.checks.sweep_regions import sweep_regions
@@ -75,7 +75,9 @@ def verdicts(experiment: Experiment, convergence: xarray.Dataset | Record) -> li
         for check in experiment.checks
     ]
     if experiment.tolerance is not None:
-        found.append(_verdict(experiment, record, None, tolerance.judge(experiment, record)))
+        found.append(
+            _verdict(experiment, record, None, experiment_tolerance.judge(experiment, record))
+        )
     return found
 
 

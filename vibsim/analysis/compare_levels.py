@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from vibsim.analysis.motion_variables import motion
 from vibsim.apriori.force_discontinuities import corner_variables
+from vibsim.checks.experiment_tolerance import bounds
 from vibsim.checks.kinds import check_variables, definition
 from vibsim.checks.order import phase_at_start
-from vibsim.checks.tolerance import bounds
 from vibsim.comparison import best_values
 from vibsim.comparison.compare_quantities import comparisons
 from vibsim.comparison.comparison_variables import Table, in_precision, numbers, over_time

@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 
 from vibsim.checks import reductions
+from vibsim.checks.experiment_tolerance import BOUND
 from vibsim.checks.fields import Field, result_fields
 from vibsim.checks.kinds import KINDS
 from vibsim.checks.order import BESIDE
 from vibsim.checks.solver_facts import LEVELS, SOLVER_FACTS
-from vibsim.checks.tolerance import BOUND
 from vibsim.core.json_schema import (
     COUNT,
     DRAFT,

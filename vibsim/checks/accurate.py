@@ -18,7 +18,7 @@ from vibsim.checks.notation import PLAIN, Notation, beside
 from vibsim.checks.outcome import Judged, as_expected
 from vibsim.checks.sentences import (
     NOT_FINITE,
-    WRONG_LIMIT,
+    WRONG_LIMIT_ADVICE,
     Description,
     Found,
     add_levels,
@@ -273,7 +273,7 @@ class _Phrases:
         """Name the level that is probably as accurate as asked, where one is known."""
         change, needed = f"hange `{self.check.key}:`", self.f.fact("level_needed")
         if self.f.word("order_reason") == "wrong_limit":
-            return WRONG_LIMIT.format(scheme=self.f.scheme_name)
+            return WRONG_LIMIT_ADVICE.format(scheme=self.f.scheme_name)
         if needed < 0:
             return f"Take finer `levels:` or a scheme of higher order (`schemes:`), or c{change}."
         add = add_levels(self.level, needed - self.level, self.cost)

@@ -13,7 +13,7 @@ from itertools import pairwise
 from vibsim.checks.order_context import COINCIDE, OrderContext
 from vibsim.checks.phase_amplitude_text import NO_PART, PART_ADVICE
 from vibsim.checks.sentences import (
-    WRONG_LIMIT,
+    WRONG_LIMIT_ADVICE,
     Description,
     Found,
     Template,
@@ -72,7 +72,7 @@ DIAGNOSES: Words = {
     "wrong_limit": (
         "The levels of {what} approach each other, but not the exact solution. The remaining error is too large."
         "{error}",
-        WRONG_LIMIT,
+        WRONG_LIMIT_ADVICE,
     ),
     "unstable, beyond the limit": (
         "The run is unstable at level {culprit}, where w dt = {omega_dt:4} is beyond the limit {limit} of scheme "

@@ -2,10 +2,10 @@
 
 Every member has a number x and a bound e of its error: 0 for the number of one level, which is what it is; of a limit,
 what the levels leave. Where that is not known, all finer levels together are taken to change it by no more than three
-times its last change (`vibsim.checks.value.REACH`); with no change to see it is infinite. The true number of a member
-is from x - e to x + e. So the reduced number is from `low` to `high`, the least and the largest value that numbers in
-these intervals can give it. It is as asked where every value between them is, and not as asked where none is. Else the
-levels decide nothing, and the members that could change the outcome are named.
+times its last change (`vibsim.checks.value.STILL_TO_CHANGE`); with no change to see it is infinite. The true number of
+a member is from x - e to x + e. So the reduced number is from `low` to `high`, the least and the largest value that
+numbers in these intervals can give it. It is as asked where every value between them is, and not as asked where none
+is. Else the levels decide nothing, and the members that could change the outcome are named.
 """
 
 from __future__ import annotations

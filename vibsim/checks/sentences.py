@@ -16,7 +16,7 @@ from vibsim.checks.notation import PLAIN, Notation
 from vibsim.core.array_types import Floats
 from vibsim.core.record import Record
 from vibsim.experiment import Experiment
-from vibsim.experiment.cost import load_of
+from vibsim.experiment.cost import level_cost
 from vibsim.experiment.schema.checks import Measurement
 from vibsim.models.base import Model
 
@@ -31,7 +31,7 @@ NOT_FINITE = (
 NOTHING_MOVES = "Nothing moves here, so {} keeps its initial value with any scheme"
 MOVE = "Choose `initial:` values or a force that cause motion."
 """Advice where nothing moves."""
-WRONG_LIMIT = (
+WRONG_LIMIT_ADVICE = (
     "Check `model:` and `initial:` against the intended equation, and the code of scheme {scheme} if it is your own. "
     "Finer levels will not help."
 )
@@ -138,13 +138,13 @@ def growth_in_words(f: Found, predicted: float, measured: float) -> str:
 
 def cost_in_words(experiment: Experiment, levels: Sequence[int]) -> str:
     """Return what levels cost together, as a plan estimates it; the memory is that of the largest job."""
-    loads = [load_of(experiment, level) for level in levels]
+    costs = [level_cost(experiment, level) for level in levels]
     members = experiment.members
-    steps = sum(load.schemes * load.steps * members for load in loads)
-    memory = max(load.memory(min(members, load.shard)) for load in loads)
+    steps = sum(cost.schemes * cost.steps * members for cost in costs)
+    memory = max(cost.memory(min(members, cost.shard)) for cost in costs)
     count = f"{steps}" if steps < 100_000 else f"{steps:.2g}"
     size = f"{memory / 1e6:.0f} MB" if memory < 1e9 else f"{memory / 1e9:.1f} GB"
-    time = _time(sum(load.seconds(members) for load in loads))
+    time = _time(sum(cost.seconds(members) for cost in costs))
     return f"{count} steps, {time} on one core, {size} of memory"
 
 

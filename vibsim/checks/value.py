@@ -59,7 +59,7 @@ DIRECTION_ASKED = {1.0: "rising", -1.0: "falling", 0.0: "neither rising nor fall
 """What is asked of a direction, by the number that stands for it."""
 UNKNOWN, SETTLED, MOVING = -1, 0, 1
 """What finer levels do to a number that misses what is asked: not known, too little, perhaps enough."""
-REACH = 3.0
+STILL_TO_CHANGE = 3.0
 """All finer levels together change a number by no more than so many times its last change (an order of 1/2 by 2.4)."""
 FINER, MOST_FINER = 2, 12
 """So many finer levels are advised where nothing tells how many are needed, and so many at most."""
@@ -98,7 +98,7 @@ def measure(block: MemberBlock, compared: Compared, check: ValueCheck) -> Measur
         numbers = _by_level(name, place)
     if check.take is not None and row.has_limit(at.level):
         # every member has a part in the number of all
-        bound = np.where(np.isnan(bound), REACH * _last_change(numbers) + missed, bound)
+        bound = np.where(np.isnan(bound), STILL_TO_CHANGE * _last_change(numbers) + missed, bound)
     own = row.own_levels(levels) or tuple(levels)
     level = place.level if place.level in own else own[-1]
     left = np.where(is_open, missed, 0.0)
@@ -167,8 +167,8 @@ def _prospects(
         with np.errstate(all="ignore"):
             last = _last_change(numbers)
             change = np.abs(np.diff(numbers[..., -3:], axis=-1))
-            shrinks = change[..., -1] <= REACH / (1.0 + REACH) * change[..., 0]
-            reach = np.where(is_open & ~shrinks, MOST_FINER, REACH) * last + left
+            shrinks = change[..., -1] <= STILL_TO_CHANGE / (1.0 + STILL_TO_CHANGE) * change[..., 0]
+            reach = np.where(is_open & ~shrinks, MOST_FINER, STILL_TO_CHANGE) * last + left
             code[away[..., -1] <= reach] = MOVING
             code[(away[..., -1] > reach) | (reach == 0.0)] = SETTLED
             code[fulfilled] = np.where(reach > -away[..., -1], MOVING, UNKNOWN)[fulfilled]
@@ -460,7 +460,7 @@ def advice_on_bound(f: Found, check: ValueCheck) -> str:
     bound = f.fact("error_bound")
     # without a bound, what is asked is so far away that the levels do not decide
     away = bound if np.isfinite(bound) else _room(check, f.fact("value"))
-    if check.number.rests_on_run and REACH * _last_change(numbers) < away:
+    if check.number.rests_on_run and STILL_TO_CHANGE * _last_change(numbers) < away:
         key = "periods" if f.experiment.time.periods is not None else "end"
         return f"Make the run longer (`time: {key}`): finer levels do not shrink the error bound."
     return ""

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from vibsim.apriori.formal_orders import columns_of
-from vibsim.checks import accurate, equal, tolerance, value
+from vibsim.checks import accurate, equal, experiment_tolerance, value
 from vibsim.checks.kinds import KINDS
 from vibsim.checks.notation import PLAIN, Notation
 from vibsim.checks.outcome import Result, compared_reason, truth
@@ -27,7 +27,7 @@ CORRECT = "Correct `expect:`, or find out why the outcome differs."
 def expectation(experiment: Experiment, check: Check | None, notation: Notation = PLAIN) -> str:
     """Say what a check expects; None stands for the tolerance of the experiment."""
     if check is None:
-        return tolerance.rule(experiment, notation)
+        return experiment_tolerance.rule(experiment, notation)
     match check.kind:
         case "claim":
             return "true" if check.holds else "false"
@@ -79,7 +79,9 @@ class Wording:
             self.notation,
         )
         return (
-            tolerance.describe(found) if check is None else KINDS[check.kind].describe(found, check)
+            experiment_tolerance.describe(found)
+            if check is None
+            else KINDS[check.kind].describe(found, check)
         )
 
     def sentence(self, result: Result) -> str:

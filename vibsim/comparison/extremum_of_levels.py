@@ -14,7 +14,6 @@ from vibsim.comparison.thresholds import OF_A_LINE
 from vibsim.convergence.differences import error_factor
 from vibsim.convergence.thresholds import ORDER_ABOVE_ROUND_OFF
 from vibsim.core.array_types import Flags, Floats
-from vibsim.models.events import Crossings, Impact
 from vibsim.observe.member_block import MemberBlock
 
 _UPWARD = {"min": np.negative, "max": np.positive, "max_abs": np.abs}
@@ -71,7 +70,8 @@ def _upward(name: str, place: value_numbers.Place) -> Series:
 
 def _is_struck(block: MemberBlock) -> Flags:
     """Mark members whose velocity events change, shape (scheme, case)."""
-    return np.logical_not(block.eventless) & isinstance(block.model.events, Impact | Crossings)
+    events = block.model.events
+    return np.logical_not(block.eventless) & (events is not None and events.jumps)
 
 
 def _error_over_points(

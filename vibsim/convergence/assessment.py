@@ -7,7 +7,7 @@ A power *dominates* where no other one has more than a tenth of it. The table of
 | a value that is not finite | FAIL ``non_finite`` |
 | fewer than three levels | INCONCLUSIVE ``too_few_levels`` |
 | all differences are noise as expected, but not the distance from the exact solution | FAIL ``wrong_limit`` |
-| they fall like the lowest power at least, and the exact solution is far away (`_is_far`) | FAIL ``wrong_limit`` |
+| they fall like the lowest power at least, far from the exact solution (`_is_far_from_exact`) | FAIL ``wrong_limit`` |
 | the levels surely show an expansion with another limit than the exact solution (`is_missed`) | FAIL ``wrong_limit`` |
 | all differences are noise as expected | PASS ``exact`` |
 | a power within the tolerance of the expected one dominates, surely, and was measured | PASS ``asymptotic`` |
@@ -234,7 +234,7 @@ def _evaluate(ladder: Ladder, question: Question, left_out: float) -> _Evaluatio
     if ladder.exact_known:
         factor = question.noise_factor if question.limit_factor is None else question.limit_factor
         away = np.sqrt(ladder.gram[:, -1, -1]) > factor * ladder.floor[:, -1]
-        away &= exact | _is_far(ladder)
+        away &= exact | _is_far_from_exact(ladder)
     return _Evaluation(
         question,
         believed,
@@ -329,7 +329,7 @@ def _probability(codes: Codes, found: _Evaluation) -> Floats:
     return np.where(is_one_of(codes, *DECIDED), right, 1.0)
 
 
-def _is_far(ladder: Ladder) -> Flags:
+def _is_far_from_exact(ladder: Ladder) -> Flags:
     """Say where differences fall at least like the lowest power of an expansion, and the exact solution is far away.
 
     They must be no round-off. Then less is to come than that power leaves, and both together are much less than the

@@ -102,7 +102,7 @@ def is_noise(e: Evidence) -> Flags:
     """Say where the finest differences may be noise: round-off of the predicted size, or what does not fall."""
     last, before = e.difference[..., -1], e.difference[..., -2:][..., 0]
     small = last <= th.ABOVE_ROUND_OFF * floor_of_pairs(e)[..., -1]
-    return np.asarray(small | ((last > th.STAYS * before) & (last <= e.ceiling)))
+    return np.asarray(small | ((last > th.FLOOR_STAYS * before) & (last <= e.ceiling)))
 
 
 def errors_stay(e: Evidence) -> Flags:
@@ -117,7 +117,7 @@ def errors_stay(e: Evidence) -> Flags:
         steps = e.steps * 2.0 ** (e.levels[-1] - e.levels[0])
         step = np.where(np.isfinite(e.omega_dt[..., -1]), e.omega_dt[..., -1], 1.0 / steps)
         beside_a_point = e.size * on_arrays.power(step, np.fmin(e.corner, e.left_to_the_mesh))
-        stays = e.error > th.STAYED * np.sqrt(square)
+        stays = e.error > th.ERROR_STAYED * np.sqrt(square)
         return np.asarray(stays & ~(e.error <= beside_a_point))
 
 

@@ -37,7 +37,7 @@ EXACT_DIFFERENCE = 1e-10  # largest difference of an exact scheme, over the solu
 EXACT_ACCURACY = 1e-12  # an exact solution is trusted to this part of its size [convention]
 # An ordinary error, (w dt)^p at the coarsest level, that exceeds `ABOVE_ROUND_OFF` by this factor is seen. [calibrated]
 VISIBLE_ERROR = 1e4
-STAYS = 0.5  # a floor does not fall below this part of itself [calibrated]
+FLOOR_STAYS = 0.5  # a floor does not fall below this part of itself [calibrated]
 
 # ---- Decisions by the error model
 
@@ -71,7 +71,9 @@ LIMIT_ROUNDING = 1e-9  # w dt within this part of a stability limit is at the li
 BLOWN_UP = 10.0  # a solution so many times larger than the exact one has grown [convention]
 # A step no longer than so many times that in which damping takes a velocity away sees how it goes. [derived]
 RESOLVED_DECAY = 1.0
-STAYED = 0.5  # an error has stayed that is a larger part of that of the coarsest level [derived]
+ERROR_STAYED = (
+    0.5  # an error has stayed that is a larger part of that of the coarsest level [derived]
+)
 
 # ---- A promised order behind a higher one
 

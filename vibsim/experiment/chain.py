@@ -15,8 +15,8 @@ from dataclasses import replace
 from typing import Any
 
 from vibsim.experiment.faults import Report
-from vibsim.experiment.other_forms import OF_COORDINATE
 from vibsim.experiment.repeat import REPEAT
+from vibsim.experiment.shorthand import OF_COORDINATE
 from vibsim.experiment.yaml.parse import Path_
 from vibsim.models.system import MOST
 

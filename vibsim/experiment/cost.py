@@ -126,7 +126,7 @@ def work(force_evaluations: int, explicit: bool, alone: float | None = None) -> 
 
 
 @dataclass(frozen=True)
-class Load:
+class LevelCost:
     """What one level asks of a job, apart from the number of members."""
 
     schemes: int
@@ -246,55 +246,55 @@ def _packed(size: int, extrema: int) -> int:
     return size if extrema and size <= PACKED_UP_TO else 0
 
 
-def analysis_memory(loads: Sequence[Load], members: int) -> int:
-    """Return the bytes that an analysis in one process holds at its peak; `loads` are those of every level."""
-    written = _packed(analysis_disk(loads, members, is_lean=False), loads[0].extrema)
-    result = RESULT * loads[0].schemes * members
-    return ANALYSIS_MEMORY + _part_memory(loads, members) + result + written
+def analysis_memory(levels: Sequence[LevelCost], members: int) -> int:
+    """Return the bytes that an analysis in one process holds at its peak; `levels` are those of every level."""
+    written = _packed(analysis_disk(levels, members, is_lean=False), levels[0].extrema)
+    result = RESULT * levels[0].schemes * members
+    return ANALYSIS_MEMORY + _part_memory(levels, members) + result + written
 
 
-def process_memory(loads: Sequence[Load], members: int) -> int:
+def process_memory(levels: Sequence[LevelCost], members: int) -> int:
     """Return the bytes that each process holds where several share an analysis."""
-    return PROCESS_MEMORY + _part_memory(loads, members)
+    return PROCESS_MEMORY + _part_memory(levels, members)
 
 
-def _part_memory(loads: Sequence[Load], members: int) -> int:
-    part = max(1, PART_SAMPLES // (loads[0].samples * loads[0].schemes))
-    return round(ANALYSED * min(members, part) * sum(load.stored for load in loads))
+def _part_memory(levels: Sequence[LevelCost], members: int) -> int:
+    part = max(1, PART_SAMPLES // (levels[0].samples * levels[0].schemes))
+    return round(ANALYSED * min(members, part) * sum(level.stored for level in levels))
 
 
-def analysis_disk(loads: Sequence[Load], members: int, is_lean: bool) -> int:
+def analysis_disk(levels: Sequence[LevelCost], members: int, is_lean: bool) -> int:
     """Return the bytes that an analysis of `members` writes, before they are compressed.
 
-    `loads` are those of every level; `is_lean` tells whether series are left out.
+    `levels` are those of every level; `is_lean` tells whether series are left out.
     """
     once, each = ANALYSIS_BYTES
-    size, file = once + each * len(loads), COMPARED_FILE
+    size, file = once + each * len(levels), COMPARED_FILE
     if not is_lean:
         once, each = COMPARED_SERIES
-        size += loads[0].samples * (once + each * len(loads))
-        size += EXTREMUM * len(loads) * max(load.extrema for load in loads) + COMPARED_NUMBERS
-        size += EVENT * len(loads) * max(load.events for load in loads)
+        size += levels[0].samples * (once + each * len(levels))
+        size += EXTREMUM * len(levels) * max(level.extrema for level in levels) + COMPARED_NUMBERS
+        size += EVENT * len(levels) * max(level.events for level in levels)
         file += COMPARED_SERIES_FILE
         # those of one coordinate
-        size, file = loads[0].coordinates * size, loads[0].coordinates * file
-    return loads[0].schemes * members * size + file
+        size, file = levels[0].coordinates * size, levels[0].coordinates * file
+    return levels[0].schemes * members * size + file
 
 
-def analysis_written(loads: Sequence[Load], members: int, is_lean: bool) -> int:
+def analysis_written(levels: Sequence[LevelCost], members: int, is_lean: bool) -> int:
     """Return about how many bytes the file of an analysis takes; see `analysis_disk`."""
-    samples = loads[0].schemes * members * loads[0].samples
+    samples = levels[0].schemes * members * levels[0].samples
     once, each = COMPARED_SERIES
-    series = loads[0].coordinates * samples * (once + each * len(loads))
-    one, all_ = max(load.all_extrema(members) for load in loads)
+    series = levels[0].coordinates * samples * (once + each * len(levels))
+    one, all_ = max(level.all_extrema(members) for level in levels)
     return _written(
-        analysis_disk(loads, members, is_lean),
-        (8 * samples * len(loads), series),
-        (one * len(loads), all_ * len(loads) * loads[0].coordinates),
+        analysis_disk(levels, members, is_lean),
+        (8 * samples * len(levels), series),
+        (one * len(levels), all_ * len(levels) * levels[0].coordinates),
     )
 
 
-def load_of(experiment: ExperimentSpec, level: int) -> Load:
+def level_cost(experiment: ExperimentSpec, level: int) -> LevelCost:
     """Return what one member of `experiment` costs at `level`."""
     from vibsim.experiment.storage import (
         event_times,
@@ -326,7 +326,7 @@ def load_of(experiment: ExperimentSpec, level: int) -> Load:
         each, of_entry = STRUCTURE_SECONDS
         entries = len(model.loaded.structure.stiffness.entries)
         whole = steps * len(kinds) * (each + of_entry * entries)
-    return Load(
+    return LevelCost(
         schemes=len(experiment.schemes),
         steps=steps,
         samples=steps // sampling(experiment, level) + 1,

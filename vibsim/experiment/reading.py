@@ -15,7 +15,6 @@ from vibsim.experiment.collection import collection_of
 from vibsim.experiment.data import ExperimentSpec, ModelSpec, Sweep, TimeSpec
 from vibsim.experiment.faults import MISSING, Report, shorten
 from vibsim.experiment.kinds import Kinds
-from vibsim.experiment.other_forms import write_usual_form
 from vibsim.experiment.repeat import write_out_repeats
 from vibsim.experiment.rules import continuation, members, size_limits, timing, unlikely
 from vibsim.experiment.rules import schemes as scheme_rules
@@ -33,6 +32,7 @@ from vibsim.experiment.schema.fields import IDENTIFIER
 from vibsim.experiment.schema.model_and_schemes import scheme_names
 from vibsim.experiment.schema.published import claims
 from vibsim.experiment.settings import with_settings
+from vibsim.experiment.shorthand import write_usual_form
 from vibsim.experiment.validation import read_document
 from vibsim.experiment.yaml.parse import MAX_DEPTH, Source, read
 from vibsim.models import MODELS, Model

@@ -21,6 +21,7 @@ Differential Equations I, section II.6 (discontinuous equations).
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 from vibsim.formula import Expression
 
@@ -31,6 +32,8 @@ Formula = str | Expression
 class Friction:
     """Coulomb friction; both formulas are accelerations, in the position, ``t`` and the parameters."""
 
+    jumps: ClassVar[bool] = False
+    """Whether events change the state at once."""
     drive: Formula
     """By all forces but the friction."""
     limit: Formula
@@ -43,6 +46,7 @@ class Friction:
 class Impact:
     """Impact on the ground, at the position 0; formulas in the parameters."""
 
+    jumps: ClassVar[bool] = True
     restitution: Formula
     """Speed after an impact over the speed before it."""
     near: Formula
@@ -71,6 +75,7 @@ class Crossing:
 class Crossings:
     """Events where formulas change their signs; at one time the first of them happens first."""
 
+    jumps: ClassVar[bool] = True
     rows: tuple[Crossing, ...]
     cost: Formula = "1"
     """What goes at an event is counted in energy."""

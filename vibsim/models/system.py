@@ -298,14 +298,14 @@ class Written:
     @cached_property
     def stiffness(self) -> dict[tuple[int, int], Expression]:
         """Entries of ``-da/dx`` that are not 0, by row and column."""
-        return self.falls(self.coordinates)
+        return self.minus_jacobian(self.coordinates)
 
     @cached_property
     def couplings(self) -> dict[tuple[int, int], Expression]:
         """Entries of ``-da/dv`` that are not 0, by row and column."""
-        return self.falls(self.velocities)
+        return self.minus_jacobian(self.velocities)
 
-    def falls(self, states: Sequence[str]) -> dict[tuple[int, int], Expression]:
+    def minus_jacobian(self, states: Sequence[str]) -> dict[tuple[int, int], Expression]:
         """Return minus the derivatives of the accelerations by some states that are not 0, by row and column."""
         found = {
             (i, j): -derivative(a, name)

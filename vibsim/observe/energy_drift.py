@@ -169,7 +169,7 @@ def drift_of(
     # a small rise may be the last stair of an oscillation with several frequencies
     stops = last_rise < th.STILL_WIDENS * rise
     if deviation is not None:
-        moves = _moves(deviation)
+        moves = _shifts_the_range(deviation)
         stops |= ~moves
     has_stopped = (rise < th.SMALL_RISE * size) & stops
     if deviation is not None:
@@ -236,7 +236,7 @@ def _range(deviation: Floats) -> Floats:
     return np.asarray(highest - lowest)
 
 
-def _moves(deviation: Floats) -> Flags:
+def _shifts_the_range(deviation: Floats) -> Flags:
     """Say whether both ends of the range move the same way from the third quarter to the last, as those of a drift do.
 
     An oscillation of several frequencies may grow to one side for a while, and stay on the other one.

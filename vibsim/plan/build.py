@@ -18,7 +18,7 @@ from vibsim.experiment.cost import (
     JOB_SECONDS,
     analysis_memory,
     analysis_written,
-    load_of,
+    level_cost,
     process_memory,
 )
 from vibsim.experiment.storage import is_bounded, sampling, stored_series
@@ -55,7 +55,7 @@ def build(experiment: Experiment) -> Plan:
     values = cache(lambda start, stop: values_digest(experiment, start, stop))
     levels = tuple(_level(experiment, content, level, values) for level in experiment.levels)
     groups, trajectories = _groups(levels), experiment.trajectories
-    loads = [load_of(experiment, level) for level in experiment.levels]
+    costs = [level_cost(experiment, level) for level in experiment.levels]
     before = made_from(levels, experiment.settings)
     analysis = job_digest("analyse", in_numbers(analysed(content)), before)
     reference = round(forecast.reference_seconds(experiment), 3)
@@ -78,10 +78,10 @@ def build(experiment: Experiment) -> Plan:
             for shard in range(len(group[0].shards))
         ),
         analysis=analysis,
-        analysis_memory=analysis_memory(loads, experiment.members)
-        + forecast.other_memory(experiment, loads),
-        process_memory=process_memory(loads, experiment.members),
-        analysis_bytes=analysis_written(loads, experiment.members, is_bounded(experiment)),
+        analysis_memory=analysis_memory(costs, experiment.members)
+        + forecast.other_memory(experiment, costs),
+        process_memory=process_memory(costs, experiment.members),
+        analysis_bytes=analysis_written(costs, experiment.members, is_bounded(experiment)),
         extrapolation=extrapolation,
         report=job_digest("report", content, {"analysis": analysis}, DRAWING),
         content=content,
@@ -91,7 +91,7 @@ def build(experiment: Experiment) -> Plan:
         inputs=experiment.model.files,
         packages=packages,
         reference_seconds=reference,
-        other_seconds=round(forecast.other_seconds(experiment, loads), 3),
+        other_seconds=round(forecast.other_seconds(experiment, costs), 3),
     )
 
 
@@ -159,7 +159,7 @@ def _level(
     values: Callable[[int, int], str],
 ) -> LevelJob:
     """Return the files of a level; `values` gives the digest of a range of members."""
-    load, members = load_of(experiment, level), experiment.members
+    cost, members = level_cost(experiment, level), experiment.members
     every = sampling(experiment, level)
     kinds = _kinds(experiment)
     shared = digest_of(
@@ -168,11 +168,11 @@ def _level(
             "experiment": [experiment.collection, experiment.name],
             "uses": in_numbers(simulated(content)),
             "level": level,
-            "steps": load.steps,
+            "steps": cost.steps,
             "every": every,
             "series": [*stored_series(experiment), "lean" if is_bounded(experiment) else "all"],
-            "extrema": load.extrema,
-            "events": load.events,
+            "extrema": cost.extrema,
+            "events": cost.events,
             "own ends": experiment.end_varies,
             "code": code_of(experiment.model.kind, kinds),
             "versions": versions(NUMERICAL),
@@ -181,21 +181,21 @@ def _level(
     folder, is_swept = f"{experiment.collection}/{experiment.name}", experiment.sweep is not None
 
     def shard(index: int) -> ShardJob:
-        start, stop = index * load.shard, min((index + 1) * load.shard, members)
+        start, stop = index * cost.shard, min((index + 1) * cost.shard, members)
         path = shard_path(folder, level, index if is_swept else None)
         own = {"shared": shared, "cases": [start, stop], "values": values(start, stop)}
         return ShardJob(index, start, stop, path, digest_of(own))
 
     return LevelJob(
         level=level,
-        steps=load.steps,
+        steps=cost.steps,
         every=every,
-        member_steps=load.schemes * members * load.steps,
-        bytes=load.written(members),
-        seconds=round(load.seconds(members), 3),
-        shared=round(members * load.shared, 3),
-        memory=load.memory(min(members, load.shard)),
-        shards=tuple(map(shard, range(load.shards(members)))),
+        member_steps=cost.schemes * members * cost.steps,
+        bytes=cost.written(members),
+        seconds=round(cost.seconds(members), 3),
+        shared=round(members * cost.shared, 3),
+        memory=cost.memory(min(members, cost.shard)),
+        shards=tuple(map(shard, range(cost.shards(members)))),
     )
 
 

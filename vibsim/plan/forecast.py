@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from vibsim.core.vocabulary import LEVELS_OF_AN_ORDER
-from vibsim.experiment.cost import PLAIN_MEMBER_STEPS, Load, analysis_disk
+from vibsim.experiment.cost import PLAIN_MEMBER_STEPS, LevelCost, analysis_disk
 from vibsim.experiment.storage import is_bounded
 from vibsim.formula.jumps import held
 from vibsim.models import has_solution, tree
@@ -85,35 +85,35 @@ def reference_seconds(experiment: Experiment) -> float:
     return smooth * (1.0 + MEMBER_PART * others) + cornered * (1.0 + CORNER_MEMBER_PART * others)
 
 
-def gaps(experiment: Experiment, loads: Sequence[Load]) -> int:
+def gaps(experiment: Experiment, levels: Sequence[LevelCost]) -> int:
     """Return between how many points of the finest level the force of all members is looked at for a pulse."""
     model = experiment.model.definition
     forces = () if model.loaded is not None else (tree(model, row) for row in model.accelerations)
     is_driven = any("t" in force.names for force in forces)
-    return min(experiment.members * loads[-1].steps, MOST_GAPS) if is_driven else 0
+    return min(experiment.members * levels[-1].steps, MOST_GAPS) if is_driven else 0
 
 
-def other_memory(experiment: Experiment, loads: Sequence[Load]) -> int:
+def other_memory(experiment: Experiment, levels: Sequence[LevelCost]) -> int:
     """Return the bytes that an analysis holds beside the levels and what it writes."""
-    judges = JUDGED_BYTES if len(loads) >= LEVELS_OF_AN_ORDER else 0
-    judges += LEVEL_BYTES * max(min(len(loads), MANY_LEVELS) - FEW_LEVELS, 0)
-    series = VARIABLE_BYTES * max(loads[0].series - FEW_SERIES, 0)
-    return judges + series + GAP_BYTES * gaps(experiment, loads)
+    judges = JUDGED_BYTES if len(levels) >= LEVELS_OF_AN_ORDER else 0
+    judges += LEVEL_BYTES * max(min(len(levels), MANY_LEVELS) - FEW_LEVELS, 0)
+    series = VARIABLE_BYTES * max(levels[0].series - FEW_SERIES, 0)
+    return judges + series + GAP_BYTES * gaps(experiment, levels)
 
 
-def other_seconds(experiment: Experiment, loads: Sequence[Load]) -> float:
+def other_seconds(experiment: Experiment, levels: Sequence[LevelCost]) -> float:
     """Return the seconds of one core that series, the comparison of the levels and the page take."""
     plain, compiled = NUMBER_SECONDS
     series = 0.0
-    for load in loads:
-        samples = experiment.trajectories * load.samples
-        series += samples * load.series * (plain if samples <= PLAIN_MEMBER_STEPS else compiled)
+    for level in levels:
+        samples = experiment.trajectories * level.samples
+        series += samples * level.series * (plain if samples <= PLAIN_MEMBER_STEPS else compiled)
     start, of_byte, of_quantity = ANALYSIS_SECONDS
-    written = analysis_disk(loads, experiment.members, is_bounded(experiment))
-    compared = start + of_byte * written + of_quantity * loads[0].series * len(loads)
-    written += sum(load.disk(experiment.members) for load in loads)
-    searched = GAP_SECONDS * gaps(experiment, loads)
-    page = PAGE_SECONDS + SCHEME_SECONDS * loads[0].schemes
+    written = analysis_disk(levels, experiment.members, is_bounded(experiment))
+    compared = start + of_byte * written + of_quantity * levels[0].series * len(levels)
+    written += sum(level.disk(experiment.members) for level in levels)
+    searched = GAP_SECONDS * gaps(experiment, levels)
+    page = PAGE_SECONDS + SCHEME_SECONDS * levels[0].schemes
     return series + compared + BYTE_SECONDS * written + searched + page
 
 

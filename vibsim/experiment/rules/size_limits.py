@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property, partial
 
-from vibsim.experiment.cost import Load, load_of
+from vibsim.experiment.cost import LevelCost, level_cost
 from vibsim.experiment.data import ExperimentSpec, SchemeSpec, Sweep, TimeSpec
 from vibsim.experiment.faults import Report
 from vibsim.experiment.storage import events_kept, extrema_kept, is_lean, stride
@@ -96,21 +96,21 @@ class Setting:
         coarsest = self.steps(self.levels[0])
         return stride(self.samples, coarsest, self.steps(level), self.trajectories)
 
-    def load(self, level: int) -> Load:
+    def level_cost(self, level: int) -> LevelCost:
         """Return what `level` asks of a job."""
         steps = self.steps(level)
         has_events = self.model is not None and self.model.events is not None
         d2t = bool(self.own) and not has_events
         samples = steps // self.stride(level) + 1
-        load = partial(Load, self.scheme_count, steps, samples, chain=self.sweep.chain)
+        cost = partial(LevelCost, self.scheme_count, steps, samples, chain=self.sweep.chain)
         if is_lean(self.samples, self.steps(self.levels[0]), self.trajectories):
-            return load(_LEAN, d2t=d2t)
+            return cost(_LEAN, d2t=d2t)
         known = len(quantities(self.model)) if self.model else 0
         # with the running maximum of the energy deviation
         series = max(known, _SMALLEST_MODEL) + 1 + (_D2T if d2t else 0)
         extrema = extrema_kept(self.trajectories)
         events = events_kept(self.trajectories) if has_events else 0
-        return load(series, exact=2, extrema=extrema, events=events, d2t=True)
+        return cost(series, exact=2, extrema=extrema, events=events, d2t=True)
 
 
 def check(setting: Setting, report: Report) -> None:
@@ -135,12 +135,12 @@ def check(setting: Setting, report: Report) -> None:
         rule = f"the experiment must not take more than {MAX_MEMBER_STEPS} steps, it takes {total}"
         report.add(("levels",), rule, "steps of every level, scheme and member together")
         return
-    loads = [setting.load(level) for level in setting.levels]
+    costs = [setting.level_cost(level) for level in setting.levels]
     hint = "store fewer samples, or begin at a lower level"
     # one member, or one chain of them, is the least that a job can make
     least = setting.sweep.chain
-    memory = max(load.memory(least) for load in loads)
-    disk = sum(load.disk(members) for load in loads)
+    memory = max(cost.memory(least) for cost in costs)
+    disk = sum(cost.disk(members) for cost in costs)
     if memory > MAX_MEMORY:
         what = "one member" if least == 1 else f"the {least} members that follow each other"
         rule = f"{what} at one level must not take more than {MAX_MEMORY} bytes of memory, it takes {memory}"
@@ -152,7 +152,9 @@ def check(setting: Setting, report: Report) -> None:
 
 def check_files(experiment: ExperimentSpec, report: Report) -> None:
     """Note where the files of all levels are too many."""
-    files = [load_of(experiment, level).shards(experiment.members) for level in experiment.levels]
+    files = [
+        level_cost(experiment, level).shards(experiment.members) for level in experiment.levels
+    ]
     if sum(files) > MAX_FILES:
         rule = f"the levels must not have more than {MAX_FILES} files, they have {sum(files)}"
         finest = f"{files[-1]} of them are of level {experiment.levels[-1]}"

@@ -245,7 +245,7 @@ class Chain(Section):
 
 
 def _refuse_coordinates(_: Any) -> Any:
-    # what has formulas is written otherwise before (`vibsim.experiment.other_forms`)
+    # what has formulas is written otherwise before (`vibsim.experiment.shorthand`)
     raise refused("each coordinate must have an acceleration, or a force with its mass")
 
 

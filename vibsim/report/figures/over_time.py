@@ -17,7 +17,7 @@ from vibsim.core.array_types import Floats
 from vibsim.core.record import Record
 from vibsim.experiment.schema.figures import LEVEL, MEMBER, FigureOfSource
 from vibsim.formula import parse, values
-from vibsim.models.events import Crossings, Impact
+from vibsim.models.events import Impact
 from vibsim.report import choice, data, series, style, words
 from vibsim.report.data import Member
 from vibsim.report.figures import panels
@@ -170,7 +170,7 @@ def _draw(
             ax.plot(*style.thin(fine, best), label="exact", **wide)
             exact.append(best)
     size = max(map(data.largest, exact), default=0.0)
-    drawn, jumps = [], isinstance(model.events, Impact | Crossings)
+    drawn, jumps = [], model.events is not None and model.events.jumps
     for k, (text, member) in enumerate(panel.runs):
         t = data.times(record, member.case)
         found = series.on_level(experiment, record, panel.quantity, member, panel.level)

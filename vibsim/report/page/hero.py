@@ -28,9 +28,9 @@ from vibsim.report.tables.best import numbers as numbers_of
 from vibsim.report.text import assertions, findings
 from vibsim.report.types import Experiment
 
-NUMBERS = 3  # large numbers on the first screen
-NAMED = 3  # schemes that are named
-STATEMENTS = 3  # statements that are read beside the finding
+MOST_NUMBERS = 3  # large numbers on the first screen
+MOST_SCHEMES = 3  # schemes that are named
+MOST_STATEMENTS = 3  # statements that are read beside the finding
 MEASURED = {
     "stable": "Growth per period", "conserves": "Largest energy error over E(0)", "equal": "Largest difference",
     "accurate": "Error of the finest level", "tolerance": "Error bound of the best solution",
@@ -53,12 +53,12 @@ def context(
         "counts": words.passed(statuses),
         "marks": words.marks(summary["checks"]),
         "facts": " · ".join(filter(None, _facts(experiment, record))),
-        "numbers": list(numbers(experiment, record, lead))[:NUMBERS],
+        "numbers": list(numbers(experiment, record, lead))[:MOST_NUMBERS],
         "meaning": " ".join(
             [findings.paragraph(experiment, record, lead, levels), *_traps(summary, lead)]
         ),
-        "statements": claims[:STATEMENTS],
-        "more_statements": max(0, len(claims) - STATEMENTS),
+        "statements": claims[:MOST_STATEMENTS],
+        "more_statements": max(0, len(claims) - MOST_STATEMENTS),
     }
 
 
@@ -87,7 +87,7 @@ def _facts(experiment: Experiment, record: Record) -> Iterator[str]:
     """Yield what was run: the title, the schemes, the members, the steps and the source."""
     yield experiment.title
     names = [spec.name for spec in experiment.schemes]
-    yield ", ".join(names) if len(names) <= NAMED else f"{len(names)} schemes"
+    yield ", ".join(names) if len(names) <= MOST_SCHEMES else f"{len(names)} schemes"
     if data.swept(record):
         yield f"{words.number(len(record['case']), 'integer')} members"
     steps = [words.number(int(n), "integer") for n in record["steps"]]

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from vibsim import Experiment, InputError
-from vibsim.experiment.other_forms import solved
+from vibsim.experiment.shorthand import solved
 from vibsim.formula import ExpressionError, evaluate, parse
 
 REST = """
