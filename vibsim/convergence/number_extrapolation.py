@@ -7,7 +7,8 @@ would tell an accident from an order, so that nothing is believed but what was s
 - its error is as much as it has changed from row to row, times a safety; a part of that only where the changes fall as
   the next power does;
 - a change that is smaller than the one before it promises may be passing through zero, and does not count as smaller;
-- an entry that a finer row contradicts is as wrong as the contradiction says;
+- an entry that a finer row contradicts is as wrong as the contradiction says, times the same safety;
+- another power than the promised one is believed where the finest two triples of levels show it;
 - where nothing is believed, the finest level stands as it is, with an error of `SPREAD` times what the last levels
   differ by (L. Eca and M. Hoekstra, 2014). It is unknown where they do not approach each other, if only raggedly.
 
@@ -82,13 +83,7 @@ def _limit(
         unsure = np.where(np.isnan(bound), np.inf, bound)
         best = Limit(values[..., -1].copy(), unsure, finest, finest.copy())
         if n > 2:
-            observed = observed_order(values, levels, floor)
-            # a number whose error changes its sign falls fast by accident, and not at two triples alike
-            earlier = observed_order(values[..., :-1], levels[:-1], floor[..., :-1])
-            p = _leading(
-                np.where(earlier < observed - th.OTHER_ORDER, np.fmin(observed, order), observed),
-                order,
-            )
+            p = _leading(values, levels, order, floor)
             best = _extrapolated(values, levels, p, np.where(even, 2, 1), floor, best)
     known = np.isfinite(best.bound) & np.isfinite(best.value)
     return Limit(best.value, np.where(known, best.bound, np.nan), best.first, best.last)
@@ -111,11 +106,18 @@ def triple_at(values: Floats, floor: Floats, i: int) -> tuple[tuple[Floats, Floa
         return (first, second), (np.abs(second) > noise) & (np.abs(first) > noise)
 
 
-def _leading(observed: Floats, promised: Floats) -> Floats:
-    """Return the order to extrapolate with: the promised one, or another one that the levels show."""
+def _leading(values: Floats, levels: Sequence[int], promised: Floats, floor: Floats) -> Floats:
+    """Return the order to extrapolate with: the promised one, or another one that two successive triples show.
+
+    One triple alone may show any order: where an error changes its sign, or on the way to the promised one.
+    """
     p = np.where(np.isfinite(promised), promised, th.ORDINARY_ORDER)
+    observed = observed_order(values, levels, floor)
+    earlier = observed_order(values[..., :-1], levels[:-1], floor[..., :-1])
     likely = np.clip(np.round(2.0 * observed) / 2, 0.5, th.HIGHEST_ORDER)
-    other = (np.abs(observed - p) > th.OTHER_ORDER) & (np.abs(observed - likely) <= th.NEAR_HALF)
+    other = np.abs(observed - p) > th.OTHER_ORDER
+    for order in (earlier, observed):
+        other &= np.abs(order - likely) <= th.NEAR_HALF
     return np.where(other, likely, p)
 
 
@@ -204,7 +206,7 @@ class _Rows:
         error = (self.safety_alone if alone else th.NUMBER_SAFETY) * change
         error = np.where(self._agrees(j, i), error_left(error, fall), error)
         for finer in self.entries[i + 1 :]:
-            error = np.fmax(error, np.abs(self.entries[i][j] - finer[j]))
+            error = np.fmax(error, th.NUMBER_SAFETY * np.abs(self.entries[i][j] - finer[j]))
         return error
 
     def least(self, best: Limit) -> Limit:

@@ -114,8 +114,8 @@ SLOWEST_ORDER = 0.5 * math.log2(1.0 + 1.0 / SPREAD)
 RAGGED, DECLINE = 5, 0.5
 ORDER_ABOVE_ROUND_OFF = 30.0  # a difference has an order above so many times its floor [calibrated]
 FALL_ABOVE_ROUND_OFF = 200.0  # and must fall above so many times its floor [calibrated]
-# An order further than the first from the promised one is another one, where it is as near as the second to a multiple
-# of 1/2. [calibrated]
+# An order further than the first from the promised one is another one, where those of two triples are as near as the
+# second to one multiple of 1/2. [calibrated]
 OTHER_ORDER, NEAR_HALF = 0.3, 0.15
 HIGHEST_ORDER = 12.0  # no higher order is looked for [convention]
 

@@ -231,3 +231,23 @@ def test_a_steady_phase_of_an_unknown_bound_counts_what_is_left_of_the_start() -
         [found] = run(content, {"value": "steady_phase", "quantity": "u", **BEST, **claim}).verdicts
         assert found.status == "INCONCLUSIVE"
         assert "Make the run longer (`time: periods`)" in found.advice
+
+
+def test_a_crest_in_the_first_step_of_all_levels_is_in_the_bound() -> None:
+    """``u'' + 0.2 u' + u = 0`` rises from 1 to 1.00019945 at t = 0.01996, before the first grid point of any level."""
+    content = {
+        "model": {"kind": "oscillator", "damping": {"linear": 0.2}},
+        "initial": {"u": 1.0, "v": 0.02},
+        "time": {"end": 20.0},
+        "levels": [5, 6, 7],
+    }
+    asked = {"quantity": "u", **BEST, "equals": 1.00019945, "atol": 1e-8}
+    for scheme in ("central", "rk4", "euler_cromer", "crank_nicolson"):
+        for sign, names in ((1.0, ("max", "max_abs")), (-1.0, ("min", "max_abs"))):
+            content["initial"] = {"u": sign, "v": 0.02 * sign}
+            for name in names:
+                claim = {**asked, "equals": sign * 1.00019945} if name == "min" else asked
+                [found] = run({**content, "schemes": [scheme]}, {"value": name, **claim}).verdicts
+                assert found.status != "FAIL"
+            small = {"value": "max_abs", "quantity": "u", **BEST, "below": 1.0001}
+            assert run({**content, "schemes": [scheme]}, small).verdicts[0].status != "PASS"

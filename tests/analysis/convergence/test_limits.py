@@ -50,6 +50,23 @@ def test_an_order_that_one_triple_shows_by_accident_is_not_taken() -> None:
     assert abs(value + 0.7) <= bound
 
 
+def test_orders_on_their_way_to_the_promised_one_are_not_taken() -> None:
+    """How Backward Euler damps a motion over 34 s: orders 0.26, 0.63, then 1; one triple alone shows 1/2."""
+    values = [0.231817926, 0.444982614, 0.622882106, 0.737446925]
+    value, bound, *_ = run(np.array(values), (7, 8, 9, 10), 1.0)
+    assert abs(value - 0.873909) <= bound
+    # the end of a run with Euler-Cromer: its finest triple has order 4
+    value, bound, *_ = run(np.array([0.39767, 0.40201, 0.40228]), (6, 7, 8), 1.0)
+    assert bound > 2.0 * abs(0.40228 - 0.40201)
+
+
+def test_an_entry_is_further_off_than_the_finest_level_says() -> None:
+    """An end of generalized_alpha on coarse levels; the truth is beyond what the finest level contradicts by."""
+    values = [-0.08771, 0.27388, 0.37447, 0.34738]
+    value, bound, *_ = run(np.array(values), (3, 4, 5, 6), 2.0)
+    assert abs(value - 0.3302) <= bound
+
+
 @pytest.mark.parametrize("levels", [(3, 4, 5, 6), (3, 5, 6, 8), (2, 3, 4, 5, 6, 7)])
 @pytest.mark.parametrize(("p", "even"), [(1.0, False), (2.0, True), (4.0, True), (3.0, False)])
 def test_two_powers_are_taken_away(levels: tuple[int, ...], p: float, even: bool) -> None:
