@@ -95,6 +95,24 @@ def test_energy_that_a_written_potential_does_not_conserve_is_not_blamed_on_the_
     assert "by the `potential` that is written" in fault
 
 
+@pytest.mark.parametrize("value", ["relative_energy_error", "relative_energy_error_d2t"])
+def test_the_error_of_an_energy_without_a_potential_is_refused(value):
+    hill = {f: f"2*{f}*exp(-x**2 - y**2)" for f in ("x", "y")}
+    around = {"coordinates": ["x", "y"], "force": hill}
+    check = {"value": value, "below": 1e-3}
+    (fault,) = refused(around, initial={"x": 1.0}, checks=[check])
+    assert "no potential energy was found" in fault
+    assert "write its `potential`" in fault
+    written = {**around, "potential": "exp(-x**2 - y**2)"}
+    assert read(written, initial={"x": 1.0}, checks=[check]).notes == ()
+
+
+def test_energies_without_a_potential_are_noted():
+    around = {"coordinates": ["x", "y"], "force": {"x": "-y", "y": "x"}}
+    ((_, note),) = read(around, initial={"x": 1.0}).notes
+    assert "energies are kinetic alone" in note
+
+
 def test_a_place_of_a_sweep_without_one_says_so():
     asked = {"value": "end", "quantity": "u", "at": {"model.k": 2}, "equals": 1, "atol": 1}
     (fault,) = refused({"acceleration": "-u"}, checks=[asked])

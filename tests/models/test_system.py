@@ -103,6 +103,14 @@ def test_a_chain_moves_as_its_modes_do(count):
         (("x", "y"), {"acceleration.x": "vy", "acceleration.y": "-vx"}, "0", True),
         (
             ("x", "y"),
+            {"force.x": "exp(-x) - exp(x - y)", "force.y": "exp(x - y) - exp(y)"},
+            "exp(-x) + exp(x - y) + exp(y) - 3",
+            True,
+        ),
+        (("x", "y"), {"force.x": "mu*sin(y - x)", "force.y": "mu*sin(x - y)"}, "mu*(1 - cos(x - y))", True),
+        (("x", "y"), {"force.x": "-tanh(2*x + y)*2", "force.y": "-tanh(2*x + y)"}, "log(cosh(2*x + y))", True),
+        (
+            ("x", "y"),
             {"force.x": "y - x", "force.y": "x - y - mu*vy", "mass.x": "2", "mass.y": "mu"},
             "(x - y)**2/2",
             False,

@@ -51,6 +51,8 @@ class Value:
     """Whether it comes from the theory of linear models without damping."""
     fixed_step: bool = False
     """Whether it does not exist of schemes that choose their own steps."""
+    needs_potential: bool = False
+    """Whether it does not exist where forces of the position have no potential energy that is known."""
     needs_rational: bool = False
     """Whether the acceleration must be worked out in exact numbers (`vibsim.theory.degrees`)."""
     needs_events: bool = False
@@ -151,8 +153,8 @@ growth_per_period | none | none | best roots has_own_size survives_failure | fac
 period
 predicted_growth_per_period | none | none | needs_linear fixed_step survives_failure | the same by the theory of the \
 scheme
-relative_energy_error | none | none | best | max |E(t) - E(0)| / |E(0)| over every step
-relative_energy_error_d2t | none | none | | the same with the centred difference of the position as velocity, without \
+relative_energy_error | none | none | best needs_potential | max |E(t) - E(0)| / |E(0)| over every step
+relative_energy_error_d2t | none | none | needs_potential | the same with the centred difference of the position as velocity, without \
 the end points
 event_count | none | count | needs_events | number of events, where the motion is not smooth
 event_time | none | time | numbered needs_events best has_own_size | time of the event with the number `event`, from 1

@@ -149,12 +149,18 @@ def _of_power(node: Expression, base: Expression, power: float, name: str) -> Ex
             return filled("x**n/n", x=base, n=n) if power > 0.0 else None
         case Call("max", (x, Number(0.0))):
             return _of_linear("max(x, 0)**n/n", x, node, name, n=n) if power > 0.0 else None
-    # a spring between two coordinates; the powers of u - 1 are left to points, whose sum does not cancel
-    start = put(base, name, ZERO)
-    is_spring = bool(start.names) or values(start, {}) == 0.0
-    if power < 1.0 or not power.is_integer() or not is_spring:
+    if power < 1.0 or not power.is_integer() or not _may_begin(base, name):
         return None
     return _of_linear("x**n/n", base, node, name, n=n)
+
+
+def _may_begin(x: Expression, name: str) -> bool:
+    """Tell whether an argument is 0 where the integral begins, or is one of a spring between two coordinates.
+
+    Functions of u - 1 are left to points, whose sum does not cancel.
+    """
+    start = put(x, name, ZERO)
+    return bool(start.names) or values(start, {}) == 0.0
 
 
 def _of_function(
@@ -163,8 +169,7 @@ def _of_function(
     """Return the integral of a function of ``a x + b``."""
     x, *others = arguments
     if function in SMOOTH:
-        slope = slope_of(x, name, with_start=False)
-        return _over_slope(filled(SMOOTH[function], x=x), slope, node, name)
+        return _of_linear(SMOOTH[function], x, node, name) if _may_begin(x, name) else None
     if function in BROKEN:
         return _of_linear(BROKEN[function], x, node, name)
     if len(others) != 1:

@@ -204,6 +204,8 @@ class Model:
     """Of the coordinates behind the first one."""
     loaded: Loaded | None = None
     """The structure that is stepped as a whole, of which the states are what is observed; None of any other model."""
+    misses_potential: bool = False
+    """Whether positions make forces of which no potential energy is known: energies are kinetic alone."""
     superposed: bool = False
     """Whether the motion of several coordinates is a sum of linear, conservative ones: the energy has their orders."""
 

@@ -248,14 +248,26 @@ class Written:
         return self.inertia.kinetic
 
     @cached_property
+    def position_forces(self) -> list[Expression]:
+        """The terms of every force that name neither velocities nor the time."""
+        moving = {*self.velocities, "t", HEIGHT}
+        return [
+            sum((term for term in terms_of(whole) if moving.isdisjoint(term.names)), ZERO)
+            for whole in self.forces
+        ]
+
+    @property
+    def misses_potential(self) -> bool:
+        """Tell whether the positions alone make forces, and no potential energy of these is known."""
+        acts = any(not force.names.isdisjoint(self.coordinates) for force in self.position_forces)
+        return acts and self.potential == ZERO and not self.terms("potential")
+
+    @cached_property
     def potential(self) -> Expression:
         """The potential energy, 0 where none is known."""
         if terms := self.terms("potential"):
             return paired(terms, operator.add)
-        moving, total, forces = {*self.velocities, "t", HEIGHT}, [], []
-        for whole in self.forces:
-            still = (term for term in terms_of(whole) if moving.isdisjoint(term.names))
-            forces.append(sum(still, ZERO))
+        total, forces = [], self.position_forces
         for i, (name, force) in enumerate(zip(self.coordinates, forces, strict=True)):
             for later in self.coordinates[i + 1 :]:
                 if later in force.names:
@@ -451,6 +463,7 @@ def system(
         further_accelerations=tuple(rest),
         kinetic_energy=own.kinetic,
         potential_energy=own.potential,
+        misses_potential=own.misses_potential,
         energy_unit="1",
         conservative=is_conservative,
         natural_frequency=own.natural_frequency,

@@ -386,6 +386,9 @@ def _is_comparable(row: Value, quantity: str | None, scope: Scope) -> None:
         scope.refuse(f"the exact period of {model.kind} is not known", value=row.name)
     if row.needs_exact == "solution":
         _known_exactly(quantity, row.name, scope)
+    if row.needs_potential and model.misses_potential:
+        rule = "no potential energy was found of the forces that the positions make"
+        scope.refuse(rule, _instead_of_energy(scope), row.name)
     if row.needs_events and model.events is None:
         scope.refuse(f"{model.kind} has no events: its motion is smooth", value=row.name)
     if row.needs_rational:

@@ -153,6 +153,10 @@ def _written(
             rule = f"must have a finite value at t = 0, where {name} is {value:g}"
             report.add(("model", *exact.split(".")), rule, value=texts.get(exact))
             return Equation(None)
+    if found.misses_potential:
+        rule = "no potential energy was found of the forces that the positions make"
+        hint = "energies are kinetic alone; write `potential`, if the forces have one"
+        report.note(("model",), rule, hint)
     if any(row.name == "spring" for row in model.formulas):
         check_potential(found, parameters, texts, report)
     return Equation(found, parameters, texts, tables)
