@@ -13,7 +13,8 @@ smooths the stairs in which a drift climbs under an oscillation, and the oscilla
 - ``bounded``: m1 is above m2 by less than `STILL` of M(T), or it creeps only: k below `CREEP`, m1 above m2 by less
   than `STILL_CREEPS` (finer sampling of the same maximum); and so does the range of the deviation so far, which a drift
   widens from the start on, where M stands until the drift has overtaken an oscillation to the other side;
-- ``linear``, ``quadratic``: k, of M or of that range, within `NEAR_POWER` of 1 or 2; the range, and M where it has
+- ``linear``, ``quadratic``: k, of M or of that range, within `NEAR_POWER` of 1 or 2 (of the range where that says 1 and
+  M says 2: M seems to rise so when a drift has just overtaken); the range, and M where it has
   risen by less than `SMALL_RISE` of itself, must still grow in the last T/8, by `STILL_WIDENS` of what a drift would:
   an oscillation whose middle moves slowly, or one of several frequencies, widens them for a while. A drift that is
   seen in the range alone, or in a small rise of M, moves both ends of the range the same way;
@@ -173,13 +174,16 @@ def drift_of(
         stops |= ~moves
     has_stopped = (rise < th.SMALL_RISE * size) & stops
     if deviation is not None:
-        # M stands still until a drift has overtaken an oscillation to the other side, and is of no power then
-        widens = still | ~(_is_near(k, 1) | _is_near(k, 2))
-        widens &= samples >= th.LEAST_PER_PERIOD * periods
+        # M stands still until a drift has overtaken an oscillation to the other side; just behind that it may seem to
+        # rise as any power
         so_far = _range(deviation)
         of_range = _means(so_far)
-        widens &= ~_is_still(*_rise(of_range), size)
-        stops = _last_rise(so_far) < th.STILL_WIDENS * _rise(of_range)[0]
+        range_rise, range_k = _rise(of_range)
+        overtakes = _is_near(k, 2) & _is_near(range_k, 1)
+        widens = still | overtakes | ~(_is_near(k, 1) | _is_near(k, 2))
+        widens &= samples >= th.LEAST_PER_PERIOD * periods
+        widens &= ~_is_still(range_rise, range_k, size)
+        stops = _last_rise(so_far) < th.STILL_WIDENS * range_rise
         has_stopped = np.where(widens, stops | ~moves, has_stopped)
         means = np.where(widens[..., None], of_range, means)
         rise, k = _rise(means)
