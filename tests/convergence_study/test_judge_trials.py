@@ -398,3 +398,45 @@ def test_a_number_is_no_wrong_limit_of_what_is_printed_like_it(printed: float) -
     places = len(str(printed).partition(".")[2])
     exact = printed - 0.4 * 10.0**-places
     assert judge([0.16, 0.08, 0.04, 0.02], [printed] * 4, order=2, exact=exact).status != "FAIL"
+
+
+COUNTS = [20, 24, 29, 35, 41, 50, 60, 72]
+SIDE_BY_SIDE = {
+    # implicit and explicit Euler for u'' + w^2 u = 0 and y' = 4 y: counts, values, what is expected
+    "implicit_7": (COUNTS, lambda n: ((1 - 7j / n) ** -n).real, 1.0),
+    "explicit_8.5": (COUNTS, lambda n: ((1 + 8.5j / n) ** n).real, 1.0),
+    "explicit_10": (COUNTS, lambda n: ((1 + 10j / n) ** n).real, 2.0),
+    "growth": (list(range(10, 22)), lambda n: (1 + 4 / n) ** n, 1.0),
+    "rational": ([10, 15, 20, 25, 30, 40], lambda n: (10 / n) ** 2 / (1 + 20 / n), 2.0),
+}
+"""Levels side by side, each far from an asymptotic range; their orders seemed sure for their many differences."""
+
+
+@pytest.mark.parametrize("name", SIDE_BY_SIDE)
+def test_levels_side_by_side_make_no_order_sure(name: str) -> None:
+    counts, value, order = SIDE_BY_SIDE[name]
+    values = [value(n) for n in counts]
+    for asked in ({"order": order}, {}):
+        found = judge([1.0 / n for n in counts], values, **asked)
+        assert found.status == "INCONCLUSIVE"
+
+
+def test_a_verdict_says_how_many_levels_it_leaves_out() -> None:
+    counts = [20, 25, 30, 40, 50, 60, 80]
+    found = judge([1.0 / n for n in counts], [1.0 + (20 / n) ** 2 for n in counts], order=2)
+    assert (found.status, len(found.levels)) == ("PASS", 7)
+    assert found.h_used == pytest.approx((1 / 20, 1 / 30, 1 / 50, 1 / 80))
+    assert "The verdict leaves out 3 of 7 levels" in found.sentence
+    # noise tells of itself on all levels
+    noise = np.random.default_rng(5).normal(scale=0.3, size=7)
+    values = [1.0 + (20 / n) ** 2 * (1.0 + e) for n, e in zip(counts, noise, strict=True)]
+    assert "leaves out" not in judge([1.0 / n for n in counts], values, order=2).sentence
+
+
+def test_levels_that_move_apart_miss_no_limit() -> None:
+    values = [
+        *(1.677165945215565, 1.7554101183002653, 1.7648010281805395, 1.7659316291133815),
+        *(1.765308192756225, 1.7642746950669002, 1.7631931516643038),
+    ]
+    found = judge([1 / (13 * k) for k in range(1, 8)], values, exact=1.740340983574077)
+    assert found.reason == "pre_asymptotic"

@@ -208,7 +208,9 @@ def _assess_block(ladder: Ladder, factors: Floats, question: Question) -> dict[s
         # what the levels say of the limit without the exact solution
         of_limit = posterior(ladder.without_exact(), question.promise)
         risk = np.where(rests_on_three(of_limit), RISK_OF_THREE, RISK)
-        missed = missed | ((of_limit.expansion > 1.0 - risk) & is_missed(ladder, of_limit))
+        order = finest_order(of_limit.orders, likely_window(of_limit)[1])
+        approaches = (of_limit.expansion > 1.0 - risk) & ~(order < LEAST_WITH_LIMIT)
+        missed = missed | (approaches & is_missed(ladder, of_limit))
     numbers = _numbers(ladder, found, of_limit, missed)
     values = best_value(ladder, of_limit, found.exact, factors)
     if not ladder.exact_known:

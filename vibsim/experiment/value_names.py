@@ -154,8 +154,8 @@ period
 predicted_growth_per_period | none | none | needs_linear fixed_step survives_failure | the same by the theory of the \
 scheme
 relative_energy_error | none | none | best needs_potential | max |E(t) - E(0)| / |E(0)| over every step
-relative_energy_error_d2t | none | none | needs_potential | the same with the centred difference of the position as velocity, without \
-the end points
+relative_energy_error_d2t | none | none | needs_potential | the same with the centred difference of the position as \
+velocity, without the end points
 event_count | none | count | needs_events | number of events, where the motion is not smooth
 event_time | none | time | numbered needs_events best has_own_size | time of the event with the number `event`, from 1
 first_event_time | none | time | needs_events best has_own_size | time of the first event

@@ -10,7 +10,7 @@ import numpy as np
 from vibsim.convergence.differences import orders_of_steps
 from vibsim.convergence.study.common_points import CommonValues
 from vibsim.convergence.study.measurement import rounding_of_sizes
-from vibsim.convergence.study.outcomes import Outcome, Request
+from vibsim.convergence.study.outcomes import LEAST_RATIO, Outcome, Request
 from vibsim.convergence.study.refinement import Refinement
 from vibsim.convergence.study.sentences import Setting, describe
 from vibsim.convergence.study.verdict import LadderVerdict, Level
@@ -73,7 +73,7 @@ def verdict(
         is_contradicted=one.is_contradicted,
         are_sizes_rounded=_moved_by_sizes(one, h) > ORDER_TOLERANCE,
         notes=(*common.notes, *_interpolated_linearly(common, reason)),
-        parts=(*common.parts, *_rounding(one)),
+        parts=(*common.parts, *_left_out(one), *_rounding(one)),
     )
     sentence, advice = describe(found, setting)
     return replace(found, sentence=sentence, advice=advice)
@@ -112,6 +112,16 @@ def _interpolated_linearly(common: CommonValues, reason: str) -> tuple[str, ...]
     if common.kind == "linear" and common.interpolation_order is not None and is_open:
         return ("The error of linear interpolation may hide the order. Use restrict: cubic.",)
     return ()
+
+
+def _left_out(one: Outcome) -> tuple[str, ...]:
+    """Say how many levels the verdict leaves out."""
+    if not one.left_out:
+        return ()
+    some = f"{one.left_out} of {len(one.finite)} levels"
+    return (
+        f"The verdict leaves out {some}: their step sizes are within a factor of {LEAST_RATIO:g} of others.",
+    )
 
 
 def _rounding(one: Outcome) -> tuple[str, ...]:

@@ -32,6 +32,13 @@ MOST_ADDED_UP, ADDED_UP = 100.0, 10.0
 """What rounding errors add up to in a calculation, in units of the precision of the values: at most, and usually.
 
 Bounds count the latter for single precision, whose steps are often seen beside the error."""
+LEAST_RATIO = 1.4
+"""Of levels whose step sizes have a smaller ratio some are left out of the verdict [calibrated].
+
+The two powers of the error model leave a smooth rest. At levels side by side it is no independent misfit, as the model
+takes it, and their many differences would make any order seem sure."""
+SMOOTH = 0.05
+"""Levels lie on a smooth curve if each is off it by so small a part of what levels differ by [calibrated]."""
 SEEN = 0.1
 """The rounding of exact values is seen where it is so large a part of the error of the finest level."""
 
@@ -75,6 +82,8 @@ class Outcome:
     """Positions of the levels that the order rests on."""
     is_contradicted: bool = False
     """Whether finer levels contradict that order."""
+    left_out: int = 0
+    """How many finite levels the verdict leaves out, because their step sizes are close to those of others."""
     error: float = np.nan
     error_bound: float = np.nan
     best: Floats | None = None
@@ -106,9 +115,10 @@ def outcomes(
         Exact values, shape (member, points); None where they are not known.
     """
     finite: Flags = np.asarray(np.isfinite(values).all(axis=2))
+    patterns = np.stack([finite, _judged(h, values, finite)], axis=1)
     found: dict[int, Outcome] = {}
-    for pattern in np.unique(finite, axis=0):
-        members = np.flatnonzero(np.all(finite == pattern, axis=1))
+    for pattern in np.unique(patterns, axis=0):
+        members = np.flatnonzero(np.all(patterns == pattern, axis=(1, 2)))
         truth = None if exact is None else exact[members]
         some = _with_finite(request, h, values[members], epsilon, truth, pattern)
         found |= dict(zip(members.tolist(), some, strict=True))
@@ -117,12 +127,65 @@ def outcomes(
             half = _rounding_of_exact(one, exact[i], request.half_of_exact)
             if not half:
                 continue
-            (levels,) = _with_finite(request, h, values[i : i + 1], epsilon, None, finite[i])
+            (levels,) = _with_finite(request, h, values[i : i + 1], epsilon, None, patterns[i])
             is_better = one.reason == "wrong_limit" or levels.reason in (*DECIDED, "exact")
             if is_better and _agrees(levels, exact[i], half):
                 levels.agrees_to_digits = True
                 found[i] = levels
     return [found[i] for i in range(len(values))]
+
+
+def _judged(h: Floats, values: Floats, finite: Flags) -> Flags:
+    """Say which levels of each member a verdict rests on: finite ones, and of those side by side only some.
+
+    Some are left out where all lie on a smooth curve. Else there is noise, of which every level tells.
+    """
+    judged = finite.copy()
+    for i, row in enumerate(finite):
+        places = np.flatnonzero(row)
+        kept = spread_out(h[places])
+        others = np.setdiff1d(np.arange(len(places)), kept)
+        if len(others) and _is_smooth(h[places], values[i, places], others):
+            judged[i, places[others]] = False
+    return judged
+
+
+def _is_smooth(h: Floats, values: Floats, places: Integers) -> bool:
+    """Say whether levels at some places are where the cubic through the four levels around them has them.
+
+    Nothing is asked of the coarsest one, which has none before it. They may be off by a small part
+    of what these differ by. `values` are of shape (n, points).
+    """
+    n, scale = len(h), float(np.max(np.abs(values)))
+    u = values / (scale if scale > 0.0 else 1.0)
+    moved = np.sqrt(np.mean(np.diff(u, axis=0) ** 2, axis=1))
+    for j in places[places > 0].tolist():
+        first = min(max(j - 2, 0), max(n - 5, 0))
+        around = [k for k in range(first, min(first + 5, n)) if k != j]
+        cubic = np.zeros_like(u[j])
+        for k in around:
+            others = [h[m] for m in around if m != k]
+            cubic += np.prod([(h[j] - x) / (h[k] - x) for x in others]) * u[k]
+        allowed = SMOOTH * np.mean(moved[around[0] : around[-1]])
+        if not np.sqrt(np.mean((u[j] - cubic) ** 2)) <= allowed:
+            return False
+    return True
+
+
+def spread_out(h: Floats) -> Integers:
+    """Return the places of step sizes of which each is `LEAST_RATIO` times the next finer one at least.
+
+    Of three levels and more they are three at least: the ends, and the one that is nearest to their middle.
+    """
+    kept = [len(h) - 1]
+    for i in range(len(h) - 2, -1, -1):
+        if h[i] >= LEAST_RATIO * h[kept[-1]]:
+            kept.append(i)
+    if len(kept) < LEVELS_OF_AN_ORDER <= len(h):
+        sizes = on_arrays.log(h)
+        middle = np.argmin(np.abs(sizes[1:-1] - 0.5 * (sizes[0] + sizes[-1])))
+        kept = [len(h) - 1, int(middle) + 1, 0]
+    return np.array(kept[::-1])
 
 
 def _rounding_of_exact(one: Outcome, exact: Floats, half: float | None) -> float:
@@ -151,8 +214,9 @@ def _with_finite(
     exact: Floats | None,
     pattern: Flags,
 ) -> list[Outcome]:
-    """Return what was decided of members that have the same finite levels."""
-    finite, (count, n, points) = np.flatnonzero(pattern), values.shape
+    """Return what was decided of members that have the same finite levels, and the same ones that are judged."""
+    finite, (count, n, points) = np.flatnonzero(pattern[0]), values.shape
+    judged = np.flatnonzero(pattern[1][finite])
     exact_known = exact is not None and len(finite) > 0
     found = [
         Outcome(np.full(n, np.nan), np.full(n, np.nan), points == 1, exact_known, finite)
@@ -162,19 +226,22 @@ def _with_finite(
         return found
     part = values[:, finite]
     measured = measurement(part, h[finite], epsilon[finite], request.noise, exact)
+    few, rest = measured, part[:, judged]
+    if len(judged) < len(finite):
+        few = measurement(rest, h[finite][judged], epsilon[finite][judged], request.noise, exact)
     decided = None
     if len(finite) >= LEVELS_OF_AN_ORDER:
         question = Question(request.order, request.at_least)
         if request.noise:
             question = question.with_stated_noise
-        decided = assess(measured.ladder, question)
+        decided = assess(few.ladder, question)
         if not request.noise:
-            _allow_for_rounding(decided, measured, part, question)
+            _allow_for_rounding(decided, few, rest, question)
     for k, one in enumerate(found):
         truth = None if exact is None else exact[k]
         _measure(one, measured, k, part[k], truth)
         if decided is not None:
-            _decide(one, decided, k, measured, part[k], truth, bool(request.noise))
+            _decide(one, decided, k, few, part[k], judged, truth, bool(request.noise))
         if len(finite) < n:
             # levels that are not finite decide, whatever the others say; the error is that of the finest level
             one.reason = "non_finite"
@@ -215,11 +282,10 @@ def _measure(
 ) -> None:
     """Add what was measured of member `k`, whose finite levels are `part`, shape (finite, points)."""
     scale, rows = float(measured.scale[k]), len(part) - 1
-    products = measured.ladder.gram[k, :rows, :rows]
-    sizes = np.sqrt(np.diagonal(products))
+    sizes = np.sqrt(np.diagonal(measured.ladder.gram[k]))[:rows]
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         one.differences = part[:-1, 0] - part[1:, 0] if one.is_number else sizes * scale
-        one.ratios = np.sign(np.diagonal(products, 1)) * sizes[:-1] / sizes[1:]
+    one.ratios = _ratios(measured, k)
     one.reason = "too_few_levels"
     one.values[one.finite] = part[:, 0] if one.is_number else measured.norms[k]
     one.size = float(measured.norms[k, -1])
@@ -228,6 +294,15 @@ def _measure(
         one.errors[one.finite] = _distances(part, truth, one.is_number, scale)
         one.error = float(one.errors[one.finite[-1]])
         one.error_bound = abs(one.error) + one.floor
+
+
+def _ratios(measured: Measurement, k: int) -> Floats:
+    """Return the ratios of successive differences of member `k`, with their sign, shape (n - 2,)."""
+    rows = len(measured.ladder.h) - 1
+    products = measured.ladder.gram[k, :rows, :rows]
+    sizes = np.sqrt(np.diagonal(products))
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        return np.asarray(np.sign(np.diagonal(products, 1)) * sizes[:-1] / sizes[1:])
 
 
 def _distances(part: Floats, limit: Floats, is_number: bool, scale: float) -> Floats:
@@ -243,15 +318,20 @@ def _decide(
     decided: Assessment,
     k: int,
     measured: Measurement,
-    part: Floats,
+    every: Floats,
+    judged: Integers,
     truth: Floats | None,
     is_noise_stated: bool,
 ) -> None:
-    """Add what was decided of member `k`, whose finite levels are `part` and whose exact values are `truth`."""
-    scale = float(measured.scale[k])
+    """Add what was decided of member `k`, whose finite levels are `every` and whose exact values are `truth`.
+
+    The verdict rests on the levels at the places `judged`, of which `measured` is.
+    """
+    scale, part = float(measured.scale[k]), every[judged]
     one.reason = REASON_NAMES[int(decided.reason[k])]
-    one.order, used, weights = _estimate(one, measured.ladder.h, decided, k)
-    one.used = tuple(one.finite[used].tolist())
+    one.order, used, weights = _estimate(one, measured, decided, k)
+    one.used = tuple(one.finite[judged[used]].tolist())
+    one.left_out = len(every) - len(part)
     one.low, one.high = float(decided.low[k]), float(decided.high[k])
     one.is_contradicted = bool(decided.contradicted[k])
     if np.isfinite(weights).all():
@@ -281,23 +361,25 @@ def _decide(
         float(decided.error_bound[k]) * scale + one.rounded,
     )
     if one.best is not None:
-        one.errors[one.finite] = _distances(part, one.best, one.is_number, scale)
+        one.errors[one.finite] = _distances(every, one.best, one.is_number, scale)
         if one.is_number and one.errors[one.finite[-1]] < 0.0:
             one.error = -one.error
 
 
-def _estimate(one: Outcome, h: Floats, decided: Assessment, k: int) -> tuple[float, slice, Floats]:
+def _estimate(
+    one: Outcome, measured: Measurement, decided: Assessment, k: int
+) -> tuple[float, slice, Floats]:
     """Return the order of member `k`, the places of its levels, and the weights of the extrapolation.
 
     Where no order may be believed, they are those of the finest three levels that have one. The verdict says that such
     an estimate is not to be trusted.
     """
-    order, weights = float(decided.order[k]), decided.weights[k]
+    h, order, weights = measured.ladder.h, float(decided.order[k]), decided.weights[k]
     first, last = int(decided.first[k]), int(decided.last[k])
     if one.reason == "exact":
         return order, slice(first, last + 1), weights
     if not np.isfinite(order):
-        orders = orders_of_steps(one.ratios, h)
+        orders = orders_of_steps(_ratios(measured, k), h)
         known = np.flatnonzero(np.isfinite(orders))
         if len(known):
             first = int(known[-1])
