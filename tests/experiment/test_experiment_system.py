@@ -192,7 +192,8 @@ def test_an_exact_degree_is_that_of_the_same_equation_of_another_model():
 @pytest.mark.parametrize(
     ("model", "told"),
     [
-        ({}, ["model.acceleration: required key is missing: or force"]),
+        ({}, ["model.acceleration: required key is missing: write acceleration or force"]),
+        ({"potential": "u**2"}, ["write acceleration or force: `potential` alone makes no forces"]),
         (
             {"acceleration": "-u + nonsense", "force": {"x": "-u + 2*"}, "mass": 0},
             [

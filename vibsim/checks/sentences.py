@@ -25,7 +25,7 @@ LONG = 120.0
 
 NOT_FINITE = (
     "{} has no meaning here, because the calculation produced a number that is not finite.",
-    "Start `levels:` at a finer level, or shorten `time: end`.",
+    "Start `levels:` at a finer level. If finer levels do not avoid it, shorten `time: end`.",
 )
 """Sentence and advice where the calculation met a number that is not finite."""
 NOTHING_MOVES = "Nothing moves here, so {} keeps its initial value with any scheme"

@@ -52,6 +52,7 @@ _EXAMPLES: Mapping[object, str] = {
     ("model", "events"): "begin each one with `- `",
     "expect": "e.g. {status: FAIL, reason: order_low}",
     "then": "e.g. {v: -0.8*v}",
+    "at": "e.g. {level: best}",
 }
 """How a list or a mapping is written, where the rule alone would help nobody: by its path, or by its key anywhere."""
 

@@ -247,7 +247,9 @@ def _check_place(row: FormulaField, section: Any, report: Report) -> None:
     """Note a field that stands beside one that it replaces, or without the one that it belongs to."""
     given = section.model_fields_set
     if row.instead_of and not {row.name, row.instead_of} & given:
-        report.add(("model", row.instead_of), MISSING, f"or {row.name}")
+        alone = ": `potential` alone makes no forces" if "potential" in given else ""
+        hint = f"write {row.instead_of} or {row.name}{alone}"
+        report.add(("model", row.instead_of), MISSING, hint)
     elif row.instead_of and {row.name, row.instead_of} <= given:
         rule = f"must not be given together with {row.instead_of}"
         report.add(("model", row.name), rule, at_key=True)
