@@ -269,3 +269,26 @@ def test_linear_interpolation_that_may_hide_an_order_is_named() -> None:
     assert verdict.advice.endswith("may hide the order. Use restrict: cubic.")
     cubic = judge(h, levels, order=1, restrict="cubic")
     assert (cubic.status, cubic.advice) == ("PASS", "")
+
+
+def test_means_need_cells_of_one_width_within_the_coarse_ones() -> None:
+    counts = [8, 16, 32, 64]
+
+    def field(n: int, edges: np.ndarray) -> xarray.DataArray:
+        x = 0.5 * (edges[1:] + edges[:-1])
+        values = (np.cos(edges[:-1]) - np.cos(edges[1:])) / np.diff(edges) + n**-2.0 * np.exp(x)
+        return xarray.DataArray(values, {"x": x}, ["x"])
+
+    def judged(*levels: xarray.DataArray) -> LadderVerdict:
+        return judge([1 / n for n in counts], levels, order=2, restrict="mean", exact=np.sin)
+
+    even = [field(n, np.linspace(0.0, 1.0, n + 1)) for n in counts]
+    assert judged(*even).status == "PASS"
+    rounded = [one.assign_coords(x=np.round(one.x, 6)) for one in even]
+    assert judged(*rounded).status == "PASS"
+    stretched = [field(n, np.linspace(0.0, 1.0, n + 1) ** 2) for n in counts]
+    wider = [even[0], *(field(n, np.linspace(0.0, 1.3, n + 1)) for n in counts[1:])]
+    nodes = [one.assign_coords(x=np.arange(n) / n) for one, n in zip(even, counts, strict=True)]
+    for levels in (stretched, wider, nodes, [*even[:2], even[2][::-1], even[3]]):
+        with pytest.raises(InputError, match="mean needs cells of one width"):
+            judged(*levels)

@@ -25,6 +25,8 @@ from vibsim.core.array_types import Flags, Floats, Integers
 
 EQUAL = 1e-9
 """Two points whose distance is less than this part of the spacing are one."""
+CENTRED = 1e-3
+"""Cells may be off their centres by this part of their width: coordinates may be rounded."""
 INTERPOLATION_ORDERS: Mapping[str, int] = MappingProxyType({"linear": 2, "cubic": 4})
 """Of which order the error of an interpolation is, which is the number of points it takes."""
 Coordinate = NDArray[Any] | None
@@ -97,7 +99,7 @@ def common(
     if len(set(lengths)) == 1 and _all_equal(coordinates):
         return _everything(coordinates[0], len(lengths), lengths[0])
     if kind == "mean":
-        return _means(dim, coordinates[0], lengths)
+        return _means(dim, coordinates, lengths)
     if kind == "subset":
         return _subset(dim, coordinates, lengths) if all(known) else _every_kth(dim, lengths)
     points = [
@@ -238,7 +240,7 @@ def _nearest(targets: NDArray[Any], points: NDArray[Any]) -> tuple[Integers, Flo
     return order[found], np.abs(targets - ordered[found]).astype(np.float64)
 
 
-def _means(dim: str, coordinate: Coordinate, lengths: Sequence[int]) -> Common:
+def _means(dim: str, coordinates: Sequence[Coordinate], lengths: Sequence[int]) -> Common:
     first = lengths[0]
     if any(n % first for n in lengths):
         rule = "the number of cells of a finer level must be a multiple of that of the coarsest one"
@@ -246,11 +248,34 @@ def _means(dim: str, coordinate: Coordinate, lengths: Sequence[int]) -> Common:
             dim, f"lengths {list(lengths)}", rule, "or use restrict: subset, linear or cubic"
         )
     found = []
-    for n in lengths:
+    for level, (points, n) in enumerate(zip(coordinates, lengths, strict=True)):
         k = n // first
         indices = np.arange(n).reshape(first, k)
         found.append(Restriction(indices, np.full(indices.shape, 1.0 / k)))
-    return Common(tuple(found), coordinate)
+        _check_centres(dim, coordinates[0], points, indices, level)
+    return Common(tuple(found), coordinates[0])
+
+
+def _check_centres(
+    dim: str, coarse: Coordinate, fine: Coordinate, indices: Integers, level: int
+) -> None:
+    """Refuse coordinates that are no centres of cells of one width, the finer ones within the coarse ones.
+
+    Whole numbers count cells. `indices` are those of the finer cells in each coarse one.
+    """
+    if coarse is None or fine is None or coarse.dtype.kind != "f" or fine.dtype.kind != "f":
+        return
+    centres = np.mean(fine[indices].astype(np.float64), axis=1)
+    gaps = np.abs(np.diff(coarse)) if len(coarse) > 1 else np.abs(fine[-1:] - fine[:1])
+    off = np.flatnonzero(~(np.abs(centres - coarse) <= CENTRED * np.min(gaps)))
+    if off.size:
+        i = int(off[0])
+        rule = (
+            f"mean needs cells of one width, within those of the coarsest level: {dim} is {coarse[i]:.6g} in its cell "
+            f"{i}, and {centres[i]:.6g} in the mean of the cells of level {level} there"
+        )
+        hint = "for values at points use restrict: subset; take averages over other cells yourself"
+        raise refused(dim, "coordinates", rule, hint)
 
 
 def _interpolations(
