@@ -127,7 +127,7 @@ def growth_in_words(f: Found, predicted: float, measured: float) -> str:
     word_of_measured = "measured"
     if not f.model.conservative:
         theory = "predicted for free oscillations without damping"
-        word_of_measured = "measured, with damping and forces"
+        word_of_measured = "measured of the motion itself"
     phrases = [
         f"{f.notation.factor(value)} ({word})"
         for value, word in ((predicted, theory), (measured, word_of_measured))

@@ -55,6 +55,8 @@ ALIKE = 0.15
 FAR = 1000.0
 """A solution of linear equations that is so many times larger than theory lets it become is unstable: theory knows a
 single oscillation, without damping, and the square of its growth is allowed."""
+GROWS = 1.01
+"""Growth factor per period from which a motion is said to grow."""
 NEAR = 0.1
 """How far the logarithm of a growth may be from the predicted one, as a part of it."""
 
@@ -157,6 +159,8 @@ def describe(f: Found, check: StableCheck) -> Description:
         sentence += growth_in_words(f, *factors)
     if f.reason == "unstable" and (excess := f.fact("excess")) > FAR:
         sentence += f" The solution becomes {number(excess, 2)} times as large as the exact one."
+    if f.reason == "match" and not f.model.conservative and factors[1] > GROWS:
+        sentence += " The motion itself grows: `stable` is about the scheme, `max_abs` about the motion."
     if f.reason == "match" and _limit(f) == 0.0:
         # a scheme that grows at every step has no limit of its own
         sentence += _vanishing(f, factors)

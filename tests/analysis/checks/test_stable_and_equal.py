@@ -139,8 +139,16 @@ def test_growth_that_theory_predicts_without_damping_is_said_to_be_so() -> None:
     model = {"kind": "oscillator", "damping": {"linear": 0.2}, "spring": "40*u"}
     told = spring(["rk4"], {"stable": True}, model=model).verdicts[0].text
     assert "predicted for free oscillations without damping) and 0.9" in told
-    assert "(measured, with damping and forces)" in told
+    assert "(measured of the motion itself)" in told
     assert "without damping" not in spring(["rk4"], {"stable": True}).verdicts[0].text
+
+
+def test_a_stable_scheme_of_a_motion_that_grows_says_which_of_both_it_is_about() -> None:
+    """Damping that is negative gives the motion energy, which no step size changes."""
+    model = {"kind": "oscillator", "damping": {"linear": -0.2}, "spring": "40*u"}
+    told = spring(["rk4"], {"stable": True}, model=model).verdicts[0]
+    assert told.status == "PASS"
+    assert "The motion itself grows: `stable` is about the scheme" in told.text
 
 
 def test_of_several_coordinates_the_fastest_oscillation_decides_and_one_alone_shows_no_growth(
