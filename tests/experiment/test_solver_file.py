@@ -196,6 +196,27 @@ def test_a_function_and_a_program_beside_the_file_must_be_there(
     for name in ("solve", "given", "slove"):
         heat.write_text(TEXT.replace(f"command: {COMMAND}", f"python: slab:{name}"))
         assert main(["check", str(heat)]) == 0
+    heat.write_text(TEXT.replace(f"command: {COMMAND}", "python: slab:solve"))
+    fits = "(h, kappa=1.0)", "(h, **more)", "(*, kappa, h)", "(h, kappa, more=0)"
+    for arguments in fits:
+        module.write_text(f"def solve{arguments}:\n    pass\n")
+        assert main(["check", str(heat)]) == 0
+    capsys.readouterr()
+    for arguments in (
+        "(dt, kappa=1.0)",
+        "(h)",
+        "(h, kappa, more)",
+        "(h, kappa, /)",
+        "(*, kappa, h, n)",
+    ):
+        module.write_text(f"def solve{arguments}:\n    pass\n")
+        (told,) = faults(heat, capsys)
+        assert told.startswith(
+            "3: solver.python: slab:solve: is called with h, kappa, but solve takes "
+        )
+    # whoever knows what a decorator makes of it
+    module.write_text("@given\ndef solve(dt):\n    pass\n")
+    assert main(["check", str(heat)]) == 0
     heat.write_text(TEXT.replace("./heat", "./haet"))
     capsys.readouterr()
     assert faults(heat, capsys)[0].endswith(": ./haet: there is no such file")

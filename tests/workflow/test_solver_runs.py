@@ -365,7 +365,8 @@ def test_a_function_that_raises_is_named_with_its_traceback(study: Study) -> Non
         ),
         (
             "writes_a_file",
-            "def solve(h, output):\n    return None\n",
+            # only Python knows what a decorator makes of it
+            "def same(f): return f\n\n@same\ndef solve(h, output):\n    return None\n",
             "writes_a_file:solve is called with h, but takes (h, output) (missing a required argument: "
             "'output'): it gets sizes and parameters by name, and returns an xarray.Dataset\n",
         ),

@@ -160,7 +160,9 @@ def describe(f: Found, check: StableCheck) -> Description:
     if f.reason == "unstable" and (excess := f.fact("excess")) > FAR:
         sentence += f" The solution becomes {number(excess, 2)} times as large as the exact one."
     if f.reason == "match" and not f.model.conservative and factors[1] > GROWS:
-        sentence += " The motion itself grows: `stable` is about the scheme, `max_abs` about the motion."
+        sentence += (
+            " The motion itself grows: `stable` is about the scheme, `max_abs` about the motion."
+        )
     if f.reason == "match" and _limit(f) == 0.0:
         # a scheme that grows at every step has no limit of its own
         sentence += _vanishing(f, factors)

@@ -357,13 +357,14 @@ def _check_files(experiment: SolverExperiment, report: Report) -> None:
 
 
 def _check_function(experiment: SolverExperiment, report: Report) -> None:
-    """Check that a module beside the experiment file has the function; it is read, and not run."""
+    """Check that a module beside the experiment file has the function, and with these arguments; it is read alone."""
     module, _, name = experiment.solver.text.partition(":")
     file = experiment.folder.joinpath(*module.split(".")).with_suffix(".py")
     try:
-        nodes = list(ast.walk(ast.parse(file.read_bytes())))
+        tree = ast.parse(file.read_bytes())
     except (OSError, SyntaxError, ValueError):
         return  # an installed module, or a fault that Python tells with its line
+    nodes = list(ast.walk(tree))
     functions = [node.name for node in nodes if isinstance(node, ast.FunctionDef | ast.ClassDef)]
     assigned = {node.id for node in nodes if isinstance(node, ast.Name)}
     imported = {
@@ -374,6 +375,28 @@ def _check_function(experiment: SolverExperiment, report: Report) -> None:
     }
     if not {name, "*"} & {*functions, *assigned, *imported}:
         rule, hint = f"{file.name} has no function {name}", nearest(name, functions)
+        report.add((SOLVER, "python"), rule, hint, experiment.solver.text)
+    defined = [node for node in tree.body if getattr(node, "name", "") == name]
+    # what a decorator makes of a function may take other arguments
+    if defined and isinstance(last := defined[-1], ast.FunctionDef) and not last.decorator_list:
+        _check_arguments(last, experiment, report)
+
+
+def _check_arguments(node: ast.FunctionDef, experiment: SolverExperiment, report: Report) -> None:
+    """Check that a function takes the sizes and the parameters of the experiment by their names."""
+    given = [*experiment.sizes_of(experiment.levels[0]), *experiment.parameters_of(0)]
+    plain, only = node.args.args, node.args.kwonlyargs
+    takes = [one.arg for one in (*plain, *only)]
+    needs = [one.arg for one in plain[: len(plain) - len(node.args.defaults)]]
+    needs += [
+        one.arg for one, default in zip(only, node.args.kw_defaults, strict=True) if default is None
+    ]
+    wrong = [name for name in given if name not in takes and node.args.kwarg is None]
+    lacking = [name for name in needs if name not in given]
+    if wrong or lacking:
+        called = ", ".join(given)
+        rule = f"is called with {called}, but {node.name} takes {', '.join(takes) or 'nothing'}"
+        hint = "it gets sizes and parameters by their names"
         report.add((SOLVER, "python"), rule, hint, experiment.solver.text)
 
 
