@@ -143,3 +143,24 @@ def test_colours_do_not_shift_the_columns(monkeypatch: pytest.MonkeyPatch) -> No
     for colour in terminal._COLOURS.values():
         bare = [line.replace(f"\033[{colour}m", "") for line in bare]
     assert bare == plain
+
+
+def test_jobs_that_fail_in_the_same_way_are_told_once() -> None:
+    rows = [
+        ("a", ["no dt"]),
+        ("b", ["no dt"]),
+        ("c", []),
+        ("d", []),
+        ("e", ["no dt"]),
+        ("f", ["no h"]),
+    ]
+    failures = [{"job": job, "log": f"{job}.log", "tail": tail} for job, tail in rows]
+    told = "\n".join(outcome_text.of_failures(failures))
+    assert [job for job, _ in rows if f"failed: {job} " in told] == ["a", "c", "d", "f"]
+    assert told.count("2 more jobs failed with the same message") == 1
+    assert told.count("more job") == 1
+
+
+def test_a_run_without_a_verdict_counts_no_checks() -> None:
+    line = outcome_text.count([entry()], "FAIL")
+    assert line.startswith("1 experiment, no check was judged: ")

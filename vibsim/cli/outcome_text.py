@@ -40,17 +40,24 @@ def in_full(summaries: Sequence[Entry], columns: int) -> Iterator[str]:
 
 
 def of_failures(failures: Sequence[Entry]) -> Iterator[str]:
-    """Yield the jobs that failed, each with the end of its log."""
-    for failure in failures:
+    """Yield the jobs that failed, with the end of their logs; those with the same end are counted only."""
+    ends = [tuple(failure["tail"]) for failure in failures]
+    for i, failure in enumerate(failures):
+        if ends[i] and ends[i] in ends[:i]:
+            continue
         yield f"\nfailed: {failure['job']} (log: {failure['log']})"
         yield from (f"  {clean(line)}" for line in failure["tail"])
+        if ends[i] and (more := ends.count(ends[i]) - 1):
+            yield f"  {more} more {'job' if more == 1 else 'jobs'} failed with the same message"
 
 
 def count(summaries: Sequence[Entry], status: str) -> str:
     """Count the checks that passed, with the status of the whole run."""
     found = [check["status"] for entry in summaries for check in entry["checks"]]
     counted = "1 experiment" if len(summaries) == 1 else f"{len(summaries)} experiments"
-    passed = f"{found.count('PASS')} of {len(found)} checks passed"
+    passed = (
+        f"{found.count('PASS')} of {len(found)} checks passed" if found else "no check was judged"
+    )
     return f"{counted}, {passed}: {painted(status, status)}"
 
 
