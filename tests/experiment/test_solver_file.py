@@ -78,6 +78,11 @@ REFUSED = [
         ["6: quantities.T.exact: sin(pi*y): must be a formula in x, t, kappa", "'y'"],
     ),
     ("flux: {}", "flux: {exact: x}", ["6: quantities.flux.exact: x: must be a formula in kappa"]),
+    (
+        "flux: {}",
+        "flux: {exact: 1/0}",
+        ["6: quantities.flux.exact: 1/0: must be", "it divides by zero"],
+    ),
     ("flux: {}", "flux: {exact: [1]}", ["6: quantities.flux.exact: ", "must be a formula, or a n"]),
     ("flux: {}", "flux: {noise: -1}", ["6: quantities.flux.noise: -1: must be at least 0"]),
     ("--dt {h}", "", ["3: solver.command: ", "has no placeholder that differs between levels"]),

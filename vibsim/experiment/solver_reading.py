@@ -290,7 +290,8 @@ def _check_exact(
         if quantity.exact is None:
             continue
         try:
-            parse(quantity.exact, known)
+            if not parse(quantity.exact, known).names:
+                constant(quantity.exact)
         except ExpressionError as error:
             of = f" in {', '.join(known)}" if known else ", here without names"
             hint = error.hint or ("" if quantity.coordinates else "name its coordinates as well")
