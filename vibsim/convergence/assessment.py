@@ -127,9 +127,7 @@ class Decision:
     high: Floats  # upper end
     first: Integers  # coarsest level that the verdict rests on, as a position
     last: Integers  # finest one
-    contradicted: (
-        Flags  # whether finer levels than those contradict the order: nothing is decided on it
-    )
+    contradicted: Flags  # whether finer levels than those contradict the order
 
 
 @dataclass(frozen=True)

@@ -71,9 +71,7 @@ LIMIT_ROUNDING = 1e-9  # w dt within this part of a stability limit is at the li
 BLOWN_UP = 10.0  # a solution so many times larger than the exact one has grown [convention]
 # A step no longer than so many times that in which damping takes a velocity away sees how it goes. [derived]
 RESOLVED_DECAY = 1.0
-ERROR_STAYED = (
-    0.5  # an error has stayed that is a larger part of that of the coarsest level [derived]
-)
+ERROR_STAYED = 0.5  # an error has stayed that is a larger part of the coarsest level's [derived]
 
 # ---- A promised order behind a higher one
 
