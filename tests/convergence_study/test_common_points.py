@@ -292,3 +292,9 @@ def test_means_need_cells_of_one_width_within_the_coarse_ones() -> None:
     for levels in (stretched, wider, nodes, [*even[:2], even[2][::-1], even[3]]):
         with pytest.raises(InputError, match="mean needs cells of one width"):
             judged(*levels)
+
+
+@pytest.mark.parametrize("lengths", [(9, 17, 33, 1), (1, 3, 1, 2), (65, 33, 17, 9)])
+def test_a_finer_level_has_no_fewer_points(lengths: tuple[int, ...]) -> None:
+    with pytest.raises(InputError, match="must not have fewer points"):
+        judge(H, [np.ones(n) for n in lengths])

@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from types import MappingProxyType
 from typing import Any
 
@@ -185,6 +186,9 @@ def _every_kth(dim: str, lengths: Sequence[int]) -> Common:
     """Return common points of levels without coordinates, by the number of points: from end to end, or periodic."""
     first = lengths[0]
     steps = [n - 1 for n in lengths]
+    if any(finer < n for n, finer in pairwise(lengths)):
+        rule = "a finer level must not have fewer points than a coarser one"
+        raise refused(dim, f"lengths {list(lengths)}", rule, "check the step sizes of the levels")
     if first > 1 and all(s % steps[0] == 0 for s in steps):
         factors, note = [s // steps[0] for s in steps], ""
     elif all(n % first == 0 for n in lengths):
