@@ -216,9 +216,7 @@ def test_a_function_and_a_program_beside_the_file_must_be_there(
     ):
         module.write_text(f"def solve{arguments}:\n    pass\n")
         (told,) = faults(heat, capsys)
-        assert told.startswith(
-            "3: solver.python: slab:solve: is called with h, kappa, but solve takes "
-        )
+        assert told.startswith("3: solver.python: slab:solve: is called with h, kappa, but takes (")
     # whoever knows what a decorator makes of it
     module.write_text("@given\ndef solve(dt):\n    pass\n")
     assert main(["check", str(heat)]) == 0

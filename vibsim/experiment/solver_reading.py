@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from vibsim.core.errors import nearest
+from vibsim.core.signatures import misfit_of, signature_of
 from vibsim.experiment.collection import collection_of
 from vibsim.experiment.data import Sweep
 from vibsim.experiment.faults import Report
@@ -385,18 +386,10 @@ def _check_function(experiment: SolverExperiment, report: Report) -> None:
 
 def _check_arguments(node: ast.FunctionDef, experiment: SolverExperiment, report: Report) -> None:
     """Check that a function takes the sizes and the parameters of the experiment by their names."""
-    given = [*experiment.sizes_of(experiment.levels[0]), *experiment.parameters_of(0)]
-    plain, only = node.args.args, node.args.kwonlyargs
-    takes = [one.arg for one in (*plain, *only)]
-    needs = [one.arg for one in plain[: len(plain) - len(node.args.defaults)]]
-    needs += [
-        one.arg for one, default in zip(only, node.args.kw_defaults, strict=True) if default is None
-    ]
-    wrong = [name for name in given if name not in takes and node.args.kwarg is None]
-    lacking = [name for name in needs if name not in given]
-    if wrong or lacking:
-        called = ", ".join(given)
-        rule = f"is called with {called}, but {node.name} takes {', '.join(takes) or 'nothing'}"
+    given = {**experiment.sizes_of(experiment.levels[0]), **experiment.parameters_of(0)}
+    if misfits := misfit_of(signature_of(node), **given):
+        takes, why = misfits
+        rule = f"is called with {', '.join(given)}, but takes {takes} ({why})"
         hint = "it gets sizes and parameters by their names"
         report.add((SOLVER, "python"), rule, hint, experiment.solver.text)
 

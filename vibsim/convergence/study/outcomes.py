@@ -17,6 +17,7 @@ from vibsim.convergence.study.measurement import (
     measurement,
     step_of_values,
 )
+from vibsim.convergence.study.restriction import polynomials
 from vibsim.convergence.thresholds import LEAST_WITH_LIMIT, MISSED
 from vibsim.core.array_types import Flags, Floats, Integers
 from vibsim.core.vocabulary import LEVELS_OF_AN_ORDER, REASON_NAMES
@@ -156,18 +157,16 @@ def _is_smooth(h: Floats, values: Floats, places: Integers) -> bool:
     Nothing is asked of the coarsest one, which has none before it. They may be off by a small part
     of what these differ by. `values` are of shape (n, points).
     """
-    n, scale = len(h), float(np.max(np.abs(values)))
+    scale = float(np.max(np.abs(values)))
     u = values / (scale if scale > 0.0 else 1.0)
     moved = np.sqrt(np.mean(np.diff(u, axis=0) ** 2, axis=1))
     for j in places[places > 0].tolist():
-        first = min(max(j - 2, 0), max(n - 5, 0))
-        around = [k for k in range(first, min(first + 5, n)) if k != j]
-        cubic = np.zeros_like(u[j])
-        for k in around:
-            others = [h[m] for m in around if m != k]
-            cubic += np.prod([(h[j] - x) / (h[k] - x) for x in others]) * u[k]
-        allowed = SMOOTH * np.mean(moved[around[0] : around[-1]])
-        if not np.sqrt(np.mean((u[j] - cubic) ** 2)) <= allowed:
+        others = np.delete(np.arange(len(h)), j)
+        (weights,), (near,), _ = polynomials(h[[j]], h[others], min(4, len(others)), 0.0)
+        around = others[near]
+        off = u[j] - np.sum(weights[:, None] * u[around], axis=0)
+        allowed = SMOOTH * np.mean(moved[np.min(around) : np.max(around)])
+        if not np.sqrt(np.mean(off**2)) <= allowed:
             return False
     return True
 

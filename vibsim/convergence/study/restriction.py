@@ -302,7 +302,7 @@ def _interpolations(
             raise refused(
                 dim, f"length {len(fine)}", f"{kind} interpolation needs {width} points at least"
             )
-        weights, indices, between = _polynomials(targets, fine.astype(np.float64), width, tolerance)
+        weights, indices, between = polynomials(targets, fine.astype(np.float64), width, tolerance)
         interpolated |= between
         found.append(Restriction(indices, weights))
     part = ""
@@ -318,7 +318,7 @@ def _interpolations(
     return Common(tuple(found), targets if has_points else None, interpolated, note, part)
 
 
-def _polynomials(
+def polynomials(
     targets: Floats, points: Floats, width: int, tolerance: float
 ) -> tuple[Floats, Integers, bool]:
     """Return the weights of Lagrange's polynomials through the nearest `width` points, and whether any is used.

@@ -10,6 +10,7 @@ from vibsim.core.errors import nearest
 from vibsim.core.vocabulary import BY_TOLERANCE, REASONS, is_error_part, plain_name
 from vibsim.experiment.faults import Report
 from vibsim.experiment.rules.check_places import Scope
+from vibsim.experiment.rules.potential import NOT_FOUND
 from vibsim.experiment.rules.size_limits import Setting
 from vibsim.experiment.schema.checks import (
     SOLUTIONS,
@@ -387,8 +388,7 @@ def _is_comparable(row: Value, quantity: str | None, scope: Scope) -> None:
     if row.needs_exact == "solution":
         _known_exactly(quantity, row.name, scope)
     if row.needs_potential and model.misses_potential:
-        rule = "no potential energy was found of the forces that the positions make"
-        scope.refuse(rule, _instead_of_energy(scope), row.name)
+        scope.refuse(NOT_FOUND, _instead_of_energy(scope), row.name)
     if row.needs_events and model.events is None:
         scope.refuse(f"{model.kind} has no events: its motion is smooth", value=row.name)
     if row.needs_rational:

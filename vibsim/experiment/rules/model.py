@@ -13,7 +13,7 @@ from vibsim.experiment.data import StructureSpec, TableSpec
 from vibsim.experiment.faults import Report
 from vibsim.experiment.kinds import COORDINATES
 from vibsim.experiment.rules.formulas import NAME, declared_parameters, is_sound, read_formulas
-from vibsim.experiment.rules.potential import check_potential
+from vibsim.experiment.rules.potential import NOT_FOUND, check_potential
 from vibsim.experiment.rules.structure import read_structure, terms_of_damping
 from vibsim.experiment.schema.fields import AT, DECLARED, Section
 from vibsim.formula import (
@@ -154,9 +154,8 @@ def _written(
             report.add(("model", *exact.split(".")), rule, value=texts.get(exact))
             return Equation(None)
     if found.misses_potential:
-        rule = "no potential energy was found of the forces that the positions make"
         hint = "energies are kinetic alone; write `potential`, if the forces have one"
-        report.note(("model",), rule, hint)
+        report.note(("model",), NOT_FOUND, hint)
     if any(row.name == "spring" for row in model.formulas):
         check_potential(found, parameters, texts, report)
     return Equation(found, parameters, texts, tables)

@@ -17,6 +17,7 @@ PANELS, POINTS = 32, 16
 """Panels of an amplitude, and points of each."""
 AGREE = 1e-9
 """How far both may differ, relative to the largest energy."""
+NOT_FOUND = "no potential energy was found of the forces that the positions make"
 
 
 def check_potential(
