@@ -95,6 +95,33 @@ def test_energy_that_a_written_potential_does_not_conserve_is_not_blamed_on_the_
     assert "by the `potential` that is written" in fault
 
 
+HELD = {"acceleration": "-k*u/m - 0.1*v", "parameters": {"k": 3.0, "m": 2.0}}
+JOINED = {"coordinates": ["x", "y"], "force": {"x": "2*y - 3*x + cos(t)", "y": "2*x - 3*y - y*vy"}}
+TURNED = {"coordinates": ["x", "y"], "force": {"x": "-x - 0.3*y", "y": "-y + 0.3*x"}}
+
+
+@pytest.mark.parametrize(
+    ("model", "potential"), [(HELD, "k*u**2/2"), (JOINED, "3*(x**2 + y**2)/2")]
+)
+def test_a_potential_that_is_not_that_of_the_forces_is_noted(model, potential):
+    ((_, note),) = read({**model, "potential": potential}, initial={}).notes
+    assert "model.potential: is not that of the forces" in note
+
+
+@pytest.mark.parametrize(
+    ("model", "potential"),
+    [
+        (HELD, "1.5*u**2/2"),
+        (JOINED, "3*(x**2 + y**2)/2 - 2*x*y"),
+        (TURNED, "(x**2 + y**2)/2"),
+        ({"acceleration": "-(1 + 0.1*cos(t))*u + 2"}, "u**2/2"),
+        ({"acceleration": "-u - 0.3*sign(v) + (1 - u**2)*v"}, "u**2/2"),
+    ],
+)
+def test_a_potential_of_forces_beside_others_is_not_noted(model, potential):
+    assert read({**model, "potential": potential}, initial={}).notes == ()
+
+
 @pytest.mark.parametrize("value", ["relative_energy_error", "relative_energy_error_d2t"])
 def test_the_error_of_an_energy_without_a_potential_is_refused(value):
     hill = {f: f"2*{f}*exp(-x**2 - y**2)" for f in ("x", "y")}

@@ -164,6 +164,9 @@ def test_a_sweep_of_the_load_has_the_response_of_each_frequency():
         ({"stiffness": [1, -1]}, "model.stiffness", "negative eigenvalue"),
         ({"mass": "no.mtx"}, "model.mass", "there is no such file"),
         ({"load": {"3": "1"}}, "model.load", "2 degrees of freedom"),
+        ({"load": {"u9": "1"}}, "model.load.u9", "2 degrees of freedom"),
+        ({"load": {"top": "1"}}, "model.load.top", "or one that `observe` gives it"),
+        ({"load": ["1", "1"]}, "model.load", "must be formulas by degree of freedom"),
         ({"load": {"1": "cos(q*t)"}}, "model.load.1", "unknown name"),
         ({"observe": {"x": 7}}, "model.observe.x", "2 degrees of freedom"),
         ({"observe": {"x": {"1": 0}}}, "model.observe.x", "a factor that is not 0"),
@@ -181,6 +184,16 @@ def test_what_is_no_structure_is_refused(changed, key, rule):
     faults = [fault for fault in error.value.faults if fault.key.startswith(key)]
     assert faults, error.value
     assert rule in faults[0].rule
+
+
+def test_a_degree_of_freedom_has_the_names_that_it_has_in_results():
+    by_number = {"load": {"2": "cos(t)"}, "start": {"displacement": {"1": 0.5, "2": 1}}}
+    by_name = {"load": {"x": "cos(t)"}, "start": {"displacement": {"u1": 0.5, "x": 1}}}
+    digests = [
+        of({**TWO, "observe": {"x": 2}, **rows}).model.structure.structure.digest
+        for rows in (by_number, by_name)
+    ]
+    assert digests[0] == digests[1]
 
 
 def test_a_pattern_has_no_numbers(tmp_path):
@@ -206,6 +219,7 @@ def loaded(folder: Path, *, load: str, text: str, end: float = 3.0) -> Experimen
     [
         ("{1: {table: push.csv}}", "t,p"),
         ("{shape: [0.5], times: {table: push.csv, t: time, p: force}}", "time;force"),
+        ("{shape: [0.5], times: {table: push.csv}}", "time;force"),
     ],
 )
 def test_a_load_from_a_table_is_straight_between_its_points(tmp_path: Path, load, names):
@@ -227,7 +241,7 @@ def test_a_load_from_a_table_is_straight_between_its_points(tmp_path: Path, load
     ("text", "key", "rule"),
     [
         ("t,p\n0,0\n2,1\n", "table", "the table ends at 2, but the motion lasts to 3"),
-        ("t,q\n0,0\n4,1\n", "p", "the table has no column 'p'"),
+        ("t,q,r\n0,0,0\n4,1,1\n", "p", "the table has no column 'p'"),
         ("t,p\n1,0\n4,1\n", "table", "must begin at 0 or below"),
         ("t,p\n0,0\n4,1\n4,2\n", "table", "'t' must increase"),
         ("t,p\n0,0\n", "table", "must have at least 2 points"),
@@ -252,7 +266,7 @@ def test_results_depend_on_the_numbers_of_a_load_and_not_on_names(tmp_path: Path
         loaded(tmp_path, load=load, text=text).model.structure.structure.digest
         for load, text in (
             ("{1: {table: push.csv}}", "t,p\n0,0\n4,1\n"),
-            ("{1: {table: push.csv, p: q}}", "t,q\n0,0\n4,1\n"),
+            ("{1: {table: push.csv, p: q}}", "p,t,q\n5,0,0\n6,4,1\n"),
             ("{1: {table: push.csv}}", "t,p\n0,0\n4,2\n"),
         )
     ]

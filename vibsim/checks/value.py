@@ -186,7 +186,10 @@ def judge(experiment: Experiment, record: Record, check: ValueCheck, found: Meas
     name, number, bound = check.value, found["value"], found["error_bound"]
     row, is_limit = check.number, check.number.has_limit(check.at.level)
     holds, away = compare(check, number)
-    survives = np.isfinite(number) & row.survives_failure
+    # a limit rests on the levels behind the finest one that broke down
+    survives = np.isfinite(number) & (
+        row.survives_failure | is_limit & (record["status"][..., -1] == 0)
+    )
     # of a stability limit infinity is a value; on the separatrix there is no period, and nothing went wrong
     does_not_exist = np.isnan(number) | (np.isinf(number) & (name == "exact_period"))
     infinite = np.isinf(number) & (name != "stability_limit") & ~does_not_exist
@@ -406,8 +409,13 @@ def _measured(f: Found, check: ValueCheck, digits: int = MOST_DIGITS) -> str:
     if not check.number.has_limit(check.at.level):
         return phrase
     if not math.isfinite(bound):
-        return f"{phrase}, with an unknown error{_why_unknown(f, check)}"
-    return f"{phrase}, with an error of at most {f.notation.number(bound, 2)}"
+        phrase += f", with an unknown error{_why_unknown(f, check)}"
+    else:
+        phrase += f", with an error of at most {f.notation.number(bound, 2)}"
+    broken = np.flatnonzero(f.record["status"][f.scheme, f.case])
+    if len(broken) and not check.number.survives_failure:
+        phrase += f", from the levels behind {f.experiment.levels[broken[-1]]}, which broke down"
+    return phrase
 
 
 def _through_the_cut(f: Found, check: ValueCheck) -> str:

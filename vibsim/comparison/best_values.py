@@ -94,6 +94,8 @@ def _ladder(name: str, place: value_numbers.Place) -> _Ladder:
         rows = [value_numbers.value(name, replace(place, level=lv)) for lv in place.levels]
     values = np.stack(rows, axis=-1)
     values[block.adaptive] = np.nan
+    if not row.survives_failure:
+        values[block.failed] = np.nan
     if row.is_angle:
         turns = (values - values[..., -1:]) / (2.0 * np.pi)
         values -= 2.0 * np.pi * np.round(turns)

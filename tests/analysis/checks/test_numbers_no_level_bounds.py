@@ -251,3 +251,15 @@ def test_a_crest_in_the_first_step_of_all_levels_is_in_the_bound() -> None:
                 assert found.status != "FAIL"
             small = {"value": "max_abs", "quantity": "u", **BEST, "below": 1.0001}
             assert run({**content, "schemes": [scheme]}, small).verdicts[0].status != "PASS"
+
+
+def test_a_number_rests_on_the_levels_behind_one_that_broke_down() -> None:
+    """RK4 overflows on the coarsest level; the period is 4 K(1/2) / sqrt(50)."""
+    cubic = {"model": {"kind": "system", "acceleration": "-50*u**3"}, "initial": {"u": 1.0}}
+    ladder = {"time": {"end": 4.0}, "levels": [2, 6, 7, 8, 9], "schemes": ["rk4"]}
+    asked = {"value": "period", "equals": 4 * 1.854074677301372 / math.sqrt(50), "atol": 1e-4}
+    best, coarsest = run(
+        {**cubic, **ladder}, {**asked, **BEST}, {**asked, "at": {"level": 2}}
+    ).verdicts
+    assert (best.status, coarsest.reason) == ("PASS", "non_finite")
+    assert "from the levels behind 2, which broke down" in best.text

@@ -13,7 +13,7 @@ from vibsim.experiment.data import StructureSpec, TableSpec
 from vibsim.experiment.faults import Report
 from vibsim.experiment.kinds import COORDINATES
 from vibsim.experiment.rules.formulas import NAME, declared_parameters, is_sound, read_formulas
-from vibsim.experiment.rules.potential import NOT_FOUND, check_potential
+from vibsim.experiment.rules.potential import NOT_FOUND, check_potential, note_potential
 from vibsim.experiment.rules.structure import read_structure, terms_of_damping
 from vibsim.experiment.schema.fields import AT, DECLARED, Section
 from vibsim.formula import (
@@ -158,6 +158,8 @@ def _written(
         report.note(("model",), NOT_FOUND, hint)
     if any(row.name == "spring" for row in model.formulas):
         check_potential(found, parameters, texts, report)
+    elif any(name.startswith("potential.") for name in texts):
+        note_potential(found, parameters, report)
     return Equation(found, parameters, texts, tables)
 
 

@@ -1,4 +1,4 @@
-"""Whether a potential energy is that of its spring, by comparison with the work that the spring does."""
+"""Whether a potential energy is that of a spring, by the work of the spring, or of the forces of a system, by power."""
 
 from __future__ import annotations
 
@@ -8,13 +8,15 @@ import numpy as np
 
 from vibsim.core.array_types import Floats
 from vibsim.experiment.faults import Report
-from vibsim.formula import Expression, has_rule, parse, values
+from vibsim.formula import ZERO, Expression, derivative, has_rule, parse, values, values_of
 from vibsim.models import Model, tree
 
 AMPLITUDES = (-6, 8)
 """Powers of 2, from and to, of the amplitudes at which a potential energy is compared with its spring."""
 PANELS, POINTS = 32, 16
 """Panels of an amplitude, and points of each."""
+TESTS = 24
+"""Places at which that of a system is compared with its forces."""
 AGREE = 1e-9
 """How far both may differ, relative to the largest energy."""
 NOT_FOUND = "no potential energy was found of the forces that the positions make"
@@ -55,6 +57,39 @@ def check_potential(
             rule = "its potential energy cannot be worked out: it has corners, is singular or varies fast"
             hint = "write the energy as `potential`, a formula whose slope is the spring"
             report.add(("model", "spring"), rule, hint)
+
+
+def note_potential(model: Model, parameters: Mapping[str, float], report: Report) -> None:
+    """Note a written potential energy V of a system that is not that of its forces F.
+
+    The power dE/dt has the slopes grad V - F by velocities of 0. If the slopes of these by the positions are symmetric
+    and not 0, the forces have a potential of their own, which V lacks. Damping, driving, constant forces, and forces
+    without a potential are not like that.
+    """
+    x, v = model.positions, model.velocities
+    energy = tree(model, model.potential_energy)
+    power = tree(model, model.dissipation or model.driving or ZERO)
+    forces, own = (
+        [derivative(derivative(of, a), b) for a in first for b in x]
+        for of, first in ((power, v), (energy, x))
+    )
+    rng = np.random.default_rng(21)
+    numbers = {name: rng.uniform(-1.0, 1.0, TESTS) for name in x}
+    numbers |= {row.name: np.full(TESTS, parameters[row.key]) for row in model.parameters}
+    numbers |= dict.fromkeys(v, np.zeros(TESTS))
+    if any(formula.names - numbers.keys() for formula in forces) or energy.names & set(v):
+        return
+    found = [np.broadcast_to(value, TESTS) for value in values_of(forces + own, numbers)]
+    missing, kept = np.reshape(found, (2, len(x), len(x), TESTS))
+    size = np.max(np.abs(missing) + np.abs(kept), axis=(0, 1))
+    is_known = np.isfinite(size)
+    with np.errstate(invalid="ignore"):
+        is_even = np.abs(missing - np.swapaxes(missing, 0, 1)) <= AGREE * size
+        is_odd = np.abs(missing) > AGREE * size
+    if is_known.any() and is_even[..., is_known].all() and is_odd[..., is_known].all(axis=-1).any():
+        rule = "is not that of the forces, so that the energy changes without damping"
+        hint = "leave it out, and vibsim finds it where it can; beside `acceleration` masses are 1"
+        report.note(("model", "potential"), rule, hint)
 
 
 def _work(

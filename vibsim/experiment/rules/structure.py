@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Collection, Mapping
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 from vibsim.experiment.data import ArraySpec, StructureSpec
@@ -18,7 +20,7 @@ from vibsim.models.system import name_fault, velocities_of
 
 ROUNDED_END = 1e-9
 """By which a table may end early, relative to its end: a file may have rounded it."""
-_DOFS = "the keys must be numbers of degrees of freedom, counted from 1"
+_DOF = "must be the number of a degree of freedom, counted from 1, its name such as u2, or one that `observe` gives it"
 Formulas = dict[str, tuple[str, Path_]]
 """By key the text of a formula, and where it stands."""
 
@@ -36,19 +38,21 @@ def read_structure(
             return None, {}
         # nothing but the kind: one mass on one spring
         arrays["stiffness"] = ArraySpec(rows=((1.0,),))
-    formulas = _loads(section, arrays, report)
+    observed = _observed(section, report)
+    named = {name: row[0][0] for name, row in observed if [factor for _, factor in row] == [1.0]}
+    formulas = _loads(section, named, arrays, report)
     for name in ("displacement", "velocity"):
         value = getattr(section.start, name) if section.start is not None else None
         if value is not None:
-            arrays[f"start.{name}"] = _array(value)
+            arrays[f"start.{name}"] = _array(value, named)
     for key, row in arrays.items():
         if any(dof < 1 for dof, _ in row.entries):
-            report.add(_place(key, arrays, report), _DOFS, at_key=True)
+            report.add(_place(key, report), f"each key {_DOF}", at_key=True)
     ratios = section.damping_ratios
     spec = StructureSpec(
         arrays=arrays,
         ratios=ratios if isinstance(ratios, tuple) else (),
-        observe=_observed(section, report),
+        observe=observed,
         is_free=section.observe is None and section.start is None,
     )
     if report.doubts_model:
@@ -59,23 +63,31 @@ def read_structure(
         report.add(("model", "observe"), rule, f"e.g. {{tip: {own.unnamed}}}")
     for key, rule, hint in own.faults:
         shown = arrays[key].file if key in arrays else None
-        report.add(_place(key, arrays, report), rule, hint, shown)
+        report.add(_place(key, report), rule, hint, shown)
     return (with_digests(own) if own.structure is not None else None), formulas
 
 
-def _array(value: Any) -> ArraySpec:
+def _dof(text: str, named: Mapping[str, int]) -> int:
+    """Return the number of a degree of freedom from its name; 0 of none."""
+    number = re.fullmatch("u?([1-9][0-9]*)", text)
+    return named.get(text, int(number[1]) if number else 0)
+
+
+def _array(value: Any, named: Mapping[str, int] = MappingProxyType({})) -> ArraySpec:
     if isinstance(value, str):
         return ArraySpec(file=value)
     if isinstance(value, Mode):
         return ArraySpec(mode=value.mode, size=value.size)
     if isinstance(value, Mapping):
         # what is no number of a degree of freedom is reported later
-        entries = ((int(dof) if dof.isdigit() else 0, number) for dof, number in value.items())
+        entries = ((_dof(dof, named), number) for dof, number in value.items())
         return ArraySpec(entries=tuple(sorted(entries)))
     return ArraySpec(rows=tuple(value))
 
 
-def _loads(section: Any, arrays: dict[str, ArraySpec], report: Report) -> Formulas:
+def _loads(
+    section: Any, named: Mapping[str, int], arrays: dict[str, ArraySpec], report: Report
+) -> Formulas:
     """Return the formulas of the loads, and put their shapes and their tables among the arrays."""
     load = section.load
     if load is None:
@@ -90,16 +102,15 @@ def _loads(section: Any, arrays: dict[str, ArraySpec], report: Report) -> Formul
             found[f"{LOAD}.{number}"] = factor.strip(), path
 
     if isinstance(load, ShapedLoad):
-        arrays[f"{LOAD}.0"] = _array(load.shape)
+        arrays[f"{LOAD}.0"] = _array(load.shape, named)
         take(0, load.times, ("model", LOAD, "times"))
         return found
-    for i, (dof, factor) in enumerate(load.items()):
-        path = ("model", LOAD, dof)
-        if not dof.isdigit() or int(dof) < 1:
-            rule = "must be the number of a degree of freedom, counted from 1"
-            report.add(path, rule, "or write {shape: ..., times: ...}", at_key=True)
+    for i, (name, factor) in enumerate(load.items()):
+        path = ("model", LOAD, name)
+        if not (dof := _dof(name, named)):
+            report.add(path, _DOF, "or write {shape: ..., times: ...}", at_key=True)
             continue
-        arrays[f"{LOAD}.{i}"] = ArraySpec(entries=((int(dof), 1.0),))
+        arrays[f"{LOAD}.{i}"] = ArraySpec(entries=((dof, 1.0),))
         take(i, factor, path)
     return found
 
@@ -122,23 +133,22 @@ def _observed(
         taken += [name, velocity]
         row = _array(what) if isinstance(what, Mapping) else ArraySpec(entries=((what, 1.0),))
         if any(dof < 1 for dof, _ in row.entries):
-            report.add(("model", "observe", name), _DOFS, at_key=True)
+            report.add(("model", "observe", name), f"each key {_DOF}", at_key=True)
         found.append((name, row.entries))
     return tuple(found)
 
 
-def _place(key: str, arrays: Mapping[str, ArraySpec], report: Report) -> Path_:
+def _place(key: str, report: Report) -> Path_:
     """Return where an array stands in a file, or a part of it that stands behind its key."""
     head, *rest = key.split(".")
     if head not in (LOAD, HISTORY):
         return "model", head, *rest
     number, *part = rest
-    if "shape" in report.source.data["model"][LOAD]:
+    load = report.source.data["model"][LOAD]
+    if "shape" in load:
         return "model", LOAD, "shape" if head == LOAD else "times", *part
     # written by degree of freedom
-    if head == LOAD:
-        return "model", LOAD, *(part or [number])
-    return "model", LOAD, str(arrays[f"{LOAD}.{number}"].entries[0][0]), *part
+    return "model", LOAD, str(list(load)[int(number)]), *(part if head == HISTORY else ())
 
 
 def check_histories(spec: StructureSpec, end: float, report: Report) -> None:
@@ -146,7 +156,7 @@ def check_histories(spec: StructureSpec, end: float, report: Report) -> None:
     for number, (times, _) in spec.structure.histories:
         if end > times[-1] * (1.0 + ROUNDED_END):
             rule = f"the table ends at {times[-1]:.10g}, but the motion lasts to {end:.10g}"
-            path = _place(f"{HISTORY}.{number}.{TABLE}", spec.arrays, report)
+            path = _place(f"{HISTORY}.{number}.{TABLE}", report)
             report.add(path, rule, "add the load at the end, 0 if there is none")
 
 

@@ -99,7 +99,9 @@ class ShapedLoad(Section):
 
 
 Load: Any = by_form(
-    {"other": Annotated[dict[str, Factor], Field(min_length=1)], "shape": ShapedLoad}
+    {"mapping": Annotated[dict[str, Factor], Field(min_length=1)], "shape": ShapedLoad},
+    custom_error_type="form",
+    custom_error_message="must be formulas by degree of freedom such as {2: cos(t)}, or {shape: ..., times: ...}",
 )
 _Ratios = Annotated[tuple[NonNegative, ...], Field(min_length=1), short(MOST_ROWS)]
 RatiosText: Any = by_form({"other": NonNegative, "row": _Ratios})

@@ -77,6 +77,9 @@ def _read(
 def _from_text(content: bytes, keys: tuple[str, str], names: tuple[str, str]) -> _Columns:
     def choose(known: list[str], may_list: bool) -> list[int]:
         pairs = zip(keys, names, strict=True)
+        if len(set(known)) == len(known) == 2 and names == keys and may_list:
+            # two columns need no names in the file: the first holds the places
+            return [1, 0] if known[0] == names[1] or known[1] == names[0] else [0, 1]
         return [_found(known, name, key, "column", may_list=may_list) for key, name in pairs]
 
     try:
