@@ -224,7 +224,7 @@ class Report:
         return tuple(lines)
 
     @property
-    def doubts_model(self) -> bool:
+    def has_faulty_model(self) -> bool:
         """Whether the section ``model`` has a fault."""
         return any(fault.key.split(".")[0] == "model" for fault in self.faults)
 

@@ -20,7 +20,7 @@ from vibsim.experiment.rules import continuation, members, size_limits, timing, 
 from vibsim.experiment.rules import schemes as scheme_rules
 from vibsim.experiment.rules.checks import check_published, finish_checks
 from vibsim.experiment.rules.figures import check_figures
-from vibsim.experiment.rules.model import Equation, are_known
+from vibsim.experiment.rules.model import Equation, has_all_values
 from vibsim.experiment.rules.model import equation as read_equation
 from vibsim.experiment.rules.scaling import Numbers, characteristic
 from vibsim.experiment.rules.structure import check_histories
@@ -229,14 +229,14 @@ def _check_members(
 ) -> None:
     """Check the rules that every member of a sweep must satisfy, if all of its numbers are known."""
     model, parameters = equation.model, equation.parameters
-    if time is None or model is None or not are_known(model, parameters):
+    if time is None or model is None or not has_all_values(model, parameters):
         return
     numbers = members.MemberNumbers(model, parameters, initial, time, sweep.axes)
     members.check_ends(numbers, report)
     for table in equation.tables:
-        members.check_length(numbers, table, report)
+        members.check_table_length(numbers, table, report)
     if equation.structure is not None and equation.structure.structure.histories:
-        latest = max(float(max(end)) for _, end in numbers.members())
+        latest = max(float(max(end)) for _, end in numbers.blocks())
         check_histories(equation.structure, latest, report)
     members.check_jumps(numbers, equation.formulas, report)
     if sweep.follow is not None:
@@ -289,7 +289,7 @@ def _initial(
         if state.minimum is not None and initial[state.name] < state.minimum:
             rule = f"must be at least {state.minimum:g}"
             report.add(("initial", state.name), rule, value=initial[state.name])
-    start = model.start(parameters) if model.start and are_known(model, parameters) else {}
+    start = model.start(parameters) if model.start and has_all_values(model, parameters) else {}
     scale = max(map(abs, start.values()), default=0.0)
     for name, value in start.items():
         agrees = math.isclose(initial[name], value, rel_tol=SAME_START, abs_tol=SAME_START * scale)
