@@ -1,6 +1,6 @@
-"""A validated experiment as data: every default filled in, every number a number, nothing that could change.
+"""A validated experiment as immutable data: all defaults filled in, all numbers converted to floats.
 
-What reads an experiment or makes another one of it stands above: see `vibsim.experiment.experiment`.
+Methods that read an experiment or derive another one are in `vibsim.experiment.experiment`.
 """
 
 from __future__ import annotations
@@ -40,79 +40,79 @@ Options = Annotated[dict[str, StrictBool | float | str], AfterValidator(FrozenDi
 
 
 class TableSpec(Section):
-    """A table in place of a formula: where it stands, and which numbers it had when the experiment was read."""
+    """A table that replaces a formula: its file, and the digest of its numbers when the experiment was read."""
 
     file: Text
     """Path of the file, relative to the folder of the experiment file."""
     place: Text
     value: Text
-    """Names of the columns of places and values."""
+    """Names of the columns of abscissae (`place`) and ordinates (`value`)."""
     numbers: Text
-    """SHA-256 of the numbers (`vibsim.models.table.Table.digest`), on which results depend alone."""
+    """SHA-256 of the numbers (`vibsim.models.table.Table.digest`). Results depend on the file only through it."""
     is_met: bool = False
-    """Whether a step of every member ends at every point (`vibsim.models.table.Lookup.is_met`)."""
+    """Whether the time steps of every member hit every point of the table (`vibsim.models.table.Lookup.is_met`)."""
     _table: Table | None = PrivateAttr(default=None)
     _content: str = PrivateAttr(default="")
 
     def hold(self, table: Table, content: str) -> None:
-        """Take the numbers of the file, and the SHA-256 of its bytes, which are no part of an experiment's identity."""
+        """Attach the numbers of the file and the SHA-256 of its bytes. Neither is part of the experiment's identity."""
         self._table, self._content = table, content
 
     @property
     def content(self) -> str:
-        """SHA-256 of the bytes of the file, as it was read."""
+        """SHA-256 of the bytes of the file when it was read."""
         return self._content
 
     @property
     def table(self) -> Table:
-        """The numbers, which `vibsim.experiment.tables.file.attach` puts there."""
+        """The numbers, attached by `vibsim.experiment.tables.file.attach`."""
         if self._table is None:
             raise VibsimError(f"the table {self.file} was not read")
         return self._table
 
 
 class ArraySpec(Section):
-    """A matrix or a vector of a structure: of a file, as numbers, by degree of freedom, or the shape of a mode."""
+    """A matrix or vector of a structure: a file, rows of numbers, single entries, or a multiple of a mode shape."""
 
     file: Text | None = None
     """Path of the file, relative to the folder of the experiment file."""
     columns: tuple[Text, Text] | None = None
-    """Names of the columns of times and loads, where the file is the table of a load."""
+    """Names of the columns of times and loads, if the file is a load table."""
     rows: tuple[tuple[float, ...] | float, ...] = ()
     entries: tuple[tuple[int, float], ...] = ()
     mode: int | None = None
     size: float = 1.0
-    """What the first observed displacement has of the shape of a mode."""
+    """First observed displacement when the array is a mode shape; it scales the shape."""
     numbers: str = ""
-    """SHA-256 of the numbers of a file, on which results depend alone."""
+    """SHA-256 of the numbers of the file. Results depend on the file only through it."""
 
 
 class StructureSpec(Section):
-    """What a file says of a linear structure beside formulas and parameters."""
+    """The data of a linear structure other than its formulas and parameters."""
 
     arrays: Annotated[dict[str, ArraySpec], AfterValidator(FrozenDict)]
-    """By key: ``mass``, ``stiffness``, ``damping``, ``load.0``, ``history.0`` (its table), ``start.displacement``."""
+    """Keys: ``mass``, ``stiffness``, ``damping``, ``load.0``, ``history.0`` (its table), ``start.displacement``."""
     ratios: tuple[float, ...] = ()
     """Damping ratios of the lowest modes."""
     observe: tuple[tuple[Text, tuple[tuple[int, float], ...]], ...] = ()
-    """By name the factors of degrees of freedom, counted from 1."""
+    """Observed displacements: name, and a linear combination as pairs (degree of freedom from 1, factor)."""
     is_free: bool = False
-    """Whether the motion begins as the section ``initial`` says."""
+    """Whether the section ``initial`` gives the start of the motion."""
     _structure: Structure | None = PrivateAttr(default=None)
     _files: tuple[tuple[str, str], ...] = PrivateAttr(default=())
 
     def hold(self, structure: Structure, files: tuple[tuple[str, str], ...]) -> None:
-        """Take the numbers, and path and SHA-256 of the bytes of each file, no part of an experiment's identity."""
+        """Attach the numbers, and path and SHA-256 of each file. Neither is part of the experiment's identity."""
         self._structure, self._files = structure, files
 
     @property
     def files(self) -> tuple[tuple[str, str], ...]:
-        """Path of each file, and SHA-256 of its bytes, as it was read."""
+        """Path of each file, and SHA-256 of its bytes when it was read."""
         return self._files
 
     @property
     def structure(self) -> Structure:
-        """The numbers, which `vibsim.experiment.tables.structure.attach` puts there."""
+        """The numbers, attached by `vibsim.experiment.tables.structure.attach`."""
         if self._structure is None:
             raise VibsimError("the matrices of the structure were not read")
         return self._structure
@@ -123,34 +123,33 @@ class ModelSpec(Section):
 
     kind: Text
     parameters: Numbers
-    """By the place of each in the section: ``m``, ``damping.linear``, ``parameters.k``."""
+    """Keys are dotted paths within the section: ``m``, ``damping.linear``, ``parameters.k``."""
     formulas: Annotated[dict[str, str], AfterValidator(FrozenDict)] = FrozenDict()
-    """What the file writes as formulas: the keys are those of `vibsim.models.Model.written`."""
+    """The formulas of the file, with the keys of `vibsim.models.Model.written`."""
     coordinates: tuple[Text, ...] = ()
-    """Their names, where the model leaves these to a file (`vibsim.models.Model.named`)."""
+    """Names of the coordinates, if the file chooses them (`vibsim.models.Model.named`)."""
     tables: Annotated[dict[str, TableSpec], AfterValidator(FrozenDict)] = FrozenDict()
-    """Tables that stand in place of formulas, by the same names."""
+    """Tables that replace formulas, with the same keys."""
     terms: tuple[Text, ...] = ()
-    """Which of `vibsim.models.Model.optional` the equation has: those that are not neutral, or are swept."""
-
+    """Optional terms (`vibsim.models.Model.optional`) in the equation: those that are not neutral or are swept."""
     structure: StructureSpec | None = None
     """The matrices of a linear structure (`vibsim.models.structure`)."""
 
     _own: Model | None = PrivateAttr(default=None)
 
     def hold(self, model: Model) -> None:
-        """Take the model of this kind, where a program hands it over and none is registered."""
+        """Attach the model itself, if a program passes one that is not registered."""
         self._own = model
 
     @property
     def files(self) -> tuple[tuple[str, str], ...]:
-        """Path of each file that the section names, and SHA-256 of its bytes, as it was read."""
+        """Path of each file that the section names, and SHA-256 of its bytes when it was read."""
         tables = tuple((row.file, row.content) for row in self.tables.values())
         return (*tables, *(self.structure.files if self.structure is not None else ()))
 
     @property
     def base(self) -> Model:
-        """The model of this kind, without what the section says of it."""
+        """The model of this kind, before formulas, parameters and tables of the section are put in."""
         model = self._own or MODELS[self.kind]
         return model.named(self.coordinates) if model.named is not None else model
 
@@ -168,15 +167,15 @@ class TimeSpec(Section):
     """The time interval and the number of steps at level 0."""
 
     end: Positive
-    """The last time of a member that is not swept."""
+    """End time, unless swept. With `periods` or `steps_per_point` it belongs to the unswept parameters."""
     base_steps: Count
     """Steps at level 0."""
     periods: float | None = None
-    """The end in periods, where the file gives it so: each member then has its own end."""
+    """The end in periods, if the file gives it so. Each member then has its own end time."""
     frequency: str | None = None
-    """The parameter of the model whose periods these are, an angular frequency; natural periods where None."""
+    """Model parameter (an angular frequency) that defines the periods; None for natural periods."""
     steps_per_point: int | None = None
-    """Steps at level 0 from a point of the model's table to the next, where the file gives these instead of an end."""
+    """Steps at level 0 per spacing of the model's table, if the file gives these instead of an end."""
 
     @property
     def is_of_model(self) -> bool:
@@ -184,7 +183,7 @@ class TimeSpec(Section):
         return self.periods is not None or self.steps_per_point is not None
 
     def end_of(self, model: Model, parameters: Mapping[str, Any]) -> Any:
-        """Return the end time of members with these `parameters` (numbers or arrays), unless swept."""
+        """Return the end time for these `parameters` (numbers or arrays), if the end itself is not swept."""
         if self.periods is not None and self.frequency is not None:
             return self.periods * (2.0 * math.pi / parameters[self.frequency])
         if self.periods is not None:
@@ -193,12 +192,12 @@ class TimeSpec(Section):
 
 
 class Scaling(Section):
-    """What leads back from a run in characteristic units; the numbers of the run itself are dimensionless."""
+    """What converts a dimensionless run back to the units of the model."""
 
     scales: Numbers
     """The characteristic scales: ``t``, every state, ``energy``."""
     parameters: Numbers
-    """As in the file, in the units of the model."""
+    """Parameters as in the file, in the units of the model; so are `initial` and `end`."""
     initial: Numbers
     end: Positive
 
@@ -207,42 +206,42 @@ class SchemeSpec(Section):
     """A scheme, with every option."""
 
     name: Text
-    """The label, else the kind."""
+    """The label if there is one, otherwise the kind."""
     kind: Text
     options: Options
     _own: Scheme | None = PrivateAttr(default=None)
 
     def hold(self, scheme: Scheme) -> None:
-        """Take the scheme of this kind, where a program hands it over and none is registered."""
+        """Attach the scheme itself, if a program passes one that is not registered."""
         self._own = scheme
 
     @property
     def method(self) -> Scheme:
-        """The scheme of this kind, which is the same with any options."""
+        """The scheme of this kind; it does not depend on the options."""
         return self._own or SCHEMES[self.kind]
 
     @property
     def adaptive(self) -> bool:
-        """Whether it chooses its own steps, outside the ladder."""
+        """Whether the scheme is adaptive: it chooses its own steps and has no levels."""
         return self.method.adaptive
 
     @property
     def own_velocity(self) -> bool:
-        """Whether it has another velocity than the centred difference ``[D_2t u]``, which is then kept beside it."""
+        """Whether its velocity differs from the centred difference ``[D_2t u]``; both are then stored."""
         return not self.adaptive and self.method.stepper(self.options).own_velocity
 
 
 class Sweep(Section):
-    """Parameters that vary: a grid, the last axis fastest."""
+    """Parameters that vary: a grid of members in which the last axis varies fastest."""
 
     axes: tuple[Axis, ...]
-    """In the order written."""
+    """In the order of the file."""
     follow: str | None = None
-    """A key of the last axis, where each member along that starts from the last state of the one before."""
+    """A key of the last axis: each member along it starts from the final state of the previous one."""
 
     @property
     def keys(self) -> tuple[str, ...]:
-        """Dotted keys of everything that varies, in the order written."""
+        """Dotted keys of all swept parameters, in the order of the file."""
         return tuple(key for axis in self.axes for key in axis.keys)
 
     @property
@@ -252,7 +251,7 @@ class Sweep(Section):
 
     @property
     def chain(self) -> int:
-        """Number of members that start one from the other; 1 where all start as the file says."""
+        """Length of a chain of members that each start from the previous one; 1 without `follow`."""
         return self.axes[-1].count if self.follow else 1
 
     @property
@@ -261,14 +260,14 @@ class Sweep(Section):
             yield from ((key, *span) for key, span in zip(axis.keys, axis.spans, strict=True))
 
     def least_end(self, time: TimeSpec) -> float:
-        """Return the earliest end of a member, as far as the sweep gives it."""
+        """Return the smallest end time in the sweep; without a swept end, that of the file."""
         ends = (float(low) for key, low, _ in self._spans if key == "time.end")
         return min(ends, default=time.end)
 
     def fixed_end(self, time: TimeSpec) -> float | None:
-        """Return the end that every member has, None where the end varies.
+        """Return the end time shared by all members, None if it varies.
 
-        One that follows from the model counts as different as soon as a parameter of the model is.
+        An end that follows from the model counts as varying as soon as any model parameter does.
         """
         differ = [key for key, low, high in self._spans if low != high]
         by_model = time.is_of_model and any(key.startswith("model.") for key in differ)
@@ -276,7 +275,7 @@ class Sweep(Section):
 
 
 class ReadExperiment(Section):
-    """What every experiment is called, and where it was read."""
+    """The names of an experiment, and where it was read."""
 
     collection: Identifier
     name: Identifier
@@ -287,25 +286,25 @@ class ReadExperiment(Section):
 
     @property
     def file(self) -> Path | None:
-        """Where it was read; not part of its identity."""
+        """The experiment file, None if there is none; not part of the identity."""
         return self._file
 
     @property
     def folder(self) -> Path:
-        """Folder of that file, from which paths start, and where a command runs."""
+        """Folder of that file. Relative paths start here, and commands of the user run here."""
         return self._file.parent if self._file else Path()
 
     @property
     def settings(self) -> tuple[str, ...]:
-        """What a command line gave in place of values of the file, as ``KEY=VALUE``; not part of its identity."""
+        """Overrides of the command line, as ``KEY=VALUE``; not part of the identity."""
         return self._settings
 
     @property
     def word(self) -> str:
-        """How a command line names the experiment.
+        """The argument that names the experiment on a command line.
 
-        One that comes with vibsim is named by its collection, any other by its file, in the folder of that file:
-        results hold no path of a machine, and are the same wherever they are made.
+        It is ``collection/name`` for a shipped experiment, else the file name without its folder: results hold no path
+        of a machine, so they are the same wherever they are made.
         """
         file = self._file or Path(f"{self.name}.yaml")
         word = file.name if self.collection == ADHOC else f"{self.collection}/{file.stem}"
@@ -313,42 +312,42 @@ class ReadExperiment(Section):
         return word if is_whole else f"{word}@{self.name.removeprefix(f'{file.stem}_case_')}"
 
     def command_of(self, case: int) -> str:
-        """Return the command that runs one member of the sweep alone."""
+        """Return the shell command that runs only member `case` of the sweep."""
         return command_to_run(f"{self.word}@{case}", self.settings)
 
 
 class ExperimentSpec(ReadExperiment):
-    """The fields of an experiment, and what follows from them alone."""
+    """The fields of an experiment, and properties derived from them."""
 
     model: ModelSpec
     initial: Numbers
     """Initial value of every state."""
     time: TimeSpec
     levels: tuple[Level, ...]
-    """Strictly increasing; none where `tolerance` is still to choose them."""
+    """Strictly increasing; empty as long as `tolerance` has not chosen them."""
     schemes: tuple[SchemeSpec, ...]
     sweep: Sweep | None = None
     samples: Annotated[int, Field(ge=1)] | Literal["auto", "common", "all"] = "auto"
-    """Which steps are stored; a number n stands for every n-th of each level."""
+    """Which steps are stored; a number n means every n-th step of each level."""
     output: Output = "verdict"
-    """``best`` where the extrapolated solution is wanted beside the verdict."""
+    """``best`` to compute the extrapolated solution as well as the verdict."""
     tolerance: float | None = None
-    """Error bound that chooses the levels; None where the file gives them."""
+    """Error bound from which the levels are chosen; None if the file gives them."""
     checks: tuple[Check, ...] = ()
-    """As written, and behind them one claim for every row of `published`."""
+    """The checks of the file, followed by one claim for every row of `published`."""
     published: tuple[PublishedTable, ...] = ()
     """Tables of numbers that a source printed."""
     figures: tuple[FigureOfSource, ...] = ()
-    """Figures that a source shows, which the page draws."""
+    """Figures of a source, which the report draws."""
     units: Annotated[dict[str, str], AfterValidator(FrozenDict)] = FrozenDict()
-    """Units that the file defines, in SI base units; every number is converted already."""
+    """Units that the file defines, in SI base units. All numbers are already converted."""
     scaling: Scaling | None = None
-    """Present where the run is made in the characteristic units of the model."""
+    """Set if the run uses the characteristic units of the model."""
     _notes: tuple[tuple[int, str], ...] = PrivateAttr(default=())
 
     @property
     def notes(self) -> tuple[tuple[int, str], ...]:
-        """What the file says and probably does not mean: line (0 without one) and text; not part of its identity."""
+        """Warnings about probable mistakes: line of the file (0 if none) and text; not part of the identity."""
         return self._notes
 
     @property
@@ -358,7 +357,7 @@ class ExperimentSpec(ReadExperiment):
 
     @property
     def chain(self) -> int:
-        """Number of members that start one from the other (`Sweep.chain`)."""
+        """Length of a chain of members that each start from the previous one (`Sweep.chain`)."""
         return self.sweep.chain if self.sweep else 1
 
     @property
@@ -368,7 +367,7 @@ class ExperimentSpec(ReadExperiment):
 
     @property
     def end_varies(self) -> bool:
-        """Whether the end time differs between members, so that ``t`` is the fraction 0 to 1 of it."""
+        """Whether the end time differs between members. Then ``t`` is the fraction 0 to 1 of it."""
         return self.sweep is not None and self.sweep.fixed_end(self.time) is None
 
     @property
@@ -379,22 +378,22 @@ class ExperimentSpec(ReadExperiment):
 
     @property
     def ladder(self) -> tuple[int, ...]:
-        """Numbers of the schemes that take equal steps, and so have levels to compare; at least one."""
+        """Indices of the fixed-step schemes, which have levels to compare; at least one."""
         return tuple(i for i, scheme in enumerate(self.schemes) if not scheme.adaptive)
 
     @property
     def own_velocity(self) -> bool:
-        """Whether some scheme has another velocity than the centred difference ``[D_2t u]``, without events."""
+        """Whether the velocity of some scheme differs from ``[D_2t u]``. Always False for models with events."""
         smooth = self.model.definition.events is None
         return smooth and any(scheme.own_velocity for scheme in self.schemes)
 
     @property
     def quantities(self) -> tuple[str, ...]:
-        """Names of every quantity that is kept as a series where storage is not bounded."""
+        """Names of all quantities that are stored as time series, if storage is not bounded."""
         return quantities(self.model.definition, self.own_velocity)
 
     def natural_end(self, parameters: Mapping[str, Any]) -> Any:
-        """Return the end time of a member with these `parameters` (numbers or arrays), unless swept."""
+        """Return the end time for these `parameters` (numbers or arrays), if the end itself is not swept."""
         return self.time.end_of(self.model.definition, parameters)
 
     def steps(self, level: int) -> int:
@@ -409,11 +408,11 @@ class ExperimentSpec(ReadExperiment):
 
 
 AnyExperiment = TypeVar("AnyExperiment", bound=ExperimentSpec)
-"""The class of an experiment, which stays the same where one is made of another."""
+"""Class of an experiment, kept by functions that derive one experiment from another."""
 
 
 def check_member(case: int, members: int, name: str) -> None:
-    """Refuse a member that an experiment has not, which is read from a file called `name`."""
+    """Raise `InputError` if the experiment, read from file `name`, has no member number `case`."""
     if not 0 <= case < members:
         there = "there is 1 member" if members == 1 else f"there are {members} members"
         rule = f"a case must be from 0 to {members - 1}"
@@ -421,10 +420,10 @@ def check_member(case: int, members: int, name: str) -> None:
 
 
 def schemes_of(experiment: ExperimentSpec, check: Check) -> tuple[int, ...]:
-    """Return the numbers of the schemes that a check, or that inside a claim, is about, increasing.
+    """Return the indices of the schemes that a check applies to, increasing; a claim applies where its check does.
 
-    They are those that it names. Where it names none, they are those with equal steps; and where it is about what only
-    schemes with a velocity of their own have, those.
+    A check that names no schemes applies to all fixed-step schemes that have its quantity: only schemes with a velocity
+    of their own have the centred one beside it.
     """
     inner = check.measured
     named: tuple[str, ...] | None

@@ -1,4 +1,4 @@
-"""Collect every fault of an input, each with its line, in the words of the person who wrote it."""
+"""Collect every fault of an input, with its line and the text of the file."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ _FORMS = {
     "logspace": "must be [first, last, count]",
     "range": "must be [first, end, step]",
 }
-"""How each rule for the values of a sweep is written."""
+"""Syntax of each rule for the values of a sweep."""
 
 _EXAMPLES: Mapping[object, str] = {
     ("levels",): "e.g. [6, 7, 8, 9], or {from: 6, to: 9}",
@@ -54,64 +54,64 @@ _EXAMPLES: Mapping[object, str] = {
     "then": "e.g. {v: -0.8*v}",
     "at": "e.g. {level: best}",
 }
-"""How a list or a mapping is written, where the rule alone would help nobody: by its path, or by its key anywhere."""
+"""Examples of lists and mappings for messages whose rule alone does not help; by path, or by key anywhere."""
 
 _MEANT = {"tolerance": "atol", "tol": "atol", "at_least": "above", "at_most": "below"}
-"""A key that other programs or other checks have, and the one that has its meaning here."""
+"""Keys of other programs or other checks, and the key with the same meaning here."""
 _PLACES = {"schemes": "scheme", "levels": "level", "cases": "case"} | {
     name: name for name in ("t", "step", "event", "case", "level", "best", "scheme")
 }
-"""Keys that stand in the section `at` of a check of a number."""
+"""Keys that belong into the section `at` of a check of a number, by what is written outside of it."""
 
 
 class Report:
-    """The faults of one input, and the kinds that it may name."""
+    """The faults and warnings of one input, and the models and schemes that it may name."""
 
     def __init__(self, source: Source, kinds: Kinds | None = None) -> None:
         self.source = source
         self.kinds = kinds or Kinds()
         self.faults: set[Fault] = set(source.faults)
         self.notes: set[Fault] = set()
-        """What is allowed, and probably not meant."""
+        """Warnings: valid input that is probably a mistake."""
         self.faulty: set[Path_] = set()
-        """Places of malformed values; nothing more is said about them."""
-        self._repeated: set[Path_] = set()
-        """Places with an index of `repeat`; a fault is reported for the first of its values."""
+        """Paths of malformed values; no further fault is reported there."""
+        self._expanded: set[Path_] = set()
+        """Paths of the file that `repeat` expanded and that have a fault already; only the first copy is reported."""
 
     def add(
         self, path: Path_, rule: str, hint: str = "", value: object = None, at_key: bool = False
     ) -> None:
-        """Note a fault of the value at `path`, or with `at_key` of the key itself.
+        """Record a fault of the value at `path`, or of the key itself with `at_key`.
 
-        InputError where there are `MAX_FAULTS` already: nobody reads more of them.
+        Raises `InputError` at `MAX_FAULTS` faults, because nobody reads more of them.
         """
         origin = self.source.origin(path)
-        if path in self.faulty or origin in self._repeated:
+        if path in self.faulty or origin in self._expanded:
             return
         if origin is not None:
-            self._repeated.add(origin)
+            self._expanded.add(origin)
         self.faults.add(self._fault(path, rule, hint, value, at_key))
         if len(self.faults) == MAX_FAULTS:
             self.faults.add(Fault(self.source.file, 0, "", "", "has more faults than are listed"))
             self.raise_any()
 
     def note(self, path: Path_, rule: str, hint: str = "") -> None:
-        """Note what the value at `path` means, where something else is probably meant."""
+        """Record a warning: the value at `path` is valid, but probably a mistake."""
         self.notes.add(self._fault(path, rule, hint, None, False))
 
     def _fault(self, path: Path_, rule: str, hint: str, value: object, at_key: bool) -> Fault:
         if path and str(path[-1]).count(")") > str(path[-1]).count("("):
-            # half of a formula
+            # a comma between braces has cut a formula in two
             hint = "between braces a comma ends a value: write a formula with commas in quotation marks"
         place = self.source.place(path)
         nested = place is not None and not place.text
-        file, line = self._above(path)
+        file, line = self._nearest_place(path)
         if place and not (at_key or nested or place.setting):
             line = place.line
-        written, origin = "" if value is None else _written(value), self.source.origin(path)
+        written, origin = "" if value is None else _as_yaml(value), self.source.origin(path)
         if place and place.text and not (written and origin):
             written = place.text
-        # a key that `repeat` wrote out says more than the one of the file; positions of a list are those of the file
+        # show keys as `repeat` expanded them, but positions in a list as in the file
         is_repeated = any("{" in str(key) for key in origin or ())
         shown = path if origin is None or (is_repeated and isinstance(path[-1], str)) else origin
         return Fault(file, line, dotted(shown), shorten(written), rule, hint)
@@ -124,12 +124,12 @@ class Report:
     def add_malformed(
         self, path: Path_, rule: str, hint: str = "", value: object = None, at_key: bool = False
     ) -> None:
-        """Note a fault of which nothing else follows: see `faulty`."""
+        """Record a fault at `path` and suppress all further ones there (`faulty`)."""
         self.add(path, rule, hint, value, at_key)
         self.faulty.add(path)
 
-    def _above(self, path: Path_) -> tuple[str, int]:
-        """Return where the nearest key at or above `path` stands: the file with its line, or a setting without one."""
+    def _nearest_place(self, path: Path_) -> tuple[str, int]:
+        """Return file and line of the nearest key at or above `path`; for a command-line setting, its text and 0."""
         for length in range(len(path), 0, -1):
             place = self.source.place(path[:length])
             if place is not None and place.setting:
@@ -139,7 +139,7 @@ class Report:
         return self.source.file, self.source.top.line if self.source.top else 0
 
     def add_unknown_key(self, path: Path_, value: object, known: list[str]) -> None:
-        """Note a key that is none of those `known` in its mapping."""
+        """Record a fault of a key that is not among the `known` ones of its mapping."""
         if path[0] == "sweep" and path[-1] in _FORMS:
             rule, hint = "a key of the sweep has one rule for its values", ""
         else:
@@ -156,22 +156,22 @@ class Report:
         self.add_malformed(path, rule, hint, value, at_key=True)
 
     def _is_parameter(self, path: Path_) -> bool:
-        """Tell whether a key of the model is the name of a parameter that the model declares."""
+        """Tell whether a key of the model is the name of a declared parameter."""
         model = self.source.data["model"] if path[:-1] == ("model",) else {}
         declared = model.get("parameters")
         return isinstance(declared, Mapping) and path[-1] in declared
 
     def add_invalid(self, error: ValidationError, path: Path_) -> list[Path_]:
-        """Note every fault that pydantic found in the value at `path`; return their places."""
+        """Record every fault that pydantic found in the value at `path`, and return their paths."""
         paths = [self._add_row(row, path) for row in error.errors(include_url=False)]
         self.faulty.update(paths)
         return paths
 
     def _add_row(self, row: Any, above: Path_) -> Path_:
         kind: str = row["type"]
-        # the names of union members stand in no file
-        named = (part for part in row["loc"] if not str(part).startswith("\0"))
-        path: Path_ = (*above, *named)
+        # pydantic inserts the tags of unions, which are not in the file
+        keys = (part for part in row["loc"] if not str(part).startswith("\0"))
+        path: Path_ = (*above, *keys)
         if kind.startswith("union_tag"):
             self._add_kind(path, row["input"])
             return path
@@ -181,7 +181,7 @@ class Report:
         value = None if kind == "missing" else row["input"]
         hint = context.get("hint", "")
         if kind == "values" and isinstance(value, dict) and value:
-            # the values of a key of the sweep are no list and follow no rule
+            # a swept key has a mapping that is no known rule
             for name in map(str, value):
                 self.add((*path, name), "unknown key", nearest(name, list(_FORMS)), at_key=True)
             return path
@@ -195,13 +195,13 @@ class Report:
             hint = _EXAMPLES.get(path) or _EXAMPLES.get(path[-1], hint)
         if kind in ("missing", "too_long", "tuple_type"):
             path, rule = _whole_list(path, rule)
-        # a list with wrong items is too short only for pydantic, which counts the right ones
+        # pydantic counts only valid items: a list with invalid ones is not too short
         if kind != "too_short" or not value:
             self.add(path, rule, hint, value)
         return path
 
     def _add_kind(self, path: Path_, value: object) -> None:
-        """Note that a model or a scheme has no kind that exists."""
+        """Record that the kind of a model or a scheme is missing or unknown."""
         kinds = sorted(self.kinds.names(path[0]))
         if not isinstance(value, dict):
             hint = f"write {{kind: {value}}}" if value in kinds else f"e.g. {{kind: {kinds[0]}}}"
@@ -216,52 +216,52 @@ class Report:
 
     @property
     def note_lines(self) -> tuple[tuple[int, str], ...]:
-        """The notes as lines of the file, 0 where there is none, and texts."""
-        found = []
+        """The warnings as pairs of a line of the file (0 if none) and a text."""
+        lines = []
         for row in sorted(self.notes):
             setting = row.file.removeprefix(self.source.file).removeprefix(", ")
-            found.append((row.line, str(replace(row, file=setting, line=0))))
-        return tuple(found)
+            lines.append((row.line, str(replace(row, file=setting, line=0))))
+        return tuple(lines)
 
     @property
-    def doubts_model(self) -> bool:
+    def has_faulty_model(self) -> bool:
         """Whether the section ``model`` has a fault."""
         return any(fault.key.split(".")[0] == "model" for fault in self.faults)
 
     def formula(
         self, path: Path_, text: str, names: Sequence[str], more: str = "", hint: str = ""
     ) -> Expression | None:
-        """Return a formula that may hold some names; None where it cannot be read, which is noted.
+        """Parse a formula in the given names; record a fault and return None if it is invalid.
 
-        Where a name is unknown, `more` stands behind the rule; a `hint` takes the place of that of the parser.
+        `more` is appended to the rule about an unknown name; `hint` replaces the hint of the parser.
         """
         try:
             return parse(text, names)
         except ExpressionError as error:
             place = f" at character {error.position + 1}" if error.position < MAX_CHARACTERS else ""
-            rest = more if error.rule.startswith("unknown name") else ""
-            self.add(path, f"{error.rule}{place}{rest}", hint or error.hint, text)
+            suffix = more if error.rule.startswith("unknown name") else ""
+            self.add(path, f"{error.rule}{place}{suffix}", hint or error.hint, text)
             return None
 
     def raise_any(self) -> None:
-        """Raise `InputError` with every fault, if there is one."""
+        """Raise `InputError` with all faults, if there are any."""
         if self.faults:
             raise InputError(self.faults)
 
 
-def _written(value: object) -> str:
-    """Return a value as a file has it."""
+def _as_yaml(value: object) -> str:
+    """Return a value in YAML syntax."""
     if isinstance(value, dict):
-        return "{" + ", ".join(f"{key}: {_written(inner)}" for key, inner in value.items()) + "}"
+        return "{" + ", ".join(f"{key}: {_as_yaml(inner)}" for key, inner in value.items()) + "}"
     if isinstance(value, list):
-        return "[" + ", ".join(map(_written, value)) + "]"
+        return "[" + ", ".join(map(_as_yaml, value)) + "]"
     if isinstance(value, bool):
         return str(value).lower()
     return "null" if value is None else str(value)
 
 
 def _shipped(name: str) -> str:
-    """Return the shipped experiment of a name, with its collection; empty where there is none."""
+    """Return ``collection/name`` of the shipped experiment called `name`; empty if there is none."""
     if not re.fullmatch(r"\w+", name):
         return ""
     files = sorted((home() / "configs").glob(f"*/{name}.yaml"))
@@ -269,13 +269,13 @@ def _shipped(name: str) -> str:
 
 
 def _nearest_key(value: dict[Any, Any], rule: str) -> str:
-    """Name the key that one of a mapping is near to, of those that a rule lists."""
+    """Return the key listed in a rule that is most similar to some key of a mapping; empty if none is."""
     known = re.split(", | or ", rule.partition(" the key ")[2])
     return next(filter(None, (likely(key, known) for key in value)), "")
 
 
 def _whole_list(path: Path_, rule: str) -> tuple[Path_, str]:
-    """Return where a list of fixed length stands of which too little or too much is there, and how it is written."""
+    """Return the path of the list of fixed length that contains `path`, and a rule with its syntax."""
     for name, form in _FORMS.items():
         if name in path:
             return path[: path.index(name) + 1], form
@@ -288,7 +288,7 @@ def _whole_list(path: Path_, rule: str) -> tuple[Path_, str]:
 
 
 def shorten(text: str) -> str:
-    """Return `text` on one line, cut to `MAX_VALUE` characters; control characters are spelled out."""
+    """Return `text` on one line, cut to `MAX_VALUE` characters, with control characters escaped."""
     shown = (
         c if c.isprintable() or c in "\t\r\n" else repr(c)[1:-1] for c in text[: 4 * MAX_VALUE]
     )

@@ -1,4 +1,4 @@
-"""From a file, or what one would hold, to an experiment: all sections are read before anything is refused."""
+"""Read an experiment from a file or from a mapping; all sections are read before any fault is raised."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from vibsim.experiment.rules import continuation, members, size_limits, timing, 
 from vibsim.experiment.rules import schemes as scheme_rules
 from vibsim.experiment.rules.checks import check_published, finish_checks
 from vibsim.experiment.rules.figures import check_figures
-from vibsim.experiment.rules.model import Equation, are_known
+from vibsim.experiment.rules.model import Equation, has_all_values
 from vibsim.experiment.rules.model import equation as read_equation
 from vibsim.experiment.rules.scaling import Numbers, characteristic
 from vibsim.experiment.rules.structure import check_histories
@@ -40,16 +40,16 @@ from vibsim.models.structure import STRUCTURE
 from vibsim.schemes import SCHEMES, Scheme
 
 SOLVER = "solver"
-"""The key that only a file of `vibsim.experiment.solver_reading` has."""
+"""Key that only the files of `vibsim.experiment.solver_reading` have."""
 KEYS = (*Document.model_fields, SOLVER, "refine", "quantities")
-"""Keys of experiment files of both kinds."""
+"""Top-level keys of both kinds of experiment file."""
 MAX_NAME = 100
 MAX_REPEATS = 20
-"""Snakemake takes a name that ends in so many repetitions for a rule that feeds itself."""
+"""Snakemake takes a name that ends in this many repetitions for a rule that feeds itself."""
 AS_WRITTEN = ("title", "source", "output", "tolerance", "published", "figures", "units")
-"""Sections that an experiment has as they are written."""
+"""Sections that are copied unchanged into the experiment."""
 SAME_START = 1e-12
-"""A state that is given and follows from the parameters agrees to this part of the largest one."""
+"""Tolerance, relative to the largest state, of a given initial state that also follows from the parameters."""
 
 _PERIODIC = re.compile(rf"(.+)\1{{{MAX_REPEATS - 1}}}$")
 
@@ -72,16 +72,16 @@ def from_content(data: Mapping[str, Any], name: str, collection: str) -> Experim
 
 
 def from_objects(data: Mapping[str, Any], name: str, collection: str) -> ExperimentSpec:
-    """Build an experiment from what a file would hold, with models and schemes themselves in place of their kinds."""
-    given: dict[type[Model | Scheme], list[Any]] = {Model: [], Scheme: []}
+    """Build an experiment from a mapping that may contain model and scheme objects in place of their kinds."""
+    objects: dict[type[Model | Scheme], list[Any]] = {Model: [], Scheme: []}
 
     def named(section: Any) -> Any:
-        """Return a section as a file would have it, and keep the model or the scheme that it holds."""
+        """Replace an object in a section by its kind, and record the object."""
         if isinstance(section, Mapping):
             return {**section, "kind": named(section.get("kind"))} if "kind" in section else section
-        for type_, objects in given.items():
+        for type_, of_type in objects.items():
             if isinstance(section, type_):
-                objects.append(section)
+                of_type.append(section)
                 return section.kind
         return section
 
@@ -92,12 +92,12 @@ def from_objects(data: Mapping[str, Any], name: str, collection: str) -> Experim
         "model": named(data["model"]),
         "schemes": [named(scheme) for scheme in schemes] if are_listed else schemes,
     }
-    kinds = Kinds(MODELS.own(given[Model]), SCHEMES.own(given[Scheme]))
+    kinds = Kinds(MODELS.own(objects[Model]), SCHEMES.own(objects[Scheme]))
     return build(Source(name, _plain(content, name)), collection, name, kinds=kinds)
 
 
 def _plain(data: Any, name: str, depth: int = 0) -> Any:
-    """Return `data` with Python's own numbers, lists and dictionaries."""
+    """Return `data` converted to built-in numbers, lists and dictionaries."""
     if depth > MAX_DEPTH:
         rule = f"must not nest deeper than {MAX_DEPTH} levels"
         raise InputError([Fault(name, 0, "", "", rule)])
@@ -121,15 +121,15 @@ def build(
     file: Path | None = None,
     kinds: Kinds | None = None,
 ) -> ExperimentSpec:
-    """Validate what `source` holds and fill in every default.
+    """Validate the content of `source` and fill in every default.
 
-    `kinds` says which models and schemes it may name, by default those that are registered.
+    `kinds` holds the models and schemes that may be named, by default the registered ones.
 
-    InputError with every fault of the file.
+    Raises `InputError` with every fault of the file.
     """
     report = Report(source, kinds)
     check_names(name, collection, report)
-    # each brings its part of the content to the form that the next one reads
+    # the order matters: each step writes the form that the next one reads
     write_out_chain(report)
     write_out_repeats(report)
     write_usual_form(report)
@@ -170,20 +170,20 @@ def build(
 def _equation_and_setting(
     document: Any, folder: Path, report: Report
 ) -> tuple[Equation, Numbers, size_limits.Setting]:
-    """Return the equation, its numbers with what they are scaled by, and what checks and limits need to know."""
+    """Return the equation, its (scaled) numbers, and the setting that checks and size limits are validated against."""
     data = report.source.data
     swept = sorted(set(_keys(data.get("sweep"))))
-    # a model section with a fault elsewhere still names its model
-    of_kind = report.kinds.model_of(data.get("model"))
-    equation = read_equation(document.model, of_kind, swept, folder, report)
+    # a faulty model section may still name its model
+    registered = report.kinds.model_of(data.get("model"))
+    equation = read_equation(document.model, registered, swept, folder, report)
     model, parameters = equation.model, equation.parameters
     levels = _levels(document, report)
     schemes = tuple(scheme_rules.finish_schemes(document.schemes, model, report))
     knows_schemes = scheme_rules.are_known(document.schemes, report.kinds)
     time = timing.time_spec(document.time, model, parameters, report)
-    # the states of a structure are known with its matrices alone
-    known = None if of_kind is STRUCTURE else of_kind
-    initial = _initial(document.initial, model or known, parameters, report)
+    # the states of a structure are known only once its matrices are
+    fallback = None if registered is STRUCTURE else registered
+    initial = _initial(document.initial, model or fallback, parameters, report)
     sweep, is_whole = read_sweep(document, model, schemes, not knows_schemes, report)
     if is_whole:
         _check_members(equation, initial, time, sweep, report)
@@ -206,7 +206,7 @@ def _equation_and_setting(
 
 
 def _model_spec(equation: Equation, parameters: Mapping[str, float]) -> ModelSpec:
-    """Return the model of an experiment, whose equation is known."""
+    """Return the model of an experiment whose equation was read without fault."""
     model = equation.model
     assert model is not None
     return ModelSpec(
@@ -227,17 +227,17 @@ def _check_members(
     sweep: Sweep,
     report: Report,
 ) -> None:
-    """Check what every member of a sweep must keep, where all of its numbers are known."""
+    """Check the rules that every member of a sweep must satisfy, if all of its numbers are known."""
     model, parameters = equation.model, equation.parameters
-    if time is None or model is None or not are_known(model, parameters):
+    if time is None or model is None or not has_all_values(model, parameters):
         return
     numbers = members.MemberNumbers(model, parameters, initial, time, sweep.axes)
     members.check_ends(numbers, report)
     for table in equation.tables:
-        members.check_length(numbers, table, report)
+        members.check_table_length(numbers, table, report)
     if equation.structure is not None and equation.structure.structure.histories:
-        last = max(float(max(end)) for _, end in numbers.members())
-        check_histories(equation.structure, last, report)
+        latest = max(float(max(end)) for _, end in numbers.blocks())
+        check_histories(equation.structure, latest, report)
     members.check_jumps(numbers, equation.formulas, report)
     if sweep.follow is not None:
         continuation.check_equation(model, numbers, report)
@@ -245,7 +245,7 @@ def _check_members(
 
 
 def check_names(experiment: str, collection: str, report: Report) -> None:
-    """Note what is wrong with the names of an experiment and its collection."""
+    """Report faults in the names of an experiment and its collection."""
     for what, name in (("experiment", experiment), ("collection", collection)):
         who = f"the name of the {what}, '{shorten(name)}',"
         if not re.fullmatch(IDENTIFIER, name):
@@ -264,7 +264,7 @@ def _keys(section: Any) -> Iterator[str]:
 
 
 def _levels(document: Any, report: Report) -> tuple[int, ...]:
-    """Return the levels; none where the section is missing or faulty, or a tolerance stands for it."""
+    """Return the levels; empty if the section is missing or faulty, or replaced by a tolerance."""
     data = report.source.data
     given = [key for key in ("levels", "tolerance") if data.get(key) is not None]
     if not given:
@@ -277,32 +277,32 @@ def _levels(document: Any, report: Report) -> tuple[int, ...]:
 def _initial(
     given: Mapping[str, float], model: Model | None, parameters: Mapping[str, float], report: Report
 ) -> dict[str, float]:
-    """Return the initial value of every state, 0 for those that are not given."""
+    """Return the initial value of every state, 0 by default."""
     if model is None:
         return {}
     states = [state.name for state in model.states]
     for name in given:
         if name not in states:
             report.add(("initial", name), "unknown state", nearest(name, states), at_key=True)
-    found = {name: given.get(name, 0.0) for name in states}
+    initial = {name: given.get(name, 0.0) for name in states}
     for state in model.states:
-        if state.minimum is not None and found[state.name] < state.minimum:
+        if state.minimum is not None and initial[state.name] < state.minimum:
             rule = f"must be at least {state.minimum:g}"
-            report.add(("initial", state.name), rule, value=found[state.name])
-    start = model.start(parameters) if model.start and are_known(model, parameters) else {}
-    size = max(map(abs, start.values()), default=0.0)
+            report.add(("initial", state.name), rule, value=initial[state.name])
+    start = model.start(parameters) if model.start and has_all_values(model, parameters) else {}
+    scale = max(map(abs, start.values()), default=0.0)
     for name, value in start.items():
-        near = math.isclose(found[name], value, rel_tol=SAME_START, abs_tol=SAME_START * size)
-        if name in given and not near:
+        agrees = math.isclose(initial[name], value, rel_tol=SAME_START, abs_tol=SAME_START * scale)
+        if name in given and not agrees:
             rule = f"must be {value:.15g}, where the motion starts, or be left out"
             hint = "with `observe` or `start`, model.start gives the start"
             report.add(("initial", name), rule, hint if model.kind == "structure" else "")
-        found[name] = float(value)
-    return found
+        initial[name] = float(value)
+    return initial
 
 
 def _checks(document: Any, setting: size_limits.Setting, report: Report) -> tuple[Check, ...]:
-    """Return the checks of a file, or those of one that has none, and the claims of its printed tables."""
+    """Return the checks of the file (default: every position converges), and the claims of its printed tables."""
     given, model = document.checks, setting.model
     if not given and not document.published and model is not None:
         given = [ConvergesCheck(converges=position) for position in model.positions]
@@ -314,7 +314,7 @@ def _checks(document: Any, setting: size_limits.Setting, report: Report) -> tupl
 
 
 def _check_output(document: Any, setting: size_limits.Setting, report: Report) -> None:
-    """Refuse to extrapolate over one level, the whole motion of several coordinates, or members that follow others."""
+    """Refuse extrapolation over one level, of several coordinates, or with `follow`."""
     model = setting.model
     if document.output == "best" and len(setting.levels) == 1:
         rule = "the best solution is extrapolated over at least 2 levels, there is 1"

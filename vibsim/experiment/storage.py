@@ -1,4 +1,4 @@
-"""What a level stores: which of its steps, which quantities over time, how many extrema; bounded in large sweeps."""
+"""What a level stores: which steps, which time series, how many extrema. Large sweeps store less."""
 
 from __future__ import annotations
 
@@ -7,34 +7,34 @@ from vibsim.experiment.data import ExperimentSpec
 from vibsim.experiment.value_names import MOST_EVENTS
 
 SMALL = 200_000
-"""Samples of one variable up to which ``samples: auto`` keeps every step of a level."""
+"""Largest number of samples of one variable for which ``samples: auto`` stores every step of a level."""
 LARGE = 2**17
-"""Samples of one variable above which ``samples: auto`` keeps fewer than the times of the coarsest level."""
+"""Largest number of samples of one variable for which ``samples: auto`` stores all times of the coarsest level."""
 FEWEST_INTERVALS = 16
-"""Intervals between the samples of a member that ``samples: auto`` always keeps."""
+"""Smallest number of sampling intervals to which ``samples: auto`` thins a member."""
 LEAN = 2**18
-"""Samples of one variable on the coarsest level above which an experiment is lean."""
+"""Largest number of samples of one variable on the coarsest level of an experiment that is not lean."""
 MOST_EXTREMA = 512
-"""Peaks, and troughs, that are kept of a scheme and member."""
+"""Largest number of peaks, and of troughs, stored per scheme and member."""
 FEWEST_EXTREMA = 16
-"""As many are kept of however many members."""
+"""Number of extrema stored per scheme and member however many members there are."""
 RUNNING = "_running_max"
-"""Behind the name of an energy deviation: its largest absolute value over every step so far."""
-_OF_PEAKS = "phase_error_slope"
-"""The value that is made of the first `FEWEST_EXTREMA` peaks, which are kept whatever else is."""
+"""Suffix of the series with the running maximum of the absolute energy deviation, over all steps so far."""
+_PEAK_VALUE = "phase_error_slope"
+"""The value that is computed from single peaks, the first `FEWEST_EXTREMA`, which are always stored."""
 
 
 def stride(samples: int | str, coarsest: int, steps: int, trajectories: int) -> int:
-    """Return n where every n-th step of a level is stored.
+    """Return n such that every n-th step of a level is stored.
 
-    ``auto``, ``common`` and ``all`` keep times of the coarsest level: all of them, but where ``auto`` would keep too
-    many. Every n-th step of each level is as it says: what the levels then have in common is what is stored of the
-    coarsest.
+    ``common`` stores the times of the coarsest level and ``all`` every step. ``auto`` chooses between them by size, or
+    thins the times of the coarsest level. A number n applies to every level; the levels then share the stored times of
+    the coarsest one.
 
     Parameters
     ----------
     samples
-        What the file asks for: ``auto``, ``common``, ``all``, or n, which divides `coarsest`, for every n-th step.
+        The value in the file: ``auto``, ``common``, ``all``, or the stride n, a divisor of `coarsest`.
     coarsest, steps
         Number of steps of the coarsest level, and of this one.
     trajectories
@@ -44,7 +44,7 @@ def stride(samples: int | str, coarsest: int, steps: int, trajectories: int) -> 
         return samples
     if samples == "all" or (samples == "auto" and trajectories * (steps + 1) <= SMALL):
         return 1
-    # the least power of two that brings the samples down to `LARGE`, as far as the steps divide
+    # the smallest power of two that thins to `LARGE` samples, as far as the number of steps is divisible
     thinning = 1
     while (
         samples == "auto"
@@ -57,80 +57,77 @@ def stride(samples: int | str, coarsest: int, steps: int, trajectories: int) -> 
 
 
 def is_lean(samples: int | str, coarsest: int, trajectories: int) -> bool:
-    """Tell whether levels keep of the series only the states and the energy's deviation.
+    """Tell whether levels store only the states and the energy deviation as time series.
 
-    The parameters are as for `stride`. Who asks for every step, or for every n-th, gets every series.
+    The parameters are those of `stride`. An experiment with ``all`` or a stride in the file is never lean.
     """
     return samples in ("auto", "common") and trajectories * (coarsest + 1) > LEAN
 
 
 def extrema_kept(trajectories: int) -> int:
-    """Return how many peaks, and how many troughs, a level keeps of every scheme and member.
+    """Return the number of peaks, and of troughs, that a level stores per scheme and member.
 
-    It is the same number on every level. Among many `trajectories` (schemes times members) fewer are kept, so that they
-    take no more room than a series does (`SMALL`); all are counted.
+    It is the same on every level. With many `trajectories` (schemes times members) fewer are stored, so that they take
+    no more room than a series (`SMALL`). All of them are counted.
     """
-    return _fewer(MOST_EXTREMA, trajectories)
+    return _bounded(MOST_EXTREMA, trajectories)
 
 
 def events_kept(trajectories: int) -> int:
-    """Return of how many events a level keeps the times, of every scheme and member: of fewer among many."""
-    return _fewer(MOST_EVENTS, trajectories)
+    """Return the number of event times that a level stores per scheme and member; fewer with many `trajectories`."""
+    return _bounded(MOST_EVENTS, trajectories)
 
 
 def event_times(experiment: ExperimentSpec) -> int:
-    """Return of how many events a level keeps the times; where storage is bounded, of as many as checks ask for."""
+    """Return the number of event times that a level stores; if storage is bounded, only as many as checks need."""
     if experiment.model.definition.events is None:
         return 0
     checks = (check.measured for check in experiment.checks)
     numbers = (check.at.event or 0 for check in checks if check.kind == "value")
-    usual = 0 if is_bounded(experiment) else events_kept(experiment.trajectories)
-    return max(usual, *numbers, 0)
+    default = 0 if is_bounded(experiment) else events_kept(experiment.trajectories)
+    return max(default, *numbers, 0)
 
 
-def _fewer(kept: int, trajectories: int) -> int:
-    while kept > FEWEST_EXTREMA and kept * trajectories > SMALL:
-        kept = max(kept // 2, FEWEST_EXTREMA)
-    return kept
+def _bounded(count: int, trajectories: int) -> int:
+    while count > FEWEST_EXTREMA and count * trajectories > SMALL:
+        count = max(count // 2, FEWEST_EXTREMA)
+    return count
 
 
 def sampling(experiment: ExperimentSpec, level: int) -> int:
-    """Return the stride of the stored samples: every how many steps of `level` one is kept, the first and the last too.
-
-    All times of the coarsest level are among them unless the file asks for every n-th step of each level.
-    """
+    """Return the stride of the stored samples of `level` (see `stride`), which include the first and the last step."""
     coarsest = experiment.steps(experiment.levels[0])
     return stride(experiment.samples, coarsest, experiment.steps(level), experiment.trajectories)
 
 
 def is_bounded(experiment: ExperimentSpec) -> bool:
-    """Tell whether `experiment` is so large that its storage is bounded (`is_lean`)."""
+    """Tell whether the storage of `experiment` is bounded because it is large (`is_lean`)."""
     coarsest = experiment.steps(experiment.levels[0])
     return is_lean(experiment.samples, coarsest, experiment.trajectories)
 
 
 def checked_quantities(experiment: ExperimentSpec) -> tuple[str, ...]:
-    """Name the quantities that the checks are about."""
+    """Return the names of the quantities of all checks."""
     named = (check.measured.about for check in experiment.checks)
     return tuple(dict.fromkeys(name for name in named if name is not None))
 
 
 def lean_series(experiment: ExperimentSpec) -> tuple[str, ...]:
-    """Name the quantities that a level stores as series where storage is bounded (`is_lean`).
+    """Return the names of the time series that a level stores if storage is bounded (`is_lean`).
 
-    They are the states and the energy deviation, of which every number about an experiment can be worked out, and what
-    else a check asks for.
+    They are the states and the energy deviation, from which all other numbers can be computed, and the quantities of
+    checks.
     """
     states = (state.name for state in experiment.model.definition.states)
-    # parts of an error are made of the states
-    more = (name for name in checked_quantities(experiment) if not is_error_part(name))
-    return tuple(dict.fromkeys([*states, "energy_deviation", *more]))
+    # parts of an error are computed from the states
+    checked = (name for name in checked_quantities(experiment) if not is_error_part(name))
+    return tuple(dict.fromkeys([*states, "energy_deviation", *checked]))
 
 
 def stored_series(experiment: ExperimentSpec) -> tuple[str, ...]:
-    """Name every series that a level stores of each scheme and member.
+    """Return the names of all time series that a level stores.
 
-    Running maxima are among them; where storage is bounded, those that a check asks for.
+    They include running maxima; if storage is bounded, only those that a check needs.
     """
     running = [name for name in experiment.quantities if name.startswith("energy_deviation")]
     names = experiment.quantities
@@ -148,6 +145,6 @@ def stored_series(experiment: ExperimentSpec) -> tuple[str, ...]:
 
 
 def asks_for_peaks(experiment: ExperimentSpec) -> bool:
-    """Tell whether a check is about a number that is made of single peaks."""
+    """Tell whether a check needs a number that is computed from single peaks."""
     checks = [check.measured for check in experiment.checks]
-    return any(check.kind == "value" and check.value == _OF_PEAKS for check in checks)
+    return any(check.kind == "value" and check.value == _PEAK_VALUE for check in checks)

@@ -1,4 +1,4 @@
-"""The numbers that a ``value`` check can ask for: one row per name, worked out in the analysis."""
+"""The numbers that a ``value`` check can test. The analysis computes them."""
 
 from __future__ import annotations
 
@@ -11,86 +11,89 @@ AtPart = Literal["t", "step", "event", "level", "scheme", "case"]
 Take = Literal[
     "largest", "smallest", "mean", "where", "where_largest", "where_smallest", "monotone"
 ]
-"""Which number of all members a check is about."""
+"""How the numbers of all members are reduced to the one that is checked."""
 OF_ONE_MEMBER = (None, "largest", "smallest")
-"""Those that are the number of one member."""
+"""Reductions that pick the number of one member."""
 OF_THE_SAME_KIND = (*OF_ONE_MEMBER, "mean")
-"""Those that have the unit of a member's number, and digits of their own; others are swept values and directions."""
+"""Reductions with the unit of a member's number. The others give swept values or directions."""
 MOST_EVENTS = 512
-"""Events whose times are kept of a scheme and member."""
+"""Largest number of event times stored per scheme and member."""
 
 
 @dataclass(frozen=True)
 class Value:
-    """One number that can be checked."""
+    """A number that can be checked."""
 
     name: str
     description: str
     of: Literal[
         "series", "convergent", "states", "stored", "extremal", "deviation", "running", "none"
     ]
-    """Which quantities it can be of: every one; those that are compared between levels; the states, of which least and
-    largest value are gathered over every step; these and outputs; these and the energy deviations; the energy deviation
-    alone, whose last point is gathered apart; the energy deviations, whose largest value so far is gathered; or none
-    because the value belongs to the motion as a whole."""
+    """The quantities that it is defined for.
+
+    ``series``: all; ``convergent``: those compared between levels; ``states``: the states; ``stored``: states and
+    outputs; ``extremal``: states and energy deviations, whose extrema over every step are stored; ``deviation``: the
+    energy deviation, stored with and without its last point; ``running``: the energy deviations, whose running maximum
+    is stored; ``none``: it belongs to the motion as a whole.
+    """
     measure: Literal["none", "count", "quantity", "l1", "l2", "time", "frequency", "position"]
-    """What it is measured in: a plain number; one that is counted; the unit of its quantity, times that of the time or
-    its root in norms over time; the unit of the time, of an angle over it, or of the position."""
+    """Its unit: none; a count; the unit of the quantity, times that of time (``l1``) or its square root (``l2``);
+    the unit of time, of angle over time, or of the position."""
     at: tuple[AtPart, ...] = ("level", "scheme", "case")
-    """Which parts of ``at:`` it takes."""
+    """The keys of ``at:`` that it accepts."""
     finer_levels: int = 0
-    """How many finer levels a level must have beside it."""
+    """Number of finer levels that it needs besides its own level."""
     best: bool = False
-    """Whether it also exists at ``level: best``: as the limit of the numbers of all levels, or of the extrapolated
+    """Whether it is defined at ``level: best``, as the limit of the numbers of all levels or for the extrapolated
     solution."""
     needs_time: bool = False
     """Whether ``t`` or ``step`` must be given."""
     needs_exact: Literal["solution", "period"] | None = None
-    """What the model must know exactly."""
+    """Exact result that the model must provide."""
     needs_linear: bool = False
-    """Whether it comes from the theory of linear models without damping."""
+    """Whether it follows from theory for undamped linear models."""
     fixed_step: bool = False
-    """Whether it does not exist of schemes that choose their own steps."""
+    """Whether it is undefined for adaptive schemes."""
     needs_potential: bool = False
-    """Whether it does not exist where forces of the position have no potential energy that is known."""
+    """Whether it requires a known potential energy of all forces of the position."""
     needs_rational: bool = False
-    """Whether the acceleration must be worked out in exact numbers (`vibsim.theory.degrees`)."""
+    """Whether the acceleration must be computable in rational arithmetic (`vibsim.theory.degrees`)."""
     needs_events: bool = False
-    """Whether it exists only where the motion of the model is not smooth."""
+    """Whether it exists only for models with events."""
     needs_force: bool = False
-    """Whether it is of whole periods of a force, whose frequency ``time:`` names."""
+    """Whether it refers to whole periods of a force, whose frequency ``time:`` names."""
     is_sample: bool = False
-    """Whether it is a sample of a series, and is reported under the name of that."""
+    """Whether it is a sample of a series, and is reported under the name of the series."""
     is_count_of_work: bool = False
-    """Whether finer levels make it larger, and no more accurate."""
+    """Whether it measures work, which grows with the level and does not converge."""
     survives_failure: bool = False
-    """Whether it may be sound although the member broke down later; what theory gives no run enters."""
+    """Whether it can be valid although the run failed later. Values from theory do not depend on the run."""
     measured_by: Literal["", "parabola", "points", "roots"] = ""
-    """What its error comes from beside that of the steps: a peak interpolated by a parabola, extrema over the points of
-    the grid, or the recurrence of the steps, whose round-off is eps/(w dt)^2 (peaks where there is none)."""
+    """Its source of error besides the time steps: a peak interpolated by a parabola, extrema over grid points, or the
+    recurrence of the steps, whose round-off is eps/(w dt)^2 (peaks if the scheme has no such recurrence)."""
     is_angle: bool = False
-    """Whether whole turns make no difference."""
+    """Whether it is defined modulo whole turns."""
     has_own_size: bool = False
     """Whether its round-off is relative to itself."""
     rests_on_run: bool = False
-    """Whether a longer run makes its limit more accurate: by what is left of the start, or by other lines."""
+    """Whether a longer run makes its limit more accurate: transients and other spectral lines disturb it less."""
 
     def has_limit(self, level: int | str | None) -> bool:
-        """Tell whether it is asked for as the limit of the numbers of the levels, not of the extrapolated solution."""
+        """Tell whether at `level` it is the limit of the numbers of all levels, not of the extrapolated solution."""
         return level == "best" and self.best and self.of != "convergent"
 
     @property
     def sees_several_levels(self) -> bool:
-        """Whether it rests on more than one level: on finer ones, or on the whole ladder."""
+        """Whether it needs more than one level: finer ones, or the whole ladder."""
         return self.finer_levels > 0 or (self.of == "convergent" and "level" not in self.at)
 
     @property
     def depends_on_level(self) -> bool:
-        """Whether it is another one at another level, or rests on the whole ladder."""
+        """Whether it differs between levels, or needs the whole ladder."""
         return "level" in self.at or self.sees_several_levels
 
     def own_levels(self, levels: Sequence[int]) -> tuple[int, ...]:
-        """Return the levels that have such a number; one that is made of several belongs to the coarsest of them."""
+        """Return the levels at which it exists; a number computed from several levels belongs to the coarsest one."""
         return tuple(levels)[: len(levels) - self.finer_levels]
 
 
@@ -108,7 +111,7 @@ _MARKS: Mapping[str, Mapping[str, Any]] = {
     "points": {"measured_by": "points"},
     "roots": {"measured_by": "roots"},
 }
-"""Further fields of `Value`, by the words of the fourth column of the table; any other word is a field that is true."""
+"""Fields of `Value` for words of the fourth column of `_TABLE`; any other word is a field set to True."""
 _TABLE = """\
 end | series | quantity | anywhere best is_sample | value at the last time, or at `t` or `step`
 at | series | quantity | anywhere best needs_time is_sample survives_failure | value at the time `t` or after `step` \
@@ -199,4 +202,4 @@ def _value(line: str) -> Value:
 VALUES: Mapping[str, Value] = MappingProxyType(
     {row.name: row for row in map(_value, _TABLE.splitlines())}
 )
-"""Every value name with its meaning, as `vibsim list checks` prints it."""
+"""All values by name, as `vibsim list checks` prints them."""

@@ -1,4 +1,4 @@
-"""Where a check looks: the schemes, the member, the level and the time that it names are those of the experiment."""
+"""Validate the schemes, members, levels and times that a check refers to."""
 
 from __future__ import annotations
 
@@ -17,63 +17,63 @@ from vibsim.experiment.value_names import Value
 from vibsim.experiment.yaml.parse import Path_
 
 FEWEST_IN_A_PERIOD = 8
-"""Stored samples in a period of a force, from which its harmonic is told."""
+"""Smallest number of stored samples per period of a force from which its harmonic is computed."""
 
 
 @dataclass(frozen=True)
 class Scope:
-    """A place in the file, what a check there may name, and where its faults are noted."""
+    """A path in the file, the setting that a check there is validated against, and the report for its faults."""
 
     path: Path_
     setting: Setting
     report: Report
 
     def at(self, *keys: str | int) -> Scope:
-        """Return the scope of a place inside of this one.
+        """Return the scope of a path inside this one.
 
-        In a row of a printed table some keys stand under ``at``, which checks do not have there.
+        The keys of a row of a printed table that are under ``at`` get that prefix; callers use the names of checks.
         """
         inner = self.path[0] == "published" and keys[0] in ("t", "step", "event", "case")
         return replace(self, path=(*self.path, *(("at",) if inner else ()), *keys))
 
     @property
     def is_faulty(self) -> bool:
-        """Whether the value here is malformed and was left out."""
+        """Whether the value at this path is malformed and was left out."""
         return self.path in self.report.faulty
 
     def refuse(
         self, rule: str, hint: str = "", value: object = None, *, at_key: bool = False
     ) -> None:
-        """Note a fault here; see `vibsim.experiment.faults.Report.add`."""
+        """Report a fault at this path; see `vibsim.experiment.faults.Report.add`."""
         self.report.add(self.path, rule, hint, value, at_key)
 
     def check_scheme(self, name: str, more: tuple[str, ...] = ()) -> None:
-        """Check that a scheme of the experiment is named; `more`: other words that were right there."""
+        """Check that `name` is a scheme of the experiment; `more`: other valid words, for the hint."""
         known = self.setting.names
         if not known or name in known:
             return
-        # where a scheme of the list is itself unknown, its right name may be meant
+        # if the list of schemes has an unknown kind, `name` may be its correct spelling
         kinds = self.report.kinds.names("schemes")
         if name not in kinds or all(other in kinds for other in known):
             self.refuse("not a scheme of this experiment", nearest(name, (*known, *more)), name)
 
     def check_schemes(self, names: Sequence[str] | None) -> None:
-        """Check a list of schemes, each of the experiment and named once."""
+        """Check that a list names schemes of the experiment, each once."""
         for i, name in enumerate(names or ()):
             self.at(i).check_scheme(name)
             if name in (names or ())[:i]:
                 self.at(i).refuse("a scheme must not be repeated", value=name)
 
     def check_scheme_and_case(self, at: At) -> None:
-        """Check what is the same for every value."""
+        """Check the keys that every value accepts."""
         if at.scheme is not None:
             self.at("scheme").check_scheme(at.scheme)
         self.at("case").check_case(at.case)
         self.check_members(at, at.case)
 
     def check_members(self, at: Members, case: int | None) -> None:
-        """Check that there are members with the given values, here under `at`, or in a row of a printed table."""
-        setting, here = self.setting, self.at("at") if self.path[0] == "published" else self
+        """Check that some member has the given swept values (under `at`, or in a row of a printed table)."""
+        setting, scope = self.setting, self.at("at") if self.path[0] == "published" else self
         if not at.swept or not setting.knows_sweep:
             return
         known = [*type(at).model_fields, *setting.sweep.keys]
@@ -82,9 +82,9 @@ class Scope:
             hint = nearest(key, known)
             if not known or ("." in key and not setting.sweep.keys):
                 hint = "`at` names values of a sweep, and there is none"
-            here.at(key).refuse("unknown key", hint, _written(at.swept[key]), at_key=True)
+            scope.at(key).refuse("unknown key", hint, _written(at.swept[key]), at_key=True)
         if case is not None and not unknown:
-            first = here.at(next(iter(at.swept)))
+            first = scope.at(next(iter(at.swept)))
             first.refuse("must not be given together with case", at_key=True)
         for axis in setting.sweep.axes:
             wanted = {key: at.swept[key] for key in axis.keys if key in at.swept}
@@ -92,22 +92,22 @@ class Scope:
             for key, value in wanted.items():
                 if not matching(columns[key], value).any():
                     hint = _nearest_values(columns[key], value)
-                    here.at(key).refuse("not a value of the sweep", hint, _written(value))
+                    scope.at(key).refuse("not a value of the sweep", hint, _written(value))
                     break
             else:
                 if wanted and not members_with(columns, wanted, axis.count).any():
                     last = list(wanted)[-1]
-                    here.at(last).refuse(f"no member has this together with {next(iter(wanted))}")
+                    scope.at(last).refuse(f"no member has this together with {next(iter(wanted))}")
 
     def check_case(self, case: int | None) -> None:
-        """Check that there is a member."""
+        """Check that member `case` exists."""
         members = self.setting.members
         if case is not None and members is not None and case >= members:
             there = "there is 1 case" if members == 1 else f"there are {members} cases"
             self.refuse(f"must be at most {members - 1}", there)
 
     def check_level(self, level: int | None, instead: str = "leave it out") -> bool:
-        """Tell whether a level, if one is given, is one of the experiment; `instead`: what helps with a tolerance."""
+        """Tell whether `level` is None or a level of the experiment; `instead`: hint if levels follow a tolerance."""
         levels = self.setting.levels
         if level is None or (not self.setting.by_tolerance and (not levels or level in levels)):
             return True
@@ -120,21 +120,21 @@ class Scope:
         return False
 
     def check_place(self, at: At, row: Value) -> None:
-        """Check that `row` is taken where it exists."""
+        """Check that the value `row` exists at `at`."""
         setting = self.setting
         names = At.model_fields
-        given = [x for x in names if getattr(at, x) is not None or self.at(x).is_faulty]
-        for name in given:
+        keys = [key for key in names if getattr(at, key) is not None or self.at(key).is_faulty]
+        for name in keys:
             if name not in row.at:
                 hint = "it takes " + ", ".join(row.at)
                 self.at(name).refuse(f"{row.name} takes no {name}", hint, at_key=True)
-        if row.needs_time and "t" not in given and "step" not in given:
+        if row.needs_time and "t" not in keys and "step" not in keys:
             self.refuse(f"{row.name} needs t or step")
         if row.needs_force:
             self._check_force(row)
-        if "event" in row.at and "event" not in given:
+        if "event" in row.at and "event" not in keys:
             self.refuse(f"{row.name} needs the number of an event", "e.g. event: 1")
-        if "t" in given and "step" in given:
+        if "t" in keys and "step" in keys:
             self.at("step").refuse("must not be given together with t", at_key=True)
         self.check_scheme_and_case(at)
         if at.scheme in setting.adaptive and (row.fixed_step or at.level == "best"):
@@ -152,16 +152,16 @@ class Scope:
             self.at("t")._check_time(at.t, setting.time, level)
 
     def _check_force(self, row: Value) -> None:
-        """Check that periods of a force are known, and stored with samples enough."""
+        """Check that the period of the force is known, and that enough samples per period are stored."""
         setting, time = self.setting, self.setting.time
         if time is None:
             return
         if time.frequency is None or time.periods is None:
             rule = "is of the last period of a force, and time names no frequency"
             hint = "give time as periods, steps_per_period and frequency, e.g. model.omega"
-            # `at` need not be written: the fault is that of the number
-            above = self.path[:2] if self.path[0] == "published" else self.path[:-1]
-            self.report.add((*above, "value"), rule, hint, row.name)
+            # `at` may be absent, so the fault is reported at `value`
+            parent = self.path[:2] if self.path[0] == "published" else self.path[:-1]
+            self.report.add((*parent, "value"), rule, hint, row.name)
         elif setting.levels and setting.knows_sweep:
             coarsest = setting.levels[0]
             kept = setting.steps(coarsest) // setting.stride(coarsest) / time.periods
@@ -171,7 +171,7 @@ class Scope:
                 self.refuse(f"{row.name} needs {wanted}", f"there are {kept:.4g}: {hint}")
 
     def _level(self, at: At, row: Value) -> int | None:
-        """Check the level; return that at which times are stored, the finest by default, None where it is not known."""
+        """Check the level, and return the one whose stored times apply: the finest by default, None if unknown."""
         by_tolerance, place = self.setting.by_tolerance, self.at("level")
         levels = () if by_tolerance else self.setting.levels
         if place.is_faulty or self.is_faulty:
@@ -181,7 +181,7 @@ class Scope:
         if at.level == "best":
             if not row.best and (levels or by_tolerance):
                 place.refuse(f"{row.name} does not exist of the extrapolated solution")
-            # that solution has the times of the coarsest level
+            # the extrapolated solution has the times of the coarsest level
             return levels[0] if levels else None
         if not place.check_level(at.level, "level: best can") or not levels:
             return None
@@ -203,7 +203,7 @@ class Scope:
             self.refuse(rule, f"nearest are {low} and {low + every}")
 
     def _check_time(self, t: float, time: TimeSpec, level: int | None) -> None:
-        """Check that a time is in the interval, and where its level is known one of the equal parts that are stored."""
+        """Check that a time is within the run and, if `level` is known, that it is a stored sample time."""
         setting = self.setting
         fixed = setting.sweep.fixed_end(time)
         end = 1.0 if fixed is None else fixed
@@ -224,7 +224,7 @@ def _written(value: float | str) -> str:
 
 
 def _nearest_values(column: Column, value: float | str) -> str:
-    """Name the values of a column on both sides of one that it has not, or what it has of words."""
+    """Name the values of a column next to a missing number, or the words most similar to a missing word."""
     known = np.unique(column)
     if isinstance(value, str) or known.dtype.kind == "U":
         return nearest(value, [str(word) for word in known])

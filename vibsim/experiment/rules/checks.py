@@ -1,4 +1,4 @@
-"""What checks and printed tables must be besides well-formed: they name what the model and the schemes have."""
+"""Rules for checks and printed tables: they refer to quantities that the model and the schemes have."""
 
 from __future__ import annotations
 
@@ -34,55 +34,55 @@ from vibsim.models.shared.free import why_not_free
 from vibsim.models.structure import MOST_MODES
 
 ENERGIES = ("energy", "energy_deviation")
-"""The energies that are known exactly where they are conserved."""
+"""The energies that are known exactly if energy is conserved."""
 
 
 def check_published(
-    tables: Sequence[Any], taken: Iterable[str], setting: Setting, report: Report
+    tables: Sequence[Any], ids: Iterable[str], setting: Setting, report: Report
 ) -> None:
-    """Note every fault of printed tables (None stands for a malformed one, or row); `taken`: the ids of the checks."""
-    own = {
+    """Report every fault of printed tables (None: a malformed table or row); `ids` holds the ids of the checks."""
+    row_ids = {
         row_id(i, j)
         for i, table in enumerate(tables, 1)
         for j in range(1, 1 + len(table.rows if table else ()))
     }
-    for i, id_ in enumerate(taken):
-        if id_ in own:
+    for i, id_ in enumerate(ids):
+        if id_ in row_ids:
             report.add(("checks", i, "id"), "is the id of a row of published", value=id_)
     for i, table in enumerate(tables):
         if table is not None:
-            _published_table(table, Scope(("published", i), setting, report))
+            _check_table(table, Scope(("published", i), setting, report))
 
 
-def _published_table(table: Any, scope: Scope) -> None:
+def _check_table(table: Any, scope: Scope) -> None:
     rows = [(row, scope.at("rows", j)) for j, row in enumerate(table.rows) if row is not None]
-    row = None if table.value is None else _known_value(table.value, scope.at("value"))
+    row = None if table.value is None else _value_named(table.value, scope.at("value"))
     if row is not None and not scope.at("quantity").is_faulty:
         best = any(printed.level == "best" for printed, _ in rows)
         _check_value(row, table.quantity, best, scope)
     for j, name in enumerate(table.beside):
         place = scope.at("beside", j)
-        other = _known_value(name, place)
+        other = _value_named(name, place)
         if name in table.beside[:j]:
             place.refuse("a value must not be repeated", value=name)
         if other is not None:
-            # it is of the quantity of the table where it is of one
+            # a value that needs a quantity has that of the table
             choices = _allowed(other, scope.setting)
             if choices and table.quantity not in choices:
                 rule = f"{name} is not known of the quantity of this table"
                 place.refuse(rule, "it is of " + ", ".join(choices), name)
-            _is_comparable(other, table.quantity, place)
+            _check_support(other, table.quantity, place)
     for printed, place in rows:
         if row is not None:
             place.check_place(row_at(printed), row)
         else:
             place.check_scheme_and_case(row_at(printed))
         if table.quantity is not None:
-            _has_quantity(table.quantity, [(printed.scheme, place.at("scheme"))])
+            _must_have(table.quantity, [(printed.scheme, place.at("scheme"))])
 
 
 def finish_checks(checks: Sequence[Any], setting: Setting, report: Report) -> tuple[Any, ...]:
-    """Note every fault of the checks (None stands for a malformed one); give an id to those without."""
+    """Report every fault of the checks (None stands for a malformed one); return them, each with an id."""
     ids = check_ids(checks, setting.by_tolerance, report)
     finished = []
     for i, check in enumerate(checks):
@@ -97,18 +97,18 @@ def finish_checks(checks: Sequence[Any], setting: Setting, report: Report) -> tu
 
 
 def check_ids(checks: Sequence[Any], by_tolerance: bool, report: Report) -> list[str]:
-    """Return the id of every check; a generated one is its place in the file."""
+    """Return the id of every check; a generated id is the position in the file."""
     ids = [check.id if check is not None else "" for check in checks]
-    given: dict[str, int] = {}
+    first: dict[str, int] = {}
     for i, id_ in enumerate(ids):
-        if id_ and given.setdefault(id_, i) != i:
+        if id_ and first.setdefault(id_, i) != i:
             report.add(("checks", i, "id"), "two checks have one id", value=id_)
         if id_ == BY_TOLERANCE and by_tolerance:
             rule = "is the id of the verdict on the tolerance itself"
             report.add(("checks", i, "id"), rule, value=id_)
     for i, id_ in enumerate(ids):
-        free = (f"check_{number}" for number in count(i + 1, len(ids)))
-        ids[i] = id_ or next(name for name in free if name not in given)
+        unused = (f"check_{number}" for number in count(i + 1, len(ids)))
+        ids[i] = id_ or next(name for name in unused if name not in first)
     return ids
 
 
@@ -128,24 +128,24 @@ def _check(check: Check, scope: Scope) -> None:
         scope.at("schemes").check_schemes(inner.schemes)
     match inner:
         case ConvergesCheck():
-            _converges(inner, scope)
+            _check_converges(inner, scope)
         case AccurateCheck():
-            _accurate(inner, scope)
+            _check_accurate(inner, scope)
         case ValueCheck():
-            _value(inner, scope)
+            _check_value_check(inner, scope)
         case ConservesCheck():
-            _quantity_of_schemes(inner.conserves, "conserves", inner.schemes, scope)
+            _check_quantity(inner.conserves, "conserves", inner.schemes, scope)
             model = scope.setting.model
             if model is not None and not model.conservative:
                 scope.refuse(
                     f"the energy of {model.kind} is not conserved", _instead_of_energy(scope)
                 )
         case EqualCheck():
-            _equal(inner, scope)
+            _check_equal(inner, scope)
 
 
 def _instead_of_energy(scope: Scope) -> str:
-    """Say what to write where an energy is not conserved, or is not known to be."""
+    """Return a hint for models whose energy is not conserved, or not known to be."""
     budget = "the budget of energy and work is: `converges: energy_budget`"
     has_budget = "energy_budget" in scope.setting.quantities
     model = scope.setting.model
@@ -161,16 +161,16 @@ def _instead_of_energy(scope: Scope) -> str:
     return budget if has_budget else ""
 
 
-def _quantity_of_schemes(name: str, key: str, schemes: Sequence[str] | None, scope: Scope) -> None:
-    """Check that the quantity under a key of a check exists, and that the schemes which the check names have it."""
+def _check_quantity(name: str, key: str, schemes: Sequence[str] | None, scope: Scope) -> None:
+    """Check that the quantity under a key of a check exists, and that the schemes named by the check have it."""
     if _is_quantity(name, scope.setting.quantities, scope.at(key)):
-        _has_quantity(name, ((s, scope.at("schemes", i)) for i, s in enumerate(schemes or ())))
+        _must_have(name, ((s, scope.at("schemes", i)) for i, s in enumerate(schemes or ())))
 
 
-def _converges(check: ConvergesCheck, scope: Scope) -> None:
+def _check_converges(check: ConvergesCheck, scope: Scope) -> None:
     check_expect(check.expect, (*scope.path, "expect"), scope.report)
     name, model = check.converges, scope.setting.model
-    _convergent(name, "converges", check.schemes, scope)
+    _check_convergent(name, "converges", check.schemes, scope)
     if not is_error_part(name) or model is None or name not in error_parts(model):
         return
     if check.order == "scheme" and (reason := why_not_free(model)):
@@ -182,20 +182,20 @@ def _converges(check: ConvergesCheck, scope: Scope) -> None:
         place.refuse(rule, "give `order:` as a number")
 
 
-def _accurate(check: AccurateCheck, scope: Scope) -> None:
+def _check_accurate(check: AccurateCheck, scope: Scope) -> None:
     check_expect(check.expect, (*scope.path, "expect"), scope.report)
-    _convergent(check.accurate, "accurate", check.schemes, scope)
+    _check_convergent(check.accurate, "accurate", check.schemes, scope)
     given = given_one(check, ("relative", "absolute"), scope.path, scope.report)
     if given == "relative" and is_error_part(check.accurate):
         rule = f"is a part of the solution, and {check.accurate} is an error itself"
         scope.at("relative").refuse(rule, "give `absolute:`", at_key=True)
 
 
-def _convergent(name: str, key: str, schemes: Sequence[str] | None, scope: Scope) -> None:
-    """Check that the quantity under a key is one that levels can be compared by."""
+def _check_convergent(name: str, key: str, schemes: Sequence[str] | None, scope: Scope) -> None:
+    """Check that levels can be compared by the quantity under a key."""
     model = scope.setting.model
     if not is_error_part(name):
-        _quantity_of_schemes(name, key, schemes, scope)
+        _check_quantity(name, key, schemes, scope)
     elif model is not None and name not in error_parts(model):
         rule, hint = "unknown quantity", nearest(name, error_parts(model))
         if not has_error_parts(model):
@@ -206,7 +206,7 @@ def _convergent(name: str, key: str, schemes: Sequence[str] | None, scope: Scope
 
 
 def check_expect(expect: Expect, path: Path_, report: Report) -> None:
-    """Check that the reason of an expected verdict, which stands at `path`, exists and has its status."""
+    """Check that the reason of the expected verdict at `path` exists and belongs to its status."""
     reason = expect.reason
     if reason is None:
         return
@@ -220,39 +220,39 @@ def check_expect(expect: Expect, path: Path_, report: Report) -> None:
 
 
 def given_one(section: Any, keys: Sequence[str], path: Path_, report: Report) -> str | None:
-    """Return which of some keys a section at `path` has, of which it must have exactly one; None where one is faulty.
+    """Check that a section at `path` has exactly one of `keys`, and return the first one it has.
 
-    Of several the first is returned.
+    The result is empty if it has none of them, and None if one of them is faulty.
     """
     if any((*path, key) in report.faulty for key in keys):
         return None
-    given = [key for key in keys if getattr(section, key) is not None]
-    if len(given) != 1:
-        found = " and ".join(given) or "none of them"
-        report.add(path, f"must have exactly one of {', '.join(keys)}; has {found}")
-    return given[0] if given else ""
+    present = [key for key in keys if getattr(section, key) is not None]
+    if len(present) != 1:
+        listed = " and ".join(present) or "none of them"
+        report.add(path, f"must have exactly one of {', '.join(keys)}; has {listed}")
+    return present[0] if present else ""
 
 
-def _value(check: ValueCheck, scope: Scope) -> None:
+def _check_value_check(check: ValueCheck, scope: Scope) -> None:
     given = given_one(check, ("equals", "below", "above"), scope.path, scope.report)
     if given is not None:
         for name in ("rtol", "atol"):
             if getattr(check, name) is not None and given != "equals":
                 scope.at(name).refuse("is used with equals only", at_key=True)
     place = scope.at("at")
-    _reduction(check, scope)
-    row = _known_value(check.value, scope.at("value"))
+    _check_reduction(check, scope)
+    row = _value_named(check.value, scope.at("value"))
     if row is None:
         place.check_scheme_and_case(check.at)
         return
     _check_value(row, check.quantity, check.at.level == "best", scope)
     if check.quantity is not None and check.at.scheme is not None:
-        _has_quantity(check.quantity, [(check.at.scheme, place.at("scheme"))])
+        _must_have(check.quantity, [(check.at.scheme, place.at("scheme"))])
     place.check_place(check.at, row)
 
 
-def _reduction(check: ValueCheck, scope: Scope) -> None:
-    """Check that a number of all members is taken over one swept key, with every other one fixed."""
+def _check_reduction(check: ValueCheck, scope: Scope) -> None:
+    """Check that a reduction over members is over one swept key, and that all other swept keys are fixed."""
     if any(scope.at(key).is_faulty for key in ("over", "take", "at")):
         return
     if check.take is None or check.over is None:
@@ -287,7 +287,7 @@ def _reduction(check: ValueCheck, scope: Scope) -> None:
             scope.at("over").refuse(f"{axis.keys[0]} varies, too", hint, check.over)
 
 
-def _equal(check: EqualCheck, scope: Scope) -> None:
+def _check_equal(check: EqualCheck, scope: Scope) -> None:
     if scope.at("equal").is_faulty:
         return
     first, second = scope.at("equal", 0), scope.at("equal", 1)
@@ -309,19 +309,19 @@ def _equal(check: EqualCheck, scope: Scope) -> None:
             if plain_name(check.quantity) in choices and setting.own_velocity:
                 choices += (check.quantity,)
     if _is_quantity(check.quantity, choices, scope.at("quantity"), what):
-        _has_quantity(check.quantity, named)
+        _must_have(check.quantity, named)
         if check.second == "exact" and setting.sweep.follow:
-            _known_of_followers(check.second, second)
+            _refuse_followers(check.second, second)
         elif check.second == "exact":
-            _known_exactly(check.quantity, check.second, second)
+            _check_exact(check.quantity, check.second, second)
         elif check.second == "discrete":
-            _known_by_theory(check.second, second)
+            _check_theory(check.second, second)
     if check.second == "discrete" and check.first in setting.adaptive:
         first.refuse("has no steps of its own that theory could know", value=check.first)
 
 
 def _is_quantity(name: str, choices: tuple[str, ...], scope: Scope, what: str = "") -> bool:
-    """Check that a quantity is one of `choices`, those of `what`; say so where it exists, but not there."""
+    """Tell whether a quantity is one of `choices`, those of `what`; report a fault otherwise."""
     model = scope.setting.model
     if not choices or name in choices:
         return True
@@ -338,17 +338,18 @@ def _is_quantity(name: str, choices: tuple[str, ...], scope: Scope, what: str = 
     return False
 
 
-def _has_quantity(name: str, schemes: Iterable[tuple[str, Scope]]) -> None:
+def _must_have(name: str, schemes: Iterable[tuple[str, Scope]]) -> None:
     for scheme, scope in schemes:
         setting = scope.setting
         if setting.model is None or name not in centred(setting.model) or not setting.own_velocity:
             return
-        if scheme in setting.names and scheme not in setting.own:
-            hint = f"choose from {', '.join(setting.own)}" if setting.own else ""
+        able = setting.with_own_velocity
+        if scheme in setting.names and scheme not in able:
+            hint = f"choose from {', '.join(able)}" if able else ""
             scope.refuse(f"has no {name} beside its {plain_name(name)}", hint, scheme)
 
 
-def _known_value(name: str, scope: Scope) -> Value | None:
+def _value_named(name: str, scope: Scope) -> Value | None:
     row = VALUES.get(name)
     if row is None:
         scope.refuse("unknown value", nearest(name, list(VALUES)), name)
@@ -356,7 +357,7 @@ def _known_value(name: str, scope: Scope) -> Value | None:
 
 
 def _check_value(row: Value, quantity: str | None, best: bool, scope: Scope) -> None:
-    """Check of which quantity a value (`best`: of the extrapolated solution) is, and what it is compared with.
+    """Check the quantity of a value (`best`: of the extrapolated solution), and that the model supports the value.
 
     The scope is that of the mapping with the keys ``value`` and ``quantity``.
     """
@@ -373,20 +374,20 @@ def _check_value(row: Value, quantity: str | None, best: bool, scope: Scope) -> 
         only_there = best and quantity in _allowed(row, scope.setting, False)
         what = f"{row.name} at `level: best`" if only_there else row.name
         _is_quantity(quantity, choices, place, what)
-    _is_comparable(row, quantity, scope.at("value"))
+    _check_support(row, quantity, scope.at("value"))
 
 
-def _is_comparable(row: Value, quantity: str | None, scope: Scope) -> None:
+def _check_support(row: Value, quantity: str | None, scope: Scope) -> None:
     model = scope.setting.model
     if model is None:
         return
     if row.needs_exact and scope.setting.sweep.follow:
-        _known_of_followers(row.name, scope)
+        _refuse_followers(row.name, scope)
         return
     if row.needs_exact == "period" and model.exact_period is None:
         scope.refuse(f"the exact period of {model.kind} is not known", value=row.name)
     if row.needs_exact == "solution":
-        _known_exactly(quantity, row.name, scope)
+        _check_exact(quantity, row.name, scope)
     if row.needs_potential and model.misses_potential:
         scope.refuse(NOT_FOUND, _instead_of_energy(scope), row.name)
     if row.needs_events and model.events is None:
@@ -401,27 +402,28 @@ def _is_comparable(row: Value, quantity: str | None, scope: Scope) -> None:
             )
             scope.refuse(rule, value=row.name)
     if row.needs_linear:
-        _known_by_theory(row.name, scope)
+        _check_theory(row.name, scope)
 
 
-def _known_exactly(quantity: str | None, value: str, scope: Scope) -> None:
-    """Check that the model knows the exact solution of a quantity, with which `value` is compared."""
+def _check_exact(quantity: str | None, value: str, scope: Scope) -> None:
+    """Check that the model has the exact solution of a quantity, which `value` is compared with."""
     model = scope.setting.model
     if model is None:
         return
-    # the energy is known where it is conserved or the motion is known; the budget is 0 always
+    # energy is exact if it is conserved or the motion is; the budget is always 0
     name = plain_name(quantity or "")
-    taken, done, budget = BUDGET
-    is_solved = has_solution(model) and name not in (taken, done)
+    dissipated, work, budget = BUDGET
+    is_solved = has_solution(model) and name not in (dissipated, work)
     if not (is_solved or name == budget or (model.conservative and name in ENERGIES)):
-        of = (*(ENERGIES if model.conservative else ()), *((budget,) if has_budget(model) else ()))
-        hint = f"{' and '.join(of)} {'is' if len(of) == 1 else 'are'}" if of else ""
+        exact: tuple[str, ...] = ENERGIES if model.conservative else ()
+        exact += (budget,) if has_budget(model) else ()
+        hint = f"{' and '.join(exact)} {'is' if len(exact) == 1 else 'are'}" if exact else ""
         rule = f"the exact {quantity or 'solution'} of {model.kind} is not known"
         scope.refuse(f"{rule}{_why_unsolved(model)}", hint, value)
 
 
 def _why_unsolved(model: Model) -> str:
-    """Say why there is neither an exact solution nor a reference, where one cause is sure."""
+    """Return why there is neither an exact solution nor a reference; empty if the cause is uncertain."""
     if has_solution(model):
         return ""
     if isinstance(model.events, Crossings):
@@ -436,13 +438,13 @@ def _why_unsolved(model: Model) -> str:
     )
 
 
-def _known_of_followers(value: str, scope: Scope) -> None:
+def _refuse_followers(value: str, scope: Scope) -> None:
     rule = "the exact solution is not known of members that start from the last state of others"
     scope.refuse(rule, "leave out `follow`", value)
 
 
-def _known_by_theory(value: str, scope: Scope) -> None:
-    """Check that the theory of schemes, which is that of linear models without damping, knows the model."""
+def _check_theory(value: str, scope: Scope) -> None:
+    """Check that the model is linear and undamped, as the theory of schemes requires."""
     model = scope.setting.model
     if model is not None and not (model.linear and model.conservative):
         rule = f"{value} is known of linear models without damping only, not of {model.kind}"
@@ -450,13 +452,13 @@ def _known_by_theory(value: str, scope: Scope) -> None:
 
 
 def _allowed(row: Value, setting: Setting, best: bool = False) -> tuple[str, ...]:
-    """Name the quantities that `row` can be of; `best`: of the extrapolated solution."""
+    """Return the quantities that the value `row` is defined for; `best`: for the extrapolated solution."""
     model = setting.model
     if model is None or row.of == "none":
         return ()
     states = tuple(state.name for state in model.states)
-    more = centred(model) if setting.own_velocity else ()
-    deviations = ("energy_deviation", *more[-1:])
+    centred_names = centred(model) if setting.own_velocity else ()
+    deviations = ("energy_deviation", *centred_names[-1:])
     choices = {
         "states": states,
         "stored": (*states, *(output.name for output in model.outputs)),
@@ -467,5 +469,5 @@ def _allowed(row: Value, setting: Setting, best: bool = False) -> tuple[str, ...
     if row.of in choices:
         return choices[row.of]
     if best:
-        return (*states, *ENERGIES, *more)
+        return (*states, *ENERGIES, *centred_names)
     return (*setting.quantities, *(error_parts(model) if row.of == "convergent" else ()))

@@ -1,7 +1,7 @@
-"""Members that start from the last state of the member before: what `follow` asks of a sweep and of an equation.
+"""Rules for `follow`, with which each member starts from the final state of the previous one.
 
-Every member begins at t = 0. So the motion goes on where it ended only if the equation repeats after the end of each
-member: the end is a whole number of periods of the force, or the equation does not name t.
+Every member starts at t = 0. So the next member continues the motion only if the equation is the same at t = 0 and at
+the end: the end is a whole number of periods of the force, or the equation does not depend on t.
 """
 
 from __future__ import annotations
@@ -20,16 +20,16 @@ from vibsim.models import Model, tree
 from vibsim.models.shared.free import why_not_free
 
 MOMENTS = np.linspace(0.0, 1.0, 16, endpoint=False)
-"""Times at which an equation is compared with itself one end later, as parts of the end."""
+"""Times at which the equation is compared with itself one end time later, as fractions of the end."""
 STATES = np.cos(np.arange(1.0, 17.0))
-"""Positions and velocities at these times: any will do."""
+"""Positions and velocities at these times; arbitrary."""
 SAME_FORCE = 1e-6
-"""How far the accelerations may differ there, over the largest of them."""
+"""Tolerance of the accelerations there, relative to the largest one."""
 KEY = ("sweep", "follow")
 
 
 def check_follow(follow: str, axes: Sequence[Axis], report: Report) -> None:
-    """Check that the key is one of the axis that varies fastest, and that this one gives no start."""
+    """Check that the key belongs to the fastest axis, and that this axis sweeps no initial value."""
     known = [key for axis in axes for key in axis.keys]
     last = axes[-1].keys
     if follow not in known:
@@ -43,7 +43,7 @@ def check_follow(follow: str, axes: Sequence[Axis], report: Report) -> None:
 
 
 def check_equation(model: Model, numbers: MemberNumbers, report: Report) -> None:
-    """Refuse an equation that no member can continue: one that does not repeat, or whose motion dies out or never."""
+    """Refuse models that cannot be continued, free linear motions, and forces that do not repeat after the end."""
     if model.loaded is not None or model.lookup is not None:
         report.add(KEY, f"needs an equation of formulas, and {model.kind} has tables or matrices")
         return
@@ -57,10 +57,10 @@ def check_equation(model: Model, numbers: MemberNumbers, report: Report) -> None
     forces = [tree(model, formula) for formula in model.accelerations]
     if not any("t" in force.names for force in forces):
         return
-    for own, end in numbers.some(numbers.count):
+    for parameters, end in numbers.sampled(numbers.count):
         if not np.isfinite(end):
             return
-        if not all(_repeats(model, force, own, end) for force in forces):
+        if not all(_repeats(model, force, parameters, end) for force in forces):
             rule = f"the force does not repeat after the end of a member, {end:.10g} s"
             hint = "give time as `periods`, `steps_per_period` and `frequency`, the parameter of the force"
             report.add(KEY, rule, hint)
@@ -72,10 +72,10 @@ def _repeats(model: Model, force: Expression, numbers: dict[str, float], end: fl
 
     def at(t: Floats) -> Floats:
         with np.errstate(all="ignore"):
-            found = values(force, {**numbers, **states, "t": t})
-            return np.asarray(np.broadcast_to(found, t.shape))
+            acceleration = values(force, {**numbers, **states, "t": t})
+            return np.asarray(np.broadcast_to(acceleration, t.shape))
 
     now, later = at(MOMENTS * end), at((1.0 + MOMENTS) * end)
-    known = np.isfinite(now) & np.isfinite(later)
-    size = np.max(np.abs(now[known]), initial=0.0)
-    return bool(np.all(np.abs(later - now)[known] <= SAME_FORCE * size))
+    is_finite = np.isfinite(now) & np.isfinite(later)
+    scale = np.max(np.abs(now[is_finite]), initial=0.0)
+    return bool(np.all(np.abs(later - now)[is_finite] <= SAME_FORCE * scale))

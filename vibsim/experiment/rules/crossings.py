@@ -1,4 +1,4 @@
-"""The keys `events` and `stop` of the section ``model``: what they may say."""
+"""Validate the keys `events` and `stop` of the section ``model``."""
 
 from __future__ import annotations
 
@@ -17,21 +17,21 @@ from vibsim.models.shared.crossings import STOP, guard_name, guard_of, is_consta
 def read_crossings(
     section: Any, model: Model, known: Collection[str], report: Report
 ) -> dict[str, str]:
-    """Return the formulas of events and stop by their names, and note what is wrong with them.
+    """Return the formulas of events and stop by name, and report their faults.
 
     Parameters
     ----------
     section
         The section ``model``.
     known
-        Names of all parameters.
+        Names of all model parameters.
     """
     states = tuple(state.name for state in model.states)
     names = (*states, "t", *known)
     texts: dict[str, str] = {}
     for i, event in enumerate(section.events):
         path = "model", "events", i
-        if event is None or _is_without_way(event, path, report):
+        if event is None or _never_happens(event, path, report):
             continue
         guard = report.formula((*path, "when"), event.when, names)
         if isinstance(guard, Compare):
@@ -72,26 +72,26 @@ def read_crossings(
 
 
 def _has_one_sign(guard: Expression, names: Collection[str]) -> bool:
-    """Tell whether a formula has values of one sign only, whatever its names are."""
+    """Tell whether a formula has one sign for all values of its names."""
     low, high = bounds(guard, dict.fromkeys(names, (-math.inf, math.inf)))
     return bool(low >= 0.0 or high <= 0.0)
 
 
 def _jumps(node: Expression) -> str:
-    """Name what in a formula jumps; nothing where it does not, as a comparison within `where` need not."""
-    parts = node.operands
+    """Name a discontinuous part of a formula; empty if none is found. The condition of a `where` does not count."""
+    operands = node.operands
     match node:
         case Compare(symbol):
             return f"a comparison by {symbol}"
         case Call(function) if function in STEPS or function == "mod":
             return function
         case Call("where"):
-            parts = parts[1:]
-    return next(filter(None, map(_jumps, parts)), "")
+            operands = operands[1:]
+    return next(filter(None, map(_jumps, operands)), "")
 
 
-def _is_without_way(event: Any, path: tuple[str, str, int], report: Report) -> bool:
-    """Tell whether an event is switched off both where its formula falls and where it rises."""
+def _never_happens(event: Any, path: tuple[str, str, int], report: Report) -> bool:
+    """Tell whether an event is switched off for both crossing directions, and report that."""
     given = [name for name in ("falling", "rising") if getattr(event, name) is not None]
     if not given or event.falling or event.rising:
         return False

@@ -1,4 +1,4 @@
-"""What a figure of a source must be besides well-formed: it names what the experiment has."""
+"""Rules for figures of a source: they refer to quantities and members that the experiment has."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from vibsim.models.base import parameter_names
 
 
 def check_figures(figures: Sequence[Any], setting: Setting, report: Report) -> None:
-    """Note every fault of the figures; None stands for a malformed one."""
+    """Report every fault of the figures; None stands for a malformed one."""
     for i, figure in enumerate(figures):
         if figure is not None:
             _figure(figure, Scope(("figures", i), setting, report))

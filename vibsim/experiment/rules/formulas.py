@@ -1,4 +1,4 @@
-"""The formulas of a section ``model``: what each may name, and what may stand in its place."""
+"""The formulas of a section ``model``: the names that each may use, and what may replace it."""
 
 from __future__ import annotations
 
@@ -38,24 +38,24 @@ from vibsim.models.system import name_fault
 
 NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 NONE = "none"
-"""Stands for a term that is left out, where others have words as well."""
+"""Word for an absent term, for fields that take words."""
 MOST_NAMED = 8
-"""Most names of a list in a message."""
+"""Largest number of names listed in a message."""
 
 
 def declared_parameters(section: Any, model: Model, report: Report) -> dict[str, float]:
-    """Return the parameters that a section declares, but those under a name that is taken."""
-    taken = {"t": "the time"}
-    taken |= {state.name: f"the {state.long_name}" for state in model.states}
-    taken |= {row.name: f"the {row.description} of the model" for row in model.parameters}
+    """Return the parameters that a section declares, without those whose name is invalid or already used."""
+    used = {"t": "the time"}
+    used |= {state.name: f"the {state.long_name}" for state in model.states}
+    used |= {row.name: f"the {row.description} of the model" for row in model.parameters}
     if model.loaded is not None:
-        # these are observed
-        taken = {"t": "the time"} | {row.name: f"the {row.description}" for row in RAYLEIGH}
+        # formulas of a structure name no states
+        used = {"t": "the time"} | {row.name: f"the {row.description}" for row in RAYLEIGH}
     if any(row.terms and isinstance(getattr(section, row.name), Section) for row in model.formulas):
-        taken["b"] = "the coefficient of the damping"
-    found = {}
+        used["b"] = "the coefficient of the damping"
+    declared = {}
     for name, value in section.parameters.items():
-        fault = f"'{name}' is {taken[name]}" if name in taken else ""
+        fault = f"'{name}' is {used[name]}" if name in used else ""
         if keyword.iskeyword(name):
             fault = f"'{name}' is a word of the grammar of formulas and cannot be a name"
         elif not NAME.fullmatch(name):
@@ -65,18 +65,18 @@ def declared_parameters(section: Any, model: Model, report: Report) -> dict[str,
         if fault:
             report.add(("model", DECLARED, name), fault, "choose another name", at_key=True)
         else:
-            found[name] = value
-    return found
+            declared[name] = value
+    return declared
 
 
 def read_formulas(
     section: Any, model: Model, declared: Mapping[str, float], folder: Path, report: Report
 ) -> tuple[dict[str, str], dict[str, float], dict[str, TableSpec]]:
-    """Return the formulas of a section, the coefficients of those that stand for a term, and the tables it names.
+    """Return the formulas of a section, the coefficients of terms given by a word, and the tables, each by key.
 
-    All are by the keys of the section; `declared` are the parameters of the section's own.
+    `declared` holds the parameters that the section declares.
     """
-    known = (*(own.name for own in model.parameters), *declared)
+    known = (*(row.name for row in model.parameters), *declared)
     texts: dict[str, str] = {}
     coefficients: dict[str, float] = {}
     tables: dict[str, TableSpec] = {}
@@ -88,12 +88,12 @@ def read_formulas(
         value = getattr(section, row.name)
         if row.of:
             names = (*known, *looked_up) if "t" in row.names else known
-            texts |= _several(row, value, model, names, report)
+            texts |= _named_formulas(row, value, model, names, report)
         elif isinstance(value, Section) and row.table is not None:
             table = _table(row, row.table, value, folder, report)
             tables |= {row.name: table} if table is not None else {}
             at: str = getattr(value, AT, "")
-            if row.tabled and _is_place(at, ("model", row.name, AT), known, report):
+            if row.tabled and _is_linear_in_time(at, ("model", row.name, AT), known, report):
                 texts[row.name] = at.strip()
         elif isinstance(value, Section):
             texts |= _term(row, value, coefficients, report)
@@ -102,9 +102,9 @@ def read_formulas(
             report.add(("model", row.name), rule, "leave the key out", at_key=True)
         elif value == NONE and row.terms and NONE not in declared:
             continue
-        elif value is not None and is_sound(value, row, ("model", row.name), known, report):
+        elif value is not None and is_valid_formula(value, row, ("model", row.name), known, report):
             texts[row.name] = value.strip()
-        _check_place(row, section, report)
+        _check_companions(row, section, report)
     if model.takes_events:
         texts |= read_crossings(section, model, known, report)
     for row in model.formulas:
@@ -116,9 +116,9 @@ def read_formulas(
 def _table(
     row: FormulaField, keys: tuple[str, str], section: Section, folder: Path, report: Report
 ) -> TableSpec | None:
-    """Return the table that stands in place of a formula; None, and a fault, where it cannot be had.
+    """Return the table that replaces a formula; report a fault and return None if it cannot be read.
 
-    The section holds the path, from `folder`, and under `keys` the names of the columns of places and values.
+    The section holds the path, relative to `folder`, and under `keys` the names of the columns of abscissae and values.
     """
     written: str = getattr(section, TABLE)
     place, value = (getattr(section, key) for key in keys)
@@ -137,9 +137,9 @@ def _table(
     return spec
 
 
-def _is_place(text: str, path: Path_, known: Collection[str], report: Report) -> bool:
-    """Tell whether a table is looked up at a constant speed, from the place 0 on; note what is wrong otherwise."""
-    if not is_sound(text, FormulaField(AT, ("t",), "", ""), path, known, report):
+def _is_linear_in_time(text: str, path: Path_, known: Collection[str], report: Report) -> bool:
+    """Tell whether the abscissa formula of a table is a constant times t; report a fault otherwise."""
+    if not is_valid_formula(text, FormulaField(AT, ("t",), "", ""), path, known, report):
         return False
     place = parse(text, ("t", *known))
     speed = derivative(place, "t")
@@ -152,7 +152,7 @@ def _is_place(text: str, path: Path_, known: Collection[str], report: Report) ->
 def _term(
     row: FormulaField, value: Section, coefficients: dict[str, float], report: Report
 ) -> dict[str, str]:
-    """Return the formula of ``{word: coefficient}``, and put the coefficient among the others."""
+    """Return the formula of a term ``{word: coefficient}``, and add its coefficient to `coefficients`."""
     given = {word: getattr(value, word) for word in row.terms if getattr(value, word) is not None}
     if len(given) != 1:
         rule = f"must have one of {', '.join(row.terms)}, or be a formula"
@@ -166,64 +166,66 @@ def _term(
     return {row.name: row.terms[word]}
 
 
-def _several(
+def _named_formulas(
     row: FormulaField, written: Any, model: Model, known: Collection[str], report: Report
 ) -> dict[str, str]:
-    """Return the formulas of a field with one of each coordinate or output, by field and name: ``acceleration.x``."""
+    """Return the formulas of a field with one per coordinate or output, by field and name: ``acceleration.x``."""
     if written is None:
         return {}
     path: Path_ = ("model", row.name)
     if row.of == "term":
         is_list = isinstance(written, tuple)
-        found: dict[str, str] = {}
+        formulas: dict[str, str] = {}
         for i, text in enumerate(written if is_list else (written,)):
-            if is_sound(text, row, (*path, i) if is_list else path, known, report):
-                found[f"{row.name}.{i}"] = text.strip()
-        return found
+            if is_valid_formula(text, row, (*path, i) if is_list else path, known, report):
+                formulas[f"{row.name}.{i}"] = text.strip()
+        return formulas
     if not isinstance(written, Mapping):
         if model.coordinates > 1 and not row.beside:
-            rule = f"must have a formula for each of {_some(model.positions)}"
+            rule = f"must have a formula for each of {_shortlist(model.positions)}"
             report.add(path, rule, f"e.g. {{{model.position}: ...}}")
             return {}
-        if not is_sound(written, row, path, known, report):
+        if not is_valid_formula(written, row, path, known, report):
             return {}
         return {f"{row.name}.{name}": written.strip() for name in model.positions}
     if row.paired:
-        return _paired(row, written, model, known, report)
-    found = {}
-    taken = [*(state.name for state in model.states), *known]
+        return _pair_formulas(row, written, model, known, report)
+    formulas = {}
+    used = [*(state.name for state in model.states), *known]
     for name, text in written.items():
         if row.of == "coordinate" and name not in model.positions:
             hint = nearest(name, list(model.positions))
             report.add((*path, name), "unknown coordinate", hint, at_key=True)
-        elif row.of == "output" and (fault := name_fault(name, tuple(taken))):
+        elif row.of == "output" and (fault := name_fault(name, tuple(used))):
             report.add((*path, name), fault, "choose another name", at_key=True)
-        elif is_sound(text, row, (*path, name), known, report):
-            found[f"{row.name}.{name}"] = text.strip()
-        taken.append(name)
+        elif is_valid_formula(text, row, (*path, name), known, report):
+            formulas[f"{row.name}.{name}"] = text.strip()
+        used.append(name)
     missing = [name for name in model.positions if name not in written]
-    # a name that is misspelt is reported already
+    # a misspelt name is already reported
     is_reported = any(name not in model.positions for name in written)
     if row.of == "coordinate" and missing and not is_reported:
-        report.add(path, f"must have a formula for each coordinate, has none for {_some(missing)}")
-    return found
+        report.add(
+            path, f"must have a formula for each coordinate, has none for {_shortlist(missing)}"
+        )
+    return formulas
 
 
-def _paired(
+def _pair_formulas(
     row: FormulaField,
     written: Mapping[str, Any],
     model: Model,
     known: Collection[str],
     report: Report,
 ) -> dict[str, str]:
-    """Return the formulas of a field that two coordinates may have together, by field and names: ``mass.x.y``."""
+    """Return the formulas of a field with one per pair of coordinates, by field and names: ``mass.x.y``."""
     formulas: dict[tuple[str, ...], str] = {}
     for name, value in written.items():
         if isinstance(value, Mapping):
             formulas |= {(name, other): text for other, text in value.items()}
         else:
             formulas[name,] = value
-    found: dict[str, str] = {}
+    valid: dict[str, str] = {}
     for names, text in formulas.items():
         path: Path_ = ("model", row.name, *names)
         unknown = [name for name in names if name not in model.positions]
@@ -233,18 +235,18 @@ def _paired(
         elif names[0] != names[-1] and names[::-1] in formulas and names > names[::-1]:
             rule = f"is that of {names[1]} and {names[0]}, which stands there already"
             report.add(path, rule, "leave it out", at_key=True)
-        elif is_sound(text, row, path, known, report):
-            found[".".join((row.name, *names))] = text.strip()
-    return found
+        elif is_valid_formula(text, row, path, known, report):
+            valid[".".join((row.name, *names))] = text.strip()
+    return valid
 
 
-def _some(names: Sequence[str]) -> str:
-    """Name a few of several coordinates."""
+def _shortlist(names: Sequence[str]) -> str:
+    """List names for a message, at most `MOST_NAMED`."""
     return ", ".join(names if len(names) <= MOST_NAMED else [*names[: MOST_NAMED - 1], "..."])
 
 
-def _check_place(row: FormulaField, section: Any, report: Report) -> None:
-    """Note a field that stands beside one that it replaces, or without the one that it belongs to."""
+def _check_companions(row: FormulaField, section: Any, report: Report) -> None:
+    """Report a field given together with one that it replaces, or without one that it needs."""
     given = section.model_fields_set
     if row.instead_of and not {row.name, row.instead_of} & given:
         alone = ": `potential` alone makes no forces" if "potential" in given else ""
@@ -261,10 +263,10 @@ def _check_place(row: FormulaField, section: Any, report: Report) -> None:
 def _check_positive(
     row: FormulaField, texts: Mapping[str, str], declared: Mapping[str, float], report: Report
 ) -> None:
-    """Refuse formulas in parameters alone whose value is not greater than 0; what two have together may be less."""
+    """Refuse constant formulas whose value is not positive; those of pairs of coordinates may have any sign."""
     for key, text in texts.items():
-        field_, *names = key.split(".")
-        if field_ == row.name and len(set(names)) == 1:
+        field, *names = key.split(".")
+        if field == row.name and len(set(names)) == 1:
             formula = parse(text, (*row.names, *declared))
             if not set(formula.names).issubset(declared):
                 continue
@@ -274,11 +276,11 @@ def _check_positive(
                 report.add(("model", *key.split(".")), rule, value=text)
 
 
-def is_sound(
+def is_valid_formula(
     text: str, row: FormulaField, path: Path_, known: Collection[str], report: Report
 ) -> bool:
-    """Tell whether a formula of variables and some `known` parameters can be read; note its fault otherwise."""
-    more = f"; it may name {f'{_some(row.names)} and ' if row.names else ''}parameters"
+    """Tell whether a formula of the variables of `row` and `known` parameters is valid; report its fault if not."""
+    more = f"; it may name {f'{_shortlist(row.names)} and ' if row.names else ''}parameters"
     is_file = row.table is not None and text.lower().endswith(ENDINGS)
     hint = f"for a table write {{{TABLE}: {text}}}" if is_file else ""
     is_oscillator = report.source.data.get("model", {}).get("kind") == "oscillator"
@@ -286,20 +288,20 @@ def is_sound(
         hint = (
             "`spring` takes u, `damping` takes v; a force that depends on both takes `kind: system`"
         )
-    read_tree = report.formula(path, text, (*row.names, *known), more, hint)
-    if read_tree is None:
+    formula = report.formula(path, text, (*row.names, *known), more, hint)
+    if formula is None:
         return False
-    if row.terms and not is_zero(read_tree) and set(row.names).isdisjoint(read_tree.names):
+    if row.terms and not is_zero(formula) and set(row.names).isdisjoint(formula.names):
         rule = f"does not depend on {row.names[0]}: it is a constant force, and no {row.name}"
         report.add(path, rule, f"write ({text})*{row.names[0]}", text)
         return False
     try:
-        for part in walk(read_tree):
-            if not part.names:
-                evaluate(part, {})
-            if isinstance(part, Binary) and part.operator == "/" and not part.right.names:
-                # u/0, which is no constant
-                evaluate(Binary("/", ONE, part.right), {})
+        for node in walk(formula):
+            if not node.names:
+                evaluate(node, {})
+            if isinstance(node, Binary) and node.operator == "/" and not node.right.names:
+                # u/0 is not constant, but its divisor is
+                evaluate(Binary("/", ONE, node.right), {})
     except ExpressionError as error:
         report.add(path, f"a constant in it {error.rule}", error.hint, text)
         return False

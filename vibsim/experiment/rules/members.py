@@ -1,8 +1,8 @@
-"""What must hold for every member: its tables are long enough, what its equation differentiates does not jump, and it
-begins outside of its stop, with masses that are positive there.
+"""Rules for every member of a sweep.
 
-A derivative of what jumps would leave out an impulse without a word. A voltage that is switched on is the most common
-case: V' vanishes before and behind it, and the current would stay 0.
+Its tables are long enough, functions that its equation differentiates do not jump, and it starts outside its stop with
+a positive definite mass matrix. The derivative of a jump would silently drop an impulse. The most common case is a
+voltage that is switched on: V' is 0 on both sides, and the current would stay 0.
 """
 
 from __future__ import annotations
@@ -39,15 +39,15 @@ from vibsim.models.shared.inertia import MASS, inertia
 from vibsim.models.table import Lookup
 
 CHUNK = 2**16
-"""Members that are looked at together."""
+"""Members per block."""
 SLACK = 1e-6
-"""What is no difference between two places, in spacings of the table or in steps: rounding."""
+"""Tolerance for rounding when abscissae are compared, in spacings of the table or in steps."""
 MOST_NAMED = 3
-"""Most swept numbers of a member that a message names."""
+"""Largest number of swept values that identify a member in a message."""
 SAMPLED_MEMBERS = 64
-"""Members of a sweep that are looked at for jumps, evenly spread: a jump is hardly ever there for single ones."""
+"""Number of members, evenly spaced, that are checked for jumps: hardly ever do only a few members jump."""
 WORK = 2**10
-"""Operations of all these members together: of a long formula, fewer members are looked at."""
+"""Bound on operations times members in that check: for a long formula, fewer members are checked."""
 WORDS = {1: "derivative", 2: "second derivative"}
 HINTS = {
     "voltage": "write a steep ramp, V0*(1 + tanh((t - t1)/0.001))/2 say, or begin behind the jump, "
@@ -59,7 +59,7 @@ OTHERS = "write a solution whose value and slope have no jumps"
 
 @dataclass(frozen=True)
 class MemberNumbers:
-    """The numbers of all members."""
+    """The parameters, initial values and end times of all members of a sweep."""
 
     model: Model
     parameters: Mapping[str, float]
@@ -67,63 +67,69 @@ class MemberNumbers:
     time: TimeSpec
     axes: Sequence[Axis]
 
-    def members(self) -> Iterator[tuple[dict[str, Any], Floats]]:
-        """Yield parts of the members that differ in what matters: their swept numbers, and their ends."""
+    def blocks(self) -> Iterator[tuple[dict[str, Any], Floats]]:
+        """Yield blocks of the distinct members (see `count`): their swept values, and their end times."""
         for start, stop in _chunks(self.count):
-            yield self._part(start, stop)
+            yield self._block(start, stop)
 
-    def some(self, most: int) -> Iterator[tuple[dict[str, float], float]]:
-        """Yield the parameters by name and the ends of at most so many of these members, evenly spread over them."""
+    def sampled(self, most: int) -> Iterator[tuple[dict[str, float], float]]:
+        """Yield parameters by name and end time of at most `most` distinct members, evenly spaced."""
         count = self.count
         for i in sorted({k * (count - 1) // max(most - 1, 1) for k in range(most)}):
-            found, end = self._part(i, i + 1)
-            numbers = self._by_name(found)
+            swept, end = self._block(i, i + 1)
+            numbers = self._by_name(swept)
             yield {name: float(np.ravel(x)[0]) for name, x in numbers.items()}, float(end[0])
 
     def starts(self) -> Iterator[tuple[int, dict[str, Any], dict[str, Any]]]:
-        """Yield the number of some members, what formulas name of them at t = 0, and their swept values, for all."""
+        """Yield blocks of all members: their number, their variables at t = 0 by name, and their swept values."""
         for start, stop in _chunks(math.prod(axis.count for axis in self.axes)):
             swept = columns_of(self.axes, start, stop)
-            begins = self.model.start(self._parameters(swept)) if self.model.start else self.initial
+            start_values = (
+                self.model.start(self._parameters(swept)) if self.model.start else self.initial
+            )
             numbers: dict[str, Any] = {"t": 0.0, **self._by_name(swept)}
             for state in self.model.states:
-                value = begins.get(state.name, 0.0)
+                value = start_values.get(state.name, 0.0)
                 numbers[state.name] = swept.get(f"initial.{state.name}", value)
             yield stop - start, numbers, swept
 
-    def _axes(self) -> list[Axis]:
-        return [axis for axis in self.axes if any(map(_matters, axis.keys))]
+    def _distinct_axes(self) -> list[Axis]:
+        return [axis for axis in self.axes if any(map(_is_distinguishing, axis.keys))]
 
     @property
     def count(self) -> int:
-        """Number of members that differ in what matters."""
-        return math.prod(axis.count for axis in self._axes())
+        """Number of members that differ in a model parameter or the end time."""
+        return math.prod(axis.count for axis in self._distinct_axes())
 
-    def _part(self, start: int, stop: int) -> tuple[dict[str, Any], Floats]:
-        found = {k: v for k, v in columns_of(self._axes(), start, stop).items() if _matters(k)}
-        end = found.get("time.end", np.full(stop - start, self.time.end))
+    def _block(self, start: int, stop: int) -> tuple[dict[str, Any], Floats]:
+        swept = {
+            k: v
+            for k, v in columns_of(self._distinct_axes(), start, stop).items()
+            if _is_distinguishing(k)
+        }
+        end = swept.get("time.end", np.full(stop - start, self.time.end))
         if self.time.is_of_model:
             with np.errstate(divide="ignore"):
-                own = self.time.end_of(self.model, self._parameters(found))
-            end = np.broadcast_to(own, end.shape)
-        return found, end
+                end_of_model = self.time.end_of(self.model, self._parameters(swept))
+            end = np.broadcast_to(end_of_model, end.shape)
+        return swept, end
 
     @property
     def lookup(self) -> Lookup:
-        """The table of the model."""
+        """The table of the model and the formula of its abscissa."""
         assert self.model.lookup is not None
         return self.model.lookup
 
-    def place(self, found: Mapping[str, Any], t: Floats) -> Floats:
-        """Return the places at times t, of members with some numbers swept."""
+    def place(self, swept: Mapping[str, Any], t: Floats) -> Floats:
+        """Return the abscissae in the table at times `t` of members with these swept values."""
         formula = tree(self.model, self.lookup.place)
-        return np.broadcast_to(values(formula, {**self._by_name(found), "t": t}), t.shape)
+        return np.broadcast_to(values(formula, {**self._by_name(swept), "t": t}), t.shape)
 
-    def _parameters(self, found: Mapping[str, Any]) -> dict[str, Any]:
-        return {key: found.get(f"model.{key}", x) for key, x in self.parameters.items()}
+    def _parameters(self, swept: Mapping[str, Any]) -> dict[str, Any]:
+        return {key: swept.get(f"model.{key}", x) for key, x in self.parameters.items()}
 
-    def _by_name(self, found: Mapping[str, Any]) -> dict[str, Any]:
-        given = self._parameters(found)
+    def _by_name(self, swept: Mapping[str, Any]) -> dict[str, Any]:
+        given = self._parameters(swept)
         return {row.name: given[row.key] for row in self.model.parameters}
 
 
@@ -131,18 +137,18 @@ def _chunks(count: int) -> Iterator[tuple[int, int]]:
     yield from ((start, min(start + CHUNK, count)) for start in range(0, count, CHUNK))
 
 
-def _matters(key: str) -> bool:
+def _is_distinguishing(key: str) -> bool:
     return key.startswith("model.") or key == "time.end"
 
 
 def check_ends(numbers: MemberNumbers, report: Report) -> None:
-    """Refuse an end that follows from the model where it has none for some member."""
+    """Refuse an end time derived from the model that is not positive and finite for some member."""
     if not numbers.time.is_of_model:
         return
-    for found, end in numbers.members():
-        has_none = ~(np.isfinite(end) & (end > 0.0))
-        if has_none.any():
-            who = named(found, int(np.argmax(has_none)))
+    for swept, end in numbers.blocks():
+        is_invalid = ~(np.isfinite(end) & (end > 0.0))
+        if is_invalid.any():
+            who = member_name(swept, int(np.argmax(is_invalid)))
             if numbers.time.frequency is not None:
                 key, rule = "frequency", "must be an angular frequency greater than 0"
             elif numbers.time.periods is not None:
@@ -153,59 +159,56 @@ def check_ends(numbers: MemberNumbers, report: Report) -> None:
             return
 
 
-def named(swept: Mapping[str, Any], i: int) -> str:
-    """Name a member by its swept numbers."""
+def member_name(swept: Mapping[str, Any], i: int) -> str:
+    """Identify member `i` in a message by its swept numbers."""
     numbers = (f"{key} = {x[i]:.10g}" for key, x in swept.items() if x.dtype.kind != "U")
     return ", ".join(list(numbers)[:MOST_NAMED])
 
 
-def check_length(numbers: MemberNumbers, name: str, report: Report) -> None:
-    """Refuse a table that ends before a member does."""
+def check_table_length(numbers: MemberNumbers, name: str, report: Report) -> None:
+    """Refuse a table that ends before the motion of some member."""
     table = numbers.lookup.table
-    most, who = -np.inf, ""
-    for found, end in numbers.members():
-        places = numbers.place(found, end)
+    furthest, who = -np.inf, ""
+    for swept, end in numbers.blocks():
+        places = numbers.place(swept, end)
         i = int(np.argmax(places))
-        if places[i] > most:
-            most = float(places[i])
-            who = named(found, i)
-    if most > table.last + SLACK * table.spacing:
-        count = int(np.ceil((most - table.first) / table.spacing - SLACK)) + 1
+        if places[i] > furthest:
+            furthest = float(places[i])
+            who = member_name(swept, i)
+    if furthest > table.last + SLACK * table.spacing:
+        count = int(np.ceil((furthest - table.first) / table.spacing - SLACK)) + 1
         unit = "" if numbers.model.dimensionless else " m"
-        rule = (
-            f"the table ends at {table.last:.10g}{unit}, but the motion comes to {most:.10g}{unit}"
-        )
+        rule = f"the table ends at {table.last:.10g}{unit}, but the motion comes to {furthest:.10g}{unit}"
         hint = f"it must have at least {count} points, not {table.points}"
         report.add(("model", name, TABLE), f"{rule}{f' ({who})' if who else ''}", hint)
 
 
 def _is_met(numbers: MemberNumbers, level: int) -> bool:
-    """Tell whether a step of every member ends at every point of the table, at every level from the coarsest one on.
+    """Tell whether the steps of every member hit every point of the table, at `level` and all finer ones.
 
-    It does where the way of a step at the coarsest level is a whole part of the spacing, and the table has a point at
-    the start.
+    They do if the spacing is a whole multiple of the advance per step at `level`, and so is the first abscissa.
     """
     table, steps = numbers.lookup.table, numbers.time.base_steps << level
-    for found, end in numbers.members():
-        way = numbers.place(found, end / steps)
+    for swept, end in numbers.blocks():
+        advance = numbers.place(swept, end / steps)
         with np.errstate(divide="ignore", invalid="ignore"):
-            per_spacing, start = table.spacing / way, table.first / way
-            rest = table.points * np.abs(per_spacing - np.round(per_spacing))
-            misses = ~(rest <= SLACK) | ~(np.abs(start - np.round(start)) <= SLACK)
-        # who does not move meets no corner
-        if np.any((misses | (per_spacing < 0.5)) & (way != 0.0)):
+            per_spacing, first = table.spacing / advance, table.first / advance
+            deviation = table.points * np.abs(per_spacing - np.round(per_spacing))
+            misses = ~(deviation <= SLACK) | ~(np.abs(first - np.round(first)) <= SLACK)
+        # a member at rest passes no point
+        if np.any((misses | (per_spacing < 0.5)) & (advance != 0.0)):
             return False
     return True
 
 
 def update_tables(experiment: AnyExperiment) -> AnyExperiment:
-    """Return `experiment` with what its tables say of its steps, whose members or levels were others before."""
+    """Return `experiment` with `TableSpec.is_met` recomputed for its members and levels."""
     model = experiment.model
     if not model.tables:
         return experiment
     axes = experiment.sweep.axes if experiment.sweep else ()
-    own, initial = model.parameters, experiment.initial
-    numbers = MemberNumbers(model.definition, own, initial, experiment.time, axes)
+    parameters, initial = model.parameters, experiment.initial
+    numbers = MemberNumbers(model.definition, parameters, initial, experiment.time, axes)
     met = {"is_met": _is_met(numbers, experiment.levels[0] if experiment.levels else 0)}
     tables = {name: spec.model_copy(update=met) for name, spec in model.tables.items()}
     model = model.model_copy(update={"tables": FrozenDict(tables)})
@@ -213,7 +216,7 @@ def update_tables(experiment: AnyExperiment) -> AnyExperiment:
 
 
 def check_jumps(members: MemberNumbers, formulas: Mapping[str, str], report: Report) -> None:
-    """Refuse formulas that jump, or whose slope does, where the equation has their derivatives."""
+    """Refuse jumps in a formula or its slope if the equation contains higher derivatives of it."""
     for row in members.model.formulas:
         for key, text in formulas.items() if row.derivatives else ():
             if key.partition(".")[0] == row.name:
@@ -224,44 +227,42 @@ def _check_jumps(
     row: FormulaField, key: str, text: str, members: MemberNumbers, report: Report
 ) -> None:
     (name,) = row.names
-    known = [own.name for own in members.model.parameters]
+    known = [row_.name for row_ in members.model.parameters]
     formula, along = parse(text, (name, *known)), parse(row.along, ("t", *known))
     for order in range(row.derivatives):
-        at = _jump(put(formula, name, along), members, along)
-        if at is not None:
+        place = _jump(put(formula, name, along), members, along)
+        if place is not None:
             what = "jumps" if order == 0 else "its slope jumps"
-            rule = (
-                f"{what} near {name} = {at:.6g}, and the equation has its {WORDS[row.derivatives]}"
-            )
+            rule = f"{what} near {name} = {place:.6g}, and the equation has its {WORDS[row.derivatives]}"
             report.add(("model", *key.split(".")), rule, HINTS.get(row.name, OTHERS), text)
             return
         formula = derivative(formula, name)
 
 
 def _jump(formula: Expression, members: MemberNumbers, along: Expression) -> float | None:
-    """Return the place of a jump of some member; None where none is found."""
+    """Return the value of `along` at a jump of some member; None if no jump is found."""
     most = max(1, min(SAMPLED_MEMBERS, WORK // len(parts_of(formula))))
-    for numbers, end in members.some(most):
-        at = first_jump(formula, numbers, end)
-        if at is not None:
-            # halving ends beside 0, not at it
-            at = at if at > 1e-9 * end else 0.0
-            return float(values(along, {**numbers, "t": at}))
+    for numbers, end in members.sampled(most):
+        t = first_jump(formula, numbers, end)
+        if t is not None:
+            # bisection ends next to 0, not at it
+            t = t if t > 1e-9 * end else 0.0
+            return float(values(along, {**numbers, "t": t}))
     return None
 
 
 def check_starts(members: MemberNumbers, formulas: Mapping[str, str], report: Report) -> None:
-    """Refuse a stop that holds at t = 0 already, and a matrix of masses that is not positive definite there."""
+    """Refuse a stop condition that holds at t = 0, and a mass matrix that is not positive definite there."""
     model = members.model
 
     def refuse(
         is_wrong: Callable[[Mapping[str, Any]], Flags], path: Path_, rule: str, hint: str
     ) -> None:
-        """Refuse the first member of which something is wrong; `rule` has a place for its name."""
+        """Report a fault for the first member for which `is_wrong`; `rule` has a placeholder for its name."""
         for count, numbers, swept in members.starts():
             wrong = np.broadcast_to(is_wrong(numbers), (count,))
             if wrong.any():
-                who = named(swept, int(np.argmax(wrong)))
+                who = member_name(swept, int(np.argmax(wrong)))
                 report.add(path, rule.format(f" (where {who})" if who else ""), hint)
                 return
 
@@ -270,9 +271,9 @@ def check_starts(members: MemberNumbers, formulas: Mapping[str, str], report: Re
         slope = rate(model, guard)
 
         def holds(numbers: Mapping[str, Any], guard: Any = guard, slope: Any = slope) -> Flags:
-            # at the border the motion may go in
-            now, ahead = values(guard, numbers), values(slope, numbers)
-            return np.asarray((now < 0.0) | ((now == 0.0) & (ahead < 0.0)))
+            # on the boundary, the motion may move into the allowed region
+            now, rate_now = values(guard, numbers), values(slope, numbers)
+            return np.asarray((now < 0.0) | ((now == 0.0) & (rate_now < 0.0)))
 
         rule = "holds at the start already{}: nothing would move"
         refuse(holds, ("model", STOP), rule, "begin outside of it")

@@ -1,4 +1,4 @@
-"""From the section ``model`` to an equation of motion: whether its formulas and parameters fit together."""
+"""Build the equation of motion from the section ``model``, and check that its formulas and parameters fit together."""
 
 from __future__ import annotations
 
@@ -12,15 +12,16 @@ import numpy as np
 from vibsim.experiment.data import StructureSpec, TableSpec
 from vibsim.experiment.faults import Report
 from vibsim.experiment.kinds import COORDINATES
-from vibsim.experiment.rules.formulas import NAME, declared_parameters, is_sound, read_formulas
+from vibsim.experiment.rules.formulas import (
+    NAME,
+    declared_parameters,
+    is_valid_formula,
+    read_formulas,
+)
 from vibsim.experiment.rules.potential import NOT_FOUND, check_potential, note_potential
 from vibsim.experiment.rules.structure import read_structure, terms_of_damping
 from vibsim.experiment.schema.fields import AT, DECLARED, Section
-from vibsim.formula import (
-    ExpressionError,
-    derivative,
-    parts_of,
-)
+from vibsim.formula import ExpressionError, derivative, parts_of
 from vibsim.models import FormulaField, Model, tree
 from vibsim.models.base import rate
 from vibsim.models.events import Crossings
@@ -30,75 +31,75 @@ from vibsim.models.structure import RAYLEIGH
 from vibsim.models.system import coordinate_faults
 
 EVENTS = "events or a stop"
-HOLDS = "coulomb friction, which may hold the body elsewhere"
+STICTION = "coulomb friction, which may hold the body elsewhere"
 MAX_NODES = 20_000
-"""Distinct parts of an equation with its slopes and energies: compiling takes 1 to 2 ms for each."""
+"""Largest number of distinct subexpressions of the equation, its slopes and energies; each compiles in 1 to 2 ms."""
 
 
 @dataclass(frozen=True)
 class Equation:
-    """What a section says, as far as it is sound."""
+    """The valid content of a section ``model``."""
 
     model: Model | None
-    """The equation of motion; None where it is not known, because the kind or a formula is at fault."""
+    """The equation of motion; None if the kind or a formula is faulty."""
     parameters: dict[str, float] = field(default_factory=dict)
     formulas: dict[str, str] = field(default_factory=dict)
     tables: dict[str, TableSpec] = field(default_factory=dict)
     terms: tuple[str, ...] = ()
-    """Which of `Model.optional` the equation has."""
+    """The optional terms (`Model.optional`) that the equation contains."""
     structure: StructureSpec | None = None
 
 
-def are_known(model: Model, parameters: Mapping[str, float]) -> bool:
-    """Tell whether every parameter of a model has a value; without some it may have none at all."""
+def has_all_values(model: Model, parameters: Mapping[str, float]) -> bool:
+    """Tell whether every parameter of a model has a value; with a faulty section there may be none at all."""
     return len(parameters) >= len(model.parameters)
 
 
 def equation(
     section: Any, model: Model | None, swept: Collection[str], folder: Path, report: Report
 ) -> Equation:
-    """Check the section of a `model` of the registry (None where it is malformed), and fill in what it leaves out.
+    """Return the equation of a section (None if malformed) of the registered `model`, with defaults filled in.
 
-    `swept` holds the dotted keys that the file sweeps; the paths of tables begin in `folder`.
+    `swept` holds the dotted keys that the file sweeps. Paths of tables are relative to `folder`.
     """
     if section is not None and model is None:
         for i, fault in enumerate(coordinate_faults(getattr(section, COORDINATES, ()))):
             if fault:
                 report.add(("model", COORDINATES, i), fault, "choose another name")
     if section is None or model is None:
-        # what follows from formulas is known only with all of them
+        # a model with formulas is known only with all of them
         return Equation(model if model is not None and model.written is None else None)
     if model.loaded is not None:
-        found = _structure(section, model, swept, folder, report)
-        _note_unused(section, found, report)
-        return found
+        result = _equation_of_structure(section, model, swept, folder, report)
+        _note_unused(section, result, report)
+        return result
     parameters = {row.name: getattr(section, row.name) for row in model.parameters}
-    found = Equation(model, parameters)
+    result = Equation(model, parameters)
     if model.written is not None:
-        found = _written(section, model, parameters, folder, report)
-        _note_unused(section, found, report)
-    if found.model is None:
-        return found
-    neutral = {row.name: row.neutral for row in found.model.parameters}
+        result = _equation_of_formulas(section, model, parameters, folder, report)
+        _note_unused(section, result, report)
+    if result.model is None:
+        return result
+    neutral = {row.name: row.neutral for row in result.model.parameters}
     terms = tuple(
         name
-        for name in found.model.optional
-        if found.parameters[name] != neutral[name] or f"model.{name}" in swept
+        for name in result.model.optional
+        if result.parameters[name] != neutral[name] or f"model.{name}" in swept
     )
-    return replace(found, model=found.model.with_terms(terms), terms=terms)
+    return replace(result, model=result.model.with_terms(terms), terms=terms)
 
 
-def _note_unused(section: Any, found: Equation, report: Report) -> None:
-    """Note declared parameters that no formula names."""
-    if found.model is None:
+def _note_unused(section: Any, equation_: Equation, report: Report) -> None:
+    """Warn about declared parameters that no formula uses."""
+    if equation_.model is None:
         return
-    used = {name for text in found.formulas.values() for name in NAME.findall(text)}
+    used = {name for text in equation_.formulas.values() for name in NAME.findall(text)}
     for name in section.parameters:
         if name not in used:
             report.note(("model", DECLARED, name), "no formula names it", "leave it out")
 
 
-def _structure(
+def _equation_of_structure(
     section: Any, model: Model, swept: Collection[str], folder: Path, report: Report
 ) -> Equation:
     """Return the equation of a structure."""
@@ -107,88 +108,88 @@ def _structure(
     }
     declared = declared_parameters(section, model, report)
     spec, loads = read_structure(section, folder, report)
-    field = FormulaField("load", ("t",), "", "load")
+    load_field = FormulaField("load", ("t",), "", "load")
     known = (*(row.name for row in RAYLEIGH), *declared)
     for text, path in loads.values():
-        is_sound(text, field, path, known, report)
-    if spec is None or report.doubts_model:
+        is_valid_formula(text, load_field, path, known, report)
+    if spec is None or report.has_faulty_model:
         return Equation(None)
     texts = {key: text for key, (text, _) in loads.items()}
-    found = model.with_formulas(texts, tuple(declared), spec.structure)
+    equipped = model.with_formulas(texts, tuple(declared), spec.structure)
     parameters |= {f"{DECLARED}.{name}": value for name, value in declared.items()}
-    terms = terms_of_damping(found, parameters, swept)
-    return Equation(found.with_terms(terms), parameters, texts, terms=terms, structure=spec)
+    terms = terms_of_damping(equipped, parameters, swept)
+    return Equation(equipped.with_terms(terms), parameters, texts, terms=terms, structure=spec)
 
 
-def _written(
+def _equation_of_formulas(
     section: Any, model: Model, parameters: dict[str, float], folder: Path, report: Report
 ) -> Equation:
-    """Return the equation of a model whose formulas the section has."""
+    """Return the equation of a model whose formulas are in the section."""
     declared = declared_parameters(section, model, report)
     texts, coefficients, tables = read_formulas(section, model, declared, folder, report)
     parameters = parameters | coefficients
     exact = next((name for name in texts if name.startswith("exact")), "")
-    _check_together(section, texts, exact, f"damping.{COULOMB}" in parameters, report)
-    if report.doubts_model:
+    _check_combinations(section, texts, exact, f"damping.{COULOMB}" in parameters, report)
+    if report.has_faulty_model:
         return Equation(None)
     parameters |= {f"{DECLARED}.{name}": value for name, value in declared.items()}
     try:
         numbers = (spec.table for spec in tables.values())
-        found = model.with_formulas(texts, tuple(declared), *numbers)
-        _check_length(found)
+        equipped = model.with_formulas(texts, tuple(declared), *numbers)
+        _check_size(equipped)
     except ExpressionError as error:
-        # an error without a text speaks of the longest formula
+        # an error without a text is attributed to the longest formula
         longest = max(texts, key=lambda name: len(texts[name]), default="kind")
         name = exact if error.text and exact else longest
         path = ("model", *name.split("."))
         report.add(path, error.rule, error.hint, texts.get(name, error.text))
         return Equation(None)
-    keys = {row.key for row in found.parameters}
+    keys = {row.key for row in equipped.parameters}
     for name in sorted(section.model_fields_set & (parameters.keys() - keys)):
         rule = "has no meaning beside an exact solution, on which the motion starts"
         report.add(("model", name), rule, "leave it out", parameters[name], at_key=True)
     parameters = {key: value for key, value in parameters.items() if key in keys}
-    for name, value in (found.start(parameters) if found.start else {}).items():
+    for name, value in (equipped.start(parameters) if equipped.start else {}).items():
         if not np.isfinite(value):
             rule = f"must have a finite value at t = 0, where {name} is {value:g}"
             report.add(("model", *exact.split(".")), rule, value=texts.get(exact))
             return Equation(None)
-    if found.misses_potential:
+    if equipped.misses_potential:
         hint = "energies are kinetic alone; write `potential`, if the forces have one"
         report.note(("model",), NOT_FOUND, hint)
     if any(row.name == "spring" for row in model.formulas):
-        check_potential(found, parameters, texts, report)
+        check_potential(equipped, parameters, texts, report)
     elif any(name.startswith("potential.") for name in texts):
-        note_potential(found, parameters, report)
-    return Equation(found, parameters, texts, tables)
+        note_potential(equipped, parameters, report)
+    return Equation(equipped, parameters, texts, tables)
 
 
-def _check_together(
+def _check_combinations(
     section: Any, texts: Mapping[str, str], exact: str, has_friction: bool, report: Report
 ) -> None:
-    """Refuse what cannot stand side by side: an exact solution, a force, friction, and events."""
+    """Refuse invalid combinations of an exact solution, a force, friction, and events."""
     friction, is_followed = f"damping.{COULOMB}", "exact" in texts
     has_events = any(map(is_crossing, texts))
     has_force = is_followed and section.force is not None
-    leaves = "the motion leaves the exact solution at an event"
+    why_no_events = "the motion leaves the exact solution at an event"
     tabled = [name for name in texts if isinstance(getattr(section, name, None), Section)]
     tabled = [name for name in tabled if hasattr(getattr(section, name), AT)]
     other = "an exact solution" if exact else EVENTS
     pairs = (
         ("force", has_force, "exact, from which it follows", ""),
-        ("exact", is_followed and has_friction, HOLDS, ""),
-        ("exact", has_events and exact, EVENTS, leaves),
+        ("exact", is_followed and has_friction, STICTION, ""),
+        ("exact", has_events and exact, EVENTS, why_no_events),
         *((name, exact or has_events, other, "") for name in tabled),
         (friction, has_events and has_friction, EVENTS, "friction has events of its own"),
     )
-    for key, are_together, other, why in pairs:
-        if are_together:
+    for key, is_invalid, other, hint in pairs:
+        if is_invalid:
             rule = f"must not be given together with {other}"
-            report.add(("model", *key.split(".")), rule, why, at_key=True)
+            report.add(("model", *key.split(".")), rule, hint, at_key=True)
 
 
-def _check_length(model: Model) -> None:
-    """Refuse an equation that would take long to compile: each call of a function is a page of machine code."""
+def _check_size(model: Model) -> None:
+    """Raise `ExpressionError` if the equation is too long to compile: each call is a page of machine code."""
     accelerations = [tree(model, formula) for formula in model.accelerations]
     states = {*model.positions, *model.velocities}
     slopes = [

@@ -1,4 +1,4 @@
-"""Whether a potential energy is that of a spring, by the work of the spring, or of the forces of a system, by power."""
+"""Check that a potential energy belongs to its spring, by work, or to the forces of a system, by power."""
 
 from __future__ import annotations
 
@@ -12,22 +12,22 @@ from vibsim.formula import ZERO, Expression, derivative, has_rule, parse, values
 from vibsim.models import Model, tree
 
 AMPLITUDES = (-6, 8)
-"""Powers of 2, from and to, of the amplitudes at which a potential energy is compared with its spring."""
+"""Range of the exponents of 2 of the amplitudes at which both are compared."""
 PANELS, POINTS = 32, 16
-"""Panels of an amplitude, and points of each."""
+"""Number of quadrature panels per amplitude, and of points per panel."""
 TESTS = 24
-"""Places at which that of a system is compared with its forces."""
+"""Number of points at which the potential of a system is compared with its forces."""
 AGREE = 1e-9
-"""How far both may differ, relative to the largest energy."""
+"""Relative tolerance of the comparison."""
 NOT_FOUND = "no potential energy was found of the forces that the positions make"
 
 
 def check_potential(
     model: Model, parameters: Mapping[str, float], texts: Mapping[str, str], report: Report
 ) -> None:
-    """Compare the potential energy with the work of the spring between half and whole amplitudes.
+    """Compare the potential energy with the work of the spring between half and full amplitudes.
 
-    `texts` holds the formulas of the file by their fields.
+    `texts` holds the formulas of the file by field.
     """
     names = (model.position, *(row.name for row in model.parameters))
     numbers = {row.name: parameters[row.key] for row in model.parameters}
@@ -40,7 +40,7 @@ def check_potential(
         coarse, work = (_work(spring, numbers, model.position, u, n) for n in (PANELS, 2 * PANELS))
         energy = [values(potential, {**numbers, model.position: x}) for x in (u, 0.5 * u)]
         scale = np.abs(work) + np.abs(energy[0]) + np.abs(energy[1])
-        # the work across a corner or a pole is not known so well
+        # quadrature across a corner or a pole is less accurate
         is_known = np.abs(work - coarse) <= 0.1 * AGREE * scale
         is_right = np.abs(energy[0] - energy[1] - work) <= AGREE * scale
     is_compared = is_known & np.isfinite(energy).all(axis=0)
@@ -95,7 +95,7 @@ def note_potential(model: Model, parameters: Mapping[str, float], report: Report
 def _work(
     spring: Expression, numbers: Mapping[str, float], position: str, u: Floats, panels: int
 ) -> Floats:
-    """Return the integral of the spring from u/2 to u, by Gauss and Legendre's rule in every panel."""
+    """Return the integral of the spring from u/2 to u, by Gauss-Legendre quadrature in every panel."""
     place, weight = np.polynomial.legendre.leggauss(POINTS)
     middle = (2.0 * np.arange(panels)[:, None] + 1.0 + place) / (2.0 * panels)
     places = u[:, None, None] * (0.5 + 0.5 * middle)

@@ -1,4 +1,4 @@
-"""A run in the characteristic units of its model: dimensionless numbers in, and the factors that lead back.
+"""A run in the characteristic units of its model: its dimensionless numbers, and the scales to convert back.
 
 Source: vibration text (B), section 10.1; pendulum lecture (A), section 1.2.
 """
@@ -18,7 +18,7 @@ from vibsim.models.shared.scales import scaled_parameters, scales
 
 @dataclass(frozen=True)
 class Numbers:
-    """What a run starts from."""
+    """The numbers that define a run."""
 
     parameters: Mapping[str, float]
     initial: Mapping[str, float]
@@ -29,7 +29,7 @@ class Numbers:
 def characteristic(
     given: Numbers, model: Model | None, swept: Iterable[str], report: Report
 ) -> Numbers:
-    """Return the dimensionless numbers of a run, with what leads back; as `given`, and a fault, where there are none.
+    """Return the dimensionless numbers of a run with their scales; report a fault and return `given` if there are none.
 
     `swept` holds the dotted keys of the sweep.
     """
@@ -39,34 +39,34 @@ def characteristic(
         report.add(("scaled",), rule, at_key=True)
     if key or model is None or given.time is None or not given.parameters:
         return given
-    found = _scaled(given, given.time, model)
-    if isinstance(found, Numbers):
-        return found
-    report.add(("scaled",), *found, at_key=True)
+    result = _scaled(given, given.time, model)
+    if isinstance(result, Numbers):
+        return result
+    report.add(("scaled",), *result, at_key=True)
     return given
 
 
 def _scaled(given: Numbers, time: TimeSpec, model: Model) -> Numbers | tuple[str, str]:
-    """Return the scaled numbers, or the rule that they break and what helps."""
+    """Return the scaled numbers, or the rule that they break and a hint."""
     if model.scales is None or model.scales.parameters is None:
         return _refusal(model)
-    rows = {row.name: float(row.value) for row in scales(model, given.parameters, given.initial)}
-    if not all(math.isfinite(value) and value > 0.0 for value in rows.values()):
+    sizes = {row.name: float(row.value) for row in scales(model, given.parameters, given.initial)}
+    if not all(math.isfinite(value) and value > 0.0 for value in sizes.values()):
         return "the scales have no finite values with these parameters and initial values", ""
-    found = scaled_parameters(model, given.parameters, given.initial)
-    parameters = {name: float(value) for name, value in found.items()}
-    initial = {name: value / rows[name] for name, value in given.initial.items()}
-    end = float(time.end_of(model, parameters)) if time.is_of_model else time.end / rows["t"]
+    scaled = scaled_parameters(model, given.parameters, given.initial)
+    parameters = {name: float(value) for name, value in scaled.items()}
+    initial = {name: value / sizes[name] for name, value in given.initial.items()}
+    end = float(time.end_of(model, parameters)) if time.is_of_model else time.end / sizes["t"]
     if not (0.0 < end < math.inf and all(map(math.isfinite, initial.values()))):
         return "the scaled end or initial values are not finite", ""
-    kept = Scaling(
-        scales=rows, parameters=dict(given.parameters), initial=dict(given.initial), end=time.end
+    scaling = Scaling(
+        scales=sizes, parameters=dict(given.parameters), initial=dict(given.initial), end=time.end
     )
-    return Numbers(parameters, initial, time.model_copy(update={"end": end}), kept)
+    return Numbers(parameters, initial, time.model_copy(update={"end": end}), scaling)
 
 
 def _refusal(model: Model) -> tuple[str, str]:
-    """Return why a model has no scaled equation, and what helps."""
+    """Return the reason why a model has no scaled equation, and a hint."""
     rule = f"the model {model.kind} has no scaled equation"
     if model.dimensionless:
         return f"{rule}: it is dimensionless already", "leave it out"

@@ -1,4 +1,4 @@
-"""The schemes of an experiment: each exists, has a name of its own, and can treat the forces of the model."""
+"""Rules for schemes: each exists, has a unique name, and can treat the forces of the model."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ from vibsim.schemes.base import EVENTS, MOST_UNKNOWNS, VECTOR
 def finish_schemes(
     sections: Sequence[Any], model: Model | None, report: Report
 ) -> list[SchemeSpec]:
-    """Return the schemes of a list (None stands for a malformed entry), and note every fault of it."""
-    found: list[SchemeSpec] = []
+    """Return the schemes of a list (None stands for a malformed entry), and report all faults."""
+    finished: list[SchemeSpec] = []
     first: dict[str, int] = {}
     for i, section in enumerate(sections):
         if section is None:
@@ -33,16 +33,16 @@ def finish_schemes(
             hint = nearest(kind, sorted(report.kinds.names("schemes")))
             report.add(("schemes", i), "unknown scheme", hint, kind)
             continue
-        several = _specs(section, scheme, model, report.kinds)
-        found.extend(several)
+        specs = _specs(section, scheme, model, report.kinds)
+        finished.extend(specs)
         if model is not None:
             _check_options(section, i, scheme, model, report)
             _check_forces(scheme, i, model, report)
-        _check_names(several, i, first, report)
-    if are_known(sections, report.kinds) and all(spec.adaptive for spec in found):
+        _check_names(specs, i, first, report)
+    if are_known(sections, report.kinds) and all(spec.adaptive for spec in finished):
         rule = "at least one scheme must take equal steps, on the levels that are compared"
         report.add(("schemes",), rule, "choose from " + ", ".join(FIXED_STEP), at_key=True)
-    return found
+    return finished
 
 
 def _specs(section: Any, scheme: Scheme, model: Model | None, kinds: Kinds) -> list[SchemeSpec]:
@@ -56,25 +56,25 @@ def _specs(section: Any, scheme: Scheme, model: Model | None, kinds: Kinds) -> l
         name = section.label or kind
         given = {key: getattr(section, key) for key in options}
         options |= {key: value for key, value in given.items() if value is not None}
-    several = options.get(TOLERANCE)
-    if not isinstance(several, tuple):
+    tolerances = options.get(TOLERANCE)
+    if not isinstance(tolerances, tuple):
         spec = SchemeSpec(name=name, kind=kind, options=options)
         if kind in kinds.own_schemes:
             spec.hold(scheme)
         return [spec]
     return [
-        SchemeSpec(name=tolerance_name(name, one), kind=kind, options={**options, TOLERANCE: one})
-        for one in several
+        SchemeSpec(name=tolerance_name(name, x), kind=kind, options={**options, TOLERANCE: x})
+        for x in tolerances
     ]
 
 
-def _check_names(several: list[SchemeSpec], i: int, first: dict[str, int], report: Report) -> None:
-    """Check the names of the schemes of entry number `i`; `first` holds where each name came first."""
-    for j, spec in enumerate(several):
+def _check_names(specs: list[SchemeSpec], i: int, first: dict[str, int], report: Report) -> None:
+    """Check the names of the schemes of entry number `i`; `first` holds the first entry with each name."""
+    for j, spec in enumerate(specs):
         if spec.name in SOLUTIONS:
             rule = f"'{spec.name}' is what checks compare a scheme with, and names none"
             report.add(("schemes", i, "label"), rule, value=spec.name)
-        elif spec.name in [other.name for other in several[:j]]:
+        elif spec.name in [other.name for other in specs[:j]]:
             report.add(("schemes", i, TOLERANCE, j), "a tolerance must not be repeated")
         elif first.setdefault(spec.name, i) != i:
             rule = f"two schemes are named '{spec.name}'"
@@ -114,14 +114,14 @@ def _check_forces(method: Scheme, i: int, model: Model, report: Report) -> None:
 
 
 def _velocities(model: Model) -> str:
-    """Name the velocities on which the acceleration depends."""
+    """List the velocities that the acceleration depends on."""
     named = {name for row in model.accelerations for name in tree(model, row).names}
-    found = [name for name in model.velocities if name in named] or [model.velocity]
-    return ", ".join(found if len(found) < MOST_NAMED else [*found[: MOST_NAMED - 1], "..."])
+    used = [name for name in model.velocities if name in named] or [model.velocity]
+    return ", ".join(used if len(used) < MOST_NAMED else [*used[: MOST_NAMED - 1], "..."])
 
 
 def _check_options(section: Any, i: int, scheme: Scheme, model: Model, report: Report) -> None:
-    """Refuse options without a meaning on this model, and a treatment of events where there are none."""
+    """Refuse options that have no meaning for this model, and a treatment of events for models without events."""
     if isinstance(section, str):
         return
     known = scheme.options_on(model)
@@ -130,7 +130,7 @@ def _check_options(section: Any, i: int, scheme: Scheme, model: Model, report: R
             rule = f"has no meaning for {model.kind}, on which the scheme has one form"
             report.add(("schemes", i, option.name), rule, "leave it out", at_key=True)
     given = getattr(section, EVENTS.name, None)
-    if given is None or report.doubts_model or model.events is not None:
+    if given is None or report.has_faulty_model or model.events is not None:
         return
     rows = map(report.kinds.model, report.kinds.names("model"))
     able = [row.kind for row in rows if row is not None and row.events is not None]
@@ -140,6 +140,6 @@ def _check_options(section: Any, i: int, scheme: Scheme, model: Model, report: R
 
 
 def are_known(sections: Sequence[Any], kinds: Kinds) -> bool:
-    """Tell whether nothing is wrong with any scheme."""
-    found = (kinds.scheme(s) if isinstance(s, str) else s for s in sections)
-    return bool(sections) and all(section is not None for section in found)
+    """Tell whether every scheme of the list is well-formed and of a known kind."""
+    known = (kinds.scheme(s) if isinstance(s, str) else s for s in sections)
+    return bool(sections) and all(section is not None for section in known)

@@ -1,4 +1,4 @@
-"""What no experiment may exceed, found from counts alone: nothing is written out or allocated to find it."""
+"""Limits on the size of an experiment, checked by counts alone: nothing is expanded or allocated."""
 
 from __future__ import annotations
 
@@ -13,47 +13,50 @@ from vibsim.models import Model, quantities
 
 MAX_MEMBERS = 10**7
 MAX_MEMBER_STEPS = 2**40
-"""Steps of every scheme, member and level together: about a day of one core."""
+"""Total steps of all schemes, members and levels: about a day of one core."""
 MAX_MEMORY = 8 * 2**30
-"""Bytes that a job may hold: at least all samples of one member, every scheme, at one level."""
+"""Memory of a job [bytes], which holds at least all samples of one member and all schemes at one level."""
 MAX_DISK = 2**40
 """Bytes of the files of all levels."""
 MAX_FILES = 10_000
-"""Files of all levels, each made by a job or a part of one: with more the workflow is busy with itself."""
+"""Files of all levels. With more of them the overhead of the workflow dominates."""
 MIN_DT = 1e-100
-"""Smallest time step: its square and what is divided by that must not leave the range of floats."""
+"""Smallest time step: its square, and quotients by that, must stay within the range of floats."""
 
 _SMALLEST_MODEL = 6
 """Series of the smallest model: two states and the energies."""
 _D2T = 4
-"""Series with the centred difference as velocity: itself, two energies, and a running maximum."""
+"""Further series with the centred difference as velocity: itself, two energies, and a running maximum."""
 _LEAN = 3
-"""Series that a lean experiment keeps: two states and the energy deviation, and what else a check is about."""
+"""Series that a lean experiment stores: two states and the energy deviation, if checks need no others."""
 
 
 @dataclass(frozen=True)
 class Setting:
-    """What an experiment consists of; None or empty where a section is faulty, and then nothing is said about it."""
+    """The parts of an experiment that checks and limits are validated against.
+
+    A part is None or empty if its section is faulty; rules about it are then skipped.
+    """
 
     model: Model | None
     time: TimeSpec | None
     levels: tuple[int, ...]
     schemes: tuple[SchemeSpec, ...]
-    """Those without a fault."""
+    """The schemes without a fault."""
     names: tuple[str, ...]
-    """The names of the schemes as written, right or wrong."""
+    """The names of the schemes in the file, valid or not."""
     sweep: Sweep
-    """Its axes without a fault."""
+    """The sweep, with only its valid axes."""
     samples: int | str
     knows_sweep: bool = True
-    """Whether the whole sweep is known."""
+    """Whether all axes of the sweep are valid."""
     by_tolerance: bool = False
-    """Whether the levels are still to be chosen, so that none of them can be named."""
+    """Whether a tolerance will choose the levels, so that checks cannot name them."""
     knows_schemes: bool = True
-    """Whether every scheme is known; where one is not, it may be of any kind."""
+    """Whether the kind of every scheme is known; an unknown one may be of any kind."""
 
     def steps(self, level: int) -> int:
-        """Return the number of steps at `level`; 1 at level 0 where the time is not known."""
+        """Return the number of steps at `level`, with 1 base step if the time is not known."""
         return (self.time.base_steps if self.time else 1) << level
 
     @property
@@ -63,7 +66,7 @@ class Setting:
 
     @property
     def members(self) -> int | None:
-        """Number of members, 1 without a sweep; None where it cannot be told."""
+        """Number of members, 1 without a sweep; None if the sweep is faulty."""
         return self.sweep.count if self.knows_sweep else None
 
     @property
@@ -73,40 +76,40 @@ class Setting:
 
     @cached_property
     def adaptive(self) -> tuple[str, ...]:
-        """Names of the schemes that choose their own steps."""
+        """Names of the adaptive schemes."""
         return tuple(scheme.name for scheme in self.schemes if scheme.adaptive)
 
     @cached_property
-    def own(self) -> tuple[str, ...]:
-        """Names of the schemes with another velocity than the centred difference."""
+    def with_own_velocity(self) -> tuple[str, ...]:
+        """Names of the schemes whose velocity differs from the centred difference."""
         return tuple(scheme.name for scheme in self.schemes if scheme.own_velocity)
 
     @property
     def own_velocity(self) -> bool:
-        """Whether some scheme has, or may have, another velocity than the centred difference."""
-        return bool(self.own) or not self.knows_schemes
+        """Whether the velocity of some scheme differs, or may differ, from the centred difference."""
+        return bool(self.with_own_velocity) or not self.knows_schemes
 
     @cached_property
     def quantities(self) -> tuple[str, ...]:
-        """Names of every quantity that is kept over time."""
+        """Names of all quantities that are stored over time."""
         return () if self.model is None else quantities(self.model, self.own_velocity)
 
     def stride(self, level: int) -> int:
-        """Return n where every n-th step of `level` is stored; there must be levels."""
+        """Return n such that every n-th step of `level` is stored. Requires `levels`."""
         coarsest = self.steps(self.levels[0])
         return stride(self.samples, coarsest, self.steps(level), self.trajectories)
 
     def level_cost(self, level: int) -> LevelCost:
-        """Return what `level` asks of a job."""
+        """Return the cost of `level`, as far as the setting is known."""
         steps = self.steps(level)
         has_events = self.model is not None and self.model.events is not None
-        d2t = bool(self.own) and not has_events
+        d2t = bool(self.with_own_velocity) and not has_events
         samples = steps // self.stride(level) + 1
         cost = partial(LevelCost, self.scheme_count, steps, samples, chain=self.sweep.chain)
         if is_lean(self.samples, self.steps(self.levels[0]), self.trajectories):
             return cost(_LEAN, d2t=d2t)
         known = len(quantities(self.model)) if self.model else 0
-        # with the running maximum of the energy deviation
+        # 1 is the running maximum of the energy deviation
         series = max(known, _SMALLEST_MODEL) + 1 + (_D2T if d2t else 0)
         extrema = extrema_kept(self.trajectories)
         events = events_kept(self.trajectories) if has_events else 0
@@ -114,7 +117,7 @@ class Setting:
 
 
 def check(setting: Setting, report: Report) -> None:
-    """Note every limit that counts exceed."""
+    """Report every limit that is exceeded."""
     members = setting.members or 1
     if members > MAX_MEMBERS:
         rule = f"must not have more than {MAX_MEMBERS} members, has {members}"
@@ -137,12 +140,12 @@ def check(setting: Setting, report: Report) -> None:
         return
     costs = [setting.level_cost(level) for level in setting.levels]
     hint = "store fewer samples, or begin at a lower level"
-    # one member, or one chain of them, is the least that a job can make
-    least = setting.sweep.chain
-    memory = max(cost.memory(least) for cost in costs)
+    # the smallest job makes one member, or one chain of members
+    smallest = setting.sweep.chain
+    memory = max(cost.memory(smallest) for cost in costs)
     disk = sum(cost.disk(members) for cost in costs)
     if memory > MAX_MEMORY:
-        what = "one member" if least == 1 else f"the {least} members that follow each other"
+        what = "one member" if smallest == 1 else f"the {smallest} members that follow each other"
         rule = f"{what} at one level must not take more than {MAX_MEMORY} bytes of memory, it takes {memory}"
         report.add(("levels",), rule, hint, at_key=True)
     if disk > MAX_DISK:
@@ -151,7 +154,7 @@ def check(setting: Setting, report: Report) -> None:
 
 
 def check_files(experiment: ExperimentSpec, report: Report) -> None:
-    """Note where the files of all levels are too many."""
+    """Report if the levels have too many files."""
     files = [
         level_cost(experiment, level).shards(experiment.members) for level in experiment.levels
     ]

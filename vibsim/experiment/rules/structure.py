@@ -1,4 +1,4 @@
-"""From the section ``model`` of a structure to its equation of motion."""
+"""Build the matrices and loads of a structure from its section ``model``."""
 
 from __future__ import annotations
 
@@ -19,16 +19,16 @@ from vibsim.models.structure import HISTORY, LOAD, MOST_OBSERVED, RAYLEIGH
 from vibsim.models.system import name_fault, velocities_of
 
 ROUNDED_END = 1e-9
-"""By which a table may end early, relative to its end: a file may have rounded it."""
+"""Relative tolerance of the end of a load table, which the file may have rounded."""
 _DOF = "must be the number of a degree of freedom, counted from 1, its name such as u2, or one that `observe` gives it"
 Formulas = dict[str, tuple[str, Path_]]
-"""By key the text of a formula, and where it stands."""
+"""Formulas by key: text, and path in the file."""
 
 
 def read_structure(
     section: Any, folder: Path, report: Report
 ) -> tuple[StructureSpec | None, Formulas]:
-    """Return what a section says of a structure, with the numbers of its files, and the formulas of its loads."""
+    """Return the structure of a section with the numbers of its files, and the formulas of its loads."""
     arrays = {
         key: _array(value) for key in MATRICES if (value := getattr(section, key)) is not None
     }
@@ -36,7 +36,7 @@ def read_structure(
         if any(section.model_fields_set - {"kind", DECLARED}):
             report.add(("model", "stiffness"), MISSING)
             return None, {}
-        # nothing but the kind: one mass on one spring
+        # default: one mass on one spring
         arrays["stiffness"] = ArraySpec(rows=((1.0,),))
     observed = _observed(section, report)
     named = {name: row[0][0] for name, row in observed if [factor for _, factor in row] == [1.0]}
@@ -55,16 +55,18 @@ def read_structure(
         observe=observed,
         is_free=section.observe is None and section.start is None,
     )
-    if report.doubts_model:
+    if report.has_faulty_model:
         return None, formulas
-    own = assemble(spec, folder, ratios if isinstance(ratios, float) else None)
-    if own.unnamed:
-        rule = f"must be given above {MOST_OBSERVED} degrees of freedom, there are {own.unnamed}"
-        report.add(("model", "observe"), rule, f"e.g. {{tip: {own.unnamed}}}")
-    for key, rule, hint in own.faults:
+    assembled = assemble(spec, folder, ratios if isinstance(ratios, float) else None)
+    if assembled.unnamed:
+        rule = (
+            f"must be given above {MOST_OBSERVED} degrees of freedom, there are {assembled.unnamed}"
+        )
+        report.add(("model", "observe"), rule, f"e.g. {{tip: {assembled.unnamed}}}")
+    for key, rule, hint in assembled.faults:
         shown = arrays[key].file if key in arrays else None
         report.add(_place(key, report), rule, hint, shown)
-    return (with_digests(own) if own.structure is not None else None), formulas
+    return (with_digests(assembled) if assembled.structure is not None else None), formulas
 
 
 def _dof(text: str, named: Mapping[str, int]) -> int:
@@ -79,7 +81,7 @@ def _array(value: Any, named: Mapping[str, int] = MappingProxyType({})) -> Array
     if isinstance(value, Mode):
         return ArraySpec(mode=value.mode, size=value.size)
     if isinstance(value, Mapping):
-        # what is no number of a degree of freedom is reported later
+        # 0 marks an invalid degree of freedom, which is reported later
         entries = ((_dof(dof, named), number) for dof, number in value.items())
         return ArraySpec(entries=tuple(sorted(entries)))
     return ArraySpec(rows=tuple(value))
@@ -88,31 +90,31 @@ def _array(value: Any, named: Mapping[str, int] = MappingProxyType({})) -> Array
 def _loads(
     section: Any, named: Mapping[str, int], arrays: dict[str, ArraySpec], report: Report
 ) -> Formulas:
-    """Return the formulas of the loads, and put their shapes and their tables among the arrays."""
+    """Return the formulas of the loads, and add their shapes and tables to `arrays`."""
     load = section.load
     if load is None:
         return {}
-    found: Formulas = {}
+    formulas: Formulas = {}
 
-    def take(number: int, factor: Any, path: Path_) -> None:
+    def add_factor(number: int, factor: Any, path: Path_) -> None:
         if isinstance(factor, LoadTable):
             spec = ArraySpec(file=factor.table, columns=(factor.t, factor.p))
             arrays[f"{HISTORY}.{number}"] = spec
         else:
-            found[f"{LOAD}.{number}"] = factor.strip(), path
+            formulas[f"{LOAD}.{number}"] = factor.strip(), path
 
     if isinstance(load, ShapedLoad):
         arrays[f"{LOAD}.0"] = _array(load.shape, named)
-        take(0, load.times, ("model", LOAD, "times"))
-        return found
+        add_factor(0, load.times, ("model", LOAD, "times"))
+        return formulas
     for i, (name, factor) in enumerate(load.items()):
         path = ("model", LOAD, name)
         if not (dof := _dof(name, named)):
             report.add(path, _DOF, "or write {shape: ..., times: ...}", at_key=True)
             continue
         arrays[f"{LOAD}.{i}"] = ArraySpec(entries=((dof, 1.0),))
-        take(i, factor, path)
-    return found
+        add_factor(i, factor, path)
+    return formulas
 
 
 def _observed(
@@ -123,36 +125,36 @@ def _observed(
     if len(section.observe) > MOST_OBSERVED:
         rule = f"must not have more than {MOST_OBSERVED} names, has {len(section.observe)}"
         report.add(("model", "observe"), rule, at_key=True)
-    found = []
-    taken: list[str] = ["t", *(row.name for row in RAYLEIGH)]
+    observed = []
+    used: list[str] = ["t", *(row.name for row in RAYLEIGH)]
     names = tuple(section.observe)
     for (name, what), velocity in zip(section.observe.items(), velocities_of(names), strict=True):
-        fault = next((f for f in (name_fault(x, tuple(taken)) for x in (name, velocity)) if f), "")
+        fault = next((f for f in (name_fault(x, tuple(used)) for x in (name, velocity)) if f), "")
         if fault:
             report.add(("model", "observe", name), fault, "choose another name", at_key=True)
-        taken += [name, velocity]
+        used += [name, velocity]
         row = _array(what) if isinstance(what, Mapping) else ArraySpec(entries=((what, 1.0),))
         if any(dof < 1 for dof, _ in row.entries):
             report.add(("model", "observe", name), f"each key {_DOF}", at_key=True)
-        found.append((name, row.entries))
-    return tuple(found)
+        observed.append((name, row.entries))
+    return tuple(observed)
 
 
 def _place(key: str, report: Report) -> Path_:
-    """Return where an array stands in a file, or a part of it that stands behind its key."""
-    head, *rest = key.split(".")
+    """Return the path in the file of the array `key`, which may have a suffix for a value inside it."""
+    head, *parts = key.split(".")
     if head not in (LOAD, HISTORY):
-        return "model", head, *rest
-    number, *part = rest
+        return "model", head, *parts
+    number, *suffix = parts
     load = report.source.data["model"][LOAD]
     if "shape" in load:
-        return "model", LOAD, "shape" if head == LOAD else "times", *part
-    # written by degree of freedom
-    return "model", LOAD, str(list(load)[int(number)]), *(part if head == HISTORY else ())
+        return "model", LOAD, "shape" if head == LOAD else "times", *suffix
+    # loads by degree of freedom
+    return "model", LOAD, str(list(load)[int(number)]), *(suffix if head == HISTORY else ())
 
 
 def check_histories(spec: StructureSpec, end: float, report: Report) -> None:
-    """Refuse a table of a load that ends before the motion does."""
+    """Refuse a load table that ends before the motion."""
     for number, (times, _) in spec.structure.histories:
         if end > times[-1] * (1.0 + ROUNDED_END):
             rule = f"the table ends at {times[-1]:.10g}, but the motion lasts to {end:.10g}"
@@ -163,6 +165,6 @@ def check_histories(spec: StructureSpec, end: float, report: Report) -> None:
 def terms_of_damping(
     model: Model, parameters: Mapping[str, float], swept: Collection[str]
 ) -> tuple[str, ...]:
-    """Return the names of the parameters of Rayleigh damping that are in the equation."""
+    """Return the names of the parameters of Rayleigh damping that the equation contains: nonzero or swept ones."""
     keys = {row.name: row.key for row in RAYLEIGH if row.name in model.optional}
     return tuple(name for name, key in keys.items() if parameters[key] or f"model.{key}" in swept)

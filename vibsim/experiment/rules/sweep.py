@@ -1,4 +1,4 @@
-"""The section ``sweep``: what may vary, within which bounds, counted before anything is written out."""
+"""Read the section ``sweep``: which keys may vary, and within which bounds. Values are counted but not expanded."""
 
 from __future__ import annotations
 
@@ -31,9 +31,9 @@ from vibsim.experiment.yaml.parse import Path_
 from vibsim.models import Model
 
 MAX_HYPERCUBE = 10**6
-"""Points of a latin hypercube: none of them is known before all are drawn."""
+"""Largest number of points of a Latin hypercube, which must be drawn as a whole."""
 MAX_RANGE = 2.0**53
-"""Values of a range, at most: beyond it, their numbers are no floats."""
+"""Largest number of values of a range: larger indices are not exact as floats."""
 _STEPS = "step counts cannot be swept: every member has the same steps"
 _FIXED = {
     f"time.{name}": _STEPS
@@ -42,7 +42,7 @@ _FIXED = {
 
 
 def _table_keys(model: Model) -> set[str]:
-    """Name every formula that may be a table, and the keys of that, by dotted key."""
+    """Return the dotted keys of all formulas that may be tables, and of the keys of these tables."""
     tables = ((f"model.{row.name}", row.table) for row in model.formulas if row.table)
     return {key for name, row in tables for key in (name, *(f"{name}.{k}" for k in (TABLE, *row)))}
 
@@ -54,25 +54,25 @@ def read_sweep(
     lacks_scheme: bool,
     report: Report,
 ) -> tuple[Sweep, bool]:
-    """Return what is sound of the sweep of a document, and whether that is all.
+    """Return the valid part of the sweep of a document, and whether that is the whole sweep.
 
-    What is malformed was left out of the document. Where a scheme is at fault (`lacks_scheme`), nothing is said about
-    options of unknown schemes.
+    Malformed values are already left out of the document. If a scheme is faulty (`lacks_scheme`), options of unknown
+    schemes are not reported.
     """
     section = document.sweep
     if section is None:
         return Sweep(axes=()), _is_wellformed(report)
     types = sweep_types(model, ((scheme.name, scheme.method) for scheme in schemes))
     reader = SweepReader(types, report, document.time, model, lacks_scheme)
-    found = reader.axes(section)
-    sound = tuple(axis for axis in found if axis is not None)
-    is_whole = _is_wellformed(report) and len(sound) == len(found)
-    if is_whole and not sound:
+    axes = reader.axes(section)
+    valid = tuple(axis for axis in axes if axis is not None)
+    is_whole = _is_wellformed(report) and len(valid) == len(axes)
+    if is_whole and not valid:
         report.add(("sweep",), "must not be empty")
-    follow = section.follow if is_whole and sound else None
+    follow = section.follow if is_whole and valid else None
     if follow is not None:
-        check_follow(follow, sound, report)
-    return Sweep.model_construct(axes=sound, follow=follow), is_whole
+        check_follow(follow, valid, report)
+    return Sweep.model_construct(axes=valid, follow=follow), is_whole
 
 
 def _is_wellformed(report: Report) -> bool:
@@ -80,20 +80,20 @@ def _is_wellformed(report: Report) -> bool:
 
 
 def _values_of_kind(kind: Any) -> str:
-    """Name what a key takes that is no number; empty where it takes numbers."""
+    """Return the name of the values that a key accepts other than numbers; empty if it accepts numbers."""
     if kind is StrictBool:
         return "true and false"
     return "words" if get_origin(kind) is Literal else ""
 
 
 def _axis(keys: tuple[str, ...], values: tuple[Values, ...] | Draw) -> Axis:
-    # every number is checked already, and there may be many
+    # skips validation: all numbers are checked already, and there may be many
     return Axis.model_construct(keys=keys, values=values)
 
 
 @dataclass
 class SweepReader:
-    """Turns what is written of each key into values of its type; None stands for those with a fault."""
+    """Converts the content of the section to axes with values of the right type; None stands for a faulty axis."""
 
     types: Mapping[str, Any]
     report: Report
@@ -101,27 +101,27 @@ class SweepReader:
     model: Model | None = None
     lacks_scheme: bool = False
     first: dict[str, Path_] = field(default_factory=dict)
-    """Where each key is swept first."""
+    """Path at which each key is swept first."""
 
     def axes(self, section: Any) -> list[Axis | None]:
         """Return the axes of a section, in the order of the file."""
-        found: list[Axis | None] = []
+        axes: list[Axis | None] = []
         for key in self.report.source.data["sweep"]:
             if key == "zip" and section.zip is not None:
-                found.append(self.zipped(section.zip))
+                axes.append(self.zip_axis(section.zip))
             elif key == "sample" and section.sample is not None:
-                found.append(self.scattered(section.sample))
+                axes.append(self.sample_axis(section.sample))
             elif key in section.single:
-                found.append(self.alone(key, section.single[key]))
-        return found
+                axes.append(self.single_axis(key, section.single[key]))
+        return axes
 
-    def alone(self, key: str, written: Written) -> Axis | None:
-        """Return a key that moves alone."""
+    def single_axis(self, key: str, written: Written) -> Axis | None:
+        """Return the axis of a single key."""
         values = self._values(key, written, ("sweep", key))
         return None if values is None else _axis((key,), (values,))
 
-    def zipped(self, section: Mapping[str, Written]) -> Axis | None:
-        """Return keys that move together."""
+    def zip_axis(self, section: Mapping[str, Written]) -> Axis | None:
+        """Return the axis of keys that vary together."""
         rows = {key: self._values(key, row, ("sweep", "zip", key)) for key, row in section.items()}
         values = {key: row for key, row in rows.items() if row is not None}
         counts = {key: count_of(row) for key, row in values.items()}
@@ -133,9 +133,9 @@ class SweepReader:
         is_sound = len(values) == len(rows) and len(set(counts.values())) == 1
         return _axis(tuple(values), tuple(values.values())) if is_sound else None
 
-    def scattered(self, section: Sample) -> Axis | None:
-        """Return points over several keys."""
-        sound = [self._is_interval(key, *ends) for key, ends in section.over.items()]
+    def sample_axis(self, section: Sample) -> Axis | None:
+        """Return the axis of sample points over several keys."""
+        are_valid = [self._is_interval(key, *ends) for key, ends in section.over.items()]
         if section.method == "latin_hypercube" and section.n > MAX_HYPERCUBE:
             most = f"must be at most {MAX_HYPERCUBE}"
             rule = f"{most} for a latin hypercube, which is drawn as a whole"
@@ -144,7 +144,7 @@ class SweepReader:
             return None
         bounds = tuple(section.over.values())
         draw = Draw(method=section.method, n=section.n, seed=section.seed, over=bounds)
-        return _axis(tuple(section.over), draw) if all(sound) else None
+        return _axis(tuple(section.over), draw) if all(are_valid) else None
 
     def _is_interval(self, key: str, low: float, high: float) -> bool:
         path: Path_ = ("sweep", "sample", "over", key)
@@ -167,20 +167,20 @@ class SweepReader:
         if kind is None:
             return None
         if isinstance(written, tuple):
-            found = self._entries(written, kind, path)
-            is_flags = found is not None and kind is StrictBool
-            return tuple(FLAGS[flag] for flag in found) if is_flags else found
+            entries = self._entries(written, kind, path)
+            is_flags = entries is not None and kind is StrictBool
+            return tuple(FLAGS[flag] for flag in entries) if is_flags else entries
         if what := _values_of_kind(kind):
             hint = "" if kind is StrictBool else "choose from " + ", ".join(get_args(kind))
             self.report.add(path, f"must be a list of {what}", hint)
             return None
         path = (*path, next(iter(type(written).model_fields)))
-        # a rule goes nowhere beyond its ends
+        # all values of a rule lie between its ends
         is_sound = self._gives_values(written, path)
         return written if is_sound and self._entries(written.ends, kind, path) else None
 
     def _type(self, key: str, path: Path_) -> Any:
-        """Return the type of what `key` at `path` stands for; None, and a fault, where it cannot be swept."""
+        """Return the type of the values of `key` at `path`; report a fault and return None if it cannot be swept."""
         first = self.first.setdefault(key, path)
         model, time, kind = self.model, self.time, self.types.get(key)
         rule = hint = ""
@@ -198,17 +198,19 @@ class SweepReader:
             hint = f"sweep a parameter, such as {example}"
         elif model is not None and not (self.lacks_scheme and key.startswith("schemes.")):
             last = key.lower().split(".")[-1]
-            alike = [name for name in self.types if name.lower() == key.lower()]
-            alike = alike or [name for name in self.types if name.lower().split(".")[-1] == last]
-            rule, hint = "cannot be swept", nearest(key, alike or list(self.types))
-            if len(alike) == 1:
-                hint = f"did you mean '{alike[0]}'?"
+            similar = [name for name in self.types if name.lower() == key.lower()]
+            similar = similar or [
+                name for name in self.types if name.lower().split(".")[-1] == last
+            ]
+            rule, hint = "cannot be swept", nearest(key, similar or list(self.types))
+            if len(similar) == 1:
+                hint = f"did you mean '{similar[0]}'?"
         if rule:
             self.report.add(path, rule, hint, at_key=True)
         return None
 
     def _entries(self, written: tuple[Any, ...], kind: Any, path: Path_) -> Any:
-        """Return the entries of a list as what they are: numbers, some of them written as formulas, words or flags."""
+        """Return the entries of a list converted to type `kind`: numbers (also written as formulas), words or flags."""
         try:
             return TypeAdapter(tuple[kind, ...]).validate_python(written)
         except ValidationError as error:

@@ -1,4 +1,4 @@
-"""Time and levels: from the ways of writing them to an end and a number of steps, and to levels that rise."""
+"""Read the sections ``time`` and ``levels``: an end, a number of steps, and increasing levels."""
 
 from __future__ import annotations
 
@@ -10,15 +10,15 @@ from vibsim.core.errors import listed, nearest
 from vibsim.experiment.data import TimeSpec
 from vibsim.experiment.faults import MISSING, Report
 from vibsim.experiment.rules.members import SLACK
-from vibsim.experiment.rules.model import are_known
+from vibsim.experiment.rules.model import has_all_values
 from vibsim.experiment.schema.document import LevelRange, TimeSection
 from vibsim.experiment.yaml.parse import Path_
 from vibsim.models import Model, natural_end, table_end
 
 ANGULAR = ("rad s-1", "1")
-"""Units of an angular frequency: what a user declares and what is dimensionless has the unit 1."""
+"""Units of an angular frequency; 1 for parameters that the user declares and for dimensionless models."""
 WHOLE_NUMBER = 1e-12
-"""How far, relative to it, a number may be from a whole number that is meant."""
+"""Relative tolerance within which a number counts as a whole number."""
 
 
 def time_spec(
@@ -27,7 +27,7 @@ def time_spec(
     parameters: Mapping[str, float],
     report: Report,
 ) -> TimeSpec | None:
-    """Return the end and the steps at level 0; None where they cannot be told."""
+    """Return the end and the steps at level 0; None if they cannot be determined."""
     if section is None:
         return None
     given = {name for name in TimeSection.model_fields if getattr(section, name) is not None}
@@ -67,7 +67,7 @@ def time_spec(
     if steps is None:
         rule = "periods*steps_per_period must be a whole number"
         report.add(("time", "steps_per_period"), rule, f"it is {product:.15g}")
-    if steps is None or model is None or not are_known(model, parameters):
+    if steps is None or model is None or not has_all_values(model, parameters):
         return None
     if section.frequency is not None:
         return _by_force(section, steps, model, parameters, report)
@@ -85,7 +85,7 @@ def _by_force(
     parameters: Mapping[str, float],
     report: Report,
 ) -> TimeSpec | None:
-    """Return the time of whole periods of a parameter of the model, with whole steps in each."""
+    """Return the time of whole periods of a forcing frequency, with whole steps in each period."""
     assert section.periods is not None
     assert section.steps_per_period is not None
     for name in ("periods", "steps_per_period"):
@@ -96,9 +96,9 @@ def _by_force(
             return None
     key = str(section.frequency).removeprefix("model.")
     units = {row.key: row.unit for row in model.parameters}
-    some = [name for name in parameters if units.get(name) == ANGULAR[0]]
-    some = some or [name for name in parameters if units.get(name) in ANGULAR]
-    known = [f"model.{name}" for name in some]
+    frequencies = [name for name in parameters if units.get(name) == ANGULAR[0]]
+    frequencies = frequencies or [name for name in parameters if units.get(name) in ANGULAR]
+    known = [f"model.{name}" for name in frequencies]
     if f"model.{key}" != section.frequency or key not in parameters:
         rule = "must be a parameter of the model"
         report.add(("time", "frequency"), rule, nearest(str(section.frequency), known))
@@ -118,8 +118,8 @@ def _by_force(
 def _by_table(
     steps: int, model: Model | None, parameters: Mapping[str, float], report: Report
 ) -> TimeSpec | None:
-    """Return the time from the place 0 to the end of the table, with so many steps from point to point."""
-    if model is None or not are_known(model, parameters):
+    """Return the time from abscissa 0 to the end of the table, with `steps` steps per spacing."""
+    if model is None or not has_all_values(model, parameters):
         return None
     if model.lookup is None:
         rule = "needs a model with a table, such as a vehicle whose road is one"
@@ -146,7 +146,7 @@ def _refuse(names: set[str], rule: str, report: Report) -> None:
 
 
 def _whole(value: float) -> int | None:
-    """Return the whole number, at least 1, that `value` is to `WHOLE_NUMBER`; None where there is none."""
+    """Return the whole number >= 1 that `value` equals within `WHOLE_NUMBER`; None if there is none."""
     if not math.isfinite(value):
         return None
     nearest = round(value)
@@ -156,7 +156,7 @@ def _whole(value: float) -> int | None:
 def rising_levels(
     section: LevelRange | tuple[int, ...] | None, report: Report, path: Path_ = ("levels",)
 ) -> tuple[int, ...]:
-    """Return the levels of a section, which stands at `path`; none where it is missing or faulty."""
+    """Return the levels of the section at `path`; empty if it is missing or faulty."""
     if isinstance(section, LevelRange):
         if section.from_ > section.to and report.is_set((*path, "from")):
             report.add((*path, "from"), f"must be at most 'to', which is {section.to}")
@@ -173,6 +173,6 @@ def rising_levels(
         is_earlier = report.is_set((*path, i - 1)) and not report.is_set((*path, i))
         if is_earlier:
             hint = hint or f"the next one is {levels[i]}"
-        own = i - 1 if is_earlier else i
-        report.add((*path, own), f"levels {word}", hint, levels[own])
+        faulty = i - 1 if is_earlier else i
+        report.add((*path, faulty), f"levels {word}", hint, levels[faulty])
     return () if falling else levels
