@@ -57,6 +57,10 @@ def normal(**more: Any) -> dict[str, Any]:
             {"checks": [{"id": "order", "converges": "u", "order": 1}]},
             ["checks.order.order: 2.0 -> 1.0"],
         ),
+        (
+            {"checks": [{"id": "order", "value": "end", "quantity": "u", "below": 2}]},
+            ["checks.order.kind: converges -> value"],
+        ),
         ({"sweep": {"model.m": [1.0, 3.0]}}, ["sweep.model.m: [1.0, 2.0] -> [1.0, 3.0]"]),
     ],
 )

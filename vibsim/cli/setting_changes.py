@@ -84,7 +84,9 @@ def _columns(axes: Sequence[Any]) -> dict[str, Any]:
 
 def _compared(path: str, old: Any, new: Any) -> Iterator[Change]:
     if isinstance(old, Mapping) and isinstance(new, Mapping):
-        for key in dict.fromkeys([*old, *new]):
+        # of another kind nothing is the same
+        kinds = ("kind",) if "kind" in old and old["kind"] != new.get("kind") else (*old, *new)
+        for key in dict.fromkeys(kinds):
             inner = f"{path}.{key}" if path else str(key)
             if key in old and key in new:
                 yield from _compared(inner, old[key], new[key])
