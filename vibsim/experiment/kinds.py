@@ -1,4 +1,4 @@
-"""The models and schemes that an experiment may name: registered ones, and those that a program hands over."""
+"""The models and schemes that an experiment may name: registered ones, and objects passed by a program."""
 
 from __future__ import annotations
 
@@ -11,42 +11,42 @@ from vibsim.models.system import MOST, coordinate_faults
 from vibsim.schemes import SCHEMES, Scheme
 
 COORDINATES = "coordinates"
-"""The key under which a file names the coordinates of its equations."""
+"""Key under which a file names the coordinates of its equations."""
 
 
 @dataclass(frozen=True)
 class Kinds:
-    """What ``kind`` may name."""
+    """The valid values of ``kind``."""
 
     own_models: Mapping[str, Model] = field(default_factory=dict)
-    """Given in memory, by kind; they come before those that are registered."""
+    """Models passed as objects, by kind; they take precedence over registered ones."""
     own_schemes: Mapping[str, Scheme] = field(default_factory=dict)
 
     def model(self, kind: Any) -> Model | None:
-        """Return the model of a kind; None where there is none."""
+        """Return the model of a kind; None if there is none."""
         return self.own_models.get(kind) or MODELS.get(kind) if isinstance(kind, str) else None
 
     def model_of(self, section: Any) -> Model | None:
-        """Return the model that a section ``model`` describes, with the coordinates that it names, but no formulas.
+        """Return the model of a section ``model``, with the coordinates of the section but without its formulas.
 
-        None where there is no such model, or its coordinates cannot have these names.
+        The result is None if there is no such model, or if the names of the coordinates are invalid.
         """
-        given = section if isinstance(section, Mapping) else {}
-        found = self.model(given.get("kind"))
-        if found is None or found.named is None or given.get(COORDINATES) is None:
-            return found
-        names = given[COORDINATES]
+        content = section if isinstance(section, Mapping) else {}
+        model = self.model(content.get("kind"))
+        if model is None or model.named is None or content.get(COORDINATES) is None:
+            return model
+        names = content[COORDINATES]
         if not isinstance(names, list | tuple) or not all(isinstance(x, str) for x in names):
             return None
-        is_sound = 0 < len(names) <= MOST and not any(coordinate_faults(names))
-        return found.named(tuple(names)) if is_sound else None
+        are_valid = 0 < len(names) <= MOST and not any(coordinate_faults(names))
+        return model.named(tuple(names)) if are_valid else None
 
     def scheme(self, kind: Any) -> Scheme | None:
-        """Return the scheme of a kind; None where there is none."""
+        """Return the scheme of a kind; None if there is none."""
         return self.own_schemes.get(kind) or SCHEMES.get(kind) if isinstance(kind, str) else None
 
     def names(self, section: str | int) -> tuple[str, ...]:
-        """Name every kind of the section ``model`` or ``schemes``; nothing is imported for that."""
+        """Return all kinds of the section ``model`` or ``schemes``, without importing their modules."""
         if section == "model":
             return (*MODELS, *self.own_models)
         return (*SCHEMES, *self.own_schemes)

@@ -1,4 +1,4 @@
-"""What a file may claim about its outcome: the checks, as written and as used."""
+"""The checks: what a file may claim about its outcome."""
 
 from __future__ import annotations
 
@@ -34,19 +34,19 @@ from vibsim.experiment.value_names import MOST_EVENTS, VALUES, Take, Value
 
 Drift = Literal["none", "bounded", "linear", "quadratic"]
 SOLUTIONS = ("exact", "discrete")
-"""What a scheme may be compared with beside another scheme; no scheme has such a name."""
+"""Words for the solutions that a scheme may be compared with; no scheme may have these names."""
 
-_EVERY_SCHEME = "Names of the schemes; every scheme when left out."
+_EVERY_SCHEME = "Names of the schemes; all schemes when left out."
 _Schemes = Annotated[
     Annotated[tuple[Text, ...], Field(min_length=1)] | None, Field(description=_EVERY_SCHEME)
 ]
 _Level = Annotated[Level | None, Field(description="A level; the finest one when left out.")]
-_EVERY_CASE = "Index of a member of the sweep, from 0; every one when left out."
+_EVERY_CASE = "Index of a member of the sweep, from 0; all members when left out."
 _Case = Annotated[Index | None, Field(description=_EVERY_CASE)]
 
 
 class Expect(Section):
-    """The verdict that a check should get."""
+    """The expected verdict of a check."""
 
     stand_ins = MappingProxyType({})
 
@@ -57,7 +57,7 @@ class Expect(Section):
 
 
 def _swept_value(value: Any) -> Any:
-    """Return a swept value as a sweep has it: a number, also of a formula, or the word of an option."""
+    """Return a swept value in the form that a sweep has: a number, also from a formula, or an option word."""
     if isinstance(value, bool):
         return "true" if value else "false"
     if not isinstance(value, str):
@@ -78,7 +78,7 @@ def _describe_members(schema: dict[str, Any]) -> None:
 
 
 class Members(Section):
-    """The members of the sweep that a check is about: those with the given value under each swept key."""
+    """Selects the members of the sweep that a check applies to, by values of swept keys."""
 
     model_config = ConfigDict(extra="allow", json_schema_extra=_describe_members)
     __pydantic_extra__: dict[str, SweptValue]
@@ -87,11 +87,11 @@ class Members(Section):
 
     @property
     def swept(self) -> Mapping[str, float | str]:
-        """The values by dotted key of the sweep; none of them stands for every member."""
+        """Values by dotted key of the sweep; empty for all members."""
         return self.__pydantic_extra__ or {}
 
     def without_members(self, **changes: Any) -> Self:
-        """Return the same of an experiment without a sweep, and with other `changes`."""
+        """Return a copy without swept values, as for an experiment without a sweep, with `changes` to its fields."""
         return type(self)(
             **{**{name: getattr(self, name) for name in type(self).model_fields}, **changes}
         )
@@ -100,17 +100,17 @@ class Members(Section):
 _At = Annotated[
     Members,
     Field(
-        description="Values of swept keys, such as `model.omega: 1.4`; every member when left out."
+        description="Values of swept keys, such as `model.omega: 1.4`; all members when left out."
     ),
 ]
 
 
 OF_A_QUANTITY = ("converges", "accurate")
-"""Kinds of checks that have their quantity under their leading key."""
+"""Kinds of checks whose leading key holds the quantity."""
 
 
 class MeasuringCheck(Section):
-    """What every check that measures something has."""
+    """Base class of all checks that measure something."""
 
     kind: ClassVar[str]
     id: GivenId = ""
@@ -118,38 +118,38 @@ class MeasuringCheck(Section):
 
     @property
     def measured(self) -> Self:
-        """The check that is measured: this one."""
+        """The check that is evaluated: this one."""
         return self
 
     @property
     def about(self) -> str | None:
-        """The quantity that must be known over time."""
+        """The quantity whose time series the check needs; None if it needs none."""
         key = self.kind if self.kind in OF_A_QUANTITY else "quantity"
         found: str | None = getattr(self, key, None)
         return found
 
     @property
     def member(self) -> int | None:
-        """The member of the sweep that the check speaks of; None for every one."""
-        has_own = "case" in type(self).model_fields
-        found: int | None = getattr(self if has_own else getattr(self, "at", None), "case", None)
+        """Index of the member of the sweep that the check applies to; None for all."""
+        has_case = "case" in type(self).model_fields
+        found: int | None = getattr(self if has_case else getattr(self, "at", None), "case", None)
         return found
 
     @property
     def swept(self) -> Mapping[str, float | str]:
-        """The swept values, by dotted key, of the members that the check speaks of; none stands for every one."""
+        """Swept values by dotted key that select the members the check applies to; empty for all."""
         found: Members | None = getattr(self, "at", None)
         return found.swept if found is not None else {}
 
     @property
     def expected_verdict(self) -> Expect | None:
-        """The verdict that passes, of a check that may say so; None of the others."""
+        """The verdict that passes; None for kinds of checks without the key `expect`."""
         found: Expect | None = getattr(self, "expect", None)
         return found
 
     @property
     def expects_pass(self) -> bool:
-        """Whether the verdict that passes is a PASS."""
+        """Whether the check expects the verdict PASS."""
         return self.expected_verdict is None or self.expected_verdict.status == "PASS"
 
 
@@ -167,19 +167,19 @@ class StableCheck(MeasuringCheck):
 
     @property
     def expects_pass(self) -> bool:
-        """Whether they must be."""
+        """Whether the check expects stability."""
         return self.stable
 
 
 class ConservesCheck(MeasuringCheck):
-    """The error of the energy has a kind of growth with time."""
+    """The error of the energy grows with time in the given way."""
 
     kind: ClassVar[Literal["conserves"]] = "conserves"
     stand_ins = MappingProxyType({"conserves": "energy"})
     conserves: Literal["energy", "energy_d2t"]
     """`energy` by the scheme's own velocity, or `energy_d2t` by the centred difference of the position."""
     drift: Drift = "none"
-    """How the largest error so far grows: not at all (round-off), bounded, like t, or like t^2."""
+    """Growth of the running maximum of the error: none (round-off), bounded, like t, or like t^2."""
     schemes: _Schemes = None
     level: _Level = None
     case: _Case = None
@@ -187,21 +187,22 @@ class ConservesCheck(MeasuringCheck):
 
     @property
     def about(self) -> str | None:
-        """The quantity that must be known over time."""
+        """The energy deviation that belongs to the energy."""
         return self.conserves.replace("energy", "energy_deviation")
 
 
 class EqualCheck(MeasuringCheck):
-    """The solution of a scheme is that of another one, or a known one, at every stored time."""
+    """The solution of a scheme equals that of another scheme, or a known solution, at every stored time."""
 
     kind: ClassVar[Literal["equal"]] = "equal"
     stand_ins = MappingProxyType({"equal": (STAND_IN, STAND_IN)})
     equal: tuple[Text, Text]
-    """A scheme, and what it must equal: another scheme, `exact`, or `discrete`, the exact solution of its own steps."""
+    """A scheme, and what it must equal: another scheme, `exact`, or `discrete`, the exact solution of its difference
+    equations."""
     quantity: Text
     """The quantity that is compared."""
     atol: NonNegative | None = None
-    """How far apart they may be; derived from the number of steps and the machine precision when left out."""
+    """Largest difference; derived from the number of steps and the machine precision when left out."""
     level: _Level = None
     case: _Case = None
     at: _At = Members()
@@ -213,7 +214,7 @@ class EqualCheck(MeasuringCheck):
 
     @property
     def second(self) -> str:
-        """What it must equal: a scheme, or one of `SOLUTIONS`."""
+        """The scheme, or the word of `SOLUTIONS`, that it must equal."""
         return self.equal[1]
 
 
@@ -225,12 +226,12 @@ def _order(value: Any) -> Any:
     if value == "scheme":
         return value
     try:
-        found = number(value)
+        order = number(value)
     except PydanticCustomError as error:
         raise refused(_ORDER, likely(value, ["scheme"]) or _HALVING) from error
-    if found <= 0.0:
+    if order <= 0.0:
         raise refused(_ORDER, _HALVING)
-    return found
+    return order
 
 
 def _level(value: Any) -> Any:
@@ -258,10 +259,10 @@ def _describe_best(schema: dict[str, Any]) -> None:
 
 
 class PublishedAt(Members):
-    """Where else a printed number is taken, beside its scheme and level."""
+    """Time, event or members of a printed number."""
 
     t: Number | None = None
-    """A stored sample time; where the end differs between members, the fraction 0 to 1 of it."""
+    """A stored sample time; if the end differs between members, the fraction 0 to 1 of it."""
     step: Index | None = None
     """A stored step of the level, from 0."""
     event: Annotated[int, Field(ge=1, le=MOST_EVENTS), BeforeValidator(whole)] | None = None
@@ -271,7 +272,7 @@ class PublishedAt(Members):
 
 
 class At(PublishedAt):
-    """Where a value is taken; left out means every scheme, every case, the finest level."""
+    """The scheme, member, level and time of a value; by default all schemes, all members, the finest level."""
 
     model_config = ConfigDict(json_schema_extra=_describe_best)
     stand_ins = MappingProxyType({})
@@ -282,16 +283,16 @@ class At(PublishedAt):
     """Name of a scheme."""
 
     @classmethod
-    def normal(cls, written: Mapping[str, Any]) -> tuple[Mapping[str, Any], str]:
-        """Return what is written with ``level: best`` for ``best: true``."""
-        if "best" not in written:
-            return written, ""
-        rest = {key: value for key, value in written.items() if key not in ("best", "level")}
-        if written["best"] is not True:
-            return rest, "best must be true, or left out"
-        if written.get("level", "best") != "best":
-            return rest, "must have a level or best, not both"
-        return {**rest, "level": "best"}, ""
+    def normal(cls, content: Mapping[str, Any]) -> tuple[Mapping[str, Any], str]:
+        """Return the content with ``best: true`` replaced by ``level: best``, and the rule that it breaks."""
+        if "best" not in content:
+            return content, ""
+        others = {key: value for key, value in content.items() if key not in ("best", "level")}
+        if content["best"] is not True:
+            return others, "best must be true, or left out"
+        if content.get("level", "best") != "best":
+            return others, "must have a level or best, not both"
+        return {**others, "level": "best"}, ""
 
 
 class ConvergesCheck(MeasuringCheck):
@@ -305,7 +306,7 @@ class ConvergesCheck(MeasuringCheck):
     order: Order = "scheme"
     """The order: `scheme` for the order that the scheme promises, or a number."""
     tolerance: Positive = ORDER_TOLERANCE
-    """How far the observed order may be from the expected one."""
+    """Largest difference of the observed order from the expected one."""
     norm: Norm = TYPICAL_NORM
     """The norm over time in which differences are measured."""
     schemes: _Schemes = None
@@ -320,9 +321,9 @@ class Accuracy(MeasuringCheck):
     kind: ClassVar[Literal["accurate"]] = "accurate"
     stand_ins = MappingProxyType({"accurate": STAND_IN})
     accurate: Text
-    """The quantity: one that `converges` may be about."""
+    """The quantity, as for `converges`."""
     relative: Positive | None = None
-    """The error must be below this part of the solution, both in the L2 norm."""
+    """The error must be below this fraction of the solution, both in the L2 norm."""
     absolute: Positive | None = None
     """The error must be below this, in the unit of its norm."""
     expect: Expect = Expect()
@@ -330,19 +331,19 @@ class Accuracy(MeasuringCheck):
 
     @property
     def key(self) -> str:
-        """The key that says how accurate."""
+        """The key that holds the bound."""
         return "relative" if self.is_relative else "absolute"
 
     @property
     def is_relative(self) -> bool:
-        """Whether the error counts as a part of the solution."""
+        """Whether the bound is relative to the solution."""
         return self.relative is not None
 
     @property
     def accuracy(self) -> float:
-        """The error that is allowed; NaN where the file does not say."""
-        given = self.absolute if self.relative is None else self.relative
-        return math.nan if given is None else given
+        """The bound of the error; NaN if the file gives none."""
+        bound = self.absolute if self.relative is None else self.relative
+        return math.nan if bound is None else bound
 
 
 class AccurateCheck(Accuracy):
@@ -353,9 +354,9 @@ class AccurateCheck(Accuracy):
 
 
 DEFAULT_RTOL, DEFAULT_ATOL = 1e-9, 1e-12
-"""Tolerances of ``equals`` where a check gives none; the second of numbers without a unit, and of 0, alone."""
+"""Default tolerances of ``equals``; the absolute one only for numbers without a unit, and for 0."""
 PLAIN = ("none", "count")
-"""Measures of numbers without a unit."""
+"""Measures (`Value.measure`) of numbers without a unit."""
 
 
 class ValueCheck(MeasuringCheck):
@@ -366,14 +367,15 @@ class ValueCheck(MeasuringCheck):
     value: Annotated[str, Field(json_schema_extra={"enum": sorted(VALUES)})]
     """Name of the number, see `vibsim list checks`."""
     quantity: Text | None = None
-    """The quantity that it is of, where it is of one."""
+    """The quantity of the number, if it has one."""
     at: At = At()
-    """Where it is taken."""
+    """The scheme, member, level and time of the number."""
     over: Text | None = None
-    """The swept key over which one number is taken of all members, or `cases` where one varies only: see `take`."""
+    """The swept key over which the numbers of all members are reduced to one (see `take`), or `cases` if it is the only
+    one."""
     take: Take | None = None
-    """That number: the `largest`, the `smallest` or the `mean`, the value of the key `where_largest` (or `where`) or
-    `where_smallest` is, or `monotone`: 1 where it rises with the key, -1 where it falls, else 0."""
+    """The reduction: the `largest`, the `smallest`, the `mean`, the value of the key `where_largest` (or `where`) or
+    `where_smallest` occurs, or `monotone`: 1 if the numbers rise with the key, -1 if they fall, else 0."""
     equals: Number | None = None
     """The number that it must equal, within `rtol` and `atol`."""
     below: Number | None = None
@@ -386,63 +388,63 @@ class ValueCheck(MeasuringCheck):
     """Absolute tolerance of `equals`."""
 
     @classmethod
-    def normal(cls, written: Mapping[str, Any]) -> tuple[Mapping[str, Any], str]:
-        """Return what is written with ``level: best`` for a number of all members, where there is such a level."""
-        row, at = VALUES.get(str(written.get("value"))), written.get("at") or {}
+    def normal(cls, content: Mapping[str, Any]) -> tuple[Mapping[str, Any], str]:
+        """Return the content with ``level: best`` as the default of reductions over members, if the number has it."""
+        row, at = VALUES.get(str(content.get("value"))), content.get("at") or {}
         is_plain = isinstance(at, Mapping) and not {"level", "best"} & set(at)
-        if "take" not in written or row is None or not row.best or not is_plain:
-            return written, ""
-        return {**written, "at": {**at, "level": "best"}}, ""
+        if "take" not in content or row is None or not row.best or not is_plain:
+            return content, ""
+        return {**content, "at": {**at, "level": "best"}}, ""
 
     @property
     def number(self) -> Value:
-        """What is said of the number that is asked for, whose name is a known one."""
+        """The description of the number."""
         return VALUES[self.value]
 
     @property
     def allowed(self) -> float:
-        """How far the number may be from `equals`; NaN where the check has a border."""
+        """Tolerance of `equals`; NaN for checks with `below` or `above`."""
         if self.equals is None:
             return math.nan
         plain = self.rtol is None and self.atol is None
         rtol = DEFAULT_RTOL if plain else self.rtol or 0.0
-        # what has a unit may be as small as it likes
+        # a number with a unit has no natural absolute tolerance
         sized = self.equals != 0.0 and self.number.measure not in PLAIN
         atol = (0.0 if sized else DEFAULT_ATOL) if plain else self.atol or 0.0
         return atol + rtol * abs(self.equals)
 
 
 def as_data(check: Any) -> dict[str, Any]:
-    """Return a check as JSON-able data, with its kind, and a claim with that of what decides it."""
+    """Return a check as JSON data with its kind; a claim includes the check that decides it."""
     data: dict[str, Any] = {"kind": check.kind, **check.model_dump(mode="json")}
     return data | ({"that": as_data(check.that)} if check.kind == "claim" else {})
 
 
 def without_kind(data: Mapping[str, Any]) -> dict[str, Any]:
-    """Return what `as_data` returned as it is validated."""
-    found = {key: value for key, value in data.items() if key != "kind"}
-    return found | ({"that": without_kind(found["that"])} if "that" in found else {})
+    """Return the result of `as_data` in the form that is validated, without kinds."""
+    fields = {key: value for key, value in data.items() if key != "kind"}
+    return fields | ({"that": without_kind(fields["that"])} if "that" in fields else {})
 
 
 def by_key(kinds: Iterable[str]) -> Callable[[Any], str | None]:
-    """Return what tells of which of some kinds a check is: by its leading key."""
+    """Return a function that gives the tag of a check, found by its leading key among `kinds`."""
 
-    def which(value: Any) -> str | None:
+    def discriminate(value: Any) -> str | None:
         if isinstance(value, ClaimCheck | MeasuringCheck):
             kind: str = value.kind
             return tag(kind)
         keys = value if isinstance(value, dict) else ()
         return next((tag(key) for key in kinds if key in keys), None)
 
-    return which
+    return discriminate
 
 
-def one_of(members: Mapping[str, type[Section]], which: Callable[[Any], str | None]) -> Any:
-    """Return the union of checks, of which `which` tells by `by_key`."""
-    *others, last = members
-    rule = f"must be a mapping with the key {', '.join(others)} or {last}"
+def one_of(members: Mapping[str, type[Section]], discriminate: Callable[[Any], str | None]) -> Any:
+    """Return the tagged union of checks; `discriminate` gives the tag (`by_key`)."""
+    *first, last = members
+    rule = f"must be a mapping with the key {', '.join(first)} or {last}"
     return tagged(
-        members, Discriminator(which, custom_error_type="check", custom_error_message=rule)
+        members, Discriminator(discriminate, custom_error_type="check", custom_error_message=rule)
     )
 
 
@@ -455,9 +457,9 @@ MEASURED: Mapping[str, type[Section]] = MappingProxyType(
         )
     }
 )
-"""The checks that measure something, by their leading key."""
+"""The checks that measure something, by leading key."""
 KINDS = ("claim", *MEASURED)
-"""Leading keys, in the order in which they are looked for."""
+"""Leading keys, in the order in which they are tried."""
 
 Measurement = (
     ConvergesCheck | AccurateCheck | ValueCheck | StableCheck | ConservesCheck | EqualCheck
@@ -469,7 +471,7 @@ else:
 
 
 class ClaimCheck(Section):
-    """A statement of a source, true or false, and the measurement that decides it."""
+    """A statement of a source, and the check that decides whether it is true."""
 
     kind: ClassVar[Literal["claim"]] = "claim"
     stand_ins = MappingProxyType({"claim": STAND_IN})
@@ -478,17 +480,17 @@ class ClaimCheck(Section):
     claim: Text
     """The statement, in words."""
     source: Citation | None = None
-    """Where the statement stands."""
+    """The source of the statement."""
     that: Measured
-    """The check that measures it."""
+    """The check that decides it."""
     holds: StrictBool = True
     """Whether the statement is expected to be true."""
     note: Text | None = None
-    """What a reader of the report should know of it."""
+    """A remark for readers of the report."""
 
     @property
     def measured(self) -> Measurement:
-        """The check that is measured: the one that decides the claim."""
+        """The check that is evaluated: the one that decides the claim."""
         return self.that
 
 

@@ -1,4 +1,4 @@
-"""The experiment file as it is written, one class per section, and its JSON Schema for editors."""
+"""The structure of an experiment file, one class per section, and its JSON Schema for editors."""
 
 from __future__ import annotations
 
@@ -52,14 +52,14 @@ def _kind(value: Any) -> str | None:
 
 
 class OneOf:
-    """Marks the union of the sections of all models of vibsim, or of all schemes; one that is no part of it is made."""
+    """Marks the union of the sections of all built-in models or schemes; sections of other kinds are made on demand."""
 
     def __init__(self, section: Literal["model", "schemes"]) -> None:
         self.section = section
 
-    def section_of(self, written: Any, kinds: Kinds) -> type[Section] | None:
-        """Return the class of a section with a kind that is no part of the union; None where there is none."""
-        kind = written.get("kind") if isinstance(written, Mapping) else None
+    def section_of(self, raw: Any, kinds: Kinds) -> type[Section] | None:
+        """Return the section class for the kind in `raw`; None if there is no such kind."""
+        kind = raw.get("kind") if isinstance(raw, Mapping) else None
         if self.section == "model":
             model = kinds.model(kind)
             return None if model is None else model_section(model)
@@ -88,7 +88,7 @@ Schemes: Any = _schemes(_any_scheme(SCHEMES.built_in))
 
 
 def _without(*keys: str) -> dict[str, Any]:
-    """Describe a mapping that has none of some keys, or not all of those that are joined by blanks."""
+    """Return the schema of a mapping with none of `keys`; names joined by a blank must not occur all together."""
     return {"not": {"anyOf": [{"required": key.split()} for key in keys]}}
 
 
@@ -114,20 +114,20 @@ class TimeSection(Section):
     )
 
     end: Positive | None = None
-    """The last time; the first one is 0."""
+    """The end time; the motion starts at 0."""
     base_steps: Count | None = None
     """Number of steps at level 0; 1 when left out."""
     base_dt: Positive | None = None
-    """Step at level 0, instead of `base_steps`; the end must be a whole number of it."""
+    """Time step at level 0, instead of `base_steps`; the end must be a whole multiple of it."""
     periods: Positive | None = None
     """Length in natural periods of the model (small oscillations), instead of `end`."""
     steps_per_period: Positive | None = None
     """Steps per natural period at level 0, with `periods`."""
     frequency: Text | None = None
-    """A parameter of the model, such as `model.omega`: `periods` are those of this angular frequency, that of a force,
-    in place of natural ones; both numbers must be whole then."""
+    """A parameter of the model, such as `model.omega`: the angular frequency of a force, which defines the periods
+    instead of the natural frequency. Both numbers must then be whole."""
     steps_per_point: Count | None = None
-    """Steps at level 0 from each point of the model's table to the next; the end is where the table ends."""
+    """Steps at level 0 per spacing of the model's table; the motion ends with the table."""
 
 
 class LevelRange(Section):
@@ -143,7 +143,7 @@ class Every(Section):
     """Store every n-th step of each level."""
 
     every: Count
-    """n; it must divide the number of steps of the coarsest level, whose stored times are those of the comparison."""
+    """n; it must divide the number of steps of the coarsest level, at whose stored times levels are compared."""
 
 
 _LevelList = Annotated[tuple[Level, ...], Field(min_length=1), short(MAX_LEVEL + 1)]
@@ -152,7 +152,7 @@ Samples: Any = by_form({"mapping": Every, "other": Literal["auto", "common", "al
 
 
 def _initial_schema(models: Iterable[Model]) -> dict[str, Any]:
-    """Describe the initial values of every model's states, for editors; a system has states of its own."""
+    """Return the schema of the initial values, with the states of all models; a system may have others."""
     states = {state.name: state for model in models for state in model.states}
     properties = {
         name: {
@@ -167,7 +167,7 @@ def _initial_schema(models: Iterable[Model]) -> dict[str, Any]:
 
 
 def _states_are_known(models: Iterable[Model]) -> dict[str, Any]:
-    """Describe that what begins with a value is a state of a model, unless the model's are named in the file."""
+    """Return the schema rule that initial values name states of some model, unless the file names the coordinates."""
     models = tuple(models)
     named = [model.kind for model in models if model.named is not None]
     states = sorted({state.name for model in models for state in model.states})
@@ -186,7 +186,7 @@ UNITS_SCHEMA = {
 
 
 class Document(Section):
-    """An experiment of vibsim: what is simulated, and what is claimed about the outcome."""
+    """An experiment of vibsim: a simulation, and the claims about its outcome."""
 
     model_config = ConfigDict(
         json_schema_extra={"oneOf": [{"required": ["levels"]}, {"required": ["tolerance"]}]}
@@ -195,17 +195,17 @@ class Document(Section):
     stand_ins = MappingProxyType({"title": None, "model": None, "time": None, "schemes": ()})
 
     title: Text
-    """What the experiment shows, in a line."""
+    """What the experiment shows, in one line."""
     source: Citation | None = None
-    """What the experiment comes from."""
+    """The source of the experiment."""
     units: Annotated[dict[str, str], WithJsonSchema(UNITS_SCHEMA)] = Field({})
-    """Units of the file's own, such as ``rod: 4.9 m``: every number with a unit may name them."""
+    """Additional units, such as ``rod: 4.9 m``, for all numbers that take units."""
     model: AnyModel
     """The equation of motion and its parameters."""
     stop: FormulaText | None = None
     """A comparison that ends the motion, the same as under `model`."""
     events: Annotated[tuple[Event, ...], short(MOST_EVENTS)] = ()
-    """Events of your own, the same as under `model`."""
+    """Events, the same as under `model`."""
     initial: Annotated[
         dict[str, Number], WithJsonSchema(_initial_schema(MODELS.built_in.values()))
     ] = Field({})
@@ -213,83 +213,83 @@ class Document(Section):
     time: TimeSection
     """The time interval and the number of steps."""
     levels: Levels | None = None
-    """The levels of refinement: each halves the time step of the one before."""
+    """The levels of refinement: each halves the time step of the previous one."""
     tolerance: Fraction | None = None
-    """Error bound that the extrapolated solution must reach, instead of `levels`: they are then chosen."""
+    """Error bound that the extrapolated solution must reach; vibsim then chooses the levels."""
     scaled: StrictBool = False
-    """Whether the run is made in the characteristic units of the model, where it has a scaled equation."""
+    """Whether to run in the characteristic units of the model, if it has a scaled equation."""
     schemes: Schemes
     """The schemes, each a kind or a mapping with its options."""
     sweep: SweepSection | None = None
-    """Parameters that vary, by dotted path; several make a grid, the last one fastest."""
+    """Parameters that vary, by dotted path; several make a grid, in which the last one varies fastest."""
     samples: Samples = "auto"
     """Which steps are stored."""
     output: Output = "verdict"
-    """What the experiment is for: a verdict, or beside it the best solution, extrapolated over the levels."""
+    """The result: a verdict, or also the best solution, extrapolated over the levels."""
     checks: Annotated[tuple[Check, ...], short(MAX_ENTRIES)] = ()
-    """What must come out; when left out, that the position converges as the scheme promises."""
+    """Expected outcomes; when left out, the position converges with the order of the scheme."""
     published: Annotated[tuple[PublishedTable, ...], short(MAX_ENTRIES)] = ()
-    """Tables that a source printed: every row is a claim, shown beside our number."""
+    """Tables printed in a source: every row is a claim, shown next to the computed number."""
     figures: Annotated[tuple[FigureOfSource, ...], short(MAX_ENTRIES)] = ()
-    """Figures that a source shows: each is drawn on the page under its number there."""
+    """Figures of a source: the report redraws each under its original number."""
 
 
 class _Generator(GenerateJsonSchema):
-    """Takes the texts below fields as their descriptions; leaves out the titles that pydantic makes from names.
+    """Uses attribute docstrings as descriptions of fields, and leaves out the titles that pydantic generates.
 
-    Pydantic would read these texts whenever vibsim starts (`use_attribute_docstrings`), which takes a tenth of a
-    second. Only a schema needs them.
+    Pydantic would read the docstrings at every start of vibsim (`use_attribute_docstrings`), which takes 0.1 s. Only
+    the schema needs them.
     """
 
     def field_title_should_be_set(self, schema: Any) -> bool:
         return False
 
     def tagged_union_schema(self, schema: Any) -> dict[str, Any]:
-        # which member it is follows from the form of what is written, which another may describe as well
-        found = super().tagged_union_schema(schema)
-        return {"anyOf" if key == "oneOf" else key: value for key, value in found.items()}
+        # a value may match the schemas of several members, so oneOf would refuse it
+        result = super().tagged_union_schema(schema)
+        return {"anyOf" if key == "oneOf" else key: value for key, value in result.items()}
 
     def model_schema(self, schema: Any) -> dict[str, Any]:
-        found, kind = super().model_schema(schema), schema["cls"]
+        result, kind = super().model_schema(schema), schema["cls"]
         kinds = (base for base in kind.mro() if issubclass(base, Section))
         descriptions = ChainMap(
-            *(_texts_of_module(c.__module__).get(c.__name__, {}) for c in kinds)
+            *(_attribute_docstrings(c.__module__).get(c.__name__, {}) for c in kinds)
         )
         for name, field in kind.model_fields.items():
             if field.description is None and name in descriptions:
-                found["properties"][field.alias or name]["description"] = descriptions[name]
-        return found
+                result["properties"][field.alias or name]["description"] = descriptions[name]
+        return result
 
 
 @cache
-def _texts_of_module(name: str) -> dict[str, dict[str, str]]:
-    """Return the texts below the fields of each class of a module, by the names of class and field."""
+def _attribute_docstrings(name: str) -> dict[str, dict[str, str]]:
+    """Return the attribute docstrings of each class of a module, by names of class and field."""
     tree = ast.parse(inspect.getsource(sys.modules[name]))
-    found: dict[str, dict[str, str]] = {}
-    for body in (part for part in tree.body if isinstance(part, ast.ClassDef)):
-        for field, text in pairwise(body.body):
+    texts: dict[str, dict[str, str]] = {}
+    for node in (node for node in tree.body if isinstance(node, ast.ClassDef)):
+        for field, text in pairwise(node.body):
             match field, text:
                 case (
                     ast.AnnAssign(target=ast.Name(id=key)),
                     ast.Expr(value=ast.Constant(value=str(words))),
                 ):
-                    found.setdefault(body.name, {})[key] = inspect.cleandoc(words)
-    return found
+                    texts.setdefault(node.name, {})[key] = inspect.cleandoc(words)
+    return texts
 
 
 def json_schema(kind: type[Section]) -> dict[str, Any]:
-    """Return the JSON Schema (draft 2020-12) of files that a class describes."""
+    """Return the JSON Schema (draft 2020-12) of files described by class `kind`."""
     head = {"$schema": "https://json-schema.org/draft/2020-12/schema"}
     return head | kind.model_json_schema(schema_generator=_Generator)
 
 
 def schema() -> dict[str, Any]:
-    """Return the JSON Schema of an experiment file with the models and schemes of vibsim."""
+    """Return the JSON Schema of an experiment file with the built-in models and schemes."""
     return json_schema(Document)
 
 
 def installed_schema() -> dict[str, Any]:
-    """Return the same with the models and schemes of every package that is installed beside vibsim."""
+    """Return the same with the models and schemes of all installed packages."""
     initial = WithJsonSchema(_initial_schema(MODELS.values()))
     fields: dict[str, Any] = {
         "model": (_any_model(MODELS), ...),
@@ -297,7 +297,7 @@ def installed_schema() -> dict[str, Any]:
         "schemes": (_schemes(_any_scheme(SCHEMES)), ...),
     }
     doc = Document.__doc__
-    found = json_schema(create_model("Document", __base__=Document, __doc__=doc, **fields))
-    found |= _states_are_known(MODELS.values())
-    found["$defs"]["SweepSection"]["patternProperties"] = swept_options(SCHEMES.values())
-    return found
+    result = json_schema(create_model("Document", __base__=Document, __doc__=doc, **fields))
+    result |= _states_are_known(MODELS.values())
+    result["$defs"]["SweepSection"]["patternProperties"] = swept_options(SCHEMES.values())
+    return result

@@ -1,6 +1,6 @@
-"""Types of single values: numbers that may be written as constant formulas, whole numbers, names.
+"""Types of single values: numbers (also as constant formulas), whole numbers, names, text.
 
-A rule is worded for the person who wrote the file.
+Messages are worded for the author of the file.
 """
 
 from __future__ import annotations
@@ -35,39 +35,39 @@ _CONTROL = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\ud800-\udfff\ufffe\u
 _COMMA = re.compile(r"[-+]?\d+,\d+")
 MAX_LEVEL = 40
 STAND_IN = "?"
-"""Takes the place of text that is faulty and cannot be left out; nothing is said about it a second time."""
+"""Placeholder for faulty text that cannot be left out; no further fault is reported for it."""
 MAX_FORMULAS = 1000
-"""Values of one list that are not plain numbers."""
+"""Largest number of formulas in one list."""
 MAX_ENTRIES = 1000
-"""Schemes or checks of one experiment."""
+"""Largest number of schemes or checks of one experiment."""
 DECLARED = "parameters"
-"""The key of the section ``model`` under which a file declares the names of its formulas."""
+"""Key of the section ``model`` under which a file declares parameters for its formulas."""
 TABLE = "table"
-"""The key of the path of a table."""
+"""Key of the path of a table."""
 AT = "at"
-"""The key of the place at which a table is looked up."""
+"""Key of the abscissa, as a function of time, at which a table is evaluated."""
 FORMULA_NOTE = "a number, or a constant formula such as 2*pi/30"
 
 
 class Section(BaseModel):
-    """A part of an experiment: frozen, and without unknown keys."""
+    """A section of an experiment: immutable, and without unknown keys."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, defer_build=True)
 
     stand_ins: ClassVar[Mapping[str, Any] | None] = None
-    """What takes the place of required values that are faulty, where what else is there is looked at nevertheless; None
-    where nothing is said about a part with a fault."""
+    """Placeholders for faulty required values, so that rules can still check the other values; None if a faulty section
+    is left out as a whole."""
     other_values: ClassVar[Any] = None
-    """What describes the values of keys without a name of their own; None where there are no such keys."""
+    """Annotation of the values of keys that are not fields; None if there are no such keys."""
 
     @classmethod
-    def normal(cls, written: Mapping[str, Any]) -> tuple[Mapping[str, Any], str]:
-        """Return what is written with every abbreviation written out, and the rule that it breaks, if it does."""
-        return written, ""
+    def normal(cls, content: Mapping[str, Any]) -> tuple[Mapping[str, Any], str]:
+        """Return the content with abbreviations expanded, and the rule that it breaks (empty if none)."""
+        return content, ""
 
 
 class FrozenDict(dict[str, Any]):
-    """A dictionary that does not change, and therefore has a hash."""
+    """An immutable, hashable dictionary."""
 
     def __hash__(self) -> int:  # type: ignore[override]
         return hash(frozenset(self.items()))
@@ -89,29 +89,29 @@ class FrozenDict(dict[str, Any]):
 
 
 def refused(rule: str, hint: str = "") -> PydanticCustomError:
-    """Return the error of a value that breaks a rule."""
+    """Return the validation error of a value that breaks `rule`."""
     return PydanticCustomError("refused", "{rule}", {"rule": rule, "hint": hint})
 
 
 def tag(name: str) -> str:
-    """Mark the name of a union's member, so that it can be told from a key in the place of a fault."""
+    """Mark the name of a union member, to distinguish it from keys in the location of an error."""
     return f"\0{name}"
 
 
-def tagged(members: Mapping[str, Any], which: Discriminator) -> Any:
-    """Return the union of `members`, of which `which` chooses one by its name."""
+def tagged(members: Mapping[str, Any], discriminator: Discriminator) -> Any:
+    """Return the tagged union of `members`, which maps tags to types."""
     kinds: Any = (Annotated[kind, Tag(tag(name))] for name, kind in members.items())
-    return Annotated[reduce(or_, kinds), which]
+    return Annotated[reduce(or_, kinds), discriminator]
 
 
 _FORMS = ("mapping", "text", "number", "list", "rows", "row", "other")
 
 
 def by_form(members: Mapping[str, Any], **error: Any) -> Any:
-    """Return the union of types of which the form of what is written chooses one; `error` is that of any other form.
+    """Return a union of types selected by the YAML form of the value; `error` is raised for a form without a member.
 
-    Members are named after a key of a mapping, or are ``mapping``, ``text``, ``number``, ``list``, ``rows`` (a list of
-    lists), ``row`` (any other list), and ``other`` for what no other member is for.
+    A member is named after a key that its mapping must have, or is ``mapping``, ``text``, ``number``, ``list``,
+    ``rows`` (a list of lists), ``row`` (any other list), or ``other`` for all remaining forms.
     """
 
     def form(value: Any) -> str:
@@ -128,7 +128,7 @@ def by_form(members: Mapping[str, Any], **error: Any) -> Any:
 
 
 def number(value: Any) -> float:
-    """Return `value` as a finite float; text is worked out as a constant formula."""
+    """Return `value` as a finite float; text is evaluated as a constant formula."""
     if isinstance(value, str):
         if _COMMA.fullmatch(value):
             raise refused("must have a decimal point", f"write {value.replace(',', '.')}")
@@ -161,18 +161,18 @@ def whole(value: Any) -> int:
 
 
 def exponent(value: Any) -> int:
-    """Return `value` as the number of a level, which is no number of steps."""
-    found = whole(value)
-    if found > MAX_LEVEL:
+    """Return `value` as a level; refuse a number of steps."""
+    level = whole(value)
+    if level > MAX_LEVEL:
         meaning = "level n has 2^n steps"
-        if found.bit_count() == 1:
-            meaning += f"; {found} steps are level {found.bit_length() - 1}"
+        if level.bit_count() == 1:
+            meaning += f"; {level} steps are level {level.bit_length() - 1}"
         raise refused(f"must be at most {MAX_LEVEL}", f"{meaning} (times `base_steps:` of `time:`)")
-    return found
+    return level
 
 
 def short(limit: int) -> BeforeValidator:
-    """Refuse a list of more than `limit` entries before they are looked at."""
+    """Refuse a list of more than `limit` entries before its entries are validated."""
 
     def check(values: Any) -> Any:
         if isinstance(values, list | tuple) and len(values) > limit:
@@ -183,19 +183,19 @@ def short(limit: int) -> BeforeValidator:
 
 
 def plain(values: Any) -> Any:
-    """Refuse a list with more formulas than a person would write."""
+    """Refuse a list of more than `MAX_FORMULAS` formulas."""
     if isinstance(values, list | tuple):
-        others = sum(not isinstance(value, int | float) for value in values)
-        if others > MAX_FORMULAS:
-            raise refused(f"must not hold more than {MAX_FORMULAS} formulas, holds {others}")
+        formulas = sum(not isinstance(value, int | float) for value in values)
+        if formulas > MAX_FORMULAS:
+            raise refused(f"must not hold more than {MAX_FORMULAS} formulas, holds {formulas}")
     return values
 
 
 def _printable(text: str) -> str:
-    """Refuse what no page and no figure can show: XML 1.0 (2008), section 2.2, and the controls."""
-    found = _CONTROL.search(text)
-    if found:
-        raise refused(f"must not hold control characters, holds U+{ord(found.group()):04X}")
+    """Refuse control characters and those that are invalid in XML 1.0 (2008), section 2.2."""
+    match = _CONTROL.search(text)
+    if match:
+        raise refused(f"must not hold control characters, holds U+{ord(match.group()):04X}")
     return text
 
 
@@ -206,7 +206,7 @@ def _one_line(text: str) -> str:
 
 
 class _Formula:
-    """Marks a float that may be written as text; editors then accept both."""
+    """Annotation of a float that may be given as text; the JSON Schema then accepts both."""
 
     def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> CoreSchema:
         return core_schema.no_info_before_validator_function(number, handler(source))
@@ -221,7 +221,7 @@ class _Formula:
 
 
 def _as_text(value: Any) -> Any:
-    """Return a number as the text of a formula."""
+    """Return a number as the text of a formula, and text unchanged."""
     if isinstance(value, int | float) and not isinstance(value, bool):
         return repr(value)
     if not isinstance(value, str):
@@ -230,7 +230,7 @@ def _as_text(value: Any) -> Any:
 
 
 def _no_default(schema: dict[str, Any]) -> None:
-    """Leave the default out of the schema: an empty id stands for a generated one."""
+    """Remove the default from the schema: an empty id stands for a generated one."""
     schema.pop("default", None)
 
 
@@ -244,7 +244,7 @@ Count = Annotated[int, Field(ge=1), BeforeValidator(whole)]
 Index = Annotated[int, Field(ge=0), BeforeValidator(whole)]
 Identifier = Annotated[str, Field(pattern=IDENTIFIER)]
 GivenId = Annotated[Identifier, Field(json_schema_extra=_no_default)]
-"""The id of a check; empty where the file gives none."""
+"""The id of a check; empty if the file gives none."""
 Text = Annotated[str, Field(min_length=1), AfterValidator(_printable)]
 """Text that may have several lines."""
 Line = Annotated[Text, AfterValidator(_one_line)]

@@ -1,4 +1,4 @@
-"""Figures that a source shows: each one asked for is drawn on the page of its experiment, under its number there."""
+"""Figures of a source, which the report redraws under their original numbers."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ Shows = Literal[
 ]  # fmt: skip
 KINDS: tuple[str, ...] = get_args(Shows)
 OVER_TIME = ("quantities", "panels", "each", "until", "beside")
-"""Keys that belong to `over_time` alone."""
+"""Keys that only `over_time` accepts."""
 LEVEL, MEMBER = "level", "member"
-"""What the panels of a figure may stand for beside a swept key."""
+"""Values of `panels` and `each` besides swept keys."""
 
 
 class FigureOfSource(Section):
@@ -27,18 +27,18 @@ class FigureOfSource(Section):
     stand_ins = MappingProxyType({"shows": None, "source": None})
 
     shows: Shows
-    """What it shows."""
+    """The kind of figure."""
     source: Citation
-    """Where it stands: the text, and the number of the figure."""
+    """The source: the text, and the number of the figure."""
     quantities: Annotated[tuple[Text, ...], short(MAX_ENTRIES)] = ()
-    """What is drawn over time, each in a panel; the position when left out."""
+    """Quantities that are drawn over time, each in a panel; the position when left out."""
     panels: Text | None = None
-    """What has a panel each: ``level``, ``member`` or a swept key."""
+    """One panel per ``level``, ``member`` or value of a swept key."""
     each: Text | None = None
-    """What has a figure each: ``member`` or a swept key."""
+    """One figure per ``member`` or value of a swept key."""
     until: Positive | None = None
-    """When the figure ends; the end of the run when left out."""
+    """Last time of the figure; the end of the run when left out."""
     beside: Annotated[dict[str, Text], AfterValidator(FrozenDict)] = Field(
         {}, validate_default=True
     )
-    """Further curves by their names: formulas in ``t`` and the parameters."""
+    """Further curves by name: formulas in ``t`` and the parameters."""

@@ -1,7 +1,6 @@
-"""The section ``model`` and the entries of ``schemes`` as written: classes made from the registries.
+"""Classes of the section ``model`` and the entries of ``schemes``, made from the registries.
 
-A scheme that chooses its own steps may have a list of tolerances; it stands for as many schemes, each named after its
-tolerance.
+An adaptive scheme may have a list of tolerances; it then stands for one scheme per tolerance, named after it.
 """
 
 from __future__ import annotations
@@ -43,7 +42,7 @@ from vibsim.schemes import AnyOption, Flag, NumberOption, Option, Scheme
 from vibsim.schemes.base import EVENTS
 
 TOLERANCE = "tolerance"
-"""The option that a scheme with steps of its own choice may have several values of."""
+"""The option of adaptive schemes that may have several values."""
 MAX_TOLERANCES = 100
 
 
@@ -53,7 +52,7 @@ def _class_name(kind: str) -> str:
 
 @cache
 def scheme_section(scheme: Scheme) -> type[Section]:
-    """Return the class of an entry that is a mapping."""
+    """Return the class of an entry of ``schemes`` that is a mapping."""
     label = "Name of the scheme in this experiment, if not its kind."
     fields: dict[str, Any] = {
         "kind": (Literal[scheme.kind], Field(description=scheme.title)),
@@ -72,16 +71,16 @@ def scheme_section(scheme: Scheme) -> type[Section]:
 
 
 def _bounded(**bounds: float | None) -> Any:
-    """Return the type of a number within some of the bounds ``gt``, ``ge`` and ``le``."""
-    given: Any = {
+    """Return the type of a number with some of the bounds ``gt``, ``ge`` and ``le``."""
+    finite: Any = {
         name: end for name, end in bounds.items() if end is not None and math.isfinite(end)
     }
-    return Annotated[float, Field(**given), FORMULA]
+    return Annotated[float, Field(**finite), FORMULA]
 
 
 def _parameter_type(row: Parameter) -> Any:
-    least = {"gt" if row.exclusive else "ge": row.minimum}
-    return _bounded(**least, le=row.maximum)
+    lower = {"gt" if row.exclusive else "ge": row.minimum}
+    return _bounded(**lower, le=row.maximum)
 
 
 def _option_type(option: AnyOption) -> Any:
@@ -94,35 +93,35 @@ def _type(option: AnyOption, scheme: Scheme) -> Any:
     value: Any = _option_type(option)
     if not scheme.adaptive or option.name != TOLERANCE or not isinstance(option, NumberOption):
         return value
-    several = Annotated[tuple[value, ...], Field(min_length=1), short(MAX_TOLERANCES)]
-    return by_form({"other": value, "list": several})
+    values = Annotated[tuple[value, ...], Field(min_length=1), short(MAX_TOLERANCES)]
+    return by_form({"other": value, "list": values})
 
 
 def sweep_types(model: Model | None, schemes: Iterable[tuple[str, Scheme]]) -> dict[str, Any]:
-    """Return the type of everything that can be swept, by dotted key; `schemes` have their names before them."""
-    found: dict[str, Any] = {}
+    """Return the types of all keys that can be swept, by dotted key; `schemes` are pairs of name and scheme."""
+    types: dict[str, Any] = {}
     if model is not None:
         for state in model.states if model.start is None else ():
-            found[f"initial.{state.name}"] = _bounded(ge=state.minimum)
-        found |= {f"model.{row.key}": _parameter_type(row) for row in model.parameters}
-    found["time.end"] = Positive
+            types[f"initial.{state.name}"] = _bounded(ge=state.minimum)
+        types |= {f"model.{row.key}": _parameter_type(row) for row in model.parameters}
+    types["time.end"] = Positive
     for name, scheme in schemes:
         for option in scheme.options_on(model):
-            found[f"schemes.{name}.{option.name}"] = _option_type(option)
-    return found
+            types[f"schemes.{name}.{option.name}"] = _option_type(option)
+    return types
 
 
 def scheme_names(data: Any) -> Iterator[str]:
-    """Yield the names that a list of schemes gives as written, right or wrong."""
+    """Yield the names of a list of schemes in the file, valid or not."""
     for item in data if isinstance(data, list) else ():
         name = item if not isinstance(item, Mapping) else item.get("label") or item.get("kind")
         if not isinstance(name, str):
             continue
-        several = item.get(TOLERANCE) if isinstance(item, Mapping) else None
-        if not isinstance(several, list):
+        tolerances = item.get(TOLERANCE) if isinstance(item, Mapping) else None
+        if not isinstance(tolerances, list):
             yield name
             continue
-        for value in several[:MAX_TOLERANCES]:
+        for value in tolerances[:MAX_TOLERANCES]:
             try:
                 yield tolerance_name(name, number(value))
             except PydanticCustomError:
@@ -135,10 +134,10 @@ MAX_DECLARED, MOST_TERMS = 50, 1000
 def _at_most(limit: int, what: str) -> AfterValidator:
     """Refuse a mapping of more than `limit` entries."""
 
-    def check(found: Mapping[str, Any]) -> Mapping[str, Any]:
-        if len(found) > limit:
-            raise refused(f"must not have more than {limit} {what}, has {len(found)}")
-        return found
+    def check(entries: Mapping[str, Any]) -> Mapping[str, Any]:
+        if len(entries) > limit:
+            raise refused(f"must not have more than {limit} {what}, has {len(entries)}")
+        return entries
 
     return AfterValidator(check)
 
@@ -147,34 +146,34 @@ Declared = Annotated[dict[str, Number], _at_most(MAX_DECLARED, "parameters")]
 _few = _at_most(MOST, "formulas")
 
 
-def _formulas(of_one: Any) -> Any:
-    """Return the type of some formulas by their names."""
-    return Annotated[dict[str, of_one], Field(min_length=1), _few]
+def _formulas(single: Any) -> Any:
+    """Return the type of formulas by name, given the type of a single one."""
+    return Annotated[dict[str, single], Field(min_length=1), _few]
 
 
 def _formula_type(model: Model, field: FormulaField) -> Any:
-    """Return what may stand for a formula: text, and beside it ``{word: coefficient}`` or ``{table: file}``.
+    """Return the type of a formula field: text, or ``{word: coefficient}`` or ``{table: file}`` if it takes those.
 
-    Where coordinates or outputs have formulas of their own, it is a mapping of these, or the formula of the only
-    coordinate; where it is a sum of terms, a list of them, or one.
+    A field with one formula per coordinate or output is a mapping, or the formula of the only coordinate. A sum of
+    terms is a list of formulas, or one formula.
     """
     if field.of:
         if field.of == "term":
             terms = Annotated[tuple[FormulaText, ...], Field(min_length=1), short(MOST_TERMS)]
             return by_form({"other": FormulaText, "list": terms})
-        several: Any = _formulas(FormulaText)
+        mapping: Any = _formulas(FormulaText)
         if field.paired:
-            several = _formulas(by_form({"mapping": several, "other": FormulaText}))
+            mapping = _formulas(by_form({"mapping": mapping, "other": FormulaText}))
         if field.of == "output":
-            return several
-        return by_form({"mapping": several, "other": FormulaText})
+            return mapping
+        return by_form({"mapping": mapping, "other": FormulaText})
     name = f"{_class_name(model.kind)}{_class_name(field.name)}"
     fields: dict[str, Any] = {}
     if field.table is not None:
         name += "Table"
         words = f"path of a table, relative to this file: {field.description}; a .csv or a .nc file"
         fields[TABLE] = (Text, Field(description=words))
-        # the keys for the columns are their names by default
+        # the default name of a column is its key
         for key, what in zip(field.table, ("places", "values"), strict=True):
             words = f"name of the column of {what} in the table, or of the variable"
             fields[key] = (Text, Field(default=key, description=words))
@@ -186,21 +185,21 @@ def _formula_type(model: Model, field: FormulaField) -> Any:
         fields[word] = (value, Field(default=None, description=f"b of {text}"))
     if not fields:
         return FormulaText
-    own = create_model(name, __base__=Section, **fields)
+    section = create_model(name, __base__=Section, **fields)
     if field.tabled:
-        return own
-    return by_form({"mapping": own, "other": FormulaText})
+        return section
+    return by_form({"mapping": section, "other": FormulaText})
 
 
 def _coefficient(field: FormulaField, word: str) -> Callable[[Any], Any]:
-    """Return what refuses the name of a parameter as the coefficient b of a term, and says what to write."""
+    """Return a validator that refuses a parameter name as coefficient b of a term, with a hint how to write it."""
 
     def check(value: Any) -> Any:
         if isinstance(value, str) and value.isidentifier() and value not in CONSTANTS:
             whole = re.sub(r"\bb\b", value, field.terms[word])
             hint = f"with a parameter write the formula: `{field.name}: {whole}`"
             if word == COULOMB:
-                # its formula would hold nothing
+                # a friction formula could not hold the body at rest
                 hint = f"its values may be swept, as `model.{field.name}.{word}`"
             raise refused(f"must be {FORMULA_NOTE}", hint)
         return value
@@ -209,7 +208,7 @@ def _coefficient(field: FormulaField, word: str) -> Callable[[Any], Any]:
 
 
 class Event(Section):
-    """An event that a user writes as formulas."""
+    """An event defined by formulas."""
 
     when: FormulaText
     """a formula in the states, t and parameters: the event is where it crosses 0"""
@@ -227,13 +226,13 @@ class Coordinate(Section):
     acceleration: FormulaText | None = None
     """its acceleration"""
     mass: FormulaText | dict[str, FormulaText] | None = None
-    """its mass, or what couples it with the accelerations of others, by name"""
+    """its mass, or its row of the mass matrix by names of coordinates"""
     force: FormulaText | None = None
     """the force on it"""
 
 
 class Chain(Section):
-    """A number of coordinates, and an index with their formulas (`vibsim.experiment.chain`)."""
+    """A chain: the number of coordinates, and formulas with an index (`vibsim.experiment.chain`)."""
 
     model_config = ConfigDict(
         extra="allow", json_schema_extra={"minProperties": 2, "maxProperties": 2}
@@ -241,17 +240,17 @@ class Chain(Section):
     __pydantic_extra__: dict[str, dict[str, Coordinate]]
 
     n: int
-    """how many coordinates, x_1 to x_n"""
+    """number of coordinates, x_1 to x_n"""
 
 
 def _refuse_coordinates(_: Any) -> Any:
-    # what has formulas is written otherwise before (`vibsim.experiment.shorthand`)
+    # coordinates with formulas are rewritten earlier (`vibsim.experiment.shorthand`)
     raise refused("each coordinate must have an acceleration, or a force with its mass")
 
 
 @cache
 def model_section(model: Model) -> type[Section]:
-    """Return the class of the section of a model."""
+    """Return the section class of a model."""
     if model.loaded is not None:
         return StructureSection
     fields: dict[str, Any] = {"kind": (Literal[model.kind], Field(description=model.title))}
@@ -261,11 +260,11 @@ def model_section(model: Model) -> type[Section]:
         fields[row.name] = (_parameter_type(row), default)
     if model.named is not None:
         words = "names of the coordinates; the velocity of x is vx, that of u alone v"
-        several = Annotated[tuple[Text, ...], Field(min_length=1), short(MOST)]
-        each = Annotated[dict[str, Coordinate], AfterValidator(_refuse_coordinates)]
-        listed = by_form({"mapping": each, "other": several})
+        listed = Annotated[tuple[Text, ...], Field(min_length=1), short(MOST)]
+        mapping = Annotated[dict[str, Coordinate], AfterValidator(_refuse_coordinates)]
+        coordinates = by_form({"mapping": mapping, "other": listed})
         words += "; or a mapping of the names to the formulas of each"
-        fields[COORDINATES] = (listed, Field(default=model.positions, description=words))
+        fields[COORDINATES] = (coordinates, Field(default=model.positions, description=words))
         words = "the equation of one coordinate, such as u'' + u = 0, in place of its acceleration"
         fields["equation"] = (Text | None, Field(default=None, description=words))
         words = "indices with first and last value: every key and entry with {i} in it is written out for each i"

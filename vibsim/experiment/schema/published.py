@@ -1,4 +1,4 @@
-"""Tables of numbers that a source printed: every row is a claim, and a report shows their digits beside ours."""
+"""Tables of numbers printed in a source: every row is a claim, and the report shows it next to the computed number."""
 
 from __future__ import annotations
 
@@ -21,28 +21,28 @@ _MAX_LENGTH = 60
 
 
 class PrintedNumber(NamedTuple):
-    """What a printed number says, and half a unit of its last digit."""
+    """The value of a printed number, and half a unit of its last digit."""
 
     number: float
     half_unit: float
 
 
 def read_printed(text: str) -> PrintedNumber | None:
-    """Return what `text` says; None where it is no number, or none that floats hold."""
-    found = _PRINTED.fullmatch(text.replace("\N{MINUS SIGN}", "-")[: _MAX_LENGTH + 1])
-    if found is None or len(text) > _MAX_LENGTH:
+    """Return the number in `text`; None if it is not a number, or outside the range of floats."""
+    match = _PRINTED.fullmatch(text.replace("\N{MINUS SIGN}", "-")[: _MAX_LENGTH + 1])
+    if match is None or len(text) > _MAX_LENGTH:
         return None
-    mantissa = Decimal(found[1])
-    power = int(found[2] or found[3] or found[4] or 0)
-    # a number of digits without a point ends in units
+    mantissa = Decimal(match[1])
+    power = int(match[2] or match[3] or match[4] or 0)
+    # exponent of the last digit; 0 for a number without a decimal point
     last = int(mantissa.as_tuple().exponent) + power
     printed = PrintedNumber(float(mantissa.scaleb(power)), float(Decimal(5).scaleb(last - 1)))
-    is_sound = math.isfinite(printed.number) and 0.0 < printed.half_unit < math.inf
-    return printed if is_sound else None
+    is_float = math.isfinite(printed.number) and 0.0 < printed.half_unit < math.inf
+    return printed if is_float else None
 
 
 def _as_text(value: Any) -> str:
-    """Return a number as text; in a file its digits are those written (`vibsim.experiment.validation`)."""
+    """Return a number as text; in a file it has its original digits (`vibsim.experiment.validation`)."""
     text = repr(value) if isinstance(value, int | float) and not isinstance(value, bool) else value
     if not isinstance(text, str) or read_printed(text) is None:
         raise refused("must be a number as printed, such as 1.120e8, 1.120 10^8 or 4.93")
@@ -55,27 +55,27 @@ PrintedText = Annotated[
 
 
 class PublishedRow(Section):
-    """One printed number."""
+    """A printed number."""
 
     scheme: Text
     """Name of the scheme."""
     level: LevelOrBest | None = None
     """A level, or `best` for the Richardson-extrapolated solution; the finest level when left out."""
     at: PublishedAt = PublishedAt()
-    """Where else it is taken."""
+    """Time, event or members of the number."""
     printed: PrintedText
-    """The number as printed: `1.120e8`, `1.120 10^8`, `4.93`. Its last digit says how exact it is meant."""
+    """The number as printed: `1.120e8`, `1.120 10^8`, `4.93`. Its last digit defines its precision."""
     holds: StrictBool = True
-    """Whether ours is expected to agree to half a unit of the last printed digit."""
+    """Whether the computed number is expected to agree to half a unit of the last printed digit."""
     note: Text | None = None
-    """What a reader of the report should know of it, such as why it does not agree."""
+    """A remark for readers of the report, such as why it does not agree."""
 
     @property
     def meaning(self) -> PrintedNumber:
         """The printed number, and half a unit of its last digit."""
-        found = read_printed(self.printed)
-        assert found is not None
-        return found
+        number = read_printed(self.printed)
+        assert number is not None
+        return number
 
 
 class PublishedTable(Section):
@@ -86,24 +86,24 @@ class PublishedTable(Section):
     title: Text
     """What the table shows."""
     source: Citation | None = None
-    """Where it stands; the experiment's `source` when left out."""
+    """The source of the table; the experiment's `source` when left out."""
     value: Text
-    """The value that is printed, one of those of a `value` check."""
+    """The printed value, one of those of a `value` check."""
     quantity: Text | None = None
-    """The quantity that it is of, where it is of one."""
+    """The quantity of the value, if it has one."""
     beside: Annotated[tuple[Text, ...], short(MAX_ENTRIES)] = ()
-    """Further values, shown beside each row without a claim."""
+    """Further values, shown next to each row without a claim."""
     rows: Annotated[tuple[PublishedRow, ...], Field(min_length=1), short(MAX_ENTRIES)]
     """The printed numbers."""
 
 
 def row_id(table: int, row: int) -> str:
-    """Return the id of the claim of row number `row` of table number `table`, both from 1."""
+    """Return the id of the claim of row `row` of table `table`, both counted from 1."""
     return f"published_{table}_{row}"
 
 
 def row_at(row: PublishedRow) -> At:
-    """Return where the number of a row is taken."""
+    """Return the scheme, level, time and members of a row as the section ``at`` of a check."""
     return At(scheme=row.scheme, level=row.level, **dict(row.at))
 
 
@@ -120,10 +120,10 @@ def _claim(table: PublishedTable, row: PublishedRow, id_: str) -> ClaimCheck:
     places = [f"scheme {row.scheme}"]
     if row.level is not None:
         places.append("extrapolated" if row.level == "best" else f"level {row.level}")
-    given = row.at.model_dump(exclude_none=True)
-    places += [f"{k} {v if isinstance(v, str) else f'{v:g}'}" for k, v in given.items()]
-    own = {"id": id_, "value": table.value, "quantity": table.quantity, "at": row_at(row)}
-    that = ValueCheck(**own, equals=row.meaning.number, atol=row.meaning.half_unit)
+    entries = row.at.model_dump(exclude_none=True)
+    places += [f"{k} {v if isinstance(v, str) else f'{v:g}'}" for k, v in entries.items()]
+    fields = {"id": id_, "value": table.value, "quantity": table.quantity, "at": row_at(row)}
+    that = ValueCheck(**fields, equals=row.meaning.number, atol=row.meaning.half_unit)
     return ClaimCheck(
         id=id_,
         claim=f"{table.title}: {', '.join(places)}: {row.printed}",

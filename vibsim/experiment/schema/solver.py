@@ -1,4 +1,4 @@
-"""The file of an experiment whose levels a solver of the user makes, one class per section, and its JSON Schema."""
+"""The structure of the file of an experiment with a solver of the user, one class per section, and its JSON Schema."""
 
 from __future__ import annotations
 
@@ -31,11 +31,11 @@ from vibsim.experiment.schema.sweep import ParameterSweep
 
 Kind = Literal["command", "python", "files"]
 KINDS: tuple[Kind, ...] = get_args(Kind)
-"""Ways to have levels made, each the key of a section ``solver``."""
+"""Kinds of solvers, each a key of the section ``solver``."""
 PLACE = "output"
-"""The placeholder of the file that a command writes."""
+"""Placeholder of the file that a command writes."""
 RESERVED = (PLACE, "level", "levels", "threads", "case")
-"""Names that mean something already where a size, a parameter or a quantity has its name."""
+"""Names that no size, parameter or quantity may have."""
 MOST_LEVELS = 100
 
 
@@ -51,7 +51,7 @@ Function = Annotated[str, BeforeValidator(_function)]
 
 
 class SolverSection(Section):
-    """How a level is made: by a command, by a function in Python, or by nobody, because its file is there."""
+    """How a level is computed: by a command, by a Python function, or not at all because its file exists."""
 
     model_config = ConfigDict(json_schema_extra={"oneOf": [{"required": [kind]} for kind in KINDS]})
     stand_ins = MappingProxyType({})
@@ -65,7 +65,7 @@ class SolverSection(Section):
     files: Line | None = None
     """The path of a netCDF or CSV file for each level, from the folder of this file, with placeholders."""
     inputs: Annotated[tuple[Line, ...], short(MAX_ENTRIES)] = ()
-    """Files that the solver reads or consists of; when one changes, all levels are made again."""
+    """Files that the solver reads or consists of; when one changes, all levels are computed again."""
 
 
 _List = Annotated[tuple[Number, ...], Field(min_length=1), short(MOST_LEVELS)]
@@ -76,7 +76,7 @@ else:
 
 
 class RefineSection(Section):
-    """What differs between levels: a list of values for each name, or formulas in `level`. The first is the step size.
+    """What differs between levels: for each name a list of values, or a formula in `level`. The first is the step size.
 
     Several names are refined together.
     """
@@ -87,11 +87,11 @@ class RefineSection(Section):
     other_values = Sizes
 
     levels: Levels | None = None
-    """Numbers of levels, for formulas in `level` such as `h: 1/2**level`."""
+    """The levels, for formulas in `level` such as `h: 1/2**level`."""
 
     @property
     def sizes(self) -> Mapping[str, tuple[float, ...] | str]:
-        """What is written of each name."""
+        """Values or formula of each name."""
         return self.__pydantic_extra__ or {}
 
 
@@ -100,13 +100,13 @@ class QuantitySection(Section):
 
     stand_ins = MappingProxyType({})
     coordinates: Annotated[tuple[Line, ...], Field(min_length=1)] | None = None
-    """Names of the coordinates that it must have; when left out, a number, or the coordinates that the file has."""
+    """Names of the coordinates that it must have; when left out, it is a number, or has the coordinates of the file."""
     restrict: Restriction = "subset"
-    """How levels are brought to common points."""
+    """How levels are restricted to common points."""
     exact: FormulaText | None = None
     """The exact values, if they are known: a number, or a formula in its coordinates and in swept numbers."""
     noise: NonNegative | None = None
-    """How noisy each level is (an iteration that stops early, printed digits): the root mean square of the noise."""
+    """Root mean square of the noise of each level (an iteration that stops early, printed digits)."""
 
 
 class SolverConvergesCheck(MeasuringCheck):
@@ -117,9 +117,9 @@ class SolverConvergesCheck(MeasuringCheck):
     converges: Text
     """The quantity."""
     order: Positive | None = None
-    """The order that is expected."""
+    """The expected order."""
     at_least: Positive | None = None
-    """The lowest order that is expected; without this and `order`, any order will do that can be believed."""
+    """The lowest expected order; without this and `order`, any credible order passes."""
     expect: Expect = Expect()
     """The verdict that passes; PASS when left out."""
 
@@ -131,7 +131,7 @@ class SolverAccurateCheck(Accuracy):
 CHECKS: Mapping[str, type[Section]] = MappingProxyType(
     {"converges": SolverConvergesCheck, "accurate": SolverAccurateCheck}
 )
-"""Every kind of check on the levels of a solver, by its leading key."""
+"""All kinds of checks on the levels of a solver, by leading key."""
 if TYPE_CHECKING:
     SolverCheck = SolverConvergesCheck | SolverAccurateCheck
 else:
@@ -139,14 +139,14 @@ else:
 
 
 class ResourcesSection(Section):
-    """What the making of one level takes, for Snakemake."""
+    """Resources that one level needs, for Snakemake."""
 
     mem_mb: Count = 1000
-    """Megabytes of memory: so many jobs run at once as fit."""
+    """Memory [MB]: as many jobs run at once as fit."""
     runtime: Count | None = None
-    """Minutes, for clusters that want to know; here nothing ends a solver."""
+    """Run time [min], for clusters that require it; vibsim itself enforces no limit."""
     threads: Count = 1
-    """Cores."""
+    """Number of cores."""
 
 
 class SolverDocument(Section):
@@ -155,23 +155,23 @@ class SolverDocument(Section):
     stand_ins = MappingProxyType({"title": None, "solver": None, "refine": None, "quantities": {}})
 
     title: Text
-    """What the experiment shows, in a line."""
+    """What the experiment shows, in one line."""
     source: Citation | None = None
-    """What the experiment comes from."""
+    """The source of the experiment."""
     solver: SolverSection
-    """How a level is made."""
+    """How a level is computed."""
     refine: RefineSection
     """What differs between levels."""
     quantities: Annotated[dict[str, QuantitySection], Field(min_length=1)]
-    """What is judged: variables or columns of the output, by their names."""
+    """The quantities that are judged: variables or columns of the output, by name."""
     checks: Annotated[tuple[SolverCheck, ...], short(MAX_ENTRIES)] = ()
-    """What must come out; when left out, that every quantity converges."""
+    """Expected outcomes; when left out, every quantity converges."""
     resources: ResourcesSection = ResourcesSection()
-    """What the making of one level takes."""
+    """Resources that one level needs."""
     sweep: ParameterSweep | None = None
     """Parameters that vary; every member has all levels."""
 
 
 def schema() -> dict[str, Any]:
-    """Return the JSON Schema (draft 2020-12) of such a file."""
+    """Return the JSON Schema (draft 2020-12) of an experiment file with a solver of the user."""
     return json_schema(SolverDocument)

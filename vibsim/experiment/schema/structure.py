@@ -1,4 +1,4 @@
-"""The section ``model`` of a linear structure as written: matrices, damping, loads, the start, what is observed."""
+"""The section ``model`` of a linear structure: matrices, damping, loads, initial values, observed displacements."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from vibsim.experiment.schema.fields import (
 from vibsim.models.structure import MOST_OBSERVED
 
 MOST_ROWS = 128
-"""Rows of a matrix that is written in the experiment file, at most: larger ones come from files."""
+"""Largest number of rows of a matrix in the experiment file; larger matrices come from files."""
 Row = Annotated[tuple[Number, ...], Field(min_length=1), short(MOST_ROWS)]
 
 
@@ -40,7 +40,7 @@ class Mode(Section):
     mode: Annotated[Index, Field(ge=1)]
     """number of the mode, from 1"""
     size: Number = 1.0
-    """largest entry of its shape"""
+    """value of the first observed displacement in this shape"""
 
 
 _VECTOR = "must be the name of a file, a list such as [0, 1], or numbers by degree of freedom such as {2: 1}"
@@ -58,7 +58,7 @@ StartText: Any = by_form(
 
 
 class Start(Section):
-    """How the motion begins."""
+    """Initial displacement and velocity."""
 
     displacement: StartText | None = None
     """u(0); 0 when left out"""
@@ -76,7 +76,7 @@ class Rayleigh(Section):
 
 
 class LoadTable(Section):
-    """A load over time from a table, straight between its points."""
+    """A load over time from a table, interpolated linearly."""
 
     table: Text
     """path of a .csv or .nc file, relative to this file"""
@@ -90,7 +90,7 @@ Factor: Any = by_form({"mapping": LoadTable, "other": FormulaText})
 
 
 class ShapedLoad(Section):
-    """A load of one shape."""
+    """A load with a fixed shape."""
 
     shape: VectorText
     """the load of every degree of freedom"""
@@ -130,7 +130,7 @@ class StructureSection(Section):
     observe: Annotated[dict[str, Observed], Field(min_length=1)] | None = Field(
         None,
         description="names of displacements that are stored: the number of a degree of freedom, or factors by "
-        f"number; all of them when left out, up to {MOST_OBSERVED}",
+        f"number; all degrees of freedom when left out, up to {MOST_OBSERVED}",
     )
     parameters: dict[str, Number] = Field({})
     """names that the formulas use, with their values"""

@@ -1,7 +1,7 @@
-"""The section ``sweep``, as written and as used: a rule for the values of each key, never the values themselves.
+"""The section ``sweep``, in the file and in an experiment: rules for the values of each key, not the values.
 
-An axis is one key whose values a rule gives, several keys that move together (``zip``), or points scattered over
-several keys (``sample``). The numbers come from `vibsim.experiment.sweep_columns`.
+An axis is a single key, several keys that vary together (``zip``), or sample points over several keys (``sample``).
+`vibsim.experiment.sweep_columns` computes the values.
 """
 
 from __future__ import annotations
@@ -28,24 +28,24 @@ from vibsim.schemes import SCHEMES, NumberOption, Option, Scheme
 from vibsim.schemes.base import EVENTS
 
 FLAGS: Mapping[bool, str] = {False: "false", True: "true"}
-"""How a flag that is swept is written among the values of a sweep."""
+"""Text of a flag among the values of a sweep."""
 
 
 def as_option(known: str | float | bool, value: Any) -> str | float | bool:
-    """Return `value`, an entry of a column of a sweep, as the option of which `known` is a value."""
+    """Return `value`, an entry of a column of a sweep, converted to the type of the option value `known`."""
     if isinstance(known, bool):
         return str(value) == FLAGS[True]
     return str(value) if isinstance(known, str) else float(value)
 
 
 def tolerance_name(name: str, tolerance: float) -> str:
-    """Return the name of one of several schemes that differ in their tolerance alone: ``dop853_1e-04``."""
+    """Return the name of a scheme with one of several tolerances: ``dop853_1e-04``."""
     texts = (f"{tolerance:.{digits}e}" for digits in range(17))
     return f"{name}_{next((text for text in texts if float(text) == tolerance), repr(tolerance))}"
 
 
 HIT = 1e-9
-"""How far the last value of a range may be from its end, in steps, to count as reached."""
+"""Tolerance within which the last value of a range reaches the end, in steps."""
 MAX_SEED = 2**63 - 1
 Seed = Annotated[int, Field(ge=0, le=MAX_SEED), BeforeValidator(whole)]
 Method = Literal["latin_hypercube", "sobol", "random"]
@@ -53,13 +53,13 @@ Interval = tuple[Number, Number]
 
 
 class _Spaced(Section):
-    """A first value, a last one, and how many there are."""
+    """A rule that gives spaced values between two ends."""
 
     @property
     def numbers(self) -> tuple[Any, ...]:
-        """The list of three numbers that the rule consists of."""
-        found: tuple[Any, ...] = next(iter(self.__dict__.values()))
-        return found
+        """The three numbers of the rule."""
+        numbers: tuple[Any, ...] = next(iter(self.__dict__.values()))
+        return numbers
 
     @property
     def count(self) -> int:
@@ -87,14 +87,14 @@ class Logspace(_Spaced):
 
 
 class Range(_Spaced):
-    """Values at a fixed distance."""
+    """Values with a fixed spacing."""
 
     range: tuple[Number, Number, Number]
-    """First value a, end b, and step: a + i*step up to b, which is among them when it is hit to 1e-9 of a step."""
+    """First value a, end b, and step: a + i*step up to b, which is included if it is reached to 1e-9 of a step."""
 
     @property
     def count(self) -> int:
-        """Number of values; the step must lead to the end."""
+        """Number of values; the step must have the sign of last minus first."""
         first, last, step = self.range
         return math.floor((last - first) / step + HIT) + 1
 
@@ -106,26 +106,26 @@ class Range(_Spaced):
 
 
 RULES: Mapping[str, type[Section]] = {"linspace": Linspace, "logspace": Logspace, "range": Range}
-"""Every rule by the key that it is written with."""
+"""All rules by key."""
 Rule = Linspace | Logspace | Range
 Entry = float | str
 Values = tuple[float, ...] | tuple[Text, ...] | Rule
-"""Numbers, option words, or a rule that gives numbers."""
+"""Numbers, option words, or a rule for numbers."""
 
 
-class _Scattered(Section):
-    """How points are scattered over a box."""
+class _Sampled(Section):
+    """How points of a box are sampled."""
 
     method: Method
     """Latin hypercube, Sobol sequence (scrambled), or independent random numbers."""
     n: Count
     """Number of points."""
     seed: Seed
-    """Whole number from which the points are drawn: the same ones every time."""
+    """Seed of the random numbers; the same seed gives the same points."""
 
 
-class Draw(_Scattered):
-    """Points scattered over several keys, as used."""
+class Draw(_Sampled):
+    """Sample points over several keys, in an experiment."""
 
     over: tuple[Interval, ...]
     """Least and largest value of every key."""
@@ -137,7 +137,7 @@ class Axis(Section):
     keys: tuple[str, ...]
     """Dotted keys."""
     values: tuple[Values, ...] | Draw
-    """The values of every key, or points over all of them."""
+    """The values of every key, or sample points over all keys."""
 
     @property
     def count(self) -> int:
@@ -162,7 +162,7 @@ LIST_RULE = "must be a list, or a mapping with one of " + ", ".join(RULES)
 
 
 def _as_entry(value: Any) -> Any:
-    """Leave text as it is: only the key tells whether it is an option or a formula, and a flag likewise."""
+    """Leave text and flags unchanged: the key decides whether they are options or formulas."""
     return value if isinstance(value, str | bool) else number(value)
 
 
@@ -173,7 +173,7 @@ _Entry = Annotated[
 ]
 _List = Annotated[tuple[_Entry, ...], Field(min_length=1), BeforeValidator(plain)]
 Written = tuple[bool | float | str, ...] | Linspace | Logspace | Range
-"""Values of one key as written: text is an option word or a formula, a truth value a flag, which its key tells."""
+"""Values of one key in the file. The key decides whether text is an option word or a formula."""
 if TYPE_CHECKING:
     Spread = Written
 else:
@@ -182,8 +182,8 @@ else:
     )
 
 
-class Sample(_Scattered):
-    """Points scattered over several parameters, all of them one axis of the grid."""
+class Sample(_Sampled):
+    """Sample points over several parameters, which form one axis of the grid."""
 
     stand_ins = MappingProxyType({"method": "random", "n": 1, "seed": 0})
 
@@ -192,10 +192,10 @@ class Sample(_Scattered):
 
 
 def swept_options(schemes: Iterable[Scheme]) -> dict[str, Any]:
-    """Describe the options of schemes that take a list of words or flags, for editors."""
+    """Return the schema of swept scheme options that are words or flags."""
     words: dict[str, list[str | bool]] = {}
-    every = (option for scheme in schemes for option in scheme.options)
-    for option in (*every, EVENTS):
+    options = (option for scheme in schemes for option in scheme.options)
+    for option in (*options, EVENTS):
         if not isinstance(option, NumberOption):
             choices = option.choices if isinstance(option, Option) else (False, True)
             words.setdefault(option.name, []).extend(choices)
@@ -218,25 +218,25 @@ class ParameterSweep(Section):
     other_values = Spread
 
     zip: Annotated[dict[str, Spread], Field(min_length=1)] | None = None
-    """Parameters that move together, each with as many values: one axis of the grid."""
+    """Parameters that vary together, with equally many values: one axis of the grid."""
     sample: Sample | None = None
-    """Points scattered over several parameters: one axis of the grid."""
+    """Sample points over several parameters: one axis of the grid."""
 
     @property
     def single(self) -> Mapping[str, Written]:
-        """Values of the parameters that are an axis of their own."""
+        """Values of the parameters that form an axis each."""
         return self.__pydantic_extra__ or {}
 
 
 def _key(value: Any) -> Any:
-    """Return a key of the sweep as written; what is no text can name none."""
+    """Return a key of the sweep unchanged; refuse other types than text."""
     if not isinstance(value, str):
         raise refused("must name a swept key, such as model.omega")
     return value
 
 
 class SweepSection(ParameterSweep):
-    """Parameters that vary, by dotted path; several make a grid in the order written, the last one fastest."""
+    """Parameters that vary, by dotted path; several make a grid in the order of the file, the last one fastest."""
 
     model_config = ConfigDict(
         extra="allow",
@@ -247,4 +247,4 @@ class SweepSection(ParameterSweep):
     )
 
     follow: Annotated[Text, BeforeValidator(_key)] | None = None
-    """A swept key along which each member starts from the last state of the member before; it must vary fastest."""
+    """A swept key along which each member starts from the final state of the previous one; it must vary fastest."""

@@ -1,8 +1,8 @@
-"""A number with a unit as text: taken apart by a grammar of its own, with no meaning yet.
+"""The grammar of a number with a unit: split into formula and unit names, which are not interpreted here.
 
-A quantity is a constant formula and a unit behind it, ``2*pi/30 rad``. A unit consists of names with whole exponents
+A quantity is a constant formula followed by a unit, ``2*pi/30 rad``. A unit consists of names with integer exponents
 (``s^2``, ``s**2``, ``s2``, ``s-2``), multiplied by ``*`` or a blank and divided by ``/``. There are no parentheses,
-and no blank after a ``/``: in ``J/kg K`` nobody knows where the K belongs.
+and no blank may follow a ``/``, because ``J/kg K`` is ambiguous.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from vibsim.core.errors import VibsimError
 from vibsim.formula import CONSTANTS, FUNCTIONS
 
 MAX_UNIT = 200
-"""Characters of a unit."""
+"""Largest number of characters of a unit."""
 MAX_EXPONENT = 9
 
 _LETTERS = "A-Za-z\u00b5\u03bc\u03a9\u2126\u00b0%"
@@ -28,7 +28,7 @@ _JOINT = re.compile(r"\s*(/|\*(?!\*))\s*|\s+")
 
 
 class UnitError(VibsimError):
-    """A unit, or a number with one, that is refused."""
+    """An invalid unit, or an invalid number with a unit."""
 
     def __init__(self, rule: str, hint: str = "") -> None:
         self.rule = rule
@@ -40,35 +40,35 @@ class UnitError(VibsimError):
 
 
 class Factor(NamedTuple):
-    """One name of a unit."""
+    """A factor of a unit: name and exponent."""
 
     name: str
     exponent: int
 
 
 def split(text: str) -> tuple[str, str] | None:
-    """Return the formula and the unit of `text`; None where no name follows directly on a number.
+    """Return the formula and the unit of `text`; None if no name directly follows a number.
 
-    A constant or a function of formulas is no unit there: ``2 pi`` is a formula that lacks its ``*``.
+    Constants and functions of formulas are not units: ``2 pi`` is a formula with a missing ``*``.
     """
     depth, ends_value = 0, False
-    for found in _TOKEN.finditer(text):
-        token = found.group()
-        if found.lastgroup == "name" and ends_value and depth == 0:
-            is_call = token in FUNCTIONS and text[found.end() :].lstrip().startswith("(")
+    for match in _TOKEN.finditer(text):
+        token = match.group()
+        if match.lastgroup == "name" and ends_value and depth == 0:
+            is_call = token in FUNCTIONS and text[match.end() :].lstrip().startswith("(")
             if token in CONSTANTS or is_call or keyword.iskeyword(token):
                 return None
-            return text[: found.start()].strip(), text[found.start() :].strip()
+            return text[: match.start()].strip(), text[match.start() :].strip()
         depth += (token == "(") - (token == ")")
-        ends_value = found.lastgroup != "other" or token == ")"
+        ends_value = match.lastgroup != "other" or token == ")"
     return None
 
 
 def factors(text: str) -> tuple[Factor, ...]:
-    """Return the names of a unit with their exponents; UnitError where the text is no unit."""
+    """Return the factors of a unit; raise `UnitError` if the text is not a unit."""
     if len(text) > MAX_UNIT:
         raise UnitError(f"a unit must have at most {MAX_UNIT} characters, has {len(text)}")
-    found: list[Factor] = []
+    result: list[Factor] = []
     place, joint, has_divided = 0, "", False
     while True:
         match = _FACTOR.match(text, place)
@@ -78,10 +78,10 @@ def factors(text: str) -> tuple[Factor, ...]:
         if not 0 < abs(exponent) <= MAX_EXPONENT:
             rule = f"an exponent of a unit must be -{MAX_EXPONENT} to {MAX_EXPONENT}, and not 0"
             raise UnitError(rule)
-        found.append(Factor(match[1], -exponent if joint == "/" else exponent))
+        result.append(Factor(match[1], -exponent if joint == "/" else exponent))
         place = match.end()
         if place == len(text):
-            return tuple(found)
+            return tuple(result)
         between = _JOINT.match(text, place)
         if between is None:
             raise _fault(text, place)
