@@ -37,10 +37,10 @@ from vibsim.convergence.evidence import pick
 from vibsim.convergence.reasons import code
 from vibsim.convergence.thresholds import (
     HALF_SPACING,
-    LEAST_CANDIDATE,
-    MOST_ABOVE,
+    LOWEST_ORDER,
     ORDER_ABOVE_ROUND_OFF,
     ORDINARY_ORDER,
+    SUPERCONVERGENCE,
 )
 from vibsim.convergence.verdict import Judgement
 from vibsim.core.array_types import Codes, Floats
@@ -182,7 +182,7 @@ def _more_levels(q: Comparison, judged: Judgement, order: Floats, tolerance: flo
         factor = np.maximum(observed, promised)
         steps = np.ceil(on_arrays.log(tolerance / away[..., -1]) / on_arrays.log(factor)) + 1
         # an error that falls faster than the powers do is none of them
-        known = early & np.isfinite(steps) & (last <= aim + MOST_ABOVE)
+        known = early & np.isfinite(steps) & (last <= aim + SUPERCONVERGENCE)
         # how small the promised power still is, behind a higher one, is not in the orders
         known &= ~((last > q.order + HALF_SPACING) & (q.special > q.order + HALF_SPACING))
     known &= (factor <= SLOWEST) & (steps <= MOST)
@@ -199,7 +199,7 @@ def _finest_readable(
     """
     found = np.full(judged.reason.shape, UNKNOWN, dtype=np.int8)
     with np.errstate(invalid="ignore"):
-        p = np.where(judged.order >= LEAST_CANDIDATE, judged.order, order)
+        p = np.where(judged.order >= LOWEST_ORDER, judged.order, order)
     lost = (judged.reason == code("round_off")) & np.isfinite(p)
     if not np.any(lost):
         return found

@@ -1,32 +1,33 @@
 """The verdict on any ladder of levels, from the probabilities of the error model.
 
-A power *dominates* where no other one has more than a tenth of it. The table of decisions, first to last:
+A power *dominates* if no other one has more than a tenth of it. The first row that applies decides:
 
-| what is found | status and reason |
+| condition | status and reason |
 |---|---|
-| a value that is not finite | FAIL ``non_finite`` |
+| a value is not finite | FAIL ``non_finite`` |
 | fewer than three levels | INCONCLUSIVE ``too_few_levels`` |
-| all differences are noise as expected, but not the distance from the exact solution | FAIL ``wrong_limit`` |
-| they fall like the lowest power at least, far from the exact solution (`_is_far_from_exact`) | FAIL ``wrong_limit`` |
+| all differences are noise as expected, but the exact solution is further away | FAIL ``wrong_limit`` |
+| they fall at least like the lowest power, far from the exact solution (`_is_far_from_exact`) | FAIL ``wrong_limit`` |
 | the levels surely show an expansion with another limit than the exact solution (`is_missed`) | FAIL ``wrong_limit`` |
 | all differences are noise as expected | PASS ``exact`` |
-| a power within the tolerance of the expected one dominates, surely, and was measured | PASS ``asymptotic`` |
-| others dominate, surely, the expected one does not, and one is definite | FAIL ``order_low``, ``order_high`` |
-| noise is more probable than errors that alternate, and than all else | INCONCLUSIVE ``round_off`` |
-| errors that change their sign from level to level are | INCONCLUSIVE ``oscillating`` |
-| anything else | INCONCLUSIVE ``pre_asymptotic`` |
+| a power within the tolerance of the expected one surely dominates and was measured | PASS ``asymptotic`` |
+| others surely dominate, the expected one does not, and one is definite | FAIL ``order_low``, ``order_high`` |
+| noise is more probable than alternating errors and than everything else | INCONCLUSIVE ``round_off`` |
+| alternating errors are more probable than everything else | INCONCLUSIVE ``oscillating`` |
+| otherwise | INCONCLUSIVE ``pre_asymptotic`` |
 
-Nothing is decided on an order where the measured one is below half of the least of an expansion, and none where levels
-behind the window contradict it (`_is_contradicted`).
+No order is decided if the measured one is below half of the lowest order of an expansion, or if levels finer than the
+window contradict it (`_is_contradicted`).
 
-*Surely* is a probability above ``1 - RISK``. Where it rests on three levels and coarser ones do not fit them, it is one
-above ``1 - RISK_OF_THREE`` for a FAIL, and for a PASS that no exact solution confirms: three levels may fall like a
-power by accident. *Was measured*: the order of the finest levels is nearer to the expected one than to the next order
-of an expansion. Levels may fit two powers by accident whose weaker one moves the measured order by more than that.
+*Surely* means with a probability above ``1 - RISK``. If the order rests on three levels that coarser ones do not fit,
+the probability must exceed ``1 - RISK_OF_THREE`` for a FAIL, and for a PASS that no exact solution confirms: three
+levels may fall like a power by accident. *Measured* means that the order of the finest levels is nearer to the expected
+one than to the next order of an expansion: levels may by accident fit two powers, the weaker of which shifts the
+measured order by more than that.
 
-Noise that is predicted to grow may not do so. Where it ends the window, and the finest differences show that it may be
-far less, the ladder is judged with less noise as well (`_with_less_noise`). Then a verdict is sure that is sure with
-one of the two, while it has at least the probability `RISK` with the other.
+Noise that is predicted to grow may not do so. If predicted noise ends the window, and the finest differences show that
+it may be far smaller, the ladder is also judged with less noise (`_with_less_noise`). A verdict is then sure if it is
+sure with one of the two predictions and has at least the probability `RISK` with the other.
 """
 
 from __future__ import annotations
@@ -55,13 +56,13 @@ from vibsim.convergence.reasons import code, first_reason, is_one_of
 from vibsim.convergence.thresholds import (
     ABOVE_ROUND_OFF,
     DEFINITE,
-    FURTHER_APART,
     HALF_SPACING,
-    LEAST_CANDIDATE,
     LEAST_WITH_LIMIT,
-    LEVELS_OF_A_FALL,
+    LOWEST_ORDER,
     MISSED_FAR,
+    MISSED_FAR_LEVELS,
     NOISE_FACTOR,
+    NON_ADJACENT_FACTOR,
     RISK,
     RISK_OF_THREE,
     STATED_LIMIT_FACTOR,
@@ -72,34 +73,34 @@ from vibsim.core.vocabulary import ORDER_TOLERANCE
 from vibsim.elementary import on_arrays
 
 DECIDED = "asymptotic", "order_low", "order_high"
-"""Reasons of verdicts on an order."""
-ROUGHLY = 1e-3
-"""Part of all evidence that may be left out where only the verdict is asked, if that part cannot change it."""
-NEAR = 0.1
-"""Distance of an extrapolation from the exact solution, over the error of the finest level, that surely is no miss."""
+"""Reasons that state an order."""
+ROUGH_LEFT_OUT = 1e-3
+"""Largest part of all evidence that `decide` may skip, if that cannot change the verdict."""
+MEETS_WITHIN = 0.1
+"""An extrapolation this near the exact solution, relative to the error of the finest level, surely does not miss it."""
 
 
 @dataclass(frozen=True)
 class Question:
-    """What is asked of ladders. Without an order that is expected any one will do that can be believed."""
+    """The order that ladders are judged by; without an expected one, any order that is certain enough passes."""
 
     expected: float | None = None
-    """The order that is expected."""
+    """Expected order."""
     at_least: float | None = None
-    """The least order that is expected."""
+    """Least expected order."""
     tolerance: float = ORDER_TOLERANCE
-    """How far from `expected`, or below `at_least`, an order may be."""
+    """Largest distance of an order from `expected`, or below `at_least`."""
     noise_factor: float = NOISE_FACTOR
-    """Noise may be so many times `Ladder.floor` where levels are said to differ by nothing else."""
+    """Largest ratio of actual noise to `Ladder.floor` for which levels count as equal."""
     limit_factor: float | None = None
-    """The same of the finest level and the exact solution, if it is another number."""
+    """The same for the finest level and the exact solution; `noise_factor` by default."""
     by_theory: bool = False
-    """Whether theory promises the order that is expected."""
+    """Whether theory promises the expected order."""
 
     def is_met_by(self, order: Floats) -> Flags:
         """Say which measured orders are nearer to the expected one than to the next order of an expansion.
 
-        Orders of expansions are 0.5 apart, and those of a scheme by its theory 1.
+        Orders of expansions are 0.5 apart, those that theory promises are 1 apart.
         """
         margin = max(self.tolerance, (2.0 if self.by_theory else 1.0) * HALF_SPACING)
         if self.expected is not None:
@@ -108,75 +109,81 @@ class Question:
 
     @property
     def with_stated_noise(self) -> Question:
-        """What is asked where the noise of levels is known, and no prediction."""
+        """The same question for levels whose noise the user states."""
         return replace(self, noise_factor=STATED_NOISE_FACTOR, limit_factor=STATED_LIMIT_FACTOR)
 
     @property
     def promise(self) -> Promise | None:
-        """The order that has a prior of its own."""
+        """The expected order, which has a prior of its own."""
         return None if self.expected is None else Promise(self.expected, self.by_theory)
 
 
 @dataclass(frozen=True)
 class Decision:
-    """What was decided of ladders; arrays of shape (ladder,)."""
+    """The verdicts on ladders; arrays of shape (ladder,)."""
 
     reason: Codes  # index into `vocabulary.REASON_NAMES`
-    order: Floats  # the order of the finest three levels that the verdict rests on; NaN where there is none
+    order: (
+        Floats  # order of the finest three levels that the verdict rests on; NaN if there is none
+    )
     low: Floats  # lower end of the interval of the order
     high: Floats  # upper end
-    first: Integers  # coarsest level that the verdict rests on, as a position
-    last: Integers  # finest one
-    contradicted: Flags  # whether finer levels than those contradict the order
+    first: Integers  # index of the coarsest level that the verdict rests on
+    last: Integers  # index of the finest one
+    contradicted: Flags  # whether finer levels contradict the order
 
 
 @dataclass(frozen=True)
 class Assessment(Decision):
-    """What was decided of ladders, and their best values; arrays of shape (ladder,) where no other is given."""
+    """The verdicts on ladders, and their best values; arrays of shape (ladder,) unless another shape is given."""
 
-    # of levels without a settled order that hardly approach each other, or not at all, these are NaN
-    error: Floats  # norm of the error of the finest level, estimated where the exact solution is not known
-    error_bound: Floats  # what it is at most
-    weights: Floats  # the best value is the sum of these times the values of the levels, shape (ladder, level)
-    best_bound: Floats  # how far the limit is from the best value, at most
+    # NaN for levels without a decided order that approach each other slowly or not at all
+    error: Floats  # norm of the error of the finest level, estimated if the exact solution is not known
+    error_bound: Floats  # upper bound of that norm
+    weights: (
+        Floats  # the best value is the sum of the levels with these weights, shape (ladder, level)
+    )
+    best_bound: Floats  # upper bound of the distance from the best value to the limit
 
 
 def assess(ladder: Ladder, question: Question) -> Assessment:
-    """Decide whether ladders, any number of them with the same step sizes, converge as expected."""
-    found = in_blocks(ladder, partial(_assess_block, question=question))
-    return Assessment(**{field.name: found[field.name] for field in fields(Assessment)})
+    """Decide whether ladders with the same step sizes converge as expected."""
+    result = in_blocks(ladder, partial(_assess_block, question=question))
+    return Assessment(**{field.name: result[field.name] for field in fields(Assessment)})
 
 
 def decide(ladder: Ladder, question: Question) -> Decision:
-    """Decide whether ladders converge as expected; the same as `assess`, at a fraction of its cost.
+    """Return the same verdicts as `assess`, without best values and at a fraction of the cost.
 
-    Most ladders are so clear that a rough posterior has the same verdict (see `_is_sure`).
+    Most ladders are so clear that an approximate posterior gives the same verdict (see `_is_sure`).
     """
-    found = in_blocks(ladder, partial(_decide_block, question=question))
-    rest = np.flatnonzero(~found["sure"])
-    if len(rest):
-        assessed = in_blocks(ladder.some(rest), partial(_assess_block, question=question))
+    result = in_blocks(ladder, partial(_decide_block, question=question))
+    unsure = np.flatnonzero(~result["sure"])
+    if len(unsure):
+        assessed = in_blocks(ladder.some(unsure), partial(_assess_block, question=question))
         for field in fields(Decision):
-            found[field.name][rest] = assessed[field.name]
-    return Decision(**{field.name: found[field.name] for field in fields(Decision)})
+            result[field.name][unsure] = assessed[field.name]
+    return Decision(**{field.name: result[field.name] for field in fields(Decision)})
 
 
 @dataclass(frozen=True)
 class _Evaluation:
-    """What the posterior of ladders leads to, but for an exact solution that is missed."""
+    """The results of a posterior that decide a verdict, except for a missed exact solution."""
 
     question: Question
     posterior: Posterior
     sides: Floats  # probabilities of a lower, an expected and a higher power, shape (3, ladder)
-    exact: Flags
-    away: Flags  # surely not the exact solution, whatever the order is
-    is_confirmed: bool  # whether an exact solution is known
-    cut_short: Flags  # whether noise that may be far less than predicted ends the window: nothing is decided
-    contradicted: Flags  # whether levels behind the window contradict it: nothing is decided
+    only_noise: Flags  # levels differ by noise alone
+    misses_exact: Flags  # the exact solution is missed, whatever the order is
+    exact_known: bool
+    cut_short: (
+        Flags  # noise that may be far less than predicted ends the window: no order is decided
+    )
+    contradicted: Flags  # levels finer than the window contradict it: no order is decided
 
     @property
-    def by_three(self) -> Flags:
-        """Whether three levels decide behind others that do not fit."""
+    def rests_on_three(self) -> Flags:
+        """Whether the order rests on three levels that coarser ones do not fit."""
         return rests_on_three(self.posterior)
 
     @property
@@ -184,33 +191,33 @@ class _Evaluation:
         """The order of the finest levels of the most probable window."""
         return finest_order(self.posterior.orders, likely_window(self.posterior)[1])
 
-    def some(self, rows: Integers) -> _Evaluation:
-        """Return what was found of some of the ladders."""
-        flags = "exact", "away", "cut_short", "contradicted"
-        parts = {name: getattr(self, name)[rows] for name in flags}
-        posterior, of_sides = self.posterior.some(rows), self.sides[:, rows]
-        return replace(self, posterior=posterior, sides=of_sides, **parts)
+    def some(self, subset: Integers) -> _Evaluation:
+        """Return the results of a subset of the ladders."""
+        flags = "only_noise", "misses_exact", "cut_short", "contradicted"
+        parts = {name: getattr(self, name)[subset] for name in flags}
+        posterior, sides = self.posterior.some(subset), self.sides[:, subset]
+        return replace(self, posterior=posterior, sides=sides, **parts)
 
-    def replace(self, ladders: Integers, other: _Evaluation, rows: Flags) -> None:
-        """Take what was found of some ladders from some rows of another one."""
-        self.posterior.replace(ladders, other.posterior, rows)
-        self.sides[:, ladders] = other.sides[:, rows]
-        self.contradicted[ladders] = other.contradicted[rows]
+    def update(self, ladders: Integers, source: _Evaluation, rows: Flags) -> None:
+        """Overwrite some ladders with rows of another evaluation."""
+        self.posterior.update(ladders, source.posterior, rows)
+        self.sides[:, ladders] = source.sides[:, rows]
+        self.contradicted[ladders] = source.contradicted[rows]
 
 
 def _assess_block(ladder: Ladder, factors: Floats, question: Question) -> dict[str, np.ndarray]:
-    """Return what an `Assessment` holds, of ladders of three levels and more."""
-    found = _with_less_noise(ladder, _evaluate(ladder, question, LEFT_OUT), question)
-    of_limit, missed = found.posterior, found.away
+    """Return the fields of an `Assessment` of ladders with at least three levels."""
+    evaluation = _with_less_noise(ladder, _evaluate(ladder, question, LEFT_OUT), question)
+    levels_only, missed = evaluation.posterior, evaluation.misses_exact
     if ladder.exact_known:
-        # what the levels say of the limit without the exact solution
-        of_limit = posterior(ladder.without_exact(), question.promise)
-        risk = np.where(rests_on_three(of_limit), RISK_OF_THREE, RISK)
-        order = finest_order(of_limit.orders, likely_window(of_limit)[1])
-        approaches = (of_limit.expansion > 1.0 - risk) & ~(order < LEAST_WITH_LIMIT)
-        missed = missed | (approaches & is_missed(ladder, of_limit))
-    numbers = _numbers(ladder, found, of_limit, missed)
-    values = best_value(ladder, of_limit, found.exact, factors)
+        # estimate the limit without the exact solution, and compare
+        levels_only = posterior(ladder.without_exact(), question.promise)
+        risk = np.where(rests_on_three(levels_only), RISK_OF_THREE, RISK)
+        order = finest_order(levels_only.orders, likely_window(levels_only)[1])
+        approaches = (levels_only.expansion > 1.0 - risk) & ~(order < LEAST_WITH_LIMIT)
+        missed = missed | (approaches & is_missed(ladder, levels_only))
+    numbers = _numbers(ladder, evaluation, levels_only, missed)
+    values = best_value(ladder, levels_only, evaluation.only_noise, factors)
     if not ladder.exact_known:
         is_open = is_one_of(numbers["reason"], "pre_asymptotic")
         for row in values.values():
@@ -219,42 +226,42 @@ def _assess_block(ladder: Ladder, factors: Floats, question: Question) -> dict[s
 
 
 def _decide_block(ladder: Ladder, factors: Floats, question: Question) -> dict[str, np.ndarray]:
-    """Return what a `Decision` holds, of ladders of three levels and more, and whether it is sure."""
+    """Return the fields of a `Decision` of ladders with at least three levels, and whether it is `sure`."""
     del factors
-    found = _evaluate(ladder, question, ROUGHLY)
-    numbers = _numbers(ladder, found, found.posterior, found.away)
-    return numbers | {"sure": _is_sure(ladder, found, question)}
+    evaluation = _evaluate(ladder, question, ROUGH_LEFT_OUT)
+    numbers = _numbers(ladder, evaluation, evaluation.posterior, evaluation.misses_exact)
+    return numbers | {"sure": _is_sure(ladder, evaluation, question)}
 
 
 def _evaluate(ladder: Ladder, question: Question, left_out: float) -> _Evaluation:
-    believed = posterior(ladder, question.promise, left_out=left_out)
-    of_sides = np.stack(sides(believed, question.expected, question.at_least, question.tolerance))
-    exact = _is_only_noise(ladder, question)
-    away = np.zeros_like(exact)
+    p = posterior(ladder, question.promise, left_out=left_out)
+    probabilities = np.stack(sides(p, question.expected, question.at_least, question.tolerance))
+    only_noise = _is_only_noise(ladder, question)
+    misses_exact = np.zeros_like(only_noise)
     if ladder.exact_known:
         factor = question.noise_factor if question.limit_factor is None else question.limit_factor
-        away = np.sqrt(ladder.gram[:, -1, -1]) > factor * ladder.floor[:, -1]
-        away &= exact | _is_far_from_exact(ladder)
+        misses_exact = np.sqrt(ladder.gram[:, -1, -1]) > factor * ladder.floor[:, -1]
+        misses_exact &= only_noise | _is_far_from_exact(ladder)
     return _Evaluation(
         question,
-        believed,
-        of_sides,
-        exact,
-        away,
-        is_confirmed=ladder.exact_known,
-        cut_short=_is_cut_short(ladder, believed),
-        contradicted=_is_contradicted(ladder, believed, question),
+        p,
+        probabilities,
+        only_noise,
+        misses_exact,
+        exact_known=ladder.exact_known,
+        cut_short=_is_cut_short(ladder, p),
+        contradicted=_is_contradicted(ladder, p, question),
     )
 
 
-def _is_sure(ladder: Ladder, found: _Evaluation, question: Question) -> Flags:
-    """Say where the same is decided whatever the hypotheses are like that were left out.
+def _is_sure(ladder: Ladder, evaluation: _Evaluation, question: Question) -> Flags:
+    """Say where the skipped hypotheses cannot change the verdict.
 
-    Then no probability is nearer than `ROUGHLY` to what it is compared with. And either the extrapolation by the order
-    of the finest levels is so near the exact solution that no other one misses it, or the levels show no order.
+    Then no probability is within `ROUGH_LEFT_OUT` of its threshold. Also, either the extrapolation by the order of the
+    finest levels is so near the exact solution that no other one misses it, or the levels show no order.
     """
-    p, (lower, right, higher) = found.posterior, found.sides
-    rest, fails = 1.0 - p.noise - p.alternating, lower + higher > 0.5
+    p, (lower, right, higher) = evaluation.posterior, evaluation.sides
+    remaining, fails = 1.0 - p.noise - p.alternating, lower + higher > 0.5
     definite = np.zeros_like(right)
     definite[fails] = most_near_a_power(p)[fails]
     margins = [
@@ -263,83 +270,83 @@ def _is_sure(ladder: Ladder, found: _Evaluation, question: Question) -> Flags:
         lower + higher - (1.0 - RISK),
         np.where(fails, lower - higher, 1.0),
         definite - DEFINITE,
-        p.noise - np.maximum(rest, p.alternating),
-        p.alternating - rest,
+        p.noise - np.maximum(remaining, p.alternating),
+        p.alternating - remaining,
         *(np.min(np.abs(tail - OUTSIDE), axis=-1) * p.expansion for tail in tails(p)),
     ]
     window = np.sort(p.window, axis=-1)
     if window.shape[1] > 1:
         margins.append(window[:, -1] - window[:, -2])
-    sure: Flags = np.all(np.abs(margins) > ROUGHLY, axis=0) & ~found.cut_short
-    sure &= ~(found.by_three & (fails | (not found.is_confirmed)))
+    sure: Flags = np.all(np.abs(margins) > ROUGH_LEFT_OUT, axis=0) & ~evaluation.cut_short
+    sure &= ~(evaluation.rests_on_three & (fails | (not evaluation.exact_known)))
     if ladder.exact_known:
-        open_still = np.flatnonzero(sure & ~_meets(ladder, p))
-        if len(open_still):
-            levels = ladder.some(open_still).without_exact()
-            of_limit = posterior(levels, question.promise, left_out=ROUGHLY)
-            sure[open_still] = of_limit.expansion < 1.0 - RISK - ROUGHLY
+        unclear = np.flatnonzero(sure & ~_meets(ladder, p))
+        if len(unclear):
+            levels = ladder.some(unclear).without_exact()
+            levels_only = posterior(levels, question.promise, left_out=ROUGH_LEFT_OUT)
+            sure[unclear] = levels_only.expansion < 1.0 - RISK - ROUGH_LEFT_OUT
     return sure
 
 
 def _meets(ladder: Ladder, p: Posterior) -> Flags:
-    """Say where the extrapolation by the order of the finest levels is almost the exact solution."""
+    """Say where the extrapolation by the order of the finest levels almost equals the exact solution."""
     order, ratio = p.orders[:, -1], ladder.h[-2] / ladder.h[-1]
     with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
-        step = 1.0 / (on_arrays.power(ratio, order) - 1.0)
-        distance = norm(np.stack([-step, np.ones_like(step)], axis=-1), ladder.gram[:, -2:, -2:])
-        near = distance <= NEAR * step * np.sqrt(ladder.gram[:, -2, -2])
+        gain = 1.0 / (on_arrays.power(ratio, order) - 1.0)
+        distance = norm(np.stack([-gain, np.ones_like(gain)], axis=-1), ladder.gram[:, -2:, -2:])
+        near = distance <= MEETS_WITHIN * gain * np.sqrt(ladder.gram[:, -2, -2])
     ends = np.array(p.windows)[np.argmax(p.window, axis=-1), 1]
     return np.asarray((order > 0.0) & near & (ends == len(ladder.h) - 1))
 
 
-def _is_cut_short(ladder: Ladder, believed: Posterior) -> Flags:
-    """Say where noise that may be far less than predicted ends the most probable window."""
-    every, last = np.arange(len(ladder.gram)), likely_window(believed)[1]
-    least = _least_noise(ladder)[every, last]
-    return np.asarray(NOISE_FACTOR * least < ladder.floor[every, last])
+def _is_cut_short(ladder: Ladder, p: Posterior) -> Flags:
+    """Say where the predicted noise that ends the most probable window may be far too large."""
+    index, last = np.arange(len(ladder.gram)), likely_window(p)[1]
+    least_noise = _least_noise(ladder)[index, last]
+    return np.asarray(NOISE_FACTOR * least_noise < ladder.floor[index, last])
 
 
-def _with_less_noise(ladder: Ladder, found: _Evaluation, question: Question) -> _Evaluation:
-    """Return what is found of ladders whose window is cut short by noise, with that noise and with less.
+def _with_less_noise(ladder: Ladder, evaluation: _Evaluation, question: Question) -> _Evaluation:
+    """Judge ladders that are cut short by predicted noise once more, with less noise.
 
-    What is sure with one of the two counts, where it has at least the probability `RISK` with the other; else nothing.
+    A verdict that is sure with one of the two counts if it has at least the probability `RISK` with the other.
     """
-    rows = np.flatnonzero(found.cut_short & ~found.exact)
+    rows = np.flatnonzero(evaluation.cut_short & ~evaluation.only_noise)
     if not len(rows):
-        return found
-    none = np.zeros(len(rows), dtype=bool)
-    first = replace(found.some(rows), cut_short=none)
-    less = replace(ladder.some(rows), floor=_least_noise(ladder)[rows])
-    other = replace(_evaluate(less, question, LEFT_OUT), cut_short=none)
-    own = _reasons(first, none)
-    others = _reasons(other, none)
-    excluded = _probability(own, other) < RISK
-    added = ~is_one_of(own, *DECIDED) & is_one_of(others, *DECIDED)
-    added &= _probability(others, first) >= RISK
+        return evaluation
+    no_flags = np.zeros(len(rows), dtype=bool)
+    usual = replace(evaluation.some(rows), cut_short=no_flags)
+    quiet_ladder = replace(ladder.some(rows), floor=_least_noise(ladder)[rows])
+    quiet = replace(_evaluate(quiet_ladder, question, LEFT_OUT), cut_short=no_flags)
+    reasons = _reasons(usual, no_flags)
+    quiet_reasons = _reasons(quiet, no_flags)
+    excluded = _probability(reasons, quiet) < RISK
+    added = ~is_one_of(reasons, *DECIDED) & is_one_of(quiet_reasons, *DECIDED)
+    added &= _probability(quiet_reasons, usual) >= RISK
     chosen = excluded | added
-    found.replace(rows[chosen], other, chosen)
-    found.cut_short[rows] = excluded & ~added
-    return found
+    evaluation.update(rows[chosen], quiet, chosen)
+    evaluation.cut_short[rows] = excluded & ~added
+    return evaluation
 
 
-def _probability(codes: Codes, found: _Evaluation) -> Floats:
-    """Return the probability of what is decided, 1 where nothing is."""
-    lower, right, higher = found.sides
-    right = np.where(codes == code("asymptotic"), right, lower + higher)
-    return np.where(is_one_of(codes, *DECIDED), right, 1.0)
+def _probability(reasons: Codes, evaluation: _Evaluation) -> Floats:
+    """Return the probability of the decided order, 1 where none is decided."""
+    lower, right, higher = evaluation.sides
+    right = np.where(reasons == code("asymptotic"), right, lower + higher)
+    return np.where(is_one_of(reasons, *DECIDED), right, 1.0)
 
 
 def _is_far_from_exact(ladder: Ladder) -> Flags:
     """Say where differences fall at least like the lowest power of an expansion, and the exact solution is far away.
 
-    They must be no round-off. Then less is to come than that power leaves, and both together are much less than the
-    distance.
+    If the differences exceed round-off, the levels will move no further than that power lets them. All they have moved
+    and will move must be much less than the distance.
     """
     n = len(ladder.h)
-    if n < LEVELS_OF_A_FALL:
+    if n < MISSED_FAR_LEVELS:
         return np.zeros(len(ladder.gram), dtype=bool)
     sizes = np.sqrt(np.diagonal(ladder.gram, axis1=1, axis2=2))
-    powers = on_arrays.power(ladder.h, LEAST_CANDIDATE)
+    powers = on_arrays.power(ladder.h, LOWEST_ORDER)
     rates = sizes[:, : n - 1] / (powers[:-1] - powers[1:])
     to_come = rates[:, -1] * powers[-1]
     moved = np.sum(sizes[:, : n - 1], axis=1)
@@ -349,44 +356,46 @@ def _is_far_from_exact(ladder: Ladder) -> Flags:
     return np.asarray(falls & (sizes[:, -1] > MISSED_FAR * (moved + to_come)))
 
 
-def _is_contradicted(ladder: Ladder, believed: Posterior, question: Question) -> Flags:
-    """Say where levels behind the most probable window differ by more than those at its end, and than predicted noise.
+def _is_contradicted(ladder: Ladder, p: Posterior, question: Question) -> Flags:
+    """Say where levels finer than the most probable window differ too much to be noise.
 
-    What a window leaves out behind it is noise. Noise that begins with more than the last difference in the window, or
-    that grows faster than round-off, would be seen there: a level behind it is wrong, or those before it are.
+    That is by more than the last difference in the window, grown as fast as round-off can, and by more than the
+    predicted noise. Then either a finer level or the levels of the window are wrong.
     """
     sizes = np.sqrt(np.diagonal(ladder.gram, axis1=1, axis2=2))[:, : len(ladder.h) - 1]
-    last = likely_window(believed)[1]
-    at_end = np.take_along_axis(sizes, last[:, None] - 1, axis=1)
-    is_behind = np.arange(sizes.shape[1]) >= last[:, None]
-    finer = np.where(
-        is_behind, ladder.h[np.minimum(last + 1, len(ladder.h) - 1)][:, None] / ladder.h[1:], 1.0
+    last = likely_window(p)[1]
+    last_difference = np.take_along_axis(sizes, last[:, None] - 1, axis=1)
+    is_finer = np.arange(sizes.shape[1]) >= last[:, None]
+    refinement = np.where(
+        is_finer, ladder.h[np.minimum(last + 1, len(ladder.h) - 1)][:, None] / ladder.h[1:], 1.0
     )
-    at_most = at_end * on_arrays.power(finer, GROWTHS[-1])
+    largest = last_difference * on_arrays.power(refinement, GROWTHS[-1])
     noise = question.noise_factor * (ladder.floor[:, :-1] + ladder.floor[:, 1:])
-    return np.asarray(np.any(is_behind & (sizes > np.maximum(at_most, noise)), axis=1))
+    return np.asarray(np.any(is_finer & (sizes > np.maximum(largest, noise)), axis=1))
 
 
-def _reasons(found: _Evaluation, missed: Flags) -> Codes:
-    """Return the reasons of the verdicts, as positions in `REASON_NAMES`; see the head of this module."""
-    p, (lower, right, higher) = found.posterior, found.sides
-    risk = np.where(found.by_three, RISK_OF_THREE, RISK)
-    # expansions begin with the order 1/2, whatever two powers fit levels that do not approach each other
-    may_decide = ~(found.cut_short | found.contradicted | (found.order < LEAST_WITH_LIMIT))
-    another = (lower + higher > 1.0 - risk) & (right < risk) & may_decide
-    if np.any(another):
-        another &= most_near_a_power(p) > DEFINITE
+def _reasons(evaluation: _Evaluation, missed: Flags) -> Codes:
+    """Return the reasons of the verdicts by the table in the docstring of this module."""
+    p, (lower, right, higher) = evaluation.posterior, evaluation.sides
+    risk = np.where(evaluation.rests_on_three, RISK_OF_THREE, RISK)
+    # two powers may fit levels that do not approach each other, but expansions begin with order 1/2
+    decidable = ~(
+        evaluation.cut_short | evaluation.contradicted | (evaluation.order < LEAST_WITH_LIMIT)
+    )
+    other_order = (lower + higher > 1.0 - risk) & (right < risk) & decidable
+    if np.any(other_order):
+        other_order &= most_near_a_power(p) > DEFINITE
     cases = [
         (missed, "wrong_limit"),
-        (found.exact, "exact"),
+        (evaluation.only_noise, "exact"),
         (
-            (right > 1.0 - (RISK if found.is_confirmed else risk))
-            & found.question.is_met_by(found.order)
-            & may_decide,
+            (right > 1.0 - (RISK if evaluation.exact_known else risk))
+            & evaluation.question.is_met_by(evaluation.order)
+            & decidable,
             "asymptotic",
         ),
-        (another & (lower > higher), "order_low"),
-        (another, "order_high"),
+        (other_order & (lower > higher), "order_low"),
+        (other_order, "order_high"),
         (p.noise > np.maximum(1.0 - p.noise - p.alternating, p.alternating), "round_off"),
         (p.alternating > 1.0 - p.noise - p.alternating, "oscillating"),
     ]
@@ -394,53 +403,53 @@ def _reasons(found: _Evaluation, missed: Flags) -> Codes:
 
 
 def _numbers(
-    ladder: Ladder, found: _Evaluation, of_limit: Posterior, missed: Flags
+    ladder: Ladder, evaluation: _Evaluation, levels_only: Posterior, missed: Flags
 ) -> dict[str, np.ndarray]:
-    """Return what a `Decision` holds beside the status, for ladders of three levels and more."""
-    n, believed, exact = len(ladder.h), found.posterior, found.exact
-    first, last = likely_window(believed)
-    order = np.where(exact, np.nan, found.order)
-    low, high = interval(believed, order)
+    """Return the fields of a `Decision`."""
+    n, p, only_noise = len(ladder.h), evaluation.posterior, evaluation.only_noise
+    first, last = likely_window(p)
+    order = np.where(only_noise, np.nan, evaluation.order)
+    low, high = interval(p, order)
     if np.any(missed):
-        # where the exact solution is missed, the levels alone have an order
-        ends = zip(interval(of_limit, order), (low, high), strict=True)
+        # if the exact solution is missed, only the differences of the levels have an order
+        ends = zip(interval(levels_only, order), (low, high), strict=True)
         low, high = (np.where(missed, a, b) for a, b in ends)
     return {
-        "reason": _reasons(found, missed),
+        "reason": _reasons(evaluation, missed),
         "order": order,
-        "low": np.where(exact, np.nan, low),
-        "high": np.where(exact, np.nan, high),
-        "first": np.where(exact, 0, first),
-        "last": np.where(exact, n - 1, last),
-        "contradicted": found.contradicted,
+        "low": np.where(only_noise, np.nan, low),
+        "high": np.where(only_noise, np.nan, high),
+        "first": np.where(only_noise, 0, first),
+        "last": np.where(only_noise, n - 1, last),
+        "contradicted": evaluation.contradicted,
     }
 
 
 def _is_only_noise(ladder: Ladder, question: Question) -> Flags:
-    """Say where all levels differ by no more than the noise that is expected of them.
+    """Say where all levels differ by no more than their expected noise.
 
-    Noise that is stated has its size, and none of two levels more: many small steps would add up to anything. Over many
-    points its mean is known better than that of a number.
+    Stated noise limits the distance of any two levels, since many small steps could add up. Averaged over many points
+    it is also known better than that of a single number.
     """
     n, factor = len(ladder.h), np.full(len(ladder.gram), question.noise_factor)
     furthest = 1
     if question.limit_factor is not None:
         factor = 1.0 + (factor - 1.0) / np.sqrt(ladder.points)
         furthest = n - 1
-    found = np.ones(len(ladder.gram), dtype=bool)
+    result = np.ones(len(ladder.gram), dtype=bool)
     for gap in range(1, furthest + 1):
         for i in range(n - gap):
             square = np.sum(ladder.gram[:, i : i + gap, i : i + gap], axis=(1, 2))
-            between = np.sqrt(np.maximum(square, 0.0))
+            distance = np.sqrt(np.maximum(square, 0.0))
             noise = ladder.floor[:, i] + ladder.floor[:, i + gap]
-            found &= between <= factor * noise * (FURTHER_APART if gap > 1 else 1.0)
-    return found
+            result &= distance <= factor * noise * (NON_ADJACENT_FACTOR if gap > 1 else 1.0)
+    return result
 
 
 def _least_noise(ladder: Ladder) -> Floats:
-    """Return the noise of every level if it grows no more than the finest differences show, shape (ladder, n).
+    """Return the least noise of each level that the two finest differences allow, shape (ladder, n).
 
-    At the coarsest level it is as predicted, since storing numbers makes noise even where differences are 0.
+    It is never less than predicted for the coarsest level: storing numbers makes noise even if differences are 0.
     """
     finest = np.sqrt(np.max(np.diagonal(ladder.gram, axis1=1, axis2=2)[:, -2:], axis=-1))
     least = np.maximum(ladder.floor[:, :1], NOISE_FACTOR * finest[:, None])

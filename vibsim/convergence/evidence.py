@@ -102,7 +102,7 @@ def is_noise(e: Evidence) -> Flags:
     """Say where the finest differences may be noise: round-off of the predicted size, or what does not fall."""
     last, before = e.difference[..., -1], e.difference[..., -2:][..., 0]
     small = last <= th.ABOVE_ROUND_OFF * floor_of_pairs(e)[..., -1]
-    return np.asarray(small | ((last > th.FLOOR_STAYS * before) & (last <= e.ceiling)))
+    return np.asarray(small | ((last > th.FLOOR_DECLINE * before) & (last <= e.ceiling)))
 
 
 def errors_stay(e: Evidence) -> Flags:

@@ -15,7 +15,7 @@ from __future__ import annotations
 import numpy as np
 
 from vibsim.convergence.evidence import Evidence, floor_of_pairs, pick
-from vibsim.convergence.thresholds import EXCLUDED, HALF_SPACING, HIGHER_POWERS
+from vibsim.convergence.thresholds import HALF_SPACING, HIDDEN_SHARE, HIGHER_POWERS
 from vibsim.core.array_types import Flags, Floats, Integers
 from vibsim.elementary import on_arrays
 
@@ -40,7 +40,7 @@ def is_promise_hidden(e: Evidence, order: Floats, last: Integers) -> Flags:
     groups = np.stack([last - 1, shown, e.promised], axis=-1)
     for pair, p, r in np.unique(groups[maybe], axis=0):
         rows = maybe & np.all(groups == (pair, p, r), axis=-1)
-        hidden[rows] = ~(_most(e, rows, int(pair), float(p), float(r)) <= EXCLUDED)
+        hidden[rows] = ~(_most(e, rows, int(pair), float(p), float(r)) <= HIDDEN_SHARE)
     return hidden
 
 

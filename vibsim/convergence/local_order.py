@@ -29,7 +29,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from vibsim.convergence.differences import largest, order_of_ratio, safe_ratio
-from vibsim.convergence.thresholds import LEAST_WINDOW, OWN_END, ROUND_OFF_SAFETY
+from vibsim.convergence.thresholds import LAST_POINT_ALONE, LEAST_WINDOW, ROUND_OFF_SAFETY
 from vibsim.core.array_types import Floats, Integers
 
 
@@ -139,7 +139,7 @@ def _with_end(
     ends = [np.abs(series[..., -1:]) for series in pair]
     alone = np.ones(ends[0].shape, dtype=bool)
     for end, square in zip(ends, sums, strict=False):
-        alone &= end > OWN_END * np.sqrt(square[..., -1:])
+        alone &= end > LAST_POINT_ALONE * np.sqrt(square[..., -1:])
     signs = np.sign(pair[0][..., -1:]) * np.sign(pair[1][..., -1:])
     one_point = np.stack([ends[0] ** 2, ends[1] ** 2, signs * ends[0] * ends[1]])
     own = _compared(one_point, noise)

@@ -115,9 +115,9 @@ def _leading(values: Floats, levels: Sequence[int], promised: Floats, floor: Flo
     observed = observed_order(values, levels, floor)
     earlier = observed_order(values[..., :-1], levels[:-1], floor[..., :-1])
     likely = np.clip(np.round(2.0 * observed) / 2, 0.5, th.HIGHEST_ORDER)
-    other = np.abs(observed - p) > th.OTHER_ORDER
+    other = np.abs(observed - p) > th.OTHER_ORDER_DISTANCE
     for order in (earlier, observed):
-        other &= np.abs(order - likely) <= th.NEAR_HALF
+        other &= np.abs(order - likely) <= th.HALF_ORDER_TOLERANCE
     return np.where(other, likely, p)
 
 
@@ -139,12 +139,14 @@ def _bound_of_finest(values: Floats, levels: Sequence[int], floor: Floats) -> Fl
         falls &= change[..., i] >= least * change[..., i + 1]
     rounding = np.max(change[..., -2:], axis=-1) <= th.FALL_ABOVE_ROUND_OFF * floor[..., -1]
     found = np.where(falls | rounding, bound, np.nan)
-    if n < th.RAGGED:
+    if n < th.RAGGED_LEVELS:
         return found
     # an extremum over grid points falls raggedly, as the grid happens to lie
-    recent = values[..., -th.RAGGED :]
+    recent = values[..., -th.RAGGED_LEVELS :]
     wide = th.SPREAD * (np.max(recent, axis=-1) - np.min(recent, axis=-1)) + noise
-    ragged = np.max(change[..., -2:], axis=-1) < th.DECLINE * np.max(change[..., :-2], axis=-1)
+    ragged = np.max(change[..., -2:], axis=-1) < th.RAGGED_DECLINE * np.max(
+        change[..., :-2], axis=-1
+    )
     return np.where(ragged, np.fmin(found, wide), found)
 
 
@@ -176,7 +178,7 @@ class _Rows:
             self.entries.append(row)
             self.changes.append(changes)
         few = len(scheme) == 3
-        self.agrees_alone = th.RATIO_OF_THREE if few else th.RATIO_ALONE_AGREES
+        self.agrees_alone = th.RATIO_TOLERANCE_OF_THREE if few else th.SINGLE_RATIO_TOLERANCE
         self.safety_alone = th.SAFETY_OF_THREE if few else th.NUMBER_SAFETY_ALONE
         self.least_part = th.LEAST_SHARE_OF_THREE if few else th.LEAST_SHARE
 
@@ -190,9 +192,9 @@ class _Rows:
         if i < j + 2:
             return np.zeros(self.floor.shape[:-1], dtype=bool)
         alone = i == j + 2
-        agrees = self._misfit_of_ratio(j, i) <= (self.agrees_alone if alone else th.RATIO_AGREES)
+        agrees = self._misfit_of_ratio(j, i) <= (self.agrees_alone if alone else th.RATIO_TOLERANCE)
         if not alone:
-            agrees &= self._misfit_of_ratio(j, i - 1) <= th.RATIO_BEFORE_AGREES
+            agrees &= self._misfit_of_ratio(j, i - 1) <= th.PREVIOUS_RATIO_TOLERANCE
         return np.asarray(agrees)
 
     def _error(self, j: int, i: int) -> Floats:

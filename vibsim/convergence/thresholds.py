@@ -1,14 +1,14 @@
-"""Every number of this room that decides something: its value, its meaning, and where it comes from.
+"""The thresholds of this room: value, meaning and origin.
 
-The origin stands in brackets at the end:
+The origin stands in brackets:
 
-- *derived*: it follows from the expansion of the error, or from the arithmetic;
+- *derived*: it follows from the expansion of the error, or from floating-point arithmetic;
 - *calibrated*: set on seeds 1, 3 and 4 of the random ladders with known truth (``tests/analysis/synthetic.py``), those
   of numbers on seeds 1 and 3. The tables of ``docs/method.md`` are for other seeds, which set none;
 - *pendulums*: set on random ladders of pendulums and springs (``tests/analysis/test_extrapolation.py``);
-- *convention*: a usual value of the field, or a size that was chosen.
+- *convention*: a usual value of the field, or a chosen one.
 
-The priors of the error model are in ``error_model/priors.py``.
+The priors of the error model are in ``error_model/priors.py``. A *floor* is a predicted round-off error.
 """
 
 from __future__ import annotations
@@ -17,123 +17,119 @@ import math
 
 # ---- Expansions
 
-# Orders no further apart are the same one: half the distance between two orders of expansions. [derived]
-HALF_SPACING = 0.25
-LEAST_CANDIDATE = 0.5  # least order of an expansion: a solution that stays away has none [derived]
-LEAST_WITH_LIMIT = LEAST_CANDIDATE - HALF_SPACING  # what falls more slowly shows no limit [derived]
-MOST_ABOVE = 2.0  # a superconvergent quantity gains at most the next even power [derived]
-ORDINARY_ORDER = 2.0  # of an error, where a scheme promises none, or exactness [convention]
-STEEPEST = 64.0  # orders are sought between -STEEPEST and STEEPEST [convention]
-# Power of the relative size of a point by which it counts where largest values are compared. [convention]
-PEAKS = 4
+HALF_SPACING = 0.25  # orders closer than this are equal: half the spacing of the orders of expansions [derived]
+LOWEST_ORDER = 0.5  # lowest order of an expansion [derived]
+LEAST_WITH_LIMIT = LOWEST_ORDER - HALF_SPACING  # slower decay does not indicate a limit [derived]
+SUPERCONVERGENCE = 2.0  # a superconvergent quantity gains at most the next even power [derived]
+ORDINARY_ORDER = 2.0  # order assumed if a scheme promises none, or exactness [convention]
+STEEPEST = 64.0  # measured orders lie between -STEEPEST and STEEPEST [convention]
+PEAKS = 4  # in cosines of the largest norm a point has the weight of its relative size to this power [convention]
 
 # ---- Round-off
 
-ABOVE_ROUND_OFF = 100.0  # a difference above its round-off by this factor is none [convention]
-ROUND_OFF_SAFETY = 10.0  # round-off may be so many times its prediction [convention]
-# A difference may be laid to the measurement up to so many times what that is known to be off by. [derived]
+ABOVE_ROUND_OFF = 100.0  # a difference this factor above its floor is not round-off [convention]
+ROUND_OFF_SAFETY = 10.0  # actual round-off is at most this factor times its floor [convention]
+# A difference below this multiple of the known measurement error is attributed to the measurement. [derived]
 MEASUREMENT_FACTOR = 2.0
 EXACT_DIFFERENCE = 1e-10  # largest difference of an exact scheme, over the solution [convention]
-EXACT_ACCURACY = 1e-12  # an exact solution is trusted to this part of its size [convention]
-# An ordinary error, (w dt)^p at the coarsest level, that exceeds `ABOVE_ROUND_OFF` by this factor is seen. [calibrated]
+EXACT_ACCURACY = 1e-12  # assumed accuracy of an exact solution, relative to its size [convention]
+# An ordinary error, (w dt)^p at the coarsest level, is visible if it exceeds `ABOVE_ROUND_OFF` floors by this factor.
+# [calibrated]
 VISIBLE_ERROR = 1e4
-FLOOR_STAYS = 0.5  # a floor does not fall below this part of itself [calibrated]
+FLOOR_DECLINE = 0.5  # round-off differences stay above this part of the previous one [calibrated]
 
 # ---- Decisions by the error model
 
 RISK = 0.01  # accepted probability that a verdict is wrong [convention]
-# The same where three levels decide behind others that do not fit. [calibrated]
-RISK_OF_THREE = 0.1 * RISK
-# An order fails only where one power has so much of the probability, alone or as one of two of a size. [calibrated]
+RISK_OF_THREE = 0.1 * RISK  # the same for three levels that coarser ones do not fit [calibrated]
+# An order fails only if one power, dominating or mixed, has at least this probability. [calibrated]
 DEFINITE = 0.9
 ORDER_INTERVAL = 0.95  # probability of the interval of an order [convention]
-# Standard deviations in the bound of a best value: of the tails that the posterior has, these are 95 %. [calibrated]
+# Standard deviations in the bound of a best value; given the tails of the posterior, they cover 95 %. [calibrated]
 BEST_BOUND = 3.0
-# A limit is missed that is so many bounds of the best value away from it, and at least so large a part of the estimated
+# A limit is missed by more than this number of bounds of the best value, and by more than this part of the estimated
 # error of the finest level. [calibrated]
 MISSED, MISSED_SHARE = 3.0, 0.5
-# Whatever the order, an exact solution is missed that is so many times further away than all that so many levels or
-# more have moved, and have to move, by differences that fall. [convention]
-MISSED_FAR, LEVELS_OF_A_FALL = 5.0, 4
-# Noise may be so many times its prediction where levels are said to differ by nothing else; the same of noise that a
-# user states, which differences of normal noise exceed in one of 200. [convention]
+# With at least this number of levels, whose differences fall, an exact solution is missed at any order if it is this
+# factor further away than the levels have moved and can still move. [convention]
+MISSED_FAR, MISSED_FAR_LEVELS = 5.0, 4
+# Largest ratio of actual to predicted noise for which levels count as equal; the same for noise that a user states:
+# differences of normal noise exceed it in one of 200 cases. [convention]
 NOISE_FACTOR, STATED_NOISE_FACTOR = 10.0, 2.0
-# Levels that are no neighbours may differ by so many times more, since there are more of them: of ten normal numbers
-# two are more than 5 standard deviations apart in one of 70 cases. [derived]
-FURTHER_APART = 1.25
-# So many times the stated noise a level is away from an exact solution that it misses: the noise of one level is less
-# than that of a difference by the root of 2, so that the risk is the same. [derived]
+# Extra factor for pairs of non-adjacent levels: there are more of them, so the largest difference is larger. Of ten
+# normal numbers two are more than 5 standard deviations apart in one of 70 cases. [derived]
+NON_ADJACENT_FACTOR = 1.25
+# The same for the distance of one level from an exact solution: the noise of a level is smaller than that of a
+# difference by the root of 2. [derived]
 STATED_LIMIT_FACTOR = 2.0 * STATED_NOISE_FACTOR / math.sqrt(2.0)
 
 # ---- Facts from outside a ladder
 
-LIMIT_ROUNDING = 1e-9  # w dt within this part of a stability limit is at the limit [convention]
-BLOWN_UP = 10.0  # a solution so many times larger than the exact one has grown [convention]
-# A step no longer than so many times that in which damping takes a velocity away sees how it goes. [derived]
-RESOLVED_DECAY = 1.0
-ERROR_STAYED = 0.5  # an error has stayed that is a larger part of the coarsest level's [derived]
+LIMIT_ROUNDING = 1e-9  # relative distance within which w dt is at a stability limit [convention]
+BLOWN_UP = 10.0  # a solution has grown if it is this factor larger than the exact one [convention]
+RESOLVED_DECAY = 1.0  # longest resolved step, over the time constant of a decay [derived]
+ERROR_STAYED = 0.5  # part of the coarsest error above which the finest one stays [derived]
 
 # ---- A promised order behind a higher one
 
-EXCLUDED = 1e-6  # a smaller part of the error takes h^(p-1) twenty levels to decide [derived]
-HIGHER_POWERS = 4  # higher powers that are taken away, at most [convention]
+HIDDEN_SHARE = 1e-6  # a smaller part like h^(p-1) needs 20 levels to dominate [derived]
+HIGHER_POWERS = 4  # largest number of higher powers that are eliminated [convention]
 
 # ---- Series over time
 
-ZERO_CROSSING = 0.1  # a denominator below this part of its surroundings crosses zero [convention]
+ZERO_CROSSING = 0.1  # a denominator below this part of its local scale crosses zero [convention]
 LEAST_WINDOW = 3  # points of the shortest window of a local order [convention]
-# The last point counts for itself where its differences are at least this part of those before it. [convention]
-OWN_END = 0.5
+# The last point is compared alone if its differences are at least this part of those in the last window. [convention]
+LAST_POINT_ALONE = 0.5
 
 # ---- Extrapolation of series
 
-# Factor on a bound that rests on a fall seen once: that of grid convergence indices (P. J. Roache, 1994). [convention]
-SERIES_SAFETY = 1.25
+SERIES_SAFETY = 1.25  # as in grid convergence indices (P. J. Roache, 1994) [convention]
 
 # ---- Extrapolation of numbers
 
-MOST_COLUMNS = 5  # so many powers are taken away at most [convention]
-# Relative distance of a ratio of changes from that of the power: of the last, of the one before, of a single one.
-# [calibrated]
-RATIO_AGREES, RATIO_BEFORE_AGREES, RATIO_ALONE_AGREES = 0.3, 0.6, 0.2
-# Factor on the change of an entry: where two ratios agree, and where there is one only. [calibrated]
-NUMBER_SAFETY, NUMBER_SAFETY_ALONE = 2.0, 4.0
-# The least part of what was taken away that is left, where one change supports the extrapolation. [calibrated]
+MOST_COLUMNS = 5  # largest number of powers that are eliminated [convention]
+# Relative distance of a ratio of changes from theory: of the last ratio, the previous one, a single one. [calibrated]
+RATIO_TOLERANCE, PREVIOUS_RATIO_TOLERANCE, SINGLE_RATIO_TOLERANCE = 0.3, 0.6, 0.2
+NUMBER_SAFETY, NUMBER_SAFETY_ALONE = (
+    2.0,
+    4.0,
+)  # factor on a change if two ratios agree, or one [calibrated]
+# With one change only, at least this part of the last correction is the error. [calibrated]
 LEAST_SHARE = 0.01
-# The same as `RATIO_ALONE_AGREES`, `NUMBER_SAFETY_ALONE` and `LEAST_SHARE` of three levels: their only ratio may be an
+# `SINGLE_RATIO_TOLERANCE`, `NUMBER_SAFETY_ALONE` and `LEAST_SHARE` for three levels, whose only ratio may be an
 # accident. [calibrated]
-RATIO_OF_THREE, SAFETY_OF_THREE, LEAST_SHARE_OF_THREE = 0.05, 6.0, 0.03
-# Factor on what the last three levels differ by (L. Eca and M. Hoekstra, 2014), three levels that are all there are,
-# and two. [calibrated]
+RATIO_TOLERANCE_OF_THREE, SAFETY_OF_THREE, LEAST_SHARE_OF_THREE = 0.05, 6.0, 0.03
+# Factor on the range of the last three levels (L. Eca and M. Hoekstra, 2014), of the only three levels, and on the
+# difference of two levels. [calibrated]
 SPREAD, SPREAD_OF_THREE, SPREAD_OF_TWO = 3.0, 3.5, 4.0
-# Least order at which that covers all that is left of changes that fall geometrically. [derived]
+# Lowest order at which that range covers the remaining error of changes that fall geometrically. [derived]
 SLOWEST_ORDER = 0.5 * math.log2(1.0 + 1.0 / SPREAD)
-# Of so many levels, changes may fall raggedly: the last two to this part of those before. [calibrated]
-RAGGED, DECLINE = 5, 0.5
-ORDER_ABOVE_ROUND_OFF = 30.0  # a difference has an order above so many times its floor [calibrated]
-FALL_ABOVE_ROUND_OFF = 200.0  # and must fall above so many times its floor [calibrated]
-# An order further than the first from the promised one is another one, where those of two triples are as near as the
-# second to one multiple of 1/2. [calibrated]
-OTHER_ORDER, NEAR_HALF = 0.3, 0.15
-HIGHEST_ORDER = 12.0  # no higher order is looked for [convention]
+# From this number of levels on, changes may fall raggedly: the last two to this part of the earlier ones. [calibrated]
+RAGGED_LEVELS, RAGGED_DECLINE = 5, 0.5
+ORDER_ABOVE_ROUND_OFF = 30.0  # differences this factor above their floor have an order [calibrated]
+FALL_ABOVE_ROUND_OFF = 200.0  # differences this factor above their floor must fall [calibrated]
+# Levels show another order than the promised one if the two differ by more than the first number, and the orders of two
+# triples are within the second of one multiple of 1/2. [calibrated]
+OTHER_ORDER_DISTANCE, HALF_ORDER_TOLERANCE = 0.3, 0.15
+HIGHEST_ORDER = 12.0  # highest order considered [convention]
 
 # ---- Extrapolation of states
 
-STATE_SAFETY = 2.0  # factor on the estimated error of truncation [pendulums]
-# Factor on what one more extrapolation leaves of an error, and where three levels are all there is, so that no gain
-# was seen before. [pendulums]
+STATE_SAFETY = 2.0  # factor on the estimated truncation error [pendulums]
+# Factor on the remaining error after one more extrapolation; the same for three levels, which have shown no gain yet.
+# [pendulums]
 GAIN_SAFETY, FIRST_GAIN_SAFETY = 5.0, 100.0
-LARGEST_GAIN = 1e-3  # one more extrapolation leaves no less of an error [pendulums]
-# A change that falls by less counts as one that falls by this factor: four times itself is then left. [convention]
+LARGEST_GAIN = 1e-3  # one more extrapolation leaves at least this part of an error [pendulums]
+# A change that falls more slowly counts as falling by this factor: four times the change then remains. [convention]
 LEAST_FALL = 1.25
-KNOWN_DIGIT = 0.1  # of an error beyond this part of the size nothing is known [convention]
+KNOWN_DIGIT = 0.1  # an error above this part of the size is unknown [convention]
 
 # ---- The grid convergence index
 
 GCI_TRUSTED, GCI_CAUTIOUS = 1.25, 3.0  # the factor F (P. J. Roache, 1994) [convention]
-# Part of the promised order that the observed one may be off (W. L. Oberkampf and C. J. Roy, 2010). [convention]
+# Largest relative deviation of the observed from the promised order (W. L. Oberkampf and C. J. Roy, 2010). [convention]
 GCI_AGREES = 0.1
-GCI_LEAST_ORDER = 0.5  # the least order that is used (the same) [convention]
-# So many of the finest levels are fitted at most, by so many exponents up to the promised order. [convention]
-GCI_FITTED, GCI_EXPONENTS = 5, 16
+GCI_LEAST_ORDER = 0.5  # lowest order in the formula (the same) [convention]
+GCI_FITTED, GCI_EXPONENTS = 5, 16  # fitted levels at most, and exponents tried [convention]
 GCI_NEAR_ZERO = 0.05  # a number below this part of its scale has no relative index [convention]

@@ -19,10 +19,10 @@ from vibsim.convergence.assessment import Assessment, Decision, Question, assess
 from vibsim.convergence.error_model import kernel, likelihood, priors
 from vibsim.convergence.error_model.hypotheses import (
     Promise,
-    between,
     form,
     hypotheses_of,
     inverse,
+    level_differences,
     noise_of_rows,
     outer,
     packed,
@@ -291,9 +291,9 @@ def test_rounding_of_steep_differences_is_no_evidence(kind: str) -> None:
     none = np.empty((1, 0))
     found = getattr(hypotheses_of((8.0, 4.0, 2.0, 1.0), Promise(6.0)), kind)
     for table in found if isinstance(found, list) else [found]:
-        apart = table.beside is not None
+        apart = table.orthogonal_forms is not None
         one, other = (
-            likelihood.weights(
+            likelihood.weigh_table(
                 table,
                 likelihood.window_rows(g, np.array([2.0]), split=apart),
                 none,
@@ -342,7 +342,7 @@ def test_probabilities_add_up_to_one() -> None:
         p = posterior(ladder(HALVED, series(HALVED, (1.0, 2.0, SHAPE)), exact=exact), promise)
         whole = p.expansion + p.alternating + p.scattered + p.noise
         assert whole == pytest.approx(1.0, abs=1e-9)
-        assert np.all(p.of_pairs >= -1e-9)
+        assert np.all(p.mixed >= -1e-9)
 
 
 @pytest.mark.parametrize("known", [True, False], ids=["exact", "unknown"])
@@ -388,7 +388,7 @@ def test_the_compiled_loop_has_the_bits_of_its_text(monkeypatch: pytest.MonkeyPa
     ):
         compiled = assess(given, Question(2.0))
         with monkeypatch.context() as plain:
-            plain.setattr(likelihood, "weigh", lambda: kernel.kernel)
+            plain.setattr(likelihood, "compiled_kernel", lambda: kernel.kernel)
             by_text = assess(given, Question(2.0))
         for name, values in vars(by_text).items():
             np.testing.assert_array_equal(vars(compiled)[name], values, err_msg=name)
@@ -406,7 +406,15 @@ def test_no_more_is_left_out_than_may_be(known: bool, left_out: float) -> None:
             continue
         given, _ = of_group(group)
         whole, part = (posterior(given, Promise(2.0), left_out=x) for x in (1e-250, left_out))
-        for name in ("alone", "lowest", "highest", "window", "noise", "scattered", "alternating"):
+        for name in (
+            "dominant",
+            "lowest",
+            "highest",
+            "window",
+            "noise",
+            "scattered",
+            "alternating",
+        ):
             off = np.abs(getattr(part, name) - getattr(whole, name))
             assert np.max(off) <= left_out, name
 
@@ -456,7 +464,7 @@ def test_the_inverse_of_one_power_is_that_of_its_covariance(
     rows = np.random.default_rng(1).normal(size=(3, 9)) * np.array([[9.0], [3.0], [1.0]])
     gram = (rows @ rows.T)[None]
     errors = sizes ** powers[..., None]
-    c = between(errors)
+    c = level_differences(errors)
     precision, log_det = inverse(outer(c, c) + noise_of_rows((priors.MISFIT * errors) ** 2))
     trace = np.sum(form(precision) * packed(gram)[:, None], axis=-1)
     log, gains, square = likelihood.single_power(sizes, powers, gram, points)

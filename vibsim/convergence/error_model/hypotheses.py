@@ -1,4 +1,4 @@
-"""What hypotheses on errors expect of the rows of a window of levels, for all hypotheses at once."""
+"""Tables of all hypotheses about the rows of a window: their covariances, priors and estimates."""
 
 from __future__ import annotations
 
@@ -17,108 +17,114 @@ from vibsim.elementary import on_arrays
 
 @dataclass(frozen=True)
 class Terms:
-    """Hypotheses on the powers of an expansion; arrays of shape (hypothesis,)."""
+    """Hypotheses about the powers of an expansion; arrays of shape (hypothesis,)."""
 
     lower: Floats  # p
-    higher: Floats  # q; p where there is none
-    share: Floats  # size of the second power over the first at the finest level of the window, with its sign
+    higher: Floats  # q; equal to p if there is no second power
+    share: Floats  # signed size of the second power relative to the first, at the finest level of the window
     log_prior: Floats
 
     @property
     def first_of_pairs(self) -> Integers:
-        """First hypothesis of every pair of powers."""
+        """Index of the first hypothesis of each pair of powers."""
         differs = (np.diff(self.lower) != 0.0) | (np.diff(self.higher) != 0.0)
         return np.flatnonzero(np.concatenate([[True], differs]))
 
 
 @dataclass(frozen=True)
 class Table:
-    """What the hypotheses on the w rows of a window say, laid out for `kernel`.
+    """Hypotheses about the w rows of a window, laid out for `kernel`.
 
-    The evidence of rows with N points is ``(root/tr(K^-1 G))^(N w/2)`` with ``root = (prior/det(K)^(N/2))^(2/(N w))``,
-    but for factors that all hypotheses on w rows share; of one shape see `_table`.
+    Up to a factor common to all hypotheses on w rows, the evidence of rows with N points is
+    ``(root/tr(K^-1 G))^(N w/2)`` with ``root = (prior/det(K)^(N/2))^(2/(N w))``. For one shape see `_table`.
     """
 
-    # forms of the precision K^-1, of the square of the first power, of the second, and of the limit without the
-    # differences behind the window; shape (hypothesis, 4, packed)
+    # Forms of the precision K^-1 and of the squares of the estimated first power, second power and limit (without the
+    # differences finer than the window); shape (hypothesis, 4, packed).
     forms: Floats
-    # root for one point and for two; variances over the scale that the rows leave to the first power, the second, and
-    # the limit; the limit less the finest level, as weights of the rows; shape (hypothesis, 5 + w)
+    # Root for N = 1 and N = 2; posterior variances of the first power, the second power and the limit, in units of the
+    # squared scale; limit minus finest level as weights of the rows; shape (hypothesis, 5 + w).
     columns: Floats
-    pair: Integers  # position of its pair of powers, shape (hypothesis,)
-    # first hypothesis of every group, and the end of the last one, shape (group + 1,)
-    groups: Integers
-    # The evidence of a group is at most ``(root/tr(M G))^(N w/2)``: its root for one point and for two, and the form of
-    # M; shape (2 + packed, group).
+    pair: Integers  # index of the pair of powers, shape (hypothesis,)
+    groups: (
+        Integers  # first hypothesis of each group, and the number of hypotheses, shape (group + 1,)
+    )
+    # The evidence of a group is at most ``(root/tr(M G))^(N w/2)``: root for N = 1 and N = 2, and the form of M; shape
+    # (2 + packed, group).
     bounds: Floats
-    # log of the evidence of all hypotheses at most, for one point and for two, where the last row has the square 1
-    limit: Floats
-    # of one shape: form of the precision of what the other rows are beside multiples of the last one, over `TAIL`
-    beside: Floats | None = None
-    # the same for whole groups: what is less than the forms of all, of the squares of the rows, shape (group, w - 1)
-    beside_bounds: Floats | None = None
+    # Upper bound of the log evidence of the table for N = 1 and N = 2, if the last row has the square 1.
+    log_bound: Floats
+    # For one shape: form of the precision of the components orthogonal to the last row, divided by `TAIL`.
+    orthogonal_forms: Floats | None = None
+    # Lower bound of these forms in each group, as weights of the squared norms, shape (group, w - 1).
+    orthogonal_bounds: Floats | None = None
 
 
 class Promise(NamedTuple):
-    """An order that is expected."""
+    """An expected order."""
 
     order: float
-    # whether theory promises it, and so knows the other powers too, or a user expects it
-    by_theory: bool = False
+    by_theory: bool = (
+        False  # theory promises it, and so restricts the other powers; otherwise a user expects it
+    )
 
 
 @lru_cache
 def two_powers(signs: tuple[float, ...], promise: Promise | None) -> Terms:
-    """Return the hypotheses on the powers: one of `POWERS` with or without a second one."""
+    """Return the hypotheses about powers: each of `POWERS` alone, and with each second power."""
     order, by_theory = promise or (math.nan, False)
-    usual = sorted({*priors.POWERS, *(p for p in [order] if 0.0 < p < math.inf)})
-    # no method has most of the orders between whole numbers that a user may expect
-    of_promise = priors.THEORY if by_theory else priors.EXPECTED * (order % 1.0 == 0.0)
-    of_promise *= order in usual
+    powers = sorted({*priors.POWERS, *(p for p in [order] if 0.0 < p < math.inf)})
+    # a user may expect a fractional order, but few methods have one
+    promised_prior = (
+        priors.THEORY_PRIOR if by_theory else priors.EXPECTED_PRIOR * (order % 1.0 == 0.0)
+    )
+    promised_prior *= order in powers
 
-    def chance(p: float) -> float:
-        return priors.BETWEEN if by_theory and (p - order) % 1.0 else 1.0
+    def relative_prior(p: float) -> float:
+        return priors.FRACTIONAL_FACTOR if by_theory and (p - order) % 1.0 else 1.0
 
-    whole, rows = sum(map(chance, usual)), []
-    distances = {distance: chance(order + distance) for distance in priors.DISTANCES}
-    for p in usual:
-        prior = (1.0 - of_promise) * chance(p) / whole + of_promise * (p == order)
-        prior *= 1.0 - priors.OTHER_PRIOR
-        rows.append((p, p, 0.0, prior * priors.PURE_PRIOR))
-        each = prior * (1.0 - priors.PURE_PRIOR) / sum(distances.values())
-        each /= len(priors.SHARES) * len(signs)
-        rows += [
-            (p, p + distance, sign * share, each * distances[distance])
+    total, entries = sum(map(relative_prior, powers)), []
+    distances = {distance: relative_prior(order + distance) for distance in priors.DISTANCES}
+    for p in powers:
+        prior = (1.0 - promised_prior) * relative_prior(p) / total + promised_prior * (p == order)
+        prior *= 1.0 - priors.ANY_POWER_PRIOR
+        entries.append((p, p, 0.0, prior * priors.PURE_PRIOR))
+        pair_prior = prior * (1.0 - priors.PURE_PRIOR) / sum(distances.values())
+        pair_prior /= len(priors.SHARES) * len(signs)
+        entries += [
+            (p, p + distance, sign * share, pair_prior * distances[distance])
             for distance, share, sign in product(distances, priors.SHARES, signs)
         ]
-    lower, higher, share, log_prior = np.array(rows).T
+    lower, higher, share, log_prior = np.array(entries).T
     return Terms(lower, higher, share, on_arrays.log(log_prior))
 
 
-def pure(powers: tuple[float, ...]) -> Terms:
-    """Return the hypotheses of one power."""
+def single_powers(powers: tuple[float, ...]) -> Terms:
+    """Return one hypothesis for each power, with equal priors."""
     p = np.array(powers)
     return Terms(p, p, np.zeros(len(p)), np.full(len(p), -on_arrays.log(len(p))))
 
 
-def between(levels: Floats) -> Floats:
-    """Return the differences of what belongs to levels, along the last axis."""
+def level_differences(levels: Floats) -> Floats:
+    """Return each level minus the next finer one, along the last axis."""
     return np.asarray(levels[..., :-1] - levels[..., 1:])
 
 
 def noise_of_rows(variance: Floats) -> Floats:
     """Return the covariance of the differences of levels with independent noise, shape (..., row, row)."""
     count = variance.shape[-1] - 1
-    found = np.zeros((*variance.shape[:-1], count, count))
-    every = np.arange(count)
-    found[..., every, every] = variance[..., :-1] + variance[..., 1:]
-    found[..., every[1:], every[:-1]] = found[..., every[:-1], every[1:]] = -variance[..., 1:-1]
-    return found
+    covariance = np.zeros((*variance.shape[:-1], count, count))
+    index = np.arange(count)
+    covariance[..., index, index] = variance[..., :-1] + variance[..., 1:]
+    covariance[..., index[1:], index[:-1]] = covariance[..., index[:-1], index[1:]] = -variance[
+        ..., 1:-1
+    ]
+    return covariance
 
 
-def outer(one: Floats, other: Floats) -> Floats:
+def outer(a: Floats, b: Floats) -> Floats:
     """Return the outer products of the vectors along the last axis."""
-    return np.asarray(one[..., :, None] * other[..., None, :])
+    return np.asarray(a[..., :, None] * b[..., None, :])
 
 
 def packed(matrices: Floats) -> Floats:
@@ -134,57 +140,57 @@ def _upper(size: int) -> tuple[Integers, Integers]:
 
 
 def form(matrices: Floats) -> Floats:
-    """Return what to multiply packed Gram matrices with, and sum up, for ``tr(M G)``."""
+    """Return the forms of symmetric matrices M: their dot product with a packed G is ``tr(M G)``."""
     i, j = _upper(matrices.shape[-1])
     return np.where(i == j, 1.0, 2.0) * packed(matrices)
 
 
-def times(matrices: Floats, vectors: Floats) -> Floats:
-    """Return products of matrices and vectors, shape (..., i), added up in the order of the columns."""
-    found = matrices[..., 0] * vectors[..., None, 0]
+def matvec(matrices: Floats, vectors: Floats) -> Floats:
+    """Return matrix-vector products, shape (..., i), summed in the order of the columns."""
+    result = matrices[..., 0] * vectors[..., None, 0]
     for k in range(1, vectors.shape[-1]):
-        found = found + matrices[..., k] * vectors[..., None, k]
-    return np.asarray(found)
+        result = result + matrices[..., k] * vectors[..., None, k]
+    return np.asarray(result)
 
 
 def inverse(covariance: Floats) -> tuple[Floats, Floats]:
-    """Return inverse and log determinant of covariances, entry by entry, which gives the same bits everywhere."""
-    # By Cholesky, L L^T, of matrices scaled so that sizes of rows do not matter. Entries are arrays of all matrices.
+    """Return inverses and log determinants of covariances, without LAPACK, so with the same bits on every machine."""
+    # Cholesky factorisation L L^T of the matrices, scaled to unit diagonals. Each a[i, j] is an array of all matrices.
     scale = np.sqrt(np.moveaxis(np.diagonal(covariance, axis1=-2, axis2=-1), -1, 0))
-    size = outer(np.moveaxis(scale, 0, -1), np.moveaxis(scale, 0, -1))
-    a = np.ascontiguousarray(np.moveaxis(covariance / size, (-2, -1), (0, 1)))
+    scales = outer(np.moveaxis(scale, 0, -1), np.moveaxis(scale, 0, -1))
+    a = np.ascontiguousarray(np.moveaxis(covariance / scales, (-2, -1), (0, 1)))
     w = len(a)
-    # of L^-1: row i is (e_i - sum_j L_ij row_j)/L_ii
+    # row i of L^-1 is (e_i - sum_j L_ij row_j)/L_ii
     lower, inverted = np.zeros_like(a), np.zeros_like(a)
     log_det = np.zeros_like(scale[0])
     for i in range(w):
         inverted[i, i] = 1.0
-        rest = a[i, i]
+        pivot = a[i, i]
         for j in range(i):
             entry = a[i, j]
             for k in range(j):
                 entry = entry - lower[i, k] * lower[j, k]
             lower[i, j] = entry / lower[j, j]
-            rest = rest - lower[i, j] ** 2
+            pivot = pivot - lower[i, j] ** 2
             inverted[i, : j + 1] -= lower[i, j] * inverted[j, : j + 1]
-        lower[i, i] = np.sqrt(np.maximum(rest, ROUNDED))
+        lower[i, i] = np.sqrt(np.maximum(pivot, LEAST_PIVOT))
         inverted[i, : i + 1] /= lower[i, i]
         log_det = log_det + 2.0 * on_arrays.log(lower[i, i] * scale[i])
     precision = np.zeros_like(a)
     for i in range(w):
-        own = inverted[i, : i + 1]
-        precision[: i + 1, : i + 1] += own[:, None] * own[None]
-    return np.moveaxis(precision, (0, 1), (-2, -1)) / size, log_det
+        row = inverted[i, : i + 1]
+        precision[: i + 1, : i + 1] += row[:, None] * row[None]
+    return np.moveaxis(precision, (0, 1), (-2, -1)) / scales, log_det
 
 
-ROUNDED = 1e-16
-"""What rounding leaves of a variance of 1 at least."""
+LEAST_PIVOT = 1e-16
+"""Lower limit of pivots, which rounding can make tiny or negative; the matrix has unit diagonal."""
 
 
-def _sizes(terms: Terms, sizes: Floats) -> tuple[Floats, Floats, Floats]:
-    """Return the error of each level by the first power, the second, and the sum of their squares; (hypothesis, level).
+def _level_errors(terms: Terms, sizes: Floats) -> tuple[Floats, Floats, Floats]:
+    """Return both powers of the step sizes, and the expected square of the error, each of shape (hypothesis, level).
 
-    Sizes are over that of the finest level of the window; the share is that at the same level.
+    Step sizes are relative to the finest level of the window.
     """
     first = on_arrays.power(sizes, terms.lower[:, None])
     second = np.where(
@@ -199,81 +205,83 @@ def _table(
     variance: Floats,
     c: tuple[Floats, Floats],
     prior: tuple[Floats, Floats, Floats],
-    beside: Floats | None = None,
+    orthogonal: Floats | None = None,
 ) -> Table:
-    """Lay hypotheses out.
+    """Return the table of these hypotheses.
 
     Parameters
     ----------
     signal
-        Covariance that both powers give the rows, shape (hypothesis, row, row).
+        Covariance of the rows due to both powers, shape (hypothesis, row, row).
     variance
-        That of the noise of each level, shape (hypothesis, level).
+        Noise variance of each level, shape (hypothesis, level).
     c
-        Both powers in the rows, at size 1, each of shape (hypothesis, row).
+        Coefficients c_k(p) and c_k(q) of the two powers, each of shape (hypothesis, row).
     prior
-        Variance of the first power, covariance, and variance of the second, each of shape (hypothesis,).
-    beside
-        Of one shape: covariance of what the other rows are beside multiples of the last one, shape (hypothesis, w - 1,
-        w - 1).
+        Variance of the first power, covariance of both, variance of the second, each of shape (hypothesis,).
+    orthogonal
+        For one shape: covariance of the components of the other rows orthogonal to the last one, shape (hypothesis,
+        w - 1, w - 1).
     """
     precision, log_det = inverse(signal + noise_of_rows(variance))
     finest = np.flatnonzero(variance[0])[-1]
-    own_noise = variance[:, finest]
+    finest_noise = variance[:, finest]
     w = precision.shape[-1]
-    one, both, other = (x[:, None] for x in prior)
-    rows = (one * c[0] + both * c[1], both * c[0] + other * c[1])
-    gains = [times(precision, row) for row in rows]
+    var_first, cov, var_second = (x[:, None] for x in prior)
+    rows = (var_first * c[0] + cov * c[1], cov * c[0] + var_second * c[1])
+    gains = [matvec(precision, row) for row in rows]
     left = [
         np.maximum(x - np.sum(gain * row, axis=-1), 0.0)
         for x, gain, row in zip(prior[::2], gains, rows, strict=True)
     ]
-    # the limit is off the finest level by both powers there, and by its noise
+    # the finest level differs from the limit by both powers and by its noise
     to_limit = rows[0] + rows[1]
-    to_limit[:, finest - 1] -= own_noise
-    path = -times(precision, to_limit)
-    whole = prior[0] + 2.0 * prior[1] + prior[2] + own_noise
-    left_whole = np.maximum(whole + np.sum(path * to_limit, axis=-1), 0.0)
-    forms = np.stack([form(x) for x in (precision, *(outer(g, g) for g in (*gains, path)))], axis=1)
-    precision_beside, log_det_beside = (None, 0.0) if beside is None else inverse(beside)
-    # of one shape there is one dimension along the last row, all others are across it
-    dimensions = [(n, n if beside is None else 1) for n in (1, 2)]
+    to_limit[:, finest - 1] -= finest_noise
+    limit = -matvec(precision, to_limit)
+    limit_variance = prior[0] + 2.0 * prior[1] + prior[2] + finest_noise
+    limit_left = np.maximum(limit_variance + np.sum(limit * to_limit, axis=-1), 0.0)
+    forms = np.stack(
+        [form(x) for x in (precision, *(outer(g, g) for g in (*gains, limit)))], axis=1
+    )
+    t_precision, t_log_det = (None, 0.0) if orthogonal is None else inverse(orthogonal)
+    # for one shape, one dimension is parallel to the last row, and all others are orthogonal to it
+    dimensions = [(n, n if orthogonal is None else 1) for n in (1, 2)]
     roots = np.stack(
         [
-            on_arrays.exp((2.0 / d * terms.log_prior - log_det - (n - d) * log_det_beside) / w)
+            on_arrays.exp((2.0 / d * terms.log_prior - log_det - (n - d) * t_log_det) / w)
             for n, d in dimensions
         ]
     )
-    columns = np.stack([*roots, *left, left_whole, *path.T], axis=1)
+    columns = np.stack([*roots, *left, limit_left, *limit.T], axis=1)
     pair = np.searchsorted(terms.first_of_pairs, np.arange(len(terms.lower)), side="right") - 1
     groups = _groups(pair, terms.share)
     exponents = np.array([[0.5 * d * w] for _, d in dimensions])
     bounds = _bounds(
-        groups, terms.share, variance, c, roots, exponents, 1.0 if beside is None else 2.0
+        groups, terms.share, variance, c, roots, exponents, 1.0 if orthogonal is None else 2.0
     )
     # tr(K^-1 G) is at least the square of the last row over its variance
     last = signal[:, -1, -1] + np.sum(variance[:, -2:], axis=-1)
-    limit = on_arrays.log(np.sum(on_arrays.power(roots * last, exponents), axis=1))
-    table = Table(np.ascontiguousarray(forms), columns, pair, groups, bounds, limit)
-    if beside is None or precision_beside is None:
+    log_bound = on_arrays.log(np.sum(on_arrays.power(roots * last, exponents), axis=1))
+    table = Table(np.ascontiguousarray(forms), columns, pair, groups, bounds, log_bound)
+    if orthogonal is None or t_precision is None:
         return table
-    # a covariance is exceeded by its diagonal times its size
-    diagonal = np.diagonal(beside, axis1=1, axis2=2) * (w - 1)
+    # w - 1 times its diagonal exceeds a covariance of w - 1 rows
+    diagonal = np.diagonal(orthogonal, axis1=1, axis2=2) * (w - 1)
     return replace(
         table,
-        beside=np.ascontiguousarray(form(precision_beside)),
-        beside_bounds=1.0 / np.maximum.reduceat(diagonal, groups[:-1], axis=0),
+        orthogonal_forms=np.ascontiguousarray(form(t_precision)),
+        orthogonal_bounds=1.0 / np.maximum.reduceat(diagonal, groups[:-1], axis=0),
     )
 
 
 def _groups(pair: Integers, share: Floats) -> Integers:
-    """Return where groups begin: hypotheses on one pair of powers, with up to `TOGETHER` successive shares."""
+    """Return `Table.groups`: a group has one pair of powers and up to `SHARES_PER_GROUP` successive shares."""
     size = np.abs(share)
-    differs = np.concatenate([[True], (np.diff(size) != 0.0) | (np.diff(pair) != 0)])
-    of_share = np.cumsum(differs) - 1
+    changes = np.concatenate([[True], (np.diff(size) != 0.0) | (np.diff(pair) != 0)])
+    share_index = np.cumsum(changes) - 1
     first = np.concatenate([[True], np.diff(pair) != 0])
-    within = of_share - np.maximum.accumulate(np.where(first, of_share, 0))
-    return np.append(np.flatnonzero(differs & (within % TOGETHER == 0)), len(pair))
+    within = share_index - np.maximum.accumulate(np.where(first, share_index, 0))
+    return np.append(np.flatnonzero(changes & (within % SHARES_PER_GROUP == 0)), len(pair))
 
 
 def _bounds(
@@ -287,14 +295,15 @@ def _bounds(
 ) -> Floats:
     """Return `Table.bounds`.
 
-    Where a matrix C exceeds ``K/t`` for all hypotheses of a group, ``tr(K^-1 G) >= tr(C^-1 G)/t``. C has the largest
-    variances over t of the group, with ``t = 1 + share^2``; what is correlated is at most `factor` of what is not.
+    If C exceeds ``K/t`` for all hypotheses of a group, ``tr(K^-1 G) >= tr(C^-1 G)/t``. Here ``t = 1 + share^2``, and C
+    is built from the largest variances over t in the group. A correlated signal is at most `factor` times as large as
+    an uncorrelated one.
     """
     start, t = groups[:-1], 1.0 + share**2
-    parts = [np.maximum.reduceat(part / t, start) for part in (np.ones_like(t), share**2)]
+    squares = [np.maximum.reduceat(square / t, start) for square in (np.ones_like(t), share**2)]
     signal = sum(
-        factor * part[:, None, None] * outer(row[start], row[start])
-        for part, row in zip(parts, c, strict=True)
+        factor * square[:, None, None] * outer(row[start], row[start])
+        for square, row in zip(squares, c, strict=True)
     )
     noise = noise_of_rows(np.maximum.reduceat(variance / t[:, None], start, axis=0))
     precision, _ = inverse(signal + noise)
@@ -303,112 +312,111 @@ def _bounds(
     return np.ascontiguousarray(np.concatenate([root, form(precision).T]))
 
 
-TOGETHER = 5
-"""So many shares of the second power have a bound together."""
+SHARES_PER_GROUP = 5
+"""Number of successive shares of the second power that one bound covers."""
 
 
 def _independent(
     terms: Terms, c: tuple[Floats, Floats]
 ) -> tuple[Floats, tuple[Floats, Floats, Floats]]:
-    """Return `signal` and `prior` of `_table` for two powers whose sizes have nothing to do with each other."""
+    """Return `signal` and `prior` of `_table` for two powers with uncorrelated coefficients."""
     square = terms.share**2
     signal = outer(c[0], c[0]) + square[:, None, None] * outer(c[1], c[1])
     return signal, (np.ones_like(square), np.zeros_like(square), square)
 
 
 def _two_shapes(sizes: Floats, terms: Terms, *, alternating: bool = False) -> list[Table]:
-    """Return the hypotheses of two shapes on the rows between levels of these sizes, for each of `FINEST_NOISE`."""
-    first, second, squares = _sizes(terms, sizes)
+    """Return the tables of two shapes for levels of these step sizes, one for each of `FINEST_NOISE`."""
+    first, second, squares = _level_errors(terms, sizes)
     if alternating:
         first, second = (x * (-1.0) ** np.arange(len(sizes)) for x in (first, second))
-    c = between(first), between(second)
+    c = level_differences(first), level_differences(second)
     signal, prior = _independent(terms, c)
     finest = np.flatnonzero(sizes)[-1]
-    found = []
+    tables = []
     for noise in priors.FINEST_NOISE:
-        part = np.full(len(sizes), priors.MISFIT**2)
-        part[finest] += noise**2
-        found.append(_table(terms, signal, squares * part, c, prior))
-    return found
+        misfit = np.full(len(sizes), priors.MISFIT**2)
+        misfit[finest] += noise**2
+        tables.append(_table(terms, signal, squares * misfit, c, prior))
+    return tables
 
 
 def _off_by_factors(
     sizes: Floats, terms: Terms, jitter: float, *, own_shape: bool = False
 ) -> Table:
-    """Return the hypotheses of levels whose errors are off by a factor each, which is 1 but for a `jitter`.
+    """Return the table of levels whose errors are each off by a factor, with standard deviation `jitter` around 1.
 
-    The second power is a multiple of the first, or has beside that as large a part of an `own_shape`.
+    The second power is a multiple of the first; with `own_shape` it also has an equally large part of another shape.
     """
-    first, second, squares = _sizes(terms, sizes)
-    powers = between(first), between(second)
+    first, second, squares = _level_errors(terms, sizes)
+    powers = level_differences(first), level_differences(second)
     c = powers[0] + terms.share[:, None] * powers[1]
-    part, across = _beside_last(c, squares)
+    ratio, covariance = _orthogonal_to_last(c, squares)
     if own_shape:
-        beside_last = terms.share[:, None] * (powers[1][:, :-1] - part * powers[1][:, -1:])
-        across = across + outer(beside_last, beside_last)
-    beside = priors.TAIL * across / c[:, -1, None, None] ** 2
+        own_part = terms.share[:, None] * (powers[1][:, :-1] - ratio * powers[1][:, -1:])
+        covariance = covariance + outer(own_part, own_part)
+    orthogonal = priors.TAIL * covariance / c[:, -1, None, None] ** 2
     ones = np.ones_like(terms.share)
     prior = ones, terms.share, terms.share**2
-    return _table(terms, outer(c, c), jitter**2 * squares, powers, prior, beside)
+    return _table(terms, outer(c, c), jitter**2 * squares, powers, prior, orthogonal)
 
 
 def _one_shape(sizes: Floats, terms: Terms) -> Table:
-    """Return the hypotheses that both powers have one shape: the second is any multiple of the first, of its share."""
-    first, second, squares = _sizes(terms, sizes)
-    c = between(first), between(second)
+    """Return the table of one shape: the second power is a multiple of the first, of random sign and size `share`."""
+    first, second, squares = _level_errors(terms, sizes)
+    c = level_differences(first), level_differences(second)
     signal, prior = _independent(terms, c)
     size = np.sqrt(c[0] ** 2 + prior[2][:, None] * c[1] ** 2)
-    _, across = _beside_last(size, squares)
-    beside = priors.TAIL * across / size[:, -1, None, None] ** 2
-    return _table(terms, signal, priors.MISFIT**2 * squares, c, prior, beside)
+    _, covariance = _orthogonal_to_last(size, squares)
+    orthogonal = priors.TAIL * covariance / size[:, -1, None, None] ** 2
+    return _table(terms, signal, priors.MISFIT**2 * squares, c, prior, orthogonal)
 
 
-def _beside_last(c: Floats, squares: Floats) -> tuple[Floats, Floats]:
-    """Return the size of the other rows over that of the last one, and the covariance of what they are beside it.
+def _orthogonal_to_last(c: Floats, squares: Floats) -> tuple[Floats, Floats]:
+    """Return the sizes of the other rows relative to the last one, and the covariance of their orthogonal components.
 
-    That is what the misfit leaves beside multiples of the last row, if all have one shape and the sizes `c`.
+    If all rows have one shape and the sizes `c`, only the misfit makes such components.
     """
     noise = noise_of_rows(squares)
-    part = c[:, :-1] / c[:, -1:]
-    across = noise[:, :-1, :-1] + outer(part, part) * noise[:, -1:, -1:]
-    mixed = outer(part, noise[:, -1, :-1])
-    return part, priors.MISFIT**2 * (across - mixed - np.swapaxes(mixed, 1, 2))
+    ratio = c[:, :-1] / c[:, -1:]
+    covariance = noise[:, :-1, :-1] + outer(ratio, ratio) * noise[:, -1:, -1:]
+    mixed = outer(ratio, noise[:, -1, :-1])
+    return ratio, priors.MISFIT**2 * (covariance - mixed - np.swapaxes(mixed, 1, 2))
 
 
 class Hypotheses(NamedTuple):
-    """All hypotheses on the rows of a window."""
+    """All hypotheses about the rows of a window."""
 
-    two_shapes: list[Table]
+    two_shapes: list[Table]  # for each of `FINEST_NOISE`
     one_shape: Table
-    # levels are off by factors: the second power is a multiple of the first, or has a shape of its own as well
-    factors: list[Table]
-    factors_with_shape: Table
-    alternating: list[Table]
-    any_power: Floats  # of a single power of any value, the same as `Table.limit`
+    factors: list[Table]  # levels off by factors, for each of `JITTERS`
+    factors_with_shape: Table  # the same, and the second power also has a shape of its own
+    alternating: list[Table]  # for each of `FINEST_NOISE`
+    any_power_log_bound: Floats  # `Table.log_bound` of a single power of any value
 
 
 @lru_cache(maxsize=48)
 def hypotheses_of(sizes: tuple[float, ...], promise: Promise | None) -> Hypotheses:
-    """Return the hypotheses for levels of these sizes; windows of ladders of one ratio share them."""
+    """Return the hypotheses for levels of these step sizes, relative to the finest one; 0 is the exact solution."""
     relative = np.array(sizes)
-    of_any_sign, terms = two_powers((1.0,), promise), two_powers((1.0, -1.0), promise)
+    unsigned, signed = two_powers((1.0,), promise), two_powers((1.0, -1.0), promise)
     return Hypotheses(
-        _two_shapes(relative, of_any_sign),
-        _one_shape(relative, of_any_sign),
-        [_off_by_factors(relative, terms, jitter) for jitter in priors.JITTERS],
-        _off_by_factors(relative, terms, priors.JITTER_OF_SHAPES, own_shape=True),
-        _two_shapes(relative, pure(priors.POWERS), alternating=True),
-        _limit_of_any_power(relative),
+        _two_shapes(relative, unsigned),
+        _one_shape(relative, unsigned),
+        [_off_by_factors(relative, signed, jitter) for jitter in priors.JITTERS],
+        _off_by_factors(relative, signed, priors.OWN_SHAPE_JITTER, own_shape=True),
+        _two_shapes(relative, single_powers(priors.POWERS), alternating=True),
+        _any_power_log_bound(relative),
     )
 
 
-def _limit_of_any_power(sizes: Floats) -> Floats:
-    """Return `Hypotheses.any_power`, read off closely spaced powers."""
-    powers = np.arange(priors.BIN, priors.HIGHEST + priors.AROUND[-1], priors.BIN)
+def _any_power_log_bound(sizes: Floats) -> Floats:
+    """Return `Hypotheses.any_power_log_bound`, from closely spaced powers."""
+    powers = np.arange(priors.SPACING, priors.MAX_POWER + priors.OFFSETS[-1], priors.SPACING)
     errors = on_arrays.power(sizes, powers[:, None])
-    c = between(errors)
+    c = level_differences(errors)
     covariance = outer(c, c) + noise_of_rows((priors.MISFIT * errors) ** 2)
     _, log_det = inverse(covariance)
     largest = np.max(c.shape[-1] * on_arrays.log(covariance[:, -1, -1]) - log_det)
-    prior = priors.OTHER_PRIOR / priors.HIGHEST * np.sum(np.gradient(priors.AROUND))
+    prior = priors.ANY_POWER_PRIOR / priors.MAX_POWER * np.sum(np.gradient(priors.OFFSETS))
     return np.array([on_arrays.log(2.0 * prior) + 0.5 * n * largest for n in (1, 2)])

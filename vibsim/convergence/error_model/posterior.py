@@ -1,4 +1,4 @@
-"""What is believed of ladders after all hypotheses of the error model have been weighed."""
+"""The posterior of ladders: the probabilities of powers, windows and limits, summed over all hypotheses."""
 
 from __future__ import annotations
 
@@ -12,426 +12,445 @@ from vibsim.convergence.error_model import priors
 from vibsim.convergence.error_model.hypotheses import (
     Promise,
     Table,
-    between,
     hypotheses_of,
+    level_differences,
     noise_of_rows,
     two_powers,
 )
 from vibsim.convergence.error_model.likelihood import (
     TINY,
     WindowRows,
-    any_size,
-    highest,
-    log_sum,
-    noise,
-    noise_of_finest,
+    finest_noise_log_priors,
+    free_row_evidence,
+    log_bound,
+    log_sum_exp,
+    noise_evidence,
     scale_free,
     single_power,
-    weights,
+    weigh_table,
     window_rows,
 )
 from vibsim.core.array_types import Flags, Floats, Integers
 from vibsim.elementary import on_arrays
 
 LEFT_OUT = 1e-11
-"""Part of all evidence that may be left out: bounds of errors change by less than a digit, probabilities not at all."""
-TABLES, MOST_HYPOTHESES = 10, 7300
-"""There are no more of them on a window."""
+"""Largest part of all evidence that may be skipped: it changes error bounds by less than a digit."""
+MOST_TABLES, MOST_HYPOTHESES = 10, 7300
+"""Upper limits of the numbers of tables and of hypotheses on a window."""
 LARGEST_LOG = 600.0
-"""Of evidence over that of no expansion at all: more says no more."""
+"""Log evidence relative to that of no expansion is clipped here, against overflow."""
 LIKELY = 1e-3
-"""Probability of a window, over that of the most probable one, from which on its limit counts."""
+"""A window contributes to the limit if its probability, relative to the most probable window, exceeds this."""
 
 
 @dataclass(frozen=True)
 class Ladder:
-    """The numbers of ladders that the model reads; n levels, m rows."""
+    """The data of ladders with n levels and m rows."""
 
     h: Floats  # step sizes, decreasing, shape (n,)
-    # inner products (means over the points) of the n-1 differences and, where the exact solution is known, of the
-    # finest level less that, shape (ladder, m, m)
+    # inner products (means over the points) of the n-1 differences and, if the exact solution is known, of the finest
+    # level minus the exact solution, shape (ladder, m, m)
     gram: Floats
-    floor: Floats  # predicted noise of every level in the same norm, shape (ladder, n)
+    floor: Floats  # predicted noise of each level in the same norm, shape (ladder, n)
     numbers: Flags  # whether the values are single numbers, shape (ladder,)
     exact_known: bool
 
     @property
     def points(self) -> Floats:
-        """Independent points, shape (ladder,)."""
+        """Number of independent points, shape (ladder,)."""
         return np.where(self.numbers, 1.0, priors.POINTS)
 
-    def some(self, rows: Integers) -> Ladder:
-        """Return some of the ladders."""
-        parts = {name: getattr(self, name)[rows] for name in ("gram", "floor", "numbers")}
+    def some(self, subset: Integers) -> Ladder:
+        """Return a subset of the ladders."""
+        parts = {name: getattr(self, name)[subset] for name in ("gram", "floor", "numbers")}
         return replace(self, **parts)
 
     def without_exact(self) -> Ladder:
-        """Return what the levels alone say, where the exact solution is known."""
+        """Return the ladders without the known exact solution."""
         m = len(self.h) - 1
         return replace(self, gram=self.gram[:, :m, :m], exact_known=False)
 
 
 @dataclass
 class Posterior:
-    """What is believed of ladders: probabilities, of shape (ladder,) where no other is given."""
+    """Posterior probabilities of ladders, of shape (ladder,) unless another shape is given."""
 
-    powers: Floats  # the powers that are looked at, increasing, shape (power,)
-    grid: Floats  # the same, and those that only other ladders have
-    # what each of `powers` may be: one of an expansion is itself, another one lies between its neighbours on the grid,
-    # since a second power behind it moves the measured order; shape (2, power)
+    powers: Floats  # the powers considered, increasing, shape (power,)
+    grid: Floats  # these, and powers considered for other ladders only
+    # The interval that each of `powers` stands for, shape (2, power): a power of an expansion stands for itself, any
+    # other for the interval between its neighbours on the grid, since a second power shifts the measured order.
     reach: Floats
-    orders: Floats  # of every three successive levels, shape (ladder, n-2); see `orders_of`
+    orders: Floats  # order of each three successive levels, shape (ladder, n-2); see `orders_of`
     windows: list[tuple[int, int]]  # coarsest and finest level
-    alone: Floats  # that this power dominates, shape (ladder, power)
-    lowest: Floats  # that this is the lowest power of weight, shape (ladder, power)
-    highest: Floats  # that this is the highest one, shape (ladder, power)
-    # that two powers are of one size, shape (ladder, pair), and these powers, shape (pair, 2)
-    of_pairs: Floats
-    pairs: Floats
-    window: Floats  # that the expansion holds in this window, shape (ladder, window)
-    alternating: Floats  # that errors change their sign from level to level
-    scattered: Floats  # that there is no expansion, and no noise either
-    noise: Floats  # that all but some coarse levels are noise
-    # the limit less the finest level: the mean of its expression in the differences, shape (ladder, row), and its mean
-    # square; given the expansion, and where the exact solution is not known
-    path: Floats
-    path_squared: Floats
+    dominant: Floats  # this power dominates, shape (ladder, power)
+    lowest: Floats  # this is the lowest power that matters, shape (ladder, power)
+    highest: Floats  # this is the highest power that matters, shape (ladder, power)
+    mixed: Floats  # two powers matter and neither dominates, shape (ladder, pair)
+    pairs: Floats  # these two powers, shape (pair, 2)
+    window: Floats  # the expansion holds in this window, shape (ladder, window)
+    alternating: Floats  # the sign of the error alternates from level to level
+    scattered: Floats  # there is neither an expansion nor noise alone
+    noise: Floats  # all levels, except some coarse ones, are noise
+    # Limit minus finest level, given an expansion: mean as weights of the differences, shape (ladder, row), and mean
+    # square. NaN if the exact solution is known.
+    limit_weights: Floats
+    limit_square: Floats
 
     @property
     def expansion(self) -> Floats:
         """Return the probability of an expansion in one or two powers."""
         return np.asarray(np.sum(self.window, axis=-1))
 
-    def some(self, rows: Integers) -> Posterior:
-        """Return what is believed of some of the ladders."""
-        return replace(self, **{name: getattr(self, name)[rows] for name in self.of_ladders()})
+    def some(self, subset: Integers) -> Posterior:
+        """Return the posterior of a subset of the ladders."""
+        return replace(self, **{name: getattr(self, name)[subset] for name in self.per_ladder()})
 
-    def replace(self, ladders: Integers, other: Posterior, rows: Flags) -> None:
-        """Believe of some ladders what another posterior of them, among fewer others, says in some of its rows."""
-        place = np.searchsorted(self.powers, other.powers)
-        for name in self.of_ladders():
-            values = getattr(other, name)[rows]
-            if name in ("alone", "lowest", "highest"):
-                every = np.zeros((len(values), len(self.powers)))
-                every[:, place] = values
-                values = every
+    def update(self, ladders: Integers, source: Posterior, rows: Flags) -> None:
+        """Overwrite some ladders with rows of another posterior, whose powers are a subset of these."""
+        columns = np.searchsorted(self.powers, source.powers)
+        for name in self.per_ladder():
+            values = getattr(source, name)[rows]
+            if name in ("dominant", "lowest", "highest"):
+                padded = np.zeros((len(values), len(self.powers)))
+                padded[:, columns] = values
+                values = padded
             getattr(self, name)[ladders] = values
 
-    def of_ladders(self) -> list[str]:
-        """Name what has a row for each ladder."""
-        names = [one.name for one in fields(self)]
+    def per_ladder(self) -> list[str]:
+        """Return the names of the fields with one row per ladder."""
+        names = [field.name for field in fields(self)]
         return [
             name for name in names if name not in ("powers", "grid", "reach", "windows", "pairs")
         ]
 
 
 def orders_of(ladder: Ladder) -> Floats:
-    """Return the order of every three successive levels, shape (ladder, n-2); NaN where there is none.
+    """Return the order of each three successive levels, shape (ladder, n-2); NaN where there is none.
 
-    It solves ``(h_0^p - h_1^p)/(h_1^p - h_2^p) = d_0/d_1``. Differences that turn their sign have none.
+    It solves ``(h_0^p - h_1^p)/(h_1^p - h_2^p) = d_0/d_1``. Successive differences of opposite sign have none.
     """
     n = len(ladder.h)
     sizes = np.sqrt(np.diagonal(ladder.gram, axis1=1, axis2=2))[:, : n - 1]
-    same = np.diagonal(ladder.gram, 1, 1, 2)[:, : n - 2] > 0.0
-    ratios = np.where(same, safe_ratio(sizes[:, :-1], sizes[:, 1:]), np.nan)
+    same_sign = np.diagonal(ladder.gram, 1, 1, 2)[:, : n - 2] > 0.0
+    ratios = np.where(same_sign, safe_ratio(sizes[:, :-1], sizes[:, 1:]), np.nan)
     return orders_of_steps(ratios, ladder.h)
 
 
-Rows = slice | Integers
-"""Some ladders, or all."""
+Subset = slice | Integers
+"""Index of some ladders, or of all."""
 
 
 class _Fit:
-    """The posterior in the making: hypotheses are added window by window."""
+    """Accumulates the evidence of hypotheses, window by window."""
 
     def __init__(self, ladder: Ladder, promise: Promise | None, left_out: float) -> None:
         self.ladder, self.points, self.promise = ladder, ladder.points, promise
         terms = two_powers((1.0,), promise)
         usual = np.concatenate([terms.lower, terms.higher])
-        every = np.unique(
-            np.concatenate([usual, np.arange(priors.BIN, priors.HIGHEST, priors.BIN)])
+        grid = np.unique(
+            np.concatenate([usual, np.arange(priors.SPACING, priors.MAX_POWER, priors.SPACING)])
         )
         self.orders = orders_of(ladder)
-        # of the powers between the usual ones, those that are nearest to some order
-        nearest = np.searchsorted(0.5 * (every[1:] + every[:-1]), self.orders)
-        # and the ends, which are the interval of an order that nothing is known of
-        ends = np.array([0, len(every) - 1])
-        used = np.unique(np.concatenate([np.searchsorted(every, usual), nearest.ravel(), ends]))
-        self.grid, self.powers, self.nearest = every, every[used], np.searchsorted(used, nearest)
-        neighbours = np.stack([np.append(every[0], every[:-1]), np.append(every[1:], every[-1])])
-        self.reach = np.where(np.isin(every, usual), every, neighbours)[:, used]
+        # of the other powers of the grid, only those nearest to a measured order are used
+        nearest = np.searchsorted(0.5 * (grid[1:] + grid[:-1]), self.orders)
+        # and both ends, which are the interval of an unknown order
+        ends = np.array([0, len(grid) - 1])
+        used = np.unique(np.concatenate([np.searchsorted(grid, usual), nearest.ravel(), ends]))
+        self.grid, self.powers, self.nearest = grid, grid[used], np.searchsorted(used, nearest)
+        neighbours = np.stack([np.append(grid[0], grid[:-1]), np.append(grid[1:], grid[-1])])
+        self.reach = np.where(np.isin(grid, usual), grid, neighbours)[:, used]
         count, n = len(ladder.gram), len(ladder.h)
         self.windows = [
-            (last - rows, last)
+            (last - length, last)
             for last in range(n - 1, 1, -1)
-            for rows in range(min(priors.LONGEST_WINDOW, last), 1, -1)
+            for length in range(min(priors.LONGEST_WINDOW, last), 1, -1)
         ]
-        # half of what may be left out is that of whole tables, half that of single hypotheses
-        part = 0.5 * left_out / len(self.windows)
-        self.of_table, self.of_one = (on_arrays.log(part / x) for x in (TABLES, MOST_HYPOTHESES))
-        # rounding is part of every row; that of a level is relative to what differs from there on
+        # of the evidence that may be skipped, half is for whole tables and half for single hypotheses
+        share = 0.5 * left_out / len(self.windows)
+        self.log_table_share, self.log_hypothesis_share = (
+            on_arrays.log(share / x) for x in (MOST_TABLES, MOST_HYPOTHESES)
+        )
+        # rounding of a level is relative to the largest difference at this and finer levels
         squares = np.diagonal(ladder.gram, axis1=1, axis2=2)[:, : n - 1]
         largest = np.maximum.accumulate(squares[:, ::-1], axis=-1)[:, ::-1]
         largest = np.concatenate([largest, largest[:, -1:]], axis=-1)
-        # it is added to the rows, so that no difference is smaller
+        # it is added to the Gram matrix, so that no difference is smaller
         self.rounding = priors.ROUNDING * (ladder.floor**2 + priors.EPSILON**2 * largest + TINY)
-        self.differences = self.rows(0, n - 1)
-        self.alone_rows = any_size(self.differences, self.points) - priors.PRICE
-        # sums over hypotheses of their evidence, over that of differences that all have a size of their own
-        self.unit = np.sum(self.alone_rows, axis=-1)
+        self.differences = self.gram(0, n - 1)
+        self.free_rows = free_row_evidence(self.differences, self.points) - priors.FREE_ROW_PENALTY
+        # all evidence is relative to that of differences with unrelated sizes
+        self.log_unit = np.sum(self.free_rows, axis=-1)
         if ladder.exact_known:
             # the true error of the coarsest level may have any size, too
-            squared = np.maximum(self.rows(0, 0, with_exact=True)[:, 0, 0], TINY)
-            self.unit = self.unit + (scale_free(squared, 0.0, self.points, 1) - priors.PRICE)
-        self.of_ends = {end: self.beyond(end) for end in range(2, n)}
-        self.total, self.every = np.ones(count), np.arange(count)
+            squared = np.maximum(self.gram(0, 0, with_exact=True)[:, 0, 0], TINY)
+            self.log_unit = self.log_unit + (
+                scale_free(squared, 0.0, self.points, 1) - priors.FREE_ROW_PENALTY
+            )
+        self.finer_by_end = {end: self.finer_rows(end) for end in range(2, n)}
+        self.total, self.index = np.ones(count), np.arange(count)
         pairs, windows = len(terms.first_of_pairs), len(self.windows)
         shapes: dict[str, tuple[int, ...]] = {
             **dict.fromkeys(("alternating", "noise"), ()),
             "pairs": (3, pairs),
-            **dict.fromkeys(("window", "path_squared"), (windows,)),
+            **dict.fromkeys(("window", "limit_square"), (windows,)),
             "any_power": (len(self.powers),),
-            "path": (windows, n - 1),
+            "limit_weights": (windows, n - 1),
         }
         self.values = {name: np.zeros((count, *shape)) for name, shape in shapes.items()}
 
     def add_window(self, index: int) -> None:
-        """Add the hypotheses that the expansion holds between two levels."""
+        """Add the hypotheses that the expansion holds exactly in this window."""
         start, end = self.windows[index]
         ladder = self.ladder
-        rest = np.sum(self.alone_rows[:, :start], axis=-1)
-        for part in self.of_ends[end]:
-            rest += part
+        outside = np.sum(self.free_rows[:, :start], axis=-1)
+        for evidence in self.finer_by_end[end]:
+            outside += evidence
         smallest = self.differences[:, end - 1, end - 1]
         sizes = ladder.h[start : end + 1] / ladder.h[end]
-        inside, behind = self.rows(start, end), np.empty((len(rest), 0))
+        gram, finer = self.gram(start, end), np.empty((len(outside), 0))
         if ladder.exact_known:
-            inside = self.rows(start, end, with_exact=True)
-            smallest = np.minimum(smallest, inside[:, -1, -1])
+            gram = self.gram(start, end, with_exact=True)
+            smallest = np.minimum(smallest, gram[:, -1, -1])
             sizes = np.append(sizes, 0.0)
         else:
-            behind = self.behind(start, end)
-        noisy = [rest + part for part in noise_of_finest(ladder.floor[:, end], smallest)]
-        # with a few digits less windows of one ratio are the same
-        of_window = hypotheses_of(tuple(np.round(sizes, 12)), self.promise)
-        tables = [(table, noisy[i]) for i, table in enumerate(of_window.two_shapes)]
-        # numbers have no shape
-        shapes = self.points > 1.0
-        own = np.where(shapes, priors.OWN_SHAPE, 0.0)
-        with np.errstate(divide="ignore"):
-            one, several = (
-                noisy[0] + on_arrays.log(priors.JITTER_PRIOR * x) for x in (1.0 - own, own)
-            )
-            alike = noisy[0] + on_arrays.log(priors.ONE_SHAPE * shapes)
-        tables += [
-            (table, one + on_arrays.log(p))
-            for table, p in zip(of_window.factors, priors.JITTER_PRIORS, strict=True)
+            finer = self.finer_products(start, end)
+        log_priors = [
+            outside + prior for prior in finest_noise_log_priors(ladder.floor[:, end], smallest)
         ]
-        tables += [(of_window.factors_with_shape, several), (of_window.one_shape, alike)]
-        read = [window_rows(inside, self.points, split=x) for x in (False, True)]
+        # rounding the sizes makes windows with equal ratios share their hypotheses
+        hypotheses = hypotheses_of(tuple(np.round(sizes, 12)), self.promise)
+        tables = [(table, log_priors[i]) for i, table in enumerate(hypotheses.two_shapes)]
+        # numbers have no shape
+        has_shape = self.points > 1.0
+        own_shape = np.where(has_shape, priors.OWN_SHAPE_PRIOR, 0.0)
+        with np.errstate(divide="ignore"):
+            multiple, with_shape = (
+                log_priors[0] + on_arrays.log(priors.JITTER_PRIOR * x)
+                for x in (1.0 - own_shape, own_shape)
+            )
+            one_shape = log_priors[0] + on_arrays.log(priors.ONE_SHAPE_PRIOR * has_shape)
+        tables += [
+            (table, multiple + on_arrays.log(p))
+            for table, p in zip(hypotheses.factors, priors.JITTER_PRIORS, strict=True)
+        ]
+        tables += [(hypotheses.factors_with_shape, with_shape), (hypotheses.one_shape, one_shape)]
+        data = [window_rows(gram, self.points, split=x) for x in (False, True)]
         for table, prior in tables:
-            self.add_table(index, table, prior, read, behind)
-        self.add_any_power(index, sizes, inside, behind, noisy[0], of_window.any_power)
-        for i, table in enumerate(of_window.alternating):
-            prior = noisy[i] + on_arrays.log(priors.ALTERNATING)
-            self.add_table(index, table, prior, read, behind[:, :0], name="alternating")
+            self.add_table(index, table, prior, data, finer)
+        self.add_any_power(index, sizes, gram, finer, log_priors[0], hypotheses.any_power_log_bound)
+        for i, table in enumerate(hypotheses.alternating):
+            prior = log_priors[i] + on_arrays.log(priors.ALTERNATING_PRIOR)
+            self.add_table(index, table, prior, data, finer[:, :0], name="alternating")
 
-    def matters(self, most: Floats) -> tuple[Rows, Floats]:
-        """Return the ladders of which a table with evidence up to this may matter, and what hypothesis would not."""
-        whole = self.unit + on_arrays.log(self.total)
-        keep = most > whole + self.of_table
-        return slice(None) if np.all(keep) else np.flatnonzero(keep), whole + self.of_one
+    def relevant(self, bound: Floats) -> tuple[Subset, Floats]:
+        """Return the ladders for which evidence up to this bound matters, and the least that a hypothesis needs."""
+        total = self.log_unit + on_arrays.log(self.total)
+        keep = bound > total + self.log_table_share
+        subset = slice(None) if np.all(keep) else np.flatnonzero(keep)
+        return subset, total + self.log_hypothesis_share
 
     def add_table(
         self,
         index: int,
         table: Table,
         prior: Floats,
-        of_kinds: list[WindowRows],
-        behind: Floats,
+        data: list[WindowRows],
+        finer: Floats,
         *,
         name: str = "window",
     ) -> None:
         """Add the hypotheses of a table on the rows of a window."""
-        read = of_kinds[table.beside is not None]
-        rows, least = self.matters(prior + highest(table, read))
-        part = read if isinstance(rows, slice) else WindowRows._make(x[rows] for x in read)
-        if not len(part.last):
+        rows = data[table.orthogonal_forms is not None]
+        subset, least = self.relevant(prior + log_bound(table, rows))
+        part = rows if isinstance(subset, slice) else WindowRows._make(x[subset] for x in rows)
+        if not len(part.last_square):
             return
-        log, pairs, path, squared = weights(table, part, behind[rows], (least - prior)[rows])
+        log, pairs, limit, squared = weigh_table(
+            table, part, finer[subset], (least - prior)[subset]
+        )
         if not np.any(np.isfinite(log)):
             return
         if name == "window":
-            weight = self.add(index, rows, log + prior[rows], path, squared)
-            self.values["pairs"][rows] += weight[:, None, None] * pairs
+            weight = self.add_to_window(index, subset, log + prior[subset], limit, squared)
+            self.values["pairs"][subset] += weight[:, None, None] * pairs
         else:
-            self.values[name][rows] += self.weight(rows, log + prior[rows])
+            self.values[name][subset] += self.add_to_total(subset, log + prior[subset])
 
-    def weight(self, rows: Rows, log: Floats) -> Floats:
-        """Return the weights of hypotheses of some ladders, and count them among all."""
-        found = on_arrays.exp(np.minimum(log - self.unit[rows], LARGEST_LOG))
-        self.total[rows] += found
-        return np.asarray(found)
+    def add_to_total(self, subset: Subset, log: Floats) -> Floats:
+        """Add log evidence of some ladders to their totals, and return it relative to that of no expansion."""
+        weight = on_arrays.exp(np.minimum(log - self.log_unit[subset], LARGEST_LOG))
+        self.total[subset] += weight
+        return np.asarray(weight)
 
-    def rows(self, start: int, end: int, *, with_exact: bool = False) -> Floats:
-        """Return the Gram matrix of the differences between two levels, and of the true error of the second one."""
+    def gram(self, start: int, end: int, *, with_exact: bool = False) -> Floats:
+        """Return the Gram matrix of the rows from level `start` to level `end`, and of the true error of the latter."""
         gram = self.ladder.gram
         noise = noise_of_rows(self.rounding[:, start : end + 1])
         if not with_exact:
             return np.asarray(gram[:, start:end, start:end] + noise)
         count = end - start
-        found = np.zeros((len(gram), count + 1, count + 1))
-        found[:, :count, :count] = gram[:, start:end, start:end] + noise
-        # the error of a level is the sum of all finer differences and of the error of the finest one
+        result = np.zeros((len(gram), count + 1, count + 1))
+        result[:, :count, :count] = gram[:, start:end, start:end] + noise
+        # the error of a level is the sum of all finer differences and of the error of the finest level
         with_error = np.sum(gram[:, :, end:], axis=-1)
-        found[:, :count, count] = found[:, count, :count] = with_error[:, start:end]
-        found[:, count, count] = np.sum(with_error[:, end:], axis=-1) + self.rounding[:, end]
+        result[:, :count, count] = result[:, count, :count] = with_error[:, start:end]
+        result[:, count, count] = np.sum(with_error[:, end:], axis=-1) + self.rounding[:, end]
         if count:
-            found[:, count - 1, count] -= self.rounding[:, end]
-            found[:, count, count - 1] -= self.rounding[:, end]
-        return found
+            result[:, count - 1, count] -= self.rounding[:, end]
+            result[:, count, count - 1] -= self.rounding[:, end]
+        return result
 
-    def beyond(self, end: int) -> tuple[Floats, Floats]:
-        """Return what is said of the rows behind windows that end at a level: the evidence of noise, and what it hides.
+    def finer_rows(self, end: int) -> tuple[Floats, Floats]:
+        """Return the log evidence that all rows finer than level `end` are noise, and a log probability.
 
-        The second is the log of how likely noise hides what an expansion leaves there. A difference of which D is
-        expected is as small as noise of the size s < D with the probability ``(s/D)^N``. D falls by the order of the
-        finest levels of the window; where they have none, nothing is expected.
+        That is the probability that noise hides the expansion there. Noise of size s < D hides a difference D with the
+        probability ``(s/D)^N``. D falls by the order of the finest levels of the window; if there is no such order,
+        nothing needs to be hidden.
         """
         sizes, floor = self.ladder.h[end - 1 :] / self.ladder.h[end], self.ladder.floor[:, end:]
-        order = np.clip(self.orders[:, end - 2, None], priors.POWERS[0], priors.HIGHEST)
-        falls = between(on_arrays.power(sizes, order))
-        own = np.sqrt(np.diagonal(self.differences, axis1=1, axis2=2)[:, end - 1 :])
-        expected = np.maximum(own[:, :1] * falls[:, 1:] / falls[:, :1], TINY)
-        largest = np.max(own[:, 1:], axis=-1, initial=0.0)
+        order = np.clip(self.orders[:, end - 2, None], priors.POWERS[0], priors.MAX_POWER)
+        falls = level_differences(on_arrays.power(sizes, order))
+        norms = np.sqrt(np.diagonal(self.differences, axis1=1, axis2=2)[:, end - 1 :])
+        expected = np.maximum(norms[:, :1] * falls[:, 1:] / falls[:, :1], TINY)
+        largest = np.max(norms[:, 1:], axis=-1, initial=0.0)
         hidden = np.fmin(on_arrays.log(np.maximum(largest, floor[:, 0])[:, None] / expected), 0.0)
         rows = self.differences[:, end:, end:]
-        return noise(self.ladder.h[end:], rows, self.points, floor), self.points * np.sum(
-            hidden, axis=-1
+        noise = noise_evidence(self.ladder.h[end:], rows, self.points, floor)
+        return noise, self.points * np.sum(hidden, axis=-1)
+
+    def finer_products(self, start: int, end: int) -> Floats:
+        """Return the argument `finer` of `kernel` for this window."""
+        with_finer = np.sum(self.differences[:, :, end:], axis=-1)
+        square = np.sum(with_finer[:, end:], axis=-1, keepdims=True)
+        last = np.maximum(self.differences[:, end - 1, end - 1], TINY)
+        return np.asarray(
+            np.concatenate([with_finer[:, start:end], square], axis=-1) / last[:, None]
         )
 
-    def behind(self, start: int, end: int) -> Floats:
-        """Return what `kernel` reads of the differences behind a window."""
-        with_rest = np.sum(self.differences[:, :, end:], axis=-1)
-        own = np.sum(with_rest[:, end:], axis=-1, keepdims=True)
-        last = np.maximum(self.differences[:, end - 1, end - 1], TINY)
-        return np.asarray(np.concatenate([with_rest[:, start:end], own], axis=-1) / last[:, None])
-
-    def add(self, index: int, rows: Rows, log: Floats, path: Floats, squared: Floats) -> Floats:
-        """Add hypotheses on the rows of a window of some ladders, and return their weights."""
-        weight = self.weight(rows, log)
-        self.values["window"][rows, index] += weight
+    def add_to_window(
+        self, index: int, subset: Subset, log: Floats, limit: Floats, squared: Floats
+    ) -> Floats:
+        """Add the log evidence and the limit of an expansion in a window, and return the weights."""
+        weight = self.add_to_total(subset, log)
+        self.values["window"][subset, index] += weight
         if not self.ladder.exact_known:
             (start, end), n = self.windows[index], len(self.ladder.h)
-            whole = np.zeros((len(path), n - 1))
-            whole[:, start:end] = path
-            whole[:, end:] = 1.0
-            # the limit is known no better than the noise behind the window
+            limit_weights = np.zeros((len(limit), n - 1))
+            limit_weights[:, start:end] = limit
+            limit_weights[:, end:] = 1.0
+            # the noise of finer levels limits how well the limit is known
             if end < n - 1:
-                squared = squared + self.differences[rows, end, end]
-            self.values["path"][rows, index] += weight[:, None] * whole
-            self.values["path_squared"][rows, index] += weight * squared
+                squared = squared + self.differences[subset, end, end]
+            self.values["limit_weights"][subset, index] += weight[:, None] * limit_weights
+            self.values["limit_square"][subset, index] += weight * squared
         return weight
 
     def add_any_power(
         self,
         index: int,
         sizes: Floats,
-        inside: Floats,
-        behind: Floats,
+        gram: Floats,
+        finer: Floats,
         prior: Floats,
-        limit: Floats,
+        bound: Floats,
     ) -> None:
-        """Add the hypotheses of one power of any value, close to that of the finest differences of the window."""
+        """Add the hypotheses of one power of any value, close to the order of the finest rows of the window."""
         w = len(sizes) - 1
         order = self.orders[:, self.windows[index][1] - 2]
-        usable = (order > 0.0) & (order < priors.HIGHEST)
-        last = np.maximum(inside[:, -1, -1], TINY)
+        usable = (order > 0.0) & (order < priors.MAX_POWER)
+        last = np.maximum(gram[:, -1, -1], TINY)
         most = prior + scale_free(last, 0.0, self.points, w)
-        most += np.where(self.points > 1.0, *limit[::-1])
-        rows, _ = self.matters(np.where(usable, most, -np.inf))
-        order, points, inside = order[rows], self.points[rows, None], inside[rows]
-        if not len(inside):
+        most += np.where(self.points > 1.0, *bound[::-1])
+        subset, _ = self.relevant(np.where(usable, most, -np.inf))
+        order, points, gram = order[subset], self.points[subset, None], gram[subset]
+        if not len(gram):
             return
         log, gains, squares = single_power(
-            sizes, np.maximum(order[:, None] + priors.AROUND, TINY), inside, points
+            sizes, np.maximum(order[:, None] + priors.OFFSETS, TINY), gram, points
         )
-        log += on_arrays.log(priors.OTHER_PRIOR / priors.HIGHEST * np.gradient(priors.AROUND))
-        total = log_sum(log)
-        path, squared = np.zeros((len(order), w)), np.zeros(len(order))
+        log += on_arrays.log(
+            priors.ANY_POWER_PRIOR / priors.MAX_POWER * np.gradient(priors.OFFSETS)
+        )
+        total = log_sum_exp(log)
+        limit, squared = np.zeros((len(order), w)), np.zeros(len(order))
         if not self.ladder.exact_known:
             weight = on_arrays.exp(log - total[:, None])
-            rest = behind[rows] * inside[:, -1:, -1]
-            path = -np.sum(weight[..., None] * gains, axis=1)
-            squares += rest[:, -1:] - 2.0 * np.sum(gains * rest[:, None, :-1], axis=-1)
+            products = finer[subset] * gram[:, -1:, -1]
+            limit = -np.sum(weight[..., None] * gains, axis=1)
+            squares += products[:, -1:] - 2.0 * np.sum(gains * products[:, None, :-1], axis=-1)
             squared = np.sum(weight * squares, axis=-1)
-        weight = self.add(index, rows, total + prior[rows], path, squared)
-        nearest = self.nearest[rows, self.windows[index][1] - 2]
-        self.values["any_power"][self.every[rows], nearest] += weight
+        weight = self.add_to_window(index, subset, total + prior[subset], limit, squared)
+        nearest = self.nearest[subset, self.windows[index][1] - 2]
+        self.values["any_power"][self.index[subset], nearest] += weight
 
     def add_no_expansion(self) -> None:
-        """Add the hypotheses that all rows behind one are noise, and those before it have a size of their own."""
+        """Add the hypotheses that all rows from some level on are noise, and coarser rows have unrelated sizes."""
         ladder, n = self.ladder, len(self.ladder.h)
         for k in range(n - 1):
-            log = np.sum(self.alone_rows[:, :k], axis=-1)
-            log += noise(
+            log = np.sum(self.free_rows[:, :k], axis=-1)
+            log += noise_evidence(
                 ladder.h[k:],
-                self.rows(k, n - 1, with_exact=ladder.exact_known),
+                self.gram(k, n - 1, with_exact=ladder.exact_known),
                 self.points,
                 ladder.floor[:, k:],
             )
-            self.values["noise"] += self.weight(slice(None), log)
+            self.values["noise"] += self.add_to_total(slice(None), log)
 
     def posterior(self) -> Posterior:
-        """Return what is believed, after all hypotheses were added."""
+        """Return the normalised probabilities, after all hypotheses were added."""
         values, total = self.values, self.total
         any_power = values.pop("any_power") / total[:, None]
         pairs, first, second = np.moveaxis(values.pop("pairs") / total[:, None, None], 1, 0)
         terms = two_powers((1.0,), self.promise)
-        of_pairs = np.stack(
+        pair_powers = np.stack(
             [terms.lower[terms.first_of_pairs], terms.higher[terms.first_of_pairs]], axis=-1
         )
-        lower, higher = (self.of_powers(p) for p in of_pairs.T)
+        lower, higher = (self.sum_by_power(p) for p in pair_powers.T)
         if self.ladder.exact_known:
-            values["path"] = np.full_like(self.alone_rows, np.nan)
-            values["path_squared"] = np.full_like(total, np.nan)
+            values["limit_weights"] = np.full_like(self.free_rows, np.nan)
+            values["limit_square"] = np.full_like(total, np.nan)
         else:
-            # what hardly can be has limits far away
+            # improbable windows may have limits far away
             window = values["window"]
             likely = window > LIKELY * np.max(window, axis=-1, keepdims=True)
             expansion = np.maximum(np.sum(window * likely, axis=-1), TINY)
-            values["path"] = np.sum(values["path"] * likely[..., None], axis=1) / expansion[:, None]
-            values["path_squared"] = np.sum(values["path_squared"] * likely, axis=1) / expansion
+            values["limit_weights"] = (
+                np.sum(values["limit_weights"] * likely[..., None], axis=1) / expansion[:, None]
+            )
+            values["limit_square"] = np.sum(values["limit_square"] * likely, axis=1) / expansion
         for name in ("alternating", "noise"):
             values[name] = values[name] / total
         values["window"] = values["window"] / total[:, None]
-        both = pairs - first - second
-        alone = any_power + lower(first) + higher(second)
+        mixed = pairs - first - second
+        dominant = any_power + lower(first) + higher(second)
         return Posterior(
             powers=self.powers,
             grid=self.grid,
             reach=self.reach,
             orders=self.orders,
             windows=self.windows,
-            alone=alone,
-            of_pairs=both,
-            pairs=of_pairs,
-            lowest=alone + lower(both),
-            highest=alone + higher(both),
+            dominant=dominant,
+            mixed=mixed,
+            pairs=pair_powers,
+            lowest=dominant + lower(mixed),
+            highest=dominant + higher(mixed),
             scattered=1.0 / total,
             **values,
         )
 
-    def of_powers(self, powers: Floats) -> Callable[[Floats], Floats]:
-        """Return what sums what belongs to pairs up over those that have each power, shape (ladder, power)."""
-        order = np.argsort(powers, kind="stable")
-        found, start = np.unique(powers[order], return_index=True)
-        places = np.searchsorted(self.powers, found)
+    def sum_by_power(self, powers: Floats) -> Callable[[Floats], Floats]:
+        """Return a function that sums values of pairs over all pairs with the same power; (ladder, power).
 
-        def summed(of_pairs: Floats) -> Floats:
-            whole = np.zeros((len(of_pairs), len(self.powers)))
-            whole[:, places] = np.add.reduceat(of_pairs[:, order], start, axis=1)
-            return whole
+        `powers` holds one power of each pair.
+        """
+        order = np.argsort(powers, kind="stable")
+        distinct, start = np.unique(powers[order], return_index=True)
+        columns = np.searchsorted(self.powers, distinct)
+
+        def summed(values: Floats) -> Floats:
+            sums = np.zeros((len(values), len(self.powers)))
+            sums[:, columns] = np.add.reduceat(values[:, order], start, axis=1)
+            return sums
 
         return summed
 
@@ -439,9 +458,9 @@ class _Fit:
 def posterior(
     ladder: Ladder, promise: Promise | None = None, *, left_out: float = LEFT_OUT
 ) -> Posterior:
-    """Return what is believed of ladders of three levels and more, all of whose numbers are finite.
+    """Return the posterior of ladders with at least three levels and finite data.
 
-    Hypotheses are left out that surely have no more than the part `left_out` of the evidence of all.
+    Hypotheses are skipped that together hold at most the part `left_out` of all evidence.
     """
     fit = _Fit(ladder, promise, left_out)
     fit.add_no_expansion()

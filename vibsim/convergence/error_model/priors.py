@@ -1,49 +1,82 @@
-"""The numbers of the error model: value, meaning, and where they come from.
+"""The constants of the error model: value, meaning and origin.
 
-[expansion] follows from expansions of errors, [arithmetic] from double precision. [chosen] is a prior that was written
-down before anything was judged. [calibrated] was set on seeds 1 and 3 of the random ladders with known truth
-(``tests/analysis/synthetic.py``); but for `POINTS` and `MISFIT` the counts there hardly change where one is doubled or
-halved.
+Origins: [expansion] follows from expansions of the error. [arithmetic] follows from double precision. [chosen] is a
+prior that was written down before any ladder was judged. [calibrated] was set on seeds 1 and 3 of the random ladders
+with known truth (``tests/analysis/synthetic.py``). Except for `POINTS` and `MISFIT`, doubling or halving one of these
+numbers hardly changes the counts there.
+
+A *row* is the difference of two successive levels; a *free* row has a size unrelated to the others.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
+# ---- Powers of an expansion
+
 POINTS = 2.0  # independent points of a series or field; a single number has one [calibrated]
-POWERS = (*(0.5 * k for k in range(1, 11)), 6.0, 7.0, 8.0)  # that expansions have [expansion]
-HIGHEST = 8.0  # power that is looked for [chosen]
-BIN = 0.05  # distance of the powers among which such a power is counted [chosen]
-OTHER_PRIOR = 0.1  # of a single power of any other value up to `HIGHEST` [chosen]
-# It is looked for at these distances from the measured order. [chosen]
-_BESIDE = 3e-4 * 2.0 ** np.arange(9)
-AROUND = np.concatenate([-_BESIDE[::-1], [0.0], _BESIDE])
-EXPECTED = 0.5  # prior of the whole order that a user expects, beside that of every power [chosen]
-THEORY = 0.9  # the same of the order that the theory of a scheme promises [chosen]
-# Prior of a power that is not a whole number away from that of theory, beside 1. [chosen]
-BETWEEN = 0.01
-DISTANCES = (0.5, 1.0, 2.0)  # from the first power to the second [expansion]
-PURE_PRIOR = 0.3  # that there is no second power in sight [chosen]
-# Size of the second power over the first, at the finest level of a window. [chosen]
+POWERS = (
+    *(0.5 * k for k in range(1, 11)),
+    6.0,
+    7.0,
+    8.0,
+)  # powers that expansions have [expansion]
+MAX_POWER = 8.0  # largest power considered [chosen]
+ANY_POWER_PRIOR = 0.1  # prior of one power of any value up to `MAX_POWER` [chosen]
+SPACING = 0.05  # spacing of the grid on which such powers are counted [chosen]
+_POSITIVE = 3e-4 * 2.0 ** np.arange(9)
+# Offsets from the measured order at which such a power is sampled. [chosen]
+OFFSETS = np.concatenate([-_POSITIVE[::-1], [0.0], _POSITIVE])
+EXPECTED_PRIOR = 0.5  # part of the prior reserved for a whole order that a user expects [chosen]
+THEORY_PRIOR = 0.9  # the same for the order that the theory of a scheme promises [chosen]
+FRACTIONAL_FACTOR = (
+    0.01  # on the prior of powers not a whole number away from the promised one [chosen]
+)
+DISTANCES = (0.5, 1.0, 2.0)  # second power minus first power [expansion]
+PURE_PRIOR = 0.3  # prior that no second power is visible [chosen]
+# Size of the second power relative to the first, at the finest level of a window. [chosen]
 SHARES = tuple(10.0 ** (-4.25 + 0.5 * k) for k in range(15))
-MISFIT = 3e-4  # of a level from its expansion, over its error [calibrated]
-LEAST = 0.1  # square of the size that both powers together have at least, over that expected of them [chosen]
-TAIL = 40.0  # degrees of freedom of the misfit of shapes that are one: nearly normal [chosen]
-ONE_SHAPE = 0.1  # of two powers of one shape, beside that of two shapes [calibrated, on seed 501]
-JITTER_PRIOR = 0.15  # of levels that are off by a factor each [calibrated]
-JITTERS, JITTER_PRIORS = (5e-3, 2.5e-2, 0.1), (0.5, 0.3, 0.2)  # size of factors less 1 [calibrated]
-# That the second power has a shape beside a multiple of the first, too, and the size of factors less 1 then: with more,
-# a third power looks like factors. [calibrated]
-OWN_SHAPE, JITTER_OF_SHAPES = 0.4, 5e-3
-FINEST_NOISE = (0.0, 0.1)  # noise of the finest level of a window, over its error [chosen]
-UNEXPECTED = 0.03  # prior of noise that nothing predicts [chosen]
-PREDICTION = 10.0  # noise is predicted within this factor [arithmetic]
-GROWTHS = (0.0, 0.5, 1.0, 1.5)  # of round-off: N to this power [arithmetic]
-COHERENCES = (3e-4, 3e-3, 3e-2, 0.3, 1.0)  # of a row that nothing is known of [chosen]
-PRICE = 2.0  # of a row with a size of its own: log of the range that sizes may have [calibrated]
-ALTERNATING = 0.02  # prior of errors that change their sign at every level [chosen]
-LONGEST_WINDOW = 11  # rows: halving from one step to round-off takes as many; more cost more than they say [chosen]
-DOMINATES = 0.1  # a power dominates where no other one has more than this part of it [chosen]
-ROUNDING = 0.1  # square of the noise that a level has at least, over its prediction [chosen]
-# The least noise of a level, over the largest difference from there on. [arithmetic]
-EPSILON = 2.0**-53
+DOMINATES = 0.1  # a power dominates if every other one is less than this part of it [chosen]
+LEAST_SIGNAL = (
+    0.1  # least mean square of both powers, given the rows, relative to the expected one [chosen]
+)
+LONGEST_WINDOW = 11  # rows; halving from one step reaches round-off in as many [chosen]
+
+# ---- Deviations from an expansion
+
+MISFIT = (
+    3e-4  # standard deviation of a level from its expansion, relative to its error [calibrated]
+)
+TAIL = 40.0  # degrees of freedom of Student's t for the misfit of one shape: nearly normal [chosen]
+ONE_SHAPE_PRIOR = 0.1  # prior of one shape, relative to two shapes [calibrated, on seed 501]
+JITTER_PRIOR = 0.15  # prior that the error of each level is off by a factor of its own [calibrated]
+# Standard deviations of these factors, and their priors. [calibrated]
+JITTERS, JITTER_PRIORS = (5e-3, 2.5e-2, 0.1), (0.5, 0.3, 0.2)
+# Prior that the second power then also has a shape of its own, and the standard deviation of the factors in that case:
+# with a larger one, a third power looks like factors. [calibrated]
+OWN_SHAPE_PRIOR, OWN_SHAPE_JITTER = 0.4, 5e-3
+ALTERNATING_PRIOR = 0.02  # prior of errors whose sign alternates from level to level [chosen]
+COHERENCES = (
+    3e-4,
+    3e-3,
+    3e-2,
+    0.3,
+    1.0,
+)  # part of a free row that is orthogonal to the next row [chosen]
+FREE_ROW_PENALTY = 2.0  # log of the range of sizes that a free row may have [calibrated]
+
+# ---- Noise
+
+FINEST_NOISE = (0.0, 0.1)  # noise of the finest level of a window, relative to its error [chosen]
+UNEXPECTED_PRIOR = 0.03  # prior of noise that differs from its prediction [chosen]
+PREDICTION_FACTOR = 10.0  # predicted noise is known to within this factor [arithmetic]
+GROWTHS = (
+    0.0,
+    0.5,
+    1.0,
+    1.5,
+)  # noise grows as the number of steps to one of these powers [arithmetic]
+ROUNDING = 0.1  # least noise variance of a level, relative to the predicted one [chosen]
+EPSILON = (
+    2.0**-53
+)  # least noise of a level, relative to the largest difference at it or at finer ones [arithmetic]
