@@ -94,6 +94,14 @@ def test_a_field_whose_errors_have_one_shape_is_judged_like_a_number(
         assert judge(h, values, order=order + 1).reason == "order_low"
 
 
+@pytest.mark.parametrize("size", [1.0, 1e-200, 1e200])
+def test_a_noise_of_any_size_is_part_of_the_bounds(size: float) -> None:
+    verdict = judge(H, [size * number for number in numbers(2.0)], noise=1e300)
+    assert verdict.reason == "exact"
+    assert (verdict.error_bound or 0.0) >= 1e300
+    assert (verdict.best_bound or 0.0) >= 1e300
+
+
 def test_another_order_fails() -> None:
     low = judge(H, numbers(1.0), order=2)
     assert (low.status, low.reason) == ("FAIL", "order_low")

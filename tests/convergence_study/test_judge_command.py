@@ -118,6 +118,37 @@ def test_tables_are_read_as_people_write_them(
         assert verdict["h_used"] == [0.1, 0.05, 0.025]
 
 
+@pytest.mark.parametrize(
+    ("cells", "bound"),
+    [
+        ("1.000", 5e-4),
+        ("1,000", 5e-4),
+        ("0.000", 5e-4),
+        ("12.50", 5e-3),
+        ("1.20e+03", 5.0),
+        # numbers as they are, by `repr`
+        ("1.0", 0.0),
+        ("0.5", 0.0),
+    ],
+)
+def test_zeros_at_the_end_of_values_are_digits(
+    cells: str, bound: float, table: Callable[..., str], capsys: Capture
+) -> None:
+    path = table("h;u\n" + "".join(f"{h};{cells}\n" for h in (4, 2, 1)))
+    exact = f"u={float(cells.replace(',', '.'))!r}"
+    for arguments in ([], ["--exact", exact]):
+        assert main(["judge", path, "--h", "h", "--json", *arguments]) == 0
+        (verdict,) = entries(capsys)
+        assert verdict["reason"] == "exact"
+        if not arguments:
+            assert verdict["error_bound"] == pytest.approx(bound, abs=1e-12)
+            assert verdict["best_bound"] == pytest.approx(bound, abs=1e-12)
+    # an exact value within half a digit is not missed
+    near = f"u={float(cells.replace(',', '.')) + 0.9 * bound!r}"
+    assert main(["judge", path, "--h", "h", "--json", "--exact", near]) == 0
+    assert entries(capsys)
+
+
 def test_two_rows_are_too_few(table: Callable[..., str], capsys: Capture) -> None:
     path = table("dt,u\n0.1,1\n0.05,2\n")
     assert main(["judge", path, "--h", "dt", "--json"]) == 1
@@ -166,6 +197,7 @@ def test_what_is_not_finite_is_data(word: str, table: Callable[..., str], capsys
         (TABLE, ["--quantity", "v"], "--quantity: v: the table has no such column"),
         (TABLE, ["--quantity", "dt"], "--quantity: dt: holds the step sizes"),
         (TABLE, ["--exact", "u"], "--exact: u: must be QUANTITY=VALUE"),
+        (TABLE, ["--exact", "3"], "--exact: 3: must be QUANTITY=VALUE: such as u=1.5"),
         (TABLE, ["--exact", "=3"], "--exact: =3: must be QUANTITY=VALUE"),
         (TABLE, ["--exact", "v=3"], "--exact: v: is no quantity that is judged"),
         (TABLE, ["--exact", "u=three"], "--exact: u=three: its value must be a finite number"),
@@ -389,6 +421,7 @@ def test_files_that_do_not_fit_are_refused(tmp_path: Path, capsys: Capture) -> N
         ([*files, "--h", "0.1,b,c", *quantity], "must be a name, or numbers separated by commas"),
         ([*files, "--h", "0.1,0.05,0.1", *quantity], f"{files[2]}: h: 0.1: is the step size of {files[0]}, too"),
         ([*files, "--h", "0.1,0.05,-1", *quantity], f"{files[2]}: h: -1: must be a finite number above 0"),
+        ([*files, "--h", "-.1,0.05,0.02", *quantity], f"{files[0]}: h: -0.1: must be a finite number above 0"),
         ([*files, files[0], "--h", "dx", *quantity], f"{files[0]}: dx: 0.1: is the step size of {files[0]}, too"),
         ([*files, "--h", "dx", "--quantity", "t"], f"{files[0]}: --quantity: t: the file has no such variable"),
         ([*files, str(empty), "--h", "dx", *quantity], f"{empty}: --h: dx: is neither"),

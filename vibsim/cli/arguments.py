@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import math
+import re
 from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from importlib import import_module
@@ -45,7 +46,13 @@ def parsed(arguments: Sequence[str]) -> argparse.Namespace:
     first = next((word for word in arguments if not word.startswith("-")), None)
     if first is not None and first not in known:
         top.error(f"unknown command '{first}': {nearest(first, known)}")
-    own, handed = list(arguments), list[str]()
+    own, handed = list[str](), list[str]()
+    for word in arguments:
+        if re.match(r"-\.?[0-9]", word) and own and re.fullmatch("--[a-z-]+", own[-1]):
+            # `argparse` takes -0.1,-0.2 for an option
+            own[-1] += f"={word}"
+        else:
+            own.append(word)
     if first == "run" and "--" in own:
         border = own.index("--")
         own, handed = own[:border], own[border + 1 :]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from decimal import Decimal, InvalidOperation
 from pathlib import Path
 from typing import Any
 
@@ -24,7 +25,7 @@ class Study:
     h: Mapping[str, Sequence[float]]
     """Name and values of the step size."""
     values: Sequence[Any]
-    """Numbers, or `vibsim.convergence.study.grid_values.GridValues`."""
+    """Numbers as they are written, or `vibsim.convergence.study.grid_values.GridValues`."""
     files: Sequence[str] = field(default_factory=tuple)
 
 
@@ -52,12 +53,24 @@ def read(path: Path, size: str, quantities: Sequence[str]) -> list[Study]:
         names.extend(_chosen(file, known, size, quantities))
         return [size, *names]
 
-    (h, *columns), lines = _read(path, choose, MOST_LEVELS)
+    cells: list[list[str]] = []
+    (h, *_), lines = _read(path, choose, MOST_LEVELS, cells)
     if not len(lines):
         raise InputError([Fault(file, 0, "", "", "has no row below the names of its columns")])
     check_sizes(((file, line) for line in lines.tolist()), size, h.tolist())
-    table = zip(names, columns, strict=True)
-    return [Study(name, {size: h.tolist()}, column.tolist(), [file]) for name, column in table]
+    columns = list(zip(*cells, strict=True))[1:]
+    return [
+        Study(name, {size: h.tolist()}, [_as_written(cell) for cell in column], [file])
+        for name, column in zip(names, columns, strict=True)
+    ]
+
+
+def _as_written(cell: str) -> Decimal:
+    try:
+        return Decimal(cell)
+    except InvalidOperation:
+        # a power of ten beyond those of decimals
+        return Decimal(float(cell))
 
 
 def columns(
@@ -84,16 +97,20 @@ def _read(
     path: Path,
     choose: Callable[[list[str], bool], Sequence[str]],
     most: int,
+    cells: list[list[str]] | None = None,
     *,
     is_shown: bool = True,
 ) -> tuple[list[Floats], Integers]:
-    """Return the columns that `choose` names of those that there are, and the line of every row."""
+    """Return the columns that `choose` names of those that there are, and the line of every row.
+
+    `cells` takes those of these columns.
+    """
 
     def numbers(known: list[str], is_table: bool) -> list[int]:
         return [known.index(name) for name in choose(known, is_table)]
 
     try:
-        return csv_text.read(read_bytes(path, MOST_BYTES), numbers, most)
+        return csv_text.read(read_bytes(path, MOST_BYTES), numbers, most, cells)
     except csv_text.CsvError as error:
         cell = _printable(error.cell) if is_shown or csv_text.is_shown(error.cell) else ""
         fault = Fault(str(path), error.line, error.column, cell, error.rule, error.hint)

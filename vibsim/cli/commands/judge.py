@@ -84,7 +84,7 @@ def _exact(entries: Sequence[str] | None, known: Sequence[str]) -> Mapping[str, 
         name, has_value, text = entry.rpartition("=")
         name = name.strip()
         if not has_value or not name:
-            _refuse("--exact", entry, "must be QUANTITY=VALUE")
+            _refuse("--exact", entry, "must be QUANTITY=VALUE", f"such as {known[0]}=1.5")
         if name not in known:
             _refuse("--exact", name, "is no quantity that is judged", nearest(name, list(known)))
         if name in found:

@@ -120,7 +120,7 @@ def _left_out(one: Outcome) -> tuple[str, ...]:
         return ()
     some = f"{one.left_out} of {len(one.finite)} levels"
     return (
-        f"The verdict leaves out {some}: their step sizes are within a factor of {LEAST_RATIO:g} of others.",
+        f"The verdict leaves out {some}: their step sizes are closer than a factor of {LEAST_RATIO:g} to others.",
     )
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from decimal import Decimal
 from typing import Any
 
 import numpy as np
@@ -32,10 +33,12 @@ class GridValues:
     """As the user gave them."""
     units_of_coords: Mapping[str, tuple[str, str]] = field(default_factory=dict)
     """Empty of coordinates without one; with the calendar of dates."""
+    written: Decimal | None = None
+    """A number with the digits that it was written with."""
 
 
 def grid_values(value: Any, key: str) -> GridValues:
-    """Return a number, a numpy array, an xarray object or `GridValues` as `GridValues`.
+    """Return a number (a `Decimal` has its digits), a numpy array, an xarray object or `GridValues` as `GridValues`.
 
     Raises
     ------
@@ -44,6 +47,9 @@ def grid_values(value: Any, key: str) -> GridValues:
     """
     if isinstance(value, GridValues):
         return value
+    if isinstance(value, Decimal):
+        number = np.array(np.nan if value.is_nan() else float(value))
+        return GridValues(number, (), written=value)
     if hasattr(value, "data_vars"):
         names = list(value.data_vars)
         if len(names) != 1:

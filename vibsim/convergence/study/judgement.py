@@ -74,6 +74,7 @@ def judge(
         not be proportional to it, but must decrease with it.
     values
         The result of every level, in the order of `h`: numbers, numpy arrays of any dimension, or xarray objects.
+        Numbers may be `decimal.Decimal`, with the digits as they are written: zeros at the end count.
     order, at_least
         The order that is expected, or the lowest one that is. Without both any order passes that may be believed.
     exact
@@ -201,10 +202,16 @@ def verdicts(
         dims = [dims]
     fixed = levels[0].dims[:1] if members else ()
     common = common_values(levels, kind, dims, fixed)
-    half = None
-    if isinstance(exact, Decimal):
-        half, exact = half_written(exact), float(exact)
-    request = Request(quantity or levels[0].name or "u", order, at_least, noise, half)
+    half = half_written(exact) if isinstance(exact, Decimal) else None
+    written = tuple(level.written for level in levels if level.written is not None)
+    request = Request(
+        quantity or levels[0].name or "u",
+        order,
+        at_least,
+        noise,
+        half,
+        written if len(written) == len(levels) else None,
+    )
     truth = None if exact is None else exact_values(exact, common, members=members)
     shape, n = common.values.shape[1:], len(steps.h)
     count, inner = (shape[0], shape[1:]) if members else (1, shape)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from decimal import Decimal
 
@@ -15,7 +16,7 @@ SINGLE = float(np.finfo(np.float32).eps)
 LARGEST = 1e150
 """Scaled values do not exceed it: their squares are numbers."""
 FURTHEST = 1e100
-"""Distance from the exact solution, over the size of the values, beyond which it is all the same."""
+"""Distance from the exact solution, and noise, over the size of the values, beyond which it is all the same."""
 
 
 FEW_DIGITS = 11
@@ -56,15 +57,24 @@ def scale_of(values: Floats) -> Floats:
     return np.asarray(np.ldexp(1.0, np.frexp(np.where(size > 0.0, size, 1.0))[1] - 1))
 
 
-def half_last_digits(values: Floats, few: int = FEW_DIGITS, *, of_binary: bool = False) -> Floats:
+def half_last_digits(
+    values: Floats,
+    few: int = FEW_DIGITS,
+    *,
+    of_binary: bool = False,
+    written: Sequence[Decimal] | None = None,
+) -> Floats:
     """Return half a unit of the last decimal digit of the values of each level, shape (n,).
 
     It is how far values are from what they were before they were printed or stored with no more than `few` digits; else
     0. All values may have as many decimal places, or as many digits: the last digit of larger ones is then at another
     place, and the larger unit counts. Finite values have the shape (n, points).
 
-    Binary fractions have few digits anyway: without `of_binary` they are taken as they are.
+    Binary fractions have few digits anyway: without `of_binary` they are taken as they are. Where the levels are
+    numbers as they were `written`, with zeros at the end, these are digits of all.
     """
+    if written is not None and any(map(_is_padded, written)):
+        return _half_units(written)
     none, sampled = np.zeros(len(values)), values[:, :: -(-values.shape[1] // SAMPLED)]
     largest, digits = float(np.max(np.abs(sampled))), 1
     size = last = Decimal(repr(largest)).adjusted()
@@ -87,6 +97,20 @@ def half_last_digits(values: Floats, few: int = FEW_DIGITS, *, of_binary: bool =
         sizes = [Decimal(repr(x)).adjusted() if x else last for x in own.tolist()]
         units = np.maximum(units, np.array(sizes) - digits + 1)
     return np.array([float(Decimal(5).scaleb(unit - 1)) for unit in units.tolist()])
+
+
+def _is_padded(number: Decimal) -> bool:
+    """Say whether a number is written with zeros at its end, as for its precision: 1.20, not 120 or 1.0."""
+    _, digits, last = number.as_tuple()
+    return last not in (-1, 0) and isinstance(last, int) and digits[-1] == 0
+
+
+def _half_units(written: Sequence[Decimal]) -> Floats:
+    """Return half a unit of the last digit of numbers with as many decimal places, or as many digits."""
+    last = min(int(number.as_tuple().exponent) for number in written)
+    digits = max(len(number.as_tuple().digits) for number in written)
+    units = (max(last, number.adjusted() - digits + 1) if number else last for number in written)
+    return np.array([float(Decimal(5).scaleb(unit - 1)) for unit in units])
 
 
 def half_written(number: Decimal) -> float:
@@ -171,7 +195,9 @@ def measurement(
     epsilon = np.where(single, np.maximum(epsilon, SINGLE), np.broadcast_to(epsilon, norms.shape))
     floor = 0.5 * epsilon * norms
     if noise is not None:
-        floor = np.maximum(floor, noise / scale[:, None])
+        # what is larger says no more, and its square would overflow
+        with np.errstate(over="ignore"):
+            floor = np.maximum(floor, np.minimum(noise / scale[:, None], FURTHEST))
     ladder = Ladder(
         h=h,
         gram=gram,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, fields, replace
+from decimal import Decimal
 
 import numpy as np
 
@@ -54,6 +55,13 @@ class Request:
     noise: float | None
     half_of_exact: float | None = None
     """Half a unit of the last digit of the exact value as it was written; None where only its value is known."""
+    written: tuple[Decimal, ...] | None = None
+    """Numbers of all levels with the digits that they were written with."""
+
+    def halves(self, part: Floats, places: Integers, *, of_binary: bool = False) -> Floats:
+        """Return half a unit of the last digit of levels, whose places are given; see `half_last_digits`."""
+        written = None if self.written is None else [self.written[i] for i in places]
+        return half_last_digits(part, of_binary=of_binary, written=written)
 
 
 @dataclass
@@ -235,12 +243,13 @@ def _with_finite(
             question = question.with_stated_noise
         decided = assess(few.ladder, question)
         if not request.noise:
-            _allow_for_rounding(decided, few, rest, question)
+            half = np.array([request.halves(rows, finite[judged]) for rows in rest])
+            _allow_for_rounding(decided, few, half, question)
     for k, one in enumerate(found):
         truth = None if exact is None else exact[k]
-        _measure(one, measured, k, part[k], truth)
+        _measure(one, measured, k, part[k], truth, request.noise or 0.0)
         if decided is not None:
-            _decide(one, decided, k, few, part[k], judged, truth, bool(request.noise))
+            _decide(one, decided, k, few, part[k], judged, truth, request)
         if len(finite) < n:
             # levels that are not finite decide, whatever the others say; the error is that of the finest level
             one.reason = "non_finite"
@@ -250,13 +259,13 @@ def _with_finite(
 
 
 def _allow_for_rounding(
-    decided: Assessment, measured: Measurement, part: Floats, question: Question
+    decided: Assessment, measured: Measurement, half: Floats, question: Question
 ) -> None:
     """Take back what was decided of values of few digits, if noise as large as their rounding decides otherwise.
 
-    What is decided in both cases has an interval that holds both.
+    What is decided in both cases has an interval that holds both. `half` is half a unit of the last digit, of shape
+    (member, n).
     """
-    half = np.array([half_last_digits(rows) for rows in part])
     near = decided.error * measured.scale <= MOST_UNITS * half[:, -1]
     doubtful = is_one_of(decided.reason, *DECIDED) | (
         near & is_one_of(decided.reason, "wrong_limit")
@@ -277,7 +286,7 @@ def _allow_for_rounding(
 
 
 def _measure(
-    one: Outcome, measured: Measurement, k: int, part: Floats, truth: Floats | None
+    one: Outcome, measured: Measurement, k: int, part: Floats, truth: Floats | None, noise: float
 ) -> None:
     """Add what was measured of member `k`, whose finite levels are `part`, shape (finite, points)."""
     scale, rows = float(measured.scale[k]), len(part) - 1
@@ -288,7 +297,7 @@ def _measure(
     one.reason = "too_few_levels"
     one.values[one.finite] = part[:, 0] if one.is_number else measured.norms[k]
     one.size = float(measured.norms[k, -1])
-    one.floor = float(measured.ladder.floor[k, -1]) * scale
+    one.floor = max(float(measured.ladder.floor[k, -1]) * scale, noise)
     if truth is not None:
         one.errors[one.finite] = _distances(part, truth, one.is_number, scale)
         one.error = float(one.errors[one.finite[-1]])
@@ -320,16 +329,16 @@ def _decide(
     every: Floats,
     judged: Integers,
     truth: Floats | None,
-    is_noise_stated: bool,
+    request: Request,
 ) -> None:
     """Add what was decided of member `k`, whose finite levels are `every` and whose exact values are `truth`.
 
     The verdict rests on the levels at the places `judged`, of which `measured` is.
     """
-    scale, part = float(measured.scale[k]), every[judged]
+    scale, part, places = float(measured.scale[k]), every[judged], one.finite[judged]
     one.reason = REASON_NAMES[int(decided.reason[k])]
     one.order, used, weights = _estimate(one, measured, decided, k)
-    one.used = tuple(one.finite[judged[used]].tolist())
+    one.used = tuple(places[used].tolist())
     one.left_out = len(every) - len(part)
     one.low, one.high = float(decided.low[k]), float(decided.high[k])
     one.is_contradicted = bool(decided.contradicted[k])
@@ -337,13 +346,13 @@ def _decide(
         # added up one by one, so that a member has the same digits alone and among others
         one.best = sum((w * row for w, row in zip(weights, part, strict=True)), 0.0 * part[0])
         added_up = ADDED_UP * SINGLE * measured.norms[k, -1] * measured.are_single[k]
-        units = np.maximum(half_last_digits(part), max(step_of_values(part), float(added_up)))
+        units = np.maximum(request.halves(part, places), max(step_of_values(part), float(added_up)))
         one.rounded = float(np.sum(units * np.abs(weights)))
     if one.reason == "wrong_limit":
         # the floor is that of storing numbers, half a unit
-        most = 0.0 if is_noise_stated else 2.0 * MOST_ADDED_UP * measured.ladder.floor[k, -1]
+        most = 0.0 if request.noise else 2.0 * MOST_ADDED_UP * measured.ladder.floor[k, -1]
         # what was printed as 10.5 was 10.46
-        half = float(half_last_digits(part, of_binary=True)[-1])
+        half = float(request.halves(part, places, of_binary=True)[-1])
         if abs(one.error) <= max(most * scale, half):
             one.reason = "round_off"
     bound_of_best = float(decided.best_bound[k]) * scale
@@ -357,7 +366,7 @@ def _decide(
         return
     one.error, one.error_bound = (
         float(decided.error[k]) * scale,
-        float(decided.error_bound[k]) * scale + one.rounded,
+        max(float(decided.error_bound[k]) * scale, request.noise or 0.0) + one.rounded,
     )
     if one.best is not None:
         one.errors[one.finite] = _distances(every, one.best, one.is_number, scale)

@@ -314,7 +314,8 @@ def _error(facts: LadderVerdict) -> str:
     share = f" ({share})" if share else ""
     bound = facts.error_bound
     limit = "" if facts.is_exact_known or bound is None else f", at most {at_most(bound)}"
-    return f"The error of the finest level is {size}{share}{limit}."
+    presumed = " if the levels converge" if limit and facts.status == "INCONCLUSIVE" else ""
+    return f"The error of the finest level is {size}{share}{limit}{presumed}."
 
 
 def _best(facts: LadderVerdict) -> str:

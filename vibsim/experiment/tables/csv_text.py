@@ -99,7 +99,10 @@ class _Rows:
 
 
 def read(
-    content: bytes, choose: Callable[[list[str], bool], Sequence[int]], most: int
+    content: bytes,
+    choose: Callable[[list[str], bool], Sequence[int]],
+    most: int,
+    written: list[list[str]] | None = None,
 ) -> tuple[list[Floats], Integers]:
     """Return columns of the bytes of a file, of equal length, and the line of every row, from 1.
 
@@ -113,6 +116,9 @@ def read(
         is not shown.
     most
         Number of rows that are read at most.
+    written
+        Takes the cells of these columns, row by row, with decimal points: zeros at the end are digits of what was
+        printed.
     """
     source = _Rows(content)
     rows = iter(source)
@@ -130,6 +136,8 @@ def read(
             raise CsvError(f"must not have more than {most} points")
         for i, name, column in chosen:
             column.append(marks.number(row[i], name, source.line, is_first=not lines))
+        if written is not None:
+            written.append([row[i].strip().replace(",", ".") for i, *_ in chosen])
         lines.append(source.line)
     marks.finish()
     columns = [np.array(column, dtype=np.float64) for _, _, column in chosen]
