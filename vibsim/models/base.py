@@ -1,7 +1,7 @@
-"""What a model is: data about an equation of motion, its formulas as text, or as trees where a user wrote them.
+"""Model: data about an equation of motion, with its formulas as text, or as expression trees if a user wrote them.
 
-A formula is no function, so that one statement of it serves every reader: the engine compiles it for each lane,
-Newton's method differentiates it, a report prints it.
+Formulas are not functions, so that each serves every reader: the engine compiles it for each lane, Newton's method
+differentiates it, a report prints it.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ Formula = str | Expression
 
 ENERGIES = ("kinetic_energy", "potential_energy", "energy", "energy_deviation")
 BUDGET = ("dissipated_energy", "work_done", "energy_budget")
-"""What damping took, what driving forces put in, and ``E(t) - E(0)`` plus the one minus the other, which is 0."""
+"""Energy taken by damping, work of driving forces, and ``E(t) - E(0)`` plus the first minus the second, which is 0."""
 
 
 @dataclass(frozen=True)
@@ -56,12 +56,12 @@ class State:
     unit: str
     long_name: str
     minimum: float | None = None
-    """Least initial value."""
+    """Smallest initial value that is accepted."""
 
 
 @dataclass(frozen=True)
 class Parameter:
-    """One parameter, with its unit and its bound."""
+    """One parameter, with its unit and its bounds."""
 
     name: str
     default: float
@@ -72,25 +72,25 @@ class Parameter:
     """Whether `minimum` itself is refused."""
     maximum: float | None = None
     neutral: float = 0.0
-    """Value at which its term is no part of the equation, of those in `Model.optional`: 1 of a factor."""
+    """For parameters in `Model.optional`: the value at which the term drops out of the equation, 1 for a factor."""
     path: str = ""
-    """Where it stands in the section ``model``, if not under its name: ``damping.linear``."""
+    """Path in the section ``model`` if it is not the name: ``damping.linear``."""
 
     @property
     def key(self) -> str:
-        """Its place in the section ``model``, by which it is swept and its values are found."""
+        """Path in the section ``model``, by which values and sweeps refer to it."""
         return self.path or self.name
 
 
 @dataclass(frozen=True)
 class Output:
-    """A quantity that follows from the state at a time, such as a force in a wire."""
+    """A further series, computed from state and time, such as the force in a wire."""
 
     name: str
     unit: str
     long_name: str
     formula: Formula
-    """In the state names, ``t`` and the parameters."""
+    """Formula in the state names, ``t`` and the parameters."""
 
 
 @dataclass(frozen=True)
@@ -99,50 +99,49 @@ class FormulaField:
 
     name: str
     names: tuple[str, ...]
-    """What it may name beside the declared parameters: a state, or ``t``."""
+    """Names that it may use beside the declared parameters: states or ``t``."""
     default: str
     description: str
     terms: Mapping[str, str] = field(default_factory=dict, hash=False)
     """Formulas with one coefficient b that may be written as ``{word: number}``."""
     term_units: Mapping[str, str] = field(default_factory=dict, hash=False)
-    """The unit of b in each of them."""
+    """The unit of b in each of these."""
     table: tuple[str, str] | None = None
-    """Names that the place and the value have in a table, where one may stand instead; None where not."""
+    """Column names of place and value if a table may replace the formula; None otherwise."""
     tabled: bool = False
-    """Whether a table always stands there, which a user looks up at a place of his own, under the key `AT`."""
+    """Whether the field is always a table; the user states under the key `AT` where it is looked up."""
     derivatives: int = 0
-    """How many times the equation differentiates it: it and all of its derivatives but the last must not jump."""
+    """Number of times the equation differentiates it; all derivatives but the last must be continuous."""
     along: str = "t"
-    """What its own name is at a time: a formula in ``t`` and the parameters of the model."""
+    """Value of its variable along the motion: a formula in ``t`` and the parameters of the model."""
     of: Literal["", "coordinate", "output", "term"] = ""
-    """What has a formula of its own, under its name: every coordinate, or every output, which a user names; or every
-    term of a sum, under its number. Empty where the field is one formula."""
+    """What has a formula each: every coordinate or output, by name, or every term of a sum, by number. Empty if the
+    field is a single formula."""
     beside: str = ""
-    """The field beside which alone it has a meaning; empty where it needs none."""
+    """The field that it requires; empty if none."""
     instead_of: str = ""
-    """The field whose place it takes."""
+    """The field that it replaces."""
     positive: bool = False
     """Whether its value must be greater than 0."""
     paired: bool = False
-    """Whether two coordinates may have one together: ``{x: {y: ...}}``, a symmetric matrix."""
+    """Whether it may have entries for pairs of coordinates, ``{x: {y: ...}}``: a symmetric matrix."""
 
 
 @dataclass(frozen=True)
 class Damping:
-    """A damping force over the mass that schemes with a treatment of their own can tell from the others."""
+    """A damping force over the mass, of a kind that some schemes treat specially."""
 
     kind: Literal["linear", "quadratic"]
     """``rate*v`` or ``rate*abs(v)*v``."""
     rate: Formula
-    """In the parameters."""
+    """Formula in the parameters."""
 
 
 @dataclass(frozen=True)
 class Model:
     """An equation of motion ``position'' = acceleration(position, velocity, t)``, of one coordinate or of several.
 
-    Of several coordinates, position and velocity are the first one's where a number is measured of one alone: peaks,
-    periods and turns.
+    Peaks, periods and turns are measured on the first coordinate.
     """
 
     kind: str
@@ -150,73 +149,73 @@ class Model:
     source: str
     equation: str
     states: tuple[State, ...]
-    """Position and velocity; of several coordinates all positions, then all velocities."""
+    """All positions, then all velocities."""
     parameters: tuple[Parameter, ...]
     acceleration: Formula
-    """Of the first coordinate, in the state names, ``t`` and the parameters."""
+    """Acceleration of the first coordinate, in the state names, ``t`` and the parameters."""
     kinetic_energy: Formula
     potential_energy: Formula
     energy_unit: str
     linear: bool
     conservative: bool
     natural_frequency: Callable[[Numbers], Any]
-    """Angular frequency of small oscillations [rad per unit of time], from the parameters; of several, of a period."""
+    """Angular frequency of small oscillations [rad per unit of time], from the parameters; the lowest if several."""
     turn: float | None = None
-    """The angle after which the position repeats; None where it does not."""
+    """Angle after which the position repeats; None if it does not repeat."""
     exact: Callable[[Floats, Numbers, Numbers], dict[str, Floats]] | None = None
     """Exact states at times t, shape (..., n_t), from initial values and parameters of shape (..., 1) or ()."""
     exact_period: Callable[[Numbers, Numbers], Any] | None = None
-    """Exact period from initial values and parameters: of an oscillation, or of one turn."""
+    """Exact period of an oscillation or of one turn, from initial values and parameters."""
     dissipation: Formula | None = None
-    """Power that damping takes from the energy; None where there is no damping."""
+    """Power that damping takes from the energy; None without damping."""
     driving: Formula | None = None
-    """Power that driving forces put into the energy; None where there are none."""
+    """Power that driving forces put into the energy; None without driving forces."""
     outputs: tuple[Output, ...] = ()
-    """What else is stored as a series."""
+    """Further stored series."""
     start: Callable[[Numbers], dict[str, Any]] | None = None
-    """Initial values that the parameters already give, as arrays that broadcast; None where a user gives them."""
+    """Initial values as a function of the parameters, arrays that broadcast; None if the user gives them."""
     optional: tuple[str, ...] = ()
-    """Parameters with a term of their own, which is no part of the equation where they are neutral (0, or a factor 1)
-    and are not swept."""
+    """Parameters with a term that is left out of the equation if they have their neutral value and are not swept."""
     variant: Callable[[frozenset[str]], Model] | None = None
-    """The model with the terms of some of `optional`; this one has those of none, but a mass."""
+    """Function that returns the model with the terms of a subset of `optional`; this model has none of them, except a
+    mass."""
     damping: Damping | None = None
-    """The damping force, where it is one of two simple kinds."""
+    """The damping force if it is of a simple kind."""
     events: Events | None = None
-    """Where the motion is not smooth; None where it is smooth throughout."""
+    """Events, where the motion is not smooth; None if it is smooth throughout."""
     formulas: tuple[FormulaField, ...] = ()
-    """What a user writes as formulas."""
+    """Formulas that a user may write."""
     takes_events: bool = False
-    """Whether a user may write events and a stop as formulas beside them (`vibsim.models.shared.crossings`)."""
+    """Whether a user may also write events and a stop as formulas (`vibsim.models.shared.crossings`)."""
     written: Callable[..., Model] | None = None
-    """The model of such formulas, by name, with declared parameters; see `vibsim.models.oscillator`. Formulas of single
-    coordinates and outputs have the name of the field before their own: ``acceleration.x``. Behind them stand numbers
-    of files: a `Table` in place of a formula, with `Lookup.is_met`, or a `Structure`."""
+    """Function that returns the model with given formulas, by name, and declared parameters, as in
+    `vibsim.models.oscillator`. Keys of formulas of coordinates and outputs begin with the field: ``acceleration.x``.
+    Further arguments are numbers of files: a `Table` in place of a formula, with `Lookup.is_met`, or a `Structure`."""
     named: Callable[[tuple[str, ...]], Model] | None = None
-    """The model whose coordinates have such names; None where a user does not name them."""
+    """Function that returns the model with coordinates of these names; None if a user cannot name them."""
     lookup: Lookup | None = None
-    """The table that the formulas look up; None where there is none."""
+    """The table that the formulas look up, if any."""
     scales: Scales | None = None
-    """Its characteristic scales, where it has any."""
+    """Characteristic scales, if any."""
     highest_frequency: Callable[[Numbers], Any] | None = None
-    """The highest angular frequency of small oscillations, which a step has to resolve; None: the natural one."""
+    """The highest angular frequency of small oscillations, which steps must resolve; None: the natural frequency."""
     further_accelerations: tuple[Formula, ...] = ()
-    """Of the coordinates behind the first one."""
+    """Accelerations of the coordinates after the first."""
     loaded: Loaded | None = None
-    """The structure that is stepped as a whole, of which the states are what is observed; None of any other model."""
+    """The structure that is stepped as a whole; the states are then its observed displacements. None otherwise."""
     misses_potential: bool = False
-    """Whether positions make forces of which no potential energy is known: energies are kinetic alone."""
+    """Whether forces depend on positions but no potential energy is known: the energy is then the kinetic energy."""
     superposed: bool = False
-    """Whether the motion of several coordinates is a sum of linear, conservative ones: the energy has their orders."""
+    """Whether the motion is a sum of linear, conservative motions; the energy then has their orders."""
 
     def with_formulas(
         self, formulas: Mapping[str, str], declared: tuple[str, ...], *numbers: Any
     ) -> Model:
-        """Return the model of formulas by their names, with declared parameters and numbers of files: see `written`."""
+        """Return the model with given formulas, declared parameters and numbers of files: see `written`."""
         return self if self.written is None else self.written(formulas, declared, *numbers)
 
     def with_terms(self, names: Iterable[str]) -> Model:
-        """Return the model with the terms of some of `optional`."""
+        """Return the model with the terms of these parameters of `optional`."""
         return self if self.variant is None else self.variant(frozenset(names))
 
     @property
@@ -226,12 +225,12 @@ class Model:
 
     @property
     def is_alone(self) -> bool:
-        """Whether the one coordinate is the whole motion."""
+        """Whether the model has a single degree of freedom."""
         return self.coordinates == 1 and self.loaded is None
 
     @property
     def dimensionless(self) -> bool:
-        """Whether the states have no units, so that the time has none."""
+        """Whether the states, and so the time, have no units."""
         return all(state.unit == "1" for state in self.states)
 
     @property
@@ -241,7 +240,7 @@ class Model:
 
     @property
     def forces(self) -> tuple[Formula, ...]:
-        """Formulas of what acts: the accelerations, or of a structure the loads that are no tables."""
+        """The accelerations; of a structure, the loads that are formulas."""
         return self.accelerations if self.loaded is None else self.loaded.formulas
 
     @property
@@ -267,18 +266,18 @@ class Model:
 
 @cache
 def tree(model: Model, formula: Formula) -> Expression:
-    """Return a formula of a model in its states, ``t`` and its parameters."""
+    """Return a formula of a model as an expression in its states, ``t`` and its parameters."""
     if not isinstance(formula, str):
         return formula
     return parse(formula, (*(state.name for state in model.states), "t", *parameter_names(model)))
 
 
 _TAKEN = ("t", "scheme", "case", "level", "status", "end")
-"""Names that files and formulas have for something else."""
+"""Names that have another meaning in files or formulas."""
 
 
 def fault_of(model: object) -> str:
-    """Say why an object from elsewhere is no model; nothing where it is one."""
+    """Return why an object from an installed package cannot be added as a model; empty if it can."""
     if not isinstance(model, Model):
         return f"is no vibsim.models.Model, but of the type {type(model).__name__}"
     if not re.fullmatch("[a-z0-9_]+", model.kind):
@@ -308,7 +307,7 @@ def fault_of(model: object) -> str:
             tree(model, formula)
         except ExpressionError as error:
             return f"its formula of {name}, {error.text}: {error.rule}"
-    # what stands in its place in an experiment
+    # models that may take its place in an experiment
     made = {
         "named": model.named and model.named(model.positions),
         "variant": model.variant and model.variant(frozenset()),
@@ -331,17 +330,17 @@ def declared_parameters(names: Iterable[str]) -> tuple[Parameter, ...]:
 def speeds(
     positions: Iterable[str], velocities: Iterable[str], accelerations: Iterable[Expression]
 ) -> Iterator[tuple[str, Expression]]:
-    """Yield everything that changes along a motion, with the formula of its rate: the time, positions, velocities."""
-    named = tuple(velocities)
+    """Yield time, positions and velocities, each with the formula of its time derivative along a motion."""
+    names = tuple(velocities)
     yield "t", ONE
-    yield from zip(positions, map(Name, named), strict=True)
-    yield from zip(named, accelerations, strict=True)
+    yield from zip(positions, map(Name, names), strict=True)
+    yield from zip(names, accelerations, strict=True)
 
 
 def rate(
     model: Model, formula: Expression, accelerations: Sequence[Expression] | None = None
 ) -> Expression:
-    """Return how fast a formula changes along a motion of the model, or along one with other accelerations."""
+    """Return the time derivative of a formula along a motion of the model, or along one with other accelerations."""
     pushes = accelerations or [tree(model, acceleration) for acceleration in model.accelerations]
     total: Expression = Number(0.0)
     for name, speed in speeds(model.positions, model.velocities, pushes):
@@ -352,30 +351,30 @@ def rate(
 
 
 def has_solution(model: Model) -> bool:
-    """Tell whether the motion is known: exactly, or to twelve digits by a reference that stops at every corner.
+    """Tell whether the motion is known: exactly, or to twelve digits by a reference solution.
 
-    Of a structure it is known by its modes alone. Of a single motion the
-    reference may not exist (`vibsim.simulation.reference.solve`): its numbers are then NaN.
+    The motion of a structure is known only by its modes. The reference solution of a single member may fail
+    (`vibsim.simulation.reference.solve`): its values are then NaN.
     """
     return model.exact is not None or (model.events is None and model.loaded is None)
 
 
 def parameter_names(model: Model) -> tuple[str, ...]:
-    """Name the parameters as formulas do, in the order of the engine."""
+    """Return the names of the parameters in formulas, in the order of the engine."""
     return tuple(parameter.name for parameter in model.parameters)
 
 
 def natural_end(model: Model, periods: float, parameters: Numbers) -> Any:
-    """Return the time that a number of natural periods (small oscillations) takes, as a number or an array."""
+    """Return the duration of a number of natural periods (small oscillations), as a number or an array."""
     return periods * (2.0 * math.pi / model.natural_frequency(parameters))
 
 
 def looked_up(
     model: Model, numbers: Mapping[str, Any], before: Floats | None = None
 ) -> dict[str, Floats]:
-    """Return what the table of a model says, by its names in formulas, in what `numbers` say of t and the parameters.
+    """Return height and second derivative from the table of a model, by their names in formulas; empty without a table.
 
-    Nothing where the model looks none up; `before` is that of `Table.read`.
+    `numbers` gives t and the parameters by name, `before` is that of `Table.read`.
     """
     if model.lookup is None:
         return {}
@@ -384,7 +383,7 @@ def looked_up(
 
 
 def table_end(model: Model, parameters: Numbers) -> Any:
-    """Return the time at which the last point of the table of `model` is reached, at a constant speed; see `Lookup`."""
+    """Return the time at which a motion reaches the last point of the table, at the speed of `Lookup.place`."""
     assert model.lookup is not None
     numbers = {row.name: parameters[row.key] for row in model.parameters}
     with np.errstate(divide="ignore"):
@@ -393,14 +392,14 @@ def table_end(model: Model, parameters: Numbers) -> Any:
 
 
 def has_budget(model: Model) -> bool:
-    """Tell whether damping, driving forces, friction or impacts change the energy of a model by known amounts."""
+    """Tell whether the energy changes by a known amount, due to damping, driving forces, friction or impacts."""
     return model.dissipation is not None or model.driving is not None or model.events is not None
 
 
 def quantities(model: Model, own_velocity: bool = False) -> tuple[str, ...]:
-    """Name every quantity of `model` that is stored as a series.
+    """Return the name of every quantity of `model` that is stored as a series.
 
-    With `own_velocity` some scheme has another velocity than the centred difference, and `centred` is stored as well.
+    `own_velocity` says that the velocity of some scheme is not the centred difference: `centred` is then stored too.
     """
     return (
         *(state.name for state in model.states),
@@ -412,19 +411,19 @@ def quantities(model: Model, own_velocity: bool = False) -> tuple[str, ...]:
 
 
 def has_error_parts(model: Model) -> bool:
-    """Tell whether a position's error is a shift in time and a factor of the amplitude: the motion is smooth.
+    """Tell whether the error of a position can be split into a shift in time and a factor of the amplitude.
 
-    Across an impact, or a corner of the force, a shift is not all there is; accelerations of a structure are not kept.
+    That requires a smooth motion, and its accelerations, which are not kept for a structure.
     """
     return model.events is None and model.lookup is None and model.loaded is None
 
 
 def error_parts(model: Model) -> tuple[str, ...]:
-    """Name these parts of every position's error, made when levels are compared; empty where there are none."""
+    """Return the names of these parts for every position; they are computed when levels are compared."""
     positions = model.positions if has_error_parts(model) else ()
     return tuple(name + end for name in positions for end in (PHASE, AMPLITUDE))
 
 
 def centred(model: Model) -> tuple[str, ...]:
-    """Name the centred differences of the positions, ``[D_2t u]``, the energy by these velocities, its deviation."""
+    """Return the names of the centred differences ``[D_2t u]``, of the energy with these velocities, its deviation."""
     return tuple(name + CENTRED for name in (*model.velocities, "energy", "energy_deviation"))

@@ -1,10 +1,10 @@
-r"""A ball that bounces: ``h'' = -g`` above the ground, ``v -> -restitution*v`` where it meets it, at h = 0.
+r"""A bouncing ball: ``h'' = -g`` above the ground, ``v -> -restitution*v`` at impacts, where h = 0.
 
-Without air, the speed after impact number k = 1, 2, ... is ``restitution^k v_1``, with v_1 that of the first impact,
-and the bounce behind it takes ``2 restitution^k v_1/g``: impacts follow each other as the terms of a geometric series.
-The ball lies at rest from the first impact behind which its speed would be at most eps_v. With eps_v = 0 there are
-infinitely many, all before ``t_1 + (2 v_1/g) restitution/(1 - restitution)``; there it lies too. A ball that is on the
-ground with at most the speed eps_v at t = 0 lies there.
+Without air, the speed after impact number k = 1, 2, ... is ``restitution^k v_1``, with v_1 the speed of the first
+impact, and the next bounce takes ``2 restitution^k v_1/g``: the durations form a geometric series. The ball is at rest
+from the first impact after which its speed would be at most eps_v. With eps_v = 0 there are infinitely many impacts,
+all before ``t_1 + (2 v_1/g) restitution/(1 - restitution)``, when it comes to rest. A ball that is on the ground at
+t = 0 with a speed of at most eps_v is at rest from the beginning.
 
 Source: vibration text (B), section 10.9, equations (115)-(117), and exercise 20. Units: g [m s-2], eps_h [m],
 eps_v [m s-1], h [m], v [m s-1]; the energy is that of a unit mass, ``v^2/2 + g h`` [m2 s-2].
@@ -27,19 +27,19 @@ def first_impact(initial: Numbers, parameters: Numbers) -> tuple[Any, Any]:
     """Return time [s] and speed [m s-1] of the first impact."""
     h, v, g = initial["h"], initial["v"], parameters["g"]
     speed = np.sqrt(v * v + 2.0 * g * h)
-    # the sum of both where they have one sign, else the same without cancellation
+    # two forms of the same root, each without cancellation for one sign of v
     with np.errstate(divide="ignore", invalid="ignore"):
         time = np.where(v >= 0, (v + speed) / g, 2.0 * h / (speed - v))
     return time, speed
 
 
 def last_impact(initial: Numbers, parameters: Numbers) -> Any:
-    """Return the number of the impact from which the ball lies at rest: 0 for the beginning, infinite for none."""
+    """Return the number of the impact after which the ball is at rest: 0 for the beginning, infinite for never."""
     _, speed = first_impact(initial, parameters)
     e, slow = parameters["restitution"], parameters["eps_v"]
     with np.errstate(divide="ignore", invalid="ignore"):
         number = np.ceil(on_arrays.log(slow / speed) / on_arrays.log(e))
-        # the logarithms may miss a speed that is eps_v itself
+        # rounding of the logarithms may miss a speed that is exactly eps_v
         number = np.where(on_arrays.power(e, number - 1.0) * speed <= slow, number - 1.0, number)
     number = np.where(e == 0, 1.0, np.where(e == 1, np.inf, np.where(slow == 0, np.inf, number)))
     number = np.where(e * speed <= slow, 1.0, number)
@@ -48,7 +48,7 @@ def last_impact(initial: Numbers, parameters: Numbers) -> Any:
 
 
 def impact_time(number: Any, initial: Numbers, parameters: Numbers) -> Any:
-    """Return the time [s] of impact `number` = 1, 2, ..., or infinite for the limit of all; 0 for number 0."""
+    """Return the time [s] of impact `number` = 1, 2, ...; their limit for an infinite number, 0 for number 0."""
     time, speed = first_impact(initial, parameters)
     e, flight = parameters["restitution"], 2.0 * speed / parameters["g"]
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -62,12 +62,12 @@ def impact_time(number: Any, initial: Numbers, parameters: Numbers) -> Any:
 
 
 def exact(t: Floats, initial: Numbers, parameters: Numbers) -> dict[str, Floats]:
-    """Return h and v at times `t`, shape (..., n_t); at the time of an impact those behind it."""
+    """Return h and v at times `t`, shape (..., n_t); at the time of an impact, the values after it."""
     g, e = parameters["g"], parameters["restitution"]
     time, speed = first_impact(initial, parameters)
     last = last_impact(initial, parameters)
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        # the sum of the bounces behind the first impact, in units of the first one over e
+        # time since the first impact, in units of the first bounce over e
         passed = (t - time) * g / (2.0 * speed)
         left = np.where(e < 1, 1.0 - passed * (1.0 - e) / e, 1.0)
         number = (
@@ -75,7 +75,7 @@ def exact(t: Floats, initial: Numbers, parameters: Numbers) -> dict[str, Floats]
             + 1.0
         )
         number = np.where(left <= 0, np.inf, np.maximum(number, 1.0))
-        # logarithms may have missed the last impact up to t by one
+        # rounding of the logarithms may miss the last impact up to t by one
         sooner = impact_time(np.maximum(number, 1.0), initial, parameters) > t
         number = np.where(sooner & (number > 1.0), number - 1.0, number)
         later = impact_time(number + 1.0, initial, parameters) <= t
@@ -87,7 +87,7 @@ def exact(t: Floats, initial: Numbers, parameters: Numbers) -> dict[str, Floats]
     rests = ~first & ((number >= last) | ~np.isfinite(number))
     h = np.where(rests, 0.0, np.maximum(h, 0.0))
     v = np.where(rests, 0.0, v)
-    # at t = 0 the initial values, also of a ball that meets the ground there
+    # at t = 0 the initial values, even if the ball hits the ground then
     first = first | (t == 0)
     fall = initial["h"] + t * (initial["v"] - 0.5 * g * t)
     return {"h": np.where(first, fall, h), "v": np.where(first, initial["v"] - g * t, v)}

@@ -36,16 +36,16 @@ FORMULAS = (FormulaField("voltage", ("t",), "0", "voltage V(t) of the source [V]
 
 
 def written(formulas: Mapping[str, str], declared: tuple[str, ...]) -> Model:
-    """Return the circuit with the voltage of a user, without its resistor.
+    """Return the circuit with a user's voltage, without its resistor.
 
-    ExpressionError where the voltage names something else than t and parameters.
+    Raises ExpressionError if the voltage uses other names than t and parameters.
     """
     return circuit(formulas.get("voltage", "0"), declared, frozenset())
 
 
 @cache
 def circuit(voltage: str, declared: tuple[str, ...], terms: frozenset[str]) -> Model:
-    """Return the circuit, with a resistor where `terms` has ``R``."""
+    """Return the circuit, with a resistor if `terms` contains ``R``."""
     parameters = (*PARAMETERS, *declared_parameters(declared))
     known = tuple(row.name for row in parameters)
 
@@ -93,9 +93,9 @@ def circuit(voltage: str, declared: tuple[str, ...], terms: frozenset[str]) -> M
 
 def _scales(forces: Forces) -> Scales | None:
     """Return the scales of the current, with the energy of the coil in place of that of a spring."""
-    found = linear_scales(forces)
-    return found and replace(found, energy="L*i_c**2")
+    scales = linear_scales(forces)
+    return scales and replace(scales, energy="L*i_c**2")
 
 
 CIRCUIT = replace(written({}, ()), equation="L i'' + R i' + i/C = V'(t)")
-"""The circuit without a voltage, under the equation of all."""
+"""The circuit without a voltage, shown with the general equation."""

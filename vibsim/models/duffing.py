@@ -34,7 +34,7 @@ TERMS = {"delta": "delta*v", "gamma": "gamma*cos(omega*t)"}
 def natural_frequency(parameters: Numbers) -> Any:
     """Return the angular frequency of small oscillations [rad s-1]: about 0, or about the bottom of a well.
 
-    That is ``sqrt(alpha)`` or, with alpha < 0 < beta, ``sqrt(-2 alpha)``; NaN where there is none.
+    That is ``sqrt(alpha)`` or, with alpha < 0 < beta, ``sqrt(-2 alpha)``; NaN if there is none.
     """
     alpha, beta = (np.asarray(parameters[name], dtype=float) for name in ("alpha", "beta"))
     square = np.where(alpha > 0.0, alpha, np.where(beta > 0.0, -2.0 * alpha, 0.0))
@@ -54,7 +54,7 @@ def exact_period(initial: Numbers, parameters: Numbers) -> Any:
 
 @cache
 def duffing(terms: frozenset[str]) -> Model:
-    """Return the oscillator, with damping and force where `terms` has ``delta`` and ``gamma``."""
+    """Return the oscillator, with damping and force if `terms` contains ``delta`` and ``gamma``."""
     names = ("u", "v", "t", *(row.name for row in PARAMETERS))
     damping, force = (parse(text, names) if t in terms else ZERO for t, text in TERMS.items())
     more: dict[str, Any] = {} if terms else {"exact": exact, "exact_period": exact_period}
@@ -69,7 +69,7 @@ def duffing(terms: frozenset[str]) -> Model:
         source="Kovacic and Brennan, The Duffing Equation, chapter 2",
         equation=f"u'' + {left}alpha u + beta u^3 = {right}",
         natural_frequency=natural_frequency,
-        # in them alpha and beta are 1 or -1
+        # in these scales alpha and beta are 1 or -1
         scales=lambda _: Scales(
             time="1/sqrt(abs(alpha))",
             position="sqrt(abs(alpha/beta))",
@@ -90,4 +90,4 @@ def duffing(terms: frozenset[str]) -> Model:
 DUFFING = replace(
     duffing(frozenset()), equation="u'' + delta u' + alpha u + beta u^3 = gamma cos(omega t)"
 )
-"""The oscillator without damping and force, under the equation that has them."""
+"""The oscillator without damping and force, shown with the equation that has them."""

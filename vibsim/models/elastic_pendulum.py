@@ -1,24 +1,25 @@
 r"""The elastic pendulum: a body on an elastic wire, in the plane; dimensionless.
 
-``x'' = -beta T x/L``, ``y'' = beta (T (1 - y)/L - 1)``, less the drag ``(gamma/beta) |v| v``, with the length of the
-wire ``L = sqrt(x^2 + (1 - y)^2)`` and its pull over the weight, ``T = (L - beta)/(1 - beta)``. The body rests at the
-origin, where L = T = 1; the pivot is at (0, 1). Length is scaled by that of the wire at rest, ``L_0 + m g/k``, time by
-``sqrt(L_0/g)``; ``beta = L_0/(L_0 + m g/k)``, and ``gamma = rho C_D A L_0/(2 m)`` for a drag ``rho C_D A |v| v/2``.
+``x'' = -beta T x/L``, ``y'' = beta (T (1 - y)/L - 1)``, minus the drag ``(gamma/beta) |v| v``, with the length of the
+wire ``L = sqrt(x^2 + (1 - y)^2)`` and its pull over the weight, ``T = (L - beta)/(1 - beta)``. The equilibrium is the
+origin, where L = T = 1; the pivot is at (0, 1). Lengths are scaled by that of the wire in equilibrium, ``L_0 + m g/k``,
+time by ``sqrt(L_0/g)``; ``beta = L_0/(L_0 + m g/k)``, and ``gamma = rho C_D A L_0/(2 m)`` for a drag
+``rho C_D A |v| v/2``.
 
-The body starts without velocity from where the wire makes the angle Theta and is longer by epsilon than at rest:
+The body starts from rest, with the wire at the angle Theta and longer by epsilon than in equilibrium:
 ``x = (1 + epsilon) sin Theta``, ``y = 1 - (1 + epsilon) cos Theta``. Small swings have the frequency ``sqrt(beta)``
-(not 1: `errata`), stretching ``sqrt(beta/(1 - beta))``: as beta tends to 1 a step has to resolve the latter, which the
-time of a swing does not show.
+(not 1: `errata`), stretching has ``sqrt(beta/(1 - beta))``: as beta tends to 1, steps must resolve the latter, which is
+much faster than a swing.
 
-With ``L - 1 = (x^2 + y (y - 2))/(L + 1)``, which loses nothing by cancellation, ``T = 1 + (L - 1)/(1 - beta)`` keeps
-its digits for beta near 1, and the body rests exactly. The limit 1/L that the text proposes there is wrong: L
-depends on beta (`errata`).
+With ``L - 1 = (x^2 + y (y - 2))/(L + 1)``, which has no cancellation, ``T = 1 + (L - 1)/(1 - beta)`` keeps its digits
+for beta near 1, and the equilibrium is exact. The limit 1/L that the text proposes there is wrong: L depends on beta
+(`errata`).
 
 The forces of a manufactured solution (exercise 23 asks for a test of the drag) are those with which ``exact_x`` and
 ``exact_y``, formulas in t, solve the equations.
 
-With Theta = 0 and no drag the body moves up and down only: ``y = -epsilon cos(sqrt(beta/(1 - beta)) t)`` exactly, since
-the wire pulls for ``|epsilon| < 1`` as a spring does.
+With Theta = 0 and no drag the motion is vertical: ``y = -epsilon cos(sqrt(beta/(1 - beta)) t)`` exactly, because for
+``|epsilon| < 1`` the wire acts as a linear spring.
 
 Source: vibration text (B), section 10.7, equations (106)-(112), and exercises 22 and 23.
 """
@@ -91,13 +92,13 @@ EQUATION = "x'' = -beta T x/L{}, y'' = beta (T (1 - y)/L - 1){}, T = (L - beta)/
 
 
 def highest_frequency(parameters: Numbers) -> Any:
-    """Return the higher one of the angular frequencies of small swings and of stretching, ``sqrt(beta/(1 - beta))``."""
+    """Return the angular frequency of stretching, ``sqrt(beta/(1 - beta))``, which exceeds that of small swings."""
     beta = parameters["beta"]
     return np.sqrt(beta / (1.0 - beta))
 
 
 def start(parameters: Numbers) -> dict[str, Any]:
-    """Return the initial position, B (109) and (111), and no velocity."""
+    """Return the initial position, B (109) and (111), and velocity 0."""
     angle, length = np.deg2rad(parameters["Theta"]), 1.0 + np.asarray(parameters["epsilon"])
     zero = np.zeros(np.broadcast_shapes(np.shape(angle), np.shape(length)))
     # 1 - (1 + epsilon) cos(Theta), without the rounding of 1 + epsilon where Theta is 0
@@ -106,7 +107,7 @@ def start(parameters: Numbers) -> dict[str, Any]:
 
 
 def vertical_motion(t: Floats, initial: Numbers, parameters: Numbers) -> dict[str, Floats]:
-    """Return the exact motion straight up and down without drag (exercise 22c); NaN of any other, and at the pivot."""
+    """Return the exact vertical motion without drag (exercise 22c); NaN for other motions or if it meets the pivot."""
     w = highest_frequency(parameters)
     y, vy = motion(t, w, initial["y"], initial["vy"])
     is_vertical = (np.asarray(initial["x"]) == 0.0) & (np.asarray(initial["vx"]) == 0.0)
@@ -116,9 +117,9 @@ def vertical_motion(t: Floats, initial: Numbers, parameters: Numbers) -> dict[st
 
 
 def written(formulas: Mapping[str, str], declared: tuple[str, ...]) -> Model:
-    """Return the elastic pendulum that hangs straight down, or that follows a manufactured solution.
+    """Return the elastic pendulum that hangs vertically, or that follows a manufactured solution.
 
-    ExpressionError where a formula names something else than its field allows.
+    Raises ExpressionError if a formula uses a name that its field does not allow.
     """
     return elastic_pendulum(tuple(sorted(formulas.items())), declared, frozenset())
 
@@ -127,7 +128,7 @@ def written(formulas: Mapping[str, str], declared: tuple[str, ...]) -> Model:
 def elastic_pendulum(
     texts: tuple[tuple[str, str], ...], declared: tuple[str, ...], terms: frozenset[str]
 ) -> Model:
-    """Return the elastic pendulum, with drag where `terms` has ``gamma``, off the vertical where it has ``Theta``."""
+    """Return the elastic pendulum, with drag if `terms` contains ``gamma``, off the vertical if it has ``Theta``."""
     is_dragged, formulas = "gamma" in terms, dict(texts)
     own = (BETA, DRAG) if formulas else (BETA, *START, DRAG)
     parameters = (*own, *declared_parameters(declared))
@@ -186,4 +187,4 @@ def _equation(is_dragged: bool, formulas: Mapping[str, str]) -> str:
 
 
 ELASTIC_PENDULUM = replace(written({}, ()), equation=_equation(is_dragged=True, formulas={}))
-"""The pendulum that hangs straight down, under the equation of all."""
+"""The pendulum that hangs vertically, shown with the general equation."""

@@ -1,18 +1,18 @@
-r"""Events: where a motion is not smooth, as data of a model; between two of them the force is a smooth one.
+r"""Events as data of a model: times at which a motion is not smooth. Between two events the force is smooth.
 
-A motion with events is a sequence of smooth pieces, each in a *mode*, a number that does not change within the piece.
-An event ends a piece: there the state may jump, and the next mode is chosen. Steps see the smooth force of their mode
-only, never a jump (`vibsim.engine.events`).
+A motion with events is a sequence of smooth pieces, each in a *mode*, a number that is constant within the piece. An
+event ends a piece: the state may jump, and the next mode is chosen. A step uses the smooth force of its mode, never a
+jump (`vibsim.engine.events`).
 
-- Friction, Coulomb's law (vibration text (B), section 10.3): with the acceleration ``drive`` by all other forces, and
-  ``limit`` the largest that friction can hold, a body that slides in the direction ``mode`` = 1 or -1 has the
-  acceleration ``drive - mode*limit``, until its velocity vanishes. There it sticks (mode 0) where
-  ``|drive| <= limit``: it stays where it is until the drive exceeds the limit. Otherwise it slides on, along the drive.
-- Impact on the ground (B, section 10.9): in flight (mode 1) until the height vanishes; there the velocity v becomes
-  ``-restitution*v``, and the body comes to rest for ever (mode 0) where that is at most `eps_v`.
-- Crossings, as a user writes them: a formula, its *guard*, changes its sign along the motion. The states then get new
-  values, or the motion ends there (mode 0; B, section 10.6). The mode says on which side of every guard the motion is:
-  an event happens once for each crossing in its direction, and not again before the guard has gone back.
+- Friction, Coulomb's law (vibration text (B), section 10.3): ``drive`` is the acceleration by all other forces and
+  ``limit`` the largest acceleration that friction can hold. A body that slides in the direction ``mode`` = 1 or -1 has
+  the acceleration ``drive - mode*limit`` until its velocity vanishes. If ``|drive| <= limit`` there, it sticks (mode 0)
+  until the drive exceeds the limit; otherwise it slides on, in the direction of the drive.
+- Impact on the ground (B, section 10.9): the body flies (mode 1) until the height vanishes. There the velocity v
+  becomes ``-restitution*v``, and the body comes to rest for ever (mode 0) if that is at most `eps_v`.
+- Crossings, as a user writes them: a formula, the *guard*, changes its sign along the motion. The states then get new
+  values, or the motion ends (mode 0; B, section 10.6). The mode says on which side of every guard the motion is: an
+  event happens once for each crossing in its direction, and not again before the guard has changed back.
 
 Source: vibration text (B), sections 10.3, 10.6 and 10.9; E. Hairer, S. P. Norsett and G. Wanner, Solving Ordinary
 Differential Equations I, section II.6 (discontinuous equations).
@@ -30,16 +30,16 @@ Formula = str | Expression
 
 @dataclass(frozen=True)
 class Friction:
-    """Coulomb friction; both formulas are accelerations, in the position, ``t`` and the parameters."""
+    """Coulomb friction; formulas in the position, ``t`` and the parameters."""
 
     jumps: ClassVar[bool] = False
-    """Whether events change the state at once."""
+    """Whether the state is discontinuous at events."""
     drive: Formula
-    """By all forces but the friction."""
+    """Acceleration by all forces except friction."""
     limit: Formula
-    """The largest that friction can hold, at least 0."""
+    """Largest acceleration that friction can hold, at least 0."""
     cost: Formula
-    """Energy that goes per length of the path: a force."""
+    """Energy lost per length of the path: a force."""
 
 
 @dataclass(frozen=True)
@@ -50,11 +50,11 @@ class Impact:
     restitution: Formula
     """Speed after an impact over the speed before it."""
     near: Formula
-    """On the mesh: the height below which a body that falls is on the ground."""
+    """With events left to the mesh: the height below which a falling body is on the ground."""
     slow: Formula
-    """The largest speed after an impact with which it stays there."""
+    """Largest speed after an impact at which the body stays on the ground."""
     cost: Formula
-    """Energy that goes per half square of the speed lost: a mass."""
+    """Energy lost per decrease of ``v^2/2``: a mass."""
 
 
 @dataclass(frozen=True)
@@ -62,25 +62,25 @@ class Crossing:
     """One event of `Crossings`; formulas in the states, ``t`` and the parameters."""
 
     guard: Formula
-    """It changes its sign at the event."""
+    """Formula that changes its sign at the event."""
     direction: int = 0
-    """-1 where only a fall below 0 is an event, 1 where only a rise above it is, 0 for both."""
+    """-1 if only a fall below 0 is an event, 1 if only a rise above 0 is, 0 for both."""
     then: tuple[tuple[str, Formula], ...] = ()
-    """States that change, with their new values by formulas in the values before."""
+    """States that change, with formulas of their new values in the old ones."""
     ends: bool = False
-    """Whether the motion ends there: the state stays as it is."""
+    """Whether the motion ends there, in an unchanged state."""
 
 
 @dataclass(frozen=True)
 class Crossings:
-    """Events where formulas change their signs; at one time the first of them happens first."""
+    """Events where formulas change sign; simultaneous events happen in the order of the rows."""
 
     jumps: ClassVar[bool] = True
     rows: tuple[Crossing, ...]
     cost: Formula = "1"
-    """What goes at an event is counted in energy."""
+    """Factor of the lost energy: losses at events are counted as energy."""
 
 
 Events = Friction | Impact | Crossings
 TREATMENTS = ("located", "mesh")
-"""How a scheme treats events: found within the step, or noticed at the grid point behind them."""
+"""How a scheme treats events: located within the step, or noticed at the next grid point."""

@@ -1,16 +1,16 @@
 r"""The general oscillator, ``m u'' + f(u') + s(u) = F(t)``, from formulas that a user writes.
 
 Source: vibration text (B), section 8, equation (59), and exercises 1, 9 and 10.2. Units: m [kg], u [m], v [m s-1], f, s
-and F [N]; energy ``m v^2/2 + V(u)`` [J] with V the integral of s from 0. With m = 1 and numbers without units all of
-them are dimensionless.
+and F [N]; energy ``m v^2/2 + V(u)`` [J] with V the integral of s from 0. With m = 1 and numbers without units, all of
+these are dimensionless.
 
-The damping f is a formula in v, linear (``b v``) or quadratic (``b |v| v``, B section 8.2), whatever way it is written:
-schemes that treat these two in their own way recognise them. Coulomb friction, ``{coulomb: b}``, holds the body where
-``|F - s| <= b`` (`vibsim.models.events`; B, section 10.3); as a formula, ``b sign(v)``, it is a force like any other.
-Events and a stop may be written as well (`vibsim.models.shared.crossings`); no exact solution is then known.
+The damping f is a formula in v. If it is linear (``b v``) or quadratic (``b |v| v``, B section 8.2), however it is
+written, schemes with a special treatment of these two recognise it. Coulomb friction, ``{coulomb: b}``, holds the body
+where ``|F - s| <= b`` (`vibsim.models.events`; B, section 10.3); as a formula, ``b sign(v)``, it is a force like any
+other. A user may also write events and a stop (`vibsim.models.shared.crossings`); there is then no exact solution.
 
-Instead of the force, an exact solution u_e(t) may be written: the force is then ``F = m u_e'' + f(u_e') + s(u_e)`` (a
-manufactured solution; B, section 2.2 and exercise 9), and the motion starts on it.
+Instead of the force, an exact solution u_e(t) may be written (manufactured solution; B, section 2.2 and exercise 9):
+the force is then ``F = m u_e'' + f(u_e') + s(u_e)``, and the initial values are those of u_e.
 """
 
 from __future__ import annotations
@@ -61,16 +61,16 @@ FORMULAS = (
 
 @dataclass(frozen=True)
 class Written:
-    """The formulas of a user, read."""
+    """The parsed formulas of a user."""
 
     formulas: Mapping[str, str]
     declared: tuple[str, ...]
     with_mass: bool = True
-    """Whether the mass is in the equation as a parameter; else it is the number 1."""
+    """Whether the mass is a parameter of the equation; otherwise it is the number 1."""
 
     @cached_property
     def term(self) -> str:
-        """Kind of the damping where it is a term with the coefficient b; else empty."""
+        """Kind of the damping if it is written as a term with the coefficient b; otherwise empty."""
         kinds = {text: kind for kind, text in TERMS.items()} if "b" not in self.declared else {}
         return kinds.get(self.formulas.get("damping", ""), "")
 
@@ -84,7 +84,7 @@ class Written:
         return (*own, *declared_parameters(self.declared))
 
     def read(self, name: str) -> Expression:
-        """Return a formula; that of a field which was not written is its default."""
+        """Return the formula of a field, or its default if the user wrote none."""
         field = next(field for field in FORMULAS if field.name == name)
         known = (*field.names, *(row.name for row in self.parameters))
         return parse(self.formulas.get(name, field.default), known)
@@ -106,12 +106,12 @@ class Written:
 
     @cached_property
     def crossings(self) -> Crossings | None:
-        """The events, where some are written."""
+        """The events, if any are written."""
         return crossings(self.formulas, ("u", "v", "t", *(row.name for row in self.parameters)))
 
     @cached_property
     def manufactured(self) -> Manufactured | None:
-        """The exact solution u(t), where it is written."""
+        """The exact solution u(t), if it is written."""
         if "exact" not in self.formulas:
             return None
         texts = (self.formulas["exact"],)
@@ -119,7 +119,7 @@ class Written:
 
     @cached_property
     def force(self) -> Expression:
-        """The force F(t), as written or that of the exact solution."""
+        """The force F(t), as written or from the exact solution."""
         motion = self.manufactured
         if motion is None:
             return self.read("force")
@@ -127,12 +127,12 @@ class Written:
 
 
 def written(formulas: Mapping[str, str], declared: tuple[str, ...]) -> Model:
-    """Return the model of formulas by the names of `FORMULAS`, with declared parameters.
+    """Return the model with formulas by the names of `FORMULAS` and declared parameters.
 
-    Equal formulas give the same model. It has a mass in its equation; its variant without that term is for the mass 1:
+    Equal formulas give the same object. Its equation contains the mass; its variant without that term is for mass 1:
     the same bits in fewer operations.
 
-    ExpressionError where a formula names something else than its field allows.
+    Raises ExpressionError if a formula uses a name that its field does not allow.
     """
     return oscillator(tuple(sorted(formulas.items())), declared, frozenset({MASS.name}))
 
@@ -141,7 +141,7 @@ def written(formulas: Mapping[str, str], declared: tuple[str, ...]) -> Model:
 def oscillator(
     formulas: tuple[tuple[str, str], ...], declared: tuple[str, ...], terms: frozenset[str]
 ) -> Model:
-    """Return the model of formulas, with a mass in the equation where `terms` has ``m``."""
+    """Return the model with given formulas, and with a mass in the equation if `terms` contains ``m``."""
     own = Written(dict(formulas), declared, MASS.name in terms)
     forces = Forces(
         spring=own.spring,
@@ -181,9 +181,9 @@ def oscillator(
 
 
 def _friction(own: Written, forces: Forces) -> dict[str, Any]:
-    """Return what is another with Coulomb friction.
+    """Return the fields of the model that differ with Coulomb friction.
 
-    What it takes is summed along the path (`vibsim.engine.events`), so that it has no power of damping.
+    The energy that friction takes is summed along the path (`vibsim.engine.events`), so there is no power of damping.
     """
 
     def held(t: Floats, initial: Numbers, parameters: Numbers) -> dict[str, Floats]:
@@ -213,8 +213,8 @@ def _equation(own: Written) -> str:
     terms.append(_term(own.spring))
     sides = " + ".join(terms).replace("+ -", "- ")
     if own.manufactured is None:
-        behind = described(own.crossings, own.formulas) if own.crossings else ""
-        return f"{sides} = {to_formula(own.force)}{behind}"
+        events = described(own.crossings, own.formulas) if own.crossings else ""
+        return f"{sides} = {to_formula(own.force)}{events}"
     return f"{sides} = F(t), with F such that u = {to_formula(own.read('exact'))}"
 
 
@@ -223,4 +223,4 @@ def _term(node: Expression) -> str:
 
 
 OSCILLATOR = replace(written({}, ()), equation="m u'' + f(u') + s(u) = F(t)")
-"""The model without formulas, under the equation of all."""
+"""The model without formulas, shown with the general equation."""

@@ -1,4 +1,4 @@
-r"""The nonlinear pendulum, ``theta'' = -(g/L) sin theta``, with quadratic air resistance if wanted.
+r"""The nonlinear pendulum, ``theta'' = -(g/L) sin theta``, optionally with quadratic air resistance.
 
 Source: pendulum lecture (A), sections 1 and 2; vibration text (B), section 10.5, equations (87)-(94). Units: g [m s-2],
 L [m], m [kg], theta [rad], omega [rad s-1], energy [J]; with g = L = m = 1 all of them are dimensionless, and the
@@ -43,7 +43,7 @@ AIR = Output("drag_force", "N", "drag force on the bob", "-m*L*drag*abs(omega)*o
 SCALES = Scales(
     time="sqrt(L/g)", position="1", energy="m*g*L", parameters=(("g", "1"), ("L", "1"), ("m", "1"))
 )
-"""Those in which g = L = m = 1 (A, section 1.2); the drag number is the same in all."""
+"""Scales in which g = L = m = 1 (A, section 1.2); they leave the drag number unchanged."""
 
 
 def natural_frequency(parameters: Numbers) -> Any:
@@ -53,7 +53,7 @@ def natural_frequency(parameters: Numbers) -> Any:
 
 @cache
 def pendulum(terms: frozenset[str]) -> Model:
-    """Return the pendulum, with air resistance where `terms` has ``drag``."""
+    """Return the pendulum, with air resistance if `terms` contains ``drag``."""
     is_dragged = "drag" in terms
     return Model(
         kind="pendulum",
@@ -88,4 +88,4 @@ def pendulum(terms: frozenset[str]) -> Model:
 
 
 PENDULUM = replace(pendulum(frozenset()), equation=DRAGGED)
-"""The pendulum without air resistance, under the equation that has it."""
+"""The pendulum without air resistance, shown with the equation that has it."""

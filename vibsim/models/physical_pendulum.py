@@ -51,7 +51,7 @@ def exact_period(initial: Numbers, parameters: Numbers) -> Any:
 
 @cache
 def physical_pendulum(terms: frozenset[str]) -> Model:
-    """Return the physical pendulum, with air resistance where `terms` has ``drag``."""
+    """Return the physical pendulum, with air resistance if `terms` contains ``drag``."""
     is_dragged = "drag" in terms
     kappa, alpha = ("kappa", "m*L**2/inertia"), ("alpha", "drag/inertia")
     return Model(
@@ -69,7 +69,7 @@ def physical_pendulum(terms: frozenset[str]) -> Model:
         conservative=not is_dragged,
         natural_frequency=lambda p: np.sqrt(p["m"] * p["g"] * p["L"] / p["inertia"]),
         turn=2 * np.pi,
-        # in them inertia and L are 1, and ``m = 1/g``
+        # in these scales inertia = L = 1 and m = 1/g
         scales=Scales(
             time="sqrt(inertia/(m*g*L))",
             position="1",
@@ -95,4 +95,4 @@ def physical_pendulum(terms: frozenset[str]) -> Model:
 
 
 PHYSICAL_PENDULUM = replace(physical_pendulum(frozenset()), equation=DRAGGED)
-"""The pendulum without air resistance, under the equation that has it."""
+"""The pendulum without air resistance, shown with the equation that has it."""

@@ -23,8 +23,8 @@ from vibsim.models.shared.scales import Scales
 
 _PULL = "where(alpha == 0, (k/m)*u, (k/m)/alpha*tanh(alpha*u))"
 _X = "(alpha*u)"
-# log cosh x cancels for small x: its series below 1/16, with y = sinh^2 x above, log(1 + y)/2 = log(w)/2 (y/(w - 1)),
-# w = 1 + y as it is rounded, and beyond 20 all of log cosh x but |x| - log 2 is round-off
+# log cosh x without cancellation: for |x| < 1/16 its series; then, with y = sinh^2 x and w = 1 + y rounded,
+# log(1 + y)/2 = log(w)/2 (y/(w - 1)); beyond 20, |x| - log 2 to round-off
 _SERIES = (
     f"0.5*k*u**2*(1 - {_X}**2/6*(1 - {_X}**2*4/15*(1 - {_X}**2*17/56"
     f"*(1 - {_X}**2*496/1530*(1 - {_X}**2*691/2046)))))"
@@ -40,12 +40,12 @@ def natural_frequency(parameters: Numbers) -> Any:
 
 
 def exact(t: Floats, initial: Numbers, parameters: Numbers) -> dict[str, Floats]:
-    """Return u and v at times `t` for the linear spring, alpha = 0; NaN for any other."""
+    """Return u and v at times `t` for the linear spring (alpha = 0); NaN for any other."""
     p = parameters
-    # the largest distance at which the spring is held
+    # the largest distance at which friction holds the box
     hold = np.where(p["alpha"] == 0, p["mu"] * p["m"] * p["g"] / p["k"], np.nan)
-    found = friction_motion(t, natural_frequency(p), hold, initial["u"], initial["v"])
-    u, v = (np.where(np.isnan(hold), np.nan, x) for x in found)
+    states = friction_motion(t, natural_frequency(p), hold, initial["u"], initial["v"])
+    u, v = (np.where(np.isnan(hold), np.nan, x) for x in states)
     return {"u": u, "v": v}
 
 

@@ -1,15 +1,15 @@
 r"""A linear structure ``M u'' + C u' + K u = p(t)``, with matrices from an experiment file or from files beside it.
 
-M is symmetric and positive definite, K and C symmetric. C is the sum of a matrix of its own, Rayleigh damping
-``alpha M + beta K``, and damping ratios of modes, ``sum_j 2 zeta_j w_j (M x_j)(M x_j)'``. Loads are formulas in t, each
-times a vector. Everything is dimensionless.
+M is symmetric and positive definite, K and C are symmetric. C is the sum of a given matrix, Rayleigh damping
+``alpha M + beta K``, and modal damping ``sum_j 2 zeta_j w_j (M x_j)(M x_j)^T``. A load is a formula in t times a
+vector. Everything is dimensionless.
 
-Its states are what is observed: displacements of single degrees of freedom, or sums of them with factors, and their
-velocities. All degrees of freedom are stepped (`vibsim.simulation.structure`), and the energies are those of the whole
-structure: ``u'' M u''/2`` with the velocity, and ``u' K u/2``.
+The states are the observed displacements (linear combinations of degrees of freedom) and their velocities. All degrees
+of freedom are stepped (`vibsim.simulation.structure`), and the energies are those of the whole structure:
+``v^T M v/2`` and ``u^T K u/2``.
 
-The exact solution is the sum of all modes (`vibsim.models.shared.matrices`), where the damping does not couple modes
-(``X' C X`` is diagonal) and every load is a sum of constants and of sines and cosines of ``W t + phase``.
+The exact solution is the sum of all modes (`vibsim.models.shared.matrices`). It is known if the damping does not couple
+modes (``X^T C X`` is diagonal) and every load is a sum of constants and of sines and cosines of ``W t + phase``.
 
 Source: R. W. Clough and J. Penzien, Dynamics of Structures, chapters 11 to 13.
 """
@@ -51,18 +51,18 @@ from vibsim.models.shared.matrices import (
 from vibsim.models.system import states_of, terms_of, velocities_of
 
 MOST_DOFS = 10_000
-"""Degrees of freedom, at most."""
+"""Largest number of degrees of freedom."""
 MOST_MODES = 128
-"""Degrees of freedom up to which all modes are found."""
+"""Largest number of degrees of freedom for which all modes are computed."""
 MOST_OBSERVED = 16
-"""Displacements that are observed, at most."""
+"""Largest number of observed displacements."""
 UNCOUPLED = 1e-12
-"""Modes are not coupled by damping where the other entries of ``X' C X`` are below this part of the largest one."""
+"""Modes count as uncoupled if the off-diagonal entries of ``X^T C X`` are below this fraction of the largest entry."""
 ROUNDED = 2.0**-53 / 64.0
-"""Relative error that rounding leaves of a motion in its lowest mode, for each unit of ``(w_max/w_min)^2``: forces of
-stiff parts cancel. [measured, of beams of 32 to 512 degrees of freedom]"""
+"""Relative rounding error of a motion in the lowest mode per unit of ``(w_max/w_min)^2``, because forces of stiff parts
+cancel. [measured on beams with 32 to 512 degrees of freedom]"""
 TIMES_AT_ONCE = 2**20
-"""Modes times times that are worked on at once."""
+"""Size (modes times points of time) of the arrays that are computed at once."""
 
 ALPHA = Parameter(
     "alpha", 0.0, "1", "Rayleigh damping by the mass", minimum=0.0, path="rayleigh.alpha"
@@ -72,16 +72,16 @@ BETA = Parameter(
 )
 RAYLEIGH = (ALPHA, BETA)
 LOAD = "load"
-"""Before the number of a load: the key of its formula in `Model.written`."""
+"""Prefix of the number of a load, in the key of its formula in `Model.written`."""
 HISTORY = "history"
-"""Before the number of a load that a table gives over time."""
+"""Prefix of the number of a load that is a table over time."""
 _TABULATED = Name("_history")
-"""The formula of such a load; no user can write it."""
+"""Placeholder for the formula of a tabulated load; no user can write it."""
 
 
 @dataclass(frozen=True)
 class Structure:
-    """What a file says of a structure in numbers; two of the same numbers are equal."""
+    """The numbers of a structure; equal numbers make equal objects."""
 
     mass: Matrix
     stiffness: Matrix
@@ -89,15 +89,15 @@ class Structure:
     ratios: tuple[float, ...] = ()
     """Damping ratios of the lowest modes."""
     names: tuple[str, ...] = ()
-    """Of the observed displacements."""
+    """Names of the observed displacements."""
     observed: Floats = field(default_factory=lambda: np.eye(1), compare=False, repr=False)
-    """Factors of all degrees of freedom in each of them, shape (observed, dof)."""
+    """Coefficients of the observed displacements, shape (observed, dof)."""
     start: tuple[Floats, Floats] | None = field(default=None, compare=False, repr=False)
-    """Displacement and velocity at t = 0, shape (dof,); None where they are the initial values of a file."""
+    """Displacement and velocity at t = 0, shape (dof,); None if the initial values of the experiment file give them."""
     shapes: Floats = field(default_factory=lambda: np.empty((0, 1)), compare=False, repr=False)
     """The vector of each load, shape (load, dof)."""
     histories: tuple[tuple[int, Floats], ...] = field(default=(), compare=False, repr=False)
-    """Numbers of loads that are tables, and their times and factors, shape (2, point), straight between points."""
+    """Index of each tabulated load, with times and factors, shape (2, point); linear between the points."""
     digest: str = field(init=False)
     """SHA-256 of all numbers."""
 
@@ -118,45 +118,45 @@ class Structure:
 
     @property
     def has_all_modes(self) -> bool:
-        """Whether all modes are found."""
+        """Whether all modes are computed."""
         return self.dofs <= MOST_MODES
 
     @property
     def modes(self) -> Modes:
-        """Every mode, up to `MOST_MODES` degrees of freedom; of more, the three lowest ones."""
+        """All modes if `has_all_modes`, otherwise the three lowest."""
         return _modes(self.mass, self.stiffness)
 
     @cached_property
     def own_damping(self) -> Any:
-        """The matrix C without the Rayleigh damping, sparse; None where there is none."""
-        found = self.damping.sparse if self.damping is not None else None
+        """The matrix C without Rayleigh damping, sparse; None if it is 0."""
+        matrix = self.damping.sparse if self.damping is not None else None
         if any(self.ratios):
             from scipy.sparse import csc_array
 
             modes, count = self.modes, len(self.ratios)
-            sides = self.mass.sparse @ modes.shapes[:, :count]
-            middle = 2.0 * np.array(self.ratios) * modes.frequencies[:count]
-            by_modes = csc_array((sides * middle) @ sides.T)
-            found = by_modes if found is None else found + by_modes
-        return found
+            weighted = self.mass.sparse @ modes.shapes[:, :count]
+            factors = 2.0 * np.array(self.ratios) * modes.frequencies[:count]
+            modal = csc_array((weighted * factors) @ weighted.T)
+            matrix = modal if matrix is None else matrix + modal
+        return matrix
 
     @cached_property
     def decays(self) -> Floats | None:
-        """Half the diagonal of ``X' C X`` without Rayleigh damping, shape (mode,); None where modes are coupled."""
-        found = np.zeros(self.dofs)
+        """Half the diagonal of ``X^T C X`` without Rayleigh damping, shape (mode,); None if damping couples modes."""
+        rates = np.zeros(self.dofs)
         if self.damping is not None:
-            between = self.modes.shapes.T @ (self.damping.sparse @ self.modes.shapes)
-            coupling = between - np.diag(np.diag(between))
-            if np.max(np.abs(coupling)) > UNCOUPLED * np.max(np.abs(between), initial=0.0):
+            modal = self.modes.shapes.T @ (self.damping.sparse @ self.modes.shapes)
+            coupling = modal - np.diag(np.diag(modal))
+            if np.max(np.abs(coupling)) > UNCOUPLED * np.max(np.abs(modal), initial=0.0):
                 return None
-            found += 0.5 * np.diag(between)
+            rates += 0.5 * np.diag(modal)
         if self.ratios:
             count = len(self.ratios)
-            found[:count] += np.array(self.ratios) * self.modes.frequencies[:count]
-        return found
+            rates[:count] += np.array(self.ratios) * self.modes.frequencies[:count]
+        return rates
 
     def start_of(self, initial: Floats) -> tuple[Floats, Floats]:
-        """Return displacement and velocity at t = 0 of a member with these initial values of all states."""
+        """Return displacement and velocity at t = 0, shape (dof,), of a member with these initial values of states."""
         count = len(self.names)
         return self.start or (initial[:count], initial[count:])
 
@@ -177,7 +177,7 @@ def _highest(mass: Matrix, stiffness: Matrix) -> float:
 
 @dataclass(frozen=True)
 class Harmonic:
-    """The load ``amplitude cos(angular t + phase)``, each in the parameters; a constant has the frequency 0."""
+    """The load ``amplitude cos(angular t + phase)``, formulas in the parameters; a constant has frequency 0."""
 
     amplitude: Expression
     angular: Expression
@@ -185,14 +185,14 @@ class Harmonic:
 
 
 def harmonics(load: Expression) -> tuple[Harmonic, ...] | None:
-    """Return a load as a sum of constants, sines and cosines; None where it is no such sum."""
-    found = []
+    """Return a load as a sum of constants, sines and cosines; None if it is not such a sum."""
+    rows = []
     for term in terms_of(load):
         row = _harmonic(term)
         if row is None:
             return None
-        found.append(row)
-    return tuple(found)
+        rows.append(row)
+    return tuple(rows)
 
 
 def _harmonic(term: Expression) -> Harmonic | None:
@@ -224,25 +224,25 @@ def _harmonic(term: Expression) -> Harmonic | None:
 
 @dataclass(frozen=True)
 class Loaded:
-    """A structure with the formulas of its loads: what the model is made of."""
+    """A structure with the formulas of its loads."""
 
     structure: Structure
     loads: tuple[Expression, ...]
-    """In t and the parameters, in the order of `Structure.shapes`."""
+    """Formulas in t and the parameters, in the order of `Structure.shapes`."""
     parameters: tuple[Parameter, ...]
     terms: frozenset[str]
     """Names of the parameters of `RAYLEIGH` that are in the equation."""
 
     @property
     def formulas(self) -> tuple[Expression, ...]:
-        """The loads that are no tables."""
+        """The loads that are formulas, not tables."""
         return tuple(load for load in self.loads if load != _TABULATED)
 
     @property
     def is_damped(self) -> bool:
-        """Whether anything damps the motion."""
-        own = self.structure
-        return bool(self.terms) or own.damping is not None or any(own.ratios)
+        """Whether there is any damping."""
+        structure = self.structure
+        return bool(self.terms) or structure.damping is not None or any(structure.ratios)
 
     @property
     def is_driven(self) -> bool:
@@ -251,18 +251,19 @@ class Loaded:
 
     @property
     def rounding(self) -> float:
-        """Predicted round-off relative to the solution, whatever the scheme (order of magnitude)."""
-        own = self.structure
+        """Predicted round-off relative to the solution, for any scheme (order of magnitude)."""
         lowest = float(self.natural_frequency({}))
-        return ROUNDED * (_highest(own.mass, own.stiffness) / lowest) ** 2 if lowest > 0.0 else 0.0
+        if not lowest > 0.0:
+            return 0.0
+        return ROUNDED * (_highest(self.structure.mass, self.structure.stiffness) / lowest) ** 2
 
     def named(self, parameters: Numbers, case: int) -> dict[str, float]:
-        """Return the parameters of a member by the names that formulas have for them."""
-        found = {}
+        """Return the parameters of a member by their names in formulas."""
+        numbers = {}
         for row in self.parameters:
             value = np.ravel(parameters[row.key])
-            found[row.name] = float(value[case if len(value) > 1 else 0])
-        return found
+            numbers[row.name] = float(value[case if len(value) > 1 else 0])
+        return numbers
 
     def forces(self, t: Floats, named: Mapping[str, float]) -> Floats:
         """Return the value of every load at times t, shape (load, time)."""
@@ -277,7 +278,7 @@ class Loaded:
 
     @cached_property
     def harmonics(self) -> tuple[tuple[Harmonic, ...], ...] | None:
-        """Every load as a sum of harmonic ones; None where one is no such sum."""
+        """Every load as a sum of harmonic loads; None if some load is not such a sum."""
         rows = [None if load == _TABULATED else harmonics(load) for load in self.loads]
         known = [row for row in rows if row is not None]
         return tuple(known) if len(known) == len(rows) else None
@@ -285,74 +286,73 @@ class Loaded:
     @cached_property
     def has_exact(self) -> bool:
         """Whether the exact solution is known."""
-        own = self.structure
-        return own.has_all_modes and own.decays is not None and self.harmonics is not None
+        has_modes = self.structure.has_all_modes and self.structure.decays is not None
+        return has_modes and self.harmonics is not None
 
     def exact(self, t: Floats, initial: Numbers, parameters: Numbers) -> dict[str, Floats]:
-        """Return the states at times t, shape (..., n_t), by all modes; see `vibsim.models.Model.exact`."""
-        own, names = self.structure, self.structure.names
+        """Return the states at times t, shape (..., n_t), by modal superposition; see `vibsim.models.Model.exact`."""
+        names = self.structure.names
         columns = [np.ravel(initial[name]) for name in (*names, *velocities_of(names))]
         rows = [np.ravel(parameters[row.key]) for row in self.parameters]
         count = max(map(len, (*columns, *rows, np.atleast_2d(t))))
-        times_of = np.broadcast_to(np.atleast_2d(t), (count, np.shape(t)[-1]))
-        found = np.empty((2 * len(names), *times_of.shape))
+        times = np.broadcast_to(np.atleast_2d(t), (count, np.shape(t)[-1]))
+        states = np.empty((2 * len(names), *times.shape))
         for case in range(count):
             member = np.array([x[case if len(x) > 1 else 0] for x in columns])
             named = self.named(parameters, case)
-            size = max(TIMES_AT_ONCE // own.dofs, 1)
-            for first in range(0, times_of.shape[1], size):
+            size = max(TIMES_AT_ONCE // self.structure.dofs, 1)
+            for first in range(0, times.shape[1], size):
                 part = slice(first, first + size)
-                found[:, case, part] = self._motion(times_of[case, part], member, named)
-        shaped = found if np.ndim(t) > 1 or count > 1 else found[:, 0]
+                states[:, case, part] = self._motion(times[case, part], member, named)
+        shaped = states if np.ndim(t) > 1 or count > 1 else states[:, 0]
         return dict(zip((*names, *velocities_of(names)), shaped, strict=True))
 
     def _motion(self, t: Floats, initial: Floats, named: Mapping[str, float]) -> Floats:
-        own = self.structure
-        modes, decays = own.modes, own.decays
+        structure = self.structure
+        modes, decays = structure.modes, structure.decays
         assert decays is not None
         assert self.harmonics is not None
         w = modes.frequencies
         d = decays + 0.5 * (named["alpha"] + named["beta"] * w * w)
-        weighed = own.mass.sparse @ modes.shapes
-        start = tuple(weighed.T @ x for x in own.start_of(initial))
-        pushes = own.shapes @ modes.shapes
+        weighted = structure.mass.sparse @ modes.shapes
+        start = tuple(weighted.T @ x for x in structure.start_of(initial))
+        modal_loads = structure.shapes @ modes.shapes
         loads: list[tuple[Complexes, float]] = []
-        for push, rows in zip(pushes, self.harmonics, strict=True):
+        for modal, rows in zip(modal_loads, self.harmonics, strict=True):
             for row in rows:
                 amplitude, angular, phase = (
                     float(values(part, named)) for part in (row.amplitude, row.angular, row.phase)
                 )
-                loads.append((push * amplitude * on_arrays.complex_exp(1j * phase), angular))
+                loads.append((modal * amplitude * on_arrays.complex_exp(1j * phase), angular))
         q, v = mode_motion(t, w, d, (start[0], start[1]), loads)
-        shapes = own.observed @ modes.shapes
+        shapes = structure.observed @ modes.shapes
         return np.concatenate([shapes @ q, shapes @ v])
 
     def start(self, parameters: Numbers) -> dict[str, Any]:
         """Return the observed displacements and velocities at t = 0; see `vibsim.models.Model.start`."""
-        own = self.structure
-        assert own.start is not None
-        names = own.names, velocities_of(own.names)
+        structure = self.structure
+        assert structure.start is not None
+        names = structure.names, velocities_of(structure.names)
         return {
             name: float(value)
-            for row, state in zip(names, own.start, strict=True)
-            for name, value in zip(row, own.observed @ state, strict=True)
+            for row, state in zip(names, structure.start, strict=True)
+            for name, value in zip(row, structure.observed @ state, strict=True)
         }
 
     def natural_frequency(self, parameters: Numbers) -> Any:
-        """Return the lowest natural frequency that is not 0; NaN where there is none."""
-        found = self.structure.modes.frequencies
-        return found[found > 0.0][0] if np.any(found > 0.0) else np.nan
+        """Return the lowest natural frequency that is not 0; NaN if there is none."""
+        frequencies = self.structure.modes.frequencies
+        return frequencies[frequencies > 0.0][0] if np.any(frequencies > 0.0) else np.nan
 
 
 def written(
     formulas: Mapping[str, str], declared: tuple[str, ...], structure: Structure | None = None
 ) -> Model:
-    """Return the model of a structure under loads, ``load.0`` the formula of the first one, with declared parameters.
+    """Return the model of a structure, with formulas of its loads by key (``load.0``) and declared parameters.
 
-    A load that is a table of the structure has no formula. Without a structure it has one degree of freedom, with the
-    mass and the stiffness 1.
+    Tabulated loads have no formula. Without a structure the model has one degree of freedom, mass 1 and stiffness 1.
 
-    ExpressionError where a formula names something else than t and parameters.
+    Raises ExpressionError if a formula uses other names than t and parameters.
     """
     if structure is None:
         one = Matrix.of(np.eye(1))
@@ -368,19 +368,19 @@ def _structure(
     parameters = (*RAYLEIGH, *declared_parameters(declared))
     known = ("t", *(row.name for row in parameters))
     loads = tuple(parse(text, known) if text else _TABULATED for text in texts)
-    own = Loaded(structure, loads, parameters, terms)
-    is_conservative = not own.is_damped and not own.loads
+    loaded = Loaded(structure, loads, parameters, terms)
+    is_conservative = not loaded.is_damped and not loaded.loads
     accelerations = tuple(Name(f"_acceleration_{i}") for i in range(len(structure.names)))
-    sides = ["M u''", *(["C u'"] if own.is_damped else []), "K u"]
-    right = "p(t)" if own.is_driven else "p" if own.loads else "0"
+    left = ["M u''", *(["C u'"] if loaded.is_damped else []), "K u"]
+    right = "p(t)" if loaded.is_driven else "p" if loaded.loads else "0"
     return Model(
         kind="structure",
         title="Linear structure",
         source="the experiment file",
-        equation=f"{' + '.join(sides)} = {right}, {structure.dofs} degrees of freedom",
+        equation=f"{' + '.join(left)} = {right}, {structure.dofs} degrees of freedom",
         states=states_of(structure.names, "displacement"),
         parameters=parameters,
-        # of the whole structure, known to those alone who step it
+        # placeholders: `vibsim.simulation.structure` steps the whole structure and sums its energies
         acceleration=accelerations[0],
         further_accelerations=accelerations[1:],
         kinetic_energy=Name("_kinetic"),
@@ -389,11 +389,11 @@ def _structure(
         linear=False,
         conservative=is_conservative,
         superposed=is_conservative,
-        natural_frequency=own.natural_frequency,
+        natural_frequency=loaded.natural_frequency,
         highest_frequency=lambda _: _highest(structure.mass, structure.stiffness),
-        exact=own.exact if own.has_exact else None,
-        start=own.start if structure.start is not None else None,
-        loaded=own,
+        exact=loaded.exact if loaded.has_exact else None,
+        start=loaded.start if structure.start is not None else None,
+        loaded=loaded,
         written=written,
         optional=tuple(row.name for row in RAYLEIGH),
         variant=partial(_structure, structure, texts, declared),
@@ -401,4 +401,4 @@ def _structure(
 
 
 STRUCTURE = replace(written({}, ()), equation="M u'' + C u' + K u = p(t), with matrices M, C, K")
-"""The structure of one degree of freedom, under the equation of all."""
+"""The structure of one degree of freedom, shown with the general equation."""

@@ -1,21 +1,21 @@
 r"""A system of equations that a user writes: ``x'' = a(x, y, ..., x', y', ..., t)`` for each of its coordinates.
 
-The velocity of x is named vx; of a system with the one coordinate u it is v. Instead of accelerations there may be
-forces and masses, ``m x'' = F``. Masses may depend on positions, and belong to two coordinates together; the terms that
-they then add to the equations are found (`vibsim.models.shared.inertia`). Everything is dimensionless.
+The velocity of x is named vx; in a system whose only coordinate is u, it is v. Instead of accelerations a user may
+write forces and masses, ``m x'' = F``. The mass matrix may depend on positions and have off-diagonal entries; the
+velocity terms that follow are added to the equations (`vibsim.models.shared.inertia`). Everything is dimensionless.
 
-Energy: kinetic ``sum M_ij v_i v_j/2`` and a potential V, unless a user writes them. Of each force the terms that name
-positions alone are taken; V is their work from the origin,
-``-sum_i int_0^(x_i) F_i(x_1, ..., x_(i-1), s, 0, ..., 0) ds``. That is done where it is found by rules and its gradient
-is these forces; else V is 0. The power of everything else follows from the equations, ``P = dE/dt``, and a system is
-conservative where P vanishes. Both are tested at places and parameters of all kinds, because two formulas of one
-function need not look alike.
+Energy: kinetic ``sum M_ij v_i v_j/2`` and a potential V, unless a user writes them. V is minus the work, from the
+origin, of the terms of the forces that depend on positions alone,
+``-sum_i int_0^(x_i) F_i(x_1, ..., x_(i-1), s, 0, ..., 0) ds``, if rules can integrate it and its gradient gives these
+terms; otherwise V is 0. The power of everything else follows from the equations, ``P = dE/dt``, and a system is
+conservative if P vanishes. Both conditions are tested numerically at random states and parameters, because equal
+functions may have different formulas.
 
 Frequencies are those of small oscillations about the origin, ``w^2`` the positive eigenvalues of ``-da/dx`` at t = 0.
 
-Instead of forces a motion may be written for each coordinate: what is missing in the equations is then added, and the
-motion starts on it (a manufactured solution; vibration text (B), section 2.2 and exercises 9 and 23). Events and a stop
-may be written as well (`vibsim.models.shared.crossings`).
+Instead of forces a user may write the motion of each coordinate (a manufactured solution; vibration text (B), section
+2.2 and exercises 9 and 23): the missing forces are then added, and the initial values are those of the motion. Events
+and a stop may be written as well (`vibsim.models.shared.crossings`).
 """
 
 from __future__ import annotations
@@ -71,14 +71,14 @@ from vibsim.models.shared.mechanical import damping_of
 from vibsim.models.table import HEIGHT, Lookup, Table
 
 MOST = 64
-"""Coordinates, at most."""
+"""Largest number of coordinates."""
 NUMBERS = (
     *("period", "amplitude", "frequency", "growth_per_period", "relative_energy_error"),
     *("peak", "trough", "scalar", "theory", "measured", "work", "energy_drift", "check"),
 )
-"""What results hold with further words behind it, beside the energies."""
+"""Prefixes of names of variables in results, beside the energies."""
 SECTIONS = ("initial", "model", "schemes", "time")
-"""What the names of swept values begin with."""
+"""Prefixes of names of swept values."""
 TAKEN = frozenset(
     """
     t scheme case decay_rate level pair triple norm norm_seconds check steps dt end index extremum size_over
@@ -87,17 +87,17 @@ TAKEN = frozenset(
     exact_period
     """.split()  # noqa: SIM905
 )
-"""Other names of variables in results, and what would have such a name with a word of theirs behind it."""
+"""Other reserved names: variables of results, and names that would make one together with a suffix of results."""
 TESTS = 24
-"""Places at which formulas are compared."""
+"""Number of random points at which formulas are compared."""
 AGREE = 1e-9
-"""How far they may differ, to the size of their terms."""
+"""Largest difference of equal formulas, relative to the size of their terms."""
 SHOWN = 6
-"""Equations that are shown; of more, the first ones and the last one."""
+"""Largest number of equations that are all shown; otherwise the first ones and the last."""
 
 
 def velocities_of(coordinates: tuple[str, ...]) -> tuple[str, ...]:
-    """Name the velocities."""
+    """Return the names of the velocities."""
     return ("v",) if coordinates == ("u",) else tuple(f"v{name}" for name in coordinates)
 
 
@@ -108,7 +108,7 @@ def states_of(coordinates: tuple[str, ...], word: str) -> tuple[State, ...]:
 
 
 def name_fault(name: str, others: tuple[str, ...] = ()) -> str:
-    """Say why a name cannot be that of a coordinate, a velocity or an output beside others; nothing where it can."""
+    """Return why a name cannot name a coordinate, a velocity or an output beside `others`; empty if it can."""
     if not re.fullmatch("[A-Za-z][A-Za-z0-9_]*", name):
         return "must consist of letters, digits and _, and begin with a letter"
     if keyword.iskeyword(name):
@@ -126,7 +126,7 @@ def name_fault(name: str, others: tuple[str, ...] = ()) -> str:
 
 
 def coordinate_faults(coordinates: Sequence[str]) -> Iterator[str]:
-    """Yield for each name why it cannot be that of a coordinate beside those before it; nothing where it can."""
+    """Yield for each name why it cannot name a coordinate beside those before it; empty if it can."""
     before: list[str] = []
     for name in coordinates:
         velocity = velocities_of(tuple(coordinates) if len(coordinates) == 1 else (name, ""))[0]
@@ -143,12 +143,12 @@ KINETIC = "kinetic energy, or its terms, where it is not that of the masses"
 OUTPUTS = "further series, each with a name of your own"
 TABLED = "series of a table, which accelerations, forces and outputs may name"
 INPUT = "input"
-"""What formulas call the present value of the table."""
+"""Name of the table's current value in formulas."""
 EXACT = "exact solution of each coordinate, for which forces are then added"
 
 
 def fields(coordinates: tuple[str, ...]) -> tuple[FormulaField, ...]:
-    """Return what a user may write about a system with these coordinates."""
+    """Return the formulas that a user may write for a system with these coordinates."""
     velocities = velocities_of(coordinates)
     states, known = (*coordinates, *velocities), (*coordinates, *velocities, "t")
     of_each: dict[str, Any] = {"of": "coordinate"}
@@ -168,7 +168,7 @@ def fields(coordinates: tuple[str, ...]) -> tuple[FormulaField, ...]:
 
 @dataclass(frozen=True)
 class Written:
-    """The formulas of a user, read."""
+    """The parsed formulas of a user."""
 
     coordinates: tuple[str, ...]
     formulas: Mapping[str, str]
@@ -187,45 +187,45 @@ class Written:
 
     @cached_property
     def parameters(self) -> tuple[Parameter, ...]:
-        """Those that are declared."""
+        """The declared parameters."""
         return declared_parameters(self.declared)
 
     def read(self, key: str, default: str = "") -> Expression:
-        """Return a formula by its key; `default` where it is not written."""
+        """Return a formula by its key, or `default` if the user wrote none."""
         known = (*self.states, "t", *self.declared)
         if self.lookup is None:
             return parse(self.formulas.get(key, default), known)
         return put(parse(self.formulas.get(key, default), (*known, INPUT)), INPUT, Name(HEIGHT))
 
     def terms(self, name: str) -> list[Expression]:
-        """Return the terms of a sum that is written, in their order; none where it is not."""
+        """Return the terms of a sum in their order; empty if the user wrote none."""
         keys = [key for key in self.formulas if key.partition(".")[0] == name]
         return [self.read(key) for key in sorted(keys, key=lambda key: int(key.partition(".")[2]))]
 
     @cached_property
     def inertia(self) -> Inertia:
-        """The masses; 1 of a coordinate that has an acceleration."""
+        """The mass matrix; the mass is 1 if accelerations are written."""
         return inertia(self.formulas, self.coordinates, self.velocities, self.declared)
 
     @cached_property
     def forces(self) -> tuple[Expression, ...]:
-        """The forces; accelerations, where these are written."""
+        """The forces, or the accelerations if these are written."""
         field = "force" if f"force.{self.coordinates[0]}" in self.formulas else "acceleration"
         return tuple(self.read(f"{field}.{name}", f"-{name}") for name in self.coordinates)
 
     @cached_property
     def own_accelerations(self) -> tuple[Expression, ...]:
-        """The accelerations without the forces of a manufactured solution."""
+        """The accelerations without the additional forces of a manufactured solution."""
         return self.inertia.accelerations(self.forces)
 
     @cached_property
     def crossings(self) -> Crossings | None:
-        """The events, where some are written."""
+        """The events, if any are written."""
         return crossings(self.formulas, (*self.states, "t", *self.declared))
 
     @cached_property
     def manufactured(self) -> Manufactured | None:
-        """The motion that is written down, where it is."""
+        """The manufactured solution, if it is written."""
         keys = [f"exact.{name}" for name in self.coordinates]
         if keys[0] not in self.formulas:
             return None
@@ -249,7 +249,7 @@ class Written:
 
     @cached_property
     def position_forces(self) -> list[Expression]:
-        """The terms of every force that name neither velocities nor the time."""
+        """The sum of the terms of every force that depend on neither velocities nor time."""
         moving = {*self.velocities, "t", HEIGHT}
         return [
             sum((term for term in terms_of(whole) if moving.isdisjoint(term.names)), ZERO)
@@ -258,13 +258,13 @@ class Written:
 
     @property
     def misses_potential(self) -> bool:
-        """Tell whether the positions alone make forces, and no potential energy of these is known."""
+        """Tell whether there are forces that depend on positions alone, but no potential energy is known."""
         acts = any(not force.names.isdisjoint(self.coordinates) for force in self.position_forces)
         return acts and self.potential == ZERO and not self.terms("potential")
 
     @cached_property
     def potential(self) -> Expression:
-        """The potential energy, 0 where none is known."""
+        """The potential energy; 0 if none is known."""
         if terms := self.terms("potential"):
             return paired(terms, operator.add)
         total, forces = [], self.position_forces
@@ -292,11 +292,11 @@ class Written:
         return tuple(term for term in found if term != ZERO)
 
     def is_constant(self, node: Expression) -> bool:
-        """Tell whether a formula names parameters alone."""
+        """Tell whether a formula depends on parameters alone."""
         return {*self.states, "t", HEIGHT}.isdisjoint(node.names)
 
     def vanishes(self, terms: Any) -> bool:
-        """Tell whether a sum is 0 wherever it has a value, and that it has one somewhere."""
+        """Tell whether a sum is 0 at all random test points where it is finite, and finite at one at least."""
         rng = np.random.default_rng(21)
         numbers = {name: rng.uniform(-1.0, 1.0, TESTS) for name in self.states}
         numbers |= {name: rng.uniform(0.3, 1.7, TESTS) for name in ("t", HEIGHT, *self.declared)}
@@ -318,7 +318,7 @@ class Written:
         return self.minus_jacobian(self.velocities)
 
     def minus_jacobian(self, states: Sequence[str]) -> dict[tuple[int, int], Expression]:
-        """Return minus the derivatives of the accelerations by some states that are not 0, by row and column."""
+        """Return the nonzero entries of minus the Jacobian of the accelerations with respect to `states`."""
         found = {
             (i, j): -derivative(a, name)
             for i, a in enumerate(self.own_accelerations)
@@ -327,10 +327,10 @@ class Written:
         return {place: entry for place, entry in found.items() if entry != ZERO}
 
     def frequencies(self, parameters: Numbers) -> Floats:
-        """Return the angular frequencies of small oscillations, increasing, NaN behind the last, shape (..., n).
+        """Return the angular frequencies of small oscillations, increasing, padded with NaN, shape (..., n).
 
-        Velocities that couple like those in a magnetic field or a rotating frame, with opposite signs, take part;
-        damping does not.
+        Gyroscopic coupling of velocities (with opposite signs, as in a magnetic field or a rotating frame) is included;
+        damping is not.
         """
         numbers = {row.name: np.asarray(parameters[row.key], float) for row in self.parameters}
         shape = np.broadcast_shapes(*(number.shape for number in numbers.values()))
@@ -341,13 +341,13 @@ class Written:
             entries = values_of(list(formulas.values()), numbers | at_origin)
             for (i, j), entry in zip(formulas, entries, strict=True):
                 matrix[..., i, j] = entry
-        # of a matrix that is not finite nothing is known
+        # NaN for matrices that are not finite
         is_known = np.isfinite(stiffness).all(axis=(-2, -1), keepdims=True)
         squares = np.linalg.eigvals(np.where(is_known, stiffness, 0.0))
         largest = np.max(np.abs(squares), axis=-1, keepdims=True)
         is_one = (squares.real > 1e-12 * largest) & (np.abs(squares.imag) <= 1e-9 * largest)
         found = np.sort(np.sqrt(np.where(is_one, squares.real, np.nan)), axis=-1)
-        # damping couples with the same sign, and so does the diagonal
+        # gyroscopic terms have opposite signs; damping, also on the diagonal, has equal signs
         turning = np.where(coupling * np.swapaxes(coupling, -1, -2) < 0.0, coupling, 0.0)
         is_known = is_known[..., 0, 0] & np.isfinite(turning).all(axis=(-2, -1))
         turns = (is_known & np.any(turning, axis=(-2, -1)))[..., None]
@@ -356,16 +356,16 @@ class Written:
         return np.where(turns, _of_first_order(stiffness, turning, turns), found)
 
     def natural_frequency(self, parameters: Numbers) -> Any:
-        """Return the lowest one; NaN where there is none."""
+        """Return the lowest frequency; NaN if there is none."""
         return self.frequencies(parameters)[..., 0]
 
     def highest_frequency(self, parameters: Numbers) -> Any:
-        """Return the highest one; NaN where there is none."""
+        """Return the highest frequency; NaN if there is none."""
         return np.fmax.reduce(self.frequencies(parameters), axis=-1)
 
 
 def _of_first_order(stiffness: Floats, turning: Floats, known: Flags) -> Floats:
-    """Return the frequencies of ``x'' + G x' + K x = 0``, increasing, NaN behind the last, shape (..., n)."""
+    """Return the frequencies of ``x'' + G x' + K x = 0``, increasing, padded with NaN, shape (..., n)."""
     still = np.zeros_like(stiffness)
     rows = [[still, still + np.eye(stiffness.shape[-1])], [-stiffness, -turning]]
     matrix = np.where(known[..., None], np.block(rows), 0.0)
@@ -377,7 +377,7 @@ def _of_first_order(stiffness: Floats, turning: Floats, known: Flags) -> Floats:
 
 
 def terms_of(node: Expression) -> Iterator[Expression]:
-    """Yield the terms of a sum, also of one that is multiplied by what names nothing but parameters."""
+    """Yield the terms of a sum, with factors and divisors of sums multiplied out."""
     match node:
         case Binary("+", left, right):
             yield from terms_of(left)
@@ -409,9 +409,9 @@ def written(
     table: Table | None = None,
     is_met: bool = False,
 ) -> Model:
-    """Return the system of formulas, with declared parameters.
+    """Return the system with given formulas and declared parameters.
 
-    ExpressionError where a formula names something else than its field allows.
+    Raises ExpressionError if a formula uses a name that its field does not allow.
 
     Parameters
     ----------
@@ -431,7 +431,7 @@ def system(
     declared: tuple[str, ...],
     lookup: Lookup | None = None,
 ) -> Model:
-    """Return the system of formulas; see `written`."""
+    """Return the system with given formulas; see `written`."""
     own = Written(coordinates, dict(formulas), declared, lookup)
     motion = own.manufactured
     more: dict[str, Any] = {}
@@ -482,7 +482,7 @@ def system(
 
 
 def _is_linear(own: Written) -> bool:
-    """Tell whether the acceleration of the only coordinate is a number times it, beside what does not name it."""
+    """Tell whether the acceleration of the only coordinate is linear in it, with a constant coefficient."""
     (a,), (u,) = own.accelerations, own.coordinates
     jumps = (part for part in walk(a) if is_jump(part) and u in part.names)
     return not any(jumps) and own.is_constant(derivative(a, u))
@@ -543,4 +543,4 @@ def _equation(own: Written) -> str:
 
 
 SYSTEM = replace(named(("u",)), equation="x'' = a(x, y, ..., x', y', ..., t) for each coordinate x")
-"""The system of one coordinate without formulas, under the equation of all."""
+"""The system of one coordinate without formulas, shown with the general equation."""

@@ -1,11 +1,11 @@
-r"""Heights that are known at equally spaced places only, and what follows from them between the places.
+r"""Heights known at equally spaced places, and their interpolation.
 
 Source: vibration text (B), section 10.8. With heights ``h_i = h(x_i)``, ``x_i = x_0 + i dx``, the second derivative is
-``q_i = (h_(i-1) - 2 h_i + h_(i+1))/dx^2``, at the ends that of the neighbour, ``q_0 = q_1``, ``q_N = q_(N-1)``: first
-order at one point, so that all in all second order is kept, where an end value of 0 would leave the first alone.
+``q_i = (h_(i-1) - 2 h_i + h_(i+1))/dx^2``; at the ends it is that of the neighbour, ``q_0 = q_1``, ``q_N = q_(N-1)``.
+This is of first order at one point only, so the motion keeps second order; an end value of 0 would reduce it to first.
 
-Between two points q is the straight line, and h the cubic through both heights whose second derivative is that line:
-with the fraction w of the way from point i to point i+1
+Between two points q is linear, and h is the cubic through both heights with that second derivative: with the fraction w
+of the way from point i to point i+1
 
     h = (1 - w) h_i + w h_(i+1) - dx^2 w (1 - w)/6 ((2 - w) q_i + (1 + w) q_(i+1)),
 
@@ -24,23 +24,23 @@ from vibsim.core.array_types import Floats
 from vibsim.models.events import Formula
 
 FEWEST_POINTS = 3
-"""Points of a table, at least: a second difference takes three."""
+"""Smallest number of points of a table: a second difference takes three."""
 HEADER, HEIGHTS, BENDS = range(3)
 """Rows of `Table.rows`."""
 ROWS = 3
 HEIGHT, BEND = "_height", "_bend"
-"""Names by which formulas of a model know h and q at the present place; no user can write them."""
+"""Names of h and q at the current place in formulas of a model; no user can write them."""
 
 
 @dataclass(frozen=True)
 class Table:
-    """Heights at equally spaced places; two of the same numbers are equal."""
+    """Heights at equally spaced places; equal numbers make equal objects."""
 
     first: float
     """Place of the first point."""
     spacing: float
     heights: Floats = field(compare=False, repr=False)
-    """At least three, shape (point,)."""
+    """Shape (point,), with at least `FEWEST_POINTS` points."""
     digest: str = field(init=False)
     """SHA-256 of all numbers."""
 
@@ -61,7 +61,7 @@ class Table:
 
     @property
     def spacings_ahead(self) -> float:
-        """Spacings from the place 0, where motions begin, to the last point; whole where a point is there."""
+        """Number of spacings from place 0, where motions begin, to the last point; an integer if 0 is a point."""
         return self.points - 1 + self.first / self.spacing
 
     @cached_property
@@ -73,19 +73,20 @@ class Table:
 
     @cached_property
     def rows(self) -> Floats:
-        """What a kernel looks up, shape (`ROWS`, point): place and spacing, heights, second derivatives."""
-        found = np.zeros((ROWS, self.points))
-        found[HEADER, :2] = self.first, self.spacing
-        found[HEIGHTS], found[BENDS] = self.heights, self.bends
-        return found
+        """Array for a kernel, shape (`ROWS`, point): first place and spacing, heights, second derivatives."""
+        rows = np.zeros((ROWS, self.points))
+        rows[HEADER, :2] = self.first, self.spacing
+        rows[HEIGHTS], rows[BENDS] = self.heights, self.bends
+        return rows
 
     def read(self, x: Floats, before: Floats | None = None) -> tuple[Floats, Floats]:
-        """Return heights and second derivatives at places, by numpy: not for steps.
+        """Return heights and second derivatives at places, by numpy; kernels do not use it.
 
         Parameters
         ----------
         before
-            Number of the point before each place, whose piece is taken; it goes on beyond its ends. None finds it.
+            Index of the point at which the piece of each place begins; pieces are extrapolated beyond their ends. None
+            for the piece that contains the place.
         """
         way = (x - self.first) / self.spacing
         number = np.clip(np.floor(way) if before is None else before, 0, self.points - 2)
@@ -99,10 +100,10 @@ class Table:
 
 @dataclass(frozen=True)
 class Lookup:
-    """A table that the formulas of a model look up, under the names `HEIGHT` and `BEND`."""
+    """A table whose values formulas of a model use under the names `HEIGHT` and `BEND`."""
 
     table: Table
     place: Formula
-    """Where, in ``t`` and the parameters: a speed times ``t``."""
+    """Place in the table at time ``t``: a speed times ``t``, a formula in ``t`` and the parameters."""
     is_met: bool = False
-    """Whether a step of every member ends at every point of the table, so that no step has a corner of the force."""
+    """Whether steps of every member end at every point of the table, so that no step contains a corner of the force."""

@@ -50,7 +50,7 @@ FORMULAS = (
     ),
 )
 PLACE = Binary("*", Name("speed"), Name("t"))
-"""Where the vehicle is."""
+"""Place of the vehicle on the road."""
 
 
 def written(
@@ -59,9 +59,9 @@ def written(
     table: Table | None = None,
     is_met: bool = False,
 ) -> Model:
-    """Return the vehicle with the spring and the road of a user, a formula or a table, without its damper.
+    """Return the vehicle with a user's spring and road (formula or table), without its damper.
 
-    ExpressionError where a formula names something else than its field allows.
+    Raises ExpressionError if a formula uses a name that its field does not allow.
     """
     texts = tuple(formulas.get(field.name, field.default) for field in FORMULAS)
     lookup = None if table is None else Lookup(table, PLACE, is_met)
@@ -75,7 +75,7 @@ def vehicle(
     terms: frozenset[str],
     lookup: Lookup | None = None,
 ) -> Model:
-    """Return the vehicle, with a damper where `terms` has ``b``, and on the road of a table where there is one."""
+    """Return the vehicle, with a damper if `terms` contains ``b``, and on the road of the table if there is one."""
     parameters = (*PARAMETERS, *declared_parameters(declared))
     known = tuple(row.name for row in parameters)
     spring, road = parse(texts[0], ("u", *known)), parse(texts[1], ("x", *known))
@@ -114,4 +114,4 @@ def vehicle(
 
 
 VEHICLE = replace(written({}, ()), equation="m u'' + b u' + s(u) = -m h''(speed t) speed^2")
-"""The vehicle without formulas, under the equation of all."""
+"""The vehicle without formulas, shown with the general equation."""

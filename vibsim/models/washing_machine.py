@@ -3,8 +3,8 @@ r"""A washing machine on springs and dampers, ``m u'' + b u' + k u = e W^2 cos(W
 Source: vibration text (B), section 10.4 (unfinished there); the force is that of a mass m_e which turns at a distance r
 with the angular speed W: ``e = m_e r`` [kg m], and m [kg] is the mass of everything that moves. Units: k [N m-1],
 b [kg s-1], speed W [rad s-1], u [m]. The steady amplitude is ``e W^2/sqrt((k - m W^2)^2 + (b W)^2)``: small below
-resonance, e/m far above it. The floor carries ``k u + b u'`` beside the weight; the machine jumps when that pulls
-harder than the weight.
+resonance, e/m far above it. The floor carries ``k u + b u'`` in addition to the weight; the machine jumps when that
+pulls up more than the weight.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ PARAMETERS = (
 
 @cache
 def washing_machine(terms: frozenset[str]) -> Model:
-    """Return the machine, with dampers where `terms` has ``b``."""
+    """Return the machine, with dampers if `terms` contains ``b``."""
     names = ("u", "v", "t", *(row.name for row in PARAMETERS))
     damping, floor, term = ("b*v", "k*u + b*v", "b u' + ") if "b" in terms else ("0", "k*u", "")
     return mechanical(
@@ -52,4 +52,4 @@ def washing_machine(terms: frozenset[str]) -> Model:
 WASHING_MACHINE = replace(
     washing_machine(frozenset()), equation="m u'' + b u' + k u = unbalance speed^2 cos(speed t)"
 )
-"""The machine without dampers, under the equation that has them."""
+"""The machine without dampers, shown with the equation that has them."""

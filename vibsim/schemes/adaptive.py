@@ -1,7 +1,7 @@
-"""References that choose their own steps, from SciPy: DOP853, LSODA and Radau; each is its name and its tolerance.
+"""Adaptive reference solvers of SciPy: DOP853, LSODA and Radau, each given by its name and a tolerance.
 
-They stand outside the ladder: a run knows a tolerance and no level, so that no order is promised. The rows that they
-have in the files of the levels are their dense output at the points of each level (`vibsim.simulation.adaptive`).
+They have no levels, only a tolerance, so no order is promised. Their rows in the level files are dense output at the
+points of each level (`vibsim.simulation.adaptive`).
 
 Source: vibration text (B), exercise 4; E. Hairer, S. P. Norsett and G. Wanner, Solving Ordinary Differential Equations
 I, section II.10 (DOP853), and II, section IV.8 (Radau IIA of order 5); A. C. Hindmarsh, ODEPACK, and L. Petzold, SIAM
@@ -32,14 +32,14 @@ _MEASURED = {
     "lsoda": (46.0, 0.075, 3e-5),
     "radau": (150.0, 1 / 4, 3e-4),
 }
-"""Steps per period at a tolerance of 1e-8, the power of the tolerance by which they grow, seconds of a step:
-measured on the pendulum."""
+"""Steps per period at tolerance 1e-8, exponent of their growth with 1/tolerance, seconds per step: measured on the
+pendulum."""
 START_SECONDS = 3e-3
-"""Of a member beside its steps."""
+"""Overhead of one member."""
 
 
 def seconds(kind: str, tolerance: float, periods: float) -> float:
-    """Return the seconds that SciPy takes of one member, as far as periods of small oscillations tell."""
+    """Return the predicted run time [s] of one member over a number of periods of small oscillations."""
     steps, power, cost = _MEASURED[kind]
     periods = periods if math.isfinite(periods) else 1.0
     return float(START_SECONDS + periods * steps * (1e-8 / tolerance) ** power * cost)

@@ -1,8 +1,8 @@
-"""What a scheme is: data about a time-stepping method, and the small functions that step it.
+"""Scheme: data about a time-stepping method, with the small functions that advance one step.
 
 The functions are plain Python on floats, one member at a time. The engine compiles them for a lane, or runs the same
-text uncompiled where the work is small; the theory runs them on exact numbers. They use ``+ - * /`` and comparisons
-only, so that every lane gives the same bits.
+text uncompiled for small amounts of work; the theory runs them on exact numbers. They use only ``+ - * /`` and
+comparisons, so that every lane gives the same bits.
 """
 
 from __future__ import annotations
@@ -25,18 +25,18 @@ OptionValue = str | float | bool
 Options = Mapping[str, OptionValue]
 
 CarriedState = tuple[float, ...]
-"""What a scheme carries from step to step; the first entry is the position."""
+"""State that a scheme carries from step to step; the first entry is the position."""
 Acceleration = Callable[[float, float, float, Any], float]
 """``acceleration(u, v, t, p)`` with the parameters p of the member."""
 Slopes = Callable[[float, float, float, Any], tuple[float, float]]
-"""``slopes(u, v, t, p)``: derivatives of the acceleration by position and by velocity."""
+"""``slopes(u, v, t, p)``: derivatives of the acceleration with respect to position and velocity."""
 
 UNIT_ROUND_OFF = 2.0**-53
 
 
 @dataclass(frozen=True)
 class Option:
-    """A choice that a user may make within a scheme; the first choice is the default."""
+    """An option of a scheme with named choices; the first choice is the default."""
 
     name: str
     choices: tuple[str, ...]
@@ -44,13 +44,13 @@ class Option:
 
     @property
     def default(self) -> str:
-        """The choice taken when the user makes none."""
+        """The choice when the user makes none."""
         return self.choices[0]
 
 
 @dataclass(frozen=True)
 class NumberOption:
-    """A number that a user may give a scheme, from `least` to `most`, both included."""
+    """A numerical option of a scheme, from `least` to `most`, both included."""
 
     name: str
     default: float
@@ -61,7 +61,7 @@ class NumberOption:
 
 @dataclass(frozen=True)
 class Flag:
-    """Something that a user may switch on; off by default."""
+    """An option that a user may switch on; off by default."""
 
     name: str
     description: str
@@ -71,7 +71,7 @@ class Flag:
 AnyOption = Option | NumberOption | Flag
 
 LOW_STARTS = {"first_order": "omits its dt^2 term", "backward": "has twice its dt^2 term"}
-"""Choices of an option `start` that leave order 1, and what is wrong with them in words."""
+"""Choices of an option `start` that lower the order to 1, and in words what is wrong with the first step."""
 
 EVENTS = Option(
     "events",
@@ -79,57 +79,58 @@ EVENTS = Option(
     "where the motion is not smooth: the event is found within the step and the rest of the step begins there, or it "
     "is left to the mesh and noticed at the grid point behind it",
 )
-"""Option of every scheme with equal steps on a model with events (`vibsim.models.events`)."""
+"""Option of every fixed-step scheme on a model with events (`vibsim.models.events`)."""
 
 
 def no_backward(state: CarriedState, dt: float) -> float:
-    """Return NaN: a scheme that carries its velocity has no use for a one-sided one."""
+    """Return NaN: a scheme that carries its velocity needs no one-sided difference."""
     return math.nan * dt
 
 
 @dataclass(frozen=True)
 class Stepper:
-    """The arithmetic of a scheme: functions on the carried state of one member, and how it starts and ends.
+    """The arithmetic of a scheme: functions on the carried state of one member, with its start and its end.
 
-    A function may ask for `slopes` or `damping_rate` (`vibsim.models.base.Damping`) behind `acceleration`, by these
-    names. Of several coordinates positions, velocities and accelerations are vectors (`vibsim.engine.coordinates`).
+    After `acceleration` a function may take parameters named `slopes` and `damping_rate`
+    (`vibsim.models.base.Damping`). On models with several coordinates, positions, velocities and accelerations are
+    vectors (`vibsim.engine.coordinates`).
     """
 
     start: Callable[..., CarriedState]
-    """``start(variant, u, v, dt, p, acceleration)``: the state at the first step."""
+    """``start(variant, u, v, dt, p, acceleration)``: the state after the first step."""
     step: Callable[..., tuple[CarriedState, float]]
-    """``step(state, t, dt, p, acceleration)``: the next state, and the velocity at the present time t."""
+    """``step(state, t, dt, p, acceleration)``: the next state, and the velocity at the current time t."""
     backward: Callable[..., float] = no_backward
-    """``backward(state, dt)``: the one-sided velocity ``(u^n - u^(n-1))/dt`` at the present time."""
+    """``backward(state, dt)``: the one-sided velocity ``(u^n - u^(n-1))/dt`` at the current time."""
     variant: int = 0
-    """Which of its starts `start` is to take."""
+    """Variant of the start, passed to `start`."""
     end: str = "own"
-    """Velocity at the last point: `END_RULES`."""
+    """Velocity at the last point: one of `END_RULES`."""
     own_velocity: bool = True
-    """Whether the velocity is another one than the centred difference ``[D_2t u]``."""
+    """Whether the velocity differs from the centred difference ``[D_2t u]``."""
     staggered: bool = False
-    """Whether the velocity belongs to another time than the position: peaks are then found by ``[D_2t u]``."""
+    """Whether velocity and position belong to different times; peaks are then located by ``[D_2t u]``."""
     implicit: bool = False
-    """Whether a step solves an equation, for which it may ask for `slopes`."""
+    """Whether a step solves an equation; `step` may then take `slopes`."""
     scaling: Callable[[Floats], tuple[Floats, ...]] | None = None
-    """Factors of the acceleration and of the initial velocity that enters the start, from ``w dt``; None for 1."""
+    """Function of ``w dt`` that returns factors of the acceleration and of the initial velocity; None for 1."""
     events: str = ""
-    """How it treats events, one of `EVENTS`; empty for a smooth model."""
+    """Treatment of events, one of the choices of `EVENTS`; empty for a smooth model."""
     carried: Callable[..., CarriedState] = lambda u, v, a, t, dt: (u(t), v(t))
-    """``carried(u, v, a, t, dt)``: the state at time t of a motion with that position, velocity and acceleration,
-    functions of time."""
+    """``carried(u, v, a, t, dt)``: the state at time t along the motion with position u, velocity v and acceleration a,
+    all functions of time."""
     tabulated: bool = False
-    """Whether the points are known before, and stand behind the parameters (`vibsim.simulation.adaptive`)."""
+    """Whether the points are already known and follow the parameters (`vibsim.simulation.adaptive`)."""
 
 
 END_RULES = ("own", "extrapolate", "backward")
-"""The scheme's own velocity, the linear extrapolation of the last two, or `Stepper.backward`."""
+"""The scheme's own velocity, the linear extrapolation of the last two velocities, or `Stepper.backward`."""
 
 ZERO = 0.0
 """The number 0; in a kernel for several coordinates, the vector of zeros."""
 
 HANDED = ("acceleration", "slopes", "damping_rate")
-"""Functions of the model that a function of a scheme is handed, by these names."""
+"""Functions of the model that a scheme's function may take, by parameter name."""
 
 
 def handed(
@@ -138,14 +139,14 @@ def handed(
     slopes: Slopes,
     damping_rate: Acceleration = lambda u, v, t, p: 0.0,
 ) -> Callable[..., Any]:
-    """Return `function`, a `Stepper`'s start or step, with those functions of the model that it asks for."""
-    known = {"acceleration": acceleration, "slopes": slopes, "damping_rate": damping_rate}
+    """Return `function`, a `Stepper`'s start or step, bound to the functions of the model that it takes."""
+    available = {"acceleration": acceleration, "slopes": slopes, "damping_rate": damping_rate}
     parameters = inspect.signature(function).parameters
-    return partial(function, **{name: known[name] for name in HANDED if name in parameters})
+    return partial(function, **{name: available[name] for name in HANDED if name in parameters})
 
 
 ORDER_AT_CORNERS = 2.0
-"""Order that is left where the slope of the force jumps within a step, and of a sum of its power over such steps."""
+"""Highest order where the slope of the force jumps within a step; also that of the work summed over such steps."""
 
 
 def round_off(options: Options, steps: int) -> float:
@@ -154,9 +155,9 @@ def round_off(options: Options, steps: int) -> float:
 
 
 MOST_UNKNOWNS = 16
-"""Unknowns of a step, at most: their elimination is written out, n^3/3 operations, which takes seconds to compile."""
+"""Largest number of unknowns of a step: the elimination is unrolled, n^3/3 operations that take seconds to compile."""
 VECTOR = "vector "
-"""Before a kind of damping: that of a model with several coordinates."""
+"""Prefix of a kind of damping on models with several coordinates."""
 
 
 def is_on_the_mesh(options: Options) -> bool:
@@ -171,7 +172,7 @@ def _kind_of(model: Model) -> str:
 
 @dataclass(frozen=True)
 class Weights:
-    """The family of Newmark's scheme (`vibsim.schemes.newmark`), in which all steps of structures are."""
+    """Parameters of the Newmark family (`vibsim.schemes.newmark`), to which every scheme for structures belongs."""
 
     beta: float
     gamma: float
@@ -187,35 +188,35 @@ class Scheme:
     title: str
     source: str
     family: str
-    """Such as ``Runge-Kutta``, ``multistep``, ``symplectic``."""
+    """For example ``Runge-Kutta``, ``multistep`` or ``symplectic``."""
     stepper: Callable[[Options], Stepper]
-    """The arithmetic that the options ask for; the same functions for the same options."""
+    """The arithmetic for given options; equal options give the same function objects."""
     orders: Callable[[Options], Orders]
-    """Orders that the scheme promises with these options."""
+    """The formal orders for given options."""
     force_evaluations: int = 1
-    """Evaluations of the acceleration per step; of an implicit scheme, per iteration."""
+    """Evaluations of the acceleration per step; per iteration if the scheme is implicit."""
     start: str = "none: a one-step method"
-    """What is needed for the first step, in words."""
+    """How the first step is made, in words."""
     explicit: bool = True
     symplectic: bool = False
     symmetric: bool = False
-    """Whether a step with -dt takes a step back, up to round-off."""
+    """Whether a step with -dt undoes a step with dt, up to round-off."""
     velocity_forces: bool = True
-    """Whether the acceleration may depend on the velocity, however it does."""
+    """Whether the acceleration may depend on the velocity in any way."""
     damped: tuple[tuple[str, Callable[[Options], Stepper]], ...] = ()
-    """Kinds of damping (`vibsim.models.base.Damping`) that it has a treatment of its own for, and the arithmetic."""
+    """Kinds of damping (`vibsim.models.base.Damping`) with a special treatment, each with its arithmetic."""
     options: tuple[AnyOption, ...] = ()
     even_powers: bool | Callable[[str, Model, Options], bool] = False
-    """Whether the error of a quantity expands in h^p, h^(p+2), ... rather than h^p, h^(p+1), ...: of every quantity
-    where the scheme, its start and its velocity are symmetric."""
+    """Whether the error of a quantity expands in h^p, h^(p+2), ... rather than h^p, h^(p+1), ...: true of every
+    quantity if the scheme, its start and its velocity are symmetric."""
     round_off: Callable[[Options, int], float] = round_off
     """Predicted round-off after a number of steps, relative to the solution (order of magnitude)."""
     adaptive: bool = False
-    """Whether it chooses its own steps, outside the ladder (`vibsim.schemes.adaptive`)."""
+    """Whether the scheme chooses its own steps, outside the ladder (`vibsim.schemes.adaptive`)."""
     weights: Callable[[Options], Weights] | None = None
-    """Its step on a linear structure, which is stepped as a whole; None of a scheme that cannot do that."""
+    """Newmark parameters of the step on a linear structure; None if the scheme cannot step structures."""
     weighed: tuple[str, ...] = ()
-    """Options that count on a structure."""
+    """Names of the options that apply to structures."""
 
     def defaults(self) -> dict[str, OptionValue]:
         """Return every option with its default."""
@@ -223,18 +224,18 @@ class Scheme:
 
     @property
     def words(self) -> tuple[Option, ...]:
-        """The options that are a choice of words."""
+        """The options with named choices."""
         return tuple(option for option in self.options if isinstance(option, Option))
 
     def options_on(self, model: Model | None) -> tuple[AnyOption, ...]:
-        """Return every option that has a meaning on a model."""
+        """Return the options that apply to a model."""
         if model is not None and model.loaded is not None:
             return tuple(option for option in self.options if option.name in self.weighed)
         has_events = model is not None and model.events is not None and not self.adaptive
         return (*self.options, EVENTS) if has_events else self.options
 
     def treats(self, model: Model) -> bool:
-        """Tell whether the scheme can treat the forces of a model, and its events."""
+        """Tell whether the scheme can handle the forces and events of a model."""
         if model.loaded is not None:
             return self.weights is not None
         if (self.adaptive and model.events is not None) or self.unknowns(model) > MOST_UNKNOWNS:
@@ -246,14 +247,14 @@ class Scheme:
         )
 
     def unknowns(self, model: Model) -> int:
-        """Return how many unknowns a step eliminates on a model: the accelerations at all of its stages."""
+        """Return the number of unknowns of an implicit step on a model: the accelerations at all stages."""
         is_solved = not (self.explicit or self.adaptive) and model.coordinates > 1
         return model.coordinates * self.force_evaluations if is_solved else 1
 
     def stepper_for(self, model: Model, options: Options) -> Stepper:
-        """Return the arithmetic that the options ask for, with its treatment of the model's damping if it has one.
+        """Return the arithmetic for a model, with the special treatment of its damping if there is one.
 
-        Across an event the centred difference ``[D_2t u]`` is no velocity, and none is gathered.
+        Across an event the centred difference ``[D_2t u]`` is no velocity, so it is not gathered.
         """
         stepper = dict(self.damped).get(_kind_of(model), self.stepper)(options)
         if model.events is None:
@@ -270,46 +271,46 @@ class Scheme:
         *,
         meets_events: bool = True,
     ) -> float:
-        """Return the order that is promised for a quantity of a model; infinite for what is exact.
+        """Return the formal order of a quantity of a model; infinite if the quantity is exact.
 
-        An event that is left to the mesh is noticed up to a step late: no order above 1 is left. A corner of the force
-        that a step does not see leaves 2 (`ORDER_AT_CORNERS`). A motion that meets no event is smooth.
+        An event left to the mesh is noticed up to a step late, which limits the order to 1. A corner of the force
+        inside a step limits it to 2 (`ORDER_AT_CORNERS`). A motion that meets no event is smooth.
         """
         orders = self.orders(options)
         if model.events is None or not meets_events:
             order = orders.of(quantity, model, beginning)
-            # the power of the force has its corners, whatever the steps do; that of damping has none
-            is_kept = self._sees_corners(model) and quantity not in BUDGET[1:]
+            # the power of the force has corners, wherever steps end; the power of damping has none
+            is_kept = self._resolves_corners(model) and quantity not in BUDGET[1:]
             return order if model.lookup is None or is_kept else min(order, ORDER_AT_CORNERS)
         order = orders.between_events(model)
         return min(order, 1.0) if is_on_the_mesh(options) else order
 
     def special_order(self, options: Options) -> float:
-        """Return the highest order of any state or energy in a special case of motion, model or numbers of options.
+        """Return the highest order of any state or energy in any special case of motion, model or numerical option.
 
-        What vanishes there alone is small near by, also in what it drives: the swing of a wrong energy.
+        An error term that vanishes in a special case is small near it, and so is everything that it drives.
         """
-        usual = {o.name: o.default for o in self.options if isinstance(o, NumberOption)}
-        return max(self.orders(near).highest for near in (options, {**options, **usual}))
+        defaults = {o.name: o.default for o in self.options if isinstance(o, NumberOption)}
+        return max(self.orders(case).highest for case in (options, {**options, **defaults}))
 
     def has_even_powers(self, quantity: str, model: Model, options: Options) -> bool:
         """Tell whether the error of a quantity expands in h^p, h^(p+2), ...
 
-        It does not where an event divides a step, or a corner of the force.
+        It does not if an event or a corner of the force lies inside a step.
         """
-        if model.events is not None or not self._sees_corners(model):
+        if model.events is not None or not self._resolves_corners(model):
             return False
         even = self.even_powers
         return even if isinstance(even, bool) else even(quantity, model, options)
 
-    def _sees_corners(self, model: Model) -> bool:
-        """Tell whether every step has a smooth force: between two corners, and without a look back across one."""
+    def _resolves_corners(self, model: Model) -> bool:
+        """Tell whether the force is smooth in every step: steps end at the corners and do not look back across them."""
         is_multistep = self.family == "multistep"
         return model.lookup is None or (model.lookup.is_met and not is_multistep)
 
 
 def fault_of(scheme: object) -> str:
-    """Say why an object from elsewhere is no scheme that can be added; nothing where it is one."""
+    """Return why an object from an installed package cannot be added as a scheme; empty if it can."""
     if not isinstance(scheme, Scheme):
         return f"is no vibsim.schemes.Scheme, but of the type {type(scheme).__name__}"
     if not re.fullmatch("[a-z0-9_]+", scheme.kind):

@@ -4,18 +4,18 @@ Order 2, symplectic and symmetric, explicit, one evaluation of the acceleration 
 velocity is the centred difference ``(u^(n+1) - u^(n-1))/(2 dt)``. Not to be confused with Euler-Cromer: the same
 recurrence, but a first-order solution with plain initial values.
 
-One scheme written three ways, algebraically equal, with different round-off:
+The scheme is written in three ways, algebraically equal but with different round-off:
 
 - ``three_term``, as in the source texts: ``u^(n+1) = 2 u^n - u^(n-1) + dt^2 a``. Each rounding of u acts like a kick of
-  the velocity by eps/dt and is carried on for the rest of the run: round-off grows like eps N^(3/2).
-- ``increment``: ``d^(n+1) = d^n + dt^2 a``, ``u^(n+1) = u^n + d^(n+1)``. Grows like eps N^(1/2).
-- ``compensated``: the same with both additions carrying their rounding error along (Knuth's two-sum). Does not grow.
+  the velocity by eps/dt that persists for the rest of the run: round-off grows like eps N^(3/2).
+- ``increment``: ``d^(n+1) = d^n + dt^2 a``, ``u^(n+1) = u^n + d^(n+1)``. Round-off grows like eps N^(1/2).
+- ``compensated``: the same, but both additions carry their rounding error along (Knuth's two-sum). No growth.
 
 The first step follows from the centred difference ``(u^1 - u^(-1))/(2 dt) = V`` and the scheme at n = 0 (`centred`), or
 from three terms of the Taylor polynomial (`taylor`, B, exercise 5): ``u^1 = u^0 + dt V + dt^2 a^0/2`` either way. A
-one-sided difference of the initial velocity leaves order 1 (B, section 7.2): the forward one is ``u^1 = u^0 + dt V``
-(`first_order`), as Euler-Cromer starts with the position first; the backward one, ``u^(-1) = u^0 - dt V``, is
-``u^1 = u^0 + dt V + dt^2 a^0`` (`backward`), as it starts with the velocity first.
+one-sided difference of the initial velocity lowers the order to 1 (B, section 7.2): the forward difference gives
+``u^1 = u^0 + dt V`` (`first_order`), like Euler-Cromer with the position first; the backward difference,
+``u^(-1) = u^0 - dt V``, gives ``u^1 = u^0 + dt V + dt^2 a^0`` (`backward`), like Euler-Cromer with the velocity first.
 
 Damping. With the increments ``d = u^n - u^(n-1)`` and ``e = u^(n+1) - u^n``, a damping rate c over the mass, and a the
 acceleration without damping at n, every step of ``u'' + D(u') = a(u, t)`` is ``e = d + kick``:
@@ -60,13 +60,13 @@ from vibsim.schemes.code_generation import written
 from vibsim.schemes.orders import Orders, depends_on_velocity, same_orders
 
 FORWARD_START, BACKWARD_START = 1, 2
-"""Variants of a start with a one-sided difference of the initial velocity."""
+"""Variants of the start with a one-sided difference of the initial velocity."""
 
 
 def first_kick(
     variant: int, u: float, v: float, dt: float, p: Any, acceleration: Acceleration
 ) -> float:
-    """Return the dt^2 term of u^1, by A (11): half of ``dt^2 a``, none (the trap of A, section 2.3) or all of it."""
+    """Return the dt^2 term of u^1, A (11): ``dt^2 a/2``, or with a one-sided start 0 (A, section 2.3) or ``dt^2 a``."""
     share = 1.0 if variant == BACKWARD_START else 0.5
     return ZERO if variant == FORWARD_START else share * (dt * dt) * acceleration(u, v, 0.0, p)
 
@@ -100,7 +100,7 @@ def backward_increment(state: tuple[float, float], dt: float) -> float:
 def start_compensated(
     variant: int, u: float, v: float, dt: float, p: Any, acceleration: Acceleration
 ) -> tuple[float, float, float, float]:
-    """Return u^1, the increment u^1 - u^0, and the rounding errors that both still have to get."""
+    """Return u^1, the increment u^1 - u^0, and the rounding errors of both."""
     kick = first_kick(variant, u, v, dt, p, acceleration)
     push = dt * v
     d = push + kick
@@ -114,14 +114,14 @@ def start_compensated(
 
 @dataclass(frozen=True)
 class Treatment:
-    """How a step takes the damping: the text of its kick."""
+    """Treatment of the damping in a step: the text of its kick."""
 
     kick: str
-    """Formula of the kick, from ``push``, which is ``dt^2 a``, and ``d``."""
+    """Formula of the kick in ``push`` (``dt^2 a``) and ``d``."""
     lines: tuple[str, ...] = ()
-    """Assignments before it."""
+    """Assignments before the kick."""
     velocity: str = "ZERO"
-    """The velocity at which the acceleration is taken: at rest it has no damping."""
+    """Velocity at which the acceleration is evaluated; at rest it contains no damping."""
 
 
 _RATE = "rate = damping_rate(u, ZERO, t, p)"
@@ -147,7 +147,7 @@ def step_compensated(state, t, dt, p, {handed}):
     d_ahead = d + kick
     part = d_ahead - d
     d_rest_ahead = (d - (d_ahead - part)) + (kick - part)
-    # the rest of d belongs to u as well, but only in the sum that u keeps
+    # the rounding error of d is due to u as well, but only within the compensated sum
     drift = d_ahead + u_rest
     ahead = u + drift
     part_of_u = ahead - u
@@ -178,11 +178,11 @@ class Arithmetic:
 
     start: Callable[..., Any]
     text: str
-    """Of the step, without its treatment of the damping."""
+    """Text of the step, with placeholders for the treatment of the damping."""
     backward: Callable[..., float]
     carried: Callable[..., Any]
     growth: float
-    """Power of the number of steps by which round-off grows."""
+    """Exponent of the growth of round-off with the number of steps."""
 
 
 ARITHMETICS = {
@@ -227,12 +227,12 @@ def _step(arithmetic: str, treatment: Treatment) -> Callable[..., Any]:
 
 
 def corrected(p: Floats) -> tuple[Floats, Floats]:
-    """Return the factors of force and initial velocity that make the scheme oscillate at w, from ``p = w dt``.
+    """Return the factors of force and initial velocity that correct the numerical frequency, from ``p = w dt``.
 
     The numerical frequency is that of ``sin(w~ dt/2) = w dt/2``, too high by ``p^2/24`` (B, equation (19)); exercise 3
     replaces w by ``w (1 - p^2/24)``, so the force by its square times the force, which leaves ``w~ = w (1 + O(p^4))``.
     The solution is ``u^n = I cos(n w~ dt) + V dt sin(n w~ dt)/sin(w~ dt)``: the initial velocity V stands there with
-    the factor ``p/sin p = 1 + p^2/6 + O(p^4)`` against the exact ``V/w``, so the start gets ``(1 - p^2/6) V``.
+    the factor ``p/sin p = 1 + p^2/6 + O(p^4)`` relative to the exact ``V/w``, so the start uses ``(1 - p^2/6) V``.
     """
     slower = 1.0 - p * p / 24.0
     return slower * slower, 1.0 - p * p / 6.0
@@ -242,31 +242,31 @@ _ENDS = {"extrapolate": "extrapolate", "backward": "backward", "kick": "own"}
 
 
 def stepper(options: Options, treatment: Treatment = UNDAMPED) -> Stepper:
-    """Return the arithmetic, the start and the end that the options ask for.
+    """Return the arithmetic, the start and the end for given options.
 
-    The velocity at n is known once u^(n+1) is. At the last point that is one more step, whose velocity is the kick:
+    The velocity at n is known once u^(n+1) is, so `kick` takes one more step for the velocity at the last point:
     without damping ``(u^(N+1) - u^(N-1))/(2 dt) = (u^N - u^(N-1))/dt + dt a^N/2``.
     """
-    arithmetic = str(options["arithmetic"])
-    chosen = ARITHMETICS[arithmetic]
+    name = str(options["arithmetic"])
+    arithmetic = ARITHMETICS[name]
     return Stepper(
-        chosen.start,
-        _step(arithmetic, treatment),
-        chosen.backward,
+        arithmetic.start,
+        _step(name, treatment),
+        arithmetic.backward,
         variant={"first_order": FORWARD_START, "backward": BACKWARD_START}.get(
             str(options["start"]), 0
         ),
         end=_ENDS[str(options["end_velocity"])],
         own_velocity=False,
         scaling=corrected if options.get("frequency_correction") else None,
-        carried=chosen.carried,
+        carried=arithmetic.carried,
     )
 
 
 def orders(options: Options) -> Orders:
-    """Return 2: scheme, start and velocity are centred; the corrected frequency makes it 4 for positions on a spring.
+    """Return order 2, and 4 for the position on a spring with corrected frequency.
 
-    That holds for the starts of `LOW_STARTS` too: they break the promise, and the verdict says so.
+    The starts of `LOW_STARTS` promise the same: they miss it, and the verdict says so.
     """
     return same_orders(2, position_linear=4.0 if options.get("frequency_correction") else None)
 
@@ -279,9 +279,9 @@ def round_off(options: Options, steps: int) -> float:
 
 
 def even_powers(quantity: str, model: Model, options: Options) -> bool:
-    """Tell whether the error of `quantity` has even powers of dt only (A, section 2.4).
+    """Tell whether the error of `quantity` has only even powers of dt (A, section 2.4).
 
-    The start must be centred and the damping smooth; whatever has the velocity in it needs a centred one at the end.
+    The start must be centred and the damping linear; quantities of the velocity also need a centred one at the end.
     """
     centred_end = quantity in model.positions or options["end_velocity"] == "kick"
     centred_damping = model.damping is None or model.damping.kind == "linear"
@@ -289,10 +289,10 @@ def even_powers(quantity: str, model: Model, options: Options) -> bool:
 
 
 def _damped(quadratic: Treatment) -> tuple[tuple[str, Callable[[Options], Stepper]], ...]:
-    """Return how every kind of damping is treated, given the treatment of a quadratic one of one coordinate.
+    """Return the treatment of each kind of damping, given that of quadratic damping of one coordinate.
 
-    The geometric mean ``|v^(n-1/2)| v^(n+1/2)`` of several coordinates is off by ``dt/2 (|v| v' - |v|' v)``, which
-    vanishes where v' is parallel to v only: there the quadratic damping is centred.
+    With several coordinates the geometric mean ``|v^(n-1/2)| v^(n+1/2)`` has the error ``dt/2 (|v| v' - |v|' v)``,
+    which vanishes only if v' is parallel to v; so quadratic damping is exactly centred there.
     """
     linear = partial(stepper, treatment=LINEAR)
     centred = partial(stepper, treatment=ROOT)

@@ -1,10 +1,9 @@
-"""Functions written out from data: a tableau or coefficients become the text of a step, a step the text of its start.
+"""Code generation: source text of steps from a tableau or coefficients, and of starts from steps.
 
-The text is kept where Python looks for source (`linecache`), so that the engine, a traceback and a debugger read it
-as they read any other function.
+The text is registered with `linecache`, so that the engine, tracebacks and debuggers can read it like any other source.
 
-Coefficients are formulas such as ``"1/2 - sqrt(3)/6"``: the function has their values as floats, under the names that
-its text uses, and the theory reads the formulas themselves, to be exact (`exact_names`).
+Coefficients are formulas such as ``"1/2 - sqrt(3)/6"``. The function uses their values as floats, by name; the theory
+reads the formulas themselves, to be exact (`exact_names`).
 """
 
 from __future__ import annotations
@@ -25,10 +24,10 @@ from vibsim.schemes.base import HANDED, Stepper
 def written(
     text: str, formulas: Mapping[str, str] | None = None, functions: Mapping[str, Any] | None = None
 ) -> FunctionType:
-    """Return the function that `text` defines; the same one for the same text.
+    """Return the function that `text` defines; equal arguments give the same object.
 
-    The text is one ``def``, in ``+ - * /`` and comparisons. `formulas` are those of the numbers that it uses by name
-    (two functions of one scheme that share a name share its formula), `functions` what it calls, or `math`.
+    The text is a single ``def`` that uses ``+ - * /`` and comparisons. `formulas` give the constants that it uses by
+    name (functions of one scheme must agree on them), `functions` the functions that it calls, or `math`.
     """
     return _written(text, tuple((formulas or {}).items()), tuple(sorted((functions or {}).items())))
 
@@ -56,7 +55,10 @@ def _written(
 def weighted(
     prefix: str, weights: Sequence[str], names: Sequence[str], formulas: dict[str, str]
 ) -> str:
-    """Write a sum of names with weights, which join `formulas` as ``prefix_1``, ...; weights 0 and 1 are left out."""
+    """Return the text of a weighted sum of names, and add the weights to `formulas` as ``prefix_1``, ...
+
+    Terms of weight 0 are omitted; weight 1 is not written.
+    """
     terms = []
     for j, (weight, name) in enumerate(zip(weights, names, strict=True), 1):
         if weight not in ("0", "1"):
@@ -71,23 +73,23 @@ _FORMULAS: dict[FunctionType, Mapping[str, str]] = {}
 
 
 def exact_names(function: Callable[..., Any]) -> Mapping[str, str]:
-    """Return the formulas of the numbers that a function uses by name; none for one that was not written here."""
+    """Return the formulas of a generated function's constants by name; empty for any other function."""
     return _FORMULAS.get(function, {}) if isinstance(function, FunctionType) else {}
 
 
 def self_starting(
     step: Callable[..., Any], *, implicit: bool = False, carries_acceleration: bool = False
 ) -> Stepper:
-    """Return the arithmetic of a one-step method, whose velocity is its own, from its step (`Stepper.step`).
+    """Return the arithmetic of a one-step method from its step (`Stepper.step`): the start is the first step.
 
-    Where it carries the acceleration, with which the last step ended and a step begins, the state is (u, v, a).
+    The state is (u, v), or (u, v, a) if the acceleration at the end of a step is reused by the next one.
     """
-    taken = [name for name in HANDED if name in inspect.signature(step).parameters]
-    rest = ", ".join(["dt", "p", *taken])
+    handed = [name for name in HANDED if name in inspect.signature(step).parameters]
+    arguments = ", ".join(["dt", "p", *handed])
     state = "u, v, acceleration(u, v, 0.0, p)" if carries_acceleration else "u, v"
     start = written(
-        f"def start_one_step(variant, u, v, {rest}):\n"
-        f"    following, velocity = {step.__name__}(({state}), 0.0, {rest})\n"
+        f"def start_one_step(variant, u, v, {arguments}):\n"
+        f"    following, velocity = {step.__name__}(({state}), 0.0, {arguments})\n"
         "    return following\n",
         functions={step.__name__: step},
     )

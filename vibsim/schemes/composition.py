@@ -1,20 +1,20 @@
-r"""Compositions of drifts and kicks for ``u'' = a(u, t)``; each scheme is its coefficients.
+r"""Compositions of drifts and kicks for ``u'' = a(u, t)``, given by their coefficients.
 
-A drift moves the position with the velocity held, ``u = u + c dt v``, and time with it, ``t = t + c dt``; a kick moves
-the velocity with the position held, ``v = v + d dt a(u, t)``. Each of them is the exact flow of one part of the energy,
-so that every composition is symplectic; a palindrome is symmetric, and its errors have even powers of dt only.
+A drift moves the position at fixed velocity, ``u = u + c dt v``, and advances time, ``t = t + c dt``; a kick moves the
+velocity at fixed position, ``v = v + d dt a(u, t)``. Each is the exact flow of one part of the energy, so every
+composition is symplectic; a palindrome is symmetric, and its errors have only even powers of dt.
 
-Where the first and the last substep are kicks, the last acceleration of a step is the first one of the next step: the
-state carries it, and it is worked out once. Euler-Cromer is the composition of one kick and one drift, in either order:
-the recurrence of the centred scheme, with a velocity that lives half a step away from the position. With plain initial
-values its solution is of first order (`errata`, vibration text 7.1), with the centred start of second order; its own
-velocity and energy are of first order with both. Of a motion ``u'' = a(u, t)`` plain initial values leave the errors
-``dt/2 y`` and ``dt/2 (y' - a)`` with ``y'' = (da/du) y``, ``y(0) = 0``, ``y'(0) = a(0)`` (less them, position first).
-With no acceleration at the start y is 0, and the position of second order. From rest y is v where time does not enter,
-and the velocity is of second order.
+If the first and the last substep are kicks, the last acceleration of a step is the first one of the next: the state
+carries it. Euler-Cromer is the composition of one kick and one drift, in either order: the recurrence of the centred
+scheme, with a velocity half a step away from the position. With plain initial values its solution is of first order
+(`errata`, vibration text 7.1), with the centred start of second order; its own velocity and energy are of first order
+with both. With plain initial values the leading errors are ``dt/2 y`` in the position and ``dt/2 (y' - a)`` in the
+velocity, where ``y'' = (da/du) y``, ``y(0) = 0``, ``y'(0) = a(0)`` (opposite signs for position first). If the initial
+acceleration is 0, so is y, and the position is of second order. From rest, under forces that do not depend on time, y
+equals v, and the velocity is of second order.
 
 A kick needs the force at a known velocity. Only Euler-Cromer with the velocity first has one, the old velocity (B,
-section 7.1); the others would be implicit or lose their order on a force that depends on the velocity.
+section 7.1); on a force that depends on the velocity the others would be implicit or lose their order.
 
 Source: vibration text (B), sections 7.1-7.3 and 8.8; E. Hairer, C. Lubich and G. Wanner, Geometric Numerical
 Integration, sections I.1.4 and II.5; H. Yoshida, Physics Letters A 150 (1990) 262-268; I. P. Omelyan, I. M. Mryglod and
@@ -35,15 +35,15 @@ from vibsim.schemes.orders import depends_on_velocity, same_orders
 
 KICK, DRIFT = "kick", "drift"
 Substeps = tuple[tuple[str, str], ...]
-"""Kind and coefficient, a formula, of every substep in its order."""
+"""Kind and coefficient (a formula) of every substep, in order."""
 
 
 def substep_function(substeps: Substeps) -> Callable[..., Any]:
-    """Write the step of a composition on the state (u, v), with the acceleration at u behind it where it is carried."""
+    """Return the step of a composition; its state is (u, v), or (u, v, a) if the acceleration is carried."""
     formulas: dict[str, str] = {}
 
     def times_dt(coefficient: str) -> str:
-        """Write a part of dt; equal parts are worked out once."""
+        """Return the text of a fraction of dt; equal coefficients share a name."""
         if coefficient == "1":
             return "dt"
         names = {formula: name for name, formula in formulas.items()}
@@ -81,7 +81,7 @@ def alternating(first: str, *coefficients: str) -> Substeps:
 
 
 def carries_acceleration(substeps: Substeps) -> bool:
-    """Tell whether a step begins with the acceleration that the step before ended with."""
+    """Tell whether a step begins with the acceleration at the end of the previous step."""
     return substeps[0][0] == substeps[-1][0] == KICK
 
 
@@ -94,7 +94,7 @@ def _composed(
     *,
     own_velocity: bool = True,
 ) -> Scheme:
-    """Return the declaration of a symmetric composition."""
+    """Return the scheme of a symmetric composition."""
 
     @cache
     def stepper() -> Stepper:
@@ -162,7 +162,7 @@ PEFRL = _composed(
 def start_velocity_first(
     variant: int, u: float, v: float, dt: float, p: Any, acceleration: Acceleration
 ) -> tuple[float, float]:
-    """Return u^1 and v^1: a step from the initial values, or with v^1 half a step after v^0 (B, `solver_ic_fix`)."""
+    """Return u^1 and v^1: a step from the initial values, or with half a kick to v^1 (B, `solver_ic_fix`)."""
     part = 0.5 * dt if variant else dt
     v_1 = v + part * acceleration(u, v, 0.0, p)
     return u + dt * v_1, v_1
@@ -171,7 +171,7 @@ def start_velocity_first(
 def start_position_first(
     variant: int, u: float, v: float, dt: float, p: Any, acceleration: Acceleration
 ) -> tuple[float, float]:
-    """Return u^1 and v^1: a step from the initial values, or from v^0 half a step later."""
+    """Return u^1 and v^1: a step from the initial values, or from the velocity half a step later."""
     ahead = v + 0.5 * dt * acceleration(u, v, 0.0, p) if variant else v
     u_1 = u + dt * ahead
     return u_1, ahead + dt * acceleration(u_1, ahead, dt, p)
@@ -181,7 +181,7 @@ _STARTS = ("first_order", "centred")
 
 _PLAIN = same_orders(
     1,
-    # the errors stand at the head of this module
+    # see the leading errors in the module docstring
     from_rest=same_orders(1, velocity=2, velocity_d2t=1, energy_d2t=2, energy_d2t_linear=2),
     from_balance=same_orders(1, position=2, energy_d2t=2, energy_d2t_linear=2),
 )
@@ -190,7 +190,7 @@ _CENTRED = same_orders(
     position=2,
     energy_d2t=2,
     energy_d2t_linear=2,
-    # the old velocity is half a step behind the place where the force is taken
+    # the force is evaluated with a velocity that is half a step old
     velocity_dependent=same_orders(1),
 )
 
@@ -200,9 +200,9 @@ def _is_centred(options: Options) -> bool:
 
 
 def _even_powers(quantity: str, model: Model, options: Options) -> bool:
-    """Tell whether a quantity has even powers only: all that the positions of the centred scheme decide."""
-    decided = quantity in (*model.positions, "potential_energy") or quantity.endswith("_d2t")
-    return decided and _is_centred(options) and not depends_on_velocity(model)
+    """Tell whether the error of a quantity has only even powers of dt: true if it depends on positions alone."""
+    by_positions = quantity in (*model.positions, "potential_energy") or quantity.endswith("_d2t")
+    return by_positions and _is_centred(options) and not depends_on_velocity(model)
 
 
 def _euler_cromer(
@@ -215,7 +215,7 @@ def _euler_cromer(
     *,
     velocity_forces: bool,
 ) -> Scheme:
-    """Return the declaration of one order of the two substeps."""
+    """Return the scheme with one order of the two substeps."""
 
     def stepper(options: Options) -> Stepper:
         variant = _STARTS.index(str(options["start"]))

@@ -1,18 +1,18 @@
 r"""Backward Euler, Crank-Nicolson, BDF2 and the Gauss method with two stages for ``u' = v``, ``v' = a(u, v, t)``.
 
-Each step leaves one equation for the acceleration at the next point, solved by Newton's method to round-off
+Each step solves one equation for the acceleration at the next point, by Newton's method to round-off
 (`vibsim.schemes.newton`). On ``u'' + w^2 u = 0``, with p = w dt, a step multiplies the energy by ``1/(1 + p^2)``
-(Backward Euler, order 1), by 1 (Crank-Nicolson, which keeps it exactly) and by ``1 - p^4/2 + ...`` (BDF2, order 3).
+(Backward Euler, order 1), by 1 (Crank-Nicolson, which conserves it) and by ``1 - p^4/2 + ...`` (BDF2, order 3).
 
 Crank-Nicolson is the trapezoidal rule, ``(u^(n+1) - 2 u^n + u^(n-1))/dt^2 = (a^(n+1) + 2 a^n + a^(n-1))/4``; it is
-Newmark's scheme with beta = 1/4 and gamma = 1/2. Not to be confused with the implicit midpoint rule, to which the
-text's program gives the same name: they differ by a change of variables, and agree on a linear force.
+Newmark's scheme with beta = 1/4 and gamma = 1/2. It is not the implicit midpoint rule, to which the text's program
+gives the same name: the two differ by a change of variables, and agree on a linear force.
 
 The Gauss method is of order 4, symplectic and symmetric: ``V_i = v + dt sum_j a_ij A_j`` and
 ``U_i = u + dt sum_j a_ij V_j`` with ``A_i = a(U_i, V_i, t + c_i dt)``. Together
 ``U_i = u + c_i dt v + dt^2 sum_j (a^2)_ij A_j``: the two stage accelerations are the unknowns of each step. On
 ``u'' + w^2 u = 0`` a step is ``(1 + z/2 + z^2/12)/(1 - z/2 + z^2/12)``, the Pade approximation of ``exp z`` at z = i p,
-of modulus 1: the energy is kept exactly and no step is too large.
+of modulus 1: the energy is conserved and the method is unconditionally stable.
 
 Source: vibration text (B), sections 5.2 and 5.3, equations (29)-(42); E. Hairer and G. Wanner, Solving Ordinary
 Differential Equations II, section V.1 (BDF2). Gauss: E. Hairer, C. Lubich and G. Wanner, Geometric Numerical
@@ -70,7 +70,7 @@ def step_bdf2(
     """Return u, v at n+1 and at n, and the velocity at n: ``(3 y^(n+1) - 4 y^n + y^(n-1))/(2 dt) = f^(n+1)``."""
     u, v, u_before, v_before = state
     part = 2.0 * dt / 3.0
-    # the increment is what is rounded, not 4/3 of the solution
+    # written with increments, so that rounding acts on these and not on 4/3 of the solution
     drift, push = (u - u_before) / 3.0, (v - v_before) / 3.0
     guess = (v - v_before) / dt
     reach, speed = u + (drift + part * (v + push)), v + push

@@ -1,16 +1,16 @@
-r"""Explicit multistep methods (Adams-Bashforth) for ``u' = v``, ``v' = a(u, v, t)``; each is its weights.
+r"""Explicit multistep methods (Adams-Bashforth) for ``u' = v``, ``v' = a(u, v, t)``, given by their weights.
 
 ``u^(n+1) = u^n + dt sum_j b_j v^(n-j)``, ``v^(n+1) = v^n + dt sum_j b_j a^(n-j)``, j = 0, ..., k-1: order k with one
-evaluation of the force per step, on any force. The state carries the slopes of the k-1 points behind.
+evaluation of the force per step, for any force. The state carries the slopes at the k-1 previous points.
 
 **Start.** The missing points come from a Runge-Kutta method of order k, one more than a start needs. The second-order
-method has its slopes at n = 0 and 1 after one step of Heun's method. The third-order one needs u^2 as well before its
-formula has all slopes. A scheme hands the engine its state at step 1 only; so the start takes two steps with Kutta's
-method, and puts in place of the slope at n = -1, which nobody has, the one with which the formula gives just that u^2:
-``f^(-1) = ((u^2 - u^1)/dt - b_0 f^1 - b_1 f^0)/b_2``, for v likewise. The force is never asked for at t < 0.
+method has its slopes at n = 0 and 1 after one step of Heun's method. The third-order method also needs u^2 before its
+formula has all slopes, but a scheme hands the engine its state at step 1 only. So the start takes two steps of Kutta's
+method and replaces the missing slope at n = -1 by the value with which the formula reproduces that u^2:
+``f^(-1) = ((u^2 - u^1)/dt - b_0 f^1 - b_1 f^0)/b_2``, and likewise for v. The force is never evaluated at t < 0.
 
-On ``u'' + w^2 u = 0`` both grow slowly: a step multiplies the amplitude by ``1 + p^4/4`` (k = 2) and ``1 - 3 p^4/8``
-(k = 3, damped up to its stability limit), p = w dt, so that the energy is of order 3 there with both.
+On ``u'' + w^2 u = 0`` a step multiplies the amplitude by ``1 + p^4/4`` (k = 2) or ``1 - 3 p^4/8`` (k = 3, damped up to
+its stability limit), p = w dt, so the energy is of order 3 with both.
 
 Source: E. Hairer, S. P. Norsett and G. Wanner, Solving Ordinary Differential Equations I, section III.1.
 """
@@ -30,14 +30,14 @@ kutta_step = RK3.stepper({}).step
 
 
 def adams_bashforth(weights: tuple[str, ...]) -> Callable[..., Any]:
-    """Write the step of the method with these weights, formulas, the latest slope first.
+    """Return the step of the method with these weights (formulas, the latest slope first).
 
-    The state is (u, v), then velocity and acceleration of the point behind, then of the one behind that.
+    The state is (u, v), then velocity and acceleration at each previous point, the latest first.
     """
     formulas: dict[str, str] = {}
-    behind = range(1, len(weights))
-    velocities, accelerations = ([name, *(f"{name}_{j}" for j in behind)] for name in ("v", "a"))
-    carried = [name for j in behind for name in (f"v_{j}", f"a_{j}")]
+    previous = range(1, len(weights))
+    velocities, accelerations = ([name, *(f"{name}_{j}" for j in previous)] for name in ("v", "a"))
+    carried = [name for j in previous for name in (f"v_{j}", f"a_{j}")]
     drift, kick = (weighted("W", weights, names, formulas) for names in (velocities, accelerations))
     following = [f"u + dt * ({drift})", f"v + dt * ({kick})", "v", "a", *carried[:-2]]
     text = (
@@ -60,7 +60,7 @@ def start_two(
 def start_three(
     variant: int, u: float, v: float, dt: float, p: Any, acceleration: Acceleration
 ) -> tuple[float, ...]:
-    """Return u^1 and v^1 by Kutta's method, the slopes at n = 0, and in place of those at n = -1 what gives u^2."""
+    """Return u^1 and v^1 by Kutta's method, the slopes at n = 0, and slopes at n = -1 that reproduce its u^2, v^2."""
     one, _ = kutta_step((u, v), 0.0, dt, p, acceleration)
     two, _ = kutta_step(one, dt, dt, p, acceleration)
     u_1, v_1 = one
@@ -79,9 +79,9 @@ def _scheme(
     orders: Orders,
 ) -> Scheme:
     def carried(u: Any, v: Any, a: Any, t: Any, dt: Any) -> Any:
-        """Return u and v at t, then v and a at the points behind, the latest first."""
-        behind = [t - float(j) * dt for j in range(1, len(weights))]
-        return u(t), v(t), *(slope(time) for time in behind for slope in (v, a))
+        """Return u and v at t, then v and a at the previous points, the latest first."""
+        previous = [t - float(j) * dt for j in range(1, len(weights))]
+        return u(t), v(t), *(slope(time) for time in previous for slope in (v, a))
 
     return Scheme(
         kind=kind,

@@ -1,28 +1,28 @@
-r"""Newmark's scheme and those that damp the highest frequencies: HHT-alpha and generalized-alpha.
+r"""Newmark's scheme and its variants with dissipation at high frequencies: HHT-alpha and generalized-alpha.
 
-With ``f^n = a(u^n, v^n, t^n)`` the force per unit mass, all of them are
+With ``f^n = a(u^n, v^n, t^n)`` the force per unit mass, all three are
 
 ``u^(n+1) = u^n + dt v^n + dt^2 ((1/2 - beta) a^n + beta a^(n+1))``,
 ``v^(n+1) = v^n + dt ((1 - gamma) a^n + gamma a^(n+1))``,
 ``(1 - alpha_m) a^(n+1) + alpha_m a^n = (1 - alpha_f) f^(n+1) + alpha_f f^n``,
 
-with a^0 = f^0. The state carries (u, v, a). Forces are averaged, and external forces with them, rather than taken at an
-averaged point: the two agree on a linear structure but for the time of the load, and both are of order 2.
+with a^0 = f^0. The state carries (u, v, a). Forces, external ones included, are averaged rather than evaluated at an
+averaged point. On a linear structure the two differ only in the time of the load, and both are of order 2.
 
 On a linear structure, ``M u'' + C u' + K u = p(t)``, the force is ``f = M^-1 (p - C v - K u)``, and a step solves
 
 ``S a^(n+1) = (1 - alpha_f) (p^(n+1) - C v~ - K u~) + alpha_f (p^n - C v^n - K u^n) - alpha_m M a^n``,
 ``S = (1 - alpha_m) M + (1 - alpha_f) (gamma dt C + beta dt^2 K)``,
 
-with u~ and v~ the first two lines without a^(n+1). Centred differences, with the damping centred as well, are beta = 0
-and gamma = 1/2.
+with u~ and v~ the first two lines without a^(n+1). Centred differences with centred damping are the case beta = 0,
+gamma = 1/2.
 
-- ``newmark``: alpha_m = alpha_f = 0, any beta and gamma. Order 2 for gamma = 1/2 only; above it the amplitude is
-  damped, below it grows at every step. beta = 1/4 is the trapezoidal rule (Crank-Nicolson), 1/6 the linear acceleration
-  method, 1/12 Fox-Goodwin, 0 velocity Verlet, which is explicit.
+- ``newmark``: alpha_m = alpha_f = 0, any beta and gamma. Order 2 for gamma = 1/2 only; a larger gamma damps the
+  amplitude, a smaller one makes it grow. beta = 1/4 is the trapezoidal rule (Crank-Nicolson), 1/6 the linear
+  acceleration method, 1/12 Fox-Goodwin, 0 velocity Verlet, which is explicit.
 - ``hht``: alpha_m = 0, alpha_f = -alpha, with alpha from -1/3 (most damping) to 0, beta = (1 - alpha)^2/4 and
   gamma = (1 - 2 alpha)/2.
-- ``generalized_alpha``: by rho_inf, what is left of the highest frequencies in one step, from 0 to 1 (none is damped):
+- ``generalized_alpha``: by rho_inf, the spectral radius at infinite frequency, from 0 to 1 (no damping):
   alpha_m = (2 rho_inf - 1)/(rho_inf + 1), alpha_f = rho_inf/(rho_inf + 1), beta = (1 - alpha_m + alpha_f)^2/4 and
   gamma = 1/2 - alpha_m + alpha_f.
 
@@ -67,7 +67,7 @@ _AVERAGED = {
 
 @cache
 def _stepper(beta: str, gamma: str, alpha_m: str = "0", alpha_f: str = "0") -> Stepper:
-    """Return the arithmetic for these parameters, which are formulas."""
+    """Return the arithmetic for these parameters (formulas)."""
     is_averaged = (alpha_m, alpha_f) != ("0", "0")
     new, share = f"(1 - ({alpha_m}))", f"(1 - ({alpha_f}))/(1 - ({alpha_m}))"
     formulas = {
@@ -110,11 +110,11 @@ class _Family:
     parameters: Callable[[Options], tuple[str, ...]]
 
     def stepper(self, options: Options) -> Stepper:
-        """Return the step of equations as formulas."""
+        """Return the arithmetic on a model with formulas."""
         return _stepper(*self.parameters(options))
 
     def weights(self, options: Options) -> Weights:
-        """Return the step of a linear structure."""
+        """Return the parameters of the step on a linear structure."""
         return Weights(*map(constant, self.parameters(options)))
 
 
@@ -132,7 +132,7 @@ def _newmark_orders(options: Options) -> Orders:
         return same_orders(1)
     orders = _second_order(math.inf if options["beta"] == 0.25 else 2.0)
     if options["beta"] == NUMEROV:
-        # the error of the velocity drives no motion that begins without one
+        # the error of the velocity does not affect a motion that begins at rest
         return replace(orders, from_rest=replace(orders, position_linear=4.0))
     return orders
 

@@ -1,22 +1,22 @@
-r"""Newton's method for the equation that a step of an implicit scheme leaves, or the equations of several coordinates.
+r"""Newton's method for the equations of one step of an implicit scheme.
 
 Every scheme of `vibsim.schemes.implicit` and `vibsim.schemes.newmark` reduces to one unknown: the acceleration x at
-the next point, with ``x = a(u + d_u x, v + d_v x, t)`` and known u, d_u, v, d_v. Newton's method takes the model's own
-derivative, ``1 - (d_u da/du + d_v da/dv)``, and goes on to round-off: a quasi-Newton method that stopped at 1e-4 is
-what spoiled the Crank-Nicolson rows of the vibration text (B), section 6.2 (`errata`).
+the next point, with ``x = a(u + d_u x, v + d_v x, t)`` and known u, d_u, v, d_v. Newton's method uses the exact
+derivative, ``1 - (d_u da/du + d_v da/dv)``, and iterates to round-off: the quasi-Newton method of the vibration text
+(B), section 6.2, stopped at 1e-4, which spoiled its Crank-Nicolson rows (`errata`).
 
-It stops when what is left, by the rate at which the corrections fall, is a few units in the last place of the terms of
-the equation (E. Hairer and G. Wanner, Solving Ordinary Differential Equations II, equation IV.8.10). A linear force
-takes two iterations, of which the second one finds the first one exact. Where Newton's method circles (a steep friction
-law), bisection takes turns with it between two places where the residual has different signs. Where no solution is
-found the result is NaN, so that the member ends there as failed: never a value that does not solve the equation. Of
-several solutions, which large steps may have, it is the one that Newton's method reaches from the present acceleration.
+The iteration stops when the remaining error, estimated from the rate of convergence, is a few units in the last place
+of the terms of the equation (E. Hairer and G. Wanner, Solving Ordinary Differential Equations II, equation IV.8.10). A
+linear force takes two iterations; the second confirms the first. If Newton's method cycles (a steep friction law), it
+alternates with bisection between two points where the residual has opposite signs. If no solution is found the result
+is NaN and the member fails there; a value that does not solve the equation is never returned. Large steps may have
+several solutions: the result is the one that Newton's method reaches from the current acceleration.
 
-Of several coordinates the unknowns are the accelerations of all of them at one or two stages (`solver`),
-``x_i = a(U_i, V_i, t_i)`` with ``U_i = u_i + sum_j d_u_ij x_j`` and V_i likewise. The matrix of Newton's method,
-``1 - (d_u_ij da/du + d_v_ij da/dv)``, differs from the unit matrix by O(dt^2), or O(dt) where the force depends on the
-velocity: it is eliminated without a search for pivots. A pivot that vanishes ends the member, as does an iteration
-without an end. There is no bisection.
+With several coordinates the unknowns are all accelerations at one or two stages (`solver`),
+``x_i = a(U_i, V_i, t_i)`` with ``U_i = u_i + sum_j d_u_ij x_j`` and V_i likewise. The Jacobian,
+``1 - (d_u_ij da/du + d_v_ij da/dv)``, differs from the identity by O(dt^2), or O(dt) if the force depends on the
+velocity, so it is eliminated without pivoting. A zero pivot or an iteration that does not converge gives NaN. There is
+no bisection.
 """
 
 from __future__ import annotations
@@ -35,25 +35,25 @@ Two = tuple[float, float]
 Four = tuple[float, float, float, float]
 
 TOLERANCE = 2.0**-51
-"""Largest error that is left, relative to the terms of the equation."""
+"""Largest remaining error, relative to the terms of the equation."""
 STALLED = 2.0**-30
-"""Largest correction that may be taken for round-off once corrections no longer fall."""
+"""Largest correction that counts as round-off once corrections stop decreasing, relative to the same terms."""
 LEAST = 2.0**-1022
-"""Error that is left all the same: the smallest normal number, below which `TOLERANCE` of a number is rounded to 0."""
-MOST = 12
-"""Iterations before bisection helps."""
-MOST_TOGETHER = 50
-"""Iterations before a system has no solution."""
+"""Absolute tolerance: the smallest normal number, because `TOLERANCE` times a smaller one may underflow."""
+MAX_NEWTON = 12
+"""Newton iterations before bisection takes part."""
+MAX_NEWTON_SYSTEM = 50
+"""Newton iterations before a system counts as unsolvable."""
 ONE_SIDED = 8
-"""Iterations after which Newton's method is led where it stays on one side of the solution without meeting it."""
-LED = 3
-"""So many times, twice as far each time."""
-MOST_BISECTED = 200
-"""Iterations before the equation has no solution: every second one halves the interval."""
+"""Iterations on one side of the solution after which the search widens."""
+WIDENINGS = 3
+"""Number of widenings, each twice as far as the one before."""
+MAX_BISECTION = 200
+"""Iterations before the equation counts as unsolvable; every second one halves the interval."""
 
 
 def alone(function: F) -> F:
-    """Mark a function that a kernel compiles for itself instead of into its callers: start and step share it."""
+    """Mark a function that a kernel compiles separately instead of inlining it: start and step share it."""
     return function
 
 
@@ -61,12 +61,12 @@ def alone(function: F) -> F:
 def solved(
     x: float, u: float, d_u: float, v: float, d_v: float, t: float, p: Any, acceleration: Acceleration, slopes: Slopes
 ) -> float:  # fmt: skip
-    """Return the x with ``x = acceleration(u + d_u x, v + d_v x, t, p)``, from a first guess x; NaN for none.
+    """Return the solution of ``x = acceleration(u + d_u x, v + d_v x, t, p)`` from the initial guess x; NaN if none.
 
-    It runs on exact numbers too, for which a change is either 0 or too large.
+    It also runs on exact numbers, for which a correction is either 0 or too large.
     """
     guess, before = x, 0.0
-    for k in range(MOST):
+    for k in range(MAX_NEWTON):
         here, speed = u + d_u * x, v + d_v * x
         force = acceleration(here, speed, t, p)
         by_u, by_v = slopes(here, speed, t, p)
@@ -74,7 +74,7 @@ def solved(
         scale = abs(force) + abs(by_u * here) + abs(by_v * speed)
         rate = change / before if k else 1.0
         x = x - change
-        # not a number where x or a slope is infinite or NaN
+        # NaN if x or a slope is infinite or NaN
         sound = (x - x) + (scale - scale)
         if sound != sound:
             break
@@ -90,16 +90,16 @@ def solved(
 def bisected(
     x: float, u: float, d_u: float, v: float, d_v: float, t: float, p: Any, acceleration: Acceleration, slopes: Slopes
 ) -> float:  # fmt: skip
-    """Return what `solved` does, by Newton's method and bisection in turns, or NaN."""
+    """Solve the equation of `solved` by alternating Newton's method and bisection; return NaN if that fails."""
     below = above = math.nan
     change, scale, width = math.inf, 0.0, 0.0
-    for k in range(MOST_BISECTED):
+    for k in range(MAX_BISECTION):
         here, speed = u + d_u * x, v + d_v * x
         force = acceleration(here, speed, t, p)
         by_u, by_v = slopes(here, speed, t, p)
         slope = 1.0 - (d_u * by_u + d_v * by_v)
         terms = abs(by_u * here) + abs(by_v * speed)
-        # a slope that is infinite or none is replaced by that of a constant force
+        # an infinite or zero slope is replaced by that of a constant force
         if not abs(slope) > 0.0 or not abs(slope) + terms < math.inf:
             slope, terms = 1.0, 0.0
         change, scale = (x - force) / slope, abs(force) + terms
@@ -113,8 +113,8 @@ def bisected(
         if below == below and above == above:
             if not (k % 2 == 0 and (ahead - below) * (ahead - above) < 0.0):
                 ahead = 0.5 * (below + above)
-        elif ONE_SIDED < k <= ONE_SIDED + LED:
-            # a force that hardly changes has its solution about |x - a| away: look there, but not for a far one
+        elif ONE_SIDED < k <= ONE_SIDED + WIDENINGS:
+            # a nearly constant force has its solution about |x - a| away: search there, but no farther
             ahead = x + width if x < force else x - width
             width = 2.0 * width
         else:
@@ -127,12 +127,12 @@ def bisected(
 def solved_together(
     x: float, y: float, u: Two, d_u: Four, v: Two, d_v: Four, t: Two, p: Any, acceleration: Acceleration, slopes: Slopes
 ) -> Two:  # fmt: skip
-    """Return x and y with ``x = a(U_1, V_1, t_1)`` and ``y = a(U_2, V_2, t_2)``, from first guesses; NaN for none.
+    """Solve ``x = a(U_1, V_1, t_1)``, ``y = a(U_2, V_2, t_2)`` from initial guesses x and y; return NaN if that fails.
 
-    ``U_i = u_i + d_u_i1 x + d_u_i2 y`` and V_i likewise; `d_u` and `d_v` are matrices row by row.
+    ``U_i = u_i + d_u_i1 x + d_u_i2 y`` and V_i likewise; `d_u` and `d_v` are matrices in row-major order.
     """
     before = 0.0
-    for k in range(MOST_TOGETHER):
+    for k in range(MAX_NEWTON_SYSTEM):
         u_1, u_2 = u[0] + (d_u[0] * x + d_u[1] * y), u[1] + (d_u[2] * x + d_u[3] * y)
         v_1, v_2 = v[0] + (d_v[0] * x + d_v[1] * y), v[1] + (d_v[2] * x + d_v[3] * y)
         force_1, force_2 = acceleration(u_1, v_1, t[0], p), acceleration(u_2, v_2, t[1], p)
@@ -150,7 +150,7 @@ def solved_together(
             abs(force_1) + abs(force_2) + abs(a * u_1) + abs(b * v_1) + abs(c * u_2) + abs(d * v_2)
         )
         rate = change / before if k else 1.0
-        # `not >`, so that NaN ends it as well
+        # `not >`, so that NaN ends the iteration as well
         if not change * rate > TOLERANCE * scale + LEAST:
             return x, y
         if k and not change > STALLED * scale + LEAST and not rate < 0.5:
@@ -161,10 +161,10 @@ def solved_together(
 
 @cache
 def solver(coordinates: int, stages: int) -> Callable[..., Any]:
-    """Return what `solved` (one stage) or `solved_together` (two) is for several coordinates.
+    """Return the counterpart of `solved` (one stage) or `solved_together` (two) for several coordinates.
 
-    Positions, velocities and accelerations are vectors; `slopes` returns the derivatives of every acceleration by every
-    position, row by row, and then those by every velocity.
+    Positions, velocities and accelerations are vectors; `slopes` returns the Jacobian of the accelerations with respect
+    to the positions in row-major order, then that with respect to the velocities.
     """
     guesses = ", ".join(("x", "y")[:stages])
     name = f"solved_{'together_' if stages > 1 else ''}{coordinates}"
@@ -173,10 +173,10 @@ def solver(coordinates: int, stages: int) -> Callable[..., Any]:
         "@alone",
         f"def {name}({guesses}, u, d_u, v, d_v, t, p, acceleration, slopes):",
         "    before = 0.0",
-        f"    for k in range({MOST_TOGETHER}):",
+        f"    for k in range({MAX_NEWTON_SYSTEM}):",
         *(f"        {line}" for line in _iteration(coordinates, stages)),
         "        rate = change / before if k else 1.0",
-        "        # `not >`, so that NaN ends it as well",
+        "        # `not >`, so that NaN ends the iteration as well",
         "        if not change * rate > TOLERANCE * scale + LEAST:",
         f"            return {guesses}",
         "        if k and not change > STALLED * scale + LEAST and not rate < 0.5:",
@@ -195,12 +195,12 @@ def _iteration(coordinates: int, stages: int) -> Iterator[str]:
     unknowns = list(enumerate(product(range(stages), several)))
 
     def of_stage(name: str, *index: int) -> str:
-        """Name an entry of a vector or matrix over stages; of one stage it is the number itself."""
+        """Return the text of an entry of a vector or matrix over stages; with one stage, of the number itself."""
         place = sum(i * stages ** (len(index) - k) for k, i in enumerate(index, 1))
         return f"{name}[{place}]" if stages > 1 else name
 
     def slope(i: int, row: int, column: int, by: int) -> str:
-        """Name the derivative of an acceleration at stage i by a position (0) or a velocity (1)."""
+        """Return the text of a derivative of an acceleration at stage i by a position (0) or a velocity (1)."""
         return f"slopes_{i}[{by * coordinates**2 + row * coordinates + column}]"
 
     terms = []
@@ -209,8 +209,8 @@ def _iteration(coordinates: int, stages: int) -> Iterator[str]:
             reach = (f"{of_stage(weights, i, j)} * {x}" for j, x in enumerate(guesses))
             yield f"{name}_{i} = {of_stage(known, i)} + ({' + '.join(reach)})"
         for name in ("acceleration", "slopes"):
-            found = "force" if name == "acceleration" else name
-            yield f"{found}_{i} = {name}(place_{i}, speed_{i}, {of_stage('t', i)}, p)"
+            target = "force" if name == "acceleration" else name
+            yield f"{target}_{i} = {name}(place_{i}, speed_{i}, {of_stage('t', i)}, p)"
         for c in several:
             terms.append(f"abs(force_{i}[{c}])")
             for e in several:
@@ -229,20 +229,20 @@ def _iteration(coordinates: int, stages: int) -> Iterator[str]:
     yield "change = abs(r_0)"
     for row, _ in unknowns[1:]:
         yield f"change = abs(r_{row}) if abs(r_{row}) > change else change"
-    # a change that is no number is one in the sum as well
+    # a NaN in any change is a NaN in the sum as well
     yield from _summed("total", [f"r_{row}" for row, _ in unknowns])
     yield "change = change + (total * 0.0)"
     yield from _summed("scale", terms)
 
 
 def _summed(name: str, terms: Sequence[str]) -> Iterator[str]:
-    """Yield the lines that make `name` the sum of `terms` from the first one on, however many there are."""
+    """Yield the lines that sum `terms` into `name`, one term a line."""
     for i, term in enumerate(terms):
         yield f"{name} = {f'{name} + ' if i else ''}{term}"
 
 
 def elimination(size: int) -> Iterator[str]:
-    """Yield the lines that solve ``m x = r`` for ``m_0_0, m_0_1, ...``; the solution stands in ``r_0, ...`` then."""
+    """Yield the lines that solve ``m x = r``, entries ``m_0_0, m_0_1, ...``, leaving the solution in ``r_0, ...``."""
     for k in range(size):
         for row in range(k + 1, size):
             yield f"factor = m_{row}_{k} / m_{k}_{k}"

@@ -1,4 +1,4 @@
-"""The orders that a scheme promises: powers of dt with which the errors of quantities vanish."""
+"""Formal orders of a scheme: the powers of dt with which the errors of quantities vanish."""
 
 from __future__ import annotations
 
@@ -11,18 +11,18 @@ from vibsim.models.base import BUDGET, Model, tree
 from vibsim.models.events import Friction
 
 ORDER_OF_WORK = 4.0
-"""Order of the sum by which the work of forces is found (`vibsim.simulation.derived`)."""
+"""Order of the quadrature for the work of forces (`vibsim.simulation.derived`)."""
 Beginning = Literal["any", "rest", "balance"]
-"""How a smooth motion begins whose forces do not depend on the velocity: at rest, where they do not depend on time
-either; with no acceleration; or in any other way."""
+"""Start of a smooth motion under forces that do not depend on the velocity: ``rest``, from rest under forces that do
+not depend on time either; ``balance``, with zero acceleration; ``any`` otherwise."""
 
 
 @cache
 def depends_on_velocity(model: Model) -> bool:
-    """Tell whether the acceleration of a model depends on the velocity; between events, where there are some."""
+    """Tell whether the acceleration of a model depends on the velocity (between events if it has any)."""
     if model.loaded is not None:
         return model.loaded.is_damped
-    return not _named(model).isdisjoint(model.velocities)
+    return not _names_in_acceleration(model).isdisjoint(model.velocities)
 
 
 @cache
@@ -30,11 +30,11 @@ def is_autonomous(model: Model) -> bool:
     """Tell whether the acceleration of a model does not depend on time."""
     if model.loaded is not None:
         return not model.loaded.is_driven
-    return "t" not in _named(model)
+    return "t" not in _names_in_acceleration(model)
 
 
-def _named(model: Model) -> frozenset[str]:
-    """Return what the acceleration names; between events, where there are some."""
+def _names_in_acceleration(model: Model) -> frozenset[str]:
+    """Return the names in the formulas of the acceleration (between events if the model has any)."""
     events = model.events
     smooth = (events.drive,) if isinstance(events, Friction) else model.accelerations
     return frozenset(name for formula in smooth for name in tree(model, formula).names)
@@ -42,9 +42,9 @@ def _named(model: Model) -> frozenset[str]:
 
 @dataclass(frozen=True)
 class Orders:
-    """Powers of dt with which the errors of a scheme vanish, infinite where a quantity is exact.
+    """Powers of dt with which the errors of a scheme vanish; infinite if a quantity is exact.
 
-    Those of the energy differ between a linear, conservative model, or a sum of such motions, and any other one.
+    The suffix ``_linear`` marks the order on linear, conservative models and on superpositions of such motions.
     """
 
     position: float
@@ -52,23 +52,23 @@ class Orders:
     energy: float
     energy_linear: float
     velocity_d2t: float | None = None
-    """Of the centred difference ``[D_2t u]``; None: that of the position, 2 at most."""
+    """Order of the centred difference ``[D_2t u]``; None: that of the position, at most 2."""
     energy_d2t: float | None = None
-    """Of the energy with that velocity; None: that of the energy, 2 at most."""
+    """Order of the energy with that velocity; None: that of the energy, at most 2."""
     energy_d2t_linear: float | None = None
     position_linear: float | None = None
-    """Of the position of a linear, conservative model; None: that of any other one."""
+    """Order of the position on a linear, conservative model; None: `position`."""
     velocity_dependent: Orders | None = None
-    """What is promised instead where the acceleration depends on the velocity; None: the same."""
+    """Orders if the acceleration depends on the velocity; None: the same."""
     from_rest: Orders | None = None
-    """What is promised instead of a motion that begins at rest (`Beginning`); None: the same."""
+    """Orders of a motion that begins at rest (`Beginning`); None: the same."""
     from_balance: Orders | None = None
-    """What is promised instead of a motion that begins with no acceleration (`Beginning`); None: the same."""
+    """Orders of a motion that begins with zero acceleration (`Beginning`); None: the same."""
 
     def between_events(self, model: Model) -> float:
-        """Return the order of every quantity where events are located: the lower one of position and velocity.
+        """Return the order of every quantity if events are located: the lower of position and velocity.
 
-        Of these two the scheme starts anew.
+        After an event the scheme restarts from these two.
         """
         if self.velocity_dependent is not None and depends_on_velocity(model):
             return self.velocity_dependent.between_events(model)
@@ -76,14 +76,14 @@ class Orders:
 
     @property
     def highest(self) -> float:
-        """The highest order of position, velocity or energy in any case: of models, damping and beginnings."""
+        """The highest order of position, velocity or energy over all cases above."""
         own = (self.position, self.velocity, self.energy, self.energy_linear)
         others = (self.velocity_dependent, self.from_rest, self.from_balance)
         cases = (case.highest for case in others if case is not None)
         return max(*own, self.position_linear or 0.0, *cases)
 
     def of(self, quantity: str, model: Model, beginning: Beginning = "any") -> float:
-        """Return the order of a state or an energy (`vibsim.models.ENERGIES`), or of either with ``_d2t`` behind it."""
+        """Return the order of a state or an energy (`vibsim.models.ENERGIES`), with or without the suffix ``_d2t``."""
         special = {"rest": self.from_rest, "balance": self.from_balance}.get(beginning)
         if special is not None:
             return special.of(quantity, model)
@@ -95,7 +95,7 @@ class Orders:
 
 @cache
 def _of_quantities(orders: Orders, model: Model) -> tuple[Mapping[str, float], float]:
-    """Return the orders of quantities of a model, and that of its energy and whatever is not named."""
+    """Return orders of a model's quantities by name, and the order of the energy and every quantity not named."""
     is_simple = model.linear and model.conservative
     is_sum = is_simple or model.superposed
     linear = orders.position if orders.position_linear is None else orders.position_linear
@@ -124,6 +124,6 @@ def _of_quantities(orders: Orders, model: Model) -> tuple[Mapping[str, float], f
 
 
 def same_orders(order: float, **others: Any) -> Orders:
-    """Return one order for position, velocity and energy, but for what is named."""
+    """Return `Orders` with one order for position, velocity and energy, except for fields in `others`."""
     names = ("position", "velocity", "energy", "energy_linear")
     return Orders(**{**dict.fromkeys(names, order), **others})

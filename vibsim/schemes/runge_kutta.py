@@ -1,17 +1,16 @@
-r"""Explicit Runge-Kutta and Runge-Kutta-Nystroem methods; each is its tableau.
+r"""Explicit Runge-Kutta and Runge-Kutta-Nystroem methods, given by their tableaux.
 
 **Runge-Kutta**, for ``u' = v``, ``v' = a(u, v, t)``:
 ``U_i = u + dt sum_j a_ij V_j``, ``V_i = v + dt sum_j a_ij A_j``, ``A_i = a(U_i, V_i, t + c_i dt)``, and the same sums
-with b_i give the next point. One-step methods: they start by themselves, on any force.
+with b_i give the next point. These one-step methods are self-starting and take any force.
 
 On ``u'' + w^2 u = 0`` a step multiplies the energy by ``|R(i w dt)|^2``, R the truncated exponential: ``1 + p^2`` for
-Forward Euler, ``1 + p^4/4`` at order 2, ``1 - p^4/12 + ...`` at order 3, ``1 - p^6/72 + ...`` at order 4, so that the
-energy is of order 1, 3, 3 and 5 there (`errata`: the vibration text finds dt^2 for RK4, an artefact of ``[D_2t u]``).
+Forward Euler, ``1 + p^4/4`` at order 2, ``1 - p^4/12 + ...`` at order 3, ``1 - p^6/72 + ...`` at order 4, so the energy
+is of order 1, 3, 3 and 5 there (`errata`: the vibration text finds dt^2 for RK4, an artefact of ``[D_2t u]``).
 
 **Runge-Kutta-Nystroem**, for ``u'' = a(u, t)``: ``A_i = a(u + c_i dt v + dt^2 sum_j a_ij A_j, t + c_i dt)``, then
-``u = u + dt v + dt^2 sum_i p_i A_i`` and ``v = v + dt sum_i q_i A_i``. What a Runge-Kutta method spends on velocities
-between the points is saved: order 4 with three evaluations of the force where `rk4` has four. Neither symplectic nor
-symmetric.
+``u = u + dt v + dt^2 sum_i p_i A_i`` and ``v = v + dt sum_i q_i A_i``. No velocities are needed at the stages: order 4
+takes three evaluations of the force instead of the four of `rk4`. Neither symplectic nor symmetric.
 
 Source: vibration text (B), sections 5.1 (Forward Euler) and 5.5; E. Hairer, S. P. Norsett and G. Wanner, Solving
 Ordinary Differential Equations I, section II.1 (Kutta's third and fourth order methods, Heun, the midpoint rule) and
@@ -34,7 +33,7 @@ class Tableau:
     """Butcher's tableau of an explicit method; entries are formulas."""
 
     a: tuple[tuple[str, ...], ...]
-    """The rows behind the first one; each has the entries below the diagonal."""
+    """The rows after the first; each has the entries below the diagonal."""
     b: tuple[str, ...]
 
 
@@ -117,9 +116,9 @@ class NystromTableau:
     """Tableau of an explicit method; entries are formulas."""
 
     c: tuple[str, ...]
-    """Places of the accelerations behind the first one, as parts of the step."""
+    """Nodes of the stages after the first, as fractions of the step."""
     a: tuple[tuple[str, ...], ...]
-    """Their rows; each has the entries below the diagonal."""
+    """Rows of these stages; each has the entries below the diagonal."""
     position: tuple[str, ...]
     velocity: tuple[str, ...]
 

@@ -1,8 +1,8 @@
-"""Events and a stop as a user writes them, from text to `vibsim.models.events.Crossings`.
+"""Events and a stop that a user writes as formulas: from text to `vibsim.models.events.Crossings`.
 
-They stand among the formulas of a user (`Model.formulas`) under names of their own: ``stop`` is a condition,
-``events.2.falling`` (or ``rising``, or ``when`` for both) the guard of event 2, counted from 1, and ``events.2.then.v``
-the value of the state v behind it.
+Among the formulas of a user (`Model.formulas`) they have these names: ``stop`` is a condition, ``events.2.falling`` (or
+``rising``, or ``when`` for both) the guard of event 2, counted from 1, and ``events.2.then.v`` the value of the state v
+after it.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from vibsim.formula import (
 from vibsim.models.events import Crossing, Crossings
 
 MOST_EVENTS = 8
-"""Events of a model, beside its stop."""
+"""Largest number of events of a model, beside its stop."""
 STOP = "stop"
 DIRECTIONS: Mapping[str, int] = {"falling": -1, "when": 0, "rising": 1}
 """The last word in the name of a guard."""
@@ -34,15 +34,15 @@ def is_crossing(name: str) -> bool:
 
 
 def guard_name(number: int, falling: bool, rising: bool) -> str:
-    """Return the name of the guard of an event that happens where it falls, rises, or does either."""
+    """Return the name of the guard of an event that happens where the guard falls, rises, or does either."""
     word = "when" if falling == rising else "falling" if falling else "rising"
     return f"events.{number}.{word}"
 
 
 def guard_of(condition: Expression) -> Expression:
-    """Return what falls below 0 where a condition begins to hold: a comparison, or some joined by and, or.
+    """Return a formula that falls below 0 where a condition begins to hold.
 
-    ExpressionError where it is another formula, or asks for a single value.
+    Raises ExpressionError if the condition is not a comparison by < or >, or several joined by and, or.
     """
     match condition:
         case Compare("<" | "<=", left, right):
@@ -60,17 +60,20 @@ def guard_of(condition: Expression) -> Expression:
 
 
 def crossings(texts: Mapping[str, str], names: tuple[str, ...]) -> Crossings | None:
-    """Return the events of some formulas, which may hold `names`; the stop is the last one. None where there are none.
+    """Return the events of a user's formulas, in which `names` are allowed; the stop is the last. None without events.
 
-    ExpressionError where a formula cannot be read.
+    Raises ExpressionError if a formula cannot be parsed.
     """
     rows = []
     for number in range(1, MOST_EVENTS + 1):
         head = f"events.{number}."
         for word, direction in DIRECTIONS.items():
             if head + word in texts:
-                own = {key: text for key, text in texts.items() if key.startswith(f"{head}then.")}
-                then = tuple((key.split(".")[-1], parse(text, names)) for key, text in own.items())
+                then = tuple(
+                    (key.split(".")[-1], parse(text, names))
+                    for key, text in texts.items()
+                    if key.startswith(f"{head}then.")
+                )
                 rows.append(Crossing(parse(texts[head + word], names), direction, then))
     if STOP in texts:
         rows.append(Crossing(guard_of(parse(texts[STOP], names)), -1, ends=True))
@@ -78,7 +81,7 @@ def crossings(texts: Mapping[str, str], names: tuple[str, ...]) -> Crossings | N
 
 
 def described(events: Crossings, texts: Mapping[str, str]) -> str:
-    """Return events as they stand behind an equation, each after a comma."""
+    """Return the text of events that follows an equation, each after a comma."""
     words = {-1: " falls to 0", 0: " = 0", 1: " rises to 0"}
     parts = []
     for row in events.rows:
@@ -96,7 +99,7 @@ def _text(formula: str | Expression) -> str:
 
 
 def written(texts: Mapping[str, str]) -> dict[str, Any]:
-    """Return events and stop as they stand in a file."""
+    """Return events and stop in the form of an experiment file."""
     events = []
     for name, guard in sorted(texts.items()):
         head, _, word = name.rpartition(".")
@@ -108,10 +111,10 @@ def written(texts: Mapping[str, str]) -> dict[str, Any]:
                 key.removeprefix(then): x for key, x in texts.items() if key.startswith(then)
             }
             events.append(event | ({"then": changes} if changes else {}))
-    found: dict[str, Any] = {"events": events} if events else {}
-    return found | ({STOP: texts[STOP]} if STOP in texts else {})
+    sections: dict[str, Any] = {"events": events} if events else {}
+    return sections | ({STOP: texts[STOP]} if STOP in texts else {})
 
 
 def is_constant(guard: Expression, states: tuple[str, ...]) -> bool:
-    """Tell whether a guard depends on no state and not on the time."""
+    """Tell whether a guard depends neither on states nor on time."""
     return set(guard.names).isdisjoint((*states, "t"))

@@ -9,10 +9,10 @@ With the energy ``E = v^2/2 + alpha u^2/2 + beta u^4/4`` and ``S = sqrt(alpha^2 
 - beta < 0 < alpha, within the well: ``u = A sn``, with ``A^2 = 4 E/(S + alpha)``, rate ``sqrt((S + alpha)/2)`` and
   1 - m = 2 S/(S + alpha).
 
-The phase at the start enters by the theorems of addition, so that no function has to be inverted. Anything else is
-linear (beta = 0), or escapes to infinity in a finite time, where NaN stands.
+The initial phase enters by the addition theorems, so no function is inverted. All other motions are linear (beta = 0),
+or escape to infinity in finite time, for which the result is NaN.
 
-Source: Abramowitz and Stegun, chapter 16 (16.17 for the theorems of addition).
+Source: Abramowitz and Stegun, chapter 16 (16.17 for the addition theorems).
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ CN, DN, SN, LINEAR, ESCAPES, REST = range(6)
 
 
 def _orbit(alpha: Any, beta: Any, u: Any, v: Any) -> tuple[Floats, ...]:
-    """Return the kind of orbit, amplitude, rate and ``1 - m``, all of one shape, after the broadcast arguments."""
+    """Return kind of orbit, amplitude, rate, ``1 - m`` and the four arguments, all broadcast to one shape."""
     alpha, beta, u, v = (np.asarray(x, dtype=float) for x in np.broadcast_arrays(alpha, beta, u, v))
     with np.errstate(all="ignore"):
         energy = 0.5 * v * v + u * u * (0.5 * alpha + 0.25 * beta * u * u)
@@ -43,7 +43,7 @@ def _orbit(alpha: Any, beta: Any, u: Any, v: Any) -> tuple[Floats, ...]:
         is_cn = (beta > 0.0) & ((energy > 0.0) | (alpha >= 0.0))
         is_dn = (beta > 0.0) & ~is_cn
         is_sn = (beta < 0.0) & (alpha > 0.0) & (square >= 0.0) & (-beta * u * u <= alpha)
-        # S - alpha and S + alpha: the smaller one from their product 4 beta E
+        # S - alpha and S + alpha: the smaller from their product 4 beta E, without cancellation
         sum_ = np.where(alpha < 0.0, 4.0 * beta * energy / (s - alpha), s + alpha)
         gap = np.where(alpha > 0.0, 4.0 * beta * energy / (s + alpha), s - alpha)
         amplitude = np.sqrt(np.where(is_sn, 4.0 * energy / (s + alpha), gap / beta))
@@ -76,7 +76,7 @@ def motion(t: Any, alpha: Any, beta: Any, u_0: Any, v_0: Any) -> tuple[Floats, F
         starts = (x[linear, None] for x in (alpha, np.zeros_like(alpha), u, v))
         found[:, linear] = damped_motion(t[linear], *starts)
     own = (size, rate, complement, u, v)
-    # of a start beyond 1e77 the energy overflows: NaN
+    # for initial values beyond 1e77 the energy overflows, and the result is NaN
     with np.errstate(all="ignore"):
         well = (*own, alpha + beta * u * u, beta)
         for code, move, numbers in ((CN, _cn, own), (DN, _dn, well), (SN, _sn, own)):
@@ -89,13 +89,17 @@ def motion(t: Any, alpha: Any, beta: Any, u_0: Any, v_0: Any) -> tuple[Floats, F
 def _added(
     t: Floats, rate: Floats, complement: Floats, s: Floats, c: Floats, d: Floats
 ) -> tuple[Floats, Floats, Floats]:
-    """Return sn, cn and dn at ``rate t`` behind a phase where they are s, c and d, shape (rows, n)."""
+    """Return sn, cn and dn at ``phase + rate t``, with values s, c and d at the phase; shape (rows, n)."""
     sn, cn, dn, _ = jacobi(rate[:, None] * t, complement[:, None])
     m = (1.0 - complement)[:, None]
-    # 1 - m s^2 sn^2, as a sum of what is not negative
-    below = complement[:, None] + m * (c * c + (s * cn) ** 2)
+    # 1 - m s^2 sn^2, as a sum of nonnegative terms
+    denominator = complement[:, None] + m * (c * c + (s * cn) ** 2)
     sine, cosine = s * cn * dn + sn * c * d, c * cn - s * sn * d * dn
-    return sine / below, cosine / below, (d * dn - m * s * sn * c * cn) / below
+    return (
+        sine / denominator,
+        cosine / denominator,
+        (d * dn - m * s * sn * c * cn) / denominator,
+    )
 
 
 def _cn(
@@ -120,8 +124,8 @@ def _dn(
 ) -> tuple[Floats, Floats]:
     side = np.copysign(size, u)[:, None]
     d = np.clip(u[:, None] / side, 0.0, 1.0)
-    # slope = S cos(2 phi) and sqrt(2 beta) |v| = S sin(2 phi), where sn = sin(phi): from d = u/A neither sn near the
-    # outer turning point nor cn near the inner one would have a digit
+    # with sn = sin(phi): slope = S cos(2 phi) and sqrt(2 beta) |v| = S sin(2 phi); from d = u/A alone, sn near the
+    # outer turning point and cn near the inner one would lose all digits
     swing = np.sqrt(2.0 * beta) * np.abs(v)
     both = on_arrays.hypot(slope, swing)  # S
     large = np.sqrt(0.5 + 0.5 * np.abs(slope) / both)
@@ -143,7 +147,7 @@ def _sn(
 
 
 def period(alpha: Any, beta: Any, u_0: Any, v_0: Any) -> Floats:
-    """Return the period; NaN at rest and for a motion that does not repeat, infinite between two kinds of orbit."""
+    """Return the period; NaN at rest and for motions that are not periodic, infinite on a separatrix."""
     kind, _, rate, complement, alpha, *_ = _orbit(alpha, beta, u_0, v_0)
     quarter = agm_quarter_period(complement).reshape(kind.shape)
     with np.errstate(all="ignore"):

@@ -6,9 +6,9 @@ With ``w = sqrt(g/L)`` and ``k^2 = sin^2(theta_0/2) + (omega_0/(2 w))^2`` (the e
 - rotation, k > 1: ``theta/2 = +-am(k u, 1/k)``, ``omega = +-2 w k dn(k u, 1/k)``, time of a turn ``2 K(1/k)/(w k)``;
 - separatrix, k = 1: ``sin(theta/2) = tanh u``, infinite period.
 
-Everything is computed from the *complementary* parameter ``1 - k^2 = cos^2(theta_0/2) - (omega_0/(2 w))^2``, so that
-nothing is lost near the separatrix; a library routine that takes the parameter itself has lost it before it starts
-(measured at 1 - m = 1e-12, u = 20: wrong in the ninth digit, and 3e30 at u = 100).
+Everything is computed from the *complementary* parameter ``1 - k^2 = cos^2(theta_0/2) - (omega_0/(2 w))^2``, so no
+digits are lost near the separatrix. A library routine that takes the parameter m = k^2 itself loses them (measured at
+1 - m = 1e-12, u = 20: wrong in the ninth digit, and 3e30 at u = 100).
 
 Source: pendulum lecture (A), section 1.2, which mentions the closed form; Abramowitz and Stegun, chapters 16 and 17;
 R. Bulirsch, Numerische Mathematik 7 (1965) 78-90 (sn, cn, dn);
@@ -27,17 +27,16 @@ from vibsim.elementary import on_arrays
 from vibsim.models.base import Numbers
 
 _MEANS = ((0.1, 5), (1e-5, 6), (1e-11, 7), (1e-30, 8), (0.0, 12))
-"""Steps of the arithmetic-geometric mean that bring 1 and sqrt(x) together to the last digit, for x from each bound on.
+"""Pairs (bound, steps): iterations of the arithmetic-geometric mean of 1 and sqrt(x) to the last digit for x >= bound.
 
-Each step squares the defect, so a few steps serve nearly all; the number for a member is its own, whatever is computed
-beside it.
+The number depends on x alone, not on what is computed together, so that each member has the same bits in any batch.
 """
 _DUPLICATIONS = 12
-"""They bring the arguments of R_F together to 1 %, for a ratio of 1e-300 between them; the sixth power is left out."""
+"""Duplications that make the arguments of R_F equal to 1 % even for ratios of 1e-300; the series omits sixth powers."""
 
 
 def _classes(complement: Floats) -> Iterator[tuple[Flags | slice, int]]:
-    """Yield which entries need how many steps of the mean; entries that are 0 belong to none."""
+    """Yield masks of entries with the number of steps of the mean that they need; zeros are in no mask."""
     below = np.inf
     for bound, steps in _MEANS:
         mask = (complement >= bound) & (complement < below) & (complement > 0.0)
@@ -64,7 +63,7 @@ def agm_quarter_period(complement: Floats) -> Floats:
 def carlson_rf(x: Floats, y: Floats, z: Floats) -> Floats:
     """Return Carlson's symmetric integral R_F(x, y, z) of arguments >= 0, at most one of them 0.
 
-    Duplication, then the series to the fifth power of what is left of the differences.
+    Duplication, then the series to the fifth power of the remaining differences.
     """
     for _ in range(_DUPLICATIONS):
         rx, ry, rz = np.sqrt(x), np.sqrt(y), np.sqrt(z)
@@ -80,7 +79,7 @@ def carlson_rf(x: Floats, y: Floats, z: Floats) -> Floats:
 
 def _incomplete(sin: Floats, cos: Floats, complement: Floats) -> Floats:
     """Return F(phi) for the angle phi in [-pi, pi] that has this sine and cosine."""
-    # an angle behind +-pi/2 is reached from the nearest multiple of pi
+    # for angles beyond +-pi/2, measured from +-pi
     with np.errstate(divide="ignore", invalid="ignore"):
         inner = sin * carlson_rf(cos * cos, cos * cos + complement * sin * sin, np.ones_like(sin))
         outer = np.copysign(2.0 * agm_quarter_period(complement), sin) - inner
@@ -102,25 +101,25 @@ def _sign(half_turns: Floats) -> Floats:
 
 
 def _reduced(u: Floats, complement: Floats) -> tuple[Floats, Floats, Floats, Floats]:
-    """Return sn, cn, dn of `u` less whole half periods 2 K, and their number.
+    """Return sn, cn, dn of `u` reduced by a multiple of the half period 2 K, and that multiple.
 
-    The shape of `u` is (rows, n), that of `complement` (rows,): what depends on it alone is computed once for a row.
+    The shape of `u` is (rows, n), that of `complement` (rows,), so that the means are computed once per row.
     """
-    found = np.full((4, *u.shape), np.nan)
+    result = np.full((4, *u.shape), np.nan)
     for chosen, steps in _classes(complement):
-        found[:, chosen] = _general(u[chosen], complement[chosen], steps)
+        result[:, chosen] = _general(u[chosen], complement[chosen], steps)
     separatrix = complement == 0.0
     if separatrix.any():
-        # K is infinite, and there is no half period
-        at = u[separatrix]
-        sech = 1.0 / on_arrays.cosh(np.clip(at, -700.0, 700.0))
-        found[:, separatrix] = on_arrays.tanh(at), sech, sech, np.zeros_like(at)
-    sn, cn, dn, turns = found
+        # K is infinite: nothing to reduce
+        x = u[separatrix]
+        sech = 1.0 / on_arrays.cosh(np.clip(x, -700.0, 700.0))
+        result[:, separatrix] = on_arrays.tanh(x), sech, sech, np.zeros_like(x)
+    sn, cn, dn, turns = result
     return sn, cn, dn, turns
 
 
 def _general(u: Floats, complement: Floats, steps: int) -> tuple[Floats, ...]:
-    """Return sn, cn, dn by descending Landen transformations (Bulirsch 1965), and the half periods."""
+    """Return sn, cn, dn by descending Landen transformations (Bulirsch 1965), and the number of half periods."""
     a, emc, means = np.ones_like(complement), complement, []
     for _ in range(steps):
         root = np.sqrt(emc)
@@ -139,15 +138,15 @@ def _general(u: Floats, complement: Floats, steps: int) -> tuple[Floats, ...]:
         dn = (root + ratio) / (mean + ratio)
         ratio = c / mean
     sn = np.copysign(1.0 / np.sqrt(c * c + 1.0), sin)
-    found = [sn, c * sn, dn]
+    result = [sn, c * sn, dn]
     if small.any():
         one = np.ones_like(u)
-        found = [np.where(small, x, y) for x, y in zip((u, one, one), found, strict=True)]
-    return (*found, half_turns)
+        result = [np.where(small, x, y) for x, y in zip((u, one, one), result, strict=True)]
+    return (*result, half_turns)
 
 
 def _energy(initial: Numbers, parameters: Numbers) -> tuple[Floats, ...]:
-    """Return w, the turns before theta_0, sin(theta_0/2), cos(theta_0/2), omega_0/(2 w) and ``1 - k^2``."""
+    """Return w, the full turns in theta_0, sin(theta_0/2), cos(theta_0/2), omega_0/(2 w) and ``1 - k^2``."""
     w, theta, omega = np.broadcast_arrays(
         np.sqrt(np.divide(parameters["g"], parameters["L"])), initial["theta"], initial["omega"]
     )
@@ -183,7 +182,7 @@ def pendulum_motion(t: Floats, initial: Numbers, parameters: Numbers) -> dict[st
 
 
 def _libration(t: Floats, *start: Floats) -> tuple[Floats, Floats]:
-    """Return theta and omega, shape (rows, n), of rows that swing."""
+    """Return theta and omega, shape (rows, n), of oscillating rows."""
     w, k, sine, _, speed, complement = start
     size = np.where(k == 0.0, 1.0, k)
     phase = _incomplete(sine / size, speed / size, complement)
@@ -193,7 +192,7 @@ def _libration(t: Floats, *start: Floats) -> tuple[Floats, Floats]:
 
 
 def _rotation(t: Floats, *start: Floats) -> tuple[Floats, Floats]:
-    """Return theta and omega, shape (rows, n), of rows that go over the top."""
+    """Return theta and omega, shape (rows, n), of rotating rows."""
     w, k, sine, cosine, speed, complement = start
     sign = np.copysign(1.0, speed)
     inverse = -complement / (k * k)  # 1 - 1/k^2
@@ -204,9 +203,9 @@ def _rotation(t: Floats, *start: Floats) -> tuple[Floats, Floats]:
 
 
 def pendulum_period(initial: Numbers, parameters: Numbers) -> Any:
-    """Return the exact period: of an oscillation, or of one turn when the pendulum goes over the top.
+    """Return the exact period of an oscillation, or the time of one turn if the pendulum rotates.
 
-    Infinite on the separatrix; NaN at rest. Units of time of the parameters; the shape of the arguments.
+    Infinite on the separatrix; NaN at rest. In the unit of time of the parameters, in the shape of the arguments.
     """
     w, _, sine, _, speed, complement = _energy(initial, parameters)
     k = on_arrays.hypot(sine, speed)

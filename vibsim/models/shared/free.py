@@ -1,6 +1,6 @@
-r"""Models that are ``u'' + c u' + w^2 (u - r) = 0``: linear, damped linearly if at all, and free of forces in time.
+r"""Models of the form ``u'' + c u' + w^2 (u - r) = 0``: linear, with linear damping or none, and no force in time.
 
-Their schemes are matrices, of which theory can say everything (`vibsim.theory`). Source: vibration text (B), sections 1
+A scheme on such a model is a matrix, whose theory is complete (`vibsim.theory`). Source: vibration text (B), sections 1
 and 8.1.
 """
 
@@ -18,21 +18,21 @@ from vibsim.models.base import Model, Numbers, tree
 
 @dataclass(frozen=True)
 class FreeOscillation:
-    """The numbers of members; every array has shape (case,)."""
+    """Coefficients and initial values of members; every array has shape (case,)."""
 
     frequency: Floats
-    """w, NaN where the spring does not pull back."""
+    """Angular frequency w; NaN if the spring does not pull back."""
     damping: Floats
     """c/w."""
     position: Floats
-    """Initial position, measured from rest."""
+    """Initial position relative to the equilibrium r."""
     velocity: Floats
     """Initial velocity over w."""
 
 
 @cache
 def why_not_free(model: Model) -> str:
-    """Return what makes a model another one, as the end of a sentence that it begins; empty where it is such a one."""
+    """Return why a model is not of this form, as a predicate ("is nonlinear"); empty if it is."""
     if not model.is_alone:
         return "has several coordinates"
     if model.events is not None or model.lookup is not None:
@@ -49,12 +49,12 @@ def why_not_free(model: Model) -> str:
 
 
 def free_oscillation(model: Model, initial: Numbers, parameters: Numbers) -> FreeOscillation:
-    """Return the numbers of members of a model for which `why_not_free` is empty.
+    """Return coefficients and initial values of members of a model for which `why_not_free` is empty.
 
     Parameters
     ----------
     initial, parameters
-        By the names of the states, and by `vibsim.models.base.Parameter.key`; numbers or arrays of shape (case,).
+        Numbers or arrays of shape (case,), by the names of the states and by `vibsim.models.base.Parameter.key`.
     """
     named = {row.name: np.asarray(parameters[row.key], float) for row in model.parameters}
     force = tree(model, model.acceleration)

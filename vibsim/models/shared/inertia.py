@@ -1,8 +1,8 @@
-r"""Masses of several coordinates: the kinetic energy ``T = sum_ij M_ij(q) q_i' q_j'/2``, and Lagrange's equations.
+r"""Mass matrix of several coordinates: the kinetic energy ``T = sum_ij M_ij(q) q_i' q_j'/2``, and Lagrange's equations.
 
-``d/dt (dT/dq_i') - dT/dq_i = F_i`` is ``sum_j M_ij q_j'' + sum_jk c_ijk q_j' q_k' = F_i`` with
-``c_ijk = (dM_ij/dq_k + dM_ik/dq_j - dM_jk/dq_i)/2``: terms that a mass which depends on the position has beside the
-forces. They are solved for the accelerations as formulas, of which common parts are worked out once.
+``d/dt (dT/dq_i') - dT/dq_i = F_i`` is ``sum_j M_ij q_j'' + sum_jk c_ijk q_j' q_k' = F_i`` with the Christoffel symbols
+``c_ijk = (dM_ij/dq_k + dM_ik/dq_j - dM_jk/dq_i)/2``, which vanish if masses do not depend on positions. The equations
+are solved for the accelerations symbolically; kernels evaluate common subexpressions once.
 
 Source: L. D. Landau and E. M. Lifshitz, Mechanics, sections 5 and 10; H. Goldstein, Classical Mechanics, section 1.4.
 """
@@ -31,12 +31,12 @@ MASS = "mass"
 
 @dataclass(frozen=True)
 class Inertia:
-    """The masses of a system."""
+    """The mass matrix of a system."""
 
     positions: tuple[str, ...]
     velocities: tuple[str, ...]
     entries: Mapping[tuple[int, int], Expression]
-    """The matrix: its diagonal, and of what stands beside it (i, j) with i < j, where it is not 0."""
+    """Entries (i, j) of the matrix with i <= j that are not 0."""
 
     def of(self, i: int, j: int) -> Expression:
         """Return an entry of the matrix."""
@@ -44,9 +44,9 @@ class Inertia:
 
     @cached_property
     def is_plain(self) -> bool:
-        """Whether every coordinate has a mass of its own, which depends on no position."""
-        named = {name for entry in self.entries.values() for name in entry.names}
-        return all(i == j for i, j in self.entries) and named.isdisjoint(self.positions)
+        """Whether the matrix is diagonal and does not depend on positions."""
+        names = {name for entry in self.entries.values() for name in entry.names}
+        return all(i == j for i, j in self.entries) and names.isdisjoint(self.positions)
 
     @cached_property
     def kinetic(self) -> Expression:
@@ -61,8 +61,8 @@ class Inertia:
         return paired(terms, partial(Binary, "+"))
 
     def rest(self, i: int) -> Expression:
-        """Return ``sum_jk c_ijk q_j' q_k'``; what cancels by symmetry is left out."""
-        found = ZERO
+        """Return ``sum_jk c_ijk q_j' q_k'``, without terms that cancel by symmetry."""
+        total = ZERO
         count = len(self.positions) if self._slopes else 0
         for j in range(count):
             for k in range(j, count):
@@ -75,31 +75,31 @@ class Inertia:
                     factor = self._slope(i, j, k) + self._slope(i, k, j) - self._slope(j, k, i)
                 if factor != ZERO:
                     speeds = (Name(self.velocities[n]) for n in (j, k))
-                    found += factor * Binary("*", *speeds)
-        return found
+                    total += factor * Binary("*", *speeds)
+        return total
 
     def accelerations(self, forces: Sequence[Expression]) -> tuple[Expression, ...]:
-        """Return the accelerations by some forces."""
-        found = [force - self.rest(i) for i, force in enumerate(forces)]
-        count, rows = len(found), self._eliminated
+        """Return the accelerations under given forces, by elimination."""
+        x = [force - self.rest(i) for i, force in enumerate(forces)]
+        count, rows = len(x), self._eliminated
         for k in range(count):
             for i in range(k + 1, count):
                 if (k, i) in rows:
-                    found[i] -= rows[k, i] / rows[k, k] * found[k]
+                    x[i] -= rows[k, i] / rows[k, k] * x[k]
         for k in reversed(range(count)):
             for i in range(k + 1, count):
-                found[k] -= rows.get((k, i), ZERO) * found[i]
-            found[k] = found[k] / rows[k, k]
-        return tuple(found)
+                x[k] -= rows.get((k, i), ZERO) * x[i]
+            x[k] = x[k] / rows[k, k]
+        return tuple(x)
 
     @cached_property
     def pivots(self) -> tuple[Expression, ...]:
-        """What must be positive: it is where every motion has a positive kinetic energy."""
+        """The pivots: all are positive if and only if the matrix is positive definite."""
         return tuple(self._eliminated[k, k] for k in range(len(self.positions)))
 
     @cached_property
     def _eliminated(self) -> dict[tuple[int, int], Expression]:
-        """The upper triangle of the matrix after elimination, which needs no other order of its rows."""
+        """The upper triangle of the matrix after elimination; no pivoting is needed."""
         rows = {(k, k): ZERO for k in range(len(self.positions))} | dict(self.entries)
         for k in range(len(self.positions)):
             others = [i for i in range(k + 1, len(self.positions)) if (k, i) in rows]
@@ -115,14 +115,14 @@ class Inertia:
 
     @cached_property
     def _slopes(self) -> dict[tuple[int, int, int], Expression]:
-        """Derivatives of the masses, those that are not 0."""
-        found = {
+        """Derivatives ``dM_ij/dq_k`` that are not 0, by (i, j, k)."""
+        slopes = {
             (i, j, k): tidied(derivative(mass, name))
             for (i, j), mass in self.entries.items()
             for k, name in enumerate(self.positions)
             if name in mass.names
         }
-        return {place: slope for place, slope in found.items() if slope != ZERO}
+        return {place: slope for place, slope in slopes.items() if slope != ZERO}
 
 
 def inertia(
@@ -131,9 +131,9 @@ def inertia(
     velocities: tuple[str, ...],
     parameters: Sequence[str],
 ) -> Inertia:
-    """Return the masses of some formulas: ``mass.x`` or ``mass.x.x`` that of x, 1 where none is written, ``mass.x.y``.
+    """Return the mass matrix from formulas: ``mass.x`` or ``mass.x.x`` (1 if missing) and ``mass.x.y`` (0 if missing).
 
-    ExpressionError where a formula cannot be read.
+    Raises ExpressionError if a formula cannot be parsed.
     """
     entries: dict[tuple[int, int], Expression] = {(i, i): ONE for i in range(len(positions))}
     for key, text in texts.items():

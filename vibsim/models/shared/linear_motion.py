@@ -1,4 +1,4 @@
-r"""Exact motions of one coordinate under linear forces: free, damped, driven by exponentials, held by dry friction.
+r"""Exact motions of one coordinate: free, damped, driven by exponentials, or with dry friction.
 
 Source: vibration text (B), sections 1, 8 and 10.3, exercise 11.
 """
@@ -22,12 +22,12 @@ Term = tuple[Any, Any]
 MOST_TERMS = 64
 MOST_POWER = 8
 NEAR = 0.5
-"""Points of a divided difference that lie closer than this are worked out by a series."""
+"""Largest distance of points at which a divided difference is computed as a series."""
 SERIES_TERMS = 20
 
 
 def harmonic(states: tuple[State, State], frequency: Callable[[Numbers], Any]) -> dict[str, Any]:
-    """Return what `Model` has of ``u'' = -w^2 u``: frequency, exact motion and period, from w of the parameters."""
+    """Return fields of `Model` for ``u'' = -w^2 u``: frequency, exact motion and period; `frequency` returns w."""
     u, v = (state.name for state in states)
 
     def exact(t: Floats, initial: Numbers, parameters: Numbers) -> dict[str, Floats]:
@@ -49,7 +49,7 @@ def motion(t: Floats, w: Any, u_0: Any, v_0: Any) -> tuple[Floats, Floats]:
 
 
 def period(w: Any, u_0: Any, v_0: Any) -> Any:
-    """Return ``2 pi/w``, whatever the amplitude; NaN at rest."""
+    """Return ``2 pi/w``, for any amplitude; NaN at rest."""
     rest = (np.asarray(u_0) == 0) & (np.asarray(v_0) == 0)
     return np.where(rest, np.nan, 2 * np.pi / w)
 
@@ -61,20 +61,20 @@ def damped_motion(
 
     Source: vibration text (B), section 8 and exercise 11; with ``q = sqrt(|stiffness - half^2|)`` the solution is
     ``exp(-half t) (u_0 C + (v_0 + half u_0) S)``, with ``C = cos(q t)``, ``S = sin(q t)/q`` below critical damping,
-    1 and t at it, and the hyperbolic functions above, which are taken together with the exponential. Its velocity is
+    1 and t at it, and the hyperbolic functions above it, which are combined with the exponential. The velocity is
     ``exp(-half t) (v_0 (C - half S) - stiffness u_0 S)``.
     """
     with np.errstate(all="ignore"):
         square = stiffness - half * half
         q = np.sqrt(np.abs(square))
         decay = on_arrays.exp(-half * t)
-        # half - q and half + q: the smaller one from their product, without cancellation
+        # half - q and half + q: the smaller from their product, without cancellation
         large = half + np.copysign(q, half)
         small_rate = stiffness / large
         least, most = np.minimum(large, small_rate), np.maximum(large, small_rate)
         fast, slow = on_arrays.exp(-most * t), on_arrays.exp(-least * t)
         angle = q * t
-        # sin(x)/x and its hyperbolic twin are 1 where the damping is critical
+        # at critical damping sin(x)/x and sinh(x)/x are 1
         small = np.abs(angle) < 1e-8
         even, wave = (
             decay * on_arrays.cos(angle),
@@ -82,7 +82,7 @@ def damped_motion(
         )
         loss = on_arrays.expm1(-2.0 * angle)
         rise = np.where(small, decay * t, -0.5 * slow * loss / q)
-        # C + half S and C - half S: above critical damping one of them cancels as a sum
+        # C + half S and C - half S: above critical damping one of the sums cancels
         is_near, width = 2.0 * angle < 1.0, 2.0 * q
         rest = np.where(is_near, slow * (1.0 - least * loss / width), most * slow - least * fast)
         kick = np.where(is_near, slow * (1.0 + most * loss / width), most * fast - least * slow)
@@ -95,9 +95,9 @@ def damped_motion(
 
 
 def exponentials(node: Expression, numbers: Mapping[str, Any]) -> list[Term]:
-    """Return the pairs of C and s of a formula in the time that is a sum of exponentials, from values of other names.
+    """Return the terms (C, s) of a formula in t that is a sum of exponentials; `numbers` gives all other names.
 
-    ValueError where the formula is no such sum (see `is_sum_of_exponentials`).
+    Raises ValueError if the formula is not such a sum (see `is_sum_of_exponentials`).
     """
     if "t" not in node.names:
         return [(values(node, numbers) + 0j, 0j)]
@@ -105,18 +105,18 @@ def exponentials(node: Expression, numbers: Mapping[str, Any]) -> list[Term]:
         case Negate(operand):
             return [(-c, s) for c, s in exponentials(operand, numbers)]
         case Binary("+" | "-" as sign, left, right):
-            rest = [(c if sign == "+" else -c, s) for c, s in exponentials(right, numbers)]
-            return [*exponentials(left, numbers), *rest]
+            signed = [(c if sign == "+" else -c, s) for c, s in exponentials(right, numbers)]
+            return [*exponentials(left, numbers), *signed]
         case Binary("*", left, right):
             return _product(exponentials(left, numbers), exponentials(right, numbers))
         case Binary("/", left, right) if "t" not in right.names:
             divisor = values(right, numbers)
             return [(c / divisor, s) for c, s in exponentials(left, numbers)]
         case Binary("**", base, exponent) if _is_small_power(exponent):
-            factor, found = exponentials(base, numbers), [(1.0 + 0j, 0j)]
+            factor, terms = exponentials(base, numbers), [(1.0 + 0j, 0j)]
             for _ in range(int(literal(exponent) or 0)):
-                found = _product(found, factor)
-            return found
+                terms = _product(terms, factor)
+            return terms
         case Call("sin" | "cos" | "exp" | "sinh" | "cosh" as function, (argument,)):
             return _of_function(function, argument, numbers)
     raise ValueError("no sum of exponentials")
@@ -127,10 +127,10 @@ def _is_small_power(exponent: Expression) -> bool:
     return power is not None and power.is_integer() and 0 <= power <= MOST_POWER
 
 
-def _product(one: list[Term], other: list[Term]) -> list[Term]:
-    if len(one) * len(other) > MOST_TERMS:
+def _product(left: list[Term], right: list[Term]) -> list[Term]:
+    if len(left) * len(right) > MOST_TERMS:
         raise ValueError("too many exponentials")
-    return [(complex_product(a, b), p + q) for a, p in one for b, q in other]
+    return [(complex_product(a, b), p + q) for a, p in left for b, q in right]
 
 
 def _of_function(function: str, argument: Expression, numbers: Mapping[str, Any]) -> list[Term]:
@@ -147,13 +147,13 @@ def _of_function(function: str, argument: Expression, numbers: Mapping[str, Any]
             (0.5 * on_arrays.exp(start) + 0j, rate + 0j),
             (sign * on_arrays.exp(-start) + 0j, -rate + 0j),
         ]
-    # of a pair of conjugates one does: only the real part of the answer is taken
+    # a complex conjugate pair
     turned = complex_product(complex_exp(1j * start), 1.0 if function == "cos" else -1j)
     return [(0.5 * turned, 1j * rate), (0.5 * np.conj(turned), -1j * rate)]
 
 
 def is_sum_of_exponentials(node: Expression) -> bool:
-    """Tell whether `exponentials` can write a formula, whatever the values of its other names."""
+    """Tell whether a formula is a sum of exponentials in t, for any values of its other names."""
     others = {name: 0.5 for name in node.names if name != "t"}
     try:
         exponentials(node, others)
@@ -167,19 +167,19 @@ def forced_motion(
 ) -> tuple[Floats, Floats]:
     """Return position and velocity of ``u'' + 2 half u' + stiffness u = sum C exp(s t)`` at times `t`.
 
-    With the roots l1, l2 of the characteristic polynomial, the answer to ``C exp(s t)`` from rest is
-    ``C t^2 [l1 t, l2 t, s t] exp``, a divided difference of the exponential: one formula for every damping and every
-    frequency, resonance and critical damping among them, where textbooks have a case of its own for each and
-    cancellation in between. All numbers broadcast against `t`.
+    With the roots l1, l2 of the characteristic polynomial, the response to ``C exp(s t)`` from rest is
+    ``C t^2 [l1 t, l2 t, s t] exp``, a divided difference of the exponential. This formula covers every damping and
+    frequency, including resonance and critical damping, without cancellation near them. All numbers broadcast against
+    `t`.
 
     Parameters
     ----------
     terms
-        The force over the mass, `exponentials`; its imaginary part is 0.
+        The force over the mass, from `exponentials`; its imaginary part is 0.
     """
     u, v = damped_motion(t, stiffness, half, u_0, v_0)
     root = np.sqrt(np.asarray(half * half - stiffness, dtype=complex))
-    # the root that is larger in size, and the other one from their product, without cancellation
+    # the root of larger modulus, and the other from their product, without cancellation
     large = np.where(np.real(half) >= 0.0, -half - root, -half + root)
     small = np.where(large == 0.0, 0.0, stiffness / np.where(large == 0.0, 1.0, large))
     small = np.where(np.imag(root) != 0.0, -half + root, small)
@@ -188,28 +188,28 @@ def forced_motion(
         for c, s in terms:
             a, b, e = large * t, small * t, s * t
             u = u + np.real(complex_product(c * t * t, divided_twice(a, b, e)))
-            # u' - l u is the answer of the first-order equation that is left; the smaller root cancels less
-            rest = divided(a, e) + complex_product(b, divided_twice(a, b, e))
-            v = v + np.real(complex_product(c * t, rest))
+            # u' - l u solves a first-order equation; the smaller root l cancels less
+            response = divided(a, e) + complex_product(b, divided_twice(a, b, e))
+            v = v + np.real(complex_product(c * t, response))
     return np.asarray(u), np.asarray(v)
 
 
 def divided(a: Any, b: Any) -> Complexes:
-    """Return the divided difference ``(exp b - exp a)/(b - a)`` of complex numbers, also where they coincide."""
-    # from the one that grows more: the other exponential can then only vanish
+    """Return the divided difference ``(exp b - exp a)/(b - a)`` of complex numbers, which may coincide."""
+    # relative to the larger exponential: the other can underflow, but nothing overflows
     is_first = np.real(a) > np.real(b)
-    most, gap = np.where(is_first, a, b), np.where(is_first, a - b, b - a)
+    larger, gap = np.where(is_first, a, b), np.where(is_first, a - b, b - a)
     is_zero = gap == 0.0
     safe = np.where(is_zero, 1.0, gap)
     quotient = np.where(is_zero, 1.0, -complex_expm1(-safe) / safe)
-    return np.asarray(complex_product(complex_exp(most), quotient))
+    return np.asarray(complex_product(complex_exp(larger), quotient))
 
 
 def divided_twice(a: Any, b: Any, c: Any) -> Complexes:
     """Return the second divided difference of the exponential at three complex numbers, which may coincide."""
     a, b, c = np.broadcast_arrays(a, b, c)
     ab, bc, ca = complex_size(a - b), complex_size(b - c), complex_size(c - a)
-    # the two that are farthest apart: the difference of their quotients loses no digits
+    # divide by the largest distance, so that the difference of the quotients loses no digits
     order = [(ab >= bc) & (ab >= ca), bc >= ca]
     first, last, middle = (
         np.select(order, row[:2], row[2]) for row in ((a, b, c), (b, c, a), (c, a, b))
@@ -221,9 +221,9 @@ def divided_twice(a: Any, b: Any, c: Any) -> Complexes:
 
 
 def _close(a: Complexes, b: Complexes, c: Complexes) -> Complexes:
-    """Return the second divided difference at points that lie close, by Taylor's series around their mean.
+    """Return the second divided difference of the exponential at close points, by its Taylor series about their mean.
 
-    ``[a, b, c] x^(k+2)`` is the complete symmetric polynomial h_k, by the recursion of its generating function.
+    ``[a, b, c] x^(k+2)`` is the complete symmetric polynomial h_k, from the recursion of its generating function.
     """
     mean = (a + b + c) / 3.0
     x, y, z = a - mean, b - mean, c - mean
@@ -241,28 +241,28 @@ def _close(a: Complexes, b: Complexes, c: Complexes) -> Complexes:
 
 
 class Swings(NamedTuple):
-    """The pieces of a motion; arrays that broadcast against the times."""
+    """The pieces of a motion with dry friction; arrays that broadcast against the times."""
 
     direction: Any
-    """Of the first piece: 1 or -1, 0 where the body sticks from the beginning."""
+    """Direction of the first piece: 1 or -1, 0 if the body sticks from the beginning."""
     radius: Any
-    """Of the first piece."""
+    """Amplitude of the first piece."""
     angle: Any
     """``w t`` at the end of the first piece."""
     turn: Any
-    """Position there."""
+    """Position at the end of the first piece."""
     count: Any
-    """Number of half periods behind it; infinite without friction."""
+    """Number of half periods after the first piece; infinite without friction."""
 
 
 def swings(w: Any, c: Any, u_0: Any, v_0: Any) -> Swings:
-    """Return the pieces of the motion from initial values, all arrays broadcast."""
+    """Return the pieces of the motion from initial values; all arguments broadcast."""
     sticks = np.abs(u_0) <= c
     direction = np.where(v_0 == 0, np.where(sticks, 0.0, -np.sign(u_0)), np.sign(v_0))
-    away = u_0 + direction * c
-    radius = np.where(direction == 0, 0.0, on_arrays.hypot(away, v_0 / w))
-    # the velocity vanishes where the oscillation is at its end on the side of `direction`
-    start = on_arrays.atan2(np.abs(v_0) / w, direction * away)
+    offset = u_0 + direction * c
+    radius = np.where(direction == 0, 0.0, on_arrays.hypot(offset, v_0 / w))
+    # the first piece ends at the turning point on the side of `direction`
+    start = on_arrays.atan2(np.abs(v_0) / w, direction * offset)
     turn = np.where(direction == 0, u_0, direction * (radius - c))
     with np.errstate(divide="ignore", invalid="ignore"):
         count = np.ceil((np.abs(turn) - c) / (2.0 * c))
@@ -273,9 +273,9 @@ def swings(w: Any, c: Any, u_0: Any, v_0: Any) -> Swings:
 def friction_motion(t: Floats, w: Any, c: Any, u_0: Any, v_0: Any) -> tuple[Floats, Floats]:
     """Return position and velocity of ``u'' + w^2 u + w^2 c sign(u') = 0`` at times `t`: B, (86) with c = mu m g/k.
 
-    While it slides in the direction s = 1 or -1 it is a harmonic oscillation about ``-s c``. The first piece ends at
-    the first zero of the velocity; from there every piece takes half a period, ``pi/w``, and the size of the turning
-    point falls by 2 c, until one is within c of the origin: there the body sticks for ever.
+    While the body slides in the direction s = 1 or -1, it oscillates harmonically about ``-s c``. The first piece ends
+    at the first zero of the velocity. Every further piece takes half a period, ``pi/w``, and the distance of the
+    turning point from the origin decreases by 2 c, until it is at most c: there the body sticks for ever.
     """
     s = swings(w, c, u_0, v_0)
     phase = w * t
@@ -283,7 +283,7 @@ def friction_motion(t: Floats, w: Any, c: Any, u_0: Any, v_0: Any) -> tuple[Floa
         done = np.clip(np.floor((phase - s.angle) / np.pi), 0.0, s.count)
         size = np.abs(s.turn) - 2.0 * c * done
         side = np.sign(s.turn) * np.where(done % 2 == 0, 1.0, -1.0)
-        # a piece that begins at rest at x slides towards the origin, about -s c = sign(x) c
+        # a piece that begins at rest at x slides towards the origin and oscillates about -s c = sign(x) c
         late = phase - s.angle - np.pi * done
         u = side * (c + (size - c) * on_arrays.cos(late))
         v = -side * (size - c) * w * on_arrays.sin(late)

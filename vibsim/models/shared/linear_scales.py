@@ -5,11 +5,11 @@ With ``k = s'(0)`` (vibration text (B), section 10.2) ``t_c = sqrt(m/k)``; ``u_c
 equation (85): ``beta = b u_c/(2 m) = A b/(2 m k)`` and ``gamma = phi t_c``; of linear damping, ``u'' + 2 beta u' + u``,
 it is ``beta = b t_c/(2 m) = b/(2 sqrt(m k))``.
 
-The equation is one between forces, so that every sum in it has terms of one dimension, and what a sine is taken of has
-none. These are linear equations for the powers that each parameter has of the scales of mass, position and time; they
-are solved exactly. A parameter over these powers of the scales is the one of the scaled equation, which has the same
-formulas (sections 10.1 and 10.2). A number in a formula has no dimension: where it takes the place of one,
-``u + 0.1*u**3``, there is no scaled equation until it gets a name.
+The equation is a sum of forces, all terms of a sum have the same dimension, and the argument of a sine has none. These
+are linear equations for the exponents of mass, position and time in the dimension of each parameter; they are solved
+exactly. A parameter divided by these powers of the scales is the parameter of the scaled equation, which has the same
+formulas (sections 10.1 and 10.2). A number in a formula is dimensionless: if it stands for a quantity with a dimension,
+as in ``u + 0.1*u**3``, there is no scaled equation until it becomes a parameter.
 """
 
 from __future__ import annotations
@@ -46,16 +46,16 @@ if TYPE_CHECKING:
 
 TWO = Number(2.0)
 Powers = tuple[int, int, int]
-"""Of mass, position and time."""
+"""Exponents of mass, position and time."""
 FORCE: Powers = (1, 1, -2)
 SAME_DIMENSION = frozenset({"abs", "max", "min", "mod", "hypot"})
-"""Functions whose arguments and value have one dimension."""
+"""Functions whose arguments and value share one dimension."""
 FREE = frozenset({"sign", "heaviside", "atan2"})
-"""Functions without a dimension, whose arguments have any, but all the same one."""
+"""Functions with a dimensionless value, whose arguments share any dimension."""
 
 
 def linear_scales(forces: Forces) -> Scales | None:
-    """Return the scales of an oscillator; None where its spring has no stiffness at rest."""
+    """Return the scales of an oscillator; None if its spring has no stiffness at rest."""
     m, k = forces.mass, stiffness_at_rest(forces)
     if k is None:
         return None
@@ -81,7 +81,7 @@ def _time_scale(mass: Expression, stiffness: Expression) -> Expression:
 
 
 def stiffness_at_rest(forces: Forces) -> Expression | None:
-    """Return the slope of the spring at u = 0, in the parameters; None where it has none there, or is 0."""
+    """Return the stiffness at u = 0, a formula in the parameters; None if it is 0 or undefined."""
     try:
         slope = tidied(put(forces.stiffness, forces.position, ZERO))
     except ExpressionError:
@@ -90,20 +90,20 @@ def stiffness_at_rest(forces: Forces) -> Expression | None:
 
 
 def with_scaled_run(
-    scales: Scales, forces: Forces, parameters: tuple[Parameter, ...], given: Mapping[str, Powers]
+    scales: Scales, forces: Forces, parameters: tuple[Parameter, ...], stated: Mapping[str, Powers]
 ) -> Scales:
-    """Return the scales with the parameters of the scaled equation, or why there are none.
+    """Return the scales with the parameters of the scaled equation, or with the reason why there are none.
 
-    Parameters that `scales` has are taken as they are. `given` are the powers of mass, position and time that some
-    parameters have; those of the others follow from the forces.
+    Scaled parameters that `scales` already has are kept. `stated` gives the exponents of mass, position and time of
+    some parameters; those of the others follow from the forces.
     """
-    known = {forces.position: (0, 1, 0), forces.velocity: (0, 1, -1), "t": (0, 0, 1), **given}
+    known = {forces.position: (0, 1, 0), forces.velocity: (0, 1, -1), "t": (0, 0, 1), **stated}
     known |= dict.fromkeys(forces.mass.names, (1, 0, 0))
     terms = tuple(
         term for term in (forces.spring, forces.damping, forces.force) if not is_zero(term)
     )
     try:
-        found = powers(terms, known, tuple(row.name for row in parameters))
+        exponents = powers(terms, known, tuple(row.name for row in parameters))
     except DimensionError as error:
         rule = (
             f"{error} has a number in the place of a parameter: its terms cannot have one dimension"
@@ -112,29 +112,29 @@ def with_scaled_run(
     units = forces.mass, X_C, T_C
     exactly = _exactly(forces, scales) | dict(scales.parameters or ())
     scaled = (
-        (row.key, exactly.get(row.name) or over_scales(row.name, found[row.name], units))
+        (row.key, exactly.get(row.name) or over_scales(row.name, exponents[row.name], units))
         for row in parameters
     )
     return replace(scales, parameters=tuple(scaled))
 
 
 def _exactly(forces: Forces, scales: Scales) -> dict[str, Formula]:
-    """Return what the scales make 1, or -1, and should not come out of a quotient with a rounding error."""
-    found: dict[str, Formula] = dict.fromkeys(forces.mass.names, ONE)
+    """Return scaled parameters that are 1 or -1 by definition, so that no quotient rounds them."""
+    exact: dict[str, Formula] = dict.fromkeys(forces.mass.names, ONE)
     stiffness = stiffness_at_rest(forces)
     if stiffness is None or scales.time != _time_scale(forces.mass, stiffness):
-        return found
+        return exact
     match stiffness:
         case Name(name) | Binary("/", Number(1.0), Name(name)):
-            found[name] = ONE
+            exact[name] = ONE
     driven = amplitude_and_frequency(forces.force)
     if driven is not None and isinstance(driven[0], Name):
-        found[driven[0].name] = Call("sign", (driven[0],))
-    return found
+        exact[driven[0].name] = Call("sign", (driven[0],))
+    return exact
 
 
 def amplitude_and_frequency(force: Expression) -> tuple[Expression, Expression] | None:
-    """Return A and phi of a force ``A sin(phi t)`` or ``A cos(phi t)``; None for any other one."""
+    """Return A and phi of a force ``A sin(phi t)`` or ``A cos(phi t)``; None for any other force."""
     amplitude = ONE
     frequency: Expression | None = None
     parts = [force]
@@ -164,13 +164,13 @@ class DimensionError(ValueError):
 
 
 Dimension = Mapping[str, Fraction]
-"""Powers of `BASES` and of dimensions that are unknown, each by the name of a parameter."""
+"""Exponents of `BASES` and of unknown dimensions, which have the names of their parameters."""
 BASES = ("@mass", "@position", "@time")
 NONE: Dimension = {}
 
 
 def _product(left: Dimension, right: Dimension, power: Fraction = Fraction(1)) -> Dimension:
-    """Return the dimension of a product with a power of another."""
+    """Return the dimension of `left` times a power of `right`."""
     sums = {
         name: left.get(name, Fraction(0)) + power * right.get(name, Fraction(0))
         for name in {**left, **right}
@@ -184,40 +184,42 @@ def _known(powers: Powers) -> Dimension:
 
 @dataclass
 class Equations:
-    """Linear equations for unknown dimensions, kept solved: each unknown by those that are left."""
+    """Linear equations for unknown dimensions, solved one by one as they are added."""
 
     known: dict[str, Dimension]
-    """Dimensions of names that are given."""
+    """Dimensions that are given, by name."""
     solved: dict[str, Dimension] = field(default_factory=dict)
+    """Solved unknowns, each in terms of the unsolved ones."""
     fresh: int = 0
+    """Number of unknown dimensions of the number 0."""
 
-    def reduced(self, found: Dimension) -> Dimension:
-        """Return a dimension in the unknowns that are left."""
-        for name, power in found.items():
+    def reduced(self, dimension: Dimension) -> Dimension:
+        """Return a dimension in terms of the unsolved unknowns."""
+        for name, power in dimension.items():
             if name in self.solved:
-                rest = {other: p for other, p in found.items() if other != name}
-                return self.reduced(_product(rest, self.solved[name], power))
-        return found
+                others = {other: p for other, p in dimension.items() if other != name}
+                return self.reduced(_product(others, self.solved[name], power))
+        return dimension
 
     def equal(self, left: Dimension, right: Dimension, node: Expression) -> None:
-        """Demand that two dimensions are one; DimensionError where they cannot be."""
-        rest = dict(self.reduced(_product(left, right, Fraction(-1))))
-        name = next((name for name in rest if name not in BASES), None)
+        """Require that two dimensions are equal; raise DimensionError with `node` if they cannot be."""
+        quotient = dict(self.reduced(_product(left, right, Fraction(-1))))
+        name = next((name for name in quotient if name not in BASES), None)
         if name is not None:
-            power = rest.pop(name)
-            self.solved[name] = _product(NONE, rest, -1 / power)
+            power = quotient.pop(name)
+            self.solved[name] = _product(NONE, quotient, -1 / power)
             for key, value in self.solved.items():
                 self.solved[key] = self.reduced(value)
-        elif rest:
+        elif quotient:
             raise DimensionError(to_formula(node))
 
     def of(self, node: Expression) -> Dimension:
-        """Return the dimension of a formula, and demand what it needs to have one."""
+        """Return the dimension of a formula, and add the equations that it implies."""
         match node:
             case Number(value):
                 if value:
                     return NONE
-                # the number 0 has a dimension of its own: it fits any
+                # the number 0 fits any dimension: an unknown of its own
                 self.fresh += 1
                 return {f"@{self.fresh}": Fraction(1)}
             case Name(name):
@@ -241,8 +243,8 @@ class Equations:
             case Call("sqrt" | "cbrt" as root, (argument,)):
                 return _product(NONE, self.of(argument), Fraction(1, 2 if root == "sqrt" else 3))
             case Call(function, arguments) if function in SAME_DIMENSION | FREE:
-                found = self._alike(arguments, node)
-                return found if function in SAME_DIMENSION else NONE
+                dimension = self._alike(arguments, node)
+                return dimension if function in SAME_DIMENSION else NONE
             case Call(_, arguments):
                 for argument in arguments:
                     self.equal(self.of(argument), NONE, node)
@@ -267,33 +269,33 @@ class Equations:
 def powers(
     formulas: tuple[Expression, ...], known: Mapping[str, Powers], names: tuple[str, ...]
 ) -> dict[str, tuple[Fraction, ...]]:
-    """Return the powers of the scales of mass, position and time that parameters have, from forces.
+    """Return the exponents of mass, position and time in the dimensions of parameters, from formulas of forces.
 
-    DimensionError with the part of the formulas where terms of one sum cannot have the same dimension.
+    Raises DimensionError with the subexpression whose terms cannot have the same dimension.
 
     Parameters
     ----------
     known
-        The powers of the states, of ``t`` and of some parameters.
+        Exponents for the states, ``t`` and some parameters.
     names
-        The parameters that are asked for. Where the formulas leave a choice, as between the factors of a product, the
-        first ones get the dimension and the others none.
+        The parameters. If the formulas do not determine all dimensions, as those of two factors of a product, the first
+        parameters have dimensions and the others are dimensionless.
     """
     equations = Equations({name: _known(value) for name, value in known.items()})
     for formula in formulas:
         equations.equal(equations.of(formula), _known(FORCE), formula)
-    found = (equations.reduced(equations.of(Name(name))) for name in names)
+    dimensions = (equations.reduced(equations.of(Name(name))) for name in names)
     return {
         name: tuple(dimension.get(base, Fraction(0)) for base in BASES)
-        for name, dimension in zip(names, found, strict=True)
+        for name, dimension in zip(names, dimensions, strict=True)
     }
 
 
 def over_scales(
     name: str, power: tuple[Fraction, ...], scales: tuple[Expression, ...]
 ) -> Expression:
-    """Return a parameter over powers of the scales of mass, position and time."""
-    found: Expression = Name(name)
+    """Return a parameter divided by powers of the scales of mass, position and time."""
+    scaled: Expression = Name(name)
     for scale, exponent in zip(scales, power, strict=True):
         factor, size = scale, abs(exponent)
         if size.denominator != 1:
@@ -301,5 +303,5 @@ def over_scales(
         elif size != 1:
             factor = Binary("**", scale, Number(float(size)))
         if exponent:
-            found = found / factor if exponent > 0 else found * factor
-    return found
+            scaled = scaled / factor if exponent > 0 else scaled * factor
+    return scaled

@@ -1,4 +1,4 @@
-r"""Manufactured solutions: a motion that is written down, and the forces with which it solves the equations.
+r"""Manufactured solutions: a prescribed motion, and the forces with which it solves the equations.
 
 Source: vibration text (B), section 2.2, and exercises 1, 9 and 23.
 """
@@ -19,12 +19,12 @@ from vibsim.models.base import Numbers, Parameter
 
 @dataclass(frozen=True)
 class Manufactured:
-    """A motion that is written down as formulas in ``t`` and the parameters."""
+    """A motion prescribed by formulas in ``t`` and the parameters."""
 
     positions: tuple[Expression, ...]
-    """Of every coordinate."""
+    """Position of every coordinate."""
     texts: tuple[str, ...]
-    """As they were written, to be shown where they cannot be worked with."""
+    """The positions as the user wrote them, for display."""
     names: tuple[str, ...]
     """The states: all positions, then all velocities."""
     parameters: tuple[Parameter, ...]
@@ -40,17 +40,17 @@ class Manufactured:
         return tuple(derivative(v, "t") for v in self.velocities)
 
     def along(self, formula: Expression) -> Expression:
-        """Return a formula in the states at the motion, which depends on ``t`` and the parameters."""
+        """Return a formula in the states, evaluated along the motion: it depends on ``t`` and the parameters."""
         motion = zip(self.names, (*self.positions, *self.velocities), strict=True)
         return replacing(dict(motion))(formula)
 
     def forces(self, accelerations: Sequence[Expression]) -> tuple[Expression, ...]:
-        """Return what must be added to the accelerations so that this is the motion."""
+        """Return what must be added to the accelerations so that the motion solves the equations."""
         pairs = zip(self.accelerations, accelerations, strict=True)
-        return tuple(wanted - self.along(given) for wanted, given in pairs)
+        return tuple(exact - self.along(formula) for exact, formula in pairs)
 
     def exact(self, t: Floats, initial: Numbers, parameters: Numbers) -> dict[str, Floats]:
-        """Return the states at times `t`, whatever the initial values: see `Model.exact`."""
+        """Return the states at times `t`, independent of the initial values: see `Model.exact`."""
         named = {row.name: parameters[row.key] for row in self.parameters}
         numbers = {**named, "t": t}
         shape = np.broadcast_shapes(*(np.shape(value) for value in numbers.values()))

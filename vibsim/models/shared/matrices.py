@@ -1,16 +1,17 @@
 r"""Matrices of a linear structure, its natural modes, and the motion of one mode under constant and harmonic loads.
 
-A mode with the shape x, ``K x = w^2 M x`` and ``x' M x = 1``, moves like ``q'' + 2 d q' + w^2 q = f(t)``. With the
-roots r_1, r_2 of ``r^2 + 2 d r + w^2 = 0`` and the divided differences ``D[g] = (g(r_1) - g(r_2))/(r_1 - r_2)``, the
-motion from (q_0, v_0) under the load ``Re(A e^(i W t))`` is
+A mode of shape x, ``K x = w^2 M x`` and ``x^T M x = 1``, satisfies ``q'' + 2 d q' + w^2 q = f(t)``. With the roots r_1,
+r_2 of ``r^2 + 2 d r + w^2 = 0`` and the divided differences ``D[g] = (g(r_1) - g(r_2))/(r_1 - r_2)``, the motion from
+(q_0, v_0) under the load ``Re(A e^(i W t))`` is
 
     q(t)  = q_0 e^(r_1 t) + (v_0 - r_1 q_0) D[e^(r t)] + Re(A D[g]),      g(r) = (e^(i W t) - e^(r t))/(i W - r),
 
-for any damping and at resonance too: where a difference would cancel, its integral form is summed, and g by its series.
+for any damping, including resonance: where a difference would cancel, D is computed from its integral form and g from
+its series.
 
-Modes. A solver of dense eigenvalue problems has errors relative to the highest frequency, which of a beam is a million
-times the lowest. They are refined in extended precision, T. Ogita and K. Aishima, Iterative refinement for symmetric
-eigenvalue decomposition, Japan J. Indust. Appl. Math. 35 (2018), with M in place of the identity.
+Modes. A solver of dense eigenvalue problems has errors relative to the highest frequency, which for a beam is a million
+times the lowest. The modes are refined in extended precision, T. Ogita and K. Aishima, Iterative refinement for
+symmetric eigenvalue decomposition, Japan J. Indust. Appl. Math. 35 (2018), with M in place of the identity.
 """
 
 from __future__ import annotations
@@ -26,30 +27,30 @@ from vibsim.core.array_types import Complexes, Floats, Integers
 from vibsim.elementary import on_arrays
 
 SERIES_BELOW = 1.0
-"""Size of z below which ``(e^z - 1)/z`` and the like are summed as series."""
+"""Values of |z| below which ``(e^z - 1)/z`` and similar functions are summed as series."""
 TERMS = 20
-"""Of these series: the first that is left out is below ``1/21! = 2e-20``."""
+"""Number of terms of these series: the first omitted term is below ``1/21! = 2e-20``."""
 HIGHEST_TOLERANCE = 1e-4
-"""Of the square of the highest frequency of a sparse structure, which says whether steps are stable."""
+"""Relative tolerance of the square of the highest frequency of a sparse structure, which decides on stability."""
 NEAR = 1.0
-"""Size of ``(r_1 - r_2) t`` below which a divided difference is the integral of the derivative."""
+"""Values of ``|r_1 - r_2| t`` below which a divided difference is computed as the integral of the derivative."""
 NODES, WEIGHTS = (row.copy() for row in np.polynomial.legendre.leggauss(10))
-"""For that integral: its error is far below rounding."""
+"""Gauss quadrature for that integral; its error is far below rounding."""
 REFINEMENTS = 3
-"""Of modes; each squares their errors."""
+"""Refinement iterations of modes; each squares the error."""
 
 
 @dataclass(frozen=True)
 class Matrix:
-    """A square matrix by its entries; two of the same entries are equal."""
+    """A square matrix in coordinate format; equal entries make equal objects."""
 
     size: int
     rows: Integers = field(compare=False, repr=False)
-    """Rows of the entries that are not 0, from 0, in the order of rows and then columns."""
+    """Row indices of the nonzero entries, sorted by row and then column."""
     columns: Integers = field(compare=False, repr=False)
     entries: Floats = field(compare=False, repr=False)
     digest: str = field(init=False)
-    """SHA-256 of all of them."""
+    """SHA-256 of size, indices and entries."""
 
     def __post_init__(self) -> None:
         digest = hashlib.sha256(str(self.size).encode())
@@ -59,21 +60,21 @@ class Matrix:
 
     @classmethod
     def of(cls, matrix: Any) -> Matrix:
-        """Return the entries of a square array, or of a sparse one of SciPy."""
+        """Return the matrix of a square array or a sparse SciPy array."""
         if isinstance(matrix, np.ndarray):
             rows, columns = np.nonzero(matrix)
             return cls(len(matrix), rows, columns, matrix[rows, columns].astype(float))
-        found = matrix.tocsr()
-        found.sum_duplicates()
-        found.eliminate_zeros()
-        found.sort_indices()
-        found = found.tocoo()
-        rows, columns = found.row.astype(np.int64), found.col.astype(np.int64)
-        return cls(found.shape[0], rows, columns, found.data.astype(float))
+        sparse = matrix.tocsr()
+        sparse.sum_duplicates()
+        sparse.eliminate_zeros()
+        sparse.sort_indices()
+        sparse = sparse.tocoo()
+        rows, columns = sparse.row.astype(np.int64), sparse.col.astype(np.int64)
+        return cls(sparse.shape[0], rows, columns, sparse.data.astype(float))
 
     @cached_property
     def sparse(self) -> Any:
-        """The matrix as a sparse array of SciPy, by columns."""
+        """The matrix as a SciPy array in CSC format."""
         from scipy.sparse import csc_array
 
         shape = (self.size, self.size)
@@ -82,13 +83,13 @@ class Matrix:
     @property
     def dense(self) -> Floats:
         """The matrix as an array."""
-        found = np.zeros((self.size, self.size))
-        found[self.rows, self.columns] = self.entries
-        return found
+        dense = np.zeros((self.size, self.size))
+        dense[self.rows, self.columns] = self.entries
+        return dense
 
     @property
     def asymmetry(self) -> tuple[float, int, int]:
-        """The largest ``|a_ij - a_ji|`` over the largest ``|a_ij|``, and its place, from 0."""
+        """The largest ``|a_ij - a_ji|`` over the largest ``|a_ij|``, and its indices."""
         difference = abs(self.sparse - self.sparse.T).tocoo()
         if not difference.nnz:
             return 0.0, 0, 0
@@ -98,25 +99,25 @@ class Matrix:
 
 
 def factored(matrix: Any) -> Any:
-    """Return SciPy's factors of a symmetric sparse matrix; None where it is not positive definite.
+    """Return SciPy's LU factors of a symmetric sparse matrix; None if it is not positive definite.
 
-    Rows and columns are exchanged alike, so that the pivots have the signs of the eigenvalues (Sylvester's law).
+    Rows and columns are permuted alike, so the pivots have the signs of the eigenvalues (Sylvester's law of inertia).
     """
     from scipy.sparse.linalg import splu
 
     settings: dict[str, Any] = {"SymmetricMode": True}
     try:
-        found = splu(matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=settings)
+        factors = splu(matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=settings)
     except RuntimeError:
         # a pivot is exactly 0
         return None
-    is_symmetric = np.array_equal(found.perm_r, found.perm_c)
-    pivots = found.U.diagonal()
+    is_symmetric = np.array_equal(factors.perm_r, factors.perm_c)
+    pivots = factors.U.diagonal()
     largest = float(np.max(np.abs(matrix.diagonal()), initial=0.0))
     is_definite = is_symmetric and bool(
         np.all(pivots > matrix.shape[0] * 2.0**-52 * largest * 1e-8)
     )
-    return found if is_definite else None
+    return factors if is_definite else None
 
 
 @dataclass(frozen=True)
@@ -124,13 +125,13 @@ class Modes:
     """Natural modes."""
 
     frequencies: Floats
-    """Angular frequencies, increasing, shape (mode,); 0 of a motion as a rigid body, NaN where it is pushed away."""
+    """Angular frequencies, increasing, shape (mode,); 0 for rigid-body modes, NaN for unstable ones."""
     shapes: Floats
-    """Shape (dof, mode), with ``x' M x = 1``."""
+    """Mode shapes, shape (dof, mode), with ``x^T M x = 1``."""
 
 
 def all_modes(mass: Floats, stiffness: Floats) -> Modes:
-    """Return every mode of a structure with these symmetric matrices, the mass positive definite."""
+    """Return all modes for symmetric matrices, the mass positive definite."""
     from scipy.linalg import eigh
 
     _, start = eigh(stiffness, mass)
@@ -140,7 +141,7 @@ def all_modes(mass: Floats, stiffness: Floats) -> Modes:
         gap, s = np.eye(len(k)) - x.T @ (m @ x), x.T @ (k @ x)
         squares = np.diag(s) / (1.0 - np.diag(gap))
         gaps = squares[None, :] - squares[:, None]
-        # modes of one frequency stay as they are, but for their lengths and angles
+        # modes of equal frequency are only made orthonormal
         limit = 2.0 * (
             np.linalg.norm(np.asarray(s - np.diag(squares), dtype=float))
             + float(np.max(np.abs(squares))) * np.linalg.norm(np.asarray(gap, dtype=float))
@@ -156,11 +157,11 @@ def all_modes(mass: Floats, stiffness: Floats) -> Modes:
 
 
 RIGID = 1e-15
-"""Below this part of the highest one, the square of a frequency is rounding."""
+"""Squares of frequencies below this fraction of the highest square are rounding errors."""
 
 
 def lowest_modes(mass: Any, stiffness: Any, count: int) -> Modes:
-    """Return the `count` lowest modes, of sparse matrices that are both positive definite."""
+    """Return the `count` lowest modes for sparse, positive definite matrices."""
     from scipy.sparse.linalg import eigsh
 
     begin = np.ones(mass.shape[0])
@@ -170,12 +171,12 @@ def lowest_modes(mass: Any, stiffness: Any, count: int) -> Modes:
 
 
 def highest_frequency(mass: Any, stiffness: Any) -> float:
-    """Return the highest angular frequency to five digits, of sparse matrices, the mass positive definite."""
+    """Return the highest angular frequency to five digits for sparse matrices, the mass positive definite."""
     from scipy.sparse.linalg import LinearOperator, eigsh
 
     inverse = LinearOperator(mass.shape, factored(mass).solve)
     begin = on_arrays.cos(np.arange(mass.shape[0]))
-    # the highest ones lie close together: ten digits take a hundred times as long
+    # the highest frequencies are close together: ten digits would take a hundred times as long
     options = {"which": "LM", "v0": begin, "return_eigenvectors": False, "tol": HIGHEST_TOLERANCE}
     (square,) = eigsh(stiffness, k=1, M=mass, Minv=inverse, **options)
     return float(np.sqrt(max(square, 0.0)))
@@ -193,7 +194,7 @@ def _series(z: Complexes, order: int) -> Complexes:
 
 
 def _driven(r: Complexes, drive: complex, t: Complexes) -> tuple[Complexes, Complexes]:
-    """Return ``g(r) = (e^(i W t) - e^(r t))/(i W - r)`` with ``drive = i W``, and its derivative by r."""
+    """Return ``g(r) = (e^(i W t) - e^(r t))/(i W - r)`` with ``drive = i W``, and its derivative with respect to r."""
     z = (drive - r) * t
     decay, swing = on_arrays.complex_exp(r * t), on_arrays.complex_exp(drive * t)
     is_small = np.abs(z) < SERIES_BELOW
@@ -222,11 +223,11 @@ def mode_motion(
     start
         Initial positions and velocities of the modes.
     loads
-        Pairs of A, shape (mode,), and W.
+        Pairs of amplitude A, shape (mode,), and angular frequency W.
     """
     w, d = frequency[:, None].astype(complex), decay[:, None].astype(complex)
     s = np.sqrt(d * d - w * w)
-    # the two real roots of strong damping without cancellation
+    # real roots (strong damping) without cancellation
     second = -d - s
     is_real = (np.abs(d) > np.abs(w)) & (second != 0.0)
     first = np.where(is_real, w * w / np.where(is_real, second, 1.0), -d + s)
@@ -234,32 +235,32 @@ def mode_motion(
     is_near = np.abs(difference) * np.abs(time) < NEAR
     gap = np.where(difference == 0.0, 1.0, difference)
     middle = 0.5 * (first + second)
-    # those that are near lie within so small a distance that the other ones may be put in the middle
+    # the integral is not used for roots that are far apart: 0 keeps their exponentials finite
     half = np.where(is_near, 0.5 * difference, 0.0)
 
     def divided(at_first: Complexes, at_second: Complexes, slope: Any) -> Complexes:
-        found: Complexes = (at_first - at_second) / gap
+        quotient: Complexes = (at_first - at_second) / gap
         if is_near.any():
             near = np.zeros_like(time)
             for x, weight in zip(NODES, WEIGHTS, strict=True):
                 near = near + 0.5 * weight * slope(middle + x * half)
-            found = np.where(is_near, near, found)
-        return found
+            quotient = np.where(is_near, near, quotient)
+        return quotient
 
     def decaying(r: Complexes) -> Complexes:
-        found: Complexes = on_arrays.complex_exp(r * time)
-        return found
+        value: Complexes = on_arrays.complex_exp(r * time)
+        return value
 
-    one = decaying(first)
-    both = divided(one, decaying(second), lambda r: time * decaying(r))
+    e_1 = decaying(first)
+    free = divided(e_1, decaying(second), lambda r: time * decaying(r))
     q_0, v_0 = (row[:, None] for row in start)
-    rest = v_0 - first * q_0
-    q, v = q_0 * one + rest * both, v_0 * one + second * rest * both
+    excess = v_0 - first * q_0
+    q, v = q_0 * e_1 + excess * free, v_0 * e_1 + second * excess * free
     for amplitude, angular in loads:
         drive = 1j * angular
-        pushed, _ = _driven(first, drive, time)
-        other, _ = _driven(second, drive, time)
-        answer = divided(pushed, other, lambda r, drive=drive: _driven(r, drive, time)[1])
-        q = q + (amplitude[:, None] * answer).real
-        v = v + (amplitude[:, None] * (pushed + second * answer)).real
+        g_1, _ = _driven(first, drive, time)
+        g_2, _ = _driven(second, drive, time)
+        response = divided(g_1, g_2, lambda r, drive=drive: _driven(r, drive, time)[1])
+        q = q + (amplitude[:, None] * response).real
+        v = v + (amplitude[:, None] * (g_1 + second * response)).real
     return np.asarray(q.real), np.asarray(v.real)

@@ -1,7 +1,7 @@
 r"""From the terms of ``m u'' + f(u') + s(u) = F(t)`` to a model: acceleration, energies, powers, exact solution.
 
-Source: vibration text (B), section 8, equation (59). A model that is such an equation gives its four terms and gets
-everything else that follows from them; it may say more about itself than follows.
+Source: vibration text (B), section 8, equation (59). A model of this form gives its four terms; everything else
+follows, unless the model states it itself.
 """
 
 from __future__ import annotations
@@ -55,13 +55,13 @@ class Forces:
     """The force F(t)."""
     mass: Expression = ONE
     potential: Expression | None = None
-    """The integral of the spring from 0; worked out where None."""
+    """Integral of the spring force from 0; None: derived from `spring`."""
     position: str = "u"
     velocity: str = "v"
 
     @cached_property
     def stiffness(self) -> Expression:
-        """Slope of the spring, ds/du."""
+        """Derivative of the spring force, ds/du."""
         return derivative(self.spring, self.position)
 
     @cached_property
@@ -81,11 +81,11 @@ class Forces:
 
     @cached_property
     def known_damping(self) -> tuple[Literal["linear", "quadratic"], Expression] | None:
-        """Kind and coefficient of the damping force, where it is linear or quadratic; None where it is another one."""
+        """Kind and coefficient of a linear or quadratic damping force; None for any other."""
         return damping_of(self.damping, self.velocity) if self.is_damped else None
 
     def over_mass(self, node: Expression) -> Expression:
-        """Return ``(1/m) node``: the quotient of parameters is worked out once."""
+        """Return ``(1/m) node``, so that the quotient of parameters is evaluated once per member."""
         if self.mass == ONE or node == ZERO:
             return node
         inverse = ONE / self.mass
@@ -103,38 +103,38 @@ def mechanical(
     powers: Mapping[str, Powers] | None = None,
     **more: Any,
 ) -> Model:
-    """Return the model of some forces.
+    """Return the model with given forces.
 
     Parameters
     ----------
     parameters
         Every parameter, in the order of the engine.
     scales
-        From the forces, where they are others than those of a linear spring.
+        Function that returns the scales from the forces; by default those of a linear spring.
     output_scales
-        Scales of the outputs, where there are others.
+        Scales of the outputs.
     powers
-        The powers of mass, position and time of parameters, where the forces alone do not tell them.
+        Powers of mass, position and time of parameters whose dimension does not follow from the forces.
     more
-        Whatever else `Model` has: it takes the place of what follows from the forces.
+        Further fields of `Model`; they override those that follow from the forces.
     """
     velocity = Name(forces.velocity)
-    own = scales(forces)
+    scales_of_forces = scales(forces)
     is_free = not forces.is_driven and not forces.is_damped
     keys = {row.name: row.key for row in parameters}
 
-    def numbers(given: Numbers) -> dict[str, Any]:
-        return {name: given[key] for name, key in keys.items()}
+    def numbers(parameters: Numbers) -> dict[str, Any]:
+        return {name: parameters[key] for name, key in keys.items()}
 
     def natural_frequency(parameters: Numbers) -> Any:
-        """Return ``sqrt(s'(0)/m)`` [rad s-1]; NaN where the spring has no slope at 0, or none that pulls back."""
+        """Return ``sqrt(s'(0)/m)`` [rad s-1]; NaN if s'(0) is not positive and finite."""
         named = numbers(parameters)
         stiffness = values(forces.stiffness, {**named, forces.position: 0.0})
         with np.errstate(invalid="ignore"):
             ratio = stiffness / values(forces.mass, named)
-            found = np.sqrt(np.where((ratio > 0.0) & (ratio < np.inf), ratio, np.nan))
-        # of numbers alone it is one number, whatever the shape of the parameters
-        return np.broadcast_to(found, np.broadcast_shapes(*(np.shape(x) for x in named.values())))
+            w = np.sqrt(np.where((ratio > 0.0) & (ratio < np.inf), ratio, np.nan))
+        # w is a scalar if no parameter enters it
+        return np.broadcast_to(w, np.broadcast_shapes(*(np.shape(x) for x in named.values())))
 
     def exact_period(initial: Numbers, p: Numbers) -> Any:
         start = initial[forces.position], initial[forces.velocity]
@@ -153,8 +153,10 @@ def mechanical(
         "dissipation": forces.damping * velocity if forces.is_damped else None,
         "driving": forces.force * velocity if forces.is_driven else None,
         "exact": _linear_motion(forces, numbers),
-        "scales": own
-        and with_scaled_run(replace(own, outputs=output_scales), forces, parameters, powers or {}),
+        "scales": scales_of_forces
+        and with_scaled_run(
+            replace(scales_of_forces, outputs=output_scales), forces, parameters, powers or {}
+        ),
         "exact_period": exact_period if is_free and forces.is_linear else None,
     }
     if forces.known_damping is not None:
@@ -166,7 +168,7 @@ def mechanical(
 def _linear_motion(
     forces: Forces, numbers: Callable[[Numbers], dict[str, Any]]
 ) -> Callable[[Floats, Numbers, Numbers], dict[str, Floats]] | None:
-    """Return the exact solution of linear forces, driven by exponentials if at all (exercise 11); None otherwise."""
+    """Return the exact solution of linear forces (exercise 11); None unless the drive is a sum of exponentials."""
     kind, rate = forces.known_damping or ("", ZERO)
     is_solvable = forces.is_linear and is_sum_of_exponentials(forces.force)
     if not is_solvable or (forces.is_damped and kind != "linear"):
@@ -188,7 +190,7 @@ def _linear_motion(
 def damping_of(
     node: Expression, velocity: str = "v"
 ) -> tuple[Literal["linear", "quadratic"], Expression] | None:
-    """Return kind and coefficient of a linear or a quadratic damping force; None for any other one."""
+    """Return kind and coefficient of a linear or quadratic damping force; None for any other."""
     slope = derivative(node, velocity)
     if is_multiple(node, slope, velocity):
         return "linear", slope

@@ -1,4 +1,4 @@
-"""Characteristic scales of a model, and the dimensionless numbers that are left of its parameters.
+"""Characteristic scales of a model, and its dimensionless numbers.
 
 Source: vibration text (B), sections 2.3, 10.1 and 10.2; pendulum lecture (A), section 1.2. A quantity over its scale
 is dimensionless: ``t/t_c``, ``u/u_c``, ``v t_c/u_c``, ``E/E_c``.
@@ -15,27 +15,26 @@ from vibsim.formula import Expression, Name, parse, replacing, to_formula, value
 from vibsim.models.base import Formula, Model, Numbers, parameter_names
 
 T_C, X_C = Name("@t"), Name("@x")
-"""The scales of time and position inside trees, where no name of a user is like them."""
+"""The scales of time and position in expressions; no name of a user contains @."""
 
 
 @dataclass(frozen=True)
 class Scales:
     """Formulas in the parameters and the initial values, which have the names of their states.
 
-    All but the first may name the scale of time, as text ``t_c``, and those after the second that of the position, such
-    as ``u_c``.
+    All but `time` may use the scale of time, ``t_c``; those after `position` also the scale of the position, ``u_c``.
     """
 
     time: Formula
     position: Formula
-    """Where it is 0, nothing moves, and the scale is 1."""
+    """If it is 0, nothing moves, and the scale is 1."""
     energy: Formula
     numbers: tuple[tuple[str, Formula], ...] = ()
     """Dimensionless numbers by name."""
     parameters: tuple[tuple[str, Formula], ...] | None = None
-    """The parameters of the scaled equation, by key; None where a run cannot be made in these scales."""
+    """The parameters of the scaled equation, by key; None if a run cannot be made in these scales."""
     refusal: str = ""
-    """Why not, where that is so of some formulas only."""
+    """Why not, if that is due to a user's formulas."""
     outputs: tuple[tuple[str, Formula], ...] = ()
     """Scales of the model's outputs."""
 
@@ -45,16 +44,16 @@ class Characteristic:
     """One scale or one dimensionless number."""
 
     name: str
-    """``t``, a state, ``energy`` or an output for a scale; ``u(0)`` for an initial value; else that of the number."""
+    """``t``, a state, ``energy`` or an output for a scale; ``u(0)`` for an initial value; or the number's own name."""
     words: str
     formula: str
     unit: str
     value: Any
-    """A number or an array over members; NaN where it is not defined."""
+    """A number or an array over members; NaN if undefined."""
 
 
 def scales(model: Model, parameters: Numbers, initial: Numbers) -> tuple[Characteristic, ...]:
-    """Return the scales of time, position, velocity, energy and outputs; none where a model states none.
+    """Return the scales of time, position, velocity, energy and outputs; empty if a model has none.
 
     Parameters
     ----------
@@ -91,27 +90,27 @@ def scales(model: Model, parameters: Numbers, initial: Numbers) -> tuple[Charact
 def dimensionless(
     model: Model, parameters: Numbers, initial: Numbers
 ) -> tuple[Characteristic, ...]:
-    """Return the scaled initial values, and the dimensionless numbers that a model names; see `scales`."""
+    """Return the scaled initial values and the model's dimensionless numbers; see `scales`."""
     if model.scales is None:
         return ()
     sizes = {row.name: row.value for row in scales(model, parameters, initial)}
-    found = []
+    rows = []
     for state in model.states:
         words, text = f"scaled initial {state.long_name}", f"{state.name}(0)/{state.name}_c"
         with np.errstate(all="ignore"):
             ratio = np.asarray(initial[state.name], dtype=np.float64) / sizes[state.name]
-        found.append(Characteristic(f"{state.name}(0)", words, text, "1", ratio))
+        rows.append(Characteristic(f"{state.name}(0)", words, text, "1", ratio))
     numbers = _numbers(model, model.scales, parameters, initial)
     for name, formula in model.scales.numbers:
         value, words = _value(model, formula, numbers), "dimensionless number of the model"
-        found.append(Characteristic(name, words, _text(model, formula), "1", value))
-    return tuple(found)
+        rows.append(Characteristic(name, words, _text(model, formula), "1", value))
+    return tuple(rows)
 
 
 def scaled_parameters(model: Model, parameters: Numbers, initial: Numbers) -> dict[str, Any]:
     """Return the parameters of the scaled equation by their keys.
 
-    ValueError where the model has no scaled equation.
+    Raises ValueError if the model has no scaled equation.
     """
     own = model.scales
     if own is None or own.parameters is None:
@@ -121,7 +120,7 @@ def scaled_parameters(model: Model, parameters: Numbers, initial: Numbers) -> di
 
 
 def _numbers(model: Model, own: Scales, parameters: Numbers, initial: Numbers) -> dict[str, Any]:
-    """Return what the formulas may name: parameters, initial values, scales of time and position."""
+    """Return values by name for the formulas: parameters, initial values, scales of time and position."""
     numbers = {row.name: parameters[row.key] for row in model.parameters} | dict(initial)
     numbers[T_C.name] = _value(model, own.time, numbers)
     size = _value(model, own.position, numbers)
@@ -145,7 +144,7 @@ def _value(model: Model, formula: Formula, numbers: Numbers) -> Any:
 
 
 def _text(model: Model, formula: Formula) -> str:
-    """Write a formula with its initial values as such: ``abs(u(0))``."""
+    """Return the text of a formula, with initial values written as ``u(0)``."""
     names = {state.name: Name(f"{state.name}(0)") for state in model.states}
     names |= {T_C.name: Name("t_c"), X_C.name: Name(f"{model.position}_c")}
     return to_formula(replacing(names)(_tree(model, formula)))
