@@ -343,7 +343,10 @@ def paragraph(experiment: Experiment, record: Record, lead: Lead, levels: int) -
 def keeps_promise(record: Record, measured: Measurement | None, check: Mapping[str, Any]) -> bool:
     """Say whether the result that decides has the order of its scheme, and the check asks for another one."""
     decisive: Mapping[str, Any] = next(iter(check.get("results") or []), {})
-    order, place = words.fact(decisive, "order"), data.place_of(record, decisive.get("case", -1))
+    order, place = (
+        words.fact(decisive, "order"),
+        data.case_position(record, decisive.get("case", -1)),
+    )
     if measured is None or measured.kind != "converges" or measured.order == "scheme":
         return False
     if order is None or place is None:
