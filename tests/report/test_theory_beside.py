@@ -292,7 +292,7 @@ def test_levels_of_the_phase_plane_are_those_that_were_computed(text):
     exp, rec, _ = text
     member = choice.members(rec, "u")[2]
     model = MODELS["spring"]
-    values = data.of_level(rec, model.position, member, 0)
+    values = data.state_on_level(rec, model.position, member, 0)
     error = rec["u_exact"][0] - values
     np.testing.assert_allclose(error, rec["u_error"][2, 0, 0], atol=1e-13)
     picture = figures_plane.phase(exp, rec, choice.members(rec, "u"))
@@ -340,8 +340,8 @@ def test_an_exact_orbit_that_does_not_close_is_drawn_as_far_as_the_levels(model,
 )
 def test_a_printed_number_keeps_its_digits(printed, shown):
     assert words.printed(printed) == shown
-    assert words.like(0.012345678, "1.221e-2") == "1.23457·10⁻²"
-    assert words.like(4.934802, "4.93") == "4.9348"
+    assert words.in_style_of(0.012345678, "1.221e-2") == "1.23457·10⁻²"
+    assert words.in_style_of(4.934802, "4.93") == "4.9348"
 
 
 def test_a_file_holds_the_number_and_a_page_the_text():

@@ -1,7 +1,7 @@
-"""Figures for pages: their axes make no artists for ticks until somebody draws these.
+"""Figures for pages, whose axes create artists for ticks only when ticks are drawn.
 
-Matplotlib makes five artists for the first tick of each axis as soon as there is an axis, which took a tenth of the
-time of a page. `vibsim.report.figures.svg` writes ticks as text and never asks for them; what writes PNG and PDF does.
+Matplotlib creates five artists for the first tick of every new axis, which took a tenth of the time of a page.
+`vibsim.report.figures.svg` writes ticks as text and never needs them; the writers of PNG and PDF do.
 """
 
 from __future__ import annotations
@@ -16,30 +16,30 @@ from matplotlib.ticker import FixedFormatter, FixedLocator
 
 
 class _NoTicksYet:
-    """An empty list of ticks, one for each axis, that is filled by who draws them."""
+    """Descriptor: a list of ticks for each axis, empty until the ticks are drawn."""
 
     def __set_name__(self, owner: type, name: str) -> None:
         self._name = name
 
     def __get__(self, axis: Any, owner: type) -> list[Any]:
-        found: list[Any] = vars(axis).setdefault(self._name, [])
-        return found
+        ticks: list[Any] = vars(axis).setdefault(self._name, [])
+        return ticks
 
 
 class _Quiet(Axis):  # type: ignore[misc, unused-ignore]
-    """What an axis of either direction has in place of ticks that are made at once."""
+    """An axis, horizontal or vertical, without artists for ticks."""
 
     majorTicks = _NoTicksYet()  # noqa: N815
     minorTicks = _NoTicksYet()  # noqa: N815
 
     def _get_tick(self, major: bool) -> Any:
         tick = super()._get_tick(major)  # type: ignore[misc, unused-ignore]
-        # else lines of the grid would leave the frame
+        # keeps grid lines within the frame
         tick.set_clip_path(self.axes.patch)
         return tick
 
     def set_ticks(self, ticks: Any, labels: Any = None, **look: Any) -> Any:
-        """Put ticks at some places, with labels; for labels with a look of their own matplotlib makes artists."""
+        """Set positions and labels of ticks; styled labels need the artists of matplotlib."""
         if look:
             return super().set_ticks(ticks, labels, **look)
         places = np.asarray(ticks, dtype=np.float64)
@@ -70,15 +70,15 @@ class Panel(Axes):  # type: ignore[misc, unused-ignore]
                 self.spines[side].register_axis(axis)
 
     def clear(self) -> None:
-        """Begin anew; to ask for the place of a spine, as its ticks else do, puts the spine there."""
+        """Clear the axes; asking for the position of a spine, as its ticks would, puts the spine there."""
         super().clear()
         for spine in self.spines.values():
             spine.get_position()
 
 
 class Canvas(Figure):  # type: ignore[misc, unused-ignore]
-    """A figure, free of pyplot's global state, whose axes are `Panel`s."""
+    """A figure without pyplot's global state, whose axes are `Panel`s."""
 
     def add_axes(self, *box: Any, **options: Any) -> Any:
-        """Return new axes in a box: left, bottom, width and height as parts of the figure."""
+        """Return new axes in a box: left, bottom, width and height as fractions of the figure."""
         return super().add_axes(*box, **{"axes_class": Panel, **options})

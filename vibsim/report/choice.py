@@ -1,4 +1,4 @@
-"""What a report shows: the check that decides, which quantities, and which members of a sweep."""
+"""What a report shows: the decisive check, the quantities, and the members of a sweep."""
 
 from __future__ import annotations
 
@@ -25,37 +25,37 @@ from vibsim.report.types import (
 
 
 def promises(experiment: Experiment, record: Record, quantity: str) -> list[tuple[float, float]]:
-    """Return every finite order that is due to a quantity, with its tolerance, in ascending order.
+    """Return the finite orders expected of a quantity, each with its tolerance, in ascending order.
 
-    It is what a scheme promises; of a part of an error of which theory says nothing, what its checks expect.
-    What is exact has no order to compare with, nor has a scheme that chooses its own steps.
+    They are the formal orders of the schemes; for a part of an error without a formal order, those of its checks.
+    Exact quantities and adaptive schemes have none.
     """
-    asked_for = {
+    requested = {
         (float(check.order), check.tolerance)
         for check in _on_order(experiment, quantity)
         if isinstance(check.order, float)
     }
-    if data.basis_of_order(record, quantity) == "expected" and asked_for:
-        return sorted(asked_for)
+    if data.basis_of_order(record, quantity) == "expected" and requested:
+        return sorted(requested)
     promised = data.formal_orders(record, quantity)
-    found = {
+    pairs = {
         (float(order), tolerance(experiment, quantity, scheme))
         for s, scheme in enumerate(record.words("scheme"))
         for order in np.unique(promised[s][np.isfinite(promised[s])])
     }
-    return sorted(found)
+    return sorted(pairs)
 
 
 def tolerance(experiment: Experiment, quantity: str, scheme: str) -> float:
-    """Return the smallest tolerance of a check that is about the order of a quantity by a scheme."""
+    """Return the smallest tolerance among the checks of the order of a quantity with a scheme."""
     checks = _on_order(experiment, quantity)
-    found = [row.tolerance for row in checks if row.schemes is None or scheme in row.schemes]
-    return min(found, default=ORDER_TOLERANCE)
+    tolerances = [row.tolerance for row in checks if row.schemes is None or scheme in row.schemes]
+    return min(tolerances, default=ORDER_TOLERANCE)
 
 
 def _on_order(experiment: Experiment, quantity: str) -> list[ConvergesCheck]:
-    inner = [check.measured for check in experiment.checks]
-    return [row for row in inner if row.kind == "converges" and row.converges == quantity]
+    measured = [check.measured for check in experiment.checks]
+    return [row for row in measured if row.kind == "converges" and row.converges == quantity]
 
 
 def position(experiment: Experiment) -> str:
@@ -64,43 +64,43 @@ def position(experiment: Experiment) -> str:
 
 
 def asked_values(experiment: Experiment) -> list[ValueCheck]:
-    """Return the numbers that checks ask for, those of statements among them."""
-    inner = [check.measured for check in experiment.checks]
-    return [row for row in inner if row.kind == "value"]
+    """Return the value checks, including those inside claims."""
+    measured = [check.measured for check in experiment.checks]
+    return [row for row in measured if row.kind == "value"]
 
 
 def has_swept_options(experiment: Experiment, spec: SchemeSpec) -> bool:
-    """Say whether the sweep varies an option of a scheme."""
+    """Return whether the sweep varies an option of a scheme."""
     keys = experiment.sweep.keys if experiment.sweep is not None else ()
     return any(key.startswith(f"schemes.{spec.name}.") for key in keys)
 
 
 def quantities(experiment: Experiment, record: Record) -> list[str]:
-    """Return the quantities to show: the position, those that a check names, and the energy deviation."""
+    """Return the quantities to show: the position, those of checks, and the energy deviation."""
     extra = ["energy_deviation"] if experiment.model.definition.conservative else []
     wanted = dict.fromkeys([position(experiment), *checked_quantities(experiment), *extra])
     return [name for name in wanted if f"{name}_order" in record]
 
 
 def first(experiment: Experiment, record: Record) -> str:
-    """Return the first of the `quantities`; the position where the record has no order of any."""
+    """Return the first of the `quantities`; the position if the record has no order for any."""
     return next(iter(quantities(experiment, record)), position(experiment))
 
 
 def members(record: Record, quantity: str) -> list[Member]:
-    """Return what the figures over time show of a quantity: of every scheme one member, or two of a sweep.
+    """Return the members that figures over time show, with each scheme: the only one, or two of a sweep.
 
-    These are the worst member, judged by the verdicts on `quantity` and then by the distance of the order from the
-    promised one (of several schemes the worst decides), and a typical one of those that pass, if any does.
+    In a sweep they are the worst member and a typical passing one, if any passes. The worst is judged by the verdicts
+    on `quantity`, then by the distance of the order from the formal one, each taken from the worst scheme.
     """
     if not data.swept(record) or f"{quantity}_status" not in record:
-        # a large sweep has verdicts on what checks ask about alone
+        # a large sweep has verdicts only on the quantities of checks
         return data.of_case(record, 0)
     status = data.flags(record, f"{quantity}_status")
     severity = np.max([(status == word) * rank for word, rank in SEVERITY.items()], axis=(0, 1))
     away = np.abs(deviation(record, quantity))
     ranking = np.lexsort((np.max(np.where(np.isnan(away), np.inf, away), axis=0), severity))
-    # the healthiest: members that most schemes pass, and of the others those that fewest fail
+    # the best score: members that most schemes pass, among these the ones that fewest fail
     score = np.sum(status == "PASS", axis=0) * (len(status) + 1) - np.sum(status == "FAIL", axis=0)
     healthy = ranking[score[ranking] == score.max()]
     roles = {int(healthy[healthy.size // 2]): "typical", int(ranking[-1]): "worst"}
@@ -109,39 +109,39 @@ def members(record: Record, quantity: str) -> list[Member]:
 
 
 def worst(record: Record, quantity: str) -> Member:
-    """Return the worst member, judged as by `members`, with the scheme that is worst of it."""
-    found = [member for member in members(record, quantity) if member.role != "typical"]
+    """Return the worst member, judged as in `members`, with its worst scheme."""
+    candidates = [member for member in members(record, quantity) if member.role != "typical"]
     if f"{quantity}_status" not in record:
-        return found[0]
+        return candidates[0]
     status, away = data.flags(record, f"{quantity}_status"), np.abs(deviation(record, quantity))
 
     def badness(member: Member) -> tuple[int, float]:
         place = member.scheme, member.case
         return SEVERITY[status[place]], float(np.nan_to_num(away[place], nan=np.inf))
 
-    return max(found, key=badness)
+    return max(candidates, key=badness)
 
 
-def with_levels(experiment: Experiment, found: list[Member]) -> list[Member]:
-    """Leave out schemes that choose their own steps, which no level changes, unless there are no others."""
-    return [m for m in found if not experiment.schemes[m.scheme].adaptive] or found
+def with_levels(experiment: Experiment, candidates: list[Member]) -> list[Member]:
+    """Leave out adaptive schemes, whose steps do not depend on the level, unless there are no others."""
+    return [m for m in candidates if not experiment.schemes[m.scheme].adaptive] or candidates
 
 
 @dataclass(frozen=True)
 class Lead:
-    """The check that decides; an experiment without checks has none."""
+    """The decisive check, and the quantity and member shown for it; an experiment without checks has only these two."""
 
     quantity: str
-    """Whose error is shown: that of the check, or the position."""
+    """The quantity of the check, or the position."""
     member: Member
     entry: Mapping[str, Any] | None = None
     """The check in the summary."""
     asserted: Check | None = None
-    """The check in the experiment; None for its tolerance."""
+    """The check in the experiment; None if the tolerance decides."""
 
     @property
     def measured(self) -> Measurement | None:
-        """What the check measures."""
+        """The measurement behind the check."""
         return None if self.asserted is None else self.asserted.measured
 
     @property
@@ -151,12 +151,12 @@ class Lead:
 
     @property
     def facts(self) -> Mapping[str, Any]:
-        """What was measured where the check is decided."""
+        """The facts of the worst result."""
         return self.result.get("facts") or {}
 
     @property
     def is_on_order(self) -> bool:
-        """Whether the check asks for an order."""
+        """Whether the check is on an order."""
         return self.measured is not None and self.measured.kind == "converges"
 
     @property
@@ -167,43 +167,44 @@ class Lead:
 
 
 def is_refutation(check: Check | None) -> bool:
-    """Say whether a check expects a statement to be false."""
+    """Return whether a check expects a claim to be false."""
     return check is not None and check.kind == "claim" and not check.holds
 
 
 def is_trap(check: Check | None) -> bool:
-    """Say whether a check expects a verdict other than PASS, or a statement to be false."""
+    """Return whether a check expects a verdict other than PASS, or a claim to be false."""
     expected = getattr(check, "expect", None)
     return is_refutation(check) or (expected is not None and expected.status != "PASS")
 
 
 def find_lead(experiment: Experiment, record: Record, summary: Mapping[str, Any]) -> Lead:
-    """Return the check that decides: the worst one; of those that passed the most telling that is no trap.
+    """Return the decisive check: the worst one or, if all passed, the most informative one that is not a trap.
 
-    The most telling is on an order, and the least that two solutions are equal: that says how well the steps were
-    computed, and seldom what was asked. Of equals the first decides.
+    A check on an order is most informative, one that two solutions are equal least: that tests how well the steps were
+    computed, seldom the question of the experiment. The first of equals decides.
     """
-    usual = position(experiment)
+    default = position(experiment)
     asserted = {check.id: check for check in experiment.checks}
 
     def rank(entry: Mapping[str, Any]) -> tuple[int, bool, int]:
         check = asserted.get(entry["id"])
         kind = check.measured.kind if check else entry["kind"]
         if kind == "converges":
-            telling = int(check is not None and check.kind == "claim")
+            demotion = int(check is not None and check.kind == "claim")
         else:
-            telling = 3 if kind == "equal" else 2
-        return -SEVERITY[entry["status"]], is_trap(check), telling
+            demotion = 3 if kind == "equal" else 2
+        return -SEVERITY[entry["status"]], is_trap(check), demotion
 
     listed = [entry for entry in summary["checks"] if entry.get("results")]
     if not listed:
-        return Lead(usual, data.of_case(record, 0)[0])
+        return Lead(default, data.of_case(record, 0)[0])
     entry = min(listed, key=rank)
     check = asserted.get(entry["id"])
-    named = str(entry.get("quantity") or usual)
-    is_compared = any(f"{named}_{of}_norm" in record for of in ("difference", "error"))
-    quantity = named if is_compared else usual
+    name = str(entry.get("quantity") or default)
+    is_compared = any(f"{name}_{kind}_norm" in record for kind in ("difference", "error"))
+    quantity = name if is_compared else default
     result = entry["results"][0]
-    every = data.of_case(record, data.place_of(record, result.get("case", -1)) or 0)
-    member = next((one for one in every if one.scheme_name == result.get("scheme")), every[0])
+    candidates = data.of_case(record, data.case_position(record, result.get("case", -1)) or 0)
+    scheme = result.get("scheme")
+    member = next((m for m in candidates if m.scheme_name == scheme), candidates[0])
     return Lead(quantity, member, entry, check)

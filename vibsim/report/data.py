@@ -1,7 +1,7 @@
-"""Reading a convergence Record: which slice a figure or table shows.
+"""Slices of a convergence Record for figures and tables.
 
-The functions select by the names of dimensions, so that a variable with fewer of them (an exact solution knows no
-scheme) is read by the same call.
+Slices are selected by dimension name, so the same call reads variables that lack a dimension (an exact solution does
+not depend on the scheme).
 """
 
 from __future__ import annotations
@@ -21,13 +21,13 @@ from vibsim.report import words
 from vibsim.report.style import finite, label
 from vibsim.simulation.scaled import has_time_unit
 
-ABOVE = 3.0  # a difference counts as more than round-off when it exceeds this many times the floor
-_LONGEST = 40  # characters of the name of a scheme in the name of a file
+ABOVE_FLOOR = 3.0  # a difference above this multiple of the predicted floor is not round-off
+_STEM_LENGTH = 40  # most characters of a scheme's name in a file name
 
 
 @dataclass(frozen=True)
 class Member:
-    """One scheme and one member of the sweep, with the words that name them."""
+    """One scheme and one member of the sweep, with the names that a page shows."""
 
     scheme: int
     case: int
@@ -39,38 +39,38 @@ class Member:
 
     @property
     def title(self) -> str:
-        """Name of the scheme, with the member where there is a sweep, in the words of a page."""
+        """Name of the scheme and, in a sweep, of the member, as a page shows them."""
         return f"{self.scheme_name}, {self.case_words}" if self.case_name else self.scheme_name
 
     @property
     def case_words(self) -> str:
-        """Name of the member in the words of a page; empty without a sweep."""
+        """Name of the member, as a page shows it; empty without a sweep."""
         return words.swept(self.case_name)
 
     @property
     def stem(self) -> str:
-        """A plain name for files, unique by its number; file systems take 255 bytes."""
-        name = self.scheme_name[:_LONGEST]
+        """ASCII name for files, unique by the scheme's number, within the 255 bytes of file systems."""
+        name = self.scheme_name[:_STEM_LENGTH]
         plain = "".join(c if c.isascii() and c.isalnum() else "_" for c in name)
         return f"{self.scheme}_{plain}_{self.role}" if self.role else f"{self.scheme}_{plain}"
 
 
 def pick(record: Record, name: str, **index: int) -> NDArray[Any]:
-    """Return a variable at given positions of its dimensions; a dimension that it lacks is passed over."""
+    """Return a variable at given positions of its dimensions; positions of dimensions that it lacks are ignored."""
     variable = record.variable(name)
     return np.asarray(variable.values[tuple(index.get(dim, slice(None)) for dim in variable.dims)])
 
 
 def at(record: Record, name: str, member: Member, **index: int) -> Floats:
-    """Return the floats of a variable for one member (see `pick`)."""
+    """Return a variable of one member as floats (see `pick`)."""
     values = pick(record, name, scheme=member.scheme, case=member.case, **index)
     return np.asarray(values, dtype=np.float64)
 
 
-def known(record: Record, name: str, dims: tuple[str, ...], **index: int) -> Floats:
-    """Return what `pick` gives, of shape `dims`; NaN throughout where the record has no such variable.
+def pick_or_nan(record: Record, name: str, dims: tuple[str, ...], **index: int) -> Floats:
+    """Return the slice that `pick` gives, or NaN of shape `dims` if the record lacks the variable.
 
-    A model need not have an exact solution or an exact period.
+    Not every model has an exact solution or an exact period.
     """
     if name in record:
         return np.asarray(pick(record, name, **index), dtype=np.float64)
@@ -78,56 +78,59 @@ def known(record: Record, name: str, dims: tuple[str, ...], **index: int) -> Flo
 
 
 def exact_series(record: Record, quantity: str, member: Member) -> Floats:
-    """Return the exact solution of a member at the common times, shape (t,); NaN where there is none."""
-    return known(record, f"{quantity}_exact", ("t",), scheme=member.scheme, case=member.case)
+    """Return the exact solution of a member at the common times, shape (t,); NaN if it has none."""
+    return pick_or_nan(record, f"{quantity}_exact", ("t",), scheme=member.scheme, case=member.case)
 
 
 def exact_periods(record: Record) -> Floats:
-    """Return the exact period of every member, shape (case,); NaN where there is none."""
-    return known(record, "exact_period", ("case",))
+    """Return the exact period of every member, shape (case,); NaN if it has none."""
+    return pick_or_nan(record, "exact_period", ("case",))
 
 
 def natural_frequency(record: Record, case: int) -> float:
-    """Return the natural frequency w of a member; NaN where there is none."""
-    return float(np.ravel(known(record, "natural_frequency", ("case",), case=case))[0])
+    """Return the natural frequency w of a member; NaN if it has none."""
+    return float(np.ravel(pick_or_nan(record, "natural_frequency", ("case",), case=case))[0])
 
 
 def omega_dt(record: Record) -> Floats:
-    """Return w dt of every member and level, shape (case, level); NaN where the record does not have it."""
+    """Return w dt of every member and level, shape (case, level); NaN if the record lacks it."""
     shape = (len(record["case"]), len(record["level"]))
-    return np.broadcast_to(known(record, "omega_dt", ("case", "level")), shape)
+    return np.broadcast_to(pick_or_nan(record, "omega_dt", ("case", "level")), shape)
 
 
-def phase_error(record: Record, who: str) -> Floats:
-    """Return the phase error over a period by ``theory`` or as ``measured``, shape (scheme, case, level)."""
+def phase_error(record: Record, origin: str) -> Floats:
+    """Return the phase error per period as a fraction of the period, shape (scheme, case, level).
+
+    `origin` is ``theory`` or ``measured``.
+    """
     # dt has the shape (level, case) or (level,)
-    periods = omega_dt(record) / (2.0 * np.pi) / np.asarray(record["dt"], dtype=np.float64).T
-    return known(record, f"{who}_phase_error", OF_LEVEL) * periods
+    frequency = omega_dt(record) / (2.0 * np.pi) / np.asarray(record["dt"], dtype=np.float64).T
+    return pick_or_nan(record, f"{origin}_phase_error", OF_LEVEL) * frequency
 
 
 def unit(record: Record, name: str) -> str:
-    """Return the unit of a variable, with Unicode exponents; empty where it has none."""
+    """Return the unit of a variable, with Unicode exponents; empty if it has none."""
     return pretty_unit(str(record.variable(name).attrs.get("units", "")) if name in record else "")
 
 
 def time_unit(record: Record, name: str = "t") -> str:
-    """Return the unit of times, also where `t` is a fraction of the end; empty where times have none."""
+    """Return the unit of time, even if `t` is stored as a fraction of the end; empty if time has no unit."""
     return (unit(record, name) or "s") if has_time_unit(record) else ""
 
 
 def radians_unit(record: Record) -> str:
-    """Return the unit of an angular frequency; empty where times have none."""
+    """Return the unit of an angular frequency; empty if time has no unit."""
     time = time_unit(record)
     return f"rad {pretty_unit(f'{time}-1')}" if time else ""
 
 
 def time_text(record: Record, value: float) -> str:
-    """Write a time, such as that of a step, with its unit."""
+    """Write a time, such as a step, with its unit."""
     return f"{words.number(float(value), 'step')} {time_unit(record, 'dt')}".rstrip()
 
 
 def time_label(record: Record) -> str:
-    """Return the label of an axis of times."""
+    """Return the label of a time axis."""
     return label("t", time_unit(record))
 
 
@@ -139,27 +142,27 @@ def pretty_unit(text: str) -> str:
 
 
 def norm_unit(record: Record, quantity: str, norm: str = TYPICAL_NORM) -> str:
-    """Return the unit of a norm over time: l1 and l2 carry the time, or its root, too."""
+    """Return the unit of a norm over time: l1 adds a factor of time, l2 its root."""
     time = time_unit(record)
     extra = {"l1": time, "l2": f"√{time}" if time else ""}.get(norm, "")
-    # of a single level there are errors only
-    own = unit(record, f"{quantity}_difference_norm") or unit(record, f"{quantity}_error_norm")
-    return f"{own} {extra}".strip()
+    # a single level has errors but no differences
+    base = unit(record, f"{quantity}_difference_norm") or unit(record, f"{quantity}_error_norm")
+    return f"{base} {extra}".strip()
 
 
 def norm_index(record: Record, norm: str = TYPICAL_NORM) -> int:
-    """Return the position of a norm."""
+    """Return the position of a norm along the dimension ``norm``."""
     return record.words("norm").index(norm)
 
 
 def times(record: Record, case: int) -> Floats:
-    """Return the common times of a member, shape (t,); where ends differ, `t` is stored as a fraction."""
+    """Return the common times of a member, shape (t,); `t` is stored as a fraction of the end if ends differ."""
     t = np.asarray(record["t"], dtype=np.float64)
     return t * float(pick(record, "end", case=case)) if "end" in record else t
 
 
 def steps_of(record: Record, case: int) -> Floats:
-    """Return dt of every level for a member, shape (level,)."""
+    """Return dt of a member on every level, shape (level,)."""
     return np.asarray(pick(record, "dt", case=case), dtype=np.float64)
 
 
@@ -170,25 +173,25 @@ def ends_of(record: Record) -> Floats:
 
 
 def flags(record: Record, name: str) -> NDArray[Any]:
-    """Return a flag variable as words, same shape."""
-    table, values = record.meanings(name), record[name]
-    found, place = np.unique(values, return_inverse=True)
-    texts = np.array([table[int(value)] for value in found], dtype=object)
-    return np.asarray(texts[place].reshape(values.shape))
+    """Return a flag variable as words, in the same shape."""
+    meanings, values = record.meanings(name), record[name]
+    codes, inverse = np.unique(values, return_inverse=True)
+    texts = np.array([meanings[int(code)] for code in codes], dtype=object)
+    return np.asarray(texts[inverse].reshape(values.shape))
 
 
 def whole(record: Record, dim: str) -> list[int]:
-    """Return a coordinate of whole numbers (levels, pairs, triples)."""
+    """Return an integer coordinate (levels, pairs, triples); empty if the record lacks it."""
     return [int(value) for value in record[dim]] if dim in record else []
 
 
 def is_lean(record: Record) -> bool:
-    """Say whether no series over time are stored (see `vibsim.experiment.storage`)."""
+    """Return whether the record stores no series over time (see `vibsim.experiment.storage`)."""
     return record.attrs.get("storage") == "lean"
 
 
 def swept(record: Record) -> list[str]:
-    """Return the names of the swept coordinates, in the order written."""
+    """Return the names of the swept coordinates, in the order of the experiment file."""
     return [name for name, variable in record.coords.items() if "sweep_key" in variable.attrs]
 
 
@@ -197,54 +200,54 @@ def swept_label(record: Record, name: str) -> tuple[str, str]:
     return str(record.coords[name].attrs["sweep_key"]), unit(record, name)
 
 
-def case_name(record: Record, case: int, of: str | None = None) -> str:
-    """Name a member by its swept values, or by that of one key; empty without a sweep."""
+def case_name(record: Record, case: int, only: str | None = None) -> str:
+    """Name a member by its swept values, or by that of the key `only`; empty without a sweep."""
     parts = []
     for name in swept(record):
-        (key, measure), value = swept_label(record, name), pick(record, name, case=case).item()
+        (key, key_unit), value = swept_label(record, name), pick(record, name, case=case).item()
         text = f"{value:.6g}" if isinstance(value, float) else str(value)
-        if of in (None, key):
-            parts.append(f"{key} = {text} {measure}".strip())
+        if only in (None, key):
+            parts.append(f"{key} = {text} {key_unit}".strip())
     return ", ".join(parts)
 
 
-def everyone(record: Record) -> list[Member]:
-    """Return every scheme and member, all members of a scheme together."""
-    every = [of_case(record, case) for case in range(len(record["case"]))]
-    return [member for of_scheme in zip(*every, strict=True) for member in of_scheme]
+def all_members(record: Record) -> list[Member]:
+    """Return all pairs of scheme and member, ordered by scheme, then by member."""
+    by_case = [of_case(record, case) for case in range(len(record["case"]))]
+    return [member for of_scheme in zip(*by_case, strict=True) for member in of_scheme]
 
 
 def of_case(record: Record, case: int, role: str = "") -> list[Member]:
-    """Return one member by every scheme."""
+    """Return one member of the sweep with each scheme."""
     name = case_name(record, case)
     return [Member(s, case, scheme, name, role) for s, scheme in enumerate(record.words("scheme"))]
 
 
-def place_of(record: Record, case: int) -> int | None:
-    """Return the position of a member by its global index; None where the record does not have it."""
-    found = np.flatnonzero(record["case"] == case)
-    return int(found[0]) if found.size else None
+def case_position(record: Record, case: int) -> int | None:
+    """Return the position of a member, given its global index; None if the record lacks it."""
+    matches = np.flatnonzero(record["case"] == case)
+    return int(matches[0]) if matches.size else None
 
 
 def of_several(record: Record, scheme: int) -> str:
-    """Return the name of a scheme behind a comma, for a title; empty where there is one scheme."""
+    """Return ``, scheme`` as the end of a title; empty if there is only one scheme."""
     names = record.words("scheme")
     return f", {names[scheme]}" if len(names) > 1 else ""
 
 
 def formal_order(record: Record, member: Member, quantity: str) -> float:
-    """Return the order that the scheme of a member promises for a quantity."""
+    """Return the formal order of a member's scheme for a quantity."""
     return float(at(record, f"{quantity}_formal_order", member))
 
 
-def power(record: Record, member: Member, quantity: str) -> float:
-    """Return the order by which levels are rescaled: the promised one, or 0 for none where that is not finite."""
+def rescaling_order(record: Record, member: Member, quantity: str) -> float:
+    """Return the order by which levels are rescaled: the formal one, or 0 (no rescaling) if that is not finite."""
     order = formal_order(record, member, quantity)
     return order if math.isfinite(order) else 0.0
 
 
 def formal_orders(record: Record, quantity: str) -> Floats:
-    """Return the promised order of every scheme and member, shape (scheme, case): options may be swept."""
+    """Return the formal order of every scheme and member, shape (scheme, case): swept options may change it."""
     variable = record.variable(f"{quantity}_formal_order")
     orders = np.asarray(variable.values, dtype=np.float64)
     by_case = orders if "case" in variable.dims else orders[:, None]
@@ -252,23 +255,26 @@ def formal_orders(record: Record, quantity: str) -> Floats:
 
 
 def basis_of_order(record: Record, quantity: str) -> str:
-    """Say whose an order is: promised by theory, or expected by a check of a part of an error that has no promise."""
+    """Return ``promised`` for an order from theory, ``expected`` for one that only a check states.
+
+    Theory gives no order for some parts of an error, such as a phase.
+    """
     is_promised = record.variable(f"{quantity}_formal_order").attrs["promised"]
     return "promised" if is_promised else "expected"
 
 
 def promised_text(record: Record, quantity: str, scheme: int) -> str:
-    """Write the order that is due to a quantity: a number, or whose it is where it depends on the member."""
-    found = np.unique(formal_orders(record, quantity)[scheme])
-    if found.size != 1:
+    """Write the formal order of a quantity, or the word of `basis_of_order` if it differs between members."""
+    orders = np.unique(formal_orders(record, quantity)[scheme])
+    if orders.size != 1:
         return basis_of_order(record, quantity)
-    return f"{found[0]:g}".replace("inf", "∞")
+    return f"{orders[0]:g}".replace("inf", "∞")
 
 
 def stated_order(
     record: Record, quantity: str, member: Member, norm: int
 ) -> tuple[float, float, float]:
-    """Return the stated order and the ends of its interval; NaN where there is none."""
+    """Return the stated order and the ends of its interval; NaN if no order is stated."""
     order, low, high = (
         float(at(record, f"{quantity}_order{end}", member, norm=norm))
         for end in ("", "_low", "_high")
@@ -277,32 +283,32 @@ def stated_order(
 
 
 def window(record: Record, quantity: str, member: Member) -> tuple[int, int]:
-    """Return the first and the last level that the stated order rests on; -1 where there is none."""
+    """Return the first and the last level that the stated order rests on; -1 if no order is stated."""
     first, last = (int(at(record, f"{quantity}_window_{end}", member)) for end in ("first", "last"))
     return first, last
 
 
 def sound_pairs(record: Record, quantity: str, member: Member) -> list[bool]:
-    """Say of every pair of levels whether its difference stands above round-off.
+    """Return for each pair of successive levels whether its difference is above round-off.
 
-    The verdict's window decides where there is one: it ends where round-off begins. Else the predicted floor does.
+    The window of the verdict decides if there is one, because it ends where round-off begins; else the predicted floor.
     """
     levels, (_, last) = whole(record, "level"), window(record, quantity, member)
     if last >= 0:
         return [finer <= last for finer in levels[1:]]
     floor = floor_norm(record, quantity, member, TYPICAL_NORM)
     differences = at(record, f"{quantity}_difference_norm", member, norm=norm_index(record))
-    return [bool(d > ABOVE * max(floor[i], floor[i + 1])) for i, d in enumerate(differences)]
+    return [bool(d > ABOVE_FLOOR * max(floor[i], floor[i + 1])) for i, d in enumerate(differences)]
 
 
 def sound_triples(record: Record, quantity: str, member: Member) -> list[bool]:
-    """Say of every triple of levels whether its differences stand above round-off."""
+    """Return for each triple of successive levels whether both differences are above round-off."""
     above = sound_pairs(record, quantity, member)
     return [all(above[i : i + 2]) for i in range(len(whole(record, "triple")))]
 
 
 def coincidence(record: Record, quantity: str, member: Member) -> float:
-    """Return how far the finest two sound rescaled differences are apart, over the finer one; NaN where not known."""
+    """Return the distance of the two finest rescaled differences above round-off, relative to the finer one, or NaN."""
     name = f"{quantity}_coincidence"
     if name not in record:
         return math.nan
@@ -311,7 +317,7 @@ def coincidence(record: Record, quantity: str, member: Member) -> float:
 
 
 def floor_norm(record: Record, quantity: str, member: Member, norm: str) -> Floats:
-    """Return the norm over time of noise as large as the predicted round-off, shape (level,)."""
+    """Return the norm over time of noise of the predicted round-off size, shape (level,)."""
     floor = at(record, f"{quantity}_floor", member)
     if "t" in record:
         t = times(record, member.case)
@@ -320,8 +326,8 @@ def floor_norm(record: Record, quantity: str, member: Member, norm: str) -> Floa
     return norm_of_floor(floor, norm, count, steps_of(record, member.case)[:1])
 
 
-def of_level(record: Record, name: str, member: Member, level: int) -> Floats:
-    """Return a state on a level: the finest one and the differences between it and that level."""
+def state_on_level(record: Record, name: str, member: Member, level: int) -> Floats:
+    """Return a state at a position of level, shape (t,): the finest level plus the differences down to this one."""
     values = at(record, f"{name}_finest", member)
     for pair in range(level, len(whole(record, "pair"))):
         values = values + at(record, f"{name}_difference", member, pair=pair)
@@ -329,5 +335,5 @@ def of_level(record: Record, name: str, member: Member, level: int) -> Floats:
 
 
 def largest(values: Floats) -> float:
-    """Return the largest absolute value that is finite; 0 where there is none."""
+    """Return the largest finite absolute value; 0 if there is none."""
     return float(np.abs(finite(values)).max(initial=0.0))

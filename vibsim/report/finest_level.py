@@ -1,7 +1,7 @@
-"""What is known of every member at the finest level, each number with its error bar.
+"""Numbers of every member at the finest level, each with its error bar.
 
-The error of the finest of two levels follows from their difference d and the order p: ``d/(r^p - 1)``, where r is the
-ratio of their steps (pendulum lecture, section 2.5, for the finer level). The interval of p gives that of the error.
+The error of the finer of two levels follows from their difference d and the order p: ``d/(r^p - 1)``, where r is the
+ratio of their steps (pendulum lecture, section 2.5). The interval of p gives that of the error.
 """
 
 from __future__ import annotations
@@ -14,16 +14,16 @@ from vibsim.core.array_types import Floats
 from vibsim.core.record import Record
 from vibsim.core.vocabulary import MEMBER, TYPICAL_NORM
 from vibsim.report import data
-from vibsim.report.data import Member, formal_orders, known, norm_index, whole
+from vibsim.report.data import Member, formal_orders, norm_index, pick_or_nan, whole
 from vibsim.report.style import finite, no_zeros
 
 VARIES = 1e-6
-"""Relative spread below which a number is the same for all members."""
+"""Relative spread below which members share a number."""
 
 
 @dataclass(frozen=True)
 class Measured:
-    """One number of every scheme and member with its error bar; arrays have the shape (scheme, case)."""
+    """A number of every scheme and member with its error bar; arrays have the shape (scheme, case)."""
 
     name: str
     unit: str
@@ -35,20 +35,20 @@ class Measured:
 class Error:
     """The norm of the error of the finest level; arrays have the shape (scheme, case)."""
 
-    true: Floats  # against the exact solution; NaN where there is none
+    true: Floats  # against the exact solution; NaN without one
     estimate: Floats
     low: Floats
     high: Floats
-    """Estimate with the ends of the interval of the order; NaN where no interval is stated."""
+    """Estimates with the ends of the interval of the order; NaN if no interval is stated."""
 
     @property
     def kind(self) -> str:
-        """Whether any member has an exact solution to compare with."""
+        """``true`` if any member has an exact solution to compare with, else ``estimated``."""
         return "true" if np.isfinite(self.true).any() else "estimated"
 
     @property
     def best(self) -> Floats:
-        """The true error where it is known, else the estimate."""
+        """The true error if it is known, else the estimate."""
         return np.where(np.isfinite(self.true), self.true, self.estimate)
 
 
@@ -61,23 +61,23 @@ def error(record: Record, quantity: str) -> Error:
     last = data.pick(record, f"{quantity}_difference_norm", norm=norm, pair=-1)
     order, low, high = orders(record, quantity)
     stated = np.where(np.isfinite(order), order, formal_orders(record, quantity))
-    return Error(true, *(last * _part(record, p) for p in (stated, high, low)))
+    return Error(true, *(last * _error_fraction(record, p) for p in (stated, high, low)))
 
 
 def true_error(record: Record, quantity: str) -> Floats:
-    """Return the norm of the true error of the finest level, shape (scheme, case); NaN where there is none."""
+    """Return the norm of the true error of the finest level, shape (scheme, case); NaN without an exact solution."""
     norm = norm_index(record)
-    return known(record, f"{quantity}_error_norm", MEMBER, norm=norm, level=-1)
+    return pick_or_nan(record, f"{quantity}_error_norm", MEMBER, norm=norm, level=-1)
 
 
 def norms(record: Record, quantity: str, member: Member) -> Floats:
-    """Return the true error of a member at every level, or the differences of its levels where it is not known."""
+    """Return the true error of a member at every level, or the differences of its levels if it is unknown."""
 
-    def of(name: str) -> Floats:
+    def norm(name: str) -> Floats:
         return no_zeros(data.at(record, f"{quantity}_{name}_norm", member, norm=norm_index(record)))
 
-    is_known = np.isfinite(of("error")).any() or not whole(record, "pair")
-    return of("error") if is_known else np.append(of("difference"), np.nan)
+    is_known = np.isfinite(norm("error")).any() or not whole(record, "pair")
+    return norm("error") if is_known else np.append(norm("difference"), np.nan)
 
 
 def orders(
@@ -85,45 +85,45 @@ def orders(
 ) -> tuple[Floats, Floats, Floats]:
     """Return the stated order of every scheme and member and the ends of its interval, shape (scheme, case)."""
     order, low, high = (
-        # a large sweep has orders of what checks ask about only
-        known(record, f"{quantity}_order{end}", MEMBER, norm=norm_index(record, norm))
+        # a large sweep has orders only for the quantities of checks
+        pick_or_nan(record, f"{quantity}_order{end}", MEMBER, norm=norm_index(record, norm))
         for end in ("", "_low", "_high")
     )
     return order, low, high
 
 
 def deviation(record: Record, quantity: str) -> Floats:
-    """Return the stated order minus the promised one, shape (scheme, case)."""
+    """Return the stated order minus the formal one, shape (scheme, case)."""
     return np.asarray(orders(record, quantity)[0] - formal_orders(record, quantity))
 
 
-def _part(record: Record, order: Floats) -> Floats:
-    """Return the part of the difference of the two finest levels that is left as error of the finest."""
+def _error_fraction(record: Record, order: Floats) -> Floats:
+    """Return the error of the finest level as a fraction of its difference from the next coarser one."""
     levels = whole(record, "level")
     with np.errstate(divide="ignore", over="ignore"):
-        rest = 2.0 ** (order * (levels[-1] - levels[-2])) - 1.0
-        return np.where(rest > 0.0, 1.0 / rest, np.where(np.isnan(rest), np.nan, np.inf))
+        ratio = 2.0 ** (order * (levels[-1] - levels[-2])) - 1.0
+        return np.where(ratio > 0.0, 1.0 / ratio, np.where(np.isnan(ratio), np.nan, np.inf))
 
 
 def measured(record: Record, name: str, position: str) -> Measured:
-    """Return the ``period`` or the ``amplitude``, which may have either sign where a run grows without bound."""
-    value = np.abs(known(record, name, MEMBER, level=-1))
+    """Return the size of the ``period`` or ``amplitude``, whose sign is arbitrary if a run grows without bound."""
+    value = np.abs(pick_or_nan(record, name, MEMBER, level=-1))
     error = np.full(value.shape, np.nan)
     if whole(record, "pair"):
-        coarser = np.abs(known(record, name, MEMBER, level=-2))
-        error = np.abs(value - coarser) * _part(record, formal_orders(record, position))
+        coarser = np.abs(pick_or_nan(record, name, MEMBER, level=-2))
+        error = np.abs(value - coarser) * _error_fraction(record, formal_orders(record, position))
     return Measured(name, data.unit(record, name), value, error)
 
 
 def varies(values: Floats) -> bool:
-    """Say whether some numbers of members differ by more than their own rounding."""
-    found = np.abs(finite(values))
-    return found.size > 1 and bool(np.ptp(found) > VARIES * found.max())
+    """Return whether the sizes of numbers differ by more than rounding."""
+    sizes = np.abs(finite(values))
+    return sizes.size > 1 and bool(np.ptp(sizes) > VARIES * sizes.max())
 
 
 def period_error(record: Record, level: int) -> Floats:
-    """Return the relative error of the period at a position of `level`, shape (scheme, case); NaN where not known."""
-    period, exact = known(record, "period", MEMBER, level=level), data.exact_periods(record)
+    """Return the relative error of the period at a position of `level`, shape (scheme, case); NaN if unknown."""
+    period, exact = pick_or_nan(record, "period", MEMBER, level=level), data.exact_periods(record)
     with np.errstate(invalid="ignore", divide="ignore"):
-        # on the separatrix there is no period to be wrong about
+        # on the separatrix the exact period is infinite
         return np.asarray(np.where(np.isinf(exact), np.nan, np.abs(period / exact - 1.0)))

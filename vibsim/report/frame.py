@@ -1,4 +1,4 @@
-"""What belongs within the frame of a figure, and what leaves it."""
+"""Which values belong in the frame of a figure, and how those that leave it are marked."""
 
 from __future__ import annotations
 
@@ -12,25 +12,27 @@ from vibsim.core.array_types import Flags, Floats
 from vibsim.core.record import Record
 from vibsim.core.vocabulary import MEMBER, OF_LEVEL, TYPICAL_NORM
 from vibsim.report import data
-from vibsim.report.data import Member, known
+from vibsim.report.data import Member, pick_or_nan
 from vibsim.report.style import positive
 from vibsim.report.types import Axes
 
 UNBOUNDED = 1e6
-"""What exceeds the size of the motion by this factor grows without bound, and gives no frame its range."""
+"""Values beyond this multiple of the size of the motion grow without bound; no axis is scaled to them."""
 BROKE_DOWN = "broke down"
 GROWS = "grows without bound"
 ROUND_OFF = "lost in round-off"
 UNLIKE = "no longer proportional"
 NO_VALUE = "no value"
-LOOKS_ALIKE = 0.004  # curves that differ by less than this part of the frame's height look the same
+LOOKS_ALIKE = (
+    0.004  # curves that differ by less than this fraction of the frame's height look the same
+)
 LEAVING = "Triangles at an edge: values beyond the frame."  # for captions
 
 
 def sizes(record: Record, quantity: str) -> Floats:
-    """Return the size of a quantity in the motion of every member, shape (case,); NaN where nothing tells it.
+    """Return the size of a quantity in the motion of every member, shape (case,); NaN if unknown.
 
-    It is that of the exact solution, else the smallest that any scheme gives on any level: the others may have grown.
+    It is the size of the exact solution, else the smallest over all schemes and levels: the others may have grown.
     """
     count = len(record["case"])
     if f"{quantity}_exact" in record and "t" in record:
@@ -39,17 +41,19 @@ def sizes(record: Record, quantity: str) -> Floats:
         exact = np.max(np.abs(np.asarray(variable.values, dtype=np.float64)), axis=others)
         return positive(np.broadcast_to(exact, (count,)))
     if quantity.startswith("energy") and "energy_initial" in record:
-        found = np.abs(known(record, "energy_initial", MEMBER))
+        size = np.abs(pick_or_nan(record, "energy_initial", MEMBER))
     elif f"{quantity}_max" in record:
-        ends = [np.abs(known(record, f"{quantity}_{end}", OF_LEVEL)) for end in ("min", "max")]
-        found = np.swapaxes(np.maximum(*ends), 1, 2).reshape(-1, count)
+        ends = [
+            np.abs(pick_or_nan(record, f"{quantity}_{end}", OF_LEVEL)) for end in ("min", "max")
+        ]
+        size = np.swapaxes(np.maximum(*ends), 1, 2).reshape(-1, count)
     else:
         return np.full(count, np.nan)
-    return positive(np.asarray(np.min(np.where(np.isfinite(found), found, np.inf), axis=0)))
+    return positive(np.asarray(np.min(np.where(np.isfinite(size), size, np.inf), axis=0)))
 
 
 def is_bounded(values: Floats, size: Floats) -> Flags:
-    """Say of every value whether it is finite and, where the size of the motion is known, not far beyond it."""
+    """Return for every value whether it is finite and not far beyond the size of the motion, if that is known."""
     with np.errstate(over="ignore"):
         return np.isfinite(values) & ~(np.abs(values) > UNBOUNDED * size)
 
@@ -57,7 +61,7 @@ def is_bounded(values: Floats, size: Floats) -> Flags:
 def why_lost(
     record: Record, quantity: str, member: Member, levels: list[int], values: Floats
 ) -> str:
-    """Say why values of some positions of levels mean nothing: round-off only where they are near its floor."""
+    """Say why values that come from `levels` (positions) mean nothing; round-off only if they are near its floor."""
     status = np.asarray(data.pick(record, "status", scheme=member.scheme, case=member.case))
     if np.any(status[levels] != 0):
         return BROKE_DOWN
@@ -76,36 +80,36 @@ def why_lost(
 
 
 def mark_leaving(ax: Axes, x: Floats, y: Floats, *, each: bool = False, **look: Any) -> bool:
-    """Mark at the edges where values leave the frame (or, of points, each that is beyond); say whether any does."""
+    """Mark at the edges where a curve leaves the frame, or `each` point outside it; return whether there is any."""
     low, high = ax.get_ylim()
-    found = False
+    leaves = False
     for border, edge, marker in ((high, 1.0, "^"), (low, 0.0, "v")):
-        beyond = y > border if edge else y < border
-        there = beyond if each else beyond & ~np.concatenate([[False], beyond[:-1]])
-        place = np.flatnonzero(there)
-        if place.size:
-            found = True
-            across = [x[i] if each else _crossing(ax, x, y, i, border) for i in place.tolist()]
+        outside = y > border if edge else y < border
+        is_marked = outside if each else outside & ~np.concatenate([[False], outside[:-1]])
+        marked = np.flatnonzero(is_marked)
+        if marked.size:
+            leaves = True
+            across = [x[i] if each else _crossing(ax, x, y, i, border) for i in marked.tolist()]
             mark: Any = {"linestyle": "none", "marker": marker, "markersize": 5, "zorder": 6}
             where: Any = {"transform": ax.get_xaxis_transform(), "clip_on": False}
-            ax.plot(across, np.full(place.size, edge), **where, **mark, **look)
-    return found
+            ax.plot(across, np.full(marked.size, edge), **where, **mark, **look)
+    return leaves
 
 
 def _crossing(ax: Axes, x: Floats, y: Floats, i: int, border: float) -> float:
-    """Return where the line to the i-th point leaves the frame, straight on the scales of the axes."""
+    """Return where the segment to the i-th point, straight on the scales of the axes, leaves the frame."""
     if i == 0 or not np.isfinite([y[i - 1], y[i]]).all():
         return float(x[i])
-    turn = ax.transScale
-    (x0, y0), (x1, y1) = turn.transform([(x[i - 1], y[i - 1]), (x[i], y[i])])
-    level = turn.transform((float(x[i]), border))[1]
-    share = (level - y0) / (y1 - y0) if y1 != y0 else 1.0
-    return float(turn.inverted().transform((x0 + share * (x1 - x0), y1))[0])
+    scale = ax.transScale
+    (x0, y0), (x1, y1) = scale.transform([(x[i - 1], y[i - 1]), (x[i], y[i])])
+    height = scale.transform((float(x[i]), border))[1]
+    fraction = (height - y0) / (y1 - y0) if y1 != y0 else 1.0
+    return float(scale.inverted().transform((x0 + fraction * (x1 - x0), y1))[0])
 
 
 def same_as(curves: list[Floats], height: float) -> list[int | None]:
-    """Return for every curve the first earlier one that it cannot be told from in a frame of that height."""
-    found: list[int | None] = []
+    """Return for every curve the first earlier one that looks the same in a frame of that height, or None."""
+    same: list[int | None] = []
 
     def is_alike(a: Floats, b: Floats) -> bool:
         if a.shape != b.shape:
@@ -117,6 +121,6 @@ def same_as(curves: list[Floats], height: float) -> list[int | None]:
         return bool(np.max(np.abs(a[both] - b[both])) <= LOOKS_ALIKE * height)
 
     for i, curve in enumerate(curves):
-        firsts = (j for j in range(i) if found[j] is None and is_alike(curve, curves[j]))
-        found.append(next(firsts, None))
-    return found
+        earlier = (j for j in range(i) if same[j] is None and is_alike(curve, curves[j]))
+        same.append(next(earlier, None))
+    return same

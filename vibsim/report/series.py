@@ -1,4 +1,4 @@
-"""Series over time of one member: what the record holds, what follows from its states, and the exact solution."""
+"""Series over time of one member: stored, computed from its states by a formula, or exact."""
 
 from __future__ import annotations
 
@@ -21,43 +21,48 @@ ENERGIES = ("energy", "kinetic_energy", "potential_energy")
 def numbers_of(
     experiment: Experiment, record: Record, case: int
 ) -> tuple[dict[str, Floats], dict[str, Floats]]:
-    """Return parameters, by their keys in a file, and initial values of a member by its position in the record."""
+    """Return the parameters of a member, by their keys in the file, and its initial values.
+
+    `case` is its position in the record.
+    """
     index = int(record["case"][case])
-    found = members(experiment, index, index + 1)
+    member = members(experiment, index, index + 1)
     parameters, initial = (
-        {name: column[0] for name, column in part.items()}
-        for part in (found.parameters, found.initial)
+        {name: column[0] for name, column in columns.items()}
+        for columns in (member.parameters, member.initial)
     )
     return parameters, initial
 
 
 def parameters_of(experiment: Experiment, record: Record, case: int) -> dict[str, Floats]:
     """Return the parameters of a member by their names in formulas."""
-    found, _ = numbers_of(experiment, record, case)
-    return {row.name: found[row.key] for row in experiment.model.definition.parameters}
+    by_key, _ = numbers_of(experiment, record, case)
+    return {row.name: by_key[row.key] for row in experiment.model.definition.parameters}
 
 
 def on_level(
     experiment: Experiment, record: Record, quantity: str, member: Member, level: int
 ) -> Floats | None:
-    """Return a quantity at the common times of a level, shape (t,); None where it is not known.
+    """Return a quantity on a level at the common times, shape (t,); None if it is neither stored nor computable.
 
-    `level` is a position. What the record does not hold is worked out from the states by its formula.
+    `level` is a position. A quantity that the record lacks is computed from the states by its formula.
     """
     if f"{quantity}_finest" in record:
-        return data.of_level(record, quantity, member, level)
+        return data.state_on_level(record, quantity, member, level)
     model = experiment.model.definition
     names = [state.name for state in model.states]
     if any(f"{name}_finest" not in record for name in names):
         return None
-    states = {name: data.of_level(record, name, member, level) for name in names}
-    return _of_states(experiment, record, quantity, member, states, data.times(record, member.case))
+    states = {name: data.state_on_level(record, name, member, level) for name in names}
+    return _from_states(
+        experiment, record, quantity, member, states, data.times(record, member.case)
+    )
 
 
 def exact(
     experiment: Experiment, record: Record, quantity: str, member: Member, t: Floats
 ) -> Floats | None:
-    """Return the exact solution at any times; None where the model has none in closed form."""
+    """Return the exact solution at any times; None if the model has none in closed form."""
     model = experiment.model.definition
     if model.exact is None:
         return None
@@ -65,10 +70,10 @@ def exact(
     states = model.exact(t, initial, parameters)
     if quantity in states:
         return np.asarray(states[quantity])
-    return _of_states(experiment, record, quantity, member, states, t)
+    return _from_states(experiment, record, quantity, member, states, t)
 
 
-def _of_states(
+def _from_states(
     experiment: Experiment,
     record: Record,
     quantity: str,
@@ -76,31 +81,31 @@ def _of_states(
     states: Mapping[str, Floats],
     t: Floats,
 ) -> Floats | None:
-    """Work out an energy or an output of the model."""
+    """Compute an energy or an output of the model from its states."""
     model = experiment.model.definition
     numbers = {**parameters_of(experiment, record, member.case), **states, "t": t}
-    found = [
+    terms = [
         np.broadcast_to(values(tree(model, formula), numbers), t.shape)
         for formula in _formulas(model, quantity)
     ]
-    return np.sum(found, axis=0) if found else None
+    return np.sum(terms, axis=0) if terms else None
 
 
 def _formulas(model: Model, quantity: str) -> list[Formula]:
-    """Return the formulas whose sum is a quantity; none where it has no formula in the states."""
+    """Return the formulas whose sum is a quantity; empty if it has no formula in the states."""
     energies = {"kinetic_energy": model.kinetic_energy, "potential_energy": model.potential_energy}
     if model.loaded is not None:
-        # those of a structure are of all its degrees of freedom, which no record holds
+        # the energies of a structure need all its degrees of freedom, which no record stores
         energies = {}
     if quantity == "energy":
         return list(energies.values())
-    of_outputs = {row.name: row.formula for row in model.outputs}
-    formula = {**energies, **of_outputs}.get(quantity)
+    outputs = {row.name: row.formula for row in model.outputs}
+    formula = {**energies, **outputs}.get(quantity)
     return [] if formula is None else [formula]
 
 
 def unit_of(experiment: Experiment, record: Record, quantity: str) -> str:
-    """Return the unit of a quantity; empty where it has none."""
+    """Return the unit of a quantity; empty if it has none."""
     if f"{quantity}_finest" in record:
         return data.unit(record, f"{quantity}_finest")
     model = experiment.model.definition

@@ -1,6 +1,6 @@
-"""How the members of a sweep lie: along a line, on a grid of two swept parameters, or as a cloud.
+"""How the members of a sweep are arranged: along a line, on a grid over two parameters, or as a cloud.
 
-Everything is found out from the swept values, so that it does not matter how a file wrote them.
+The arrangement follows from the swept values alone, however the file specifies them.
 """
 
 from __future__ import annotations
@@ -20,24 +20,24 @@ from vibsim.report.data import swept, swept_label
 from vibsim.report.style import LOG_RATIO, label
 from vibsim.report.types import Experiment
 
-LARGEST_TO_SCALE = 1e100  # swept values from here on are not drawn to scale
+LARGEST_TO_SCALE = 1e100  # larger swept values are not drawn to scale
 FEW, LINES = 5, 6
-"""Most lines that the other parameter of a sweep of two may make, and those of one of more; others are no curves."""
+"""Most curves of a sweep over two keys, one for each value of the second, and over more; else it is a map or cloud."""
 UP, DOWN = "going up →", "← going down"
-"""Ways along a path."""
-CELLS = 400  # most cells along each side of a map: more than its pixels could show
-BINS = 8, 100  # least and most cells along each side of a map of members that lie on no grid
+"""Directions along a path."""
+CELLS = 400  # most cells along each side of a map: more than its pixels can show
+BINS = 8, 100  # fewest and most cells along each side of a map of scattered members
 
 
 @dataclass(frozen=True)
 class Key:
-    """One swept key; option words are numbered in the order of the alphabet."""
+    """One swept key; words are numbered alphabetically."""
 
     key: str  # dotted
     unit: str
     values: Floats  # of every member, shape (case,)
     distinct: Floats  # ascending
-    words: tuple[str, ...] = ()  # what the numbers stand for, where they are words
+    words: tuple[str, ...] = ()  # meaning of the numbers, if they stand for words
 
     @property
     def label(self) -> str:
@@ -46,12 +46,12 @@ class Key:
 
     @property
     def name(self) -> str:
-        """Name in the words of a page."""
+        """Name, as a page shows it."""
         return words.swept(self.key)
 
     @cached_property
     def is_log(self) -> bool:
-        """Whether the values are more even on a logarithmic axis."""
+        """Whether the values are spaced more evenly on a logarithmic axis."""
         return not self.words and is_geometric(self.distinct)
 
     def text(self, value: float) -> str:
@@ -60,9 +60,8 @@ class Key:
 
 
 def keys(record: Record) -> list[Key]:
-    """Return the swept keys that do vary, in the order written."""
-    found = [_key(record, name) for name in swept(record)]
-    return [key for key in found if key.distinct.size > 1]
+    """Return the swept keys with more than one value, in the order of the experiment file."""
+    return [key for name in swept(record) if (key := _key(record, name)).distinct.size > 1]
 
 
 def _key(record: Record, name: str) -> Key:
@@ -70,20 +69,20 @@ def _key(record: Record, name: str) -> Key:
     values = np.asarray(record[name])
     if np.issubdtype(values.dtype, np.number):
         numbers = np.asarray(values, dtype=np.float64)
-        distinct, place = np.unique(numbers, return_inverse=True)
+        distinct, inverse = np.unique(numbers, return_inverse=True)
         if np.max(np.abs(distinct)) < LARGEST_TO_SCALE:
             return Key(key, unit, numbers, distinct)
-        # no axis reaches so far: the values are numbered like words
+        # too large for an axis: the values are numbered like words
         names = [f"{value:.6g}" for value in distinct.tolist()]
     else:
-        known, place = np.unique(values.astype(str), return_inverse=True)
-        names = known.tolist()
+        options, inverse = np.unique(values.astype(str), return_inverse=True)
+        names = options.tolist()
     numbered = np.arange(len(names), dtype=np.float64)
-    return Key(key, unit, place.ravel().astype(np.float64), numbered, tuple(names))
+    return Key(key, unit, inverse.ravel().astype(np.float64), numbered, tuple(names))
 
 
 def is_geometric(distinct: Floats) -> bool:
-    """Say whether ascending values spread over decades, and more evenly in their logarithm than as they are."""
+    """Return whether ascending values span decades and their logarithms are spaced more evenly than they are."""
     low, high = float(distinct[0]), float(distinct[-1])
     if low <= 0.0 or high < LOG_RATIO * low:
         return False
@@ -94,7 +93,7 @@ def is_geometric(distinct: Floats) -> bool:
 
 
 def edges(distinct: Floats, logarithmic: bool) -> Floats:
-    """Return the borders of cells around ascending values, shape (n + 1,): halfway, and as far again at the ends."""
+    """Return the borders of cells around ascending values, shape (n + 1,): the midpoints, extended at both ends."""
     x = np.log(distinct) if logarithmic else distinct
     half = 0.5 * np.diff(x)
     borders = np.concatenate([[x[0] - half[0]], x[:-1] + half, [x[-1] + half[-1]]])
@@ -103,42 +102,42 @@ def edges(distinct: Floats, logarithmic: bool) -> Floats:
 
 @dataclass(frozen=True)
 class Grid:
-    """Members in the cells of a map over two keys, one or several in a cell."""
+    """Members in the cells of a map over two keys, one or more in a cell."""
 
     x: Key
     y: Key
     borders: tuple[Floats, Floats]  # of the cells along x and y
-    cell: NDArray[np.intp]  # position of every member in the table (y, x) of cells, shape (case,)
+    cell: NDArray[np.intp]  # flat index of every member's cell in the table (y, x), shape (case,)
     note: str = ""
-    """What a cell stands for, where it is not one member."""
+    """What a cell shows, if it holds more than one member."""
     separatrix: tuple[Floats, Floats] = (np.empty(0), np.empty(0))
-    """Points along x and y where the exact period is infinite."""
+    """Points (x, y) where the exact period is infinite."""
 
     def worst(self, values: NDArray[Any], badness: NDArray[Any] | None = None) -> Floats:
-        """Return the value of every cell's worst member, shape (y, x): the one of most `badness`.
+        """Return the value of the worst member of every cell, shape (y, x): the one of largest `badness`.
 
-        Without `badness` the largest value is the worst. A cell is NaN where no member has a finite value.
+        Without `badness` the largest value is the worst. A cell without any finite value is NaN.
         """
         bad = np.asarray(values if badness is None else badness, dtype=np.float64)
-        there = np.flatnonzero(np.isfinite(values) & ~np.isnan(bad))
+        usable = np.flatnonzero(np.isfinite(values) & ~np.isnan(bad))
         columns, rows = (border.size - 1 for border in self.borders)
         most = np.full(rows * columns, -np.inf)
-        np.maximum.at(most, self.cell[there], bad[there])
-        worst = there[bad[there] == most[self.cell[there]]]
+        np.maximum.at(most, self.cell[usable], bad[usable])
+        worst = usable[bad[usable] == most[self.cell[usable]]]
         table = np.full((rows, columns), np.nan)
         table.ravel()[self.cell[worst]] = values[worst]
         return table
 
 
-def grid_of(found: list[Key]) -> Grid | None:
-    """Return the map of members that differ in two `keys`; None where they differ in one, or in more.
+def grid_of(keys: list[Key]) -> Grid | None:
+    """Return the map of members that differ in two `keys`; None if they differ in one key, or in more.
 
-    Members on a full grid have a cell each, or are gathered in square blocks where they are too many to be seen;
-    members anywhere in the plane are gathered in as many cells as there are members for.
+    Each member of a full grid has its own cell; too many to be visible are gathered in square blocks. Members scattered
+    over the plane are gathered in bins, whose number grows with theirs.
     """
-    if len(found) != 2 or _moves_together(found):
+    if len(keys) != 2 or _is_on_curve(keys):
         return None
-    x, y = found
+    x, y = keys
     size = x.distinct.size * y.distinct.size
     column, row = (np.searchsorted(key.distinct, key.values) for key in (x, y))
     is_full = size == x.values.size and np.all(
@@ -146,8 +145,8 @@ def grid_of(found: list[Key]) -> Grid | None:
     )
     if is_full:
         block = -(-max(x.distinct.size, y.distinct.size) // CELLS)
-        whole = (edges(key.distinct, key.is_log) for key in (x, y))
-        across, up = (np.append(border[:-1:block], border[-1]) for border in whole)
+        full = (edges(key.distinct, key.is_log) for key in (x, y))
+        across, up = (np.append(edge[:-1:block], edge[-1]) for edge in full)
         column, row = column // block, row // block
         note = f"A cell shows the worst of {block} × {block} members." if block > 1 else ""
     else:
@@ -159,7 +158,7 @@ def grid_of(found: list[Key]) -> Grid | None:
 
 
 def bins(key: Key, count: int) -> Floats:
-    """Return the borders of bins over a key: around each value where these are few, else `count` even ones."""
+    """Return the borders of bins over a key: one bin for each value if there are at most `count`, else `count` bins."""
     if key.distinct.size <= count:
         return edges(key.distinct, key.is_log)
     low, high = float(key.distinct[0]), float(key.distinct[-1])
@@ -168,18 +167,18 @@ def bins(key: Key, count: int) -> Floats:
 
 def place_in(key: Key, borders: Floats) -> NDArray[np.intp]:
     """Return the bin of every member, shape (case,)."""
-    found = np.searchsorted(borders, key.values, side="right") - 1
-    return np.clip(found, 0, borders.size - 2)
+    position = np.searchsorted(borders, key.values, side="right") - 1
+    return np.clip(position, 0, borders.size - 2)
 
 
 def layout_of(experiment: Experiment, record: Record) -> Along | Grid | None:
-    """Return how the members of a sweep lie; None where they are a cloud, or differ in nothing."""
-    found, sweep = keys(record), experiment.sweep
-    return along_of(found, sweep.follow if sweep is not None else None) or grid_of(found)
+    """Return the arrangement of the members of a sweep; None for a cloud, or if no key varies."""
+    varying, sweep = keys(record), experiment.sweep
+    return along_of(varying, sweep.follow if sweep is not None else None) or grid_of(varying)
 
 
 Line = tuple[str, NDArray[np.intp]]
-"""The name of a line, and its members."""
+"""Name and members of a line."""
 
 
 @dataclass(frozen=True)
@@ -188,28 +187,27 @@ class Along:
 
     key: Key
     lines: tuple[Line, ...]
-    """Members that belong to one line, with a name; without where there is one line. They are in ascending order of the
-    key, or in their own where values repeat. A path that turns is a line for each of its ways: these share the member
-    at the turn."""
+    """Without a name if there is only one line. The members are in ascending order of the key, or in their own order if
+    values repeat. A path that turns back is one line for each direction; both share the member at the turn."""
     follows: bool = False  # whether other keys change with this one
 
 
-def along_of(found: list[Key], follow: str | None = None) -> Along | None:
-    """Lay members out along a key, one line per value of the others; None for too many lines.
+def along_of(keys: list[Key], follow: str | None = None) -> Along | None:
+    """Lay members out along one key, with one line for each combination of the others; None for too many lines.
 
-    `follow` is the dotted key along which each member starts where the one before ended, if there is one. The lines are
-    drawn along it, else along the key with most values.
+    `follow` is the dotted key along which each member starts from the end of the one before, if the sweep has one. The
+    lines run along it, else along the key with most values.
     """
-    if not found:
+    if not keys:
         return None
-    longest = max(found, key=lambda key: (key.key == follow, key.distinct.size))
+    longest = max(keys, key=lambda key: (key.key == follow, key.distinct.size))
     ways = _ways if longest.key == follow else _in_order
-    others = [key for key in found if key is not longest]
+    others = [key for key in keys if key is not longest]
     order = np.arange(longest.values.size)
     if not others or longest.distinct.size == longest.values.size:
-        # of keys that move together one says it all
+        # one of several keys that rise and fall together describes them all
         lines = ways(longest, order)
-        is_one = not others or _moves_together(found)
+        is_one = not others or _is_on_curve(keys)
         return Along(longest, tuple(lines), bool(others)) if is_one else None
     if int(np.prod([key.distinct.size for key in others])) > (FEW if len(others) == 1 else LINES):
         return None
@@ -226,13 +224,13 @@ def along_of(found: list[Key], follow: str | None = None) -> Along | None:
 
 
 def _in_order(key: Key, members: NDArray[np.intp]) -> list[Line]:
-    """Return the one line of members, in the order in which it is drawn."""
+    """Return members as one line, in drawing order."""
     rising = members[np.argsort(key.values[members], kind="stable")]
     return [("", rising if np.all(np.diff(key.values[rising]) > 0.0) else members)]
 
 
 def _ways(key: Key, members: NDArray[np.intp]) -> list[Line]:
-    """Return the ways up and down of members on a path, or one line where it never turns or turns too often."""
+    """Split members on a path into lines that go up and down; one line if it never turns, or turns too often."""
     is_up = np.diff(key.values[members]) > 0.0
     turns = (np.flatnonzero(is_up[1:] != is_up[:-1]) + 1).tolist()
     if not 0 < len(turns) < LINES:
@@ -244,8 +242,8 @@ def _ways(key: Key, members: NDArray[np.intp]) -> list[Line]:
     ]
 
 
-def _moves_together(found: list[Key]) -> bool:
-    """Say whether every key rises or falls steadily with the first: the members lie on one curve."""
-    order = np.argsort(found[0].values, kind="stable")
-    steps = [np.diff(key.values[order]) for key in found]
+def _is_on_curve(keys: list[Key]) -> bool:
+    """Return whether every key is monotonic in the first, so that the members lie on one curve."""
+    order = np.argsort(keys[0].values, kind="stable")
+    steps = [np.diff(key.values[order]) for key in keys]
     return all(bool(np.all(step >= 0) or np.all(step <= 0)) for step in steps)

@@ -1,4 +1,4 @@
-"""The words of a report: statuses, reasons, symbols and numbers, for a reader who meets them for the first time."""
+"""How a report writes statuses, reasons, symbols and numbers, for first-time readers."""
 
 from __future__ import annotations
 
@@ -29,10 +29,10 @@ NAMES = {
     "potential_energy": ("V", "the potential energy V"),
     "energy_deviation": ("ΔE", "the energy deviation ΔE = E(t) − E(0)"),
 }
-"""Letter and words of quantities; others go by their name."""
+"""Quantity to its letter and its words; other quantities go by their name."""
 
 PARTS = {PHASE: ("φ({})", "phase error of {}"), AMPLITUDE: ("a({})", "amplitude error of {}")}
-"""Of a part of a position's error, by the end of its name: letter and words."""
+"""Suffix of a part of a position's error to its letter and its words."""
 
 
 _KEY = re.compile(r"\b(initial|model(?:\.parameters)?|schemes|time)\.(\w+)(?:\.(\w+))?")
@@ -40,13 +40,13 @@ _KEY = re.compile(r"\b(initial|model(?:\.parameters)?|schemes|time)\.(\w+)(?:\.(
 
 
 def swept(text: str) -> str:
-    """Return a text with swept keys in the words of a page, such as `linear damping` for `model.damping.linear`.
+    """Replace swept keys in a text by words, such as `model.damping.linear` by `linear damping`.
 
     Dotted keys belong to experiment files, tables and commands.
     """
 
-    def key(found: re.Match[str]) -> str:
-        section, outer, inner = found.groups()
+    def key(match: re.Match[str]) -> str:
+        section, outer, inner = match.groups()
         if section == "initial":
             return f"initial {NAMES.get(outer, (outer,))[0]}"
         between = " of " if section == "schemes" else " "
@@ -70,12 +70,12 @@ def _named(quantity: str) -> tuple[str, str]:
 
 
 def symbol(quantity: str) -> str:
-    """Return the letter of a quantity; its name where it has none."""
+    """Return the letter of a quantity, or its name if it has none."""
     return _named(quantity)[0]
 
 
 def title(quantity: str) -> str:
-    """Return a quantity as it stands in the title of a figure, and in a sentence: its letter, or a part in words."""
+    """Return a quantity as titles and sentences show it: its letter, or the words for a part of an error."""
     return _named(quantity)[is_error_part(quantity)]
 
 
@@ -86,20 +86,20 @@ def name(quantity: str) -> str:
 
 
 _LETTERED = NAMES.keys() - {"energy"}
-"""Names that are no English words."""
+"""Names that are not English words."""
 
 
 def labelled(text: str, quantity: str | None) -> str:
-    """Return a sentence on a quantity with the labels of a page for names; what stands between backticks is code."""
+    """Replace names of quantities in a sentence by the labels of a page; code between backticks stays as it is."""
     names, ends = "|".join(filter(None, {*_LETTERED, quantity})), "|".join((CENTRED, *PARTS))
     word = re.compile(rf"(?<![\w.])({names})({ends})?(?!\w|\.\w)")
     parts = text.split("`")
-    parts[::2] = [word.sub(lambda found: title(found.group()), part) for part in parts[::2]]
+    parts[::2] = [word.sub(lambda match: title(match.group()), part) for part in parts[::2]]
     return "`".join(parts)
 
 
 def passed(statuses: Sequence[str], one: str = "check", many: str = "checks") -> str:
-    """Say how many of some checks passed: `9 of 9 checks`."""
+    """Write how many checks passed: `9 of 9 checks`."""
     if not statuses:
         return f"no {one}"
     return f"{statuses.count('PASS')} of {len(statuses)} {one if len(statuses) == 1 else many}"
@@ -107,11 +107,11 @@ def passed(statuses: Sequence[str], one: str = "check", many: str = "checks") ->
 
 BADGES = {"PASS": "passed", "INCONCLUSIVE": "undecided", "FAIL": "failed"}
 TRAP, REFUTED, CLAIMED = "trap caught", "refuted", "as claimed"
-"""Words on a check that expected a failure and got it, and on a statement that is false or true as expected."""
+"""Badges of a check that expected a failure and got it, and of a claim that is false or true as expected."""
 
 
 def badge(check: Mapping[str, Any]) -> str:
-    """Return the word on a check of a summary: passed, as claimed, trap caught, refuted, undecided or failed."""
+    """Return the badge of a check in a summary: passed, as claimed, trap caught, refuted, undecided or failed."""
     if check["status"] != "PASS":
         return BADGES.get(check["status"], str(check["status"]))
     if check["kind"] == "claim":
@@ -120,17 +120,17 @@ def badge(check: Mapping[str, Any]) -> str:
 
 
 MARKS = TRAP, REFUTED
-"""Words on checks that are told beside a verdict: that something went wrong, as expected."""
+"""Badges that are shown beside a verdict: something went wrong, as expected."""
 
 
 def marks(checks: Sequence[Mapping[str, Any]]) -> list[tuple[str, int]]:
-    """Return those of `MARKS` that checks have, with the number of checks."""
-    found = [badge(check) for check in checks]
-    return [(mark, found.count(mark)) for mark in MARKS if mark in found]
+    """Return the `MARKS` of checks, each with its number of checks."""
+    badges = [badge(check) for check in checks]
+    return [(mark, badges.count(mark)) for mark in MARKS if mark in badges]
 
 
 def is_trap(check: Mapping[str, Any]) -> bool:
-    """Say whether a check of a summary expects a failure, or a statement to be false."""
+    """Return whether a check of a summary expects a failure, or a claim to be false."""
     if check["kind"] == "claim":
         return bool(check["expected"] == "false")
     return str(check["expected"]).startswith(("FAIL", "INCONCLUSIVE"))
@@ -151,12 +151,12 @@ NORMS = {
 }  # fmt: skip
 """Words for the norms over time."""
 USUAL_NORM = NORMS[TYPICAL_NORM]
-DIGITS = {"brief": 2, "close": 7, "full": 10, "step": 6, "value": 12}  # significant digits of forms
-LEAST_PERCENT = 1e-5  # of a whole, that is written in per cent
-MORE_DIGITS = 2  # of a number beside a printed one
-MOST_DIGITS = 11  # characters of a mantissa that are read
+DIGITS = {"brief": 2, "close": 7, "full": 10, "step": 6, "value": 12}  # significant digits by form
+LEAST_PERCENT = 1e-5  # smallest fraction written in per cent
+MORE_DIGITS = 2  # digits of a measured number beyond those of the printed one
+MOST_DIGITS = 11  # longer mantissas are shortened
 PROSE = {"phase", "amplitude", "largest"} | {name.partition("_")[0] for name in VALUES}
-"""With what the name of a value, or of a part of an error, begins."""
+"""First words of the names of values and of parts of an error."""
 
 
 RAISE, LOWER = (str.maketrans("-0123456789", to) for to in ("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "₋₀₁₂₃₄₅₆₇₈₉"))
@@ -164,7 +164,7 @@ RAISE, LOWER = (str.maketrans("-0123456789", to) for to in ("⁻⁰¹²³⁴⁵�
 
 
 def power(exponent: int) -> str:
-    """Write a power of ten in Unicode."""
+    """Write a power of ten with a Unicode exponent."""
     return "10" + str(exponent).translate(RAISE)
 
 
@@ -181,7 +181,7 @@ class _Page(Notation):
         return ERRORS.get(name, name.replace(CENTRED, " by [D₂ₜu]").replace("_", " "))
 
     def opening(self, text: str) -> str:
-        # a letter of mathematics stays as it is
+        # symbols keep their case
         return text[:1].upper() + text[1:] if text.partition(" ")[0] in PROSE else text
 
     def digits(self, text: str) -> str:
@@ -195,8 +195,8 @@ class _Page(Notation):
         return mantissa.replace("1", ten) if mantissa in ("1", "−1") else f"{mantissa}·{ten}"
 
     def powers(self, text: str) -> str:
-        """Write the powers of ten in a sentence that was made for a terminal."""
-        return _FLOAT.sub(lambda found: self.digits(found.group()), text)
+        """Write the powers of ten in a sentence made for the terminal in Unicode."""
+        return _FLOAT.sub(lambda match: self.digits(match.group()), text)
 
 
 PAGE = _Page()
@@ -225,26 +225,26 @@ def number(value: Any, form: str = "norm") -> str:
 
 
 def ceiling(size: float) -> str:
-    """Write a positive number with two digits that are not less than it."""
+    """Write a positive number with two digits, rounded up."""
     unit = 10.0 ** (math.floor(math.log10(size)) - 1)
     return number(math.ceil(size / unit) * unit, "brief")
 
 
 def share(part: float) -> str:
-    """Write a part of a whole: in per cent, or as a power of ten where it is very small."""
+    """Write a fraction in per cent, or as a power of ten if it is tiny."""
     return f"{number(100.0 * part, 'brief')} %" if part >= LEAST_PERCENT else number(part, "brief")
 
 
 def printed(text: str) -> str:
-    """Write a number as a source printed it, digit by digit, a power of ten in Unicode: ``1.120e8``."""
-    found = re.fullmatch(r"\s*(.+?)\s*(?:[eE]|[x*·×]?\s*10\s*\^\s*)\{?([-+]?\d+)\}?\s*", text)
-    if found is None:
+    """Write a number with the digits that a source prints, such as ``1.120e8``, and its power of ten in Unicode."""
+    match = re.fullmatch(r"\s*(.+?)\s*(?:[eE]|[x*·×]?\s*10\s*\^\s*)\{?([-+]?\d+)\}?\s*", text)
+    if match is None:
         return text.strip().replace("-", "−")
-    return f"{found[1]}·{power(int(found[2]))}".replace("-", "−")
+    return f"{match[1]}·{power(int(match[2]))}".replace("-", "−")
 
 
-def like(value: float, text: str) -> str:
-    """Write a number in the manner of a printed one, with `MORE_DIGITS` behind those of `text`."""
+def in_style_of(value: float, text: str) -> str:
+    """Write a number in the notation of the printed `text`, with `MORE_DIGITS` more digits."""
     if not math.isfinite(value):
         return number(value)
     mantissa, _, _ = printed(text).partition("·")
@@ -264,59 +264,59 @@ def _significant(value: float, digits: int, fixed: bool) -> str:
     return f"{mantissa}·{power(int(exponent))}".replace("-", "−", 1)
 
 
-def lowered(level: int) -> str:
+def subscript(level: int) -> str:
     """Write a level as a subscript."""
     return str(level).translate(LOWER)
 
 
-def raised(exponent: float) -> str:
-    """Write an exponent: in Unicode where it is whole."""
+def superscript(exponent: float) -> str:
+    """Write an exponent, as a superscript if it is an integer."""
     return power(int(exponent))[2:] if exponent == int(exponent) else f"^{exponent:g}"
 
 
 def factor(value: float, base: float) -> str:
-    """Write the factor of a rescaled curve, a large one as a power of `base` where it is one; empty for 1."""
+    """Write the factor of a rescaled curve; as a power of `base` if it is a large one, empty for 1."""
     if value == 1.0:
         return ""
     exponent = round(math.log(value, base)) if base > 1.0 and value > 0.0 else 0
     is_power = base == int(base) and math.isclose(value, base**exponent, rel_tol=1e-9)
     if value < 1e3 or not is_power:
         return f"{number(float(value), 'step')} "
-    return f"{int(base)}{raised(exponent)} "
+    return f"{int(base)}{superscript(exponent)} "
 
 
 def interval(bounds: Sequence[float | None] | None) -> str:
-    """Write the interval of an order."""
-    known = [b for b in bounds or () if b is not None and not math.isnan(b)]
-    if len(known) < 2:
+    """Write the interval of an order; a dash if a bound is missing."""
+    ends = [b for b in bounds or () if b is not None and not math.isnan(b)]
+    if len(ends) < 2:
         return "–"
-    if max(map(abs, known)) >= 1e4:
-        return " to ".join(number(end, "order") for end in known)
-    return " to ".join(end.replace("-", "−") for end in order_interval(*known))
+    if max(map(abs, ends)) >= 1e4:
+        return " to ".join(number(end, "order") for end in ends)
+    return " to ".join(end.replace("-", "−") for end in order_interval(*ends))
 
 
 def likely(bounds: Sequence[float | None] | None) -> str:
-    """Write the interval of an order with what it is; empty where there is none."""
+    """Write the interval of an order after the words ``95 % interval``; empty if there is none."""
     text = interval(bounds)
     return f"95 % interval {text}" if text != "–" else ""
 
 
 def with_interval(order: float | None, bounds: Sequence[float | None] | None) -> str:
-    """Write an order, and in brackets its interval."""
+    """Write an order with its interval in brackets."""
     text = interval(bounds)
     return f"{number(order, 'order')}{f' ({text})' if text != '–' else ''}"
 
 
 def levels(window: Sequence[int] | None) -> str:
     """Write the levels that a verdict rests on."""
-    found = [level for level in window or () if level is not None]
-    if not found:
+    ends = [level for level in window or () if level is not None]
+    if not ends:
         return "–"
-    return str(found[0]) if len(found) == 1 else f"{min(found)} to {max(found)}"
+    return str(ends[0]) if len(ends) == 1 else f"{min(ends)} to {max(ends)}"
 
 
 def fact(result: Mapping[str, Any], name: str) -> Any:
-    """Return a fact of a result in a summary; None where it has none."""
+    """Return a fact of a result in a summary; None if it is absent."""
     return (result.get("facts") or {}).get(name)
 
 
@@ -338,8 +338,8 @@ def number_of(result: Mapping[str, Any]) -> float | None:
 
 
 def measured(result: Mapping[str, Any]) -> tuple[Any, ...]:
-    """Return the cells of a result: order, ends of its interval, levels, the number that decides, and `ERROR_FACTS`."""
+    """Return the cells of a result: order, ends of its interval, levels, decisive number, and `ERROR_FACTS`."""
     low, high = interval_of(result) or (None, None)
     window = levels_of(result)
-    of_order = fact(result, "order"), low, high, levels(window) if window else None
-    return (*of_order, number_of(result), *(fact(result, name) for name in vocabulary.ERROR_FACTS))
+    order = fact(result, "order"), low, high, levels(window) if window else None
+    return (*order, number_of(result), *(fact(result, name) for name in vocabulary.ERROR_FACTS))

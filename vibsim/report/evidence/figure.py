@@ -17,7 +17,7 @@ from vibsim.core.array_types import Floats
 from vibsim.core.record import Record
 from vibsim.core.vocabulary import DECISIVE
 from vibsim.report import style, sweep_layout, words
-from vibsim.report.data import Member, is_lean, of_case, pick, place_of, unit
+from vibsim.report.data import Member, case_position, is_lean, of_case, pick, unit
 from vibsim.report.evidence import energy, equal, frame, order, stable, value
 from vibsim.report.evidence.frame import GrowthScale, evidence, usable
 from vibsim.report.style import Picture
@@ -52,7 +52,7 @@ def picture(
 
 
 def _member(record: Record, result: Mapping[str, Any]) -> Member | None:
-    case = place_of(record, result.get("case", -1))
+    case = case_position(record, result.get("case", -1))
     every = [] if case is None else of_case(record, case)
     return next((one for one in every if one.scheme_name == result.get("scheme")), None)
 

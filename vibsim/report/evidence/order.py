@@ -39,7 +39,7 @@ def picture(
     _draw_orders(figure, record, check, member, norm)
     if not has_series:
         return evidence(f"{member.title}: {right_text}", alt, figure)
-    order = data.power(record, member, quantity)
+    order = data.rescaling_order(record, member, quantity)
     how = f"rescaled to coincide where the error has order {order:g}" if order else "as they are"
     left = f"Left: differences between levels of {member.title}, {how}; the finest pair is the thinnest line."
     return evidence(f"{left} Right: {right_text}", alt, figure)

@@ -17,7 +17,7 @@ from vibsim.core.record import Record
 from vibsim.core.vocabulary import HIGHEST
 from vibsim.report import style, words
 from vibsim.report.choice import position
-from vibsim.report.data import Member, at, known, whole
+from vibsim.report.data import Member, at, pick_or_nan, whole
 from vibsim.report.evidence import frame
 from vibsim.report.evidence.frame import brief, evidence, measured, short, usable
 from vibsim.report.style import Picture
@@ -61,7 +61,9 @@ def picture(
     p = at(record, HIGHEST if HIGHEST in record else "omega_dt", member)
     limit = float(at(record, "stability_limit", member))
     run = _Run(levels, levels.index(level), p, limit, style.canvas(1.0))
-    size = known(record, "size_over_exact", ("level",), scheme=member.scheme, case=member.case)
+    size = pick_or_nan(
+        record, "size_over_exact", ("level",), scheme=member.scheme, case=member.case
+    )
     letter = words.symbol(position(experiment))
     found = [_steps(run), _sizes(run, size, letter), _growths(run, record, member, name)]
     texts = [text for text in found if text]

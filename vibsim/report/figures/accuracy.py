@@ -14,7 +14,7 @@ import numpy as np
 from vibsim.core.array_types import Floats
 from vibsim.core.record import Record
 from vibsim.report import data, style, words
-from vibsim.report.data import Member, known, omega_dt
+from vibsim.report.data import Member, omega_dt, pick_or_nan
 from vibsim.report.figures import panels
 from vibsim.report.style import Picture
 from vibsim.report.types import Axes, Experiment
@@ -33,7 +33,7 @@ def frequency(experiment: Experiment, record: Record) -> Picture | None:
     sound = p[np.isfinite(p) & (p > 0.0)]
     if not sound.size or "measured_phase_error" not in record:
         return None
-    limits = known(record, "stability_limit", ("scheme", "case"))
+    limits = pick_or_nan(record, "stability_limit", ("scheme", "case"))
     grid = np.linspace(1e-3, float(sound.max()), POINTS)
     measured = 1.0 / (1.0 - data.phase_error(record, "measured"))
     (ax,) = panels.stacked([3.0])
@@ -90,7 +90,7 @@ def _leading(start: Floats) -> tuple[int, str, float] | None:
         top = "" if abs(near.numerator) == 1 else f"{abs(near.numerator)} "
         below = f"/{near.denominator}" if near.denominator > 1 else ""
     sign = "+" if factor > 0 else "−"
-    return order, f"1 {sign} {top}(w dt){words.raised(order)}{below}", factor
+    return order, f"1 {sign} {top}(w dt){words.superscript(order)}{below}", factor
 
 
 def second_difference(record: Record) -> Picture | None:

@@ -14,7 +14,7 @@ from vibsim.core.array_types import Floats
 from vibsim.core.record import Record
 from vibsim.core.vocabulary import MEMBER
 from vibsim.report import frame, style
-from vibsim.report.data import flags, known, largest, pick, time_label, times, unit, whole
+from vibsim.report.data import flags, largest, pick, pick_or_nan, time_label, times, unit, whole
 from vibsim.report.figures.panels import stacked
 from vibsim.report.style import Picture
 from vibsim.report.types import Axes
@@ -35,7 +35,7 @@ def running(record: Record, case: int) -> Picture | None:
     t, level = times(record, case)[1:], whole(record, "level")[0]
     if not np.isfinite(np.asarray(record[CENTRED], dtype=np.float64)).any():
         return None
-    first = np.abs(known(record, "energy_initial", MEMBER)[:, case])
+    first = np.abs(pick_or_nan(record, "energy_initial", MEMBER)[:, case])
     usable = bool(np.all(first > 0.0))
     # running maxima of the coarsest level, shape (scheme, t), the first time left out
     over = first[:, None] if usable else 1.0

@@ -246,7 +246,7 @@ def _grow(ax: Axes, lines: tuple[Any, ...], size: float) -> None:
 
 def frequency(experiment: Experiment, record: Record) -> Picture | None:
     """Draw local angular frequency and amplitude against the number of the peak; None with fewer than two peaks."""
-    everyone = choice.with_levels(experiment, data.everyone(record))
+    everyone = choice.with_levels(experiment, data.all_members(record))
     runs = runs_of(record, everyone)
     if not runs:
         return None

@@ -103,13 +103,13 @@ def _rows(record: Record, quantity: str, member: Member, most: int) -> list[Row]
         chosen = data.of_case(record, member.case)
         chosen.sort(key=lambda one: one.scheme != member.scheme)
         return [
-            Row(f"{one.scheme_name}, level {levels[0]}", data.of_level(record, quantity, one, 0), None)
+            Row(f"{one.scheme_name}, level {levels[0]}", data.state_on_level(record, quantity, one, 0), None)
             for one in chosen[:most]
         ]  # fmt: skip
     rows = []
     for i in style.spaced(len(levels), most):
         steps = words.number(int(record["steps"][i]), "integer")
-        values = data.of_level(record, quantity, member, i)
+        values = data.state_on_level(record, quantity, member, i)
         rows.append(Row(f"{steps} steps", values, style.of_level(levels[i])))
     return rows
 

@@ -27,9 +27,9 @@ Draw = Callable[[Experiment, Record, Lead], Picture | None]
 
 
 DRAWN: Mapping[str, Draw] = {
-    "phase_plane": lambda e, r, _: plane.phase(e, r, data.everyone(r)),
-    "path": lambda e, r, _: plane.path(e, r, data.everyone(r)),
-    "peaks": lambda e, r, _: extrema.local(e, r, data.everyone(r)),
+    "phase_plane": lambda e, r, _: plane.phase(e, r, data.all_members(r)),
+    "path": lambda e, r, _: plane.path(e, r, data.all_members(r)),
+    "peaks": lambda e, r, _: extrema.local(e, r, data.all_members(r)),
     "local_frequency": lambda e, r, _: extrema.frequency(e, r),
     "growth": lambda e, r, _: theory.growing(e, r),
     "frequency": lambda e, r, _: accuracy.frequency(e, r),
@@ -41,7 +41,7 @@ DRAWN: Mapping[str, Draw] = {
     "grids": lambda e, r, _: model_curves.grids(r),
     "spring": lambda e, r, _: model_curves.spring(e, r),
     "spectrum": lambda e, r, lead: spectra.spectrum(e, r, lead.member),
-    "poincare": lambda e, r, _: spectra.poincare(e, r, data.everyone(r)),
+    "poincare": lambda e, r, _: spectra.poincare(e, r, data.all_members(r)),
 }
 """What draws each kind, but those over time, which have options, and the player."""
 OF_RECORD = ("local_frequency", "frequency", "second_difference", "grids")

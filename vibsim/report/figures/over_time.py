@@ -50,7 +50,7 @@ def pictures(
     experiment: Experiment, record: Record, figure: FigureOfSource, name: str
 ) -> list[Picture]:
     """Return the figures that are asked for, one or one for each value of what `asked.each` names."""
-    everyone = choice.with_levels(experiment, data.everyone(record))
+    everyone = choice.with_levels(experiment, data.all_members(record))
     groups = _divided(record, everyone, figure.each)
     found = []
     for k, i in enumerate(style.spaced(len(groups), MOST)):
@@ -109,7 +109,7 @@ def _picture(
 def _is_thinned(record: Record, figure: FigureOfSource, members: list[Member]) -> bool:
     """Say whether figures, panels or runs are left out."""
     is_by_level = figure.panels == LEVEL
-    figures = _divided(record, data.everyone(record), figure.each)
+    figures = _divided(record, data.all_members(record), figure.each)
     groups = _divided(record, members, None if is_by_level else figure.panels)
     levels = data.whole(record, "level") if is_by_level else []
     runs = max(len(group) for _, group in groups)

@@ -16,7 +16,7 @@ from vibsim.core.record import Record
 from vibsim.core.vocabulary import MEMBER, OF_LEVEL
 from vibsim.report import choice, data, frame, style, words
 from vibsim.report.choice import position
-from vibsim.report.data import Member, known, omega_dt
+from vibsim.report.data import Member, omega_dt, pick_or_nan
 from vibsim.report.figures.panels import stacked
 from vibsim.report.style import Picture
 from vibsim.report.tables.theory import predicted
@@ -45,13 +45,15 @@ def order_and_stability(experiment: Experiment, record: Record) -> Picture | Non
     p = omega_dt(record)
     if not predicted(record) or np.unique(p[np.isfinite(p) & (p > 0.0)]).size < 2:
         return None
-    growth = [known(record, f"{who}_growth", OF_LEVEL) - 1.0 for who in ("theory", "measured")]
+    growth = [
+        pick_or_nan(record, f"{who}_growth", OF_LEVEL) - 1.0 for who in ("theory", "measured")
+    ]
     phase = [data.phase_error(record, who) for who in ("theory", "measured")]
     axes = stacked([2.9, 2.9])
     lowest, highest = float(np.min(style.finite(p[p > 0.0]))), float(np.nanmax(p))
     grid = np.geomspace(0.9 * lowest, 1.1 * highest, CURVE_POINTS)
     curves = [_theory(experiment, s, grid) for s in range(len(record["scheme"]))]
-    limits = known(record, "stability_limit", MEMBER)[:, 0]
+    limits = pick_or_nan(record, "stability_limit", MEMBER)[:, 0]
     for k, (ax, (from_theory, measured)) in enumerate(zip(axes, (growth, phase), strict=True)):
         # what has no theory, such as an adaptive scheme, has no place over w dt
         found = np.where(np.isnan(from_theory), np.nan, measured)
@@ -193,7 +195,7 @@ def growing(experiment: Experiment, record: Record) -> Picture | None:
     sizes, reference = [], 0.0
     for k, (member, level) in enumerate(runs):
         t, colour = data.times(record, member.case), style.look(k)["color"]
-        values = data.of_level(record, quantity, member, level)
+        values = data.state_on_level(record, quantity, member, level)
         exact = data.exact_series(record, quantity, member)
         most = data.largest(exact)
         reference = max(reference, most)
@@ -243,10 +245,10 @@ def growing(experiment: Experiment, record: Record) -> Picture | None:
 
 def _unstable(record: Record) -> list[tuple[Member, int]]:
     """Choose the unstable runs, from the slowest growth to the fastest."""
-    growth = known(record, "theory_growth", OF_LEVEL)
-    limit, product = known(record, "stability_limit", MEMBER), omega_dt(record)
+    growth = pick_or_nan(record, "theory_growth", OF_LEVEL)
+    limit, product = pick_or_nan(record, "stability_limit", MEMBER), omega_dt(record)
     found: list[tuple[float, Member, int]] = []
-    for member in data.everyone(record):
+    for member in data.all_members(record):
         most = float(limit[member.scheme, member.case])
         for i, factor in enumerate(growth[member.scheme, member.case].tolist()):
             is_beyond = 0.0 < most <= product[member.case, i] * (1.0 + 1e-9)

@@ -34,7 +34,7 @@ def name_of_differences(quantity: str, member: Member) -> str:
 
 def overlay(record: Record, quantity: str, member: Member) -> Picture:
     """Draw the rescaled level differences of a quantity, their spread, ratio and order over time."""
-    t, order = data.times(record, member.case), data.power(record, member, quantity)
+    t, order = data.times(record, member.case), data.rescaling_order(record, member, quantity)
     letter, measure = words.symbol(quantity), data.unit(record, f"{quantity}_difference")
     levels, good = data.whole(record, "level"), data.sound_triples(record, quantity, member)
     curves = differences(record, quantity, member)
@@ -50,7 +50,7 @@ def overlay(record: Record, quantity: str, member: Member) -> Picture:
     if orders:
         _draw_orders(axes[-1], t, record, quantity, member, good)
     axes[-1].set_xlabel(data.time_label(record))
-    law = f"dt{words.raised(order)}" if order != 1.0 else "dt"
+    law = f"dt{words.superscript(order)}" if order != 1.0 else "dt"
     what = f", {_multiplied(order, levels)}; if the error shrinks as {law}, the curves fall on one another."
     if math.isinf(data.formal_order(record, member, quantity)):
         what = ". The scheme is exact in this quantity, so nothing is rescaled and what is seen is round-off."
@@ -58,7 +58,7 @@ def overlay(record: Record, quantity: str, member: Member) -> Picture:
         name=name_of_differences(quantity, member),
         title=f"Do the levels agree? {words.title(quantity)}, {member.title}",
         caption=style.sentences(
-            f"{letter}{words.lowered(levels[0])} is {letter} on level {levels[0]}, and so on. Top: the differences "
+            f"{letter}{words.subscript(levels[0])} is {letter} on level {levels[0]}, and so on. Top: the differences "
             f"between successive levels{what}",
             f"Then {SPREAD}" * spread,
             "Below it: their ratio, which should settle at the dashed line; none near a zero crossing."
@@ -77,7 +77,7 @@ def overlay(record: Record, quantity: str, member: Member) -> Picture:
 def energy(record: Record, member: Member) -> Picture:
     """Draw the energy deviation of every level times ``(2**p)**k``: convergence to conservation."""
     name, levels = "energy_deviation", data.whole(record, "level")
-    order = data.power(record, member, name)
+    order = data.rescaling_order(record, member, name)
     measure, t = data.unit(record, f"{name}_scaled"), data.times(record, member.case)
     above = data.sound_pairs(record, name, member) if len(levels) > 1 else [True]
     # the error of the finest level is seen in the difference from the one before it
@@ -86,7 +86,7 @@ def energy(record: Record, member: Member) -> Picture:
     for i in _few(above):
         values = data.at(record, f"{name}_scaled", member, level=i)
         factor = words.factor(float(gap_ratio(order, levels[i] - levels[0])), 2.0**order)
-        text = f"{factor}ΔE{words.lowered(levels[i])}"
+        text = f"{factor}ΔE{words.subscript(levels[i])}"
         lost = _lost(record, name, member, [i])
         curves.append(panels.Curve(text, values, above[i], lost, style.of_level(levels[i])))
     spread = panels.comparable(curves)
@@ -100,8 +100,8 @@ def energy(record: Record, member: Member) -> Picture:
         name=f"conservation_{member.stem}",
         title=f"Convergence to conservation: {member.title}",
         caption=style.sentences(
-            f"ΔE{words.lowered(levels[0])} is ΔE on level {levels[0]}, and so on. The exact energy is constant, so ΔE "
-            "itself is an error.",
+            f"ΔE{words.subscript(levels[0])} is ΔE on level {levels[0]}, and so on. The exact energy is constant, so "
+            "ΔE itself is an error.",
             "The scheme conserves the energy exactly: what is seen is round-off."
             if math.isinf(data.formal_order(record, member, name))
             else f"Multiplied by {2.0**order:g} for each level the curves should coincide; look at the last point "
@@ -115,11 +115,11 @@ def energy(record: Record, member: Member) -> Picture:
 
 def differences(record: Record, quantity: str, member: Member) -> list[panels.Curve]:
     """Return the level differences, rescaled so that errors ``C dt**p`` make them coincide; at most `MOST_CURVES`."""
-    order, levels = data.power(record, member, quantity), data.whole(record, "level")
+    order, levels = data.rescaling_order(record, member, quantity), data.whole(record, "level")
     above, letter = data.sound_pairs(record, quantity, member), words.symbol(quantity)
     curves = []
     for i in _few(above):
-        gap = f"{letter}{words.lowered(levels[i])} − {letter}{words.lowered(levels[i + 1])}"
+        gap = f"{letter}{words.subscript(levels[i])} − {letter}{words.subscript(levels[i + 1])}"
         factor = words.factor(float(rescaling(order, levels[: i + 2])), 2.0**order)
         values = data.at(record, f"{quantity}_rescaled", member, pair=i)
         lost = _lost(record, quantity, member, [i, i + 1])
@@ -163,7 +163,7 @@ def _few(sound: list[bool]) -> list[int]:
 def _draw_ratios(
     ax: Axes, t: Floats, record: Record, quantity: str, member: Member, good: list[bool]
 ) -> None:
-    levels, order = data.whole(record, "level"), data.power(record, member, quantity)
+    levels, order = data.whole(record, "level"), data.rescaling_order(record, member, quantity)
     drawn: list[Floats] = []
     lost = [_lost(record, quantity, member, [i, i + 1, i + 2]) for i in range(len(good))]
     for k, i in enumerate(_few(good)):

@@ -16,7 +16,16 @@ from vibsim.core.record import Record
 from vibsim.experiment.cost import ONE_SECONDS
 from vibsim.report import style, words
 from vibsim.report.choice import position
-from vibsim.report.data import Member, at, case_name, ends_of, known, natural_frequency, unit, whole
+from vibsim.report.data import (
+    Member,
+    at,
+    case_name,
+    ends_of,
+    natural_frequency,
+    pick_or_nan,
+    unit,
+    whole,
+)
 from vibsim.report.figures.panels import legend_above, rows_of
 from vibsim.report.style import Picture
 from vibsim.report.tables.table import Cell, Column, Table
@@ -31,7 +40,7 @@ def precision(experiment: Experiment, record: Record, case: int) -> Picture | No
     figure, axes = rows_of(3, [(0.675 + 2.835 * i, 2.565) for i in range(3)], 3.1, 0.4, 0.55)
     for ax in axes[1:]:
         ax.sharey(axes[0])
-    floor = float(known(record, "work_reference_error", ("case",))[case])
+    floor = float(pick_or_nan(record, "work_reference_error", ("case",))[case])
     for k, ax in enumerate(axes):
         for i, line in enumerate(found):
             look = style.look(i) | {"markersize": 4.5, "linewidth": 1.0}

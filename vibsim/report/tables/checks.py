@@ -71,7 +71,7 @@ def results(record: Record, check: Mapping[str, Any], unit: str) -> Table | None
 
 def member(record: Record, case: int) -> str:
     """Name a member by its global index; empty where the record does not have it."""
-    place = data.place_of(record, case)
+    place = data.case_position(record, case)
     return "" if place is None else data.case_name(record, place)
 
 

@@ -16,7 +16,7 @@ from vibsim.core.array_types import Flags, Floats
 from vibsim.core.record import Record
 from vibsim.core.vocabulary import MEMBER, OF_LEVEL, ORDER_TOLERANCE, TYPICAL_NORM
 from vibsim.report import data, frame, style, words
-from vibsim.report.data import Member, known, time_unit, unit, whole
+from vibsim.report.data import Member, pick_or_nan, time_unit, unit, whole
 from vibsim.report.tables.table import Cell, Column, Table, Written
 
 OWN, CENTRED = "energy_deviation_max_abs", "energy_deviation_d2t_max_abs"
@@ -78,7 +78,7 @@ def orders(
     notes = {member: _notes(record, quantity, member, n) for member in shown}
 
     def of(name: str) -> Fill:
-        found = known(record, f"{quantity}_{name}", (*MEMBER, "level"), norm=n)
+        found = pick_or_nan(record, f"{quantity}_{name}", (*MEMBER, "level"), norm=n)
         return lambda m, i: float(found[m.scheme, m.case, i]) if i < found.shape[2] else math.nan
 
     filled = (
@@ -100,7 +100,7 @@ def _notes(record: Record, quantity: str, member: Member, norm: int) -> list[str
     """Say of every row whether the stated order rests on the three levels that start there."""
     levels, (first, last) = whole(record, "level"), data.window(record, quantity, member)
     stated, *_ = data.stated_order(record, quantity, member, norm)
-    orders = known(record, f"{quantity}_observed_order", (*MEMBER, "level"), norm=norm)
+    orders = pick_or_nan(record, f"{quantity}_observed_order", (*MEMBER, "level"), norm=norm)
     own = orders[member.scheme, member.case]
     above = data.sound_pairs(record, quantity, member) if len(levels) > 1 else []
     notes = []
@@ -131,7 +131,7 @@ def maxima(record: Record, shown: Sequence[Member]) -> Table | None:
     ):
         # lean records leave the second out
         if name in record:
-            values, is_sound = known(record, name, OF_LEVEL), record["status"] == 0
+            values, is_sound = pick_or_nan(record, name, OF_LEVEL), record["status"] == 0
             filled.append((Column(text, measure, "norm"), _cells(values)))
             if several:
                 filled.append((Column(ratio, form="order"), _cells(_ratios(values, is_sound))))
@@ -150,7 +150,7 @@ def _ratios(values: Floats, is_sound: Flags) -> Floats:
 
 def scalars(record: Record, shown: Sequence[Member]) -> Table | None:
     """Return period, amplitude and the period's error on every level."""
-    period, exact = known(record, "period", OF_LEVEL), data.exact_periods(record)
+    period, exact = pick_or_nan(record, "period", OF_LEVEL), data.exact_periods(record)
     if not np.isfinite(period).any():
         return None
     time, angle = unit(record, "period"), unit(record, "amplitude")
@@ -168,18 +168,18 @@ def scalars(record: Record, shown: Sequence[Member]) -> Table | None:
 
 def velocities(record: Record) -> Table | None:
     """Return the largest relative energy error with both velocities; None where no scheme has one of its own."""
-    if CENTRED not in record or not np.isfinite(known(record, CENTRED, OF_LEVEL)).any():
+    if CENTRED not in record or not np.isfinite(pick_or_nan(record, CENTRED, OF_LEVEL)).any():
         return None
-    first = style.positive(np.abs(known(record, "energy_initial", MEMBER)))[..., None]
+    first = style.positive(np.abs(pick_or_nan(record, "energy_initial", MEMBER)))[..., None]
     own, centred, interior = (
-        known(record, name, OF_LEVEL) / first for name in (OWN, CENTRED, f"{OWN}_interior")
+        pick_or_nan(record, name, OF_LEVEL) / first for name in (OWN, CENTRED, f"{OWN}_interior")
     )
     # the velocity of a scheme without another one is the centred difference, but at the last step
     is_same = np.asarray(np.isnan(centred).all(axis=-1))
     second = np.where(is_same[..., None], interior, centred)
     is_named = "energy_drift_kind" in record
     kinds = data.flags(record, "energy_drift_kind") if is_named else np.full(own.shape, "")
-    rates = known(record, "energy_drift_rate", OF_LEVEL)
+    rates = pick_or_nan(record, "energy_drift_rate", OF_LEVEL)
 
     def quotient(member: Member, i: int) -> Cell:
         place = member.scheme, member.case, i
@@ -205,7 +205,7 @@ def velocities(record: Record) -> Table | None:
         (Column("second over first", form="norm"), quotient),
         (Column("drift of the energy, own velocity"), drift) if is_named else None,
     )
-    return by_level(record, "energy_velocities", caption, data.everyone(record), filled)
+    return by_level(record, "energy_velocities", caption, data.all_members(record), filled)
 
 
 def _plain(quotient: float) -> Cell:
@@ -220,7 +220,7 @@ def _plain(quotient: float) -> Cell:
 def events(record: Record) -> Table | None:
     """Return number and times of impacts, turns of friction and rest; None where there are none."""
     count, first, last, rest = (
-        known(record, name, OF_LEVEL)
+        pick_or_nan(record, name, OF_LEVEL)
         for name in ("event_count", "first_event_time", "last_event_time", "rest_time")
     )
     if not (count > 0.0).any():
@@ -245,4 +245,4 @@ def events(record: Record) -> Table | None:
         (Column("at rest from", seconds, "value"), _cells(rest)) if has_rest else None,
         (Column("last, less that of the next finer level", seconds, "small"), change),
     )
-    return by_level(record, "events", caption, data.everyone(record), filled)
+    return by_level(record, "events", caption, data.all_members(record), filled)

@@ -99,7 +99,7 @@ def _row(
 ) -> Iterator[Cell]:
     headers = [column.header for column in columns]
     # without a member it is the first
-    case = 0 if row.at.case is None else data.place_of(record, row.at.case) or 0
+    case = 0 if row.at.case is None else data.case_position(record, row.at.case) or 0
     if row.at.swept:
         case = int(np.argmax(members_with(columns_of(record), row.at.swept, len(record["case"]))))
     scheme = record.words("scheme").index(row.scheme)
@@ -114,7 +114,7 @@ def _row(
     yield from (getattr(row.at, key) for key in PLACES if key in headers)
     yield from (row.at.swept.get(header) for header in headers if "." in header)
     yield row.printed
-    yield Written(ours, words.like(ours, row.printed))
+    yield Written(ours, words.in_style_of(ours, row.printed))
     yield ours - row.meaning.number
     yield _agrees(checks.get(name, {}).get("status"), row)
     if table.beside:

@@ -1,1 +1,1 @@
-"""The words of a page."""
+"""The sentences of a page."""

@@ -10,49 +10,47 @@ from vibsim.core.vocabulary import TYPICAL_NORM
 from vibsim.report import words
 from vibsim.report.types import Check, ConvergesCheck, Experiment, Measurement
 
-PLACES = ("t", "step", "level", "scheme", "case")  # where a number may be taken
+PLACES = ("t", "step", "level", "scheme", "case")  # keys that locate a number
 STABLE = {
     True: "stability: the amplitude grows by no more than an error that vanishes with dt",
     False: "instability: the amplitude grows by more than an error that vanishes with dt",
 }
-"""What is said of a check for stability: Forward Euler, whose growth refinement cures, is not unstable."""
+"""Words for a check for stability; Forward Euler, whose growth vanishes under refinement, is not unstable."""
 DRIFTS = {
     "none": "is conserved up to round-off",
     "bounded": "has an error that stays bounded",
     "linear": "has an error that grows like t",
     "quadratic": "has an error that grows like t²",
 }
-"""What is said of the energy for every kind of drift."""
+"""Kind of drift to the words on the energy."""
 SOLUTIONS = {"exact": "the exact solution", "discrete": "the exact solution of its own steps"}
-"""What a solution may be compared with, beside that of another scheme."""
-
-
+"""Words for the solutions that may be compared with one, besides those of other schemes."""
 OF_TOLERANCE = "Error of the extrapolated solution, in the unit of each state, at every stored time"
 
 
 def about(check: Check | None) -> str:
-    """Return in one line what a check is about: a statement, what it measures, or of no check the tolerance."""
+    """Return the subject of a check in one line: its claim or what it measures; without a check, the tolerance."""
     if check is None:
         return OF_TOLERANCE
     if check.kind == "claim":
         return f"“{check.claim}”"
     if check.kind == "converges":
-        return f"Order of {words.title(check.converges)}{_of_norm(check)}"
+        return f"Order of {words.title(check.converges)}{_norm_and_schemes(check)}"
     if check.kind == "accurate":
         only = f" ({_listed(check.schemes)})" if check.schemes else ""
         return f"Error of {words.title(check.accurate)} at the finest level{only}"
     return words.PAGE.opening(subject(check))
 
 
-def _of_norm(check: ConvergesCheck) -> str:
-    """Say in brackets in which norm, unless it is the usual one, and which schemes an order is about."""
+def _norm_and_schemes(check: ConvergesCheck) -> str:
+    """Write in brackets the norm, unless it is the typical one, and the schemes of a check of an order."""
     parts = [] if check.norm == TYPICAL_NORM else [words.NORMS[check.norm]]
     parts += [_listed(check.schemes)] if check.schemes else []
     return f" ({', '.join(parts)})" if parts else ""
 
 
 def wanted(experiment: Experiment, check: Measurement | None, promised: float | None = None) -> str:
-    """Say in a few words what is asked for, of no check the tolerance; `promised` is the order of the scheme."""
+    """Say in a few words what a check expects; without a check, the tolerance. `promised` is the scheme's order."""
     if check is not None and check.kind == "conserves":
         return DRIFTS[check.drift]
     if check is None or check.kind != "converges":
@@ -64,15 +62,15 @@ def wanted(experiment: Experiment, check: Measurement | None, promised: float | 
 
 
 def source(check: Check | None) -> str:
-    """Return where a claim stands and what measures it; empty for the other kinds."""
+    """Return the source of a claim and what measures it; empty for other kinds of checks."""
     if check is None or check.kind != "claim":
         return ""
-    stands = f"{check.source}. " if check.source else ""
-    return f"{stands}Measured by: {measured(check.that)}."
+    origin = f"{check.source}. " if check.source else ""
+    return f"{origin}Measured by: {measured(check.that)}."
 
 
 def measured(check: Measurement) -> str:
-    """Return what a check measures, and what is expected of it."""
+    """Say what a check measures and expects."""
     match check.kind:
         case "converges":
             order = (
@@ -93,18 +91,20 @@ def measured(check: Measurement) -> str:
             return f"{statement}{_where(check)}"
         case "value":
             bounds = {"equals": check.equals, "is below": check.below, "is above": check.above}
-            given = [
+            conditions = [
                 f" {verb} {words.PAGE.number(x, 15)}" for verb, x in bounds.items() if x is not None
             ]
-            near = (("rtol", check.rtol), ("atol", check.atol))
-            tolerances = [f"{key} {words.PAGE.number(x)}" for key, x in near if x is not None]
+            tolerance_keys = (("rtol", check.rtol), ("atol", check.atol))
+            tolerances = [
+                f"{key} {words.PAGE.number(x)}" for key, x in tolerance_keys if x is not None
+            ]
             extra = f" ({', '.join(tolerances)})" if tolerances else ""
-            return f"{subject(check)}{given[0] if given else ' '}{extra}"
+            return f"{subject(check)}{conditions[0] if conditions else ' '}{extra}"
         case "stable":
             return f"{STABLE[check.stable]}{_where(check)}"
         case "conserves":
-            own = "the scheme's own velocity" if check.conserves == "energy" else "[D₂ₜu]"
-            return f"the energy by {own} {DRIFTS[check.drift]}{_where(check)}"
+            velocity = "the scheme's own velocity" if check.conserves == "energy" else "[D₂ₜu]"
+            return f"the energy by {velocity} {DRIFTS[check.drift]}{_where(check)}"
         case "equal":
             other = SOLUTIONS.get(check.second, check.second)
             within = "round-off" if check.atol is None else words.PAGE.number(check.atol)
@@ -113,7 +113,7 @@ def measured(check: Measurement) -> str:
 
 
 def subject(check: Measurement) -> str:
-    """Return what is measured, and where, without what is expected of a number or of a difference."""
+    """Say what a check measures, and where; of a number or a difference without its expected value."""
     if check.kind == "equal":
         return f"{words.title(check.quantity)} by {check.first}{_where(check)}"
     if check.kind != "value":
@@ -130,7 +130,7 @@ def subject(check: Measurement) -> str:
 
 
 def _where(check: Measurement) -> str:
-    """Say in brackets which schemes, which level and which member a check is about."""
+    """Write in brackets the schemes, the level and the member of a check."""
     names = getattr(check, "schemes", None)
     parts = [_listed(names)] if names else []
     places = ((key, getattr(check, key, None)) for key in ("level", "case"))
@@ -140,7 +140,7 @@ def _where(check: Measurement) -> str:
 
 
 def swept_values(check: Measurement) -> list[str]:
-    """Name the swept values of the members that a check is about."""
+    """Return the swept values that select the members of a check, as ``key = value``."""
     return [
         f"{key} = {value if isinstance(value, str) else words.number(value, 'step')}"
         for key, value in check.swept.items()

@@ -1,4 +1,4 @@
-"""Terms that a student may not know, explained where the pointer or the focus rests on them."""
+"""Terms that a student may not know, with explanations for pointer and focus."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ GLOSSARY = {
     "as claimed": "A statement of a text that holds in this measurement.",
     "refuted": "A statement that does not hold, as the experiment expects.",
 }  # fmt: skip
-"""Term, in small letters, to its meaning."""
+"""Term in lower case to its meaning."""
 _TERMS = re.compile(
     rf"(?<!\w)({'|'.join(sorted(map(re.escape, GLOSSARY), key=len, reverse=True))})(?!\w)",
     re.IGNORECASE,
@@ -35,17 +35,17 @@ _TERMS = re.compile(
 
 
 def explained(text: str) -> Any:
-    """Return a text as markup in which each term of the glossary carries its meaning, where it stands first."""
+    """Return a text as markup in which the first occurrence of each term of the glossary carries its meaning."""
     from markupsafe import Markup, escape
 
     explained, pieces, end = set[str](), [], 0
-    for found in _TERMS.finditer(text):
-        word = found[1].lower()
+    for match in _TERMS.finditer(text):
+        word = match[1].lower()
         if word in explained:
             continue
         explained.add(word)
-        pieces += [escape(text[end : found.start()]), term(found[1], GLOSSARY[word])]
-        end = found.end()
+        pieces += [escape(text[end : match.start()]), term(match[1], GLOSSARY[word])]
+        end = match.end()
     return Markup("").join([*pieces, escape(text[end:])])
 
 

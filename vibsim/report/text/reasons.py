@@ -1,4 +1,4 @@
-"""What the reason of a verdict means and what would settle the question, for who meets it for the first time."""
+"""What the reason of a verdict means and what would settle the question, for first-time readers."""
 
 from __future__ import annotations
 
@@ -91,7 +91,7 @@ _NUMBERS = {
     "scheme": "Nothing more. It follows from the equations of the scheme or the model, without a run.",
     "counted": "Nothing more. It is a count, and exact.",
 }
-"""What a number that is as expected needs: of several levels, of one, of none, and one that is counted."""
+"""Needs of a number that is as expected: from several levels, from one, from the scheme alone, or a count."""
 _BY_KIND = {
     "stable": Reason(
         "The growth of the amplitude is as the check expects.",
@@ -126,10 +126,10 @@ _OF_PROMISE = {
         "Nothing more. The levels show the order that they should. Ask for the order of the scheme.",
     ),
 }
-"""What an order means that is not the one of the check, but the one of the scheme."""
+"""Explanation of an order that differs from that of the check, but is the one of the scheme."""
 
 REFUTED = "The measurement contradicts the statement, as expected."
-"""What it means that a claim matches which is expected to be false."""
+"""Meaning of a match for a claim that is expected to be false."""
 
 _OF_TOLERANCE = {
     "match": Reason(
@@ -148,10 +148,10 @@ _OF_TOLERANCE = {
 def reason(
     word: str | None, kind: str, value: str = "", levels: int = 2, is_promised: bool = False
 ) -> Reason:
-    """Return the explanation of a reason for a kind of measurement; empty words for one that has none.
+    """Return the explanation of a reason for a kind of measurement; empty if it has none.
 
-    `value` is what a ``value`` check measures, on so many `levels`; `is_promised` says whether an order that is not the
-    one of the check is the one that the scheme promises.
+    `value` is the number of a ``value`` check, measured on `levels` levels; `is_promised` says whether an order that
+    misses the one of the check is the one that the scheme promises.
     """
     if is_promised and word in _OF_PROMISE:
         return _OF_PROMISE[word]
@@ -160,10 +160,10 @@ def reason(
     if word == "match" and kind in _BY_KIND:
         return _BY_KIND[kind]
     if word == "match" and kind != "converges":
-        of = "several" if levels > 1 else "one"
+        origin = "several" if levels > 1 else "one"
         if value and not VALUES[value].depends_on_level:
-            of = "scheme"
+            origin = "scheme"
         if value and VALUES[value].is_count_of_work:
-            of = "counted"
-        return Reason("The measured number is as expected.", _NUMBERS[of])
+            origin = "counted"
+        return Reason("The measured number is as expected.", _NUMBERS[origin])
     return REASONS.get(word or "", Reason("", ""))

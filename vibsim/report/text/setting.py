@@ -14,18 +14,18 @@ from vibsim.report import data, words
 from vibsim.report.text import structure
 from vibsim.report.types import Axis, Experiment, SchemeSpec
 
-LISTED = 8  # most values of a key that are written out
+LISTED = 8  # most values of a key in a list
 NO_LETTERS: Mapping[str, str] = {}
 
 
 def not_in_file(settings: Sequence[str]) -> Iterator[tuple[str, str]]:
-    """Yield what the command line gave in place of values of the file."""
+    """Yield the values that the command line set in place of those of the file."""
     if settings:
         yield "Not as in the file", f"the run had{set_options(settings)}"
 
 
 def setup(experiment: Experiment, record: Record) -> Iterator[tuple[str, str]]:
-    """Yield what was computed as pairs of a term and its text."""
+    """Yield the setup of a run as pairs of term and text."""
     model = experiment.model.definition
     axes = experiment.sweep.axes if experiment.sweep else ()
     keys = {key for axis in axes for key in axis.keys}
@@ -47,12 +47,14 @@ def setup(experiment: Experiment, record: Record) -> Iterator[tuple[str, str]]:
         ]
         yield "Units of the file", ", ".join(text.rstrip() for text in conversions)
     if (scaling := experiment.scaling) is not None:
-        # everything else on the page is in characteristic units
+        # the rest of the page is dimensionless
         parameters = _listing("model", scaling.parameters, sizes)
         initial = _listing("initial", scaling.initial, units)
-        rest = "the run uses the scales of the table below, and every other number is dimensionless"
-        given = f"the file has {parameters}; {initial}; end = {_plain(scaling.end)} s"
-        yield "Scaled", f"{given}; {rest}"
+        remark = (
+            "the run uses the scales of the table below, and every other number is dimensionless"
+        )
+        original = f"the file has {parameters}; {initial}; end = {_plain(scaling.end)} s"
+        yield "Scaled", f"{original}; {remark}"
         sizes, units = {}, {}
     yield "Parameters", _listing("model", experiment.model.parameters, sizes, keys, letters)
     yield "Initial values", _listing("initial", experiment.initial, units, keys)
@@ -72,7 +74,7 @@ def setup(experiment: Experiment, record: Record) -> Iterator[tuple[str, str]]:
 
 
 def _scheme(spec: SchemeSpec, swept: set[str]) -> str:
-    """Write a scheme: its name, its kind where that is another word, and its options."""
+    """Write a scheme: its name, its kind if that differs, and its options."""
     options = []
     for key, value in spec.options.items():
         if f"schemes.{spec.name}.{key}" in swept:
@@ -93,8 +95,8 @@ def _times(experiment: Experiment, record: Record) -> Iterator[tuple[str, str]]:
     run = levels == list(range(levels[0], levels[-1] + 1))
     named = words.levels(levels) if run else ", ".join(map(str, levels))
     sizes = [words.number(float(value), "step") for value in (dt.max(), dt.min())]
-    # of a single level there is one number of steps, and one step
-    steps, sizes = (ends[: len(levels)] for ends in ([counts[0], counts[-1]], sizes))
+    # a single level has one number of steps and one step size
+    steps, sizes = (pair[: len(levels)] for pair in ([counts[0], counts[-1]], sizes))
     yield "Levels", f"{named}: {' to '.join(steps)} steps, dt = {' to '.join(sizes)} {time}"
     if "omega_dt" in record:
         last = 0.0
@@ -103,7 +105,7 @@ def _times(experiment: Experiment, record: Record) -> Iterator[tuple[str, str]]:
             (HIGHEST, "Highest w dt", "frequency of the fastest oscillation"),
         ):
             largest = data.largest(np.asarray(record[name], np.float64)) if name in record else 0.0
-            # a ball in free fall has no frequency, and one oscillation alone is the fastest one, too
+            # a ball in free fall has no frequency; of a single oscillation both frequencies are the same
             if largest > 0.0 and largest != last:
                 last = largest
                 yield term, f"at most {words.number(largest)} ({text} times step)"
@@ -113,7 +115,7 @@ def _listing(
     section: str, values: Mapping[str, Any], units: Mapping[str, str], swept: Collection[str] = (),
     letters: Mapping[str, str] = NO_LETTERS,
 ) -> str:  # fmt: skip
-    """List values by their keys; those with a letter in the equation by that, and by the key if it is another word."""
+    """List values by their letters in the equation, with the key if it differs, or by the key alone."""
     parts = []
     for key, value in values.items():
         name = letters.get(key, key)
@@ -127,7 +129,7 @@ def _listing(
 
 
 def _plain(value: Any) -> str:
-    # 0.0 in place of -0.0, which a formula may give
+    # writes -0.0, which a formula may give, as 0
     return f"{value + 0.0:.10g}" if isinstance(value, float) else str(value)
 
 

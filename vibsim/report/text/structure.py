@@ -1,4 +1,4 @@
-"""A linear structure in words, and as its section stands in an experiment file."""
+"""A linear structure in words, and as the section of an experiment file."""
 
 from __future__ import annotations
 
@@ -10,35 +10,37 @@ from vibsim.report import words
 from vibsim.report.types import ArraySpec, StructureSpec
 
 MOST_SHOWN = 6
-"""Natural frequencies that are listed, and rows of a matrix."""
+"""Most natural frequencies and damping ratios that are listed."""
 WORDS = {"mass": "M", "stiffness": "K", "damping": "C"}
 
 
 def as_written(spec: StructureSpec, formulas: Mapping[str, str]) -> dict[str, Any]:
-    """Return what the section ``model`` has beside its kind, its damping of Rayleigh and its parameters."""
-    found: dict[str, Any] = {key: _array(row) for key, row in spec.arrays.items() if "." not in key}
+    """Return the content of the section ``model`` apart from kind, Rayleigh damping and parameters."""
+    section: dict[str, Any] = {
+        key: _array(row) for key, row in spec.arrays.items() if "." not in key
+    }
     if spec.ratios:
         is_same = len(set(spec.ratios)) == 1 and len(spec.ratios) > 1
-        found["damping_ratios"] = spec.ratios[0] if is_same else spec.ratios
+        section["damping_ratios"] = spec.ratios[0] if is_same else spec.ratios
     shapes = {key: row for key, row in spec.arrays.items() if key.startswith(f"{LOAD}.")}
     if shapes:
         factors = {key: formulas.get(key) or _table(spec, key) for key in shapes}
         rows = [(row.entries, factors[key]) for key, row in shapes.items()]
         if all(len(entries) == 1 and entries[0][1] == 1.0 for entries, _ in rows):
-            found[LOAD] = {str(entries[0][0]): factor for entries, factor in rows}
+            section[LOAD] = {str(entries[0][0]): factor for entries, factor in rows}
         else:
             ((key, row),) = shapes.items()
-            found[LOAD] = {"shape": _array(row), "times": factors[key]}
+            section[LOAD] = {"shape": _array(row), "times": factors[key]}
     for key, row in spec.arrays.items():
         if key.startswith("start."):
-            found.setdefault("start", {})[key.removeprefix("start.")] = _array(row)
+            section.setdefault("start", {})[key.removeprefix("start.")] = _array(row)
     if not spec.is_free:
-        found["observe"] = {name: _entries(entries) for name, entries in spec.observe}
-    return found
+        section["observe"] = {name: _entries(entries) for name, entries in spec.observe}
+    return section
 
 
 def _table(spec: StructureSpec, key: str) -> dict[str, Any]:
-    """Return the table of a load as it is written."""
+    """Return the table of a load, as the file has it."""
     row = spec.arrays[f"{HISTORY}.{key.partition('.')[2]}"]
     assert row.columns is not None
     return {"table": row.file, **dict(zip(("t", "p"), row.columns, strict=True))}
@@ -61,15 +63,15 @@ def _entries(entries: tuple[tuple[int, float], ...]) -> Any:
 
 
 def rows(spec: StructureSpec, loaded: Loaded) -> Iterator[tuple[str, str]]:
-    """Yield what a page says of a structure."""
-    own, facts = loaded.structure, [f"{loaded.structure.dofs} degrees of freedom"]
+    """Yield the description of a structure as pairs of term and text."""
+    structure, facts = loaded.structure, [f"{loaded.structure.dofs} degrees of freedom"]
     for key, word in WORDS.items():
         if (row := spec.arrays.get(key)) is not None and row.file is not None:
             facts.append(f"{word} from {row.file}")
     yield "Structure", ", ".join(facts)
-    found = own.modes.frequencies
-    listed = ", ".join(words.number(float(w)) for w in found[:MOST_SHOWN])
-    rest = ", ..." if len(found) > MOST_SHOWN or own.dofs > len(found) else ""
+    frequencies = structure.modes.frequencies
+    listed = ", ".join(words.number(float(w)) for w in frequencies[:MOST_SHOWN])
+    rest = ", ..." if len(frequencies) > MOST_SHOWN or structure.dofs > len(frequencies) else ""
     tables = [row.file for key, row in spec.arrays.items() if key.startswith(f"{HISTORY}.")]
     if tables:
         yield "Loads", f"straight between the points of {', '.join(map(str, tables))}"
@@ -79,7 +81,7 @@ def rows(spec: StructureSpec, loaded: Loaded) -> Iterator[tuple[str, str]]:
         sums = [f"u_{dof}" if x == 1.0 else f"{words.number(x)} u_{dof}" for dof, x in entries]
         parts.append(f"{name} = {' + '.join(sums)}")
     yield "Observed", ", ".join(parts)
-    if own.ratios:
-        shown = ", ".join(words.number(x) for x in own.ratios[:MOST_SHOWN])
-        rest = ", ..." if len(own.ratios) > MOST_SHOWN else ""
+    if structure.ratios:
+        shown = ", ".join(words.number(x) for x in structure.ratios[:MOST_SHOWN])
+        rest = ", ..." if len(structure.ratios) > MOST_SHOWN else ""
         yield "Damping ratios", f"{shown}{rest} of the lowest modes"
