@@ -38,9 +38,9 @@ def forget() -> None:
     for cached in (
         code_digest.everything,
         code_digest._file,
-        code_digest._of_all_modules,
+        code_digest._all_imports,
         code_digest._imports,
-        code_digest._handed_on,
+        code_digest._reexports,
         build.code_of,
         build._code,
     ):
@@ -246,7 +246,7 @@ def test_imports_that_are_kept_are_those_of_the_code_as_it_is(
     def reached() -> set[str]:
         asked.clear()
         code_digest.everything.cache_clear()
-        code_digest._of_all_modules.cache_clear()
+        code_digest._all_imports.cache_clear()
         return code_digest.reached("vibsim.cli.jobs.simulate")
 
     monkeypatch.setattr(code_digest, "_imports", imports)
@@ -279,7 +279,7 @@ def test_every_lazy_name_is_found_without_running_anything() -> None:
         for name in set(loaded.__all__) - {"__version__"}:
             found = getattr(getattr(loaded, name), "__module__", None)
             if found and found.startswith("vibsim."):
-                assert found in code_digest._homes(package, name), name
+                assert found in code_digest._origins(package, name), name
 
 
 TRACE = """

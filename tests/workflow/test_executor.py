@@ -19,7 +19,7 @@ from vibsim.cli.chosen_plans import plans_of
 from vibsim.cli.run import executor, pending
 from vibsim.cli.workflow import names_of
 from vibsim.core.errors import InputError
-from vibsim.plan.workflow_names import together
+from vibsim.plan.workflow_names import group_size
 
 from .conftest import ROOT, Place, here
 
@@ -153,14 +153,14 @@ def test_what_takes_seconds_is_finished_here(place: Place) -> None:
 
 def test_short_simulations_are_divided_among_jobs_as_long_as_that_saves_time() -> None:
     # two starts would take longer than the work
-    assert together([1.0, 1.0], 16) == 2
+    assert group_size([1.0, 1.0], 16) == 2
     # two jobs that start in 4 s each and work for 6 s are done sooner than one, and than three
-    assert together([2.5] * 5, 16) == 3
+    assert group_size([2.5] * 5, 16) == 3
     # jobs of a minute each, and no more in one than a profile allows
-    assert together([4.0] * 225, 16) == 15
-    assert together([4.0] * 734, 16) == 16
-    assert together([4.0] * 734, 1) == 1
-    assert together([], 16) == 16
+    assert group_size([4.0] * 225, 16) == 15
+    assert group_size([4.0] * 734, 16) == 16
+    assert group_size([4.0] * 734, 1) == 1
+    assert group_size([], 16) == 16
 
 
 def test_a_profile_says_how_many_share_a_job_at_most(place: Place, tmp_path: Path) -> None:

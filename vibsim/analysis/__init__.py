@@ -1,7 +1,4 @@
-"""From the levels of an experiment to what they say together: the comparison, the verdicts, and the summary.
-
-It reads and writes no file.
-"""
+"""Compare the levels of an experiment, decide its checks and summarise them. No file is read or written."""
 
 from __future__ import annotations
 

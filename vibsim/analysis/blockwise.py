@@ -1,7 +1,7 @@
-"""Sweeps in parts: range after range of members, so that memory is bounded and the arrays stay in the cache.
+"""Analyse a sweep in parts, ranges of members, so that memory is bounded and the arrays fit into the cache.
 
-The parts are made side by side by processes that are copies of this one (threads would wait for each other: the arrays
-are small), and come in order. The files are read by the calling process alone.
+Worker processes analyse parts in parallel and the results come in order. Threads would wait for each other, because the
+arrays are small. Only the calling process reads files.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from concurrent.futures import Future
 
 Reader = Callable[[int, int], Record]
-"""Returns the level Record of members start..stop-1."""
+"""Returns the Record of a level for members start..stop-1."""
 
 
 def analyse_parts(
@@ -42,58 +42,58 @@ def analyse_parts(
     size: int | None = None,
     processes: int = 1,
 ) -> Iterator[Record]:
-    """Compare the levels of an experiment, range after range of its members.
+    """Compare the levels of an experiment for one range of members after the other.
 
     Parameters
     ----------
     readers
-        For every level, what returns its Record for a range of members.
+        The reader of every level.
     size
-        Members of a part; by default as many as make `PART_SAMPLES` samples. No number depends on it.
+        Number of members of a part; by default a part has about `PART_SAMPLES` samples. No result depends on it.
     processes
-        How many parts are made at the same time; at most one more is kept. No number depends on it.
+        Number of parts analysed in parallel; at most one more is in memory. No result depends on it.
 
     Yields
     ------
     Record
-        What `analyse_records` returns, for consecutive ranges of members.
+        The result of `analyse_records` for consecutive ranges of members.
 
     Raises
     ------
     VibsimError
-        As `analyse_records`, and where one of the processes is killed.
+        Where `analyse_records` does, or where a process is killed.
     """
     coarsest = experiment.levels[0]
     points = experiment.steps(coarsest) // storage.sampling(experiment, coarsest) + 1
     size = size or max(PART_SAMPLES // (points * len(experiment.schemes)), 1)
     count = experiment.members
-    given = (
+    parts = (
         {level: read(start, min(start + size, count)) for level, read in readers.items()}
         for start in range(0, count, size)
     )
-    # the first part loads what the copies of this process share
-    yield from (analyse_records(experiment, records) for records in islice(given, 1))
-    # a second part alone is sooner made here
+    # the first part loads modules that the forked processes then share
+    yield from (analyse_records(experiment, records) for records in islice(parts, 1))
+    # starting processes for a single further part does not pay
     if processes == 1 or count <= 2 * size:
-        yield from (analyse_records(experiment, records) for records in given)
+        yield from (analyse_records(experiment, records) for records in parts)
     else:
-        yield from _by_processes(experiment, given, processes)
+        yield from _in_parallel(experiment, parts, processes)
 
 
-def _by_processes(
-    experiment: Experiment, given: Iterable[dict[int, Record]], processes: int
+def _in_parallel(
+    experiment: Experiment, parts: Iterable[dict[int, Record]], processes: int
 ) -> Iterator[Record]:
-    # 14 ms, which no small analysis pays
+    # imported here, because it takes 14 ms
     import multiprocessing
     from concurrent.futures import ProcessPoolExecutor
     from concurrent.futures.process import BrokenProcessPool
 
-    # elsewhere (macOS) a copy of a process whose libraries have threads is not safe
+    # on macOS it is not safe to fork a process whose libraries have threads
     context = multiprocessing.get_context("fork" if sys.platform == "linux" else "spawn")
     pending: deque[Future[Record]] = deque()
     try:
         with ProcessPoolExecutor(processes, context, as_worker_of, (os.getpid(),)) as pool:
-            for records in given:
+            for records in parts:
                 pending.append(pool.submit(analyse_records, experiment, records))
                 if len(pending) > processes:
                     yield pending.popleft().result()
@@ -105,44 +105,43 @@ def _by_processes(
         ) from None
 
 
-_OF_VERDICTS = (
+_ALWAYS_READ = (
     *("status", "failure_time", "last_step", "omega_dt", "stability_limit", "measured_growth"),
     *("decay_rate", "pulse_time", "pulse_width", HIGHEST),
 )
-"""Variables that every verdict and the summary may read, beside those that a check or its quantity has of its own."""
+"""Variables that any verdict or the summary may read, besides those of its own check and quantity."""
 
 
 def keep_for_verdicts(
     experiment: Experiment, parts: Iterable[Record], thin: list[Record]
 ) -> Iterator[Record]:
-    """Pass parts on, and keep of each in `thin` what `verdicts` and `summarise` need of it."""
-    # a claim reads what the check that decides it reads
+    """Yield the parts, and append to `thin` of each part the variables that `verdicts` and `summarise` read."""
+    # a claim reads the variables of the check that decides it
     measured = [check.measured for check in experiment.checks]
-    checked = [one.converges for one in measured if one.kind == "converges"]
-    which = ("observed_order", "formal_order", "coincidence")
-    of_orders = {f"{name}_{one}" for name in checked for one in which}
+    quantities = [check.converges for check in measured if check.kind == "converges"]
+    suffixes = ("observed_order", "formal_order", "coincidence")
+    orders = {f"{quantity}_{suffix}" for quantity in quantities for suffix in suffixes}
 
     def is_read(name: str) -> bool:
         of_check = name.startswith(("check_", "corner_")) or is_bound(name) or is_of_parts(name)
-        return of_check or name in _OF_VERDICTS or name in of_orders
+        return of_check or name in _ALWAYS_READ or name in orders
 
     for part in parts:
         attrs = {**part.attrs, UNITS: json.dumps(units_in(part))}
-        thinned = {name: one for name, one in part.variables.items() if is_read(name)}
-        thin.append(Record(part.coords, thinned | known_errors(part), attrs))
+        read = {name: variable for name, variable in part.variables.items() if is_read(name)}
+        thin.append(Record(part.coords, read | known_errors(part), attrs))
         yield part
 
 
 def join_parts(parts: Sequence[Record]) -> Record:
-    """Return consecutive parts as one Record."""
+    """Join consecutive parts into one Record."""
 
     def join(name: str) -> Variable:
         first = parts[0].variable(name)
         if "case" not in first.dims:
             return first
-        values = [part[name] for part in parts]
-        joint = np.concatenate(values, axis=first.dims.index("case"))
-        return Variable(first.dims, joint, first.attrs)
+        values = np.concatenate([part[name] for part in parts], axis=first.dims.index("case"))
+        return Variable(first.dims, values, first.attrs)
 
     coords = {name: join(name) for name in parts[0].coords}
     return Record(coords, {name: join(name) for name in parts[0].variables}, parts[0].attrs)

@@ -1,7 +1,7 @@
-"""The checks of an experiment: what was measured, what was expected, and whether they agree.
+"""Decide the checks of an experiment by comparing measured with expected values.
 
-`tolerance:` adds one verdict: whether the tolerance was reached.
-A check is decided by its worst result: FAIL before INCONCLUSIVE before PASS. A number that is not finite never passes.
+The worst result decides a check, in the order FAIL, INCONCLUSIVE, PASS. A value that is not finite never passes. An
+experiment with `tolerance:` has one more verdict: whether the tolerance was reached.
 """
 
 from __future__ import annotations
@@ -41,27 +41,27 @@ class Verdict:
     results: Results
     """Worst first."""
     counts: dict[str, int]
-    """Number of results by status, compared with what was expected."""
+    """Number of results by status."""
     where: dict[str, Any]
-    """For every status but PASS, where in a sweep its results lie; see `vibsim.checks.sweep_regions`."""
+    """Where in a sweep the results of each status except PASS lie; see `vibsim.checks.sweep_regions`."""
     note: str | None = None
-    """What the experiment says to a reader of a claim."""
+    """The experiment's comment on a claim."""
     source: str | None = None
-    """Where a claim stands."""
+    """Where the text makes the claim."""
 
 
 def verdicts(experiment: Experiment, convergence: xarray.Dataset | Record) -> list[Verdict]:
-    """Decide every check of an experiment, and last whether it reached its tolerance, where it has one.
+    """Decide every check of an experiment, and finally whether it reached its tolerance, if it has one.
 
     Parameters
     ----------
     convergence
-        What `analyse` returned for the same experiment.
+        The result of `analyse` for the same experiment.
 
     Raises
     ------
     VibsimError
-        Where `convergence` was made without one of the checks, or for other ones.
+        Where `convergence` lacks one of the checks, or was made with other checks.
     """
     record = convergence if isinstance(convergence, Record) else Record.from_xarray(convergence)
     known = record.words("check") if "check" in record else []
@@ -70,30 +70,30 @@ def verdicts(experiment: Experiment, convergence: xarray.Dataset | Record) -> li
         raise VibsimError(f"the analysis knows {known}, not {missing}: analyse the levels again")
     if record.attrs["checks"] != definition(experiment):
         raise VibsimError("the checks are not those of the analysis: analyse the levels again")
-    found = [
+    decided = [
         _verdict(experiment, record, check, judge(experiment, record, check.measured, check.id))
         for check in experiment.checks
     ]
     if experiment.tolerance is not None:
-        found.append(
+        decided.append(
             _verdict(experiment, record, None, experiment_tolerance.judge(experiment, record))
         )
-    return found
+    return decided
 
 
 def _verdict(
     experiment: Experiment, record: Record, check: Check | None, outcome: Outcome
 ) -> Verdict:
-    """Decide a check by its worst result; None stands for the tolerance of the experiment."""
+    """Decide a check by its worst result; a check of None stands for the tolerance of the experiment."""
     id_, measured = (BY_TOLERANCE, None) if check is None else (check.id, check.measured)
     if not outcome.total:
         raise VibsimError(f"check {id_}: it applies to no scheme or no member of the experiment")
-    results, counts, found = Results(outcome), outcome.counts(), sweep_regions(record, outcome)
+    results, counts, regions = Results(outcome), outcome.counts(), sweep_regions(record, outcome)
     decisive = next(results.worst(1))
     status = worst(name for name, count in counts.items() if count)
     reason = compared_reason(measured, status, decisive.status, decisive.reason)
     wording = Wording(experiment, record, check)
-    text = wording.text(decisive, counts, found)
+    text = wording.text(decisive, counts, regions)
     if check is not None and check.kind == "claim":
         text = f"Claim: {check.claim.rstrip().removesuffix('.')}. {text}"
         is_true = truth(check, status, decisive.reason)
@@ -112,7 +112,7 @@ def _verdict(
         advice=wording.advice(status, decisive, counts),
         results=results,
         counts=counts,
-        where=found,
+        where=regions,
         note=getattr(check, "note", None),
         source=getattr(check, "source", None),
     )

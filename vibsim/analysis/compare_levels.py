@@ -1,4 +1,4 @@
-"""The convergence Record: every comparison between the levels of an experiment, on their coarsest common grid."""
+"""The convergence Record: all comparisons between the levels of an experiment, on the coarsest common time grid."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ if TYPE_CHECKING:
     from vibsim.experiment import Experiment
 
 ONCE = SAME_AT_EVERY_LEVEL | {"energy_initial"}
-"""What is taken from the finest level alone; the first energy differs between levels by its rounding only."""
+"""Variables taken from the finest level alone; the initial energy differs between levels only by rounding."""
 
 
 def analyse(
@@ -61,19 +61,19 @@ def analyse(
     Parameters
     ----------
     datasets
-        What `simulate` returned for every level, by level or in any order.
+        The results of `simulate` for every level, by level or in any order.
 
     Returns
     -------
     xarray.Dataset
-        The content of ``convergence.nc``: every quantity compared between levels, norms, orders, and what was measured
-        for each check; each variable says in its ``long_name`` what it is.
+        The content of ``convergence.nc``: every quantity compared between levels, norms, orders, and the measured
+        values of each check. The ``long_name`` of each variable describes it.
 
     Raises
     ------
     VibsimError
-        Where there is no level, a level is given twice, the levels have no times in common, or they are not levels of
-        one and the same problem, that of the experiment.
+        Where there is no level, a level is given twice, the levels have no common times, or the levels do not belong to
+        the problem of the experiment.
     """
     rows = datasets.values() if isinstance(datasets, Mapping) else datasets
     records = [Record.from_xarray(dataset) for dataset in rows]
@@ -85,62 +85,63 @@ def analyse(
 
 
 def analyse_records(experiment: Experiment, records: Mapping[int, Record]) -> Record:
-    """Compare the levels of some members, or all, given and returned as plain arrays; see `analyse`.
+    """Compare the levels, by level, of all members or a range of them; see `analyse`.
 
-    What is found of a member does not depend on the members beside it.
+    The results of a member do not depend on the other members.
     """
     block = block_of(experiment, records)
-    # what is made with ``[D_2t u]``, where series are kept and a scheme has another velocity
+    # quantities from centred differences ``[D_2t u]``, stored where the scheme defines another velocity
     by_differences = () if block.lean else centred(block.model)
     stored = tuple(name for name in by_differences if name in block.finest)
-    found = comparisons(block, compared(experiment, block.lean) + stored)
+    quantities = comparisons(block, compared(experiment, block.lean) + stored)
     measured = (check.measured for check in experiment.checks)
-    asked_for = checked_quantities(experiment)
-    # a sweep too large for its series has verdicts on what checks ask about, and its sentences need
-    judged = [name for name in found if not block.lean or name in asked_for or is_error_part(name)]
-    judge_orders(found, judged, [check for check in measured if check.kind == "converges"])
+    checked = checked_quantities(experiment)
+    # where a sweep is too large to store series, only quantities of checks are judged, and their error parts
+    judged = [n for n in quantities if not block.lean or n in checked or is_error_part(n)]
+    judge_orders(quantities, judged, [check for check in measured if check.kind == "converges"])
     table: Table = {}
-    for q in found.values():
-        is_shown = not is_error_part(q.name) or q.name in asked_for
+    for q in quantities.values():
+        is_shown = not is_error_part(q.name) or q.name in checked
         if is_shown:
             table |= numbers(q)
         if q.name in judged:
             table |= _verdict(q) | phase_at_start(q)
         if is_shown and not block.lean:
             table |= over_time(q)
-    table |= _scalars(block) | check_variables(block, found) | motion(block, found)
+    table |= _scalars(block) | check_variables(block, quantities) | motion(block, quantities)
     table |= corner_variables(block.model, block.corners)
     if may_miss_pulses(block.model):
         table |= missed_variables(block.missed)
     if is_damped(block.model):
         words = "largest rate at which damping takes a velocity away"
         table["decay_rate"] = Variable.of(MEMBER, block.decay, words, "1/s")
-    table |= best_values.table(block, found)
+    table |= best_values.table(block, quantities)
     if experiment.tolerance is not None:
         table |= bounds(block)
     if not block.lean:
-        table |= _scaled_deviation(found["energy_deviation"]) | work_precision(block, found)
-    about: dict[str, Any] = {
+        table |= _scaled_deviation(quantities["energy_deviation"])
+        table |= work_precision(block, quantities)
+    attrs: dict[str, Any] = {
         "title": experiment.title,
         "model": experiment.model.kind,
         "end_included": int(block.grid.end_included),
         "storage": "lean" if block.lean else "series",
         "checks": definition(experiment),
     }
-    return in_scales(Record(_coords(block), table, about), experiment)
+    return in_scales(Record(_coords(block), table, attrs), experiment)
 
 
 def compared(experiment: Experiment, lean: bool = False) -> tuple[str, ...]:
-    """Name the quantities that are compared between levels: states, energy, and what a check asks for."""
+    """Return the names of the quantities compared between levels: states, energy, and those of the checks."""
     states = (state.name for state in experiment.model.definition.states)
-    own = lean_series(experiment) if lean else (*states, "energy", "energy_deviation")
-    return tuple(dict.fromkeys([*own, *checked_quantities(experiment)]))
+    series = lean_series(experiment) if lean else (*states, "energy", "energy_deviation")
+    return tuple(dict.fromkeys([*series, *checked_quantities(experiment)]))
 
 
 def _coords(block: MemberBlock) -> Table:
     grid, finest = block.grid, block.finest
-    kept = ("scheme",), ("case",)
-    coords = {n: _widened(block, v) for n, v in finest.coords.items() if v.dims in kept}
+    shared = ("scheme",), ("case",)
+    coords = {n: _widened(block, v) for n, v in finest.coords.items() if v.dims in shared}
     coords["t"] = Variable(("t",), grid.t, finest.coords["t"].attrs)
     levels = np.array(grid.levels, dtype=np.int64)
 
@@ -159,15 +160,15 @@ def _coords(block: MemberBlock) -> Table:
         add("check", [check.id for check in block.experiment.checks], "name of the check")
     coords |= best_values.coordinate(block)
     add("steps", np.array(grid.steps, dtype=np.int64), "number of time steps", "level")
-    is_of_case = "end" in finest
-    dt = grid.dt if is_of_case else grid.dt[:, 0]
-    dims = ("level", "case") if is_of_case else ("level",)
+    end_varies = "end" in finest
+    dt = grid.dt if end_varies else grid.dt[:, 0]
+    dims = ("level", "case") if end_varies else ("level",)
     coords["dt"] = Variable.of(dims, dt, "time step", "s")
     return coords
 
 
 def _widened(block: MemberBlock, variable: Variable) -> Variable:
-    """Give swept words the same width in every part of a sweep."""
+    """Give swept strings the same width in every part of a sweep."""
     if variable.values.dtype.kind != "U" or "sweep_key" not in variable.attrs:
         return variable
     schemes = (scheme.method for scheme in block.experiment.schemes)
@@ -177,9 +178,9 @@ def _widened(block: MemberBlock, variable: Variable) -> Variable:
 
 
 def _scaled_deviation(q: Comparison) -> Table:
-    """Return dE_l (2^p)^k, which coincide where the energy converges to conservation (A, section 2.6)."""
+    """Return dE_l (2^p)^k; the levels coincide where the energy error converges to zero (A, section 2.6)."""
     levels, p = q.block.grid.levels, q.power[..., None]
-    # an energy that grew without bound stays without bound
+    # an infinite energy error stays infinite
     with np.errstate(over="ignore", invalid="ignore"):
         scaled = [
             u * differences.gap_ratio(p, level - levels[0])
@@ -191,14 +192,14 @@ def _scaled_deviation(q: Comparison) -> Table:
 
 
 def _scalars(block: MemberBlock) -> Table:
-    """Gather what the levels hold once per member, and the last value of every series."""
+    """Return the scalars of every member at each level, and the last value of every series."""
     rows = [block.records[level] for level in block.grid.levels]
     largest = {f"{state.name}_max" for state in block.model.states}
     table: Table = {}
     for name, variable in rows[-1].variables.items():
         attrs, dims = dict(variable.attrs), variable.dims
         if dims == SERIES:
-            # neither of these has a value of its own at the end
+            # no centred difference exists at the end; a running maximum there is the overall maximum
             if not name.endswith((CENTRED, RUNNING)):
                 attrs["long_name"] = f"{attrs.get('long_name', name)} at the last stored time"
                 last = np.stack([row[name][..., -1] for row in rows], -1)
@@ -220,11 +221,11 @@ _LEAN = {
     *("status", "failure_time", "omega_dt", HIGHEST),
     *("period", "amplitude", "energy_deviation_max_abs"),
 }
-"""Numbers that the levels hold of every member, kept where storage is bounded."""
+"""Scalars of every member that are kept even where storage is bounded."""
 
 
 def _verdict(q: Comparison) -> Table:
-    """Return the verdict on a quantity by the formal order: in the typical norm, but for the order in every norm."""
+    """Return the verdict on the order of a quantity in the typical norm, and its stated order in every norm."""
     typical = judgement(q, TYPICAL_NORM)
     table: Table = {}
 
@@ -239,9 +240,8 @@ def _verdict(q: Comparison) -> Table:
         values = [
             np.full(orders.shape[:-1], np.nan) if j is None else getattr(j, end) for j in judged
         ]
-        found = np.stack(values, axis=-1)
         words = f"{text} end of the interval of the order, in the norms that are judged"
-        add(f"order_{end}", in_precision(q, found), words)
+        add(f"order_{end}", in_precision(q, np.stack(values, axis=-1)), words)
     for key, levels in (("first", typical.first), ("last", typical.last)):
         text = f"{key} level that the order rests on, -1 for none"
         add(f"window_{key}", levels.astype(np.int16), text)

@@ -1,8 +1,7 @@
-"""What is kept of the motion beside the comparison of levels: theory beside measurement, extrema, energy, cost.
+"""Variables of the motion besides the comparison of levels: predicted and measured oscillation, extrema, energy, cost.
 
-Kept where series are, that is up to 2^18 samples on the coarsest level. A larger sweep keeps none of it: its checks are
-worked out all the same, while the levels are at hand. Theory is left out, too, where more than `THEORY_RUNS` runs
-differ in w dt.
+They are stored only where series are, that is up to 2^18 samples on the coarsest level. The checks of a larger sweep
+are evaluated all the same, from the levels. Predictions are left out where more than `THEORY_RUNS` runs differ in w dt.
 """
 
 from __future__ import annotations
@@ -26,8 +25,7 @@ from vibsim.observe.energy_drift import drift_at
 from vibsim.observe.member_block import MemberBlock, by_level
 
 THEORY_RUNS = 2**12
-"""Runs for which theory is worked out, at about 0.1 ms each."""
-
+"""Most runs for which predictions are computed, at about 0.1 ms each."""
 
 PEAKS = "interpolated peaks"
 RECURRENCE = f"recurrence of the steps; {PEAKS} where a run satisfies none to rounding"
@@ -37,7 +35,7 @@ EARLY = "time by which peaks come early, per period"
 
 
 def motion(block: MemberBlock, compared: Compared) -> Table:
-    """Return the variables of the convergence Record that belong to the motion of every scheme, member and level."""
+    """Return the variables of the convergence Record on the motion of every scheme, member and level."""
     if block.lean:
         return {}
     table = _theory(block) | _drift(block) | _side_by_side(block) | _running(block)
@@ -53,71 +51,72 @@ def motion(block: MemberBlock, compared: Compared) -> Table:
     return table
 
 
-def _by_level(block: MemberBlock, of: Callable[[MemberBlock, int], Floats]) -> Floats:
-    return by_level([np.broadcast_to(of(block, level), block.shape) for level in block.grid.levels])
+def _by_level(block: MemberBlock, measure: Callable[[MemberBlock, int], Floats]) -> Floats:
+    rows = [np.broadcast_to(measure(block, level), block.shape) for level in block.grid.levels]
+    return by_level(rows)
 
 
 def _theory(block: MemberBlock) -> Table:
-    """Return growth, frequency and phase error, predicted and measured."""
-    known, seen = predicted_oscillation, oscillation
+    """Return predicted and measured growth, frequency and phase error."""
+    theory, observed = predicted_oscillation, oscillation
     rows: tuple[tuple[str, str, str, Callable[..., Floats], Callable[..., Floats]], ...] = (
-        ("growth", GROWTH, "1", known.growth_per_period, seen.growth_of_motion),
-        ("frequency", "angular frequency", "rad s-1", known.frequency, seen.frequency),
-        ("phase_error", EARLY, "s", known.phase_error, seen.phase_error),
+        ("growth", GROWTH, "1", theory.growth_per_period, observed.growth_of_motion),
+        ("frequency", "angular frequency", "rad s-1", theory.frequency, observed.frequency),
+        ("phase_error", EARLY, "s", theory.phase_error, observed.phase_error),
     )
-    by_recurrence = all(seen.has_recurrence(block, level) for level in block.grid.levels)
+    by_recurrence = all(observed.has_recurrence(block, level) for level in block.grid.levels)
     method = RECURRENCE if by_recurrence else PEAKS
     predicted: Table = {}
     measured: Table = {}
-    for name, text, unit, theory, measurement in rows:
+    for name, text, unit, predict, measure in rows:
         values = np.full((*block.shape, len(block.grid.levels)), np.nan)
-        if _different(block) <= THEORY_RUNS:
-            values = _by_level(block, theory)
+        if _distinct_runs(block) <= THEORY_RUNS:
+            values = _by_level(block, predict)
         predicted[f"theory_{name}"] = Variable.of(OF_LEVEL, values, f"predicted {text}", unit)
-        values, words = _by_level(block, measurement), f"measured {text}"
+        values, words = _by_level(block, measure), f"measured {text}"
         measured[f"measured_{name}"] = Variable.of(OF_LEVEL, values, words, unit, method=method)
     return predicted | measured
 
 
-def _different(block: MemberBlock) -> int:
-    """Return how many runs of the whole experiment may differ in w dt or in options: it depends on no part of it."""
+def _distinct_runs(block: MemberBlock) -> int:
+    """Return how many runs of the whole experiment, not of this part, may differ in w dt or in options."""
     experiment = block.experiment
     keys = experiment.sweep.keys if experiment.sweep else ()
     runs = len(experiment.schemes) * len(block.grid.levels)
-    alike = all(key.startswith("initial.") for key in keys)
-    return runs if alike else runs * experiment.members
+    is_initial = all(key.startswith("initial.") for key in keys)
+    return runs if is_initial else runs * experiment.members
 
 
 def _drift(block: MemberBlock) -> Table:
-    """Return how the energy error by the scheme's own velocity grows with time."""
-    found = [drift_at(block, level) for level in block.grid.levels]
-    kinds = np.stack([drift.kind for drift in found], axis=-1)
-    rates = by_level([drift.rate for drift in found])
-    of_kind = "how the energy error grows with time"
-    of_rate = (
+    """Return how the energy error, computed with the scheme's own velocity, grows with time."""
+    drifts = [drift_at(block, level) for level in block.grid.levels]
+    kinds = np.stack([drift.kind for drift in drifts], axis=-1)
+    rates = by_level([drift.rate for drift in drifts])
+    kind_words = "how the energy error grows with time"
+    rate_words = (
         "relative energy error per period of a linear drift, per period squared of a quadratic one, change of its "
         "logarithm per period of an exponential one"
     )
     return {
-        "energy_drift_kind": Variable.of(OF_LEVEL, kinds, of_kind, **flags(DRIFTS)),
-        "energy_drift_rate": Variable.of(OF_LEVEL, rates, of_rate),
+        "energy_drift_kind": Variable.of(OF_LEVEL, kinds, kind_words, **flags(DRIFTS)),
+        "energy_drift_rate": Variable.of(OF_LEVEL, rates, rate_words),
     }
 
 
 def _side_by_side(block: MemberBlock) -> Table:
-    """Return peaks, troughs and times of events of every level side by side, NaN behind those of coarse levels."""
+    """Return peaks, troughs and event times of all levels; where a level has fewer, the rest is NaN."""
     rows = [block.records[level] for level in block.grid.levels]
-    parts = ("_time", "", "_time_grid", "_grid")
-    of_extrema = {f"{kind}{part}": "extremum" for kind in ("peak", "trough") for part in parts}
+    suffixes = ("_time", "", "_time_grid", "_grid")
+    names = {f"{kind}{suffix}": "extremum" for kind in ("peak", "trough") for suffix in suffixes}
     table: Table = {}
-    for name, along in (of_extrema | {"event_time": "event"}).items():
+    for name, dim in (names | {"event_time": "event"}).items():
         if all(name in row for row in rows):
             longest = max(row[name].shape[-1] for row in rows)
-            found = np.full((*block.shape, len(rows), longest), np.nan)
+            values = np.full((*block.shape, len(rows), longest), np.nan)
             for i, row in enumerate(rows):
-                found[:, :, i, : row[name].shape[-1]] = row[name]
+                values[:, :, i, : row[name].shape[-1]] = row[name]
             attrs = rows[-1].variable(name).attrs
-            table[name] = Variable((*OF_LEVEL, along), found, attrs)
+            table[name] = Variable((*OF_LEVEL, dim), values, attrs)
     return table
 
 
@@ -127,28 +126,31 @@ def _running(block: MemberBlock) -> Table:
     table: Table = {}
     for name in ("energy_deviation_running_max", "energy_deviation_d2t_running_max"):
         if all(name in row for row in rows):
-            found = np.ascontiguousarray(np.stack([take(block.grid, row, name) for row in rows], 2))
-            table[name] = Variable((*OF_LEVEL, "t"), found, rows[-1].variable(name).attrs)
+            maxima = np.stack([take(block.grid, row, name) for row in rows], 2)
+            attrs = rows[-1].variable(name).attrs
+            table[name] = Variable((*OF_LEVEL, "t"), np.ascontiguousarray(maxima), attrs)
     return table
 
 
 def _beside(block: MemberBlock, compared: Compared) -> Table:
-    """Return what published tables have beside their rows, shape (check, case, beside); NaN elsewhere."""
+    """Return the additional columns of published tables, shape (check, case, beside); NaN elsewhere."""
     experiment = block.experiment
     width = max((len(table.beside) for table in experiment.published), default=0)
     if not width:
         return {}
     ids = [check.id for check in experiment.checks]
     names = [scheme.name for scheme in experiment.schemes]
-    found = np.full((len(ids), block.shape[1], width), np.nan)
+    columns = np.full((len(ids), block.shape[1], width), np.nan)
     for i, table in enumerate(experiment.published, 1):
         for j, row in enumerate(table.rows, 1):
-            at, of = row_at(row), table.quantity or ""
-            place = value_numbers.Place(block, compared, of, at.level, at.t, at.step, at.event)
+            at, quantity = row_at(row), table.quantity or ""
+            row_place = value_numbers.Place(
+                block, compared, quantity, at.level, at.t, at.step, at.event
+            )
             for k, name in enumerate(table.beside):
-                # a value of the motion as a whole is of no quantity
-                own = place if VALUES[name].of != "none" else replace(place, quantity="")
-                values, _, _ = best_values.value(name, own)
-                found[ids.index(row_id(i, j)), :, k] = values[names.index(row.scheme)]
+                has_quantity = VALUES[name].of != "none"
+                place = row_place if has_quantity else replace(row_place, quantity="")
+                values, _, _ = best_values.value(name, place)
+                columns[ids.index(row_id(i, j)), :, k] = values[names.index(row.scheme)]
     words = "numbers beside each row of a published table"
-    return {"published_beside": Variable.of(("check", "case", "beside"), found, words)}
+    return {"published_beside": Variable.of(("check", "case", "beside"), columns, words)}

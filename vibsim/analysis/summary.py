@@ -1,4 +1,4 @@
-"""The content of ``summary.json``, every check with its verdict: plain data, None where a number does not exist."""
+"""The content of ``summary.json``: every check with its verdict, as plain data; None stands for a missing number."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from vibsim.experiment.data import ReadExperiment
 
 WORST = 10
-"""Of a sweep, so many results of a check and so many failures are listed."""
+"""Number of results of a check, and of failures, that the summary of a sweep lists."""
 
 
 def summarise(
@@ -32,15 +32,15 @@ def summarise(
     Parameters
     ----------
     verdicts, convergence
-        What `verdicts` and `analyse` returned for the experiment.
+        The results of `verdicts` and `analyse` for the experiment.
 
     Returns
     -------
     dict
-        Ready for JSON: no NaN, no infinity, no numpy type. With a sweep the `WORST` results of each check and the
-        first `WORST` failures are listed, each with the swept ``values`` and the ``command`` that runs its member
-        alone; ``settings`` are those of the command line, where there were any;
-        ``counts`` and ``failure_count`` count all of them, and ``where`` tells where they are.
+        Ready for JSON: no NaN, no infinity, no numpy type. For a sweep it lists the `WORST` results of each check and
+        the first `WORST` failures, each with the swept ``values`` and the ``command`` that runs its member alone;
+        ``counts`` and ``failure_count`` count all of them, and ``where`` locates them in the sweep. ``settings`` are
+        those of the command line, if any.
     """
     record = convergence if isinstance(convergence, Record) else Record.from_xarray(convergence)
     most = None if experiment.sweep is None else WORST
@@ -56,13 +56,13 @@ def summarise(
 
 
 def heading(experiment: ReadExperiment, status: str) -> dict[str, Any]:
-    """Return what a summary says of a whole experiment, whatever makes its levels."""
-    given = {"settings": list(experiment.settings)} if experiment.settings else {}
+    """Return the fields of a summary that describe the whole experiment; they are the same for a user's own solver."""
+    settings = {"settings": list(experiment.settings)} if experiment.settings else {}
     return {
         "vibsim_format": FORMAT,
         "collection": experiment.collection,
         "experiment": experiment.name,
-        **given,
+        **settings,
         "title": experiment.title,
         "source": citation.fields(experiment.source),
         "status": status,
@@ -82,18 +82,18 @@ def _check(
 
 
 def _member(experiment: Experiment, record: Record, case: int) -> dict[str, Any]:
-    """Return the swept values of a member of a sweep, and what runs it alone, where that is possible."""
+    """Return the swept values of a member, and the command that runs it alone if that is possible."""
     if experiment.sweep is None:
         return {}
     at = record.place("case", case)
-    found = {"values": {key: values[at] for key, values in columns_of(record).items()}}
+    fields = {"values": {key: values[at] for key, values in columns_of(record).items()}}
     if case % experiment.chain:
-        return found
-    return found | {"command": experiment.command_of(case)}
+        return fields
+    return fields | {"command": experiment.command_of(case)}
 
 
 def _failures(experiment: Experiment, record: Record, most: int | None) -> list[dict[str, Any]]:
-    """List the members that broke down, the earliest first: all, or so many."""
+    """Return the runs that broke down, the earliest first: all, or the first `most`."""
     failed, names, schemes = (
         record["status"] != 0,
         record.meanings("status"),
@@ -118,7 +118,7 @@ def _failures(experiment: Experiment, record: Record, most: int | None) -> list[
 
 
 def _step(record: Record, scheme: int, case: int, level: int) -> int:
-    """Return the step at which a member failed."""
+    """Return the step at which a run failed."""
     if "last_step" in record:
         return int(record["last_step"][scheme, case, level]) + 1
     return round(float(record["failure_time"][scheme, case, level]) / record.step(level, case))

@@ -1,6 +1,6 @@
-"""The JSON Schema of ``summary.json`` (`workflow/schemas.py` writes its file).
+"""The JSON Schema of ``summary.json``, which `workflow/schemas.py` writes to a file.
 
-What a result may state follows from the fields of each kind of check.
+The facts that a result may contain follow from the fields of each kind of check.
 """
 
 from __future__ import annotations
@@ -42,9 +42,9 @@ def _fact(field: Field) -> dict[str, Any]:
     if field.words:
         return {"enum": list(field.words), "description": field.meaning}
     kind = "integer" if np.issubdtype(field.type, np.integer) else "number"
-    several = list_of({"type": kind}, or_null=True)
-    one = several if len(field.dims) > len(MEMBER) else or_null(kind)
-    return one | {"description": field.meaning}
+    is_list = len(field.dims) > len(MEMBER)
+    value = list_of({"type": kind}, or_null=True) if is_list else or_null(kind)
+    return value | {"description": field.meaning}
 
 
 def schema() -> dict[str, Any]:

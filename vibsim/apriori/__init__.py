@@ -1,1 +1,1 @@
-"""What theory and the equation say before any level is compared: orders, corners of the force, exact values."""
+"""What is known from theory and the equation before levels are compared: orders, corners of the force, exact values."""

@@ -1,4 +1,4 @@
-"""What is known exactly of a quantity: from the exact states, from conservation, or from its definition."""
+"""Exact values of derived quantities: from the exact states, from conservation, or from the definition."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from vibsim.simulation.members import Members
 def known_values(
     model: Model, name: str, states: Mapping[str, Floats], t: Floats, group: Members
 ) -> Floats | None:
-    """Return the exact values of a quantity other than a state, shape (case, t); None where nothing is known.
+    """Return the exact values of a quantity other than a state, shape (case, t); None if unknown.
 
-    `states` are the exact ones at times `t`, shape (case, t), empty where they are not known; `group` the members.
+    `states` are the exact states at times `t`, shape (case, t), empty if unknown; `group` are the members.
     """
     if name == BUDGET[2] or (name == "energy_deviation" and model.conservative):
         return np.zeros(t.shape)
     if not states or model.loaded is not None:
-        # what is observed of a structure does not tell its energy
+        # the observed displacements of a structure do not determine its energy
         return None
     formulas = {
         "kinetic_energy": model.kinetic_energy,
@@ -32,13 +32,13 @@ def known_values(
     }
     numbers = {**group.by_name(model), **states, "t": t}
 
-    def of(formula: Formula) -> Floats:
+    def evaluate(formula: Formula) -> Floats:
         return np.broadcast_to(values(tree(model, formula), numbers), t.shape)
 
     numbers |= looked_up(model, numbers)
     if name in formulas:
-        return of(formulas[name])
+        return evaluate(formulas[name])
     if name in ("energy", "energy_deviation"):
-        energy = of(model.kinetic_energy) + of(model.potential_energy)
+        energy = evaluate(model.kinetic_energy) + evaluate(model.potential_energy)
         return energy if name == "energy" else energy - energy[:, :1]
     return None

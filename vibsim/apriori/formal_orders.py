@@ -1,6 +1,7 @@
-"""What schemes promise to members: order, powers, round-off, stability.
+"""What schemes promise for each member: order, powers of dt, round-off and stability limit.
 
-It depends on options, which may be swept; the order of some schemes, on how a motion begins (`vibsim.schemes.orders`).
+These depend on the options of the scheme, which may be swept; the order of some schemes also depends on how the motion
+begins (`vibsim.schemes.orders`).
 """
 
 from __future__ import annotations
@@ -27,14 +28,14 @@ from vibsim.schemes.orders import Beginning, depends_on_velocity, is_autonomous
 from vibsim.simulation.members import numbers_of
 
 BALANCED = 1e-12
-"""A force that makes so little of the velocity within a radian is rounding. [convention]"""
+"""A force that changes the velocity by less than this fraction within a radian counts as zero. [convention]"""
 BEGINNINGS: tuple[Beginning, ...] = get_args(Beginning)
 Columns = Mapping[str, NDArray[Any]]
 """Swept values by dotted key, each of shape (case,)."""
 
 
 def columns_of(record: Record) -> Columns:
-    """Return the swept values that a Record holds as coordinates."""
+    """Return the swept values, which a Record holds as coordinates."""
     return {
         str(variable.attrs["sweep_key"]): variable.values
         for variable in record.coords.values()
@@ -43,28 +44,28 @@ def columns_of(record: Record) -> Columns:
 
 
 def options_swept(experiment: Experiment) -> bool:
-    """Tell whether an option of a scheme differs between members."""
+    """Tell whether an option of a scheme is swept."""
     return _sweeps(experiment, "schemes.")
 
 
 def options_of(experiment: Experiment, columns: Columns, scheme: int, case: int) -> Options:
-    """Return the options that one member has of one scheme, by their positions."""
-    own = {key: values[case : case + 1] for key, values in columns.items()}
-    return sweep_columns.option_groups(experiment, scheme, own)[0][0]
+    """Return the options of scheme number `scheme` for member number `case`."""
+    single = {key: values[case : case + 1] for key, values in columns.items()}
+    return sweep_columns.option_groups(experiment, scheme, single)[0][0]
 
 
-def beginning_matters(experiment: Experiment) -> bool:
-    """Tell whether some scheme promises other orders to motions that begin in a special way."""
+def depends_on_beginning(experiment: Experiment) -> bool:
+    """Tell whether the order of some scheme depends on how the motion begins: from rest or from balance."""
     model = experiment.model.definition
     if model.events is not None or model.lookup is not None or depends_on_velocity(model):
         return False
     if experiment.chain > 1:
-        # nobody knows beforehand how a member begins that starts from another one
+        # a member that starts from the end of another one begins in an unknown way
         return False
     if model.loaded is not None:
-        # no scheme of structures has other orders then
+        # no scheme for structures has special orders
         return False
-    # a swept option is another one in every member
+    # with swept options the orders are not known here
     return options_swept(experiment) or any(
         orders.from_rest is not None or orders.from_balance is not None
         for orders in (s.method.orders(s.options) for s in experiment.schemes)
@@ -72,36 +73,36 @@ def beginning_matters(experiment: Experiment) -> bool:
 
 
 def beginning_varies(experiment: Experiment) -> bool:
-    """Tell whether members may begin in different ways, so that each has orders of its own."""
-    return beginning_matters(experiment) and _sweeps(experiment, "initial.", "model.")
+    """Tell whether members may begin in different ways, so that their orders may differ."""
+    return depends_on_beginning(experiment) and _sweeps(experiment, "initial.", "model.")
 
 
 def _sweeps(experiment: Experiment, *sections: str) -> bool:
-    """Tell whether something in one of these sections is swept."""
+    """Tell whether a key in one of these sections is swept."""
     keys = experiment.sweep.keys if experiment.sweep else ()
     return any(key.startswith(sections) for key in keys)
 
 
 def beginnings(experiment: Experiment, columns: Columns) -> Integers:
-    """Return the index in `BEGINNINGS` for every member, shape (case,); of shape (1,) where it is one for all."""
+    """Return the index in `BEGINNINGS` of every member, shape (case,), or (1,) if all members have the same."""
     size = len(next(iter(columns.values()))) if beginning_varies(experiment) else 1
-    if not beginning_matters(experiment):
+    if not depends_on_beginning(experiment):
         return np.zeros(size, dtype=np.int64)
     model = experiment.model.definition
-    own = {key: column[:size] for key, column in columns.items()}
-    parameters, initial = numbers_of(experiment, own, size)
+    columns = {key: column[:size] for key, column in columns.items()}
+    parameters, initial = numbers_of(experiment, columns, size)
     fastest = np.max([np.abs(initial[name]) for name in model.velocities], axis=0)
     at_rest = (fastest == 0.0) & is_autonomous(model)
     with np.errstate(all="ignore"):
         frequency = np.asarray(model.natural_frequency(parameters), dtype=float)
         rounding = BALANCED * fastest * np.nan_to_num(frequency)
-        named = {row.name: np.asarray(parameters[row.key], float) for row in model.parameters}
-        named |= {**initial, "t": np.zeros(1)}
-        pulls = [np.abs(values(tree(model, a), named)) for a in model.accelerations]
-        is_balanced = np.max(pulls, axis=0) <= rounding
-    found = np.where(at_rest, BEGINNINGS.index("rest"), BEGINNINGS.index("any"))
-    found = np.where(is_balanced, BEGINNINGS.index("balance"), found)
-    return np.broadcast_to(found, size)
+        numbers = {row.name: np.asarray(parameters[row.key], float) for row in model.parameters}
+        numbers |= {**initial, "t": np.zeros(1)}
+        accelerations = [np.abs(values(tree(model, a), numbers)) for a in model.accelerations]
+        is_balanced = np.max(accelerations, axis=0) <= rounding
+    index = np.where(at_rest, BEGINNINGS.index("rest"), BEGINNINGS.index("any"))
+    index = np.where(is_balanced, BEGINNINGS.index("balance"), index)
+    return np.broadcast_to(index, size)
 
 
 def formal_orders(
@@ -109,20 +110,23 @@ def formal_orders(
 ) -> Floats:
     """Return the order that every scheme promises for a quantity, shape (scheme, case).
 
-    It is infinite for what is exact, and NaN for a scheme that chooses its own steps. Of a part of an error it is what
-    theory says of it, and that of the position where it says nothing. Where no option is swept there is one case for
-    all, here and below, but of parts, which depend on every number of a member, and of schemes whose orders depend on
-    how a motion begins. Of a model with events `eventless`, shape (scheme, case), says which members met none.
+    The order is infinite for an exact quantity, and NaN for a scheme that chooses its own steps. The order of an error
+    part follows from theory, or is that of the position where theory does not apply. Here and below, the length of the
+    dimension case is 1 if no option is swept, except for error parts, which depend on all parameters of a member, and
+    for orders that depend on how the motion begins. For a model with events, `eventless`, shape (scheme, case), marks
+    the members that met none.
     """
     if is_promised(experiment, quantity):
         return part_orders(experiment, quantity, columns)
-    model, of = experiment.model.definition, whole_of(quantity)
+    model, whole = experiment.model.definition, whole_of(quantity)
 
     def promised(beginning: Beginning, meets_events: bool = True) -> Floats:
         return _each(
             experiment,
             columns,
-            lambda s, o: float(s.formal_order(of, model, o, beginning, meets_events=meets_events)),
+            lambda scheme, options: float(
+                scheme.formal_order(whole, model, options, beginning, meets_events=meets_events)
+            ),
         )
 
     if eventless is not None and np.any(eventless):
@@ -134,9 +138,9 @@ def formal_orders(
 
 
 def orders_in(experiment: Experiment, record: Record, quantity: str) -> Floats:
-    """Return the promised orders that a convergence Record holds of a quantity, shape (scheme, 1 or case).
+    """Return the promised orders of a quantity, shape (scheme, 1 or case), as a convergence Record holds them.
 
-    Those of the file alone where it does not hold them: whether a motion meets an event, its levels say.
+    If it does not hold them, they follow from the experiment alone, as if every member of a model with events met one.
     """
     name = f"{quantity}_formal_order"
     if name not in record:
@@ -147,41 +151,40 @@ def orders_in(experiment: Experiment, record: Record, quantity: str) -> Floats:
 
 
 def is_promised(experiment: Experiment, quantity: str) -> bool:
-    """Tell whether theory knows the order of a quantity as that of a part of an error."""
+    """Tell whether a quantity is an error part whose order follows from theory."""
     return is_error_part(quantity) and not why_not_free(experiment.model.definition)
 
 
 def part_orders(experiment: Experiment, quantity: str, columns: Columns) -> Floats:
-    """Return the order of a part for which `is_promised` holds, shape (scheme, 1 or case).
+    """Return the order of an error part for which `is_promised` holds, shape (scheme, 1 or case).
 
-    It is infinite where the part is exact, and NaN where nothing oscillates or a scheme chooses its own steps.
+    It is infinite where the part is exact, and NaN where nothing oscillates or the scheme chooses its own steps.
     """
     model = experiment.model.definition
     size = len(next(iter(columns.values()))) if columns else 1
     parameters, initial = numbers_of(experiment, columns, size)
     motion = free_oscillation(model, initial, parameters)
-    found = np.full((len(experiment.schemes), len(motion.frequency)), np.nan)
+    orders = np.full((len(experiment.schemes), len(motion.frequency)), np.nan)
     for s, spec in enumerate(experiment.schemes):
         if spec.adaptive:
             continue
         for options, cases in sweep_columns.option_groups(experiment, s, columns):
             stepper = spec.method.stepper_for(model, options)
             damping = motion.damping[cases]
-            # worked out once for each damping
             for value in np.unique(damping[np.isfinite(damping)]).tolist():
-                own = cases[damping == value]
+                subset = cases[damping == value]
                 both = theory.part_orders(
-                    stepper, value, motion.position[own], motion.velocity[own]
+                    stepper, value, motion.position[subset], motion.velocity[subset]
                 )
-                found[s, own] = both[0 if quantity.endswith(PHASE) else 1]
-    return found
+                orders[s, subset] = both[0 if quantity.endswith(PHASE) else 1]
+    return orders
 
 
 def special_orders(experiment: Experiment, quantity: str, columns: Columns) -> Floats:
-    """Return the highest order that every scheme has in a special case, shape (scheme, 1 or case).
+    """Return the highest order that every scheme can have in a special case, shape (scheme, 1 or case).
 
-    A part of an error has one order at a special start, and another at any other one: it may have any. Where the mesh
-    or corners decide there is no such case (NaN).
+    It is infinite for an error part, whose order may be any at a special initial state, and NaN where the mesh or
+    corners decide the order.
     """
     model = experiment.model.definition
     if model.lookup is not None:
@@ -197,32 +200,32 @@ def special_orders(experiment: Experiment, quantity: str, columns: Columns) -> F
 
 
 def orders_vary(experiment: Experiment, quantity: str) -> bool:
-    """Tell whether members have orders of their own."""
+    """Tell whether the orders of a quantity may differ between members."""
     if is_promised(experiment, quantity) or experiment.model.definition.events is not None:
         return experiment.sweep is not None
     return options_swept(experiment) or beginning_varies(experiment)
 
 
 def even_powers(experiment: Experiment, quantity: str, columns: Columns) -> Flags:
-    """Tell whether the error of a quantity has every second power only, shape (scheme, case)."""
-    model, of = experiment.model.definition, whole_of(quantity)
-    even = _each(experiment, columns, lambda s, o: float(s.has_even_powers(of, model, o)))
+    """Tell whether the error expansion of a quantity has only every second power of dt, shape (scheme, case)."""
+    model, whole = experiment.model.definition, whole_of(quantity)
+    even = _each(experiment, columns, lambda s, o: float(s.has_even_powers(whole, model, o)))
     return np.asarray(even != 0)
 
 
 def left_to_the_mesh(experiment: Experiment, columns: Columns, has_corners: Flags) -> Floats:
-    """Return the power that is left where it depends on the mesh what a step sees, shape (scheme, 1 or case).
+    """Return the power of dt with a coefficient that depends on the mesh, shape (scheme, 1 or case).
 
-    It is 1 where events are left to the mesh, and 2 where steps have corners of a table inside (`has_corners`, shape
-    (case,)): how much of an error belongs to that power is then the accident of where they lie between two points. NaN
-    stands where errors have a regular expansion.
+    It is 1 where events are left to the mesh, and 2 where corners of a table lie inside steps (`has_corners`, shape
+    (case,)): the coefficient then depends on their positions between two grid points. It is NaN where errors have a
+    regular expansion.
     """
     model = experiment.model.definition
 
     def left(scheme: Scheme, options: Options) -> float:
         if model.events is not None:
             return 1.0 if is_on_the_mesh(options) else math.nan
-        # the error of a scheme of first order is its own
+        # the error of a first-order scheme dominates that of the corners
         order = scheme.formal_order(model.position, model, options)
         return ORDER_AT_CORNERS if order >= ORDER_AT_CORNERS else math.nan
 
@@ -238,7 +241,7 @@ def relative_floors(
 ) -> Floats:
     """Return the predicted round-off relative to the solution, shape (scheme, case, level).
 
-    `steps` are those of every level, `arithmetic` that of schemes which have several, their own one where None.
+    `steps` are the numbers of steps of the levels; `arithmetic` replaces the option of this name, unless it is None.
     """
     loaded = experiment.model.definition.loaded
     least = SPACING_AT_ONE if loaded is None else max(SPACING_AT_ONE, loaded.rounding)
@@ -252,24 +255,24 @@ def relative_floors(
 
 
 def stability_limits(experiment: Experiment, columns: Columns) -> Floats:
-    """Return the largest stable w dt of every scheme, infinite for none, shape (scheme, case).
+    """Return the largest stable w dt of every scheme, infinite if there is no limit, shape (scheme, case).
 
-    It is infinite too for a scheme that grows at every step (its growth vanishes with dt, and is no instability), and
-    for one that chooses its own steps.
+    It is also infinite for a scheme that chooses its own steps, and for one that grows at every step: its growth
+    vanishes with dt, so it is no instability.
     """
     limits = _each(experiment, columns, limit_of)
     return np.where(limits > 0.0, limits, np.inf)
 
 
 def limit_of(scheme: Scheme, options: Options) -> float:
-    """Return the largest stable w dt of a scheme, infinite for none, 0 where every step grows; NaN where it adapts."""
+    """Return the largest stable w dt of a scheme: infinite without a limit, 0 if every step grows, NaN if adaptive."""
     return math.nan if scheme.adaptive else theory.stability_limit(scheme, options)
 
 
 def _each(
     experiment: Experiment, columns: Columns, promise: Callable[[Scheme, Options], ArrayLike]
 ) -> Floats:
-    """Return what every scheme promises with the options that each member has of it."""
+    """Return `promise` for every scheme and for the options of each member, shape (scheme, 1 or case, ...)."""
     rows = []
     for i, scheme in enumerate(experiment.schemes):
         groups = sweep_columns.option_groups(experiment, i, columns)

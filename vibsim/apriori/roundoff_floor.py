@@ -1,7 +1,7 @@
-"""The floor that round-off puts under differences between levels.
+"""The floor of round-off below differences between levels.
 
-A scheme predicts the size of its accumulated round-off relative to the solution, from the arithmetic and the number of
-steps. It is an order of magnitude; the verdict blames it only where the data show it too.
+A scheme predicts its accumulated round-off, relative to the solution, from the arithmetic and the number of steps. This
+is an order of magnitude: a verdict attributes an error to round-off only if the data show it too.
 """
 
 from __future__ import annotations
@@ -20,17 +20,16 @@ SPACING_AT_ONE = float(np.finfo(np.float64).eps)
 No stored number is known better than this, relative to its size.
 """
 STORED = 1.0 / 7.0
-"""Root mean square of the error that storing leaves of numbers from 1/2 to 1: half a spacing over root 12. [derived]"""
+"""Root mean square of the rounding error of stored numbers from 1/2 to 1, in epsilon: 1/2 over sqrt(12). [derived]"""
 
 
 def stored_floor(
     records: Mapping[int, Record], levels: Sequence[int], names: Sequence[str]
 ) -> Floats:
-    """Return the round-off of storing at every level, relative to the solution's size, shape (level,); 0 for doubles.
+    """Return the rounding error of stored values at every level, relative to the solution, shape (level,).
 
-    Data of other programs may be kept in single precision: no difference of two such levels is known to more than its
-    seven digits.
-    `names` are the states.
+    It is 0 for double precision. Other programs may store single precision, so that differences between levels are
+    known to seven digits only. `names` are the states.
     """
     floors = []
     for level in levels:
@@ -41,9 +40,9 @@ def stored_floor(
 
 
 def solution_size(series: list[Floats]) -> Floats:
-    """Return the size of a solution, shape (scheme, case): its largest value at the finest level that has one.
+    """Return the largest absolute value of a solution at the finest level with finite values, shape (scheme, case).
 
-    The solution at every level from coarse to fine has the shape (scheme, case, t).
+    `series` is the solution at every level from coarse to fine, each of shape (scheme, case, t).
     """
     size = largest(series[-1])
     if np.all(np.isfinite(size)):
@@ -57,10 +56,9 @@ def solution_size(series: list[Floats]) -> Floats:
 
 
 def norm_of_floor(floor: Floats, kind: str, points: int, spacing: Floats) -> Floats:
-    """Return the norm over time of noise as large as `floor` at every point; the shape of `floor`.
+    """Return the norm over time of noise of size `floor`, shape (..., case), at each of `points` grid points.
 
-    The floor has the shape (..., case), the kind is one of `vocabulary.NORMS`; the points of the grid have a spacing of
-    shape (case,) or (1,).
+    `kind` is one of `vocabulary.NORMS`; `spacing` is that of the grid, shape (case,) or (1,).
     """
     weight = {"l1": spacing * points, "l2": np.sqrt(spacing * points)}.get(kind, np.ones(1))
     return np.asarray(floor * weight)

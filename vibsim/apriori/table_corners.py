@@ -1,8 +1,8 @@
-"""Where a force that is looked up in tables has corners within steps: tables of systems and load histories alike.
+"""Corners inside steps of a force from tables: tables of systems, and load histories of structures.
 
-Between two points such a force is a straight line. A step across a point at which the slope changes by s has an error
-of the impulse of ``s dt^2/8`` at most, another part of it on each level; the sum over all such points bounds what no
-level shows. Steps that end at a point have no such error there.
+Between two points of the table such a force is linear. A step across a point at which the slope changes by s has an
+error of the impulse of at most ``s dt^2/8``, of which each level has a different fraction; the sum over all such points
+bounds the error that no level shows. Steps that end at a point of the table have no such error there.
 """
 
 from __future__ import annotations
@@ -16,23 +16,23 @@ from vibsim.formula import Pulses, values
 from vibsim.models import Model, tree
 
 ON_A_POINT = 1e-6
-"""Part of a step within which a corner is at its end. [convention]"""
+"""A corner closer to a grid point than this fraction of a step is at the grid point. [convention]"""
 STRAIGHT = 1e-9
-"""A slope that changes by less than this part of the largest one is the rounding of a straight line. [convention]"""
+"""A change of slope below this fraction of the largest slope is rounding. [convention]"""
 PULSE_RATIO = 2.0
-"""A pulse leaves the values at the grid points around it by more than so many times their range, ..."""
+"""A pulse exceeds the values at the grid points around it by more than this multiple of their range, ..."""
 SMALLEST_PULSE = 1e-3
-"""... and by this part of the largest force. [convention]"""
+"""... and by more than this fraction of the largest force. [convention]"""
 
 
 def is_on_a_point(t: Floats, dt: Floats) -> Flags:
-    """Tell whether times are grid points of step dt."""
+    """Tell whether times are grid points for step dt."""
     place = t / dt
     return np.asarray(np.abs(place - np.round(place)) <= ON_A_POINT)
 
 
 def has_tables(model: Model) -> bool:
-    """Tell whether a force of a model is looked up in a table that may have points within steps."""
+    """Tell whether a model looks up its force in a table that may have points inside steps."""
     if model.loaded is not None:
         return bool(model.loaded.structure.histories)
     return model.lookup is not None and not model.lookup.is_met
@@ -41,46 +41,46 @@ def has_tables(model: Model) -> bool:
 def table_corners(
     model: Model, parameters: Mapping[str, Floats], end: Floats, dt: Floats
 ) -> Floats:
-    """Find the corners of tables within steps of length dt: the first one, and how much they turn, shape (3, case).
+    """Return the corners of tables inside steps of length dt, shape (3, case); NaN without a corner.
 
-    That is all changes of slope together, over the largest change and over the largest force; NaN without a corner.
-    `parameters` are those of the members by name, each of shape (case,), as are `end` and `dt`.
+    Rows: time of the first one [s], sum of all changes of slope over the largest change, and the same sum over the
+    largest force [1/s]. `parameters` are those of the members by name, each of shape (case,), as are `end` and `dt`.
     """
-    found = np.full((3, len(end)), np.nan)
+    corners = np.full((3, len(end)), np.nan)
     if has_tables(model):
         for case in range(len(end)):
-            own = {name: x[case] for name, x in parameters.items()}
-            found[:, case] = _of_member(model, own, float(end[case]), float(dt[case]))
-    return found
+            single = {name: x[case] for name, x in parameters.items()}
+            corners[:, case] = _member_corners(model, single, float(end[case]), float(dt[case]))
+    return corners
 
 
-def _of_member(
+def _member_corners(
     model: Model, parameters: Mapping[str, float], end: float, dt: float
 ) -> tuple[float, float, float]:
-    """Return what `table_corners` finds of one member."""
+    """Return a column of `table_corners`, for one member."""
     first, total, sharpest, largest = np.inf, 0.0, 0.0, 0.0
     for t, force in _histories(model, parameters):
         slopes = np.diff(force) / np.diff(t)
         turns, at = np.abs(np.diff(slopes)), t[1:-1]
-        is_due = (at > 0.0) & (at < end) & ~is_on_a_point(at, np.asarray(dt))
-        is_due &= turns > STRAIGHT * np.max(np.abs(slopes))
+        is_corner = (at > 0.0) & (at < end) & ~is_on_a_point(at, np.asarray(dt))
+        is_corner &= turns > STRAIGHT * np.max(np.abs(slopes))
         largest = max(largest, float(np.max(np.abs(force))))
-        if is_due.any():
-            first = min(first, float(at[is_due][0]))
-            total += float(np.sum(turns[is_due]))
-            sharpest = max(sharpest, float(np.max(turns[is_due])))
+        if is_corner.any():
+            first = min(first, float(at[is_corner][0]))
+            total += float(np.sum(turns[is_corner]))
+            sharpest = max(sharpest, float(np.max(turns[is_corner])))
     return (first, total / sharpest, total / largest) if total else (np.nan, np.nan, np.nan)
 
 
 def table_pulses(model: Model, parameters: Mapping[str, Floats], end: Floats, steps: int) -> Pulses:
-    """Find the highest pulse of a table between the points of a level with so many steps, of every member."""
+    """Find for every member the highest pulse of a table between the grid points of a level with `steps` steps."""
     time, width = np.full((2, len(end)), np.nan)
     for case in range(len(end) if has_tables(model) else 0):
-        own, highest = {name: x[case] for name, x in parameters.items()}, 0.0
+        single, highest = {name: x[case] for name, x in parameters.items()}, 0.0
         grid = np.arange(steps + 1) * (end[case] / steps)
-        for t, force in _histories(model, own):
-            seen, before = np.interp(grid, t, force), np.searchsorted(grid, t[1:-1]) - 1
-            around = seen[np.clip(before + np.arange(-1, 3)[:, None], 0, steps)]
+        for t, force in _histories(model, single):
+            sampled, before = np.interp(grid, t, force), np.searchsorted(grid, t[1:-1]) - 1
+            around = sampled[np.clip(before + np.arange(-1, 3)[:, None], 0, steps)]
             low, high = np.min(around, axis=0), np.max(around, axis=0)
             excess = np.maximum(force[1:-1] - high, low - force[1:-1])
             least = np.maximum(PULSE_RATIO * (high - low), SMALLEST_PULSE * np.max(np.abs(force)))
@@ -93,13 +93,13 @@ def table_pulses(model: Model, parameters: Mapping[str, Floats], end: Floats, st
 
 
 def _histories(model: Model, parameters: Mapping[str, float]) -> Iterator[tuple[Floats, Floats]]:
-    """Yield the times of the points of every table, and the force there but for a factor that all points share."""
+    """Yield the times of the points of every table, and the force there up to a common factor."""
     if model.loaded is not None:
-        own = model.loaded.structure
-        for number, (t, force) in own.histories:
+        structure = model.loaded.structure
+        for number, (t, force) in structure.histories:
             # a single straight line has no corner
             if len(t) > 2:
-                yield t, force * np.max(np.abs(own.shapes[number]))
+                yield t, force * np.max(np.abs(structure.shapes[number]))
     elif model.lookup is not None:
         table = model.lookup.table
         speed = float(values(tree(model, model.lookup.place), {**parameters, "t": 1.0}))

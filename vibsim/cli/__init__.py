@@ -1,4 +1,4 @@
-"""The command ``vibsim``. Each command imports what it needs when it runs: a quick one stays quick."""
+"""The command ``vibsim``. Each subcommand imports its modules only when it runs, so that quick commands stay quick."""
 
 from __future__ import annotations
 
@@ -7,10 +7,10 @@ import sys
 from collections.abc import Sequence
 
 LEAST_BYTES = 600 * 10**6
-"""Address space that a run needs. Measured with 2 cores: 450 MB are sometimes too little, 500 MB were enough."""
+"""Address space that a run needs. Measured on 2 cores: 450 MB are sometimes too little, 500 MB were enough."""
 YOUNG_OBJECTS = 50_000
-"""So many new objects before Python looks for circles among them. With its own 700 that takes a tenth of a report's
-time, most of it in imports; with 50 000 a page takes 2 MB more."""
+"""Threshold of Python's garbage collector (generation 0). With the default of 700, collections take a tenth of the time
+of a report, mostly during imports; with 50 000 a report takes 2 MB more."""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -19,14 +19,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Parameters
     ----------
     arguments
-        Those of the command. Without them this is the command itself: it takes those of the command line, and
-        it ends when it is told to, with everything that it has started.
+        Arguments of the command. None stands for those of the command line; the command then runs under supervision,
+        and a signal ends it with all processes that it has started.
 
     Returns
     -------
     int
-        0 when all went well and every check passed, 1 when a check did not pass or something failed, 2 when
-        input was refused, 129, 130 or 143 when ended by SIGHUP, SIGINT or SIGTERM.
+        0 if all went well and every check passed, 1 if a check did not pass or something failed, 2 if input was
+        refused, and 129, 130 or 143 if SIGHUP, SIGINT or SIGTERM ended the command.
     """
     if arguments is not None:
         return _perform(arguments)
@@ -41,15 +41,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _check_limits() -> None:
-    """Refuse to start with too little address space: libraries fail in many ways then, and some without a word."""
+    """Refuse to start with too little address space, where libraries fail in many ways, some without a message."""
     import resource
 
     from vibsim.core.errors import VibsimError
 
     limit, _ = resource.getrlimit(resource.RLIMIT_AS)
     if limit != resource.RLIM_INFINITY and limit < LEAST_BYTES:
-        found, needed = limit // 10**6, LEAST_BYTES // 10**6
-        text = f"not enough memory: the limit is {found} MB (ulimit -v), {needed} MB are needed"
+        available, needed = limit // 10**6, LEAST_BYTES // 10**6
+        text = f"not enough memory: the limit is {available} MB (ulimit -v), {needed} MB are needed"
         raise VibsimError(text)
 
 

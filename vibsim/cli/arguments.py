@@ -1,4 +1,4 @@
-"""What the command line takes."""
+"""Commands and options of the command line."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ _NAMES = "experiment (name or collection/name), one member of its sweep (NAME@CA
 LISTS = ("models", "schemes", "checks", "experiments", "schema")
 SHELLS = ("bash", "zsh", "fish", "words")
 _Row = tuple[str | tuple[str, str], dict[str, Any]]
-"""An option, perhaps with a short name before it, and what `argparse` takes of it."""
+"""An option, possibly with a short name before the long one, and its keyword arguments for `argparse`."""
 Command = tuple[str, str, str, Sequence[_Row]]
-"""The name of a command, the module of its function, what it does, and its options."""
+"""Name of a command, module of its function, description, and options."""
 
 
 def parser() -> argparse.ArgumentParser:
@@ -40,48 +40,46 @@ def parser() -> argparse.ArgumentParser:
 
 
 def parsed(arguments: Sequence[str]) -> argparse.Namespace:
-    """Return the options of a command line; one that is refused ends the program with status 2."""
+    """Return the parsed options; a command line that is refused ends the program with status 2."""
     top = parser()
     known = [name for name, *_ in commands()]
     first = next((word for word in arguments if not word.startswith("-")), None)
     if first is not None and first not in known:
         top.error(f"unknown command '{first}': {nearest(first, known)}")
-    own, handed = list[str](), list[str]()
-    for word in arguments:
-        if re.match(r"-\.?[0-9]", word) and own and re.fullmatch("--[a-z-]+", own[-1]):
+    ours, for_snakemake = list(arguments), list[str]()
+    if first == "run" and "--" in ours:
+        border = ours.index("--")
+        ours, for_snakemake = ours[:border], ours[border + 1 :]
+    for i in range(len(ours) - 1, 0, -1):
+        if re.match(r"-\.?[0-9]", ours[i]) and re.fullmatch("--[a-z-]+", ours[i - 1]):
             # `argparse` takes -0.1,-0.2 for an option
-            own[-1] += f"={word}"
-        else:
-            own.append(word)
-    if first == "run" and "--" in own:
-        border = own.index("--")
-        own, handed = own[:border], own[border + 1 :]
-    return top.parse_args(own, argparse.Namespace(handed=handed))
+            ours[i - 1 : i + 1] = [f"{ours[i - 1]}={ours[i]}"]
+    return top.parse_args(ours, argparse.Namespace(for_snakemake=for_snakemake))
 
 
 def _perform(module: str, name: str, options: argparse.Namespace) -> int:
-    """Call the function of a command, in a module that is imported for it."""
+    """Import the module of a command and call its function."""
     status: int = getattr(import_module(module), name)(options)
     return status
 
 
 def _number(bound: str, least: float) -> Callable[[str], float]:
-    """Return what reads a finite number of at least so much, as `bound` says in words."""
+    """Return a function that reads a finite number not less than `least`; `bound` is the limit in words."""
 
     def read(text: str) -> float:
         try:
-            found = float(text)
+            number = float(text)
         except ValueError:
-            found = math.nan
-        if not (math.isfinite(found) and found >= least):
+            number = math.nan
+        if not (math.isfinite(number) and number >= least):
             raise argparse.ArgumentTypeError(f"'{text}' is not a finite number {bound}".rstrip())
-        return found
+        return number
 
     return read
 
 
 def _whole(least: int) -> Callable[[str], int]:
-    """Return what reads a whole number of at least so much."""
+    """Return a function that reads a whole number not less than `least`."""
 
     def read(text: str) -> int:
         if not text.isdecimal() or int(text) < least:
@@ -98,7 +96,7 @@ _index, _positive = _whole(0), _whole(1)
 
 
 def _path(text: str) -> Path:
-    """Return a path; an empty one would be the current folder, which nobody named."""
+    """Return a path; an empty text is refused, since it would mean the current folder."""
     return Path(_word(text))
 
 
@@ -144,11 +142,11 @@ ONE = _row("experiment", _word, "EXPERIMENT", "experiment or FILE.yaml")
 FOLDER = _row("--out", _path, "DIR", "folder to write to")
 _CHANGED = "refuse when the experiment or the code is not the one with this digest"
 _DISCARDED = "delete a damaged or outdated input, so that the next run makes it again"
-OF_JOBS = (
+JOB_OPTIONS = (
     *(RESULTS, SETTINGS),
     *(_row("--digest", _word, "SHA256", _CHANGED), _flag("--discard", _DISCARDED)),
 )
-"""What every job of the workflow takes."""
+"""Options of every job of the workflow."""
 
 
 def commands() -> Iterator[Command]:
@@ -195,14 +193,14 @@ def commands() -> Iterator[Command]:
     shell = "shell", {"choices": SHELLS, "help": what}
     yield "completion", "commands.completion", text, (shell, words)
     text = "Simulate levels of an experiment."
-    yield "simulate", "jobs.simulate", text, (ONE, THREADS, *OF_JOBS, *_simulate(), ALLOW)
+    yield "simulate", "jobs.simulate", text, (ONE, THREADS, *JOB_OPTIONS, *_simulate(), ALLOW)
     text = "Compare the levels of an experiment: convergence.nc and summary.json."
-    yield "analyse", "jobs.analyse", text, (ONE, THREADS, *OF_JOBS, FOLDER)
+    yield "analyse", "jobs.analyse", text, (ONE, THREADS, *JOB_OPTIONS, FOLDER)
     text = "Extrapolate the solution of an experiment over all its levels: best.nc."
     best = _row("--out", _path, "FILE", "netCDF file to write")
-    yield "extrapolate", "jobs.extrapolate", text, (ONE, *OF_JOBS, best)
+    yield "extrapolate", "jobs.extrapolate", text, (ONE, *JOB_OPTIONS, best)
     text = "Write the report of an experiment; without one, the index over all results."
-    yield "report", "commands.report", text, (*OF_JOBS, *_report())
+    yield "report", "commands.report", text, (*JOB_OPTIONS, *_report())
 
 
 def _run() -> Iterator[_Row]:
@@ -255,7 +253,7 @@ def _report() -> Iterator[_Row]:
 
 
 def _detail() -> Iterator[_Row]:
-    """Yield the options that say how much is printed: the last one counts."""
+    """Yield the options for the amount of output; the last one on the command line counts."""
     for names, value, text in (
         (("-v", "--verbose"), "full", "show every check, also those that passed"),
         (("-q", "--quiet"), "quiet", "print nothing but errors; the exit status tells the rest"),

@@ -1,4 +1,4 @@
-"""Plans of what a user names, with everything that a plan may need and the plan itself must not know."""
+"""Plans of the experiments that a user names; supplies what the package `vibsim.plan` may not import itself."""
 
 from __future__ import annotations
 
@@ -28,23 +28,21 @@ def plans_of(
 ) -> list[Plan]:
     """Return the plans of files, experiments or collections; without `words` those of the default collections.
 
-    The `settings` stand in place of values of all files.
-
-    With `cached`, plans that were made before will do. InputError with every word that names nothing and the faults of
-    all files.
+    The `settings` replace values of all files. With `cached`, plans may come from the cache. Raises one InputError with
+    every word that names nothing, or with the faults of all files.
     """
     return list(load_all(choose(words, home(), settings), resolve, cached=cached).values())
 
 
 def tell_notes(plans: Sequence[Plan]) -> None:
-    """Say on stderr what files say and probably do not mean."""
+    """Print the notes on experiment files to stderr."""
     for plan in plans:
         for remark in plan.remarks:
             print(from_here(remark), file=sys.stderr, flush=True)
 
 
 def one_plan_of(word: str, settings: Sequence[str] = ()) -> Plan:
-    """Return the plan of one experiment, perhaps one that was made before; InputError where `word` is a collection."""
+    """Return the plan of one experiment, possibly from the cache; raise InputError where `word` is a collection."""
     choices = choose([word], home(), settings)
     if len(choices) != 1:
         rule = "must be one experiment, not a collection"

@@ -1,4 +1,4 @@
-"""What went wrong, in a sentence: the one place that turns an exception into words and an exit status."""
+"""Turn exceptions into messages and exit statuses; no other module does."""
 
 from __future__ import annotations
 
@@ -14,18 +14,18 @@ from vibsim.core import netcdf
 from vibsim.core.errors import InputError, VibsimError
 
 FAILED, REFUSED = 1, 2
-_OF_MEMORY = (
+_MEMORY_MESSAGES = (
     *("cannot allocate memory", "failed to map segment", "can't start new thread"),
     *("std::bad_alloc", "out of memory"),
 )
-"""How libraries tell in their own words that they were given no memory."""
+"""Texts in messages of libraries that could not allocate memory."""
 
 
 def report(error: Exception) -> int:
-    """Say on stderr what went wrong and return the exit status."""
+    """Print the message of an error to stderr, and return the exit status."""
     text = sentence(error)
     if isinstance(error, BrokenPipeError):
-        # The reader of a pipe has gone (``vibsim list | head``); nobody is left to tell.
+        # the reader of a pipe has ended (``vibsim list | head``)
         sys.stderr.close()
         return FAILED
     text = from_here(text) if isinstance(error, InputError) else f"vibsim: {text}"
@@ -34,7 +34,7 @@ def report(error: Exception) -> int:
 
 
 def from_here(text: str) -> str:
-    """Write paths at the beginning of lines from the current folder on, as they were probably given."""
+    """Make paths at the beginning of lines relative to the current folder, as the user probably wrote them."""
     try:
         here = f"{Path.cwd()}{os.sep}"
     except OSError:
@@ -43,12 +43,13 @@ def from_here(text: str) -> str:
 
 
 def sentence(error: Exception) -> str:
-    """Say what went wrong; for a fault of vibsim itself, where the full text is.
+    """Return the message of an error; for a fault of vibsim itself, it says where the traceback is.
 
     Raises
     ------
     Interrupted
-        Where this process was told to end: libraries pass off as a fault of their own what is raised inside them.
+        Where a signal requested this process to end: a library may have turned the Interrupted that was raised inside
+        it into an error of its own.
     """
     check_interrupted()
     if isinstance(error, VibsimError):
@@ -64,7 +65,7 @@ def sentence(error: Exception) -> str:
 
 
 def reason(error: BaseException) -> str:
-    """Return the cause that an exception names, without its number."""
+    """Return the message of an exception, without its error number."""
     if isinstance(error, OSError) and error.strerror:
         return f"{error.filename}: {error.strerror}" if error.filename else error.strerror
     kind = type(error).__name__
@@ -72,10 +73,10 @@ def reason(error: BaseException) -> str:
 
 
 def is_of_memory(error: BaseException) -> bool:
-    """Tell whether an exception, or one that led to it, says that memory is short."""
+    """Tell whether an exception, or one of its causes, means that memory is short."""
     if isinstance(error, MemoryError) or getattr(error, "errno", None) == errno.ENOMEM:
         return True
-    says_so = any(words in str(error).lower() for words in _OF_MEMORY)
+    says_so = any(words in str(error).lower() for words in _MEMORY_MESSAGES)
     if says_so and isinstance(error, ImportError | OSError | RuntimeError):
         return True
     cause = error.__cause__ or error.__context__
@@ -83,7 +84,7 @@ def is_of_memory(error: BaseException) -> bool:
 
 
 def save_text(text: str) -> str:
-    """Write a long text to a file of its own, for whoever wants to know more, and say where it is."""
+    """Write a long text to a temporary file, and return a remark that names this file."""
     try:
         descriptor, name = tempfile.mkstemp(prefix="vibsim-error-", suffix=".txt")
         with os.fdopen(descriptor, "w") as file:

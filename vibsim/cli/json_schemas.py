@@ -1,4 +1,4 @@
-"""The JSON Schemas of what ``--json`` of a run and of a plan prints (`workflow/schemas.py` writes their files)."""
+"""The JSON Schemas of the output of ``vibsim run --json`` and ``vibsim plan --json`` (see `workflow/schemas.py`)."""
 
 from __future__ import annotations
 
@@ -58,8 +58,8 @@ def run() -> dict[str, Any]:
 
 def plan() -> dict[str, Any]:
     """Return the schema of the plans of experiments."""
-    found = TypeAdapter(Plan).json_schema(ref_template="#/$defs/{model}")
-    definitions = found.pop("$defs")
+    schema = TypeAdapter(Plan).json_schema(ref_template="#/$defs/{model}")
+    definitions = schema.pop("$defs")
     total = object_of(
         {
             "jobs": COUNT,
@@ -78,9 +78,8 @@ def plan() -> dict[str, Any]:
             },
         }
     )
-    found["properties"]["total"] = total
-    # every field is printed, also one with a default
-    found["required"] = list(found["properties"])
-    for row in (found, *definitions.values()):
+    schema["properties"]["total"] = total
+    # every field is printed, even if it has its default value
+    for row in (schema, *definitions.values()):
         row["required"] = list(row["properties"])
-    return DRAFT | {"title": "vibsim plan --json"} | list_of(found) | {"$defs": definitions}
+    return DRAFT | {"title": "vibsim plan --json"} | list_of(schema) | {"$defs": definitions}

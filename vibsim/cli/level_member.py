@@ -1,4 +1,4 @@
-"""One member at one level, from the files of a results folder."""
+"""Read one member at one level from a results folder."""
 
 from __future__ import annotations
 
@@ -19,23 +19,24 @@ OUTDATED = "note: these results were made before the experiment or vibsim change
 
 
 def are_outdated(plan: Plan, summary: Mapping[str, Any]) -> bool:
-    """Say whether verdicts are of another state of the experiment or of vibsim than the present one."""
+    """Tell whether a summary was made before the experiment or vibsim changed."""
     return summary.get("digest") != plan.analysis
 
 
 def made(plan: Plan, results: Path, case: int, word: str) -> tuple[list[int], list[int]]:
-    """Return all levels of a plan, and those of which the file with a member is there.
+    """Return all levels of a plan, and those whose file with member `case` exists.
 
-    InputError where there is no such member; VibsimError where no level is there: `word` is what the user called it.
+    Raises InputError where there is no such member, and VibsimError where no level exists; `word` is the experiment's
+    name on the command line.
     """
     if not 0 <= case < plan.cases:
         raise refusal("--case", case, f"must be from 0 to {plan.cases - 1}")
     levels = [level.level for level in plan.levels]
-    found = [level for level in levels if (results / _shard(plan, level, case).path).is_file()]
-    if not found:
+    existing = [level for level in levels if (results / _shard(plan, level, case).path).is_file()]
+    if not existing:
         problem = f"there are no results yet: {called(command_to_run(word))} (looked in {results})"
         raise VibsimError(f"{plan.key}: {problem}")
-    return levels, found
+    return levels, existing
 
 
 def check_level(level: int, levels: Sequence[int]) -> None:
@@ -45,18 +46,18 @@ def check_level(level: int, levels: Sequence[int]) -> None:
 
 
 def of_level(plan: Plan, results: Path, level: int, case: int) -> Record:
-    """Return one member at one level."""
+    """Return the Record of one member at one level."""
     shard = _shard(plan, level, case)
     return read(results / shard.path, case - shard.start)
 
 
 def is_outdated(plan: Plan, record: Record, level: int, case: int) -> bool:
-    """Say whether a level was made before the experiment or vibsim changed."""
+    """Tell whether a level was made before the experiment or vibsim changed."""
     return record.attrs.get("digest") != _shard(plan, level, case).digest
 
 
 def read(path: Path, place: int) -> Record:
-    """Return one member of a level file, by its place in it."""
+    """Return member number `place` of a level file, counted within the file."""
     from vibsim import store
 
     try:
@@ -66,18 +67,18 @@ def read(path: Path, place: int) -> Record:
                 raise refusal("--case", place, f"{path}: must be from 0 to {level.cases - 1}")
             return level.read(place, place + 1)
     except KeyError:
-        # a level of a solver of the user need not have members
+        # a level of a user's solver may lack the dimension ``case``
         return store.read(path)
 
 
 def series(record: Record) -> list[str]:
-    """Return the names of what a level has over time."""
+    """Return the names of the time series in a level."""
     over_time = ("scheme", "case", "t")
     return [name for name, row in record.variables.items() if row.dims == over_time]
 
 
 def chosen(option: str, wanted: str | None, names: Sequence[str]) -> str:
-    """Return the name that was asked for, else the first one."""
+    """Return the name that the user chose with `option`, by default the first one."""
     if wanted is None:
         return names[0]
     if wanted not in names:
@@ -86,5 +87,5 @@ def chosen(option: str, wanted: str | None, names: Sequence[str]) -> str:
 
 
 def _shard(plan: Plan, level: int, case: int) -> ShardJob:
-    """Return the file of a member at a level."""
+    """Return the job that makes the file of a member at a level."""
     return next(shard for shard in plan.level(level).shards if shard.start <= case < shard.stop)

@@ -1,7 +1,7 @@
-"""A series drawn down the screen, a line of text for each time; for series of any length.
+"""Draw a series of any length as text, one line for each time.
 
 Source: vibration text, section 3.4 (``visualize_front_ascii``) and exercise 13. Time runs downwards, the numerical and
-the exact solution have a symbol each, and a counter tells how many periods have passed.
+the exact solution have a symbol each, and a column counts the periods.
 """
 
 from __future__ import annotations
@@ -14,11 +14,11 @@ from vibsim.core.array_types import Floats
 
 NUMERICAL, EXACT, BOTH, AXIS = "+", "o", "*", "|"
 LINES_PER_PERIOD = 20
-"""So many lines at most are drawn of a period."""
+"""Most lines per period."""
 _LABELS = 24
-"""Columns beside the plot, for the time and the counter."""
+"""Columns for the labels: the time and the number of periods."""
 _LEAST, _MOST = 12, 72
-"""Columns of the plot itself."""
+"""Smallest and largest number of columns of the plot itself."""
 
 
 class Series(NamedTuple):
@@ -31,22 +31,22 @@ class Series(NamedTuple):
     values: Floats
     """The numerical solution at these times; not finite where it broke down."""
     exact: Floats | None
-    """The exact solution at these times, where one is known."""
+    """The exact solution at these times; None if unknown."""
     period: float
-    """In the unit of `t`; not finite where there is none."""
+    """Period in s; not finite if there is none."""
 
 
 class Drawing(NamedTuple):
-    """Lines of text, and which of the samples they show."""
+    """Lines of text, and the indices of the samples that they show."""
 
     lines: list[str]
     shown: range
 
 
 def draw(series: Series, columns: int, rows: int, start: float = 0.0) -> Drawing:
-    """Draw at most so many lines of a series, from a time on, in a terminal with so many columns.
+    """Draw up to `rows` lines of a series, from time `start` [s], in a terminal with `columns` columns.
 
-    A period has at most `LINES_PER_PERIOD` lines. Without a period the lines are spread over the whole series.
+    A period has at most `LINES_PER_PERIOD` lines. Without a period the lines cover the whole series.
     """
     first = int((series.t < start).sum())
     shown = range(first, len(series.t), _stride(series, first, rows))[:rows]
@@ -62,7 +62,7 @@ def draw(series: Series, columns: int, rows: int, start: float = 0.0) -> Drawing
 
 
 def _stride(series: Series, first: int, rows: int) -> int:
-    """Return how many samples a line is apart from the next."""
+    """Return the number of samples from one line to the next."""
     count = len(series.t) - first
     if count > 1 and math.isfinite(series.period) and series.period > 0:
         step = float(series.t[-1] - series.t[first]) / (count - 1)
@@ -71,7 +71,7 @@ def _stride(series: Series, first: int, rows: int) -> int:
 
 
 def _head(series: Series, low: float, high: float, width: int) -> str:
-    """Return the line above the plot: its ends, and what the columns beside it are."""
+    """Return the line above the plot: its range, and the headings of the columns beside it."""
     unit = f" [{series.unit}]" if series.unit not in ("", "1") else ""
     left, right = f"{low:.4g}", f"{high:.4g}"
     middle = f"{series.name}{unit}".center(max(width - len(left) - len(right), 0))
@@ -101,6 +101,6 @@ def _lines(series: Series, shown: range, low: float, high: float, width: int) ->
 
 
 def legend(series: Series) -> str:
-    """Say what the symbols mean."""
+    """Return the legend of the symbols."""
     text = f"{NUMERICAL} {series.name}"
     return text if series.exact is None else f"{text}, {EXACT} exact, {BOTH} both"

@@ -1,4 +1,4 @@
-"""One entry of ``vibsim list`` in full: what a user needs to know to write it into an experiment file."""
+"""One entry of ``vibsim list`` in full: what a user needs to know to use it in an experiment file."""
 
 from __future__ import annotations
 
@@ -19,16 +19,16 @@ if TYPE_CHECKING:
 COORDINATES = "1 to 64 names; the velocity of x is vx, that of u alone v"
 _WIDEST = 100
 Row = tuple[str, str]
-"""A label, empty where the last one goes on, and a text."""
+"""A label, empty for a further row of the same label, and a text."""
 
 
 def in_full(what: str, name: str) -> list[str]:
-    """Return the lines of a model or a scheme.
+    """Return the lines that describe a model or a scheme.
 
     Raises
     ------
     InputError
-        Where there is none of that name, with the nearest.
+        Where the name is unknown; it suggests the nearest one.
     """
     from vibsim.models import MODELS
 
@@ -40,12 +40,12 @@ def in_full(what: str, name: str) -> list[str]:
 
 
 def scheme_named(name: str) -> Scheme:
-    """Return a scheme that was asked for on the command line.
+    """Return the scheme that the user named on the command line.
 
     Raises
     ------
     InputError
-        Where there is none of that name, with the nearest.
+        Where the name is unknown; it suggests the nearest one.
     """
     from vibsim.schemes import SCHEMES
 
@@ -55,39 +55,40 @@ def scheme_named(name: str) -> Scheme:
 
 
 def laid_out(found: Iterable[Row]) -> list[str]:
-    """Return the lines of rows, labels before texts, no wider than the terminal."""
+    """Format rows as lines with aligned texts, no wider than the terminal."""
     rows = list(found)
     width = max(len(label) for label, _ in rows)
     columns = min(terminal.columns(), _WIDEST)
     lines = []
     for label, text in rows:
         head = f"{label.ljust(width)}  "
-        rest = " " * len(head)
+        indent = " " * len(head)
         filled = textwrap.fill(
-            text, max(columns, len(head) + 20), subsequent_indent=rest, initial_indent=head
+            text, max(columns, len(head) + 20), subsequent_indent=indent, initial_indent=head
         )
         lines.append(filled)
     return lines
 
 
 def scheme_rows(scheme: Scheme) -> Iterator[Row]:
-    """Yield what there is to know of a scheme."""
+    """Yield the properties of a scheme."""
     order, step, symplectic, forces, stable = facts(scheme)
     yield "scheme", f"{scheme.kind}: {scheme.title}"
     yield "source", scheme.source
     yield "family", scheme.family
     if not scheme.adaptive:
         orders = scheme.orders(scheme.defaults())
-        of = {"position": order, "velocity": f"{orders.velocity:g}", "energy": f"{orders.energy:g}"}
-        listed = ", ".join(f"{number} of the {name}" for name, number in of.items())
+        numbers = (order, f"{orders.velocity:g}", f"{orders.energy:g}")
+        named = zip(numbers, ("position", "velocity", "energy"), strict=True)
+        listed = ", ".join(f"{number} of the {name}" for number, name in named)
         if orders.energy_linear != orders.energy:
             exact = math.isinf(orders.energy_linear)
             linear = "none, it is exact" if exact else f"{orders.energy_linear:g}"
             listed += f" (on a linear, conservative model: {linear})"
         yield "orders", listed
         if orders.velocity_dependent is not None:
-            with_damping = orders.velocity_dependent.position
-            yield "", f"{with_damping:g} of the position where a force depends on the velocity"
+            damped = orders.velocity_dependent.position
+            yield "", f"{damped:g} of the position where a force depends on the velocity"
     yield "step", step
     yield "first step", scheme.start
     yield "symplectic", symplectic
@@ -103,7 +104,7 @@ def scheme_rows(scheme: Scheme) -> Iterator[Row]:
 
 
 def facts(scheme: Scheme) -> tuple[str, ...]:
-    """Return order, kind of step, symplectic or not, forces per step and stability limit, with default options."""
+    """Return order, kind of step, symplecticity, forces per step and stability limit, for default options."""
     forces = str(scheme.force_evaluations)
     symplectic = "yes" if scheme.symplectic else "no"
     if scheme.adaptive:
@@ -116,7 +117,7 @@ def facts(scheme: Scheme) -> tuple[str, ...]:
 
 
 def stable_until(scheme: Scheme, options: Options) -> str:
-    """Return the stability limit of a scheme with equal steps."""
+    """Return the stability limit of a scheme with a constant step, as text."""
     from vibsim.theory import stability_limit
 
     limit = stability_limit(scheme, options)
@@ -124,7 +125,7 @@ def stable_until(scheme: Scheme, options: Options) -> str:
 
 
 def choices(option: AnyOption) -> str:
-    """Return what an option may be, and what it is where nothing is said."""
+    """Return the valid values and the default of an option, as text."""
     from vibsim.schemes import Flag, Option
 
     if isinstance(option, Option):
@@ -135,7 +136,7 @@ def choices(option: AnyOption) -> str:
 
 
 def model_rows(model: Model) -> Iterator[Row]:
-    """Yield what there is to know of a model."""
+    """Yield the properties of a model."""
     yield "model", f"{model.kind}: {model.title}"
     yield "equation", model.equation
     yield "source", model.source
@@ -176,18 +177,18 @@ def _formula(row: FormulaField) -> str:
 
 
 def needed(model: Model) -> tuple[FormulaField, ...]:
-    """Return the formulas that a file must write, or what stands in their place."""
+    """Return the formulas that an experiment file must contain, or an alternative to them."""
     replaced = {field.instead_of for field in model.formulas}
     return tuple(field for field in model.formulas if field.name in replaced)
 
 
 def unit_text(unit: str) -> str:
-    """Write a unit behind what has it; nothing for a plain number."""
+    """Return a unit in brackets; empty for a dimensionless quantity."""
     return "" if unit == "1" else f" [{unit}]"
 
 
 def parameter_text(row: Parameter) -> str:
-    """Say what a parameter is, with unit, default and bounds."""
+    """Return the description of a parameter, with unit, default and bounds."""
     bounds = []
     if row.minimum is not None:
         bounds.append(f"{'above' if row.exclusive else 'from'} {row.minimum:g}")

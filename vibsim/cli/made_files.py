@@ -1,9 +1,9 @@
-"""The manifest of a results folder: size, time, inode and digest of every file of an experiment, and what made it.
+"""The manifest of a results folder: size, time, inode, digest, job and machine of every file of an experiment.
 
-A job adds its files when it has made them, and a run that ends writes the whole anew, in order. A run compares it with
-the folder (`vibsim.cli.run.changes`), and so does ``vibsim verify``. The manifest is data: a line begins with a digest
-of itself and of the experiment's key, one of another form or of another experiment counts as not there, and the names
-in it are those that vibsim itself gives.
+A job appends its files when it has made them, and a run rewrites the manifest, sorted, when it ends. A run compares it
+with the folder (`vibsim.cli.run.changes`), and so does ``vibsim verify``. The manifest is untrusted data: each line
+begins with a digest of its text and of the experiment's key, a line that is invalid or of another experiment is
+ignored, and only file names of vibsim are accepted.
 """
 
 from __future__ import annotations
@@ -24,11 +24,11 @@ from vibsim.store import seal
 from vibsim.store.atomic import write_text
 
 INDEX = ""
-"""Key of the files over all experiments."""
+"""Key of the files that cover all experiments."""
 OVER_ALL = ("index.html", "summary.csv")
 """Files of the index."""
 BESIDE = ("figures", "tables")
-"""Folders of a report, whose files only the report knows."""
+"""Folders of a report; the plan does not know the files in them."""
 _NAME = re.compile(
     r"level_\d{2,}\.nc|level_\d{2,}/shard_\d{4,}\.nc|convergence\.nc|best\.nc|summary\.(?:json|csv)"
     r"|(?:report|index)\.html|(?:figures|tables)/[^/\0.][^/\0]*"
@@ -38,105 +38,105 @@ CHANGED = "its bytes are not those that were written"
 
 
 class Entry(NamedTuple):
-    """A file as it was made."""
+    """The state of a file when it was made."""
 
     size: int
     time: int
-    """Of the last change, in nanoseconds."""
+    """Time of the last change [ns]."""
     inode: int
     digest: str
-    """SHA-256 of its content; of a sealed file that of its seal."""
+    """SHA-256 of the content; for a sealed netCDF file the one in its seal."""
     job: str
-    """Digest of the job that made it; empty of the index."""
+    """Digest of the job that made the file; empty for the index."""
     machine: str
-    """Where it was made: `machine`."""
+    """The machine that made the file, as `machine` returns it."""
 
     def fits(self, status: os.stat_result) -> bool:
-        """Tell whether a file has the size, the time and the inode that it had when it was made."""
+        """Tell whether a file still has the size, time and inode that it had when it was made."""
         return (status.st_size, status.st_mtime_ns, status.st_ino) == self[:3]
 
 
 @cache
 def machine() -> str:
-    """Name this machine: its architecture, its processor and a digest of all that the processor says it can do."""
-    found: dict[str, str] = {}
+    """Return a description of this machine: architecture, processor, and a digest of the processor's feature flags."""
+    info: dict[str, str] = {}
     with suppress(OSError):
         for line in Path("/proc/cpuinfo").read_text().splitlines():
             key, _, value = line.partition(":")
-            found.setdefault(key.strip(), value.strip())
-    name = found.get("model name") or found.get("CPU part", "unknown processor")
-    features = found.get("flags") or found.get("Features", "")
+            info.setdefault(key.strip(), value.strip())
+    name = info.get("model name") or info.get("CPU part", "unknown processor")
+    features = info.get("flags") or info.get("Features", "")
     digest = hashlib.sha256(" ".join(sorted(features.split())).encode()).hexdigest()[:8]
     return f"{os.uname().machine}, {ascii(name)[1:-1][:100]}, features {digest}"
 
 
 def add(results: Path, key: str, names: Iterable[str], job: str = "") -> None:
-    """Add files that a job has just made; a report comes with all that it consists of.
+    """Add files that a job has just made; with a report also its figures and tables.
 
     `key` is the folder of the experiment in `results`, or `INDEX`; `names` are paths within that folder; `job` is the
     digest of the job.
     """
     entries = {}
-    for name in _whole(results / key, names):
+    for name in _with_report_files(results / key, names):
         file = results / key / name
         digest = seal.stored_digest(file) if file.suffix == ".nc" else content(file)
         entries[name] = entry(file.lstat(), digest, job, machine())
     _append(results, key, entries)
 
 
-def _whole(folder: Path, names: Iterable[str]) -> Iterator[str]:
-    """Yield files, and behind a report those of its folders, which it has to itself."""
+def _with_report_files(folder: Path, names: Iterable[str]) -> Iterator[str]:
+    """Yield `names`, and after a report the files in its folders."""
     for name in names:
         yield name
         if name == "report.html":
-            beside = (path for part in BESIDE for path in sorted((folder / part).glob("[!.]*")))
-            yield from (path.relative_to(folder).as_posix() for path in beside if path.is_file())
+            paths = (path for part in BESIDE for path in sorted((folder / part).glob("[!.]*")))
+            yield from (path.relative_to(folder).as_posix() for path in paths if path.is_file())
 
 
 def withdraw(results: Path, key: str, names: Iterable[str]) -> None:
-    """Take files off the record that a job is about to write; a job that is killed then leaves none that seems changed.
+    """Remove the entries of files that a job is about to write, so that no file of a killed job seems changed.
 
-    With a report goes all that it consists of.
+    With a report, the entries of its figures and tables are removed too.
     """
     _append(results, key, dict.fromkeys(names))
 
 
 def _append(results: Path, key: str, entries: Mapping[str, Entry | None]) -> None:
-    # A line that a kill cut short ends here. What is not on record is compared with its seal, or made again.
+    # The leading newline ends a line that a kill cut short. A file without an entry is checked by its seal or remade.
     with suppress(OSError):
         regular_files.append(path(results, key), f"\n{_line(key, entries)}\n".encode())
 
 
 def load(results: Path, key: str) -> dict[str, Entry]:
-    """Return what is on record, the newest of each file; of figures and tables those of the newest report."""
+    """Return the newest entry of each file; figures and tables only of the newest report."""
     return read(results, key)[0]
 
 
 def read(results: Path, key: str) -> tuple[dict[str, Entry], bool]:
-    """Return what is on record, and whether every line is as it was written."""
-    found: dict[str, Entry] = {}
+    """Return the entries (see `load`), and whether every line of the manifest is intact."""
+    entries: dict[str, Entry] = {}
     try:
         lines = path(results, key).read_bytes().split(b"\n")
     except OSError:
-        return found, False
-    is_whole = True
+        return entries, False
+    is_intact = True
     for line in filter(None, lines):
         data = _data(key, line)
         if data is None:
-            is_whole = False
+            is_intact = False
             continue
         if "report.html" in data:
-            found = {name: e for name, e in found.items() if not name.startswith(BESIDE)}
+            entries = {name: e for name, e in entries.items() if not name.startswith(BESIDE)}
         for name, entry in data.items():
             if entry is None:
-                found.pop(name, None)
+                entries.pop(name, None)
             else:
-                found[name] = entry
-    return found, is_whole
+                entries[name] = entry
+    return entries, is_intact
 
 
 def _data(key: str, line: bytes) -> dict[str, Entry | None] | None:
-    """Return the entries of a line, None of what is withdrawn; None where it is not as it was written for this key."""
+    """Return the entries of a line, None for withdrawn files; return None if the line is invalid or has another key."""
     digest, _, text = line.partition(b" ")
     if _digest(key, text) != digest:
         return None
@@ -150,7 +150,7 @@ def _data(key: str, line: bytes) -> dict[str, Entry | None] | None:
 
 
 def replace(results: Path, key: str, entries: Mapping[str, Entry]) -> None:
-    """Write the whole record anew, in one line and in order, where it is not so already."""
+    """Rewrite the manifest as one line, sorted by name, unless it is the same already."""
     file, text = path(results, key), f"{_line(key, entries)}\n"
     with suppress(OSError):
         if file.read_bytes() != text.encode() if file.exists() else entries:
@@ -158,12 +158,12 @@ def replace(results: Path, key: str, entries: Mapping[str, Entry]) -> None:
 
 
 def content(file: Path) -> str:
-    """Return the digest of a file, worked out from its bytes.
+    """Return the digest of a file, computed from its bytes.
 
     Raises
     ------
     DamagedFileError
-        When it should be sealed and is not as it was sealed.
+        Where a netCDF file does not match its seal.
     """
     if file.suffix == ".nc":
         seal.check(file)
@@ -172,12 +172,12 @@ def content(file: Path) -> str:
 
 
 def entry(status: os.stat_result, digest: str, job: str = "", machine: str = "") -> Entry:
-    """Return the entry of a file with this status; job and machine are empty where nobody knows them."""
+    """Return the entry of a file with this status; job and machine are empty if unknown."""
     return Entry(status.st_size, status.st_mtime_ns, status.st_ino, digest, job, machine)
 
 
 def path(results: Path, key: str) -> Path:
-    """Return the file of a manifest."""
+    """Return the path of the manifest of an experiment."""
     return results / ".vibsim/made" / f"{key.replace('/', '.') or 'index'}.jsonl"
 
 

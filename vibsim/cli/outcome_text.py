@@ -1,4 +1,4 @@
-"""Verdicts for a terminal: one line for each experiment, below it what did not pass; or every check."""
+"""Verdicts for a terminal: a line for each experiment, and below it the checks that did not pass, or all checks."""
 
 from __future__ import annotations
 
@@ -11,10 +11,9 @@ from vibsim.core.set_option import set_options
 from vibsim.core.vocabulary import SEVERITY, order_interval
 
 Entry = Mapping[str, Any]
-"""The summary of an experiment, one without checks and with an ``error`` where it has none; or one of its checks; or a
-failed job."""
+"""The summary of an experiment, or an entry with an ``error`` in its place; or one of its checks; or a failed job."""
 _NARROWEST = 30
-"""Columns that a text has at least, however narrow the terminal."""
+"""Smallest width of a text, however narrow the terminal."""
 
 
 def in_lines(summaries: Sequence[Entry], columns: int) -> Iterator[str]:
@@ -40,7 +39,7 @@ def in_full(summaries: Sequence[Entry], columns: int) -> Iterator[str]:
 
 
 def of_failures(failures: Sequence[Entry]) -> Iterator[str]:
-    """Yield the jobs that failed, with the end of their logs; those with the same end are counted only."""
+    """Yield the failed jobs with the ends of their logs; jobs with the same end are only counted."""
     ends = [tuple(failure["tail"]) for failure in failures]
     for i, failure in enumerate(failures):
         if ends[i] and ends[i] in ends[:i]:
@@ -52,17 +51,17 @@ def of_failures(failures: Sequence[Entry]) -> Iterator[str]:
 
 
 def count(summaries: Sequence[Entry], status: str) -> str:
-    """Count the checks that passed, with the status of the whole run."""
+    """Return the numbers of experiments and of passed checks, with the status of the whole run."""
     found = [check["status"] for entry in summaries for check in entry["checks"]]
-    counted = "1 experiment" if len(summaries) == 1 else f"{len(summaries)} experiments"
+    experiments = "1 experiment" if len(summaries) == 1 else f"{len(summaries)} experiments"
     passed = (
         f"{found.count('PASS')} of {len(found)} checks passed" if found else "no check was judged"
     )
-    return f"{counted}, {passed}: {painted(status, status)}"
+    return f"{experiments}, {passed}: {painted(status, status)}"
 
 
 def checks(rows: Sequence[Entry], columns: int) -> Iterator[str]:
-    """Yield checks of one experiment: one that passed in one line, any other with its whole text and its advice."""
+    """Yield the lines of checks: a passed check has one line, any other its whole text and advice."""
     fields = ("status", "reason", "id")
     table = [[str(check[field] or "") for field in fields] for check in rows]
     widths = [max((len(row[i]) for row in table), default=0) for i in range(3)]
@@ -82,7 +81,7 @@ def checks(rows: Sequence[Entry], columns: int) -> Iterator[str]:
 
 
 def headline(entry: Entry, columns: int) -> str:
-    """Say in at most so many columns what an experiment found: its order and error, or why it did not pass."""
+    """Return the result of an experiment in at most `columns` characters: order and error, or why it did not pass."""
     rows: Sequence[Entry] = entry["checks"]
     missed = [row for row in rows if row["status"] != "PASS"]
     candidates = [str(entry.get("error") or (rows[0]["text"] if rows else "no checks"))]
@@ -91,7 +90,7 @@ def headline(entry: Entry, columns: int) -> str:
         candidates = [f"{first['reason']} ({len(missed)} of {len(rows)} checks did not pass)"]
         candidates.append(str(first["reason"]))
     else:
-        # what was meant to fail says less than what was meant to pass
+        # checks that are meant to pass tell more than checks that are meant to fail
         plain = [row for row in rows if row["expected"] == "PASS"] or rows
         candidates = next(filter(None, map(numbers, plain)), candidates)
     fitting = next((text for text in candidates if len(text) <= columns), candidates[-1])
@@ -99,9 +98,9 @@ def headline(entry: Entry, columns: int) -> str:
 
 
 def numbers(check: Entry) -> list[str]:
-    """Write the order of a check, its interval and the error of the finest level: all, and then in fewer words.
+    """Return the order of a check, its interval and the error of the finest level, in texts from long to short.
 
-    Nothing where it has no order.
+    The list is empty for a check without an order.
     """
     facts = check["results"][0]["facts"] if check["results"] else {}
     order, low, high = (facts.get(name) for name in ("order", "order_low", "order_high"))
@@ -113,11 +112,12 @@ def numbers(check: Entry) -> list[str]:
     error = facts.get("relative_error")
     error_text = "" if error is None else f", relative error {error:.2g}"
     total = sum(check["counts"].values())
-    of = f", the hardest of {total}" if total > 1 else ""
-    return [head + between + error_text + of, head + between + error_text, head + error_text, head]
+    hardest = f", the hardest of {total}" if total > 1 else ""
+    full = head + between + error_text
+    return [full + hardest, full, head + error_text, head]
 
 
 def _name(entry: Entry) -> str:
-    """Return the name of an experiment, with what the command line gave in place of values of its file."""
+    """Return the name of an experiment, with the settings of the command line."""
     settings = set_options(entry.get("settings", ()))
     return clean(f"{entry['collection']}/{entry['experiment']}{settings}")

@@ -1,4 +1,4 @@
-"""Whether the machine has room for what is planned, and numbers with units that people read."""
+"""Check that memory and disk suffice for the plans; format quantities with units."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from vibsim.store.atomic import check_room
 
 
 def check(plans: Sequence[Plan], results: Path) -> None:
-    """Refuse what does not fit.
+    """Refuse plans that need more memory or disk than the machine has.
 
     Raises
     ------
     InputError
-        With what is needed and what is there.
+        States what is needed and what is available.
     """
     needed, free = _missing_bytes(plans, results), free_bytes(results)
     total = psutil.virtual_memory().total
@@ -36,7 +36,7 @@ def check(plans: Sequence[Plan], results: Path) -> None:
 
 
 def _missing_bytes(plans: Sequence[Plan], results: Path) -> int:
-    """Return the estimated size of the files that are not there yet."""
+    """Return the estimated size of the files that do not exist yet."""
     compared = (plan.analysis_bytes for plan in plans if not (results / plan.convergence).exists())
     return sum(compared) + sum(
         level.bytes * (shard.stop - shard.start) // plan.cases
@@ -54,7 +54,7 @@ def free_bytes(results: Path) -> int:
 
 
 def obstacle(results: Path) -> tuple[str, ...]:
-    """Return a line that says why nothing can be written in `results`; none where something can."""
+    """Return a message that says why nothing can be written in `results`; empty if writing works."""
     probe = results / ".vibsim/room"
     try:
         check_room(probe, 0)
@@ -67,7 +67,7 @@ def obstacle(results: Path) -> tuple[str, ...]:
 
 
 def megabytes(plans: Sequence[Plan]) -> int:
-    """Return how much memory all jobs at once may take: what is free, but at least what the largest one needs."""
+    """Return the memory for all concurrent jobs [MB]: the free memory, or the largest job's need if that is more."""
     largest = max((plan.memory for plan in plans), default=0)
     available: int = psutil.virtual_memory().available
     return max(available, largest) // 10**6 + 1

@@ -1,8 +1,8 @@
-"""A results folder holds files and folders only, so that nothing is written outside of it, and no pipe is waited for.
+"""Keep a results folder safe to write to: only regular files and folders, no links, pipes or devices.
 
-It may come from somebody else, who put a link where a run writes. Such a folder is refused. The results folder itself
-may be a link, which its user has named. Of files that must not be used, which were deleted, a job leaves notes there
-for the run that started it.
+A folder may come from somebody else, who put a link where a run would write; such a folder is refused. The results
+folder itself may be a link, since its user has named it. Jobs that delete damaged files leave notes in the folder for
+the run that started them.
 """
 
 from __future__ import annotations
@@ -21,42 +21,41 @@ from vibsim.core.errors import Fault, FileError, InputError, VibsimError
 _NOTE = ".vibsim/deleted.txt"
 _OURS = (".vibsim", ".snakemake", "index.html", "summary.csv")
 _IN_PLACE = ("logs", "benchmarks", "figures", "tables")
-"""Folders of an experiment where the shell and Snakemake write to files that are there."""
+"""Folders of an experiment where the shell and Snakemake overwrite existing files in place."""
 _NEEDED = ("incomplete", "log", "metadata")
-"""What a run needs of Snakemake's own folder: its records, which are JSON, and its logs."""
+"""Parts of Snakemake's own folder that a run needs: its records, which are JSON, and its logs."""
 
 
 def check(results: Path, keys: Iterable[str]) -> None:
-    """Refuse a results folder with anything else where runs of the experiments `keys` read and write.
+    """Refuse links, pipes and devices wherever runs of the experiments `keys` read or write.
 
     Raises
     ------
     InputError
-        With every path that is neither a file nor a folder.
+        Lists every path that is neither a regular file nor a folder.
     """
-    places = [results / name for name in (*_OURS, *keys)]
+    paths = [results / name for name in (*_OURS, *keys)]
     with _naming():
-        found = (entry for place in places for entry in _entries(place, deep=True))
-        folders = {*places, *(place.parent for place in places)} - {results}
-        _refuse([*folders, *(entry for entry in found if not _is_plain(entry))])
+        entries = (entry for path in paths for entry in _entries(path, deep=True))
+        folders = {*paths, *(path.parent for path in paths)} - {results}
+        _refuse([*folders, *(entry for entry in entries if not _is_plain(entry))])
 
 
 def check_folders(results: Path, key: str) -> None:
-    """Refuse the same among the folders that the jobs of the experiment `key` write to."""
+    """Refuse links, pipes and devices among the folders that the jobs of the experiment `key` write to."""
     folder = results / key
     with _naming():
-        found = (entry for entry in _entries(folder) if not _is_plain(entry))
-        _refuse([results / ".vibsim", folder.parent, folder, *found])
+        special = (entry for entry in _entries(folder) if not _is_plain(entry))
+        _refuse([results / ".vibsim", folder.parent, folder, *special])
 
 
 def clean(results: Path, keys: Iterable[str]) -> None:
-    """Make a checked folder one that Snakemake may be started in.
+    """Prepare a checked folder for Snakemake.
 
-    Of Snakemake's own folder only what a run needs stays: Snakemake would import modules from there, and a lock in it
-    belongs to a run that is no more. A file that is written in place and has another name elsewhere becomes one of its
-    own.
+    In Snakemake's own folder only the parts that a run needs stay: Snakemake would import modules from there, and a
+    lock in it is left over from an ended run. A file that is overwritten in place and has hard links is copied first.
     """
-    # jobs do without it
+    # imported here, since jobs do not need it
     from shutil import rmtree
 
     records = results / ".snakemake"
@@ -72,16 +71,16 @@ def clean(results: Path, keys: Iterable[str]) -> None:
 
 
 def forget(results: Path) -> bool:
-    """Remove the records of Snakemake that cannot be read, which end its work; tell whether there were any."""
-    found = [
+    """Delete records of Snakemake that cannot be read and would stop it; tell whether there were any."""
+    unreadable = [
         Path(entry)
         for name in ("metadata", "incomplete")
         for entry in _entries(results / ".snakemake" / name, deep=True)
         if entry.is_file() and not _is_record(Path(entry).read_bytes())
     ]
-    for path in found:
+    for path in unreadable:
         path.unlink()
-    return bool(found)
+    return bool(unreadable)
 
 
 def _is_record(content: bytes) -> bool:
@@ -101,15 +100,15 @@ _KINDS = {
 
 
 def _refuse(paths: Iterable[os.PathLike[str]]) -> None:
-    """Refuse those that are there, and neither a file nor a folder."""
+    """Refuse existing paths that are neither a regular file nor a folder."""
     advice = "remove it, or choose another folder with --results"
     faults = []
     for path in paths:
         with suppress(FileNotFoundError, NotADirectoryError):
             kind = stat.S_IFMT(os.lstat(path).st_mode)
             if kind not in (stat.S_IFREG, stat.S_IFDIR):
-                what = _KINDS.get(kind, "no file and no folder")
-                rule = f"is {what}, and vibsim writes to real files and folders only"
+                name = _KINDS.get(kind, "no file and no folder")
+                rule = f"is {name}, and vibsim writes to real files and folders only"
                 faults.append(Fault(os.fspath(path), 0, "", "", rule, advice))
     if faults:
         raise InputError(faults)
@@ -120,7 +119,7 @@ def _is_plain(entry: os.DirEntry[str]) -> bool:
 
 
 def _entries(folder: Path | str, *, deep: bool = False) -> Iterator[os.DirEntry[str]]:
-    """Yield what is in a folder, with `deep` also what is in the folders there; nothing where it is no folder."""
+    """Yield the entries of a folder, with `deep` recursively; nothing if it is not a folder."""
     with suppress(FileNotFoundError, NotADirectoryError), os.scandir(folder) as entries:
         for entry in entries:
             yield entry
@@ -142,8 +141,7 @@ def delete(error: FileError, results: Path) -> None:
     Raises
     ------
     VibsimError
-        Where a folder with something in it has the place of the file, which is not ours to delete, or the note cannot
-        be written.
+        Where the path is a folder that is not empty, which vibsim may not delete, or the note cannot be written.
     """
     try:
         if error.path.is_dir() and not error.path.is_symlink():
@@ -160,7 +158,7 @@ def delete(error: FileError, results: Path) -> None:
 
 
 def deleted(results: Path) -> list[str]:
-    """Return what was deleted since the last time, and why."""
+    """Return the notes on files deleted since the last call, and remove the notes."""
     note = results / _NOTE
     try:
         with regular_files.reading(note) as file:

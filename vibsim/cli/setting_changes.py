@@ -1,4 +1,4 @@
-"""Which settings of two experiments differ, by the names that they have in an experiment file."""
+"""Compare the settings of two experiments, under the names that they have in an experiment file."""
 
 from __future__ import annotations
 
@@ -9,20 +9,20 @@ from typing import Any, NamedTuple
 from vibsim.cli.terminal import clean
 
 _LONGEST = 48
-"""Characters of a value that is shown; of a longer one it is only said that it changed."""
+"""Most characters of a value that is shown; for a longer value only the change is mentioned."""
 _NAMES = ("collection", "name", "vibsim_format")
-"""What an experiment is called, which is no setting."""
+"""Fields that identify an experiment and are no settings."""
 
 
 class Change(NamedTuple):
-    """A setting that differs; the text of a value that is not there is empty."""
+    """A setting that differs; a missing value is an empty text."""
 
     path: str
     old: str
     new: str
 
     def __str__(self) -> str:
-        """Say it as in ``model.w: 2.0 -> 2.5``."""
+        """Return a text such as ``model.w: 2.0 -> 2.5``."""
         if not self.old or not self.new:
             return f"{self.path}: {'added' if self.new else 'removed'}"
         if max(len(self.old), len(self.new)) > _LONGEST:
@@ -31,17 +31,17 @@ class Change(NamedTuple):
 
 
 def differences(old: Mapping[str, Any], new: Mapping[str, Any]) -> list[Change]:
-    """Compare two experiments in normal form (`vibsim.experiment.canonical`), or the same part of both."""
+    """Return the differences between two experiments, or parts, in normal form (`vibsim.experiment.canonical`)."""
     return list(_compared("", _named(old), _named(new)))
 
 
 def _named(content: Mapping[str, Any]) -> dict[str, Any]:
     """Return the content with schemes, checks and axes by name, and parameters where a file has them.
 
-    It may come from a results folder of somebody else: what has another form is left as it is.
+    It may come from somebody else's results folder: data of an unexpected form are left as they are.
     """
-    found = {key: value for key, value in content.items() if key not in _NAMES}
-    model = _mapping(found.get("model"))
+    named = {key: value for key, value in content.items() if key not in _NAMES}
+    model = _mapping(named.get("model"))
     if "kind" in model:
         tables = {
             key: {name: row[name] for name in ("file", "numbers") if name in row}
@@ -50,16 +50,16 @@ def _named(content: Mapping[str, Any]) -> dict[str, Any]:
         }
         flat = {**_mapping(model.get("parameters")), **_mapping(model.get("formulas"))}
         structure = _mapping(model.get("structure"))
-        own = {**structure, **_mapping(structure.get("arrays"))}
-        found["model"] = {"kind": model["kind"]} | flat | tables | _without(own, "arrays")
+        arrays = _without({**structure, **_mapping(structure.get("arrays"))}, "arrays")
+        named["model"] = {"kind": model["kind"]} | flat | tables | arrays
     for key, name in (("schemes", "name"), ("checks", "id")):
-        match found.get(key):
+        match named.get(key):
             case [*rows] if all(isinstance(row, Mapping) and name in row for row in rows):
-                found[key] = {str(row[name]): _without(row, name) for row in rows}
-    match found.get("sweep"):
+                named[key] = {str(row[name]): _without(row, name) for row in rows}
+    match named.get("sweep"):
         case [*axes]:
-            found["sweep"] = _columns(axes)
-    return found
+            named["sweep"] = _columns(axes)
+    return named
 
 
 def _mapping(value: Any) -> Mapping[str, Any]:
@@ -67,19 +67,19 @@ def _mapping(value: Any) -> Mapping[str, Any]:
 
 
 def _without(row: Mapping[str, Any], name: str) -> dict[str, Any]:
-    """Return a row without its name, with its options beside the rest."""
-    rest = {key: value for key, value in row.items() if key not in (name, "options")}
-    return rest | dict(_mapping(row.get("options")))
+    """Return a row without the key `name`, and with its options merged into it."""
+    remaining = {key: value for key, value in row.items() if key not in (name, "options")}
+    return remaining | dict(_mapping(row.get("options")))
 
 
 def _columns(axes: Sequence[Any]) -> dict[str, Any]:
     """Return the values of a sweep by key."""
-    found: dict[str, Any] = {}
+    columns: dict[str, Any] = {}
     for axis in axes:
         match axis:
             case {"keys": [*keys], "values": [*values]}:
-                found |= {str(key): value for key, value in zip(keys, values, strict=False)}
-    return found
+                columns |= {str(key): value for key, value in zip(keys, values, strict=False)}
+    return columns
 
 
 def _compared(path: str, old: Any, new: Any) -> Iterator[Change]:
@@ -97,7 +97,7 @@ def _compared(path: str, old: Any, new: Any) -> Iterator[Change]:
 
 
 def shown(value: Any) -> str:
-    """Write a value as a file may have it; whole numbers in a row by the first and the last."""
+    """Return a value as text, as in an experiment file; consecutive whole numbers as ``first to last``."""
     if value is None:
         return "none"
     if isinstance(value, str):

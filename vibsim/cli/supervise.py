@@ -1,9 +1,8 @@
-"""A command in two processes: one works, and the other ends it when it is told to, however busy it is.
+"""Run a command in two processes: a worker, and a supervisor that can end it on a signal, however busy it is.
 
-The first process takes signals only where it waits for them, so that none arrives at a wrong moment. It asks the
-worker to end, and kills it when it does not. Each process of a run ends with the one that started it, as
-`vibsim.core.processes` says: whoever is killed, nothing works on, and the lock of the results
-folder is free.
+The supervisor receives signals only while it waits for them, so that none interrupts other code. It sends the worker
+SIGTERM, and kills it if it does not end in time. Each process of a run ends with the one that started it
+(`vibsim.core.processes`): whichever is killed, no process goes on, and the lock of the results folder is free.
 """
 
 from __future__ import annotations
@@ -28,7 +27,7 @@ from vibsim.core.processes import (
 )
 
 _GRACE = 3.0
-"""Seconds that a worker has to end by itself, and then its children."""
+"""Time that a worker has to end by itself [s], and after that its children."""
 _PARENT = "VIBSIM_PARENT"
 
 Work = Callable[[], int]
@@ -43,12 +42,12 @@ class Interrupted(KeyboardInterrupt):
 
 
 def supervised(work: Work) -> int:
-    """Return the exit status of `work`, which ends when this process is told to, or is killed.
+    """Run `work` in a second process and return its exit status; `work` ends with this process, or on its signals.
 
-    It is that of the command, which may raise `Interrupted`, or 128 and the number of the signal that ended it.
+    The status is the one that `work` returns, or 128 plus the number of the signal that ended it.
     """
     if parent := os.environ.pop(_PARENT, ""):
-        # a job of a run, which a signal ends on the spot: its files appear whole or not at all
+        # a job of a run needs no supervisor: a signal may end it at any time, since files are written in one step
         as_worker_of(int(parent))
         return work()
     ends = heeded()
@@ -67,19 +66,19 @@ def supervised(work: Work) -> int:
 
 
 def children_end_with_this() -> None:
-    """Have the commands that this process starts from now on end with it."""
+    """Make all commands that this process starts from now on end with it."""
     os.environ.update(environment())
 
 
 def environment() -> dict[str, str]:
-    """Return what tells a command to end with this process, which starts it."""
+    """Return the environment variable that makes a command end with this process, its parent."""
     return {_PARENT: str(os.getpid())}
 
 
 def child(words: Sequence[str], *, is_heard: bool = True) -> int:
     """Run another command of vibsim, which ends with this process, and return its exit status.
 
-    Where it is not heard, what it prints goes nowhere; its messages are shown.
+    Its stderr is shown, its stdout only with `is_heard`.
     """
     import subprocess
 
@@ -90,14 +89,14 @@ def child(words: Sequence[str], *, is_heard: bool = True) -> int:
 
 
 def end_at_once() -> None:
-    """End this process as soon as it is told to, whatever handlers are set later."""
+    """Make the first signal end this process at once, whatever handlers are set later."""
     _on_signal(lambda number: os._exit(128 + number))
 
 
 def end_in_order() -> None:
-    """Raise KeyboardInterrupt in the main thread as soon as this process is told to end, once.
+    """Make the first signal raise KeyboardInterrupt in the main thread.
 
-    Snakemake then cancels what it has submitted. Further requests must not disturb that.
+    Snakemake then cancels its submitted jobs, undisturbed by further signals.
     """
     signal.signal(signal.SIGUSR1, signal.default_int_handler)
     main = threading.main_thread().ident or 0
@@ -105,10 +104,10 @@ def end_in_order() -> None:
 
 
 def _on_signal(act: Callable[[int], None]) -> None:
-    """Act once, in a thread of its own, when this process is told to end.
+    """Call `act` once, in a separate thread, when a signal asks this process to end.
 
-    The signals are blocked in every thread but that one, which does nothing else than wait for them: a handler would
-    run in the middle of whatever the main thread does, locks held.
+    The signals are blocked in all threads, and this thread waits for them: a handler would interrupt the main thread at
+    any point, with locks held.
     """
     ends = heeded()
     signal.pthread_sigmask(signal.SIG_BLOCK, ends)
@@ -116,29 +115,29 @@ def _on_signal(act: Callable[[int], None]) -> None:
 
 
 def take_time(seconds: float) -> None:
-    """Ask the process that supervises this one for more time to end, from now on."""
+    """Ask the supervisor for more time to end [s]."""
     _grace[0] = seconds
 
 
 def ended_by(status: int) -> int:
-    """Return the signal of `ENDS` that ended a process with exit status `status`, as `subprocess` tells it; else 0."""
+    """Return the signal of `ENDS` that ended a process, from its exit status as `subprocess` returns it; else 0."""
     number = -status if status < 0 else status - 128
     return number if number in ENDS else 0
 
 
 def check_interrupted() -> None:
-    """Raise the request to end once more, if there was one: where it was first raised, it may have been swallowed."""
+    """Raise `Interrupted` again if a signal has arrived: a library may have swallowed the first one."""
     if _request:
         raise Interrupted(_request)
 
 
 def known_pid() -> int:
-    """Return the process that a user knows as this command, and may send a signal to."""
+    """Return the id of the process that a user knows as this command: the supervisor, if there is one."""
     return _supervisor or os.getpid()
 
 
 _grace = memoryview(mmap.mmap(-1, mmap.PAGESIZE)).cast("d")
-"""Seconds that the worker asks for to end, in memory that it shares with its supervisor; 0 where it does not."""
+"""Time that the worker requests to end [s], in memory shared with the supervisor; 0 without a request."""
 _supervisor = 0
 _request = 0
 
@@ -146,7 +145,7 @@ _request = 0
 def _work(
     supervisor: int, ends: set[signal.Signals], mask: set[int], work: Work, end: int
 ) -> NoReturn:
-    """Work in the second process and leave it for good; a byte in the pipe `end` tells that it has come to its end."""
+    """Run `work` in the worker process and exit; a byte in the pipe `end` shows that it was not killed."""
     global _supervisor
     _supervisor = supervisor
     status = 1
@@ -158,16 +157,16 @@ def _work(
         status = work()
     except Interrupted as request:
         status = 128 + request.number
-    except SystemExit as left:
-        status = int(left.code or 0)
+    except SystemExit as ended:
+        status = int(ended.code or 0)
     finally:
         os.write(end, b".")
-        # Threads that compute are not waited for.
+        # do not wait for other threads
         os._exit(status)
 
 
 def _interrupt(number: int, _: object) -> None:
-    """Unwind the stack, once; what falls on the way out is no news."""
+    """Raise `Interrupted`, once; errors in destructors on the way out are not shown."""
     global _request
     _request = number
     for other in ENDS:
@@ -177,25 +176,25 @@ def _interrupt(number: int, _: object) -> None:
 
 
 def _watch(worker: int, ends: set[signal.Signals]) -> tuple[int, int]:
-    """Return the wait status of the worker, and the signal by which it was to end, 0 without one."""
+    """Return the wait status of the worker, and the signal that asked it to end, 0 if none did."""
     signalled, deadline = 0, 0.0
     while True:
-        left = max(deadline - time.monotonic(), 0) if signalled else 3600.0
-        found = wait_for_signal(ends | {signal.SIGCHLD}, left)
+        timeout = max(deadline - time.monotonic(), 0) if signalled else 3600.0
+        received = wait_for_signal(ends | {signal.SIGCHLD}, timeout)
         if (status := _ended(worker)) is not None:
             return status, signalled
-        if found == signal.SIGCHLD:
+        if received == signal.SIGCHLD:
             continue
-        if found and not signalled:
-            signalled, deadline = found, time.monotonic() + max(_GRACE, _grace[0])
+        if received and not signalled:
+            signalled, deadline = received, time.monotonic() + max(_GRACE, _grace[0])
             os.kill(worker, signal.SIGTERM)
-        elif signalled and (found or time.monotonic() >= deadline):
-            # out of time, or asked again
+        elif signalled and (received or time.monotonic() >= deadline):
+            # out of time, or a second signal
             os.kill(worker, signal.SIGKILL)
 
 
 def _ended(worker: int) -> int | None:
-    """Return the wait status of the worker when it has ended, and let go of orphans that have."""
+    """Return the wait status of the worker if it has ended, else None, and reap orphans that have ended."""
     while True:
         process, status = os.waitpid(-1, os.WNOHANG)
         if process == worker:
@@ -205,7 +204,7 @@ def _ended(worker: int) -> int | None:
 
 
 def _wait_for_children() -> None:
-    """Wait until everything is gone that the worker started: the kernel kills it, and gives it to this process."""
+    """Wait until all processes that the worker started have ended: the kernel kills them, this process reaps them."""
     deadline = time.monotonic() + _GRACE
     with suppress(ChildProcessError):
         while time.monotonic() < deadline:
@@ -214,13 +213,13 @@ def _wait_for_children() -> None:
 
 
 def _exit_status(status: int, signalled: int, orderly: bool) -> int:
-    """Say how the worker ended, unless it has said so itself; return the exit status."""
+    """Print how the worker ended, unless it ended in order, and return the exit status."""
     code = os.waitstatus_to_exitcode(status)
     if number := signalled or ended_by(code):
         _say("interrupted; run the same command again to continue")
         return 128 + number
     if not orderly:
-        # killed by the system, or left by a library that was given no memory
+        # killed by the system, or a library that could not allocate memory called exit
         how = f"killed by {signal.Signals(-code).name}" if code < 0 else "ended by a library"
         _say(f"{how}, perhaps for lack of memory; run the same command again to continue")
         return 1
@@ -228,7 +227,7 @@ def _exit_status(status: int, signalled: int, orderly: bool) -> int:
 
 
 def _say(text: str) -> None:
-    # a line of progress may stand there; and where the terminal has gone, nobody is left to tell
+    # overwrite a line of progress; the terminal may be gone
     with suppress(OSError):
         start = "\r\033[K" if sys.stderr.isatty() else ""
         print(f"{start}vibsim: {text}", file=sys.stderr, flush=True)

@@ -1,4 +1,4 @@
-"""What the Snakefile begins with: the names of everything that is to be made, checked before anything is."""
+"""The entry point of the Snakefile: it loads and checks the plans before any job runs."""
 
 from __future__ import annotations
 
@@ -14,22 +14,21 @@ from vibsim.plan import Names
 
 
 def names_of(config: Mapping[str, Any], command_line: Mapping[str, Any]) -> Names:
-    """Return the names for the workflow of some experiments.
+    """Return the names for the workflow.
 
     Parameters
     ----------
     config
-        The ``experiments`` (files, names, collections) with the ``settings`` of all of them, one as text or several in
-        a list, and the ``results`` folder; without any the default experiments as they are, and
-        `vibsim.core.home.default_results`. ``cores`` and ``overhead`` (megabytes) of a job that runs elsewhere, and the
-        seconds of work that is done ``here``.
+        ``experiments`` (files, names or collections) and the ``settings`` of all of them, each one text or a list of
+        texts, by default the default experiments without settings; the ``results`` folder, by default
+        `vibsim.core.home.default_results`; and ``cores``, ``overhead`` and ``here`` as in `vibsim.plan.Names`.
     command_line
-        What ``--config`` says on the command line: ``allow_commands=true`` lets programs of users run.
+        The values of ``--config`` on the command line alone: ``allow_commands=true`` lets users' programs run.
 
     Raises
     ------
     InputError
-        Where a file is refused, the results folder is, or a program that is not allowed to run.
+        Where an experiment file or the results folder is refused, or a program is not allowed to run.
     """
     is_allowed = str(command_line.get("allow_commands")).lower() == "true"
     experiments, settings = (
@@ -38,8 +37,8 @@ def names_of(config: Mapping[str, Any], command_line: Mapping[str, Any]) -> Name
     )
     plans = {plan.key: plan for plan in plans_of(experiments, settings, cached=True)}
     results = Path(config.get("results", default_results())).absolute()
-    more = {key: int(config[key]) for key in ("cores", "overhead", "here") if key in config}
-    names = Names(plans, results, is_allowed, tuple(settings), **more)
+    limits = {key: int(config[key]) for key in ("cores", "overhead", "here") if key in config}
+    names = Names(plans, results, is_allowed, tuple(settings), **limits)
     results_folder.check(names.results, names.plans)
     check_allowed(names.plans.values(), is_allowed)
     return names

@@ -1,1 +1,1 @@
-"""What every room shares: errors, vocabulary, labelled arrays, the netCDF door, the private cache."""
+"""Shared by all packages: errors, vocabulary, labelled arrays, access to the netCDF library, the private cache."""

@@ -1,4 +1,4 @@
-"""Types of arrays, by what they hold; shapes stand in the docstrings."""
+"""Types of arrays by element type; shapes are in the docstrings."""
 
 from __future__ import annotations
 
@@ -10,4 +10,4 @@ Complexes = NDArray[np.complex128]
 Flags = NDArray[np.bool_]
 Integers = NDArray[np.int64]
 Codes = NDArray[np.int8]
-"""Positions in a tuple of words."""
+"""Indices into a tuple of words, such as statuses or reasons."""

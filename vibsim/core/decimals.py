@@ -1,4 +1,4 @@
-"""Decimal digits of numbers: rounding to fewer of them that goes one way."""
+"""Directed rounding to a number of decimal digits."""
 
 from __future__ import annotations
 
@@ -6,9 +6,9 @@ from decimal import ROUND_CEILING, ROUND_FLOOR, Context
 
 
 def round_outward(value: float, digits: int, *, up: bool = True) -> float:
-    """Return the next number of so many significant digits that is no smaller than `value`, or else no larger.
+    """Round `value` up, or down, to `digits` significant decimal digits.
 
-    What a number has are its shortest decimal digits: 0.1 stays 0.1, though its binary digits are a little more.
+    The shortest decimal form of `value` is rounded: 0.1 stays 0.1, although its binary value is slightly larger.
     """
     context = Context(prec=digits, rounding=ROUND_CEILING if up else ROUND_FLOOR)
     return float(context.create_decimal(str(float(value))))

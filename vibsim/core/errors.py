@@ -1,7 +1,7 @@
-"""The one family of errors.
+"""The exceptions of vibsim.
 
-A message carries the value, the rule it broke, the nearest valid choice, and where it stands (file, line, key), so
-that a user can mend the input without reading code.
+A message states the place (file, line, key), the value, the rule that it breaks, and the nearest valid choice, so that
+a user can correct the input without reading code.
 """
 
 from __future__ import annotations
@@ -15,26 +15,26 @@ from pathlib import Path
 class VibsimError(Exception):
     """Base of every error that vibsim raises on purpose.
 
-    One that takes more than its message hands that on to ``Exception``: copies in other processes are made of it.
+    A subclass must pass all its arguments to ``Exception.__init__``, so that it can be copied to another process.
     """
 
 
 @dataclass(frozen=True, order=True)
 class Fault:
-    """One fault of an input, with the place where it stands."""
+    """One fault of an input, with its place."""
 
     file: str
     """Name of the file as the user gave it."""
     line: int
-    """Line number, from 1; 0 where the fault has no line of its own."""
+    """Line number, from 1; 0 if the fault belongs to no line."""
     key: str
     """Dotted path of the key, e.g. ``initial.theta`` or ``checks[2].order``."""
     value: str
-    """The value as written, shortened; empty where there is none."""
+    """The value as written, shortened; empty if there is none."""
     rule: str
     """The rule that the value breaks."""
     hint: str = ""
-    """The nearest valid choice, or the choices."""
+    """The nearest valid choice, or all choices."""
 
     def __str__(self) -> str:
         place = f"{self.file}:{self.line}" if self.line else self.file
@@ -43,7 +43,7 @@ class Fault:
 
 
 class InputError(VibsimError):
-    """Input that is refused: every fault that was found, at once, in the order of file and line."""
+    """Invalid input, with all its faults, sorted by file and line."""
 
     def __init__(self, faults: Iterable[Fault]) -> None:
         self.faults: tuple[Fault, ...] = tuple(sorted(faults))
@@ -54,11 +54,11 @@ class InputError(VibsimError):
 
 
 class SimulationError(VibsimError):
-    """A simulation that could not be run or compiled; a run that overflows is a result, not an error."""
+    """A simulation that could not be compiled or run; an overflow is a result, not an error."""
 
 
 class FileError(VibsimError):
-    """A stored file that must not be used, and why."""
+    """A stored file that must not be used, with the reason."""
 
     def __init__(self, path: Path, reason: str) -> None:
         self.path, self.reason = path, reason
@@ -73,18 +73,18 @@ class DamagedFileError(FileError):
 
 
 class StaleFileError(FileError):
-    """A whole file that belongs to another job, another experiment or other code."""
+    """An intact file of another job, another experiment or other code."""
 
 
 MOST_CHOICES = 60
-"""So many choices are listed; of more, the nearest are named."""
+"""Most choices that are listed; of more, only the nearest are."""
 _NEAREST = 3
 _CLOSE = 0.6
-"""How alike two words are that may be meant for each other, from 0 to 1."""
+"""Similarity, from 0 to 1, above which a word may be a misspelling of another."""
 
 
 def nearest(value: object, choices: Sequence[str]) -> str:
-    """Name the choice nearest to what a user wrote; where none is near, list all, or of many the nearest."""
+    """Return a hint at the choice nearest to a user's text; if none is near, the list of choices, shortened if long."""
     if not choices:
         return ""
     written = str(value)
@@ -92,14 +92,14 @@ def nearest(value: object, choices: Sequence[str]) -> str:
 
 
 def likely(value: object, choices: Sequence[str]) -> str:
-    """Ask whether the choice nearest to what a user wrote was meant; empty where none is near."""
+    """Return a question whether the user meant the choice nearest to their text; empty if none is near."""
     written = str(value)
     close: Sequence[str] = difflib.get_close_matches(written, choices, n=1, cutoff=_CLOSE)
     if not close:
-        # by capital letters alone
-        small = {choice.casefold(): choice for choice in reversed(choices)}
-        alike = difflib.get_close_matches(written.casefold(), list(small), n=1, cutoff=_CLOSE)
-        close = [small[found] for found in alike]
+        # ignore upper and lower case
+        folded = {choice.casefold(): choice for choice in reversed(choices)}
+        matches = difflib.get_close_matches(written.casefold(), list(folded), n=1, cutoff=_CLOSE)
+        close = [folded[match] for match in matches]
     if not close:
         longer = _with_part(written, choices)
         close = longer if len(longer) == 1 else []
@@ -107,13 +107,13 @@ def likely(value: object, choices: Sequence[str]) -> str:
 
 
 def _with_part(written: str, choices: Sequence[str]) -> list[str]:
-    """Return the choices of which more than one letter was written."""
+    """Return the choices that contain the text, if it has more than one letter."""
     part = written.casefold()
     return [choice for choice in choices if len(part) > 1 and part in choice.casefold()]
 
 
 def listed(choices: Sequence[str], value: str = "") -> str:
-    """List what there is to choose from; of many those that are nearest to a value, or the first."""
+    """Return a list of the choices as text; of many, those nearest to a value, or the first ones."""
     if len(choices) <= MOST_CHOICES:
         return "choose from " + ", ".join(choices)
     near = difflib.get_close_matches(value, choices, n=_NEAREST, cutoff=0.0) if value else []

@@ -1,4 +1,4 @@
-"""Try first in another process what may take all memory, go on for ever or crash: libraries at files of users."""
+"""Try in a child process first what may exhaust memory, never end or crash: libraries that read users' files."""
 
 from __future__ import annotations
 
@@ -11,18 +11,18 @@ from contextlib import suppress
 from pathlib import Path
 
 _SECONDS, _BYTES_A_SECOND = 2, 4_000_000
-"""Time of a processor that reading may take: so long, and longer for large files."""
+"""Limit on the CPU time of reading: seconds, plus the size of the file over a rate in bytes per second."""
 _MEMORY, _MEMORY_OF_A_BYTE = 2**28, 16
-"""Memory that reading may take, in the same way."""
+"""Limit on the memory of reading: bytes, plus bytes per byte of the file."""
 _MESSAGE = 4096
 TOO_MUCH = "it is damaged, or asks for too much time or memory"
 
 
 def problem(work: Callable[[], object], size: int) -> str:
-    """Do some work on a file of `size` bytes in another process; return why it fails there, empty where it does not."""
+    """Run `work` on a file of `size` bytes in a child process; return the reason why it fails, empty if it succeeds."""
     reading, writing = os.pipe()
     with warnings.catch_warnings():
-        # of threads that this process may have: the other one uses none of them
+        # the warning about threads of this process: the child does not use them
         warnings.simplefilter("ignore", DeprecationWarning)
         child = os.fork()
     if not child:
@@ -48,7 +48,7 @@ def _limit(size: int) -> None:
         used = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
         most = used + _MEMORY + size * _MEMORY_OF_A_BYTE
         resource.setrlimit(resource.RLIMIT_AS, (most, most))
-    # where libraries and Python write what they die of
+    # silence crash messages of libraries and of Python
     faulthandler.disable()
     os.dup2(os.open(os.devnull, os.O_WRONLY), 2)
 

@@ -1,4 +1,4 @@
-"""The place of the Snakefile and the shipped experiments: beside the package, or in it where that is installed."""
+"""Location of the Snakefile and the shipped experiments: beside the package, or within it if vibsim is installed."""
 
 from __future__ import annotations
 
@@ -6,11 +6,11 @@ from pathlib import Path
 
 _PACKAGE = Path(__file__).resolve().parents[1]
 SHIPPED = _PACKAGE / "shipped"
-"""What a wheel holds of the checkout (`setup.py` puts it there); a checkout has no such folder."""
+"""Copy of the files of the checkout in an installed wheel, made by `setup.py`; a checkout has no such folder."""
 
 
 def is_installed() -> bool:
-    """Tell whether this is an installation rather than a checkout."""
+    """Tell whether vibsim is installed, rather than run from a checkout."""
     return SHIPPED.is_dir()
 
 
@@ -20,10 +20,10 @@ def home() -> Path:
 
 
 def default_results() -> Path:
-    """Return the results folder of the checkout; of an installed vibsim, that in the current folder."""
+    """Return the default results folder: in the checkout, or in the current folder if vibsim is installed."""
     return (Path.cwd() if is_installed() else home()) / "results"
 
 
 def called(command: str) -> str:
-    """Return a command of vibsim as a user types it: in the checkout, or anywhere where it is installed."""
+    """Return a command of vibsim as the user types it, in the checkout with the path of the environment."""
     return command if is_installed() else f".venv/bin/{command}"

@@ -1,4 +1,4 @@
-"""JSON Schema (draft 2020-12): the pieces of which the schemas of what commands and files hold are made."""
+"""Building blocks for the JSON Schemas (draft 2020-12) of files and of the output of commands."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ REASON = {"enum": list(REASON_NAMES)}
 def object_of(
     properties: Mapping[str, Any], optional: Iterable[str] = (), **more: Any
 ) -> dict[str, Any]:
-    """Return the schema of an object that has these keys and no others."""
+    """Return the schema of an object with these keys and no others."""
     return {
         "type": "object",
         "properties": dict(properties),
@@ -28,10 +28,10 @@ def object_of(
 
 
 def list_of(items: Mapping[str, Any], *, or_null: bool = False) -> dict[str, Any]:
-    """Return the schema of a list of such items, or null in its place."""
+    """Return the schema of a list of items, optionally also null."""
     return {"type": ["array", "null"] if or_null else "array", "items": items}
 
 
 def or_null(kind: str) -> dict[str, Any]:
-    """Return the schema of a value of a type, or null in its place."""
+    """Return the schema of a value of type `kind` or null."""
     return {"type": [kind, "null"]}

@@ -1,4 +1,4 @@
-"""Names of a package that are imported on first use (PEP 562), so that a quick command need not pay for the rest."""
+"""Lazy imports of the names of a package (PEP 562), so that a quick command imports only what it uses."""
 
 from __future__ import annotations
 
@@ -10,18 +10,18 @@ from typing import Any
 def lazy(
     package: str, names: Mapping[str, Sequence[str]]
 ) -> tuple[Callable[[str], Any], Callable[[], list[str]]]:
-    """Return ``__getattr__`` and ``__dir__`` of `package`; `names` has the names that each module gives it.
+    """Return ``__getattr__`` and ``__dir__`` of `package`; `names` maps each module to the names that it defines.
 
     Modules of the package itself begin with a dot.
     """
-    homes = {name: module for module, own in names.items() for name in own}
+    modules = {name: module for module, defined in names.items() for name in defined}
 
     def load(name: str) -> Any:
-        if name not in homes:
+        if name not in modules:
             raise AttributeError(f"module {package!r} has no attribute {name!r}")
-        return getattr(import_module(homes[name], package), name)
+        return getattr(import_module(modules[name], package), name)
 
-    def names_of() -> list[str]:
+    def list_names() -> list[str]:
         return list(import_module(package).__all__)
 
-    return load, names_of
+    return load, list_names

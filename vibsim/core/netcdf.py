@@ -1,7 +1,6 @@
-"""The one door to the netCDF library, which nothing else imports; it is imported when a file is opened.
+"""The only module that imports the netCDF library, and only when a file is opened.
 
-Behind it stand the files that vibsim writes and reads back (`vibsim.store`), and tables that a user brings along
-(`vibsim.experiment.tables.file`).
+It serves the files of vibsim itself (`vibsim.store`) and the tables of users (`vibsim.experiment.tables.file`).
 """
 
 from __future__ import annotations
@@ -14,26 +13,26 @@ from vibsim.core import guarded
 
 
 def create(path: Path) -> Any:
-    """Return a new dataset in the file `path`, to be closed by who asked for it."""
+    """Create the file `path` and return its dataset, which the caller closes."""
     from netCDF4 import Dataset
 
     return Dataset(path, "w", format="NETCDF4")
 
 
 def is_from_library(error: Exception) -> bool:
-    """Tell whether an exception is one of the library, which keeps the system's reason to itself."""
+    """Tell whether an exception comes from the netCDF library, which hides the system's reason."""
     return "NetCDF: " in str(error)
 
 
 def opened(path: Path) -> Any:
-    """Return the dataset of a file that is to be read; OSError where the library cannot read it."""
+    """Open a file of vibsim for reading; raises OSError where the library cannot read it."""
     from netCDF4 import Dataset
 
     return Dataset(path, "r")
 
 
 def variables(dataset: Any) -> Iterator[tuple[str, Any, str]]:
-    """Yield every variable of a file with its name and its group, those of the root first."""
+    """Yield name, variable and group of every variable of a file, the root group first."""
     for name, variable in dataset.variables.items():
         yield name, variable, ""
     for group, inner in dataset.groups.items():
@@ -42,7 +41,7 @@ def variables(dataset: Any) -> Iterator[tuple[str, Any, str]]:
 
 
 def foreign(source: Path | bytes) -> Any:
-    """Return the dataset of a user's file, or of its bytes; OSError where the library cannot read it."""
+    """Open an untrusted file, or its bytes, for reading; raises OSError where the library cannot read it."""
     from netCDF4 import Dataset
 
     def opened() -> Any:
@@ -50,12 +49,12 @@ def foreign(source: Path | bytes) -> Any:
             return Dataset("table.nc", memory=source)
         return Dataset(source, "r")
 
-    def look() -> None:
+    def try_to_read() -> None:
         with opened() as dataset:
             for _, variable, _ in variables(dataset):
                 variable.ncattrs()
 
     size = len(source) if isinstance(source, bytes) else source.stat().st_size
-    if problem := guarded.problem(look, size):
+    if problem := guarded.problem(try_to_read, size):
         raise OSError(problem)
     return opened()

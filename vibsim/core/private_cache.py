@@ -1,11 +1,11 @@
-"""The user's private cache: the one place that vibsim loads code from, or anything else that it trusts as its own work.
+"""The user's private cache: the only folder from which vibsim loads code, or other data that it trusts as its own.
 
-It holds compiled kernels and templates, references, plans, and what modules import, each kind in a folder of its own
-inside of ``$VIBSIM_CACHE_DIR``, else of ``vibsim`` in the user's cache folder. A seal tells a damaged entry from a
-whole one and says which entry it is, but anybody can make a seal. What keeps others out is the file system: no one but
-the user, and root, can write to the folders or replace them. A folder that others can write to is refused and not
-changed, since closing it afterwards would leave what they put there; a folder of ours that others can only read is
-closed to them. What cannot be kept is made again.
+It holds compiled kernels and templates, reference solutions, plans, and the imports of modules, each kind in its own
+folder in ``$VIBSIM_CACHE_DIR``, by default in ``vibsim`` in the user's cache folder. A seal detects damaged entries and
+identifies each one, but anybody can make a seal: security rests on the file system. Only the user and root can write to
+the folders or replace them. A folder that others can write to is refused and left as it is, since restricting it
+afterwards would keep what they put there; a folder that others can only read is made private. An entry that cannot be
+stored is made again each time.
 """
 
 from __future__ import annotations
@@ -29,19 +29,19 @@ Thing = TypeVar("Thing")
 
 KINDS = ("imports", "kernels", "plans", "references", "templates")
 MOST_BYTES = 2**29
-"""Size of the folder of a kind, at most."""
+"""Most bytes in the folder of one kind."""
 MOST_OF_ENTRY = 2**26
-"""A larger entry is not kept."""
+"""Largest entry that is stored [bytes]."""
 VARIABLE = "VIBSIM_CACHE_DIR"
 _LOCKS = 2
-"""Digits of a name that name a lock: 256 files, whatever the number of entries."""
+"""Number of leading digits of an entry's name that name its lock: 256 lock files for any number of entries."""
 _SEAL = 32
-"""Bytes of the SHA-256 behind the content."""
+"""Length of the SHA-256 after the content [bytes]."""
 _FOLDER = os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW | os.O_CLOEXEC
 _OTHERS_WRITE = stat.S_IWGRP | stat.S_IWOTH
 _MODE = 0o700
 _MOST_LINKS = 40
-"""Links that a path may lead through, as for the system."""
+"""Most symbolic links in a path, as in the Linux kernel."""
 
 
 def cached(
@@ -51,18 +51,22 @@ def cached(
     dump: Callable[[Thing], bytes | None],
     load: Callable[[bytes], Thing | None],
 ) -> Thing:
-    """Return an entry of the cache: the one on disk, or what `make` returns, which is kept.
+    """Return an entry of the cache: the stored one, or the result of `make`, which is then stored.
 
-    Processes that want the same entry at the same time wait for the first one to make it.
+    Processes that need the same entry at the same time wait for the first one to make it.
 
     Parameters
     ----------
     kind
         The folder, one of `KINDS`.
     name
-        The entry, beginning with a digest of all that it depends on.
-    make, dump, load
-        Makes it; turns it into bytes, None where it is not to be kept; turns bytes into it, None where they are not it.
+        Name of the entry, which begins with a digest of all that it depends on.
+    make
+        Makes the entry.
+    dump
+        Returns the entry as bytes, or None if it shall not be stored.
+    load
+        Returns the entry from bytes, or None if they are invalid.
     """
     folder = opened(kind)
     if folder is None:
@@ -72,7 +76,7 @@ def cached(
     if thing is not None:
         return thing
     with folder.held(name):
-        # another one may have made it
+        # another process may have made it meanwhile
         content = folder.read(name)
         thing = None if content is None else load(content)
         if thing is None:
@@ -84,19 +88,19 @@ def cached(
 
 
 def place() -> Path:
-    """Return the folder of the cache, which need not be there; OSError where nothing names one."""
+    """Return the folder of the cache, which need not exist; raises OSError where the user has no home folder."""
     if named := os.environ.get(VARIABLE):
         return Path(named).absolute()
     return general() / "vibsim"
 
 
 def general() -> Path:
-    """Return the folder where all programs of the user keep their caches; `place` tells what it raises."""
+    """Return the folder for the caches of all programs of the user; raises OSError as `place` does."""
     named = os.environ.get("XDG_CACHE_HOME", "")
-    # a relative one is invalid, says the XDG Base Directory Specification, and would be another one in each job
+    # relative paths are invalid (XDG Base Directory Specification), and would differ between jobs
     if Path(named).is_absolute():
         return Path(named)
-    # Path.home raises RuntimeError where there is none
+    # Path.home would raise RuntimeError without a home folder
     home = Path(os.path.expanduser("~"))  # noqa: PTH111
     if not home.is_absolute():
         raise OSError(0, "there is no home folder", "$HOME")
@@ -104,7 +108,7 @@ def general() -> Path:
 
 
 def opened(kind: str) -> Folder | None:
-    """Return the folder of a kind; None where it cannot be had, or others could have written to it."""
+    """Return the folder of a kind; None if it cannot be used, or if others may have written to it."""
     try:
         return _opened(place(), kind, os.geteuid())
     except OSError:
@@ -121,11 +125,12 @@ def _opened(place: Path, kind: str, user: int) -> Folder | None:
 
 @contextmanager
 def provided() -> Iterator[str]:
-    """Give this process and its children a private cache; where the user has none, one that ends with this block.
+    """Provide a private cache for this process and its children: the user's, or a temporary one within the context.
 
-    Yields why the user has none, empty where there is one. OSError where there is no folder for temporary files either.
+    Yields the reason why the user's cache cannot be used, empty if it can. Raises OSError if there is no folder for
+    temporary files either.
     """
-    # every job imports this module, and only a run has use for it
+    # imported here, since every job imports this module but only a run calls this function
     from vibsim.core.temporary import temporary_folder
 
     before = os.environ.get(VARIABLE)
@@ -138,7 +143,7 @@ def provided() -> Iterator[str]:
         reason = f"{error.filename}: {error.strerror}"
     try:
         if not reason:
-            # a relative name would be another folder for processes that work elsewhere
+            # an absolute path, since child processes have other working directories
             os.environ[VARIABLE] = str(place())
             yield ""
         else:
@@ -153,44 +158,44 @@ def provided() -> Iterator[str]:
 
 @dataclass(frozen=True)
 class Folder:
-    """The folder of a kind, opened."""
+    """The open folder of one kind of entries."""
 
     kind: str
     descriptor: int
 
     def read(self, name: str) -> bytes | None:
-        """Return the content of an entry; None where there is none, it is not as it was written, or not ours."""
+        """Return the content of an entry; None if it does not exist, is damaged, or may be another user's."""
         try:
-            found = _file(name, os.O_RDONLY, self.descriptor)
+            descriptor = _file(name, os.O_RDONLY, self.descriptor)
         except OSError:
             return None
-        with os.fdopen(found, "rb") as file:
+        with os.fdopen(descriptor, "rb") as file:
             whole = file.read()
-            # read times tell what was used last; when it was written stays
+            # set the access time, by which `_bound` finds old entries; keep the modification time
             with suppress(OSError):
-                os.utime(found, ns=(time.time_ns(), os.fstat(found).st_mtime_ns))
+                os.utime(descriptor, ns=(time.time_ns(), os.fstat(descriptor).st_mtime_ns))
         content, seal = whole[:-_SEAL], whole[-_SEAL:]
         return content if content and self._seal(name, content) == seal else None
 
     def write(self, name: str, content: bytes) -> None:
-        """Keep an entry, of which others see nothing or all, unless it is too large or cannot be written."""
+        """Store an entry in one step, unless it is too large or cannot be written."""
         if len(content) <= MOST_OF_ENTRY:
             self.put(name, content + self._seal(name, content))
             self._bound()
 
     def put(self, name: str, content: bytes) -> None:
-        """Write a file without a seal in the same way, to be read by people."""
+        """Write a file in one step, without a seal, if it can be written."""
         temporary = f".{os.urandom(8).hex()}.tmp"
         flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL
         with suppress(OSError):
-            made = regular_files.descriptor(temporary, flags, folder=self.descriptor)
-            with os.fdopen(made, "wb") as file:
+            descriptor = regular_files.descriptor(temporary, flags, folder=self.descriptor)
+            with os.fdopen(descriptor, "wb") as file:
                 file.write(content)
             os.replace(temporary, name, src_dir_fd=self.descriptor, dst_dir_fd=self.descriptor)
 
     @contextmanager
     def held(self, name: str) -> Iterator[None]:
-        """Keep others from an entry. A lock goes with its process; where there can be none, work goes on without."""
+        """Lock an entry within the context; without a lock if none is possible. A lock ends with its process."""
         lock = -1
         with suppress(OSError):
             flags = os.O_RDWR | os.O_CREAT
@@ -208,14 +213,14 @@ class Folder:
         return digest.digest()
 
     def _bound(self) -> None:
-        """Remove what was not used for longest, also what killed jobs left, until the folder is small enough."""
+        """Remove the least recently used files, also those left by killed jobs, until the folder is small enough."""
         rows = []
         for entry in os.scandir(self.descriptor):
             if entry.name.startswith("lock_"):
                 continue
             with suppress(FileNotFoundError):
-                about = entry.stat(follow_symlinks=False)
-                rows.append((about.st_atime_ns, about.st_size, entry.name))
+                status = entry.stat(follow_symlinks=False)
+                rows.append((status.st_atime_ns, status.st_size, entry.name))
         total = sum(size for _, size, _ in rows)
         for _, size, name in sorted(rows):
             if total <= MOST_BYTES:
@@ -226,7 +231,7 @@ class Folder:
 
 
 def _inside(place: Path, name: str) -> int:
-    """Return the descriptor of folder `name` inside of `place`, both made where they are missing; see `check`."""
+    """Open folder `name` in `place` and return its descriptor; both are made if missing, and checked as in `check`."""
     check(place)
     outer = os.open(place, _FOLDER)
     try:
@@ -238,68 +243,69 @@ def _inside(place: Path, name: str) -> int:
 
 
 def check(place: Path, *, writable: bool = False) -> None:
-    """Make a folder where it is missing, and refuse one that others can write to, or could put another in its place.
+    """Make a folder if it is missing, and refuse it if others can write to it or could replace it.
 
     Raises
     ------
     OSError
-        With the path and the reason, also where files cannot be made in it and it is to be `writable`.
+        States the path and the reason; with `writable`, also where this user cannot create files in the folder.
     """
     for folder in (*reversed(place.parents), place):
         with suppress(FileExistsError):
             folder.mkdir(_MODE)
-    _check_way(place.parent)
+    _check_parents(place.parent)
     os.close(_open_folder(place))
     if writable and not os.access(place, os.W_OK | os.X_OK):
         raise _refusal(place, "cannot be written")
 
 
-def _check_way(path: Path, links: int = 0) -> None:
-    """Refuse where one of the folders that lead to `path`, or a link among them, is another user's."""
+def _check_parents(path: Path, links: int = 0) -> None:
+    """Refuse `path` if another user owns or can write to it, to a folder above it, or to a link among them."""
     for folder in (*reversed(path.parents), path):
-        about = folder.lstat()
-        if about.st_uid not in (0, os.geteuid()):
+        status = folder.lstat()
+        if status.st_uid not in (0, os.geteuid()):
             raise _refusal(folder, "belongs to another user")
-        if stat.S_ISLNK(about.st_mode):
+        if stat.S_ISLNK(status.st_mode):
             if links == _MOST_LINKS:
                 raise OSError(errno.ELOOP, os.strerror(errno.ELOOP), str(path))
-            there = folder.parent / folder.readlink() / path.relative_to(folder)
-            return _check_way(there, links + 1)
-        # in a sticky folder nobody renames what is another's
-        if about.st_mode & _OTHERS_WRITE and not about.st_mode & stat.S_ISVTX:
+            target = folder.parent / folder.readlink() / path.relative_to(folder)
+            return _check_parents(target, links + 1)
+        # in a sticky folder, users cannot rename the files of others
+        if status.st_mode & _OTHERS_WRITE and not status.st_mode & stat.S_ISVTX:
             raise _refusal(folder, "others can write to it")
     return None
 
 
 def _open_folder(path: Path, outer: int | None = None) -> int:
-    """Open a folder of ours, relative to the descriptor `outer` where there is one, and close it to others there."""
+    """Open a folder of this user; relative to the descriptor `outer`, if given, it is also made private."""
     try:
-        found = os.open(path.name if outer is not None else path, _FOLDER, dir_fd=outer)
+        folder = os.open(path.name if outer is not None else path, _FOLDER, dir_fd=outer)
     except OSError as error:
         reason = "is a link" if path.is_symlink() else error.strerror
         raise OSError(error.errno, reason, str(path)) from None
-    about = os.fstat(found)
+    status = os.fstat(folder)
     try:
-        if about.st_uid != os.geteuid():
+        if status.st_uid != os.geteuid():
             raise _refusal(path, "belongs to another user")
-        if about.st_mode & _OTHERS_WRITE:
+        if status.st_mode & _OTHERS_WRITE:
             raise _refusal(path, "others can write to it")
-        # what others can read is no danger, and the folder that a user names keeps its mode
-        if outer is not None and stat.S_IMODE(about.st_mode) != _MODE:
-            os.fchmod(found, _MODE)
+        # the folder that the user names keeps its mode: it is no danger that others can read it
+        if outer is not None and stat.S_IMODE(status.st_mode) != _MODE:
+            os.fchmod(folder, _MODE)
     except OSError:
-        os.close(found)
+        os.close(folder)
         raise
-    return found
+    return folder
 
 
 def _file(name: str, flags: int, folder: int) -> int:
-    """Return the descriptor of a file in an opened folder; OSError unless it is a regular one of ours alone."""
-    found = regular_files.descriptor(name, flags | os.O_NOFOLLOW, folder=folder)
-    about = os.fstat(found)
-    if about.st_uid == os.geteuid() and about.st_nlink == 1 and not about.st_mode & _OTHERS_WRITE:
-        return found
-    os.close(found)
+    """Open a file in an open folder; raises OSError unless it is a regular file that only this user can write to."""
+    file = regular_files.descriptor(name, flags | os.O_NOFOLLOW, folder=folder)
+    status = os.fstat(file)
+    is_ours = status.st_uid == os.geteuid() and not status.st_mode & _OTHERS_WRITE
+    if is_ours and status.st_nlink == 1:
+        return file
+    os.close(file)
     raise _refusal(Path(name), "is not ours alone")
 
 

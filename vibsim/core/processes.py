@@ -1,7 +1,7 @@
-"""What the system says of processes, and does for one that ends, or whose parent does.
+"""Process control: start times, signals, and children that end with their parents.
 
-Linux does it all in the kernel (``prctl``, ``/proc``). Elsewhere (macOS) a thread looks five times a second whether
-the parent is still there, and psutil says when a process started.
+On Linux the kernel does this (``prctl``, ``/proc``). Elsewhere (macOS) a thread checks five times a second whether the
+parent is alive, and psutil returns start times.
 """
 
 from __future__ import annotations
@@ -21,20 +21,20 @@ ENDS = (signal.SIGHUP, signal.SIGINT, signal.SIGTERM)
 _SET_PARENT_DEATH_SIGNAL, _SET_CHILD_SUBREAPER = 1, 36
 _ON_LINUX = os.uname().sysname == "Linux"
 _PAUSE = 0.2
-"""Seconds between two looks where the kernel cannot be asked to tell."""
+"""Time between two checks on systems where the kernel does not send a signal [s]."""
 
 
 def usable_cores() -> int:
-    """Return how many cores this process may use."""
+    """Return the number of cores that this process may use."""
     allowed = getattr(os, "sched_getaffinity", None)
     return len(allowed(0)) if allowed else os.cpu_count() or 1
 
 
 def started(pid: int) -> str:
-    """Return when process `pid` started; empty when it is dead, even if nobody took notice.
+    """Return the start time of process `pid` as text; empty if it has ended, even if its parent has not reaped it.
 
-    The number tells a living process from a later one that was given the same id. On Linux it counts ticks since
-    boot, which no change of the clock can move.
+    The start time distinguishes a process from a later one with the same id. On Linux it is in ticks since boot, which
+    do not depend on the clock.
     """
     if not _ON_LINUX:
         return _started_elsewhere(pid)
@@ -46,33 +46,33 @@ def started(pid: int) -> str:
 
 
 def end_with(parent: int) -> None:
-    """Have this process killed when `parent`, which started it, has ended.
+    """Make the system kill this process when its parent process `parent` ends.
 
     Raises
     ------
     VibsimError
-        When it has ended already.
+        Where the parent has already ended.
     """
     if _ON_LINUX:
         _control(_SET_PARENT_DEATH_SIGNAL, signal.SIGKILL)
     if os.getppid() != parent:
         raise VibsimError("the run that started this job has ended")
     if not _ON_LINUX:
-        threading.Thread(target=_outlive, args=(parent,), daemon=True).start()
+        threading.Thread(target=_watch_parent, args=(parent,), daemon=True).start()
 
 
 def heeded() -> set[signal.Signals]:
-    """Return the signals that end this process: those that it was started to ignore (``nohup``) stay ignored."""
+    """Return the signals of `ENDS` that may end this process: those ignored at its start (``nohup``) stay ignored."""
     return {number for number in ENDS if signal.getsignal(number) is not signal.SIG_IGN}
 
 
 def as_worker_of(parent: int) -> None:
-    """Have this process end with `parent`, which started it, and on the spot by a signal that asks to end.
+    """Make this process end with its parent process `parent`, and at once on a signal of `ENDS`.
 
     Raises
     ------
     VibsimError
-        As `end_with`.
+        Where the parent has already ended.
     """
     ends = heeded()
     for number in ends:
@@ -82,23 +82,23 @@ def as_worker_of(parent: int) -> None:
 
 
 def adopt_orphans() -> None:
-    """Have processes whose parents end become children of this one, where the kernel can do that."""
+    """Make descendants whose parents have ended children of this process (on Linux only)."""
     if _ON_LINUX:
         _control(_SET_CHILD_SUBREAPER, 1)
 
 
 def wait_for_signal(numbers: Set[signal.Signals], seconds: float) -> int:
-    """Return one of the blocked signals `numbers` as soon as it comes, or 0 after `seconds` at the latest."""
+    """Wait for one of the blocked signals `numbers` and return it, or 0 after at most `seconds`."""
     if _ON_LINUX:
-        found = signal.sigtimedwait(numbers, seconds)
-        return found.si_signo if found else 0
+        received = signal.sigtimedwait(numbers, seconds)
+        return received.si_signo if received else 0
     time.sleep(min(seconds, _PAUSE))
     pending = signal.sigpending() & numbers
     return signal.sigwait(pending) if pending else 0
 
 
 def _started_elsewhere(pid: int) -> str:
-    import psutil  # 10 ms, which no job on Linux pays
+    import psutil  # imported here: it takes 10 ms, and Linux does not need it
 
     try:
         process = psutil.Process(pid)
@@ -108,7 +108,7 @@ def _started_elsewhere(pid: int) -> str:
         return ""
 
 
-def _outlive(parent: int) -> None:
+def _watch_parent(parent: int) -> None:
     while os.getppid() == parent:
         time.sleep(_PAUSE)
     os.kill(os.getpid(), signal.SIGKILL)

@@ -1,7 +1,7 @@
 """Labelled arrays in memory, without xarray.
 
-Jobs work on plain arrays: importing xarray costs more than a short simulation. A `Record` holds what an
-`xarray.Dataset` holds (dimensions, coordinates, variables, attributes), and becomes one on request.
+Jobs use plain arrays, because importing xarray costs more than a short simulation. A `Record` has the content of an
+`xarray.Dataset` (dimensions, coordinates, variables, attributes), and can be converted to one.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ class Variable:
     values: NDArray[Any]
     attrs: Mapping[str, Attribute] = field(default_factory=dict)
     group: str = ""
-    """The group of a file in which it lies; empty for the root."""
+    """The netCDF group of the variable; empty for the root."""
 
     def __post_init__(self) -> None:
         if len(self.dims) != np.ndim(self.values):
@@ -39,7 +39,7 @@ class Variable:
     def of(
         cls, dims: tuple[str, ...], values: NDArray[Any], words: str, units: str = "1", **more: Any
     ) -> Variable:
-        """Return an array that `words` describe, in its `units`; `more` are further attributes."""
+        """Return a variable with `words` as its ``long_name``; `more` are further attributes."""
         return cls(dims, values, attributes(words, units, **more))
 
 
@@ -49,7 +49,7 @@ def attributes(long_name: str, units: str, **more: Any) -> dict[str, Any]:
 
 
 def flags(words: Sequence[str]) -> dict[str, Any]:
-    """Return the attributes of a variable that holds positions in a list of words, beside `attributes`."""
+    """Return the additional attributes of a variable that holds indices into a list of words."""
     return {"flag_values": np.arange(len(words), dtype=np.int8), "flag_meanings": " ".join(words)}
 
 
@@ -70,7 +70,7 @@ class Record:
         return self.variables[name] if name in self.variables else self.coords[name]
 
     def words(self, name: str) -> list[str]:
-        """Return a coordinate of words (schemes, norms, checks) as text; files give bytes."""
+        """Return a coordinate of strings (schemes, norms, checks), also where a file has bytes."""
         entries = self[name].tolist()
         return [entry.decode() if isinstance(entry, bytes) else str(entry) for entry in entries]
 
@@ -81,11 +81,11 @@ class Record:
         return dict(zip(values, str(attrs["flag_meanings"]).split(), strict=True))
 
     def place(self, dim: str, value: int) -> int:
-        """Return the position of a value of a coordinate of whole numbers."""
+        """Return the index of a value in a coordinate of whole numbers."""
         return int(np.flatnonzero(np.asarray(self[dim]) == value)[0])
 
     def step(self, level: int, case: int) -> float:
-        """Return dt of a member at a level, both by their positions, from a convergence Record."""
+        """Return dt of a member at a level [s], both given by index, from a convergence Record."""
         dt = np.asarray(self["dt"])[level]
         return float(dt[case] if dt.ndim else dt)
 

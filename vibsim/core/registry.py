@@ -1,8 +1,8 @@
-"""What the key ``kind`` may name: the models or the schemes of vibsim, and behind them those of installed packages.
+"""Registries of the models and schemes that the key ``kind`` may name: those of vibsim, then of installed packages.
 
-A package offers a model or a scheme as an entry point of the group ``vibsim.models`` or ``vibsim.schemes``, whose name
-is its kind. Entry points are looked up only where a kind is asked for that vibsim does not have, or where all are
-listed. A name in an experiment file is compared with theirs; it is never imported itself.
+A package offers a model or a scheme by an entry point of the group ``vibsim.models`` or ``vibsim.schemes``, named by
+its kind. Entry points are looked up only for a kind that vibsim does not have, or to list all. A name in an experiment
+file is compared with their names, and never imported itself.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ Entry = TypeVar("Entry", bound=_HasKind)
 
 
 def hash_fault(entry: object) -> str:
-    """Say why what is worked out of an entry cannot be kept for the next time; nothing where it can."""
+    """Return why results derived from an entry cannot be cached; empty if they can."""
     try:
         hash(entry)
     except TypeError as error:
@@ -36,20 +36,20 @@ def hash_fault(entry: object) -> str:
 
 
 class Registry(Mapping[str, Entry]):
-    """Models or schemes by kind. Counting and naming them imports no package, but its values do."""
+    """Models or schemes by kind. Iterating over the kinds imports no package; looking up a value does."""
 
     def __init__(
         self, group: str, entries: Iterable[Entry], fault_of: Callable[[object], str]
     ) -> None:
         self.group = group
-        """Of entry points."""
+        """Group of the entry points."""
         self.built_in: Mapping[str, Entry] = MappingProxyType({row.kind: row for row in entries})
-        """Those that come with vibsim."""
+        """The entries of vibsim itself."""
         self._fault_of = fault_of
         self._loaded: dict[str, Entry] = {}
 
     def __getitem__(self, kind: str) -> Entry:
-        """Return an entry; InputError where a package offers one that cannot be had."""
+        """Return an entry; raise InputError where a package offers it but it cannot be loaded."""
         if kind in self.built_in:
             return self.built_in[kind]
         if kind not in self._loaded:
@@ -66,44 +66,44 @@ class Registry(Mapping[str, Entry]):
         return kind in self.built_in or kind in self._offers()
 
     def own(self, entries: Iterable[Any]) -> dict[str, Entry]:
-        """Return by kind what is given in memory, beside what is registered.
+        """Return a user's own models or schemes by kind, after checking them.
 
         Raises
         ------
         InputError
-            Where one is nothing of this kind, or its name is taken.
+            Where an object is not a valid entry, or its kind is taken.
         """
-        found: dict[str, Entry] = {}
+        checked: dict[str, Entry] = {}
         for entry in entries:
             fault = self._fault_of(entry)
             name = "" if fault else entry.kind
-            if not fault and found.get(name, self.built_in.get(name, entry)) is not entry:
+            if not fault and checked.get(name, self.built_in.get(name, entry)) is not entry:
                 fault = "the name is taken: give it another kind"
             if fault:
-                what = self.group.rpartition(".")[2]
-                raise InputError([Fault(f"in memory, one of the {what}", 0, "", name, fault)])
-            found[name] = entry
-        return found
+                plural = self.group.rpartition(".")[2]
+                raise InputError([Fault(f"in memory, one of the {plural}", 0, "", name, fault)])
+            checked[name] = entry
+        return checked
 
     def usable(self) -> tuple[dict[str, Entry], list[Fault]]:
-        """Return all entries that can be had, and the faults of the packages that offer others."""
-        found, faults = dict(self.built_in), list[Fault]()
+        """Return all entries that can be loaded, and the faults of the packages whose entries cannot."""
+        entries, faults = dict(self.built_in), list[Fault]()
         try:
             kinds = list(self._offers())
         except InputError as error:
-            return found, [*error.faults]
+            return entries, [*error.faults]
         for kind in kinds:
             try:
-                found[kind] = self[kind]
+                entries[kind] = self[kind]
             except InputError as error:
                 faults += error.faults
-        return found, faults
+        return entries, faults
 
     def _offers(self) -> Mapping[str, EntryPoint]:
-        found = offers(self.group)
-        for name in found.keys() & self.built_in.keys():
-            raise _refusal(found[name], "vibsim has one of this name already: choose another kind")
-        return found
+        points = offers(self.group)
+        for name in points.keys() & self.built_in.keys():
+            raise _refusal(points[name], "vibsim has one of this name already: choose another kind")
+        return points
 
     def _load(self, point: EntryPoint) -> Entry:
         step = "imported"
@@ -118,26 +118,26 @@ class Registry(Mapping[str, Entry]):
             fault = f"its kind is '{entry.kind}': the entry point must have the same name"
         if fault:
             raise _refusal(point, fault)
-        found: Entry = entry
-        return found
+        loaded: Entry = entry
+        return loaded
 
 
 @cache
 def offers(group: str) -> Mapping[str, EntryPoint]:
-    """Return the entry points of a group by name; InputError where two packages use one name."""
-    # takes 20 ms to import
+    """Return the entry points of a group by name; raise InputError where two packages use the same name."""
+    # imported here, because it takes 20 ms
     from importlib.metadata import entry_points
 
-    found: dict[str, EntryPoint] = {}
+    points: dict[str, EntryPoint] = {}
     for point in sorted(entry_points(group=group), key=lambda point: point.name):
-        if found.setdefault(point.name, point) is not point:
-            other = package_of(found[point.name])
+        if points.setdefault(point.name, point) is not point:
+            other = package_of(points[point.name])
             raise _refusal(point, f"{other} has an entry point of this name, too: remove one")
-    return MappingProxyType(found)
+    return MappingProxyType(points)
 
 
 def package_of(point: EntryPoint) -> str:
-    """Name the package of an entry point, with its version."""
+    """Return name and version of the package of an entry point."""
     return f"{point.dist.name} {point.dist.version}" if point.dist else "an unknown package"
 
 

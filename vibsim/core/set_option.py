@@ -1,4 +1,4 @@
-"""How the option ``--set`` of the command line is written: in messages, commands and pages."""
+"""The text of the command-line option ``--set`` in messages, commands and pages."""
 
 from __future__ import annotations
 
@@ -9,15 +9,15 @@ OPTION = "--set"
 
 
 def set_options(settings: Sequence[str]) -> str:
-    """Return what a command has behind the name of an experiment with settings, with a blank before each."""
+    """Return the options ``--set`` for settings as text, each after a blank."""
     return "".join(f" {OPTION} {quote(str(text))}" for text in settings)
 
 
 def command_to_run(word: str, settings: Sequence[str] = ()) -> str:
-    """Return the command that runs what a command line names by a word."""
+    """Return the command that runs the experiment named by `word`."""
     return f"vibsim run {quote(word)}{set_options(settings)}"
 
 
 def set_in(file: str, setting: str) -> str:
-    """Return what a message names as the place of a value that is given in place of one of a file."""
+    """Return the place of a setting of the command line, for messages."""
     return f"{file}, {OPTION} {setting}"

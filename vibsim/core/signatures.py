@@ -1,4 +1,4 @@
-"""Whether a function of a user can be called with some arguments, without calling it."""
+"""Check whether a user's function accepts given arguments, without calling it."""
 
 from __future__ import annotations
 
@@ -9,50 +9,53 @@ from typing import Any
 
 
 def misfit(function: Callable[..., Any], *args: Any, **named: Any) -> tuple[str, str] | None:
-    """Return what a function takes and why it cannot be called so; None where it can, or does not tell."""
+    """Return the signature and the reason why a call with these arguments fails; None if it fits or is unknown."""
     try:
-        takes = inspect.signature(function)
+        signature = inspect.signature(function)
     except (TypeError, ValueError):
-        return None  # functions of extension modules may not tell
-    return misfit_of(takes, *args, **named)
+        return None  # functions of extension modules may have no signature
+    return misfit_of(signature, *args, **named)
 
 
-def misfit_of(takes: inspect.Signature, *args: Any, **named: Any) -> tuple[str, str] | None:
-    """Return the same of a function that is known by its signature alone."""
+def misfit_of(signature: inspect.Signature, *args: Any, **named: Any) -> tuple[str, str] | None:
+    """Return the same as `misfit`, from a signature."""
     try:
-        takes.bind(*args, **named)
+        signature.bind(*args, **named)
     except TypeError as error:
-        return str(takes), str(error)
+        return str(signature), str(error)
     return None
 
 
 def signature_of(node: ast.FunctionDef) -> inspect.Signature:
-    """Return the signature of a function that is read, and not run: its default values are texts."""
-    kinds, given = inspect.Parameter, node.args
-    plain = [*given.posonlyargs, *given.args]
-    texts: list[ast.expr | None] = [None] * (len(plain) - len(given.defaults))
-    texts += given.defaults
+    """Return the signature of a parsed function, which is not executed: default values are source text."""
+    kinds, args = inspect.Parameter, node.args
+    positional = [*args.posonlyargs, *args.args]
+    defaults: list[ast.expr | None] = [None] * (len(positional) - len(args.defaults))
+    defaults += args.defaults
     rows: list[tuple[ast.arg | None, Any, ast.expr | None]] = [
-        *((one, kinds.POSITIONAL_OR_KEYWORD, text) for one, text in zip(plain, texts, strict=True)),
-        (given.vararg, kinds.VAR_POSITIONAL, None),
         *(
-            (one, kinds.KEYWORD_ONLY, text)
-            for one, text in zip(given.kwonlyargs, given.kw_defaults, strict=True)
+            (arg, kinds.POSITIONAL_OR_KEYWORD, default)
+            for arg, default in zip(positional, defaults, strict=True)
         ),
-        (given.kwarg, kinds.VAR_KEYWORD, None),
+        (args.vararg, kinds.VAR_POSITIONAL, None),
+        *(
+            (arg, kinds.KEYWORD_ONLY, default)
+            for arg, default in zip(args.kwonlyargs, args.kw_defaults, strict=True)
+        ),
+        (args.kwarg, kinds.VAR_KEYWORD, None),
     ]
-    found = [
-        kinds(one.arg, kind, default=kinds.empty if text is None else ast.unparse(text))
-        for one, kind, text in rows
-        if one is not None
+    parameters = [
+        kinds(arg.arg, kind, default=kinds.empty if default is None else ast.unparse(default))
+        for arg, kind, default in rows
+        if arg is not None
     ]
-    only = len(given.posonlyargs)
-    found[:only] = [one.replace(kind=kinds.POSITIONAL_ONLY) for one in found[:only]]
-    return inspect.Signature(found)
+    only = len(args.posonlyargs)
+    parameters[:only] = [row.replace(kind=kinds.POSITIONAL_ONLY) for row in parameters[:only]]
+    return inspect.Signature(parameters)
 
 
 def takes_by_name(function: Callable[..., Any], names: Sequence[str]) -> bool:
-    """Say whether a function has parameters of all these names, and needs no others."""
+    """Tell whether a function has parameters of all these names, and requires no others."""
     try:
         known = inspect.signature(function).parameters
     except (TypeError, ValueError):

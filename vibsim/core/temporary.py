@@ -1,4 +1,4 @@
-"""Temporary folders that are gone afterwards, also where a command is told to end while it removes one."""
+"""Temporary folders that are always removed, even if a signal interrupts the removal."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from tempfile import mkdtemp
 
 @contextmanager
 def temporary_folder() -> Iterator[Path]:
-    """Give a new folder that only this user can read, and remove it when the block ends."""
+    """Yield a new folder that only this user can read, and remove it when the context ends."""
     folder = Path(mkdtemp(prefix="vibsim-"))
     try:
         yield folder
@@ -19,5 +19,5 @@ def temporary_folder() -> Iterator[Path]:
         try:
             shutil.rmtree(folder, ignore_errors=True)
         finally:
-            # a request to end is raised once, perhaps in the middle of the first removal
+            # `Interrupted` is raised only once, possibly during the first removal
             shutil.rmtree(folder, ignore_errors=True)

@@ -1,6 +1,6 @@
-"""The words and numbers that all of vibsim agrees on: statuses, reasons, norms, dimensions, and the file format.
+"""Words and numbers used throughout vibsim: statuses, reasons, norms, dimensions, and the file format.
 
-This module imports nothing of vibsim and no library, so that any command may have it.
+This module imports nothing of vibsim and no third-party library, so that any command may import it.
 """
 
 from __future__ import annotations
@@ -12,9 +12,9 @@ from typing import Any, Literal, get_args
 
 Status = Literal["PASS", "FAIL", "INCONCLUSIVE"]
 STATUSES: tuple[Status, ...] = get_args(Status)
-"""Every status; files hold its position here."""
+"""Every status; files store the index into this tuple."""
 SEVERITY: Mapping[str, int] = MappingProxyType({"PASS": 0, "INCONCLUSIVE": 1, "FAIL": 2})
-"""How bad each of `STATUSES` is, the mildest first."""
+"""Severity of each of `STATUSES`; larger is worse."""
 
 _REASONS: Mapping[Status, str] = {
     "PASS": "asymptotic exact match",
@@ -24,35 +24,35 @@ _REASONS: Mapping[Status, str] = {
 REASONS: Mapping[str, Status] = MappingProxyType(
     {reason: status for status, words in _REASONS.items() for reason in words.split()}
 )
-"""Every reason of a verdict, with the status that it belongs to."""
+"""Every reason of a verdict, with its status."""
 REASON_NAMES = tuple(REASONS)
-"""The same without statuses; files hold a reason's position here."""
+"""The names of the reasons; files store the index into this tuple."""
 
 DRIFTS = ("none", "bounded", "linear", "quadratic", "exponential", "unclear")
-"""How the error of an energy grows with time; files hold a position here."""
+"""How the error of an energy grows with time; files store the index into this tuple."""
 
 Norm = Literal["l1", "l2", "linf", "linf_interior"]
 NORMS: tuple[Norm, ...] = get_args(Norm)
 """Every norm over time; ``linf_interior`` leaves the last point out."""
 SECONDS_OF_NORM: dict[str, float] = {"l1": 1.0, "l2": 0.5, "linf": 0.0, "linf_interior": 0.0}
-"""The power of s beside the unit of an error or a difference in each norm."""
+"""The power of s that each norm adds to the unit of an error or a difference."""
 TYPICAL_NORM: Norm = "l2"
-"""The norm of a check that names none, and of the verdict on a quantity."""
+"""The default norm of a check, and the norm of the verdict on a quantity."""
 MEMBER = ("scheme", "case")
-"""Dimensions of a number of each scheme and member."""
+"""Dimensions of a scalar of each scheme and member."""
 SERIES = (*MEMBER, "t")
 """Dimensions of a series over the stored times."""
 OF_LEVEL = (*MEMBER, "level")
-"""Dimensions of a number of each level."""
+"""Dimensions of a scalar of each scheme, member and level."""
 Restriction = Literal["subset", "mean", "linear", "cubic"]
 RESTRICTIONS: tuple[Restriction, ...] = get_args(Restriction)
-"""Ways to bring the levels of a study to common points."""
+"""Ways to restrict the levels of a study to common points."""
 ORDER_TOLERANCE = 0.1
-"""How far from the promised order a measured one may be where a check does not say."""
+"""Default distance that a check allows between the measured and the promised order."""
 LEVELS_OF_AN_ORDER = 3
-"""Fewer levels show no order, and not how large their error is."""
+"""Fewest levels that show an order, and the size of their error."""
 BY_TOLERANCE = "tolerance"
-"""Name and kind of the verdict that an experiment with a tolerance has beside those of its checks."""
+"""Name and kind of the additional verdict on an experiment with a tolerance."""
 
 DECISIVE: Mapping[str, str] = MappingProxyType(
     {
@@ -65,19 +65,22 @@ DECISIVE: Mapping[str, str] = MappingProxyType(
         BY_TOLERANCE: "error_bound",
     }
 )
-"""Kind of a check to the fact that decides it; no check has that of one before it in this order."""
+"""Name of the fact that decides each kind of check; no check has the deciding fact of a kind listed before it."""
 ERROR_FACTS = ("error", "error_bound", "relative_error")
-"""Facts on the error of the finest level, of every check that states it."""
+"""Facts on the error of the finest level, in every check that states it."""
 
 
 def decisive_number(facts: Mapping[str, Any]) -> float | None:
-    """Return the number that decides a result with these facts; None where an order does, or it is not finite."""
-    found: float | None = next((facts[name] for name in DECISIVE.values() if name in facts), None)
-    return None if DECISIVE["converges"] in facts else found
+    """Return the number that decides a result with these facts; None if an order decides or it is not finite."""
+    number: float | None = next((facts[name] for name in DECISIVE.values() if name in facts), None)
+    return None if DECISIVE["converges"] in facts else number
 
 
 def order_interval(low: float, high: float) -> tuple[str, ...]:
-    """Write the ends of the interval of an order with the decimals that tell them apart, 3 to 6; once if none do."""
+    """Return the ends of the interval of an order as text, with the 3 to 6 decimals that distinguish them.
+
+    If they agree to 6 decimals, a single text is returned.
+    """
     for decimals in range(3, 7):
         ends = f"{low:.{decimals}f}", f"{high:.{decimals}f}"
         if ends[0] != ends[1]:
@@ -90,19 +93,19 @@ FORMAT = 2
 
 
 def worst(statuses: Iterable[str]) -> str:
-    """Return the status of a whole: FAIL before INCONCLUSIVE before PASS; of nothing, nothing is concluded.
+    """Return the worst of several statuses; INCONCLUSIVE if there are none.
 
     Raises
     ------
     KeyError
-        For a word that is no status.
+        For a word that is not a status.
     """
     return max(statuses, key=SEVERITY.__getitem__, default="INCONCLUSIVE")
 
 
 def jsonable(value: Any) -> Any:
-    """Return plain data as JSON has them: lists and mappings, and None for numbers that are not finite."""
-    if hasattr(value, "tolist"):  # numbers and arrays of numpy, which quick readers do not import
+    """Return plain data for JSON: lists and mappings, and None for numbers that are not finite."""
+    if hasattr(value, "tolist"):  # a number or array of numpy, which is not imported here
         value = value.tolist()
     if isinstance(value, float):
         return value if math.isfinite(value) else None
@@ -114,25 +117,25 @@ def jsonable(value: Any) -> Any:
 
 
 FIGURE_FORMATS = ("svg", "png", "pdf")
-"""Formats in which figures of a report are written."""
+"""Formats of the figures of a report."""
 HIGHEST = "highest_omega_dt"
-"""Name of the highest angular frequency of small oscillations times the step, where it is not that of a period."""
+"""Variable with the highest angular frequency of small oscillations times the step, if it is not that of the period."""
 PHASE, AMPLITUDE = "_phase_error", "_amplitude_error"
-"""What follows the name of the position in the names of the parts of its error."""
+"""Suffixes that form the names of the error parts of a position."""
 CENTRED = "_d2t"
-"""Ends the name of a velocity or an energy that is made with the centred difference ``[D_2t u]`` of the position."""
+"""Suffix of velocities and energies computed with the centred difference ``[D_2t u]`` of the position."""
 
 
 def plain_name(name: str) -> str:
-    """Return the name of a quantity without the mark of the velocity that it is made with."""
+    """Return the name of a quantity without the suffix `CENTRED`."""
     return name.removesuffix(CENTRED)
 
 
 def is_error_part(name: str) -> bool:
-    """Tell whether a quantity is a part of a position's error."""
+    """Tell whether a quantity is the phase error or the amplitude error of a position."""
     return name.endswith((PHASE, AMPLITUDE))
 
 
 def whole_of(name: str) -> str:
-    """Return the position that a part belongs to; any other quantity as it is."""
+    """Return the position to which an error part belongs; any other quantity unchanged."""
     return name.removesuffix(PHASE).removesuffix(AMPLITUDE)

@@ -1,8 +1,8 @@
-"""The ladder as a product: the solution to a tolerance, from the cheapest levels that reach it, extrapolated.
+"""Solve to a tolerance: choose the cheapest ladder of levels that reaches it, and extrapolate the solution over it.
 
-One level of a second-order scheme is a poor solver; several of them, extrapolated, are a very good one, which bounds
-its own error. `best` gives the extrapolated solution of an experiment in memory, without files. `resolve` chooses the
-levels of an experiment that names a tolerance. `solve` is what both stand on.
+One level of a second-order scheme is a poor solver; several levels, extrapolated, are a very good one that also bounds
+its error. `best` returns the extrapolated solution of an experiment, without files. `resolve` chooses the levels of an
+experiment that names a tolerance. Both use `climb`, of which `solve` is a version with as little overhead as possible.
 """
 
 from vibsim.comparison.extrapolate_members import Extrapolated, Method, Start

@@ -1,4 +1,4 @@
-"""The solution of an experiment, extrapolated over its levels, in memory."""
+"""The solution of an experiment, extrapolated over its levels, without files."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from vibsim.experiment import Experiment
 
 POINTS_AT_A_TIME = 2**18
-"""Points of one level that are held at a time."""
+"""Most points of one level that are in memory at a time."""
 
 
 def best(
@@ -30,22 +30,22 @@ def best(
     Parameters
     ----------
     levels
-        Other levels than those of the experiment. An experiment with a tolerance and no levels gets the cheapest that
-        reach it.
+        Levels in place of those of the experiment. An experiment with a tolerance and no levels gets the cheapest ones
+        that reach it.
     threads
-        How many threads share the members; no number depends on it.
+        Number of threads that share the members; no result depends on it.
 
     Returns
     -------
     xarray.Dataset
-        What ``best.nc`` holds: every state over (scheme, case, t), ``<state>_error``, the bound of its error,
-        ``level_first`` and ``level_last``, between which the levels lie that were used, and ``reached``.
+        The content of ``best.nc``: every state over (scheme, case, t), the bound of its error ``<state>_error``, the
+        coarsest and the finest level used, ``level_first`` and ``level_last``, and ``reached``.
 
     Raises
     ------
     VibsimError
-        Where no ladder reaches the tolerance: an `InputError` that names the least bound and what forbids less. Where
-        `levels` break a rule for the levels of a file: an `InputError` too.
+        Where no ladder reaches the tolerance: an `InputError` that states the smallest bound and why no smaller one is
+        possible. Where `levels` break a rule for the levels of a file: an `InputError` too.
     """
     if levels is not None:
         experiment = experiment.with_levels(levels)
@@ -57,7 +57,7 @@ def best(
     size = max(POINTS_AT_A_TIME // (points + 1), 1)
     schemes = experiment.ladder
 
-    def climbed(scheme: int, group: Members) -> Extrapolated:
+    def extrapolated(scheme: int, group: Members) -> Extrapolated:
         return in_order(
             [
                 (climb(method, start, steps, points, threads=threads), where)
@@ -69,7 +69,7 @@ def best(
         members(experiment, first, min(first + size, experiment.members))
         for first in range(0, experiment.members, size)
     ]
-    rows = [join_members([climbed(i, group) for group in groups]) for i in schemes]
+    rows = [join_members([extrapolated(i, group) for group in groups]) for i in schemes]
     group = members(experiment, 0, experiment.members)
     names = [experiment.schemes[i].name for i in schemes]
     same_end = not experiment.end_varies

@@ -1,4 +1,4 @@
-"""A ladder as a solver: arrays in, arrays out, and little around the stepping itself."""
+"""A ladder as a solver: arrays in, arrays out, with little overhead besides the stepping itself."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ from vibsim.convergence.state_extrapolation import FLOATS, Circumstances, Pair, 
 from vibsim.convergence.thresholds import KNOWN_DIGIT
 from vibsim.core.array_types import Floats
 
-LEAST_LOOKS = 16
-"""The coarsest level is looked at so many times at least, where rounding errors are measured."""
+LEAST_TIMES = 16
+"""Fewest times at which the coarsest level is stored to measure its rounding error, where its steps allow."""
 
 
 def solve(
@@ -35,38 +35,37 @@ def solve(
     threads: int = 1,
     lane: str | None = None,
 ) -> Extrapolated:
-    """Run a ladder and extrapolate it, with as little around the stepping as can be.
+    """Run the levels of a ladder and extrapolate the solution, with as little overhead as possible.
 
     Parameters
     ----------
     method
-        A scheme with its options on a model. Make it once: it keeps what it has worked out about itself.
+        A scheme with its options on a model. Make it once, because it caches its derived data.
     start
-        The numbers of the members.
+        Parameters and initial values of the members.
     steps
         Number of steps of every level, strictly increasing, multiples of `points`.
     points
-        The solution is wanted at so many equal times, the last of which is the end.
+        Number of equidistant times of the solution, the last of which is the end.
     threads
-        How many threads share the members; no number depends on it.
+        Number of threads that share the members; no result depends on it.
     lane
-        Of the engine. Little work is done without a compiler where it is None; ``scalar`` is worth it for who calls
-        often.
+        Lane of the engine. With None, small problems run without a compiled kernel; ``scalar`` pays for frequent calls.
 
     Returns
     -------
     Extrapolated
-        Arrays of shape (points, case), with the bounds of their errors; places of levels count from 0.
+        Arrays of shape (points, case), with the bounds of their errors; levels are counted from 0.
 
     Raises
     ------
     ValueError
-        Where a level cannot be sampled at these times.
+        Where the steps of a level are not a multiple of `points`.
     """
     if points == 1 and len(start.end) == 1 and method.has_one_expansion:
-        return _end_of_one(method, start, steps, lane)
-    found = vars(climb(method, start, steps, points, threads=threads, lane=lane))
-    return Extrapolated(**{name: values[1:] for name, values in found.items()})
+        return _single_end(method, start, steps, lane)
+    fields = vars(climb(method, start, steps, points, threads=threads, lane=lane))
+    return Extrapolated(**{name: values[1:] for name, values in fields.items()})
 
 
 def climb(
@@ -78,7 +77,7 @@ def climb(
     threads: int = 1,
     lane: str | None = None,
 ) -> Extrapolated:
-    """Do the same as `solve`, with t = 0 before the other times."""
+    """Do the same as `solve`, but return the time t = 0 as well: arrays of shape (1 + points, case)."""
     if any(n % points for n in steps):
         raise ValueError(f"{points} equal times are no samples of levels with {steps} steps")
     run = partial(level_at, threads=threads, lane=lane)
@@ -90,23 +89,23 @@ def climb(
 def _levels(
     method: Method, start: Start, steps: tuple[int, ...], points: int, run: Callable[..., Pair]
 ) -> tuple[list[Pair], Floats | None]:
-    """Return every level at `points` equal times and t = 0, and the measured noise, of shape (t, case)."""
-    finer = 1
-    while points * finer < LEAST_LOOKS and steps[0] % (2 * points * finer) == 0:
-        finer *= 2
+    """Return every level at `points` equidistant times and t = 0, and the measured noise, of shape (t, case)."""
+    refinement = 1
+    while points * refinement < LEAST_TIMES and steps[0] % (2 * points * refinement) == 0:
+        refinement *= 2
     every = [n // points for n in steps]
-    every[0] //= finer
+    every[0] //= refinement
     levels = [run(method, start, n, stride) for n, stride in zip(steps, every, strict=True)]
     noise = noise_of(method, start, steps, every, levels, run)
     u, v = levels[0]
-    levels[0] = u[::finer], v[::finer]
+    levels[0] = u[::refinement], v[::refinement]
     return levels, noise
 
 
-def _end_of_one(
+def _single_end(
     method: Method, start: Start, steps: tuple[int, ...], lane: str | None
 ) -> Extrapolated:
-    """Return the end of one member: the numbers of `climb` from floats, for which numpy would take ten times longer."""
+    """Return the last values of `climb` for a single member, with Python floats: ten times faster than numpy here."""
     levels, noise = _levels(method, start, steps, 1, partial(level_at, lane=lane))
     pairs = [(float(u[-1, 0]), float(v[-1, 0])) for u, v in levels]
     rate, end = float(rate_of(start)[0]), float(start.end[0])
@@ -126,5 +125,5 @@ def _end_of_one(
     best = best_entry(method.tableau(steps, method.position_powers), pairs, known, FLOATS)
     row, column = divmod(best.entry, len(steps))
     numbers = (best.position, best.velocity, best.error, best.error * rate)
-    places = (-1, -1) if best.entry < 0 else (row - column, row)
-    return Extrapolated(*(np.array([[number]]) for number in (*numbers, *places)))
+    used = (-1, -1) if best.entry < 0 else (row - column, row)
+    return Extrapolated(*(np.array([[number]]) for number in (*numbers, *used)))

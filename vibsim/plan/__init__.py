@@ -1,6 +1,6 @@
-"""What there is to do: members, levels, shards, names, digests and costs; no arrays, no netCDF.
+"""The plan of an experiment: its members, levels, shards, file names, digests and costs; no arrays, no netCDF.
 
-Loading a plan that is cached imports neither numpy nor the validation library: Snakemake asks for the plans of all
+Loading a cached plan imports neither numpy nor the validation library, because Snakemake asks for the plans of all
 experiments each time it starts.
 """
 

@@ -1,8 +1,8 @@
 """Build the plan of a validated experiment.
 
-A digest covers exactly what a job uses: its part of the experiment in normal form, the code it runs and the libraries
-that the numbers come from. Titles and checks are no part of a simulation; a level knows nothing of the other levels but
-which samples it keeps. The start of a job costs as much as many cheap levels, which share one.
+A digest covers exactly what a job uses: its part of the experiment in normal form, the code it runs and the versions of
+the numerical libraries. A simulation does not depend on titles or checks, and a level depends on the other levels only
+through the choice of stored samples. Starting a job costs as much as many cheap levels, so cheap levels share a job.
 """
 
 from __future__ import annotations
@@ -38,13 +38,13 @@ from vibsim.plan.versions import DRAWING, NUMERICAL, versions
 from vibsim.schemes import SCHEMES
 
 CHEAP_SECONDS = 2.0
-"""Work that one job does at most where it makes several levels."""
+"""Limit on the work of a job that makes several levels [s]."""
 CHEAP_BYTES = 400 * 10**6
-"""Bytes that such a job writes at most."""
+"""Limit on the bytes that such a job writes."""
 DIVISIBLE_SECONDS = 0.5
-"""Work from which a second thread is worth its start."""
+"""Work above which a second thread pays [s]."""
 DIVISIBLE_MEMBERS = 128
-"""Trajectories from which threads have something to share."""
+"""Fewest trajectories for which several threads pay."""
 
 
 def build(experiment: Experiment) -> Plan:
@@ -56,13 +56,13 @@ def build(experiment: Experiment) -> Plan:
     levels = tuple(_level(experiment, content, level, values) for level in experiment.levels)
     groups, trajectories = _groups(levels), experiment.trajectories
     costs = [level_cost(experiment, level) for level in experiment.levels]
-    before = made_from(levels, experiment.settings)
-    analysis = job_digest("analyse", in_numbers(analysed(content)), before)
+    upstream = level_digests(levels, experiment.settings)
+    analysis = job_digest("analyse", in_numbers(analysed(content)), upstream)
     reference = round(forecast.reference_seconds(experiment), 3)
     extrapolation = ""
     if experiment.output == "best":
         extrapolation = job_digest(
-            "extrapolate", in_numbers(extrapolated(content)), made_from(levels)
+            "extrapolate", in_numbers(extrapolated(content)), level_digests(levels)
         )
     return Plan(
         collection=experiment.collection,
@@ -85,7 +85,7 @@ def build(experiment: Experiment) -> Plan:
         extrapolation=extrapolation,
         report=job_digest("report", content, {"analysis": analysis}, DRAWING),
         content=content,
-        # those of packages are for who asks what made a result
+        # versions of packages are recorded for provenance alone: their digests decide what runs again
         versions={**versions(NUMERICAL), **{dist.name: dist.version for dist in dists if dist}},
         notes=experiment.notes + forecast.notes(reference, experiment.model.kind),
         inputs=experiment.model.files,
@@ -95,50 +95,50 @@ def build(experiment: Experiment) -> Plan:
     )
 
 
-def made_from(levels: Iterable[LevelJob], settings: Sequence[str] = ()) -> dict[str, Any]:
-    """Return what a digest has of the levels that a job reads, and of the settings that its results tell of, if any."""
-    found = {"levels": [[shard.digest for shard in level.shards] for level in levels]}
-    return {**found, "settings": list(settings)} if settings else found
+def level_digests(levels: Iterable[LevelJob], settings: Sequence[str] = ()) -> dict[str, Any]:
+    """Return the digests of the levels that a job reads, and the command-line settings that its results name."""
+    digests = {"levels": [[shard.digest for shard in level.shards] for level in levels]}
+    return {**digests, "settings": list(settings)} if settings else digests
 
 
 def job_digest(
     name: str,
     content: Mapping[str, Any],
-    before: Mapping[str, Any],
+    upstream: Mapping[str, Any],
     libraries: tuple[str, ...] = NUMERICAL,
-    home: str = "vibsim.cli.jobs",
+    package: str = "vibsim.cli.jobs",
 ) -> str:
-    """Return the digest of a job that runs after the simulation: what it uses, and the digests of the jobs before.
+    """Return the digest of a job that runs after the simulation, from what it uses and the digests of `upstream` jobs.
 
-    Its code is that of the module `name` in the package `home`.
+    The job runs the module `name` of `package`.
     """
-    own = {"job": name, "experiment": content, "code": _code(name, home)}
-    return digest_of({**own, **before, "versions": versions(libraries)})
+    content = {"job": name, "experiment": content, "code": _code(name, package)}
+    return digest_of({**content, **upstream, "versions": versions(libraries)})
 
 
 @cache
-def _code(command: str, home: str = "vibsim.cli.jobs") -> str:
-    return code_digest.used_by(f"{home}.{command}")
+def _code(name: str, package: str = "vibsim.cli.jobs") -> str:
+    return code_digest.used_by(f"{package}.{name}")
 
 
 @cache
 def code_of(model: str, schemes: tuple[str, ...]) -> str:
-    """Return the digest of the code that a simulation can run: of all models and schemes, its own."""
-    homes = [
+    """Return the digest of the code that a simulation with this model and these schemes can run."""
+    entries = [
         code_digest.home(MODELS[model], "vibsim.models"),
         *(code_digest.home(SCHEMES[kind], "vibsim.schemes") for kind in schemes),
     ]
-    used = code_digest.used_by("vibsim.cli.jobs.simulate", *(module for module, _ in homes))
-    own = {"used": used, "entries": homes}
+    used = code_digest.used_by("vibsim.cli.jobs.simulate", *(module for module, _ in entries))
+    content = {"used": used, "entries": entries}
     packages = [digest for _, _, digest in _offered(model, schemes)]
     if packages:
-        # which modules of vibsim they use is not looked for
-        own |= {"packages": packages, "vibsim": code_digest.everything()}
-    return digest_of(own)
+        # a package may import any module of vibsim
+        content |= {"packages": packages, "vibsim": code_digest.everything()}
+    return digest_of(content)
 
 
 def _offered(model: str, schemes: tuple[str, ...]) -> Iterator[tuple[str, str, str]]:
-    """Yield group, kind and digest of a model and schemes, as far as installed packages offer them."""
+    """Yield group, kind and digest of the model and of each scheme that an installed package offers."""
     pairs: list[tuple[Registry[Any], str]] = [
         (MODELS, model),
         *((SCHEMES, kind) for kind in schemes),
@@ -158,7 +158,7 @@ def _level(
     level: int,
     values: Callable[[int, int], str],
 ) -> LevelJob:
-    """Return the files of a level; `values` gives the digest of a range of members."""
+    """Return the jobs of a level; `values` returns the digest of the swept values of members start..stop-1."""
     cost, members = level_cost(experiment, level), experiment.members
     every = sampling(experiment, level)
     kinds = _kinds(experiment)
@@ -183,8 +183,8 @@ def _level(
     def shard(index: int) -> ShardJob:
         start, stop = index * cost.shard, min((index + 1) * cost.shard, members)
         path = shard_path(folder, level, index if is_swept else None)
-        own = {"shared": shared, "cases": [start, stop], "values": values(start, stop)}
-        return ShardJob(index, start, stop, path, digest_of(own))
+        uses = {"shared": shared, "cases": [start, stop], "values": values(start, stop)}
+        return ShardJob(index, start, stop, path, digest_of(uses))
 
     return LevelJob(
         level=level,
@@ -200,7 +200,7 @@ def _level(
 
 
 def _groups(levels: Sequence[LevelJob]) -> Iterator[list[LevelJob]]:
-    """Put levels together that are divided alike, while one job can make all of them cheaply."""
+    """Group successive levels that have the same shards, as long as one job can make the whole group cheaply."""
     group: list[LevelJob] = []
     for level in levels:
         if group and not _is_cheap([*group, level]):
@@ -221,7 +221,7 @@ def _is_cheap(group: Sequence[LevelJob]) -> bool:
 
 
 def _batch(group: Sequence[LevelJob], index: int, trajectories: int) -> Batch:
-    """Return the job that makes shard number `index` of some levels."""
+    """Return the job that makes shard number `index` of the levels in `group`."""
     shards = group[0].shards
     once = group[0].shared + sum(level.seconds - level.shared for level in group)
     work = once * (shards[index].stop - shards[index].start) / shards[-1].stop

@@ -1,9 +1,9 @@
-"""Plans kept on disk, so that a hundred experiment files do not slow the start.
+"""Cache of plans on disk, so that a hundred experiment files do not slow the start.
 
-An entry of the private cache (`vibsim.core.private_cache`) is named by the digest of the bytes of the experiment file
-and of the code of the whole package, and it knows the bytes of every table that the file names. One that does not fit,
-or is damaged, is built again. A results folder holds no plan: it may come from somebody else, and what a plan says goes
-into commands.
+The key of an entry in the private cache (`vibsim.core.private_cache`) is a digest of the experiment file and of the
+code of the whole package. The entry also holds the digest of every table that the file names. An entry that is stale or
+damaged is built again. No plan is stored in a results folder: the folder may come from somebody else, and the content
+of a plan goes into commands.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from vibsim.experiment import Experiment
 
 Resolver = Callable[["Experiment"], "Experiment"]
-"""Fills in the levels of an experiment that names a tolerance instead; it runs a pilot, which a plan cannot."""
+"""Chooses the levels of an experiment that names a tolerance instead; needs a pilot run, which a plan cannot do."""
 
 
 def load(choice: Choice, resolve: Resolver | None = None, *, cached: bool = False) -> Plan:
@@ -35,11 +35,11 @@ def load(choice: Choice, resolve: Resolver | None = None, *, cached: bool = Fals
     Parameters
     ----------
     choice
-        The file and its collection, and the member where one alone is wanted.
+        The file, its collection, and the member if only one is wanted.
     resolve
-        What chooses the levels of an experiment with a tolerance.
+        Chooses the levels of an experiment with a tolerance.
     cached
-        Whether a plan that was made before will do, and this one is kept.
+        Whether to read the plan from the cache, and to store it there.
 
     Raises
     ------
@@ -51,7 +51,7 @@ def load(choice: Choice, resolve: Resolver | None = None, *, cached: bool = Fals
         return replace(_built(choice, resolve), file=choice.word, settings=choice.settings)
 
     def dump(plan: Plan) -> bytes | None:
-        # a file that changed while it was read is not kept under the digest of the old bytes
+        # a file that changed while it was read must not be stored under the digest of its old bytes
         is_same = key == _key(choice) and _has_inputs(plan, choice)
         return to_json(plan).encode() if is_same else None
 
@@ -76,8 +76,8 @@ def _built(choice: Choice, resolve: Resolver | None) -> Plan:
         from vibsim.experiment.solver_reading import read_solver
         from vibsim.plan import solver_plan
 
-        found = read_solver(source, choice.collection, choice.file)
-        return solver_plan.build(found if choice.case is None else found.alone(choice.case))
+        solved = read_solver(source, choice.collection, choice.file)
+        return solver_plan.build(solved if choice.case is None else solved.alone(choice.case))
     from vibsim.plan import build
 
     spec = reading.build(source, choice.collection, choice.file.stem, choice.file)
@@ -85,20 +85,20 @@ def _built(choice: Choice, resolve: Resolver | None) -> Plan:
 
 
 def _resolved(experiment: Experiment, choice: Choice, resolve: Resolver | None) -> Experiment:
-    """Return the experiment, or its member, with levels."""
-    wanted = experiment if choice.case is None else experiment.alone(choice.case)
+    """Return the experiment, or the chosen member, with its levels filled in."""
+    chosen = experiment if choice.case is None else experiment.alone(choice.case)
     if experiment.levels:
-        return wanted
+        return chosen
     if resolve is None:
         raise VibsimError(f"{choice.file}: nothing is there to choose levels for a tolerance")
-    # The ladder is that of the whole sweep, so that a member alone has the numbers that it has there.
-    return wanted.with_levels(resolve(experiment).levels)
+    # The levels are chosen for the whole sweep, so that a member alone has the same numbers as in the sweep.
+    return chosen.with_levels(resolve(experiment).levels)
 
 
 def load_all(
     choices: Iterable[Choice], resolve: Resolver | None = None, *, cached: bool = False
 ) -> dict[str, Plan]:
-    """Return the plans of several experiment files by their keys; InputError with the faults of all files at once."""
+    """Return the plans of several experiment files by key; raise one InputError with the faults of all files."""
     plans: dict[str, Plan] = {}
     faults: list[Fault] = []
     for choice in choices:
@@ -114,7 +114,7 @@ def load_all(
 
 
 def _key(choice: Choice) -> str:
-    """Return what an entry must be made from; empty when the file cannot be read."""
+    """Return the key of the cache entry; empty when the file cannot be read."""
     try:
         content = read_bytes(choice.file)
     except InputError:
@@ -126,16 +126,15 @@ def _key(choice: Choice) -> str:
 
 
 def _has_inputs(plan: Plan, choice: Choice) -> bool:
-    """Tell whether tables and packages of models and schemes are those that the plan was made from."""
+    """Tell whether tables and packages are still those that the plan was made from."""
     folder = choice.file.parent
     for group, name, digest in plan.packages:
-        is_function = group == code_digest.MODULE
-        of = (
+        current = (
             code_digest.of_module(name, folder)
-            if is_function
+            if group == code_digest.MODULE
             else code_digest.of_offer(group, name)
         )
-        if of != digest:
+        if current != digest:
             return False
     for path, digest in plan.inputs:
         try:

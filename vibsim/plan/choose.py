@@ -12,7 +12,7 @@ from vibsim.experiment.collection import ADHOC, ENDINGS, collection_of
 
 DEFAULT = ("pendulum_lab", "showcase")
 MAX_DIGITS = 18
-"""Of the number of a member."""
+"""Most digits of the number of a member."""
 
 
 @dataclass(frozen=True)
@@ -22,42 +22,42 @@ class Choice:
     collection: str
     file: Path
     case: int | None = None
-    """The member of its sweep that is meant, alone; None for all of them."""
+    """The only member of the sweep that is chosen; None for all members."""
     settings: tuple[str, ...] = ()
-    """What stands in place of values of the file, as ``KEY=VALUE`` (`vibsim.experiment.settings`)."""
+    """Values that replace those of the file, as ``KEY=VALUE`` (`vibsim.experiment.settings`)."""
 
     @property
     def name(self) -> str:
-        """Name of the experiment: that of `vibsim.experiment.Experiment.alone` for one member."""
+        """Name of the experiment; for one member the name that `vibsim.experiment.Experiment.alone` gives."""
         return self.file.stem if self.case is None else f"{self.file.stem}_case_{self.case}"
 
     @property
     def key(self) -> str:
-        """The name of the experiment over all collections."""
+        """Name of the experiment, unique among all collections: ``collection/name``."""
         return f"{self.collection}/{self.name}"
 
     @property
     def word(self) -> str:
-        """What names it on a command line."""
+        """The command-line argument that chooses this experiment."""
         return str(self.file) if self.case is None else f"{self.file}@{self.case}"
 
 
 def experiments(root: Path) -> list[Choice]:
-    """Return every experiment in the collections of the folder `root` (`vibsim.core.home.home`), in order."""
+    """Return every experiment in the collections of the folder `root` (`vibsim.core.home.home`), sorted by path."""
     return [_choice(file, root) for file in sorted((root / "configs").glob("*/*.yaml"))]
 
 
 def choose(words: Sequence[str], root: Path, settings: Sequence[str] = ()) -> list[Choice]:
-    """Find the experiments that `words` name, each once, in the order named.
+    """Find the experiments that `words` name, each once, in the order of the words.
 
-    Words are files, names of experiments (``name`` or ``collection/name``) or collections; none of them means the
-    default collections. A file or a name followed by ``@`` and a number means that member of the sweep alone. The
-    experiments in `root` are known by name. The `settings` hold for each of them.
+    A word is a file, the name of an experiment (``name`` or ``collection/name``) or a collection. Without words the
+    default collections are chosen. A file or a name followed by ``@`` and a number means one member of the sweep. Names
+    are those of the experiments in `root`. The `settings` apply to every experiment.
 
     Raises
     ------
     InputError
-        With every word that names nothing, and every pair of files that would share a name.
+        Lists every word that names nothing, and every pair of files that would share a name.
     """
     known = experiments(root)
     if not words:
@@ -76,7 +76,7 @@ def choose(words: Sequence[str], root: Path, settings: Sequence[str] = ()) -> li
 
 
 Found = tuple[list[Choice], tuple[str, str] | None]
-"""The experiments of a word, or the rule that it breaks and a hint."""
+"""The experiments that a word names, or the rule that the word breaks and a hint."""
 
 
 def _find_member(word: str, known: list[Choice], root: Path) -> Found:
@@ -109,9 +109,9 @@ def _find(word: str, known: list[Choice], root: Path) -> Found:
     hint = nearest(word, names) if known else ""
     if len(names) > MOST_CHOICES and not likely(word, names):
         hint = "`vibsim list experiments` shows all"
-    own = f"{word.removeprefix(f'{ADHOC}/')}{ENDINGS[0]}"
-    if word.startswith(f"{ADHOC}/") or Path(own).is_file():
-        hint = f"an experiment of your own is named by its file, such as {own}"
+    file = f"{word.removeprefix(f'{ADHOC}/')}{ENDINGS[0]}"
+    if word.startswith(f"{ADHOC}/") or Path(file).is_file():
+        hint = f"an experiment of your own is named by its file, such as {file}"
     return [], (rule, hint)
 
 

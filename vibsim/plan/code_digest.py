@@ -1,17 +1,17 @@
-"""Digests of the code that a job can run, so that a changed module reruns what it touches and no more.
+"""Digests of the code that a job can run, so that a changed module reruns only the jobs that can run it.
 
-The code is found from the module of the command: every import in it is followed, at any depth, those inside functions
-and those of lazy names too (their twins under ``TYPE_CHECKING`` say where they stand). It is read, never executed. A
-package counts with its ``__init__``, with what this uses itself, and with the modules whose names are asked of it.
+The search starts at the module of the command and follows every import, at any depth, also imports inside functions and
+of lazily loaded names (their imports under ``TYPE_CHECKING`` say which module defines them). Code is parsed, never
+executed. Of a package the digest covers ``__init__``, what ``__init__`` itself uses, and the modules that define the
+names imported from the package. Imports for type checking alone are ignored.
 
-Two things are no part of it, because what comes out of them is in every digest itself: the making of plans
-(`_PLANNING`), whose outcome a job compares with the digest that it was given, before it starts; and the lists of all
-models and schemes (`_LISTS`), of which a job uses its own entries (`vibsim.plan.build`). What only describes
-types runs nothing.
+Two parts are excluded, because their results are in the digest anyway: the making of plans (`_PLANNING`), since a job
+compares the digest of its plan with the one that it was started for; and the registries of all models and schemes
+(`_LISTS`), of which a job uses a few entries (`vibsim.plan.build`).
 
-To read 300 modules takes most of the time of a plan, so what each of them imports is kept in the private cache, under
-the digest of the whole package.
-Of a package that offers a model or a scheme (`vibsim.core.registry`) all files count, for what uses them.
+Parsing 300 modules takes most of the time of a plan, so the imports of each module are stored in the private cache,
+under the digest of the whole package.
+The digest of a package that offers a model or a scheme (`vibsim.core.registry`) covers all files of that package.
 """
 
 from __future__ import annotations
@@ -34,9 +34,9 @@ from vibsim.core.errors import VibsimError
 PACKAGE = Path(vibsim.__file__).parent
 _LISTS = ("vibsim.models", "vibsim.schemes")
 MODULE = "module"
-"""In place of a group of entry points: the module of a function of the user."""
+"""Takes the place of an entry-point group where the code is the module of a user's function."""
 _LOOKUP = "vibsim.core.registry"
-"""By which every job finds its entries of the lists."""
+"""Every job looks up its models and schemes with this module."""
 _PLANNING = (
     "vibsim.cli",
     "vibsim.cli.arguments",
@@ -50,25 +50,25 @@ _PLANNING = (
     "vibsim.experiment.solver_reading",
     "vibsim.plan.solver_plan",
 )
-"""From what a user writes to a plan; no job runs any of it once it has its plan (a test traces that)."""
+"""Modules that turn an experiment file into a plan; a job that has its plan runs none of them (a test traces this)."""
 
 
 @cache
 def everything() -> str:
-    """Return the digest of the whole package: of every file in it that is not made by Python."""
+    """Return the digest of the whole package: of every file except Python's bytecode."""
     return of_folder("vibsim")
 
 
-_OF_SOLVERS = (
+_SOLVER_ONLY = (
     "vibsim.cli.jobs.solve",
     "vibsim.cli.jobs.judge_levels",
     "vibsim.report.page.solver",
 )
-"""What jobs run in experiments with a solver of the user alone, whose digests begin there."""
+"""Modules that only experiments with a user's own solver run; the search for their digests starts at these modules."""
 
 
 def used_by(*names: str) -> str:
-    """Return the digest of the modules `names` and of all that they can run of this package, templates included."""
+    """Return the digest of the modules `names` and of all code of this package that they can run, with templates."""
     modules = reached(*names)
     folders = {_file(module).parent for module in modules if _is_package(module)}
     templates = (p for folder in folders for p in (folder / "templates").rglob("*") if p.is_file())
@@ -76,26 +76,25 @@ def used_by(*names: str) -> str:
 
 
 def reached(*names: str) -> set[str]:
-    """Name the modules that the modules `names` can run, and themselves."""
+    """Return the modules `names` and all modules that they can run."""
     todo, done = {_LOOKUP, *names}, set[str]()
     while todo:
         module = todo.pop()
         done.add(module)
-        imports = _of_all_modules().get(module) or _imports(module)
-        others = (*_LISTS, *_PLANNING, *_OF_SOLVERS)
-        todo |= {found for found in imports - done if found not in others}
+        imports = _all_imports().get(module) or _imports(module)
+        todo |= imports - done - {*_LISTS, *_PLANNING, *_SOLVER_ONLY}
     return done
 
 
 def of_folder(name: str) -> str:
-    """Return the digest of every file of package `name`."""
+    """Return the digest of all files of package `name`."""
     return _digest(_files_in(_file(name).parent))
 
 
 def of_offer(group: str, kind: str) -> str:
-    """Return the digest of the package that offers a model or a scheme; empty where none does.
+    """Return the digest of the package that offers a model or a scheme; empty if no installed package does.
 
-    Of all files of the outermost package that the module of the entry point stands in, or of the module alone.
+    It covers all files of the outermost package that contains the module of the entry point, or a single module.
     """
     point = registry.offers(group).get(kind)
     if point is None:
@@ -103,7 +102,7 @@ def of_offer(group: str, kind: str) -> str:
     digest = hashlib.sha256(f"{registry.package_of(point)}\n{point.value}\n".encode())
     parts = point.module.split(".")
     for size in range(1, len(parts) + 1):
-        # a namespace has no file
+        # a namespace package has no file
         spec = importlib.util.find_spec(".".join(parts[:size]))
         if spec is not None and spec.has_location and spec.origin is not None:
             file = Path(spec.origin)
@@ -114,12 +113,12 @@ def of_offer(group: str, kind: str) -> str:
 
 
 def of_module(name: str, folder: Path) -> str:
-    """Return the digest of the outermost package of a module of the user, or of the module; empty where there is none.
+    """Return the digest of the outermost package of a user's module, or of the module itself; empty if not found.
 
-    It is looked for as an import would, at last in `folder`, and not imported.
+    The module is searched for on `sys.path` and then in `folder`, but not imported.
     """
     top = name.partition(".")[0]
-    before = sys.path.copy()
+    old_path = sys.path.copy()
     try:
         sys.path.append(str(folder))
         importlib.invalidate_caches()
@@ -127,13 +126,13 @@ def of_module(name: str, folder: Path) -> str:
     except (ImportError, ValueError):
         spec = None
     finally:
-        sys.path[:] = before
+        sys.path[:] = old_path
     if spec is None:
         return ""
     digest = hashlib.sha256(f"{name}\n".encode())
     places = [Path(place) for place in spec.submodule_search_locations or ()]
     for place in places:
-        # a folder without __init__ may hold anything
+        # a folder without __init__ may contain any other files
         files = _files_in(place) if spec.has_location else sorted(place.rglob("*.py"))
         digest.update(_digest(files, place).encode())
     if not places and spec.has_location and spec.origin is not None:
@@ -142,7 +141,7 @@ def of_module(name: str, folder: Path) -> str:
 
 
 def home(item: object, package: str) -> tuple[str, str]:
-    """Name a module of `package` that has `item`, an entry of its list, and the name that it has there."""
+    """Return the module of `package` that defines `item`, an entry of its registry, and the name of `item` there."""
     for path in sorted(_file(package).parent.glob("[!_]*.py")):
         module = f"{package}.{path.stem}"
         for name, value in vars(importlib.import_module(module)).items():
@@ -152,12 +151,12 @@ def home(item: object, package: str) -> tuple[str, str]:
 
 
 def _files_in(folder: Path) -> Iterator[Path]:
-    """Yield every file in a folder that is not made by Python."""
+    """Yield every file in a folder except Python's bytecode."""
     return (p for p in folder.rglob("*") if p.is_file() and "__pycache__" not in p.parts)
 
 
 def _digest(files: Iterable[Path], folder: Path | None = None) -> str:
-    """Return the digest of files with their places in `folder`, by default that of this package."""
+    """Return the digest of files and of their paths relative to `folder`, by default the folder of this package."""
     digest = hashlib.sha256()
     for file in sorted(files):
         content = file.read_bytes()
@@ -170,7 +169,7 @@ def _digest(files: Iterable[Path], folder: Path | None = None) -> str:
 @cache
 def _file(module: str) -> Path:
     path = PACKAGE.joinpath(*module.split(".")[1:])
-    # a folder that is left over from a package that became a module is none
+    # a folder without __init__ may be left over from a package that became a module
     return package if (package := path / "__init__.py").is_file() else path.with_suffix(".py")
 
 
@@ -187,21 +186,21 @@ def _tree(module: str) -> ast.Module:
 
 
 @cache
-def _of_all_modules() -> Mapping[str, frozenset[str]]:
-    """Return `_imports` of every module of the package that can be read."""
+def _all_imports() -> Mapping[str, frozenset[str]]:
+    """Return `_imports` of every module of the package that can be parsed."""
 
     def make() -> Mapping[str, frozenset[str]]:
-        found = {}
+        imports = {}
         for file in PACKAGE.rglob("*.py"):
             parts = file.relative_to(PACKAGE.parent).with_suffix("").parts
             module = ".".join(parts).removesuffix(".__init__")
-            # a file that nothing uses may be half written
+            # an unused file may have syntax errors, such as one that is being edited
             with suppress(SyntaxError):
-                found[module] = _imports(module)
-        return found
+                imports[module] = _imports(module)
+        return imports
 
-    def dump(found: Mapping[str, frozenset[str]]) -> bytes:
-        return json.dumps({module: sorted(names) for module, names in found.items()}).encode()
+    def dump(imports: Mapping[str, frozenset[str]]) -> bytes:
+        return json.dumps({module: sorted(names) for module, names in imports.items()}).encode()
 
     def load_cached(content: bytes) -> Mapping[str, frozenset[str]] | None:
         try:
@@ -214,25 +213,25 @@ def _of_all_modules() -> Mapping[str, frozenset[str]]:
 
 @cache
 def _imports(module: str) -> frozenset[str]:
-    """Name the modules that `module` hands work to, and the packages that Python runs before it."""
+    """Return the modules that `module` imports, and its parent packages, which Python runs first."""
     parts = module.split(".")
-    found = {".".join(parts[:size]) for size in range(1, len(parts))}
-    nodes = list(_run(_tree(module)))
+    imports = {".".join(parts[:size]) for size in range(1, len(parts))}
+    nodes = list(_nodes(_tree(module)))
     used = {node.id for node in nodes if isinstance(node, ast.Name)}
-    bound = {as_: place for node in nodes for as_, place in _bound(node)}
-    for name, place in bound.items():
-        if not _is_package(module) or name in used:
-            found |= _homes(*place)
+    imported = {alias: origin for node in nodes for alias, origin in _imported_names(node)}
+    for alias, origin in imported.items():
+        if not _is_package(module) or alias in used:
+            imports |= _origins(*origin)
     for node in nodes:
         if isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name):
-            package, name = bound.get(node.value.id, ("", ""))
+            package, name = imported.get(node.value.id, ("", ""))
             if package and _exists(whole := f"{package}.{name}".rstrip(".")):
-                found |= _homes(whole, node.attr)
-    return frozenset(found)
+                imports |= _origins(whole, node.attr)
+    return frozenset(imports)
 
 
-def _run(tree: ast.AST, types: bool = False) -> Iterator[ast.AST]:
-    """Yield every node that runs; those that only describe types, too, where `types` are wanted."""
+def _nodes(tree: ast.AST, types: bool = False) -> Iterator[ast.AST]:
+    """Yield every node of a syntax tree; nodes under ``if TYPE_CHECKING`` only where `types` is true."""
     todo = [tree]
     while todo:
         node = todo.pop()
@@ -244,8 +243,8 @@ def _run(tree: ast.AST, types: bool = False) -> Iterator[ast.AST]:
                 todo.extend(ast.iter_child_nodes(node))
 
 
-def _bound(node: ast.AST) -> Iterator[tuple[str, tuple[str, str]]]:
-    """Yield the names that an import of this package binds, each with the module and the name in it."""
+def _imported_names(node: ast.AST) -> Iterator[tuple[str, tuple[str, str]]]:
+    """Yield each name that an import from this package binds, with the module and the name in that module."""
     if isinstance(node, ast.Import):
         for alias in node.names:
             if _exists(alias.name):
@@ -255,17 +254,17 @@ def _bound(node: ast.AST) -> Iterator[tuple[str, tuple[str, str]]]:
             yield alias.asname or alias.name, (node.module, alias.name)
 
 
-def _homes(module: str, name: str) -> set[str]:
-    """Name the modules behind a name: where a package hands it on, that from which it comes."""
-    if name and _exists(deeper := f"{module}.{name}"):
-        return {deeper}
+def _origins(module: str, name: str) -> set[str]:
+    """Return the modules that an import of `name` from `module` runs: for a re-exported name also the defining one."""
+    if name and _exists(submodule := f"{module}.{name}"):
+        return {submodule}
     if not name or not _is_package(module):
         return {module}
-    handed_on = _handed_on(module)
-    return {module} | (_homes(*handed_on[name]) if name in handed_on else set())
+    reexports = _reexports(module)
+    return {module} | (_origins(*reexports[name]) if name in reexports else set())
 
 
 @cache
-def _handed_on(package: str) -> dict[str, tuple[str, str]]:
-    """Return the names that a package has from elsewhere, those that it loads on first use too."""
-    return dict(bound for node in _run(_tree(package), types=True) for bound in _bound(node))
+def _reexports(package: str) -> dict[str, tuple[str, str]]:
+    """Return module and name of every name that a package imports, also of lazily loaded names."""
+    return dict(row for node in _nodes(_tree(package), types=True) for row in _imported_names(node))

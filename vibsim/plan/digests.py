@@ -1,4 +1,4 @@
-"""Digests: of an experiment the part that a job uses, which its file tells of too; of a job its files."""
+"""Digests of jobs, and the part of an experiment that each kind of job uses and records in its file."""
 
 from __future__ import annotations
 
@@ -13,33 +13,33 @@ if TYPE_CHECKING:
 
 
 def simulated(content: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the part of an experiment in normal form that every member shares."""
-    other = "title source checks levels samples sweep output tolerance published figures units"
-    return _without(content, other)
+    """Return the part of an experiment in normal form that the simulations of all its members share."""
+    unused = "title source checks levels samples sweep output tolerance published figures units"
+    return _without(content, unused)
 
 
 def extrapolated(content: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the part of an experiment in normal form that an extrapolation depends on and tells of."""
+    """Return the part of an experiment in normal form that an extrapolation uses and records."""
     return _without(content, "title source checks published figures units")
 
 
 def analysed(content: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the part of an experiment in normal form that an analysis depends on and tells of."""
-    other = "title source output figures units"
-    return _without(content, "title source solver resources" if "solver" in content else other)
+    """Return the part of an experiment in normal form that an analysis uses and records."""
+    unused = "title source output figures units"
+    return _without(content, "title source solver resources" if "solver" in content else unused)
 
 
 def solved(experiment: SolverExperiment, level: int, member: int) -> dict[str, Any]:
-    """Return what a level of a solver of the user depends on and tells of, besides files and code."""
+    """Return what a level of the user's own solver uses and records, besides files and code."""
     solver = experiment.solver
     marks = {name: f"{{{name}}}" for name in ("output", "output.nc", "output.csv", "threads")}
-    what: Any = solver.text
+    call: Any = solver.text
     if solver.kind == "command":
-        what = experiment.arguments(level, member, marks)
+        call = experiment.arguments(level, member, marks)
     elif solver.kind == "files":
-        what = experiment.path(level, member)
+        call = experiment.path(level, member)
     return {
-        solver.kind: what,
+        solver.kind: call,
         "sizes": experiment.sizes_of(level),
         "parameters": experiment.parameters_of(member),
         "quantities": {
@@ -54,7 +54,7 @@ def _without(content: Mapping[str, Any], keys: str) -> dict[str, Any]:
 
 
 def in_numbers(content: Mapping[str, Any]) -> dict[str, Any]:
-    """Return a part of an experiment in normal form with the numbers of its tables alone, wherever they stand."""
+    """Return `content` with each table reduced to its numbers, without its file and columns."""
     model = dict(content["model"])
     if "tables" in model:
         model["tables"] = {name: table["numbers"] for name, table in model["tables"].items()}
@@ -88,5 +88,5 @@ def digest_of(content: Mapping[str, Any]) -> str:
 
 
 def batch_digest(files: Sequence[str]) -> str:
-    """Return the digest of a job from those of its files: that of the file where there is one."""
+    """Return the digest of a job from the digests of its files; for a single file they are the same."""
     return files[0] if len(files) == 1 else digest_of({"job": "simulate", "files": list(files)})

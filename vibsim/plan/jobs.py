@@ -37,51 +37,51 @@ class ShardJob:
 
 @dataclass(frozen=True)
 class LevelJob:
-    """The files of one level and what they cost together."""
+    """The files of one level and their total cost."""
 
     level: int
     steps: int
     every: int
-    """Every how many steps a sample is kept."""
+    """Number of steps from one stored sample to the next."""
     member_steps: int
     """Steps of all members and schemes."""
     bytes: int
     """Size of the files, estimated."""
     seconds: float
-    """Seconds of one core that the steps and the files take, estimated."""
+    """Estimated time of the steps and the files [core seconds]."""
     shared: float
-    """Those among them that a job takes once for all of its levels: of schemes that choose their own steps."""
+    """The part of `seconds` that a job spends only once for all of its levels: schemes that choose their own steps."""
     memory: int
-    """Bytes that the largest job of the level holds at its peak, estimated."""
+    """Estimated peak memory of the largest job of the level [bytes]."""
     shards: tuple[ShardJob, ...]
 
 
 @dataclass(frozen=True)
 class Batch:
-    """What one simulate job makes: one shard, or the same members at several cheap levels."""
+    """One simulate job, which makes one shard, or the same members at several cheap levels."""
 
     levels: tuple[int, ...]
     shard: int
     digest: str
     seconds: float
-    """Seconds of one core that the job takes, estimated, its start included."""
+    """Estimated time of the job, with its start [core seconds]."""
     memory: int
-    """Bytes that the job holds at its peak, estimated."""
+    """Estimated peak memory of the job [bytes]."""
     is_divisible: bool
-    """Whether more threads than one are worth having."""
+    """Whether several threads pay."""
     threads: int | None = None
-    """Threads that the user asks for; None where vibsim knows how many are of use."""
+    """Threads that the user requests for a solver; None where vibsim chooses."""
     runtime: int | None = None
-    """Minutes that the user expects; None where nobody says."""
+    """Run time that the user requests for a solver [minutes]; None for no request."""
 
 
 SHARED_BYTES = 32 * 10**6
-"""Bytes of all files from which an analysis has work for more processes than one."""
+"""Total size of the files above which an analysis uses several processes [bytes]."""
 
 
 @dataclass(frozen=True)
 class Plan:
-    """What there is to do for one experiment."""
+    """The jobs of one experiment, with their files, digests and cost."""
 
     collection: str
     name: str
@@ -95,13 +95,13 @@ class Plan:
     analysis: str
     """Digest of the analysis."""
     analysis_memory: int
-    """Bytes that the analysis holds at its peak where one process makes it, estimated."""
+    """Estimated peak memory of an analysis in one process [bytes]."""
     process_memory: int
-    """Bytes beside these for each process, where several share it."""
+    """Extra memory of each process, where several share the analysis [bytes]."""
     analysis_bytes: int
-    """Size of what the analysis writes, estimated."""
+    """Estimated size of the results of the analysis [bytes]."""
     extrapolation: str
-    """Digest of the extrapolation over all levels; empty where the experiment does not ask for one."""
+    """Digest of the extrapolation over all levels; empty where the experiment does not request one."""
     report: str
     """Digest of the report."""
     content: dict[str, Any]
@@ -109,58 +109,58 @@ class Plan:
     versions: dict[str, str]
     """Versions of the libraries that the numbers depend on."""
     inputs: tuple[tuple[str, str], ...] = ()
-    """Every other file that the experiment was read from: its path from there, and the SHA-256 of its bytes."""
+    """Path, relative to the experiment file, and SHA-256 of every other file that the experiment was read from."""
     packages: tuple[tuple[str, str, str], ...] = ()
-    """Group, kind and digest of the code of every model and scheme that an installed package offers."""
+    """Group, kind and code digest of every model and scheme that an installed package offers."""
     settings: tuple[str, ...] = ()
-    """What a command line gave in place of values of the file, as ``KEY=VALUE``; no level depends on it."""
+    """Values of the command line that replace those of the file, as ``KEY=VALUE``; no level depends on this text."""
     reference_seconds: float = 0.0
-    """Seconds of one core that reference solutions take, estimated; those of the first level that needs one."""
+    """Estimated time of the reference solutions [core seconds]: the first job that needs them computes them."""
     other_seconds: float = 0.0
-    """Seconds of one core that series, the analysis and the page take, estimated."""
+    """Estimated time of series, analysis and page [core seconds]."""
     notes: tuple[tuple[int, str], ...] = ()
-    """What the file says and probably does not mean, each with its line, 0 without one."""
+    """Line (0 for none) and text of every warning about what the file says but probably does not mean."""
     file: str = ""
-    """Where the experiment was read, as a command line names it; no digest depends on it."""
+    """The experiment as a command line names it; no digest depends on it."""
 
     @cached_property
     def experiment(self) -> Experiment:
-        """The experiment that the digests were made of, also when its file has changed since."""
+        """The experiment that the digests cover, even if its file has changed since."""
         from vibsim.experiment import restore
 
         return restore(self.content, self.source_file, self.settings)
 
     @property
     def source_file(self) -> Path | None:
-        """The experiment file; one member alone is named by the file and its number."""
-        named = self.file if self.file.endswith(ENDINGS) else self.file.rpartition("@")[0]
-        return Path(named) if named else None
+        """The experiment file, without ``@`` and the number of a single member; None if unknown."""
+        name = self.file if self.file.endswith(ENDINGS) else self.file.rpartition("@")[0]
+        return Path(name) if name else None
 
     @property
     def remarks(self) -> tuple[str, ...]:
-        """The notes with their places."""
+        """The notes, each with file and line."""
         file = str(self.source_file or "")
         return tuple(str(Fault(file, line, "", "", f"note: {text}")) for line, text in self.notes)
 
     @property
     def has_solver(self) -> bool:
-        """Whether a solver of the user makes the levels (`vibsim.experiment.solver`)."""
+        """Whether the user's own solver makes the levels (`vibsim.experiment.solver`)."""
         return "solver" in self.content
 
     @property
     def command(self) -> str:
-        """The command or the function of the user that jobs run; empty where they run none."""
+        """The user's command or function that the jobs run; empty if they run none."""
         solver = self.content.get("solver", {})
         return "" if solver.get("kind", "files") == "files" else str(solver["text"])
 
     @property
     def key(self) -> str:
-        """The name of the experiment over all collections, also its folder within the results."""
+        """``collection/name``: the name of the experiment among all collections, and its folder in the results."""
         return f"{self.collection}/{self.name}"
 
     @property
     def convergence(self) -> str:
-        """Path of the result of the analysis."""
+        """Path of the results of the analysis."""
         return f"{self.key}/convergence.nc"
 
     @property
@@ -170,7 +170,7 @@ class Plan:
 
     @property
     def best(self) -> str | None:
-        """Path of the solution extrapolated over all levels; None where the experiment does not ask for it."""
+        """Path of the solution extrapolated over all levels; None where the experiment does not request it."""
         return f"{self.key}/best.nc" if self.extrapolation else None
 
     @property
@@ -180,12 +180,12 @@ class Plan:
 
     @property
     def files(self) -> dict[str, str]:
-        """Paths of everything that the jobs exchange, and of the report, with the digest of the job that makes each."""
-        found = {shard.path: shard.digest for shard in self.shards}
+        """Path of every file that the jobs exchange, and of the report, with the digest of the job that makes it."""
+        files = {shard.path: shard.digest for shard in self.shards}
         if self.best is not None:
-            found[self.best] = self.extrapolation
+            files[self.best] = self.extrapolation
         analysed = dict.fromkeys((self.convergence, self.summary), self.analysis)
-        return {**found, **analysed, self.page: self.report}
+        return {**files, **analysed, self.page: self.report}
 
     @property
     def shards(self) -> tuple[ShardJob, ...]:
@@ -193,7 +193,7 @@ class Plan:
         return tuple(shard for level in self.levels for shard in level.shards)
 
     def level(self, level: int) -> LevelJob:
-        """Return the jobs of `level`; KeyError where the experiment has no such level."""
+        """Return the jobs of `level`; raise KeyError where the experiment has no such level."""
         return {job.level: job for job in self.levels}[level]
 
     def made_by(self, batch: Batch) -> tuple[ShardJob, ...]:
@@ -202,35 +202,35 @@ class Plan:
 
     @property
     def seconds(self) -> float:
-        """Seconds of one core that all simulate jobs take, estimated."""
+        """Estimated time of all simulate jobs [core seconds]."""
         return sum(batch.seconds for batch in self.batches)
 
     @property
     def cpu_seconds(self) -> float:
-        """Seconds of one core that everything takes but the start of the run, estimated."""
+        """Estimated time of the whole run except its start [core seconds]."""
         return self.seconds + self.reference_seconds + self.other_seconds
 
     def wall_seconds(self, cores: int) -> float:
-        """Return how long all of that takes on so many cores, estimated; one analysis and page follow the levels."""
+        """Return the estimated wall time of the run except its start [s]; analysis and page follow the levels."""
         longest = max((b.seconds for b in self.batches if not b.is_divisible), default=0.0)
         return max(longest, self.seconds / cores) + self.reference_seconds + self.other_seconds
 
     @property
     def bytes(self) -> int:
-        """Size of all files of numbers, estimated."""
+        """Estimated size of all data files [bytes]."""
         return sum(level.bytes for level in self.levels) + self.analysis_bytes
 
     def analysis_processes(self, cores: int) -> int:
-        """Return how many processes share the analysis on so many cores: one where there is little to do."""
+        """Return the number of processes that share the analysis: `cores`, or one where the data are small."""
         return cores if self.bytes > SHARED_BYTES else 1
 
     def shared_memory(self, processes: int) -> int:
-        """Return the bytes that the analysis holds at its peak where so many processes share it, estimated."""
+        """Return the estimated peak memory of the analysis in `processes` processes [bytes]."""
         return self.analysis_memory + (self.process_memory * processes if processes > 1 else 0)
 
     @property
     def memory(self) -> int:
-        """Bytes that the largest job holds at its peak on one core, estimated."""
+        """Estimated peak memory of the largest job on one core [bytes]."""
         return max(self.analysis_memory, *(batch.memory for batch in self.batches))
 
 
@@ -242,17 +242,18 @@ def shard_path(key: str, level: int, shard: int | None) -> str:
 
 
 def to_json(plan: Plan) -> str:
-    """Write `plan` as JSON text, without the place where the experiment was read."""
+    """Return `plan` as JSON text, without `Plan.file`."""
     return json.dumps(asdict(replace(plan, file="")), allow_nan=False)
 
 
 def from_json(text: str, file: str, key: str) -> Plan:
-    """Read what `to_json` wrote for the experiment named `key`, which was read at `file`.
+    """Read the plan of the experiment named `key` from the text of `to_json`, and set `Plan.file` to `file`.
 
     Raises
     ------
     ValueError
-        Where it is no plan of that experiment: names and digests go into commands, and paths are written to.
+        Where the text is not a valid plan of that experiment. It is checked because names and digests go into commands,
+        and jobs write to the paths.
     """
     plan: Plan = replace(_typed(Plan, json.loads(text)), file=file)
     digests = [plan.analysis, plan.report, *([plan.extrapolation] if plan.extrapolation else [])]
@@ -262,8 +263,8 @@ def from_json(text: str, file: str, key: str) -> Plan:
     is_swept = plan.content.get("sweep") is not None
     for level in plan.levels:
         count = len(level.shards) if is_swept else 1
-        wanted = [(k, shard_path(key, level.level, k if is_swept else None)) for k in range(count)]
-        if [(shard.index, shard.path) for shard in level.shards] != wanted:
+        valid = [(k, shard_path(key, level.level, k if is_swept else None)) for k in range(count)]
+        if [(shard.index, shard.path) for shard in level.shards] != valid:
             raise ValueError(f"{key}, level {level.level}: other files than its own")
     shards = {level.level: len(level.shards) for level in plan.levels}
     for batch in plan.batches:
@@ -274,20 +275,20 @@ def from_json(text: str, file: str, key: str) -> Plan:
 
 @cache
 def _parts(kind: Any) -> tuple[Any, tuple[Any, ...], dict[str, Any]]:
-    """Return the origin of a type with its arguments, and the fields of a record; a plain type is its own union."""
+    """Return the origin of a type, its arguments, and the fields of a dataclass; a plain type is its own union."""
     if is_dataclass(kind):
         return None, (), get_type_hints(kind)
     origin, inner = get_origin(kind), get_args(kind)
     if origin in (tuple, dict):
         return origin, inner, {}
     inner = inner if isinstance(kind, UnionType) else (kind,)
-    # a whole number is written as one
+    # JSON may hold an integer where a float is expected
     return None, (*inner, int) if float in inner else inner, {}
 
 
 def _typed(kind: Any, value: Any) -> Any:
-    """Return the record of type `kind` that plain data describe; ValueError where a value is of another type."""
-    # types are compared, not tested by isinstance: for Python True is a number
+    """Return the object of type `kind` that plain JSON data describe; raise ValueError for a value of another type."""
+    # exact types, not isinstance: True is an int for Python
     origin, inner, fields = _parts(kind)
     if fields:
         if type(value) is not dict or value.keys() != fields.keys():
@@ -296,11 +297,11 @@ def _typed(kind: Any, value: Any) -> Any:
     if origin is tuple:
         is_open = inner[-1] is ...
         if type(value) is not list or not (is_open or len(value) == len(inner)):
-            raise ValueError(f"{value!r:.40}: no list of the length expected")
+            raise ValueError(f"{value!r:.40}: not a list of the expected length")
         return tuple(map(_typed, repeat(inner[0]) if is_open else inner, value))
     if origin is dict:
         if type(value) is not dict:
-            raise ValueError(f"{value!r:.40}: no mapping")
+            raise ValueError(f"{value!r:.40}: not a mapping")
         return {key: _typed(inner[1], item) for key, item in value.items()}
     if kind is not Any and type(value) not in inner:
         raise ValueError(f"{value!r:.40}: another type than expected")

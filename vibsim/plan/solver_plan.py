@@ -1,8 +1,8 @@
-"""Build the plan of an experiment with a solver of the user.
+"""Build the plan of an experiment with the user's own solver.
 
 The digest of a level covers what decides its numbers: the command with its arguments, or the function with sizes and
-parameters, and the content of all files that these depend on. The code of vibsim is no part of it: a solver may run for
-hours, and vibsim only stores what it wrote.
+parameters, and the content of all files that these depend on. It does not cover the code of vibsim, which only stores
+what the solver wrote: a solver may run for hours.
 """
 
 from __future__ import annotations
@@ -17,17 +17,17 @@ from vibsim.core.errors import Fault, InputError
 from vibsim.core.vocabulary import FORMAT
 from vibsim.experiment.solver import SolverExperiment
 from vibsim.plan import code_digest
-from vibsim.plan.build import job_digest, made_from
+from vibsim.plan.build import job_digest, level_digests
 from vibsim.plan.digests import analysed, digest_of, solved
 from vibsim.plan.jobs import Batch, LevelJob, Plan, ShardJob, shard_path
 from vibsim.plan.versions import DRAWING, NUMERICAL, versions
 
 MEGABYTE = 10**6
 ANALYSIS_MEMORY = 500 * MEGABYTE
-"""Bytes that an analysis may hold; the sizes of fields are not known before they are made."""
+"""Memory of an analysis [bytes]: a guess, since the sizes of the fields are unknown until the solver has run."""
 
 _level = partial(LevelJob, steps=0, every=1, member_steps=0, bytes=0, seconds=0.0, shared=0.0)
-"""A level that a solver makes, which has neither counts nor costs."""
+"""A level of the user's solver: the number of steps and the cost are unknown."""
 
 
 def build(experiment: SolverExperiment) -> Plan:
@@ -36,7 +36,7 @@ def build(experiment: SolverExperiment) -> Plan:
     Raises
     ------
     InputError
-        Where a file or a module that levels depend on cannot be found.
+        Where a file or a module that the levels depend on cannot be found.
     """
     content: dict[str, Any] = json.loads(json.dumps(experiment.content, allow_nan=False))
     solver, resources = experiment.solver, experiment.resources
@@ -49,15 +49,15 @@ def build(experiment: SolverExperiment) -> Plan:
     for level in experiment.levels:
         if solver.kind == "files":
             paths = [experiment.path(level, member) for member in range(experiment.members)]
-            read = {path: _digest(experiment, path) for path in paths}
-            files |= read
-            of_members = [{"file": read[path]} for path in paths]
+            digests = {path: _digest(experiment, path) for path in paths}
+            files |= digests
+            member_inputs = [{"file": digests[path]} for path in paths]
         else:
-            of_members = [inputs] * experiment.members
-        shards = _shards(experiment, level, of_members, package)
+            member_inputs = [inputs] * experiment.members
+        shards = _shards(experiment, level, member_inputs, package)
         levels.append(_level(level=level, memory=memory, shards=shards))
-    before = made_from(levels, experiment.settings)
-    analysis = job_digest("judge_levels", analysed(content), before)
+    upstream = level_digests(levels, experiment.settings)
+    analysis = job_digest("judge_levels", analysed(content), upstream)
     return Plan(
         collection=experiment.collection,
         name=experiment.name,
@@ -86,7 +86,7 @@ def build(experiment: SolverExperiment) -> Plan:
         analysis_bytes=0,
         extrapolation="",
         report=job_digest(
-            "solver", content, {"analysis": analysis}, DRAWING, home="vibsim.report.page"
+            "solver", content, {"analysis": analysis}, DRAWING, package="vibsim.report.page"
         ),
         content=content,
         versions=versions(NUMERICAL),
@@ -98,15 +98,15 @@ def build(experiment: SolverExperiment) -> Plan:
 def _shards(
     experiment: SolverExperiment, level: int, inputs: Sequence[Mapping[str, str]], code: str
 ) -> tuple[ShardJob, ...]:
-    """Return the jobs of a level, one for each member, from digests of inputs and of the code of its package."""
+    """Return the jobs of a level, one for each member, from the digests of its input files and of the solver's code."""
     key = f"{experiment.collection}/{experiment.name}"
     shards = []
-    for member, own in enumerate(inputs):
-        uses = {"uses": solved(experiment, level, member), "inputs": own, "code": code}
+    for member, files in enumerate(inputs):
+        uses = {"uses": solved(experiment, level, member), "inputs": files, "code": code}
         digest = digest_of({"job": "solve", "format": FORMAT, **uses})
         number = None if experiment.sweep is None else member
-        place = shard_path(key, level, number)
-        shards.append(ShardJob(member, member, member + 1, place, digest))
+        path = shard_path(key, level, number)
+        shards.append(ShardJob(member, member, member + 1, path, digest))
     return tuple(shards)
 
 
@@ -120,12 +120,12 @@ def _digest(experiment: SolverExperiment, name: str) -> str:
 
 
 def _code(experiment: SolverExperiment, module: str) -> str:
-    """Return the digest of the package that a module stands in, which is not imported for that."""
-    found = code_digest.of_module(module, experiment.folder)
-    if not found:
+    """Return the digest of the package that contains a module, without importing it."""
+    digest = code_digest.of_module(module, experiment.folder)
+    if not digest:
         rule = "cannot be found: no installed package and no module beside the file has this name"
         raise _refusal(experiment, module.partition(".")[0], rule)
-    return found
+    return digest
 
 
 def _refusal(experiment: SolverExperiment, value: str, rule: str) -> InputError:

@@ -11,9 +11,9 @@ DRAWING = ("matplotlib", "jinja2")
 
 
 def versions(names: tuple[str, ...]) -> dict[str, str]:
-    """Return the version of each library in `names`; one that is not installed has ``none``.
+    """Return the version of each library in `names`, ``none`` for a library that is not installed.
 
-    `importlib.metadata` gives the same and takes 20 ms to import, which every start would pay.
+    `importlib.metadata` gives the same, but its import would add 20 ms to every start.
     """
     installed = _installed()
     return {name: installed.get(name, "none") for name in names}

@@ -1,4 +1,4 @@
-"""What the rules of the workflow ask: names of files, digests of jobs; nothing else."""
+"""What the Snakemake rules need to know: file names, digests and resources of the jobs."""
 
 from __future__ import annotations
 
@@ -17,39 +17,39 @@ from vibsim.plan.digests import digest_of
 from vibsim.plan.jobs import Batch, Plan
 
 UNKNOWN_DISK = 1000
-"""Megabytes of a job whose files have no estimate, a solver of the user: as Snakemake assumes."""
+"""Disk of a job whose files have no size estimate, such as a user's solver [MB]; Snakemake's own default."""
 PAGE_SECONDS = 30.0
-"""Seconds of a job that makes a page: several times of what those of the default run take."""
+"""Time of a job that makes a page [s]: several times that of the default run."""
 ANALYSED_SECONDS = 20e-9
-"""Seconds of one core that an analysis takes for each byte of level files."""
+"""Time of an analysis per byte of level files [core seconds]."""
 FINISHED_SECONDS = 4.0
-"""Seconds of one core that the start of an analysis and a page take, as in the default run."""
+"""Time of one analysis and page besides that, as in the default run [core seconds]."""
 START_MINUTES = 2
-"""Minutes that a job of an executor may take to start and to end."""
+"""Time limit for start and end of an executor's job [minutes]."""
 SLOWNESS = 4.0
-"""How many times longer a job may take than is estimated, on a slower machine or one that others use as well."""
+"""Safety factor of a job's time limit, for slower or shared machines."""
 GROUP = "simulate"
-"""The group of short jobs, several of which an executor may be given as one (``--group-components``)."""
+"""Snakemake group of short jobs; an executor may submit several as one (``--group-components``)."""
 GROUPED_SECONDS = 10.0
-"""Seconds of one core that such a job takes at most: more than a shard holds."""
+"""Longest job of this group [core seconds]; a shard takes less."""
 START_SECONDS = 4.0
-"""Seconds that each job of an executor takes to start and to end."""
+"""Time of start and end of an executor's job [s]."""
 
 
-def together(seconds: Sequence[float], most: int) -> int:
-    """Return how many simulations that take so many seconds share a job of an executor, `most` at most.
+def group_size(seconds: Sequence[float], most: int) -> int:
+    """Return how many simulations, with the given times [s], an executor submits as one job: `most` or fewer.
 
-    So many jobs are made that their starts, one after the other, and the work of one, all at the same time, take the
-    least time together. Long ones, which have a job of their own, do not count.
+    The number of jobs minimises the total time, if jobs start one after the other and then work in parallel. Long
+    simulations do not count: each is a job of its own.
     """
-    short = [one for one in seconds if 0.0 < one <= GROUPED_SECONDS]
+    short = [time for time in seconds if 0.0 < time <= GROUPED_SECONDS]
     jobs = math.ceil(math.sqrt(sum(short) / START_SECONDS))
     return min(most, math.ceil(len(short) / jobs)) if jobs else most
 
 
 @dataclass(frozen=True)
 class Simulation:
-    """A rule: some levels; where they have several shards, a job for each, told apart by the wildcard ``shard``."""
+    """A rule that makes one or more levels: one job, or one for each shard, which is the wildcard ``shard``."""
 
     rule: str
     """Name of the rule."""
@@ -58,18 +58,18 @@ class Simulation:
     """The files of one job."""
     log: str
     benchmark: str
-    """Paths of the log, and of the measured time and memory."""
+    """Path of the measured time and memory."""
     threads: int
     megabytes: int
-    """Memory of a job, without the overhead of an executor."""
+    """Memory of a job without the overhead of an executor [MB]."""
     minutes: int | None
-    """Minutes of a job at most; None where nobody says."""
+    """Time limit of a job; None for no limit."""
     disk: int
-    """Megabytes that a job writes."""
+    """Size of the files of a job [MB]."""
     group: str | None
-    """The group of Snakemake that a job may share with others; None where it is long enough alone."""
+    """Snakemake group of short jobs; None for a long job."""
     digests: list[str]
-    """Of every job."""
+    """Digest of each job, by shard."""
     source: str
     """The experiment file."""
 
@@ -112,59 +112,59 @@ def _simulation(plan: Plan, batches: Sequence[Batch], rule: str, cores: int) -> 
 
 
 def _disk(size: float) -> int:
-    """Return the megabytes of files of so many bytes, 0 where there is no estimate."""
+    """Return the size of files in megabytes, from the size in bytes, which is 0 if unknown."""
     return math.ceil(size / 10**6) or UNKNOWN_DISK
 
 
 def _minutes(seconds: float) -> int | None:
-    """Return the minutes that a job may take whose work is estimated; None where it is not."""
+    """Return the time limit of a job from its estimated time; None without an estimate (0)."""
     return START_MINUTES + math.ceil(SLOWNESS * seconds / 60.0) if seconds else None
 
 
-def _of_plan(field: str) -> Callable[[Names, Any], str]:
+def _plan_field(field: str) -> Callable[[Names, Any], str]:
 
-    def ask(self: Names, wildcards: Any) -> str:
-        found: str = getattr(self.plans[wildcards.experiment], field)
-        return found
+    def get(self: Names, wildcards: Any) -> str:
+        value: str = getattr(self.plans[wildcards.experiment], field)
+        return value
 
-    return ask
+    return get
 
 
 @dataclass(frozen=True)
 class Names:
-    """The plans of the chosen experiments, asked by wildcard."""
+    """The plans of the chosen experiments, looked up by wildcard."""
 
     plans: Mapping[str, Plan]
     results: Path
     allows_commands: bool = False
-    """Whether programs of the user may run."""
+    """Whether the user's programs may run."""
     settings: tuple[str, ...] = ()
-    """What stands in place of values of the files."""
+    """Values that replace those of the files, as ``KEY=VALUE``."""
     cores: int = field(default_factory=usable_cores)
-    """Cores that a job may use at most."""
+    """Most cores of one job."""
     overhead: int = 0
-    """Megabytes that a job needs for the processes of its executor, beside its own."""
+    """Memory that an executor's own processes need in each job [MB]."""
     here: float = 0.0
-    """Seconds of analyses and pages that are no jobs of an executor, but made where the workflow runs."""
+    """Analyses and pages run where the workflow runs, not as jobs of an executor, if they take less [core seconds]."""
 
     def level_flags(self, wildcards: Any, input: Any) -> str:  # noqa: A002
-        """Return further options of jobs that make levels, which Snakemake does not compare; see `file`."""
+        """Return further options of jobs that make levels; Snakemake does not compare them, see `file`."""
         return "--allow-commands" if self.allows_commands else ""
 
-    def given(self, wildcards: Any, input: Any) -> list[str]:  # noqa: A002
-        """Return the options that give every job the settings, which Snakemake does not compare; see `file`."""
+    def setting_flags(self, wildcards: Any, input: Any) -> list[str]:  # noqa: A002
+        """Return the options that pass the settings to every job; Snakemake does not compare them, see `file`."""
         return [word for text in self.settings for word in (OPTION, text)]
 
     @property
     def experiment_pattern(self) -> str:
-        """Regular expression for exactly the chosen experiments."""
+        """Regular expression that matches exactly the chosen experiments."""
         return "|".join(map(re.escape, self.plans))
 
     def file(self, wildcards: Any, input: Any) -> str:  # noqa: A002
         """Return the experiment file.
 
-        Snakemake compares no parameter that is derived from the input, so that an experiment that
-        moved to another folder is not run again.
+        Snakemake does not compare parameters from functions that take `input`, so an experiment file that moved to
+        another folder is not run again.
         """
         return self.plans[wildcards.experiment].file
 
@@ -175,10 +175,10 @@ class Names:
         for key, plan in self.plans.items():
             for batch in plan.batches:
                 groups.setdefault((key, batch.levels), []).append(batch)
-        names = _different(_rule(key, levels) for key, levels in groups)
+        names = _numbered(_rule(key, levels) for key, levels in groups)
         return [
-            _simulation(self.plans[key], found, name, self.cores)
-            for name, ((key, _), found) in zip(names, groups.items(), strict=True)
+            _simulation(self.plans[key], batches, name, self.cores)
+            for name, ((key, _), batches) in zip(names, groups.items(), strict=True)
         ]
 
     def shards(self, wildcards: Any) -> list[str]:
@@ -187,98 +187,101 @@ class Names:
 
     @property
     def best_pattern(self) -> str:
-        """Regular expression for the experiments with an extrapolated solution; it may match nothing."""
+        """Regular expression that matches exactly the experiments with an extrapolated solution, possibly none."""
         return "|".join(re.escape(key) for key, plan in self.plans.items() if plan.best) or "(?!)"
 
     @property
     def finishes_here(self) -> bool:
-        """Whether analyses, extrapolations and pages are made where the workflow runs: together they take little."""
+        """Whether analyses, extrapolations and pages run where the workflow runs: they take less than `here`."""
         readings = sum(plan.bytes * (1 if plan.best is None else 2) for plan in self.plans.values())
         return ANALYSED_SECONDS * readings + FINISHED_SECONDS * len(self.plans) <= self.here
 
     @property
     def analysis_group(self) -> str | None:
-        """The group of Snakemake of an analysis and its page, which share a job of an executor; None for jobs here."""
+        """Snakemake group of an analysis and its page, which an executor submits as one job; None if they run here."""
         return None if self.finishes_here else "analyse"
 
-    analysis_digest = _of_plan("analysis")
-    extrapolation_digest = _of_plan("extrapolation")
-    report_digest = _of_plan("report")
+    analysis_digest = _plan_field("analysis")
+    extrapolation_digest = _plan_field("extrapolation")
+    report_digest = _plan_field("report")
 
     def analysis_threads(self, wildcards: Any) -> int:
-        """Return the threads of an analysis, which are processes."""
+        """Return the number of processes of an analysis, which Snakemake calls threads."""
         return self.plans[wildcards.experiment].analysis_processes(self.cores)
 
     def analysis_memory(self, wildcards: Any, attempt: int) -> int:
-        """Return the megabytes of an analysis; see `memory`."""
-        own = self.plans[wildcards.experiment].shared_memory(self.analysis_threads(wildcards))
-        return self.memory(math.ceil(own / 10**6))(wildcards, attempt)
+        """Return the memory of an analysis [MB]; see `memory`."""
+        size = self.plans[wildcards.experiment].shared_memory(self.analysis_threads(wildcards))
+        return self.memory(math.ceil(size / 10**6))(wildcards, attempt)
 
     def analysis_minutes(self, wildcards: Any, attempt: int) -> int | None:
-        """Return the minutes of an analysis, or of an extrapolation; see `runtime`."""
+        """Return the time limit of an analysis or an extrapolation; see `runtime`."""
         seconds = 1.0 + ANALYSED_SECONDS * self.plans[wildcards.experiment].bytes
         return self.runtime(_minutes(seconds))(wildcards, attempt)
 
     def analysis_disk(self, wildcards: Any) -> int:
-        """Return the megabytes that an analysis writes."""
+        """Return the size of the files of an analysis [MB]."""
         return _disk(self.plans[wildcards.experiment].analysis_bytes)
 
     def best_disk(self, wildcards: Any) -> int:
-        """Return the megabytes that an extrapolation writes: it has the size of a level."""
+        """Return the size of an extrapolated solution [MB]: that of the finest level."""
         return _disk(self.plans[wildcards.experiment].levels[-1].bytes)
 
     page_memory = 300
-    """Megabytes of a job that makes a page: twice of what those of the default run take."""
+    """Memory of a job that makes a page [MB]: twice that of the default run."""
     page_minutes = _minutes(PAGE_SECONDS)
     page_disk = 100
-    """Megabytes that such a job writes at most: ten times of what those of the default run write."""
+    """Limit on the files of such a job [MB]: ten times those of the default run."""
 
     def memory(self, megabytes: int) -> Callable[[Any, int], int]:
-        """Return what gives the memory of a job: with that of its executor, and more where it was not enough before."""
+        """Return a function that gives the memory of a job [MB], as Snakemake expects for ``resources``.
 
-        def of_attempt(wildcards: Any, attempt: int) -> int:
+        It includes the overhead of the executor and grows with each attempt.
+        """
+
+        def megabytes_of(wildcards: Any, attempt: int) -> int:
             return (megabytes + self.overhead) * attempt
 
-        return of_attempt
+        return megabytes_of
 
     def runtime(self, minutes: int | None) -> Callable[[Any, int], int | None]:
-        """Return what gives the minutes of a job: more where they were not enough before."""
+        """Return a function that gives the time limit of a job [minutes]; it grows with each attempt."""
 
-        def of_attempt(wildcards: Any, attempt: int) -> int | None:
+        def minutes_of(wildcards: Any, attempt: int) -> int | None:
             return minutes and minutes * attempt
 
-        return of_attempt
+        return minutes_of
 
     @property
     def files(self) -> list[str]:
-        """Every file of the chosen experiments: also one that only others are made from is kept."""
+        """Every file of the chosen experiments; intermediate ones are targets too, so that they are kept."""
         return [path for plan in self.plans.values() for path in plan.files]
 
     @property
     def indexed(self) -> list[str]:
-        """What the index shows: the chosen experiments, and the others found among the results."""
+        """Summary and page of every experiment in the index: the chosen ones and all others in the results folder."""
         chosen = {path for plan in self.plans.values() for path in (plan.summary, plan.page)}
-        shown = (self.results.glob(f"*/*/{name}") for name in ("summary.json", "report.html"))
-        files = (path for paths in shown for path in paths if path.is_file())
+        stored = (self.results.glob(f"*/*/{name}") for name in ("summary.json", "report.html"))
+        files = (path for paths in stored for path in paths if path.is_file())
         return sorted(chosen | {path.relative_to(self.results).as_posix() for path in files})
 
     @property
     def index_digest(self) -> str:
-        """Digest of the page over all experiments."""
+        """Digest of the index of all experiments."""
         return digest_of({"job": "index", "code": code_digest.everything()})
 
 
 def _rule(key: str, levels: Sequence[int]) -> str:
-    """Return a name such as ``simulate_pendulum_lab__period_map__levels_06_09``: an identifier, as its parts are."""
+    """Return a rule name that is a Python identifier, such as ``simulate_pendulum_lab__period_map__levels_06_09``."""
     ends = [f"{level:02d}" for level in dict.fromkeys((levels[0], levels[-1]))]
-    made = "_".join(["level" if len(ends) == 1 else "levels", *ends])
-    return "__".join([f"simulate_{key.replace('/', '__')}", made])
+    suffix = "_".join(["level" if len(ends) == 1 else "levels", *ends])
+    return "__".join([f"simulate_{key.replace('/', '__')}", suffix])
 
 
-def _different(names: Iterable[str]) -> list[str]:
-    """Number names that are there already: ``a__b/c`` and ``a/b__c`` give one."""
-    found: dict[str, None] = {}
+def _numbered(names: Iterable[str]) -> list[str]:
+    """Append a number to each repeated name: the experiments ``a__b/c`` and ``a/b__c`` have the same rule name."""
+    unique: dict[str, None] = {}
     for name in names:
         numbered = (f"{name}__{number}" for number in count(2))
-        found[next(one for one in chain([name], numbered) if one not in found)] = None
-    return list(found)
+        unique[next(new for new in chain([name], numbered) if new not in unique)] = None
+    return list(unique)

@@ -1,8 +1,8 @@
-"""Everything that vibsim writes to disk and reads back: whole, as it was written, or not at all.
+"""Write and read result files: a file is read exactly as it was written, or not at all.
 
-Every file appears under its name in one step, carries a digest of its own bytes and the digest of
-the job that made it. The netCDF library is imported only when such a file is opened (`vibsim.core.netcdf`);
-reading a summary imports not even numpy.
+Every file is written in one step, and holds a digest of its own bytes and the digest of the job that made it. The
+netCDF library is imported only when a netCDF file is opened (`vibsim.core.netcdf`); reading a summary does not even
+import numpy.
 """
 
 from __future__ import annotations

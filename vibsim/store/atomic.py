@@ -1,8 +1,7 @@
-"""Files that appear whole: a hidden temporary file beside the target, flushed, then renamed.
+"""Atomic writes: write to a hidden temporary file beside the target, flush it, then rename it.
 
-A reader sees the old file or the new one and nothing between, also after a crash or a power cut.
-What a killed writer leaves behind is removed by the next one with the same target, or by a run that has no such target
-any more.
+A reader sees the old file or the new one and nothing in between, even after a crash or a power cut. A killed writer
+leaves its temporary file; the next writer of the same target removes it, or a run that no longer has this target.
 """
 
 from __future__ import annotations
@@ -19,19 +18,19 @@ from vibsim.core.processes import started
 _SUFFIX = ".part"
 _TEMPORARY = re.compile(rf"\.(?P<target>.+)\.(?P<pid>\d+)-(?P<started>[^-]*)-[^-]+\{_SUFFIX}")
 _BLOCK, _MARGIN = 2**16, 2**22
-"""Bytes that are written at a time, and in all, to find out whether a disk is full."""
+"""Bytes written at a time, and in total, to find out whether the disk is full."""
 
 
 @contextmanager
 def replacing(path: Path) -> Iterator[Path]:
-    """Give a temporary path to write to; rename it to `path`, whose folder is made, when the block ends well.
+    """Yield a temporary path to write to, and rename it to `path` if the block ends without an exception.
 
-    It is a name of its own in the same folder, so that writers of one target do not meet.
+    The folder is made if necessary. The temporary name is unique, so that several writers of one target do not collide.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
-    for left, target in abandoned(path.parent):
+    for leftover, target in abandoned(path.parent):
         if target == path:
-            left.unlink(missing_ok=True)
+            leftover.unlink(missing_ok=True)
     pid = os.getpid()
     owner = f"{pid}-{started(pid)}-{secrets.token_hex(4)}"
     temporary = path.with_name(f".{path.name}.{owner}{_SUFFIX}")
@@ -40,7 +39,7 @@ def replacing(path: Path) -> Iterator[Path]:
         _flush(temporary)
         temporary.replace(path)
     except OSError as error:
-        # what a full disk raises names no file, and the temporary one is no news
+        # the error of a full disk names no file, and the temporary name means nothing to the user
         if error.filename is None or str(temporary) == str(error.filename):
             error.filename = str(path)
         raise
@@ -56,15 +55,15 @@ def write_bytes(path: Path, content: bytes) -> None:
 
 
 def write_text(path: Path, text: str) -> None:
-    """Write `text` to `path` in one step, as UTF-8 with the line ends it has."""
+    """Write `text` to `path` in one step, as UTF-8 and with its own line ends."""
     write_bytes(path, text.encode())
 
 
 def check_room(path: Path, size: int) -> None:
-    """Raise what the system says to a file of `size` bytes that could not be written; nothing where it could be.
+    """Raise the OSError that explains why a file of `size` bytes could not be written, if the cause persists.
 
-    Libraries keep the cause to themselves. It is found by writing: at the end that the file was to have, which shows a
-    limit of its size, and some more behind what there is, which shows a full disk. The file is of no use afterwards.
+    The netCDF library hides the cause, so this function writes to the file itself: one byte at offset `size`, which
+    shows a limit on file sizes, and some bytes at the end, which show a full disk. This destroys the file.
     """
     descriptor = os.open(path, os.O_WRONLY | os.O_CREAT, 0o644)
     try:
@@ -86,8 +85,8 @@ def _flush(path: Path) -> None:
 
 
 def abandoned(folder: Path) -> Iterator[tuple[Path, Path]]:
-    """Give each temporary file in `folder` whose writer has ended, and its target."""
+    """Yield each temporary file in `folder` whose writer has ended, with its target."""
     for entry in os.scandir(folder):
-        found = _TEMPORARY.fullmatch(entry.name)
-        if found and started(int(found["pid"])) != found["started"]:
-            yield Path(entry.path), folder / found["target"]
+        name = _TEMPORARY.fullmatch(entry.name)
+        if name and started(int(name["pid"])) != name["started"]:
+            yield Path(entry.path), folder / name["target"]

@@ -1,6 +1,6 @@
-"""Records from netCDF files: checked before the library is given a single bit, read whole or by ranges of members.
+"""Read Records from netCDF files, whole or by ranges of members; the seal is checked before the library sees a byte.
 
-All files of one level are read as one, whatever members are in which.
+The files of one level, its shards, are read as if they were one file.
 """
 
 from __future__ import annotations
@@ -23,21 +23,21 @@ from vibsim.store import seal
 
 
 def read(path: Path, *, digest: str | None = None) -> Record:
-    """Read what `vibsim.store.write` wrote.
+    """Read a file that `vibsim.store.write` wrote.
 
     Parameters
     ----------
     path
         The file.
     digest
-        Digest of the job whose result is wanted; None takes any.
+        Expected digest of the job that made the file; None accepts any.
 
     Raises
     ------
     DamagedFileError
-        When a single bit differs from what was written, or when no vibsim wrote it.
+        Where a single bit differs from what was written, or the file is not vibsim's.
     StaleFileError
-        When the file is whole but another job's.
+        Where the file is intact but another job made it.
     """
     seal.check(path)
     with _opened(path, digest) as dataset, _naming(path):
@@ -45,34 +45,34 @@ def read(path: Path, *, digest: str | None = None) -> Record:
 
 
 def check(path: Path, *, digest: str | None = None) -> None:
-    """Raise what `read` would, without keeping anything of the file in memory."""
+    """Raise the same exceptions as `read`, without loading the file into memory."""
     seal.check(path)
     with _opened(path, digest):
         pass
 
 
 def read_provenance(path: Path) -> dict[str, Any]:
-    """Return what a file says of its making: the settings and the versions that its job used.
+    """Return the provenance of a file: the settings and the versions that its job used.
 
     Raises
     ------
     DamagedFileError
-        When a single bit differs from what was written, or it says nothing of its making.
+        Where a single bit differs from what was written, or the file has no provenance.
     """
     seal.check(path)
     try:
         with netcdf.opened(path) as dataset:
-            found = json.loads(dataset.getncattr("provenance"))
+            provenance = json.loads(dataset.getncattr("provenance"))
     except (OSError, AttributeError, ValueError, RecursionError):
-        found = None
-    if not isinstance(found, dict) or not isinstance(found.get("experiment"), dict):
+        provenance = None
+    if not isinstance(provenance, dict) or not isinstance(provenance.get("experiment"), dict):
         raise DamagedFileError(path, "it does not say what it was made from")
-    return found
+    return provenance
 
 
 @contextmanager
 def _opened(path: Path, digest: str | None) -> Iterator[Any]:
-    """Open a file whose seal was checked; raise what `read` does."""
+    """Open a file whose seal was checked; raises the same exceptions as `read`."""
     with _naming(path):
         dataset = netcdf.opened(path)
     try:
@@ -88,7 +88,7 @@ def _opened(path: Path, digest: str | None) -> Iterator[Any]:
 
 @contextmanager
 def _naming(path: Path) -> Iterator[None]:
-    """Turn errors of the netCDF library into one that names the file."""
+    """Turn errors of the netCDF library into a DamagedFileError that names the file."""
     try:
         yield
     except (OSError, RuntimeError) as error:
@@ -98,7 +98,7 @@ def _naming(path: Path) -> Iterator[None]:
 def _record(
     dataset: Any, cases: slice = slice(None), names: Collection[str] | None = None
 ) -> Record:
-    """Return what an opened file holds of some members; `names` are the variables wanted, None for all."""
+    """Return the Record of the members `cases` of an open file, with the data variables `names`, or all for None."""
     tables: tuple[dict[str, Variable], dict[str, Variable]] = ({}, {})
     auxiliary = _auxiliary(dataset)
     for name, variable, group in netcdf.variables(dataset):
@@ -111,21 +111,21 @@ def _record(
 
 
 def _auxiliary(dataset: Any) -> set[str]:
-    """Name the coordinates that are not those of their own dimension."""
-    found = set(getattr(dataset, "coordinates", "").split())
+    """Return the names of the auxiliary coordinates: those that are not the coordinate of their own dimension."""
+    names = set(getattr(dataset, "coordinates", "").split())
     for _, variable, _ in netcdf.variables(dataset):
-        found.update(getattr(variable, "coordinates", "").split())
-    return found
+        names.update(getattr(variable, "coordinates", "").split())
+    return names
 
 
 def _read_variable(variable: Any, cases: slice, group: str) -> Variable:
     attrs = {key: _unpack(variable.getncattr(key)) for key in variable.ncattrs()}
     attrs.pop("coordinates", None)
     dims = variable.dimensions
-    wanted = tuple(cases if dim == "case" else slice(None) for dim in dims)
-    values = np.asarray(variable[wanted] if dims else variable[...])
+    index = tuple(cases if dim == "case" else slice(None) for dim in dims)
+    values = np.asarray(variable[index] if dims else variable[...])
     if attrs.pop("_Encoding", None):
-        # texts in a type that does not depend on which of them are read
+        # the width of the string type must not depend on the members that are read
         width = values.shape[-1]
         joined = np.ascontiguousarray(values).view(f"S{width}").reshape(values.shape[:-1])
         dims, values = dims[:-1], np.char.decode(joined, "utf-8").astype(f"U{width}")
@@ -142,11 +142,11 @@ def _unpack(value: Any) -> Attribute:
 
 @dataclass
 class Level:
-    """The files of a level, in the order of their members; one is open at a time."""
+    """The files of a level, in the order of their members; at most one is open at a time."""
 
     files: Sequence[tuple[Path, str | None]]
     borders: Sequence[int]
-    """First member of each file, and the number of all members."""
+    """First member of each file, and finally the total number of members."""
     _open: ExitStack = field(default_factory=ExitStack)
     _number: int = -1
     _dataset: Any = None
@@ -159,16 +159,16 @@ class Level:
     def read(
         self, start: int = 0, stop: int | None = None, names: Collection[str] | None = None
     ) -> Record:
-        """Return members start..stop-1, all by default, with the variables `names`; coordinates are always there."""
+        """Return members start..stop-1, all by default, with the data variables `names` and all coordinates."""
         last = self.cases if stop is None else stop
         first, final = self._file_of(start), self._file_of(max(start, last - 1))
         parts = []
         for number in range(first, final + 1):
             border = self.borders[number]
             end = min(last, self.borders[number + 1])
-            wanted = slice(max(start, border) - border, end - border)
+            cases = slice(max(start, border) - border, end - border)
             with _naming(self.files[number][0]):
-                parts.append(_record(self._dataset_of(number), wanted, names))
+                parts.append(_record(self._dataset_of(number), cases, names))
         return join(parts)
 
     def _file_of(self, member: int) -> int:
@@ -189,17 +189,17 @@ class Level:
 
 @contextmanager
 def open_level(files: Sequence[tuple[Path, str | None]]) -> Iterator[Level]:
-    """Open the files of a level, whose seals were checked before (`vibsim.store.check`).
+    """Open the files of a level, whose seals must have been checked (`vibsim.store.check`).
 
     Parameters
     ----------
     files
-        Path and digest of each, in the order of their members; a file of its own is a level as well.
+        Path and digest of each file, in the order of their members; a level may be a single file.
 
     Raises
     ------
     DamagedFileError, StaleFileError
-        When a file cannot be read, or is another job's.
+        Where a file cannot be read, or another job made it.
     """
     sizes = []
     for path, digest in files:
@@ -213,12 +213,12 @@ def open_level(files: Sequence[tuple[Path, str | None]]) -> Iterator[Level]:
 
 
 def join(records: Sequence[Record]) -> Record:
-    """Return one record of the shards of a level, in the order of their members: side by side along ``case``.
+    """Join the shards of a level, given in the order of their members, along ``case``.
 
     Raises
     ------
     ValueError
-        When they do not belong together: they have other variables, schemes or times.
+        Where the shards do not belong together: their variables, schemes or times differ.
     """
     if len(records) == 1:
         return records[0]

@@ -1,10 +1,8 @@
-"""Whether a result file is whole, and whose it is.
+"""Seals of binary result files, and the check that a file belongs to the expected job.
 
-The seal of a binary file is the SHA-256 of all its bytes, appended behind them.
-
-HDF5 reads what its superblock says and ignores bytes behind it, so that a sealed file opens in
-every netCDF program. The library's own checksums (fletcher32) see damaged data but not damaged
-metadata; the seal sees every bit, and it is checked before the library is given a single one.
+The seal is the SHA-256 of all bytes of the file, appended at its end. HDF5 ignores bytes after the end that its
+superblock states, so every netCDF program opens a sealed file. The library's own checksums (fletcher32) detect damaged
+data but not damaged metadata; the seal covers every bit, and it is checked before the library reads the file.
 """
 
 from __future__ import annotations
@@ -41,19 +39,19 @@ def attach(path: Path) -> None:
 
 
 def stored_digest(path: Path) -> str:
-    """Return the digest in the seal of `path`, which is not compared.
+    """Return the digest in the seal of `path`, without comparing it with the content.
 
     Raises
     ------
     DamagedFileError
-        When it has no seal.
+        Where the file has no seal.
     """
     with path.open("rb") as file:
         file.seek(max(path.stat().st_size - LENGTH, 0))
-        found = file.read()
-    if not found.startswith(_MARK):
+        seal = file.read()
+    if not seal.startswith(_MARK):
         raise DamagedFileError(path, _UNSEALED)
-    return found[len(_MARK) :].decode().rstrip("\n")
+    return seal[len(_MARK) :].decode().rstrip("\n")
 
 
 def check(path: Path) -> None:
@@ -62,30 +60,30 @@ def check(path: Path) -> None:
     Raises
     ------
     DamagedFileError
-        When there is no such file, it has no seal, or a single bit differs from what was sealed.
+        Where the file or its seal is missing, or a single bit differs from what was sealed.
     """
     try:
         size = path.stat().st_size - LENGTH
         with regular_files.reading(path) as file:
             file.seek(max(size, 0))
-            found = file.read(LENGTH + 1)
+            seal = file.read(LENGTH + 1)
         expected = _seal(path, size)
     except OSError as error:
         raise DamagedFileError(path, f"cannot be read: {error.strerror}") from error
-    if found == expected:
+    if seal == expected:
         return
-    if found.startswith(_MARK):
+    if seal.startswith(_MARK):
         raise DamagedFileError(path, "its bytes are not those that were written")
     raise DamagedFileError(path, _UNSEALED)
 
 
 def check_job(path: Path, form: Any, digest: str, wanted: str | None) -> None:
-    """Compare what a whole file says of its format (None: nothing) and its job with the digest that is wanted.
+    """Check the format `form` and the job `digest` that an intact file states; a `wanted` digest of None accepts any.
 
     Raises
     ------
     StaleFileError
-        When the file is of another format or another job's; a wanted None takes any.
+        Where the file has another format, or another job made it.
     """
     if form != FORMAT:
         raise StaleFileError(path, f"it is not in vibsim format {FORMAT}")

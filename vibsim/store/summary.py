@@ -1,4 +1,4 @@
-"""The summary as JSON text: null and never NaN, and sealed by its field ``integrity``."""
+"""Write and read summaries as JSON: null in place of NaN, sealed by the field ``integrity``."""
 
 from __future__ import annotations
 
@@ -16,29 +16,26 @@ from vibsim.store.atomic import write_text
 
 
 def write_json(path: Path, content: Mapping[str, Any], *, digest: str) -> None:
-    """Write `content` to `path` in one step, with the digest of the job that made it.
-
-    Numbers that JSON lacks (NaN, infinities) become null.
-    """
+    """Write `content` to `path` in one step, with the digest of its job; NaN and infinities become null."""
     whole = {"vibsim_format": FORMAT, **content, "digest": digest}
     whole.pop("integrity", None)
     write_text(path, _sealed(jsonable(whole)))
 
 
 def read_json(path: Path, *, digest: str | None = None, name: str | None = None) -> dict[str, Any]:
-    """Read what `write_json` wrote.
+    """Read a file that `write_json` wrote.
 
     Parameters
     ----------
     digest, name
-        Digest of the job, and ``collection/name`` of the experiment, whose summary is wanted; None takes any.
+        Expected digest of the job, and expected ``collection/name`` of the experiment; None accepts any.
 
     Raises
     ------
     DamagedFileError
-        When a single bit differs from what was written.
+        Where a single bit differs from what was written.
     StaleFileError
-        When the file is whole but another job's.
+        Where the file is intact but belongs to another job or experiment.
     """
     try:
         with regular_files.reading(path) as file:
@@ -51,9 +48,9 @@ def read_json(path: Path, *, digest: str | None = None, name: str | None = None)
     if not isinstance(content, dict) or text != _sealed(content):
         raise DamagedFileError(path, "its bytes are not those that were written")
     seal.check_job(path, content.get("vibsim_format"), str(content.get("digest")), digest)
-    found = f"{content.get('collection')}/{content.get('experiment')}"
-    if name is not None and found != name:
-        raise StaleFileError(path, f"it is {found}, wanted is {name}")
+    stored = f"{content.get('collection')}/{content.get('experiment')}"
+    if name is not None and stored != name:
+        raise StaleFileError(path, f"it is {stored}, wanted is {name}")
     return content
 
 

@@ -1,4 +1,4 @@
-"""Results as one tree of xarray: every file of an experiment is a node under the name of the file."""
+"""Results as an `xarray.DataTree`: every file of an experiment is a node with the name of the file."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from vibsim.store.summary import read_json
 
 SUMMARY = "summary.json"
 FILES = "level_*", "convergence.nc", "best.nc"
-"""What holds data in the folder of an experiment."""
-STATED = "title", "collection", "experiment", "status"
-"""What the node of an experiment has as attributes, from its summary."""
+"""Patterns of the data files and folders of an experiment."""
+ATTRIBUTES = "title", "collection", "experiment", "status"
+"""Fields of the summary that become attributes of the node of an experiment."""
 
 
 def open(  # noqa: A001
@@ -23,24 +23,24 @@ def open(  # noqa: A001
 ) -> xr.DataTree:
     """Open the results of one experiment, or of all experiments below a folder, as one tree.
 
-    An experiment has the nodes ``level_06``, ``level_07``, ..., one for each level, ``convergence`` with its group
-    ``checks``, and ``best`` where it has been made: what stands in the files of these names. The files of a sweep's
-    level are joined along `case`. Values are read when they are used; close the tree, or use it in a ``with`` block.
+    The nodes of an experiment have the names and the content of its files: ``level_06``, ``level_07``, ..., one for
+    each level, ``convergence`` with its group ``checks``, and ``best`` if it was made. The files of a level of a sweep
+    are joined along `case`. Values are loaded lazily: close the tree, or use it in a ``with`` block.
 
     Parameters
     ----------
     path
-        The folder of an experiment, such as ``results/pendulum_lab/theta_convergence``, or one above it.
+        The folder of an experiment, such as ``results/pendulum_lab/theta_convergence``, or a folder above it.
     chunks
-        Sizes of chunks by dimension: arrays are then those of dask, which must be installed. Without them the files of
-        a level that has several are read at once.
+        Sizes of chunks by dimension: arrays are then dask arrays, and dask must be installed. Without it, a level of
+        several files is loaded at once.
 
     Raises
     ------
     VibsimError
-        Where there is no folder with results.
+        Where the folder does not exist or has no results.
     DamagedFileError
-        Where a file is not as it was written.
+        Where a file was changed after it was written.
     """
     folder = Path(path)
     if not folder.is_dir():
@@ -52,26 +52,26 @@ def open(  # noqa: A001
 
 
 def _nodes(folder: Path, chunks: Mapping[str, int] | None) -> Iterator[tuple[str, xr.Dataset]]:
-    """Yield the nodes below a folder by their paths; nothing where no results are."""
-    named = [part for name in FILES for part in folder.glob(name)]
-    # level_30.yaml, for one, is an experiment file
-    found = sorted(part for part in named if part.is_dir() or part.suffix == ".nc")
-    if not found:
-        for part in sorted(part for part in folder.iterdir() if part.is_dir()):
-            for name, dataset in _nodes(part, chunks):
-                yield f"/{part.name}{name}", dataset
+    """Yield path and dataset of every node below a folder; nothing if it has no results."""
+    matches = [path for pattern in FILES for path in folder.glob(pattern)]
+    # level_30.yaml, for example, is an experiment file
+    results = sorted(path for path in matches if path.is_dir() or path.suffix == ".nc")
+    if not results:
+        for subfolder in sorted(path for path in folder.iterdir() if path.is_dir()):
+            for name, dataset in _nodes(subfolder, chunks):
+                yield f"/{subfolder.name}{name}", dataset
         return
     summary = folder / SUMMARY
-    # there is none before the analysis
+    # the analysis writes it
     content = read_json(summary) if summary.exists() else {}
-    yield "/", xr.Dataset(attrs={name: content[name] for name in STATED if name in content})
-    for part in found:
-        files = sorted(part.glob("shard_*.nc")) if part.is_dir() else [part]
+    yield "/", xr.Dataset(attrs={name: content[name] for name in ATTRIBUTES if name in content})
+    for path in results:
+        files = sorted(path.glob("shard_*.nc")) if path.is_dir() else [path]
         if not files:
             continue
         for file in files:
             reading.check(file)
-        name = f"/{part.stem}"
+        name = f"/{path.stem}"
         if len(files) == 1:
             for group, dataset in xr.open_groups(files[0], chunks=chunks).items():
                 yield name + group.rstrip("/"), dataset
@@ -81,8 +81,8 @@ def _nodes(folder: Path, chunks: Mapping[str, int] | None) -> Iterator[tuple[str
 
 
 def _joined(parts: list[xr.Dataset]) -> xr.Dataset:
-    """Join the files of a level along the member; what does not depend on it is the same in all."""
-    if all("case" not in part.dims for part in parts):  # a file of a solver holds one member
+    """Join the files of a level along `case`; variables without this dimension are the same in all files."""
+    if all("case" not in part.dims for part in parts):  # a file of a user's solver holds one member
         numbered = [part.assign_coords(case=number) for number, part in enumerate(parts)]
         return xr.concat(
             numbered,

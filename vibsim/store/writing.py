@@ -1,8 +1,8 @@
-"""Records as netCDF files: CF conventions, no clock time, the same bytes for the same content.
+"""Write Records as netCDF files: CF conventions, no clock time, the same bytes for the same content.
 
-Series of files of a moderate size are compressed, which saves about half of the space. Everything else is contiguous
-and uncompressed: compression takes ten times as long as writing, which only small data are worth. Each
-file says which job made it (``digest``) and from what (``provenance``), and ends with a seal over all its bytes.
+In files of moderate size, series are compressed, which saves about half of the space. All other data are contiguous and
+uncompressed, because compression takes ten times as long as writing. Each file states its job (``digest``) and what the
+job used (``provenance``), and ends with a seal over all its bytes.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from vibsim.store.atomic import check_room, replacing
 
 CONVENTIONS = "CF-1.11"
 _CHUNK = 2**18
-"""Bytes of whole members that are compressed together, and read together, at least one."""
+"""Size of the chunks of compressed variables [bytes]: as many whole members as fit, at least one."""
 _OURS = (
     *("Conventions", "history", "vibsim_format", "digest", "provenance", "integrity"),
     "coordinates",
@@ -49,27 +49,28 @@ def write_parts(
 ) -> None:
     """Write `parts`, consecutive ranges of members, to one netCDF file, in one step.
 
-    The bytes are those of everything at once, whatever the parts. The old file stays until the new one is whole.
+    The bytes of the file do not depend on the division into parts. An old file stays until the new one is complete.
 
     Parameters
     ----------
     parts
-        In the order of their members; asked for one by one. All have the same variables with the same dimensions and
-        types. What has no dimension ``case`` is taken from the last part, so that it may be found on the way; the
-        attributes, which need a ``title``, are taken from the first. Each variable needs a ``long_name``, each but
-        texts and flags also ``units``. Texts along ``case`` come in a type that is wide enough for all of them.
+        In the order of their members, consumed one by one. All parts have the same variables, with the same dimensions
+        and types. Variables without the dimension ``case`` are taken from the last part, so that they may depend on all
+        parts; the attributes, which need a ``title``, are taken from the first part. Each variable needs a
+        ``long_name``, and ``units`` unless it holds strings or flags. The type of strings along ``case`` must be wide
+        enough for the strings of all parts.
     cases
-        Number of members of all parts.
+        Total number of members.
     digest
-        Digest of the job that made them.
+        Digest of the job that made the parts.
     provenance
         What the job used, JSON-able.
 
     Raises
     ------
     ValueError
-        When a name, a unit or the title is missing, when values have no netCDF type, and where the parts do not belong
-        together or are not `cases` members.
+        Where a name, a unit or the title is missing, values have no netCDF type, or the parts do not belong together or
+        do not have `cases` members in total.
     OSError
         Where the file cannot be written, with the cause.
     """
@@ -90,7 +91,7 @@ def write_parts(
                     raise ValueError(text)
                 _put_all(dataset, part, None)
         except (OSError, RuntimeError) as error:
-            # what raised it may be a part that is worked out here
+            # an error from the computation of a part needs no explanation
             if netcdf.is_from_library(error):
                 check_room(temporary, _size(part, cases))
             raise
@@ -102,7 +103,7 @@ def _rows(record: Record) -> dict[str, Variable]:
 
 
 def _size(part: Record | None, cases: int) -> int:
-    """Return how many bytes the values take in a file like `part` of `cases` members, at least about."""
+    """Return the approximate size of a file of `cases` members like those of `part` [bytes]."""
     if part is None:
         return 0
     share = cases / max(part.sizes.get("case", cases), 1)
@@ -115,7 +116,7 @@ def _size(part: Record | None, cases: int) -> int:
 def _global_attributes(
     record: Record, digest: str, provenance: Mapping[str, Any]
 ) -> dict[str, Attribute]:
-    # the auxiliary coordinates that belong to no data variable
+    # CF: auxiliary coordinates of no data variable are named in the global attribute ``coordinates``
     used = {c for n, v in record.variables.items() for c in _auxiliary(record, n, v)}
     leftover = [n for n, v in record.coords.items() if (n,) != v.dims and n not in used]
     return {
@@ -131,7 +132,7 @@ def _global_attributes(
 
 
 def _auxiliary(record: Record, name: str, variable: Variable) -> list[str]:
-    """Name the coordinates of a data variable that are not those of its own dimensions."""
+    """Return the names of the auxiliary coordinates of a data variable."""
     if name in record.coords:
         return []
     return [
@@ -149,13 +150,13 @@ def _define(
     digest: str,
     provenance: Mapping[str, Any],
 ) -> None:
-    """Write the attributes of the file, the dimensions, and every variable without its values."""
+    """Write the global attributes, the dimensions, and every variable without its values."""
     if not record.attrs.get("title"):
         raise ValueError(f"{name}: a stored record needs a title")
     dataset.setncatts(_global_attributes(record, digest, provenance))
     for dim, size in record.sizes.items():
         dataset.createDimension(dim, cases if dim == "case" else size)
-    # what is large is compressed, but not where storage is lean, which many members share
+    # lean storage has no series, only scalars of many members
     packed = record.attrs.get("storage") != "lean" and _size(record, cases) <= PACKED_UP_TO
     for key, variable in _rows(record).items():
         _define_variable(dataset, key, variable, _auxiliary(record, key, variable), packed)
@@ -188,29 +189,29 @@ def _define_variable(
 def _storage(
     dataset: Any, dims: tuple[str, ...], kind: np.dtype[Any], packed: bool
 ) -> dict[str, Any]:
-    """Return how the values of a variable lie in the file, which has at least one.
+    """Return the storage options of a variable that has values.
 
-    A dimension without points is an unlimited one in netCDF, which excludes contiguous storage.
+    (A dimension of size 0 would be unlimited in netCDF, and contiguous storage impossible.)
     """
     sizes = [len(dataset.dimensions[dim]) for dim in dims]
     size = math.prod(sizes) * kind.itemsize
     if not packed or kind.kind != "f" or size < PACKED_FROM:
         return {"contiguous": True}
     members = sizes[dims.index("case")] if "case" in dims else 1
-    together = max(1, min(members, _CHUNK * members // size))
+    chunk = max(1, min(members, _CHUNK * members // size))
     return {
         "compression": "zlib",
         "complevel": 1,
         "shuffle": True,
-        # whole members, in their order, of which none leaves the cache before the file is closed: the bytes are the
-        # same whatever parts they come in
-        "chunksizes": [together if d == "case" else n for d, n in zip(dims, sizes, strict=True)],
+        # chunks hold whole members and stay in the cache until the file is closed, so that the bytes do not depend on
+        # the division into parts
+        "chunksizes": [chunk if d == "case" else n for d, n in zip(dims, sizes, strict=True)],
         "chunk_cache": 2 * size,
     }
 
 
 def _put_all(dataset: Any, part: Record, cases: slice | None) -> None:
-    """Write everything along ``case`` for some members; None: what all members share."""
+    """Write the variables along ``case`` for the members `cases`, or for None those without this dimension."""
     table = _rows(part)
     if set(table) != {name for name, _, _ in netcdf.variables(dataset)}:
         raise ValueError("parts of one file hold different variables")
@@ -233,14 +234,14 @@ def _put(target: Any, name: str, variable: Variable, cases: slice | None) -> Non
 
 
 def _width(values: NDArray[Any]) -> int:
-    """Return how many bytes a text takes at most: as many as its type says, or as these texts have."""
+    """Return the number of bytes of the longest string: the width of the type, or of these strings if larger."""
     declared = values.dtype.itemsize // 4 if values.dtype.kind == "U" else 1
     encoded = np.char.encode(values.astype(str), "utf-8")
     return max(declared, encoded.dtype.itemsize, 1)
 
 
 def _characters(name: str, values: NDArray[Any], width: int) -> NDArray[Any]:
-    """Return texts as `width` bytes along one more dimension: the CF checker stops at strings."""
+    """Return strings as `width` bytes along one more dimension, because the CF checker fails on netCDF strings."""
     encoded = np.char.encode(values.astype(str), "utf-8")
     if encoded.dtype.itemsize > width:
         raise ValueError(f"{name}: a text is longer than the {width} bytes of those before it")
@@ -261,7 +262,7 @@ def _attributes(name: str, variable: Variable, values: NDArray[Any]) -> dict[str
 
 
 def _plain(value: Attribute) -> Attribute:
-    """Return `value` in the type that CF knows: integers of 32 bits where they fit."""
+    """Return an attribute value with a type that CF allows: integers become 32-bit where they fit."""
     array = np.asarray(value)
     if array.dtype.kind == "i" and np.all(np.abs(array) < 2**31):
         return array.astype(np.int32)

@@ -20,6 +20,6 @@ rule analyse:
     params:
         digest=names.analysis_digest,
         file=names.file,
-        given=names.given,
+        given=names.setting_flags,
     shell:
         'exec > {log:q} 2>&1; cd / && exec vibsim analyse {params.file:q} {params.given:q} --results "$OLDPWD" --discard --threads {threads:q} --digest {params.digest:q}'

@@ -18,6 +18,6 @@ rule extrapolate:
     params:
         digest=names.extrapolation_digest,
         file=names.file,
-        given=names.given,
+        given=names.setting_flags,
     shell:
         'exec > {log:q} 2>&1; cd / && exec vibsim extrapolate {params.file:q} {params.given:q} --results "$OLDPWD" --discard --digest {params.digest:q}'

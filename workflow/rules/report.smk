@@ -65,6 +65,6 @@ rule report:
     params:
         digest=names.report_digest,
         file=names.file,
-        given=names.given,
+        given=names.setting_flags,
     shell:
         'exec > {log:q} 2>&1; cd / && exec vibsim report {params.file:q} {params.given:q} --results "$OLDPWD" --discard --digest {params.digest:q}'

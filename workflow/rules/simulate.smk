@@ -22,7 +22,7 @@ for simulation in names.simulations:
             levels=simulation.levels,
             shard=simulation.shard,
             file=simulation.file,
-            given=names.given,
+            given=names.setting_flags,
             flags=names.level_flags,
         shell:
             'exec > {log:q} 2>&1; cd / && exec vibsim simulate {params.file:q} {params.given:q} --level {params.levels:q} --shard {params.shard:q} --results "$OLDPWD" --threads {threads:q} --digest {params.digest:q} {params.flags}'

@@ -1,1 +1,1 @@
-"""The commands beside ``vibsim run`` and the jobs of the workflow, a file each."""
+"""The commands other than ``vibsim run`` and the jobs of the workflow, one file each."""

@@ -1,7 +1,7 @@
-"""``vibsim completion``: what a shell needs to complete commands, options and names, and what it may offer.
+"""``vibsim completion``: scripts that let a shell complete commands, options and names, and the words they offer.
 
-The scripts hold no list: they ask ``vibsim completion words -- WORD ...`` for what may stand at the last word. What is
-none of ours is left to the shell, which completes files.
+The scripts contain no lists: they call ``vibsim completion words -- WORD ...`` for the candidates of the last word.
+Where this prints none, the shell completes file names.
 """
 
 from __future__ import annotations
@@ -44,11 +44,11 @@ _NAMES = {
     **dict.fromkeys(("scheme", "schemes"), ("vibsim.schemes", "SCHEMES")),
     "checks": ("vibsim.experiment.value_names", "VALUES"),
 }
-"""Where the names stand that an option or a place may hold, by what it is called."""
+"""Module and attribute with the valid names of an option or a positional argument, by its name or metavar."""
 
 
 def completion(options: Namespace) -> int:
-    """Print the script of a shell, or the words that may stand at the end of a command line."""
+    """Print the script for a shell, or the candidates for the last word of a command line."""
     if options.shell == WORDS:
         for word in candidates(options.words or [""]):
             print(word)
@@ -58,40 +58,40 @@ def completion(options: Namespace) -> int:
 
 
 def candidates(words: Sequence[str]) -> list[str]:
-    """Return what may stand at the place of the last of some words behind ``vibsim``; it may be begun, or empty."""
-    *before, begun = words
-    return sorted({word for word in _offered(before, begun) if word.startswith(begun)})
+    """Return the candidates for the last of the words after ``vibsim``, which may be incomplete or empty."""
+    *before, prefix = words
+    return sorted({word for word in _offered(before, prefix) if word.startswith(prefix)})
 
 
-def _offered(before: Sequence[str], begun: str) -> Iterable[str]:
+def _offered(before: Sequence[str], prefix: str) -> Iterable[str]:
     from vibsim.cli.arguments import commands
 
     known = {name: rows for name, _, _, rows in commands()}
     if not before:
         return [*known, "--help", "--version"]
-    command, *others = before
+    command, *arguments = before
     if command not in known:
         return []
     rows = [((n,) if isinstance(n, str) else n, settings) for n, settings in known[command]]
-    places = [(names[0], settings) for names, settings in rows if not names[0].startswith("-")]
+    slots = [(names[0], settings) for names, settings in rows if not names[0].startswith("-")]
     options = {name: settings for names, settings in rows for name in names if name[0] == "-"}
-    last = options.get(others[-1], {}) if others else {}
+    last = options.get(arguments[-1], {}) if arguments else {}
     if "metavar" in last or "choices" in last:
-        return _of(last, others[-1].lstrip("-"), others)
-    if begun.startswith("-"):
+        return _values(last, arguments[-1].lstrip("-"), arguments)
+    if prefix.startswith("-"):
         return [*options, "--help"]
-    given = _positional(others, options)
-    if not places:
+    positional = _positional(arguments, options)
+    if not slots:
         return []
-    place = places[min(len(given), len(places) - 1)]
-    if len(given) >= len(places) and place[1].get("nargs") not in ("+", "*"):
+    name, settings = slots[min(len(positional), len(slots) - 1)]
+    if len(positional) >= len(slots) and settings.get("nargs") not in ("+", "*"):
         return []
-    return _of(place[1], place[0], given)
+    return _values(settings, name, positional)
 
 
 def _positional(words: Sequence[str], options: dict[str, dict[str, object]]) -> list[str]:
-    """Return the words that are neither options nor their values."""
-    found, is_value = [], False
+    """Return the words that are neither options nor values of options."""
+    positional, is_value = [], False
     for word in words:
         if word.startswith("-"):
             row = options.get(word, {})
@@ -99,21 +99,21 @@ def _positional(words: Sequence[str], options: dict[str, dict[str, object]]) -> 
         elif is_value:
             is_value = False
         else:
-            found.append(word)
-    return found
+            positional.append(word)
+    return positional
 
 
-def _of(settings: dict[str, object], name: str, given: Sequence[str]) -> Iterable[str]:
-    """Return the words of an option or a place: its choices, or the names that it may hold."""
+def _values(settings: dict[str, object], name: str, before: Sequence[str]) -> Iterable[str]:
+    """Return the values of an option or a positional argument: its choices, or the valid names."""
     choices = settings.get("choices")
     if isinstance(choices, Iterable):
         return [str(choice) for choice in choices]
     metavar = str(settings.get("metavar"))
-    # an entry of a list is named behind the list
-    what = given[0] if name == "name" and given else name
-    if metavar in ("EXPERIMENT", "A", "B") or what in ("experiments", "like"):
+    # the argument before NAME says which list the name is from
+    kind = before[0] if name == "name" and before else name
+    if metavar in ("EXPERIMENT", "A", "B") or kind in ("experiments", "like"):
         return _experiments()
-    module, names = _NAMES.get(metavar) or _NAMES.get(what, ("", ""))
+    module, names = _NAMES.get(metavar) or _NAMES.get(kind, ("", ""))
     return list(getattr(import_module(module), names)) if module else []
 
 

@@ -1,4 +1,4 @@
-"""``vibsim diff``: what differs between two experiments, or two results: settings, verdicts and numbers."""
+"""``vibsim diff``: the differences between two experiments or two results in settings, verdicts and numbers."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from vibsim.store import read_json
 
 _DIGITS = 6
 _RESULTS = ("summary.json", "convergence.nc", "report.html")
-"""Files that stand for the folder of results that they are in."""
+"""A user may name a results folder by one of these files in it."""
 
 
 class Side(NamedTuple):
@@ -29,11 +29,11 @@ class Side(NamedTuple):
     """The settings that its results depend on, in normal form."""
     title: str
     summary: Mapping[str, Any] | None
-    """Its verdicts; None where there are none of these settings."""
+    """Its verdicts; None if there are none for these settings."""
 
 
 def diff(options: Namespace) -> int:
-    """Show the differences; the exit status is 0 where there is none, and 1 where there are some."""
+    """Print the differences; return 1 if there are any, else 0."""
     results = chosen_results(options)
     words = (options.first, options.second)
     first, second = sides = [_side(word, results) for word in words]
@@ -60,7 +60,7 @@ def diff(options: Namespace) -> int:
 
 
 def _side(word: str, results: Path) -> Side:
-    """Return what a word means: a folder of results, or an experiment with the results that it may have.
+    """Return the side that a word names: a folder of results, or an experiment with its current results, if any.
 
     Raises
     ------
@@ -76,15 +76,15 @@ def _side(word: str, results: Path) -> Side:
         made = read_provenance(folder / "convergence.nc")
         return Side(made["experiment"], str(summary["title"]), summary)
     plan = one_plan_of(word)
-    found = None
+    current = None
     if (results / plan.summary).exists():
-        found = read_json(results / plan.summary, name=plan.key)
-        found = found if found.get("digest") == plan.analysis else None
-    return Side(analysed(plan.content), plan.title, found)
+        current = read_json(results / plan.summary, name=plan.key)
+        current = current if current.get("digest") == plan.analysis else None
+    return Side(analysed(plan.content), plan.title, current)
 
 
 Pair = tuple[str, Mapping[str, Any] | None, Mapping[str, Any] | None]
-"""Name of a check, and it on both sides, None where there is none."""
+"""Name of a check, and the check on both sides; None where a side has no such check."""
 
 
 def _pairs(first: Mapping[str, Any], second: Mapping[str, Any]) -> list[Pair]:
@@ -100,7 +100,7 @@ def _verdicts(pairs: Sequence[Pair]) -> Iterator[Change]:
 
 
 def _numbers(pairs: Sequence[Pair]) -> Iterator[Change]:
-    """Compare the numbers of the results that both sides list."""
+    """Compare the numbers of those results that both sides list."""
     for name, *sides in pairs:
         old, new = ({} if row is None else _facts(row) for row in sides)
         for key in (key for key in old if key in new):
@@ -109,19 +109,19 @@ def _numbers(pairs: Sequence[Pair]) -> Iterator[Change]:
 
 
 def _facts(check: Mapping[str, Any]) -> dict[str, float]:
-    """Return the numbers of a check by scheme, member and name, these only where there are several."""
+    """Return the numbers of a check by name, preceded by scheme and member where there are several."""
     rows = check["results"]
     several = len({row["scheme"] for row in rows}) > 1, len({row["case"] for row in rows}) > 1
-    found = {}
+    facts = {}
     for row in rows:
         place = [row["scheme"]] * several[0] + [f"case {row['case']}"] * several[1]
         for name, value in row["facts"].items():
             if isinstance(value, float) and math.isfinite(value):
-                found[".".join([*place, name])] = value
-    return found
+                facts[".".join([*place, name])] = value
+    return facts
 
 
 def _written(old: float, new: float) -> tuple[str, str]:
-    """Write two numbers with as many digits as tell them apart."""
+    """Return two different numbers as text, with enough digits to tell them apart."""
     texts = ((f"{old:.{digits}g}", f"{new:.{digits}g}") for digits in range(_DIGITS, 18))
     return next(pair for pair in texts if pair[0] != pair[1])

@@ -1,6 +1,6 @@
-"""``vibsim explain``: what the reason of a verdict means, why it happens, and what would settle the question.
+"""``vibsim explain``: what the reason of a verdict means, and what would settle the question.
 
-The words are those of the pages (`vibsim.report.text.reasons`).
+The texts are those of the reports (`vibsim.report.text.reasons`).
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ def explain(options: Namespace) -> int:
     if options.reason is None:
         width = max(map(len, REASONS))
         for status in STATUSES:
-            for word in (word for word, of in REASONS.items() if of == status):
+            for word in (word for word, own in REASONS.items() if own == status):
                 print(f"{word.ljust(width)}  {terminal.painted(status, status)}")
         return 0
     if options.reason not in REASONS:
@@ -48,19 +48,18 @@ def _lines(word: str) -> Iterator[str]:
 
 
 def meanings(word: str) -> Iterator[tuple[str, Reason]]:
-    """Yield what a reason means, and behind "For" what else it means for some kinds of checks."""
+    """Yield an introduction and the meaning of a reason: the general one, then those for some kinds of checks."""
     from vibsim.report.text.reasons import REASONS as EXPLAINED
     from vibsim.report.text.reasons import reason
 
-    own = EXPLAINED[word]
-    yield "", own
-    # what a kind of check means by the same word
-    kinds_of: dict[Reason, list[str]] = {}
+    general = EXPLAINED[word]
+    yield "", general
+    kinds_by_reason: dict[Reason, list[str]] = {}
     for kind in DECISIVE:
-        kinds_of.setdefault(reason(word, kind), []).append(f"`{kind}`")
-    for other, kinds in kinds_of.items():
-        if other != own:
-            yield f"For {', '.join(kinds)}: ", other
+        kinds_by_reason.setdefault(reason(word, kind), []).append(f"`{kind}`")
+    for special, kinds in kinds_by_reason.items():
+        if special != general:
+            yield f"For {', '.join(kinds)}: ", special
     promised = reason(word, "converges", is_promised=True)
-    if promised != own:
+    if promised != general:
         yield "Where the scheme promises that order: ", promised

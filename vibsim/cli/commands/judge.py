@@ -1,4 +1,4 @@
-"""``vibsim judge``: whether the results of any solver converge, from a table or from netCDF files."""
+"""``vibsim judge``: decide whether the results of any solver converge, from a table or from netCDF files."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _COMMAND = "vibsim judge"
 
 
 def judge(options: Namespace) -> int:
-    """Judge every quantity, show the verdicts, and write the report that is asked for."""
+    """Judge every quantity, print the verdicts, and write the report if the user requests it."""
     if options.order is not None and options.at_least is not None:
         _refuse("--at-least", f"{options.at_least:g}", "must not be given together with --order")
     if options.report:
@@ -57,7 +57,7 @@ def _refuse(key: str, value: str, rule: str, hint: str = "") -> NoReturn:
 
 
 def _studies(options: Namespace) -> list[Study]:
-    """Read what is to be judged: one table, or netCDF files."""
+    """Read the results to be judged, from one table or from netCDF files."""
     from vibsim.solver import level_files
 
     paths: list[Path] = options.files
@@ -79,7 +79,7 @@ def _studies(options: Namespace) -> list[Study]:
 
 def _exact(entries: Sequence[str] | None, known: Sequence[str]) -> Mapping[str, Decimal]:
     """Return the exact values by quantity, from ``QUANTITY=VALUE``."""
-    found: dict[str, Decimal] = {}
+    exact: dict[str, Decimal] = {}
     for entry in entries or ():
         name, has_value, text = entry.rpartition("=")
         name = name.strip()
@@ -87,23 +87,23 @@ def _exact(entries: Sequence[str] | None, known: Sequence[str]) -> Mapping[str, 
             _refuse("--exact", entry, "must be QUANTITY=VALUE", f"such as {known[0]}=1.5")
         if name not in known:
             _refuse("--exact", name, "is no quantity that is judged", nearest(name, list(known)))
-        if name in found:
+        if name in exact:
             _refuse("--exact", name, "is given twice")
         try:
-            # the digits as they are written say how far the value may be rounded
-            found[name] = Decimal(text)
+            # a Decimal, since the number of digits shows how far the value may be rounded
+            exact[name] = Decimal(text)
         except InvalidOperation:
-            found[name] = Decimal("nan")
-        if not found[name].is_finite() or not math.isfinite(float(found[name])):
+            exact[name] = Decimal("nan")
+        if not exact[name].is_finite() or not math.isfinite(float(exact[name])):
             _refuse("--exact", entry, "its value must be a finite number")
-    return found
+    return exact
 
 
 def _judged(study: Study, options: Namespace, exact: Decimal | None) -> LadderVerdict:
     from vibsim.convergence.study.judgement import verdicts
 
     try:
-        (found,) = verdicts(
+        (verdict,) = verdicts(
             study.h,
             study.values,
             quantity=study.quantity,
@@ -114,7 +114,7 @@ def _judged(study: Study, options: Namespace, exact: Decimal | None) -> LadderVe
             restrict=options.restrict or "subset",
         )
     except InputError as error:
-        # what the library says of its arguments is of these files
+        # the library names its arguments; add the files that they come from
         more = len(study.files) - 1
         file = f"{study.files[0]} and {more} more" if more else study.files[0]
         faults = (
@@ -122,17 +122,16 @@ def _judged(study: Study, options: Namespace, exact: Decimal | None) -> LadderVe
             for fault in error.faults
         )
         raise InputError(faults) from None
-    return found
+    return verdict
 
 
 def _text(verdicts: Sequence[LadderVerdict]) -> list[str]:
     """Return the lines for a terminal."""
     from vibsim.convergence.study.terminal import COLUMNS, as_text
 
-    # what goes to a file has a width of its own
     columns = shutil.get_terminal_size().columns if sys.stdout.isatty() else COLUMNS
     lines = [f"{as_text(verdict, columns)}\n" for verdict in verdicts]
     statuses = [verdict.status for verdict in verdicts]
-    counted = "1 quantity" if len(verdicts) == 1 else f"{len(verdicts)} quantities"
-    lines.append(f"{counted}, {statuses.count('PASS')} passed: {worst(statuses)}")
+    total = "1 quantity" if len(verdicts) == 1 else f"{len(verdicts)} quantities"
+    lines.append(f"{total}, {statuses.count('PASS')} passed: {worst(statuses)}")
     return lines

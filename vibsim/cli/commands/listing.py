@@ -1,4 +1,4 @@
-"""``vibsim list``: what there is to choose from."""
+"""``vibsim list``: list models, schemes, checks or experiments."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ if TYPE_CHECKING:
 
 
 def list_(options: Namespace) -> int:
-    """Print the names and what they mean, of installed packages all that can be had.
+    """Print the names with a description, also those that installed packages offer.
 
     Raises
     ------
     InputError
-        Behind the list, where a package offers something that cannot be had.
+        After the list, where the offer of a package cannot be loaded.
     """
     if options.name is not None:
         return _one(options.what, options.name)
@@ -55,19 +55,19 @@ def list_(options: Namespace) -> int:
 
 
 def _one(what: str, name: str) -> int:
-    """Print one entry in full: of models and schemes all there is to know, of other lists its line."""
+    """Print one entry: all properties of a model or a scheme, or the line of another list."""
     if what in ("models", "schemes"):
         print(*in_full(what, name), sep="\n")
         return 0
     if what == "schema":
         raise refusal("NAME", name, "the JSON Schema has no entries")
     rows = [(key.strip(), text) for key, text in (checks() if what == "checks" else _experiments())]
-    found = [row for row in rows if name in (row[0], row[0].rpartition("/")[2])]
-    if not found:
+    matches = [row for row in rows if name in (row[0], row[0].rpartition("/")[2])]
+    if not matches:
         known = [key for key, _ in rows]
         names = [*known, *(key.rpartition("/")[2] for key in known if "/" in key)]
         raise refusal("NAME", name, f"is not in the list of {what}", nearest(name, names))
-    for key, text in found:
+    for key, text in matches:
         print(f"{key}: {text}")
     return 0
 
@@ -79,7 +79,7 @@ def _models(models: Iterable[Model]) -> Iterable[tuple[str, str]]:
         )
         shape = "linear" if model.linear else "nonlinear"
         if model.written is not None:
-            # the file decides
+            # it depends on the experiment file
             shape = ""
         if model.formulas:
             shape = f"formulas {', '.join(row.name for row in model.formulas)}"
@@ -88,7 +88,7 @@ def _models(models: Iterable[Model]) -> Iterable[tuple[str, str]]:
 
 
 def _schemes(schemes: Collection[Scheme]) -> Iterable[tuple[str, str]]:
-    """Yield a line of facts for each scheme, then what it is and where it comes from, then its options."""
+    """Yield for each scheme a line of facts, then its title and source, then its options."""
     head = ("order", "step", "symplectic", "forces/step", "stability limit")
     columns = {scheme.kind: facts(scheme) for scheme in schemes}
     widths = [max(map(len, column)) for column in zip(head, *columns.values(), strict=True)]
@@ -105,7 +105,7 @@ def _schemes(schemes: Collection[Scheme]) -> Iterable[tuple[str, str]]:
 
 
 def checks() -> Iterable[tuple[str, str]]:
-    """Yield the kinds of checks, and behind `value` every number that it takes."""
+    """Yield the kinds of checks, and after `value` every number that it accepts."""
     from vibsim.experiment.value_names import VALUES
 
     drifts = "{conserves: energy | energy_d2t, drift: none | bounded | linear | quadratic}"

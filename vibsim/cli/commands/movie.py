@@ -1,4 +1,4 @@
-"""``vibsim movie``: the movie of an experiment that has been run."""
+"""``vibsim movie``: write the movie of an experiment that has been run."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 FPS = {"gif": 10.0}
 DEFAULT_FPS, MOST_FPS = 25.0, 100.0
 MOST_GIF_FRAMES = 600
-"""Of a GIF, whose frames are all in memory before it is written."""
+"""Most frames of a GIF, all of which are in memory before it is written."""
 DOTS = {"gif": 80.0}
 DEFAULT_DOTS = 120.0  # per inch
 
@@ -37,7 +37,7 @@ def movie(options: Namespace) -> int:
     Raises
     ------
     VibsimError
-        Where there are no results, or none over time, or what writes the format is not installed.
+        Where there are no results, they have no time series, or the encoder of the format is not installed.
     """
     from vibsim.report.movie import drawing, encoding
 
@@ -49,31 +49,31 @@ def movie(options: Namespace) -> int:
     _check_numbers(options, form)
     film = _film(plan, options, form)
     frames = drawing.frames(film, DOTS.get(form, DEFAULT_DOTS))
-    count, said = film.t.size, "1 frame" if film.t.size == 1 else f"{film.t.size} frames"
+    count, words = film.t.size, "1 frame" if film.t.size == 1 else f"{film.t.size} frames"
     if options.frames_to is not None:
         _check_folder(options.frames_to, count)
-    frames = _counted(_kept(frames, options.frames_to), count)
+    frames = _counted(_saved(frames, options.frames_to), count)
     if output is None:
         for _ in frames:
             pass
     else:
         write_bytes(output, encoding.movie(frames, _fps(options, form), form))
-        print(f"{output}: {said}, {count / _fps(options, form):.1f} s")
+        print(f"{output}: {words}, {count / _fps(options, form):.1f} s")
     if options.frames_to is not None:
-        print(f"{options.frames_to}: {said}")
+        print(f"{options.frames_to}: {words}")
     if film.is_cut:
-        last, rest = f"{film.stop:.5g}", "or see all of it with --frames N"
-        print(f"to t = {last} of {film.end:.5g}; go on with --from {last}, {rest}")
+        last, hint = f"{film.stop:.5g}", "or see all of it with --frames N"
+        print(f"to t = {last} of {film.end:.5g}; go on with --from {last}, {hint}")
     return 0
 
 
 def _form(output: Path) -> str:
-    """Return the format of a movie, which its ending names."""
+    """Return the format of a movie, from the suffix of its file."""
     from vibsim.report.movie import encoding
 
     form = output.suffix.removeprefix(".").lower()
     if form not in encoding.FORMATS:
-        known = [f".{one}" for one in encoding.FORMATS]
+        known = [f".{name}" for name in encoding.FORMATS]
         raise refusal("--output", output, f"must end in {', '.join(known[:-1])} or {known[-1]}")
     if not output.absolute().parent.is_dir():
         raise refusal("--output", output, "its folder does not exist")
@@ -91,9 +91,9 @@ def _check_numbers(options: Namespace, form: str) -> None:
         rule = f"must be at most {MOST_GIF_FRAMES} of a GIF; MP4 and WebM have no limit"
         raise refusal("--frames", options.frames, rule)
     for key in ("scheme", "level"):
-        given = getattr(options, key) or ()
-        if len(given) > 2:
-            raise refusal(f"--{key}", " ".join(map(str, given)), "must be one or two")
+        values = getattr(options, key) or ()
+        if len(values) > 2:
+            raise refusal(f"--{key}", " ".join(map(str, values)), "must be one or two")
 
 
 def _fps(options: Namespace, form: str) -> float:
@@ -101,7 +101,7 @@ def _fps(options: Namespace, form: str) -> float:
 
 
 def _film(plan: Plan, options: Namespace, form: str) -> Film:
-    """Return what is shown: what the options choose, else the finest level and what differs from it visibly."""
+    """Return the film of the chosen runs; by default the finest level, and a coarse run if it differs visibly."""
     from vibsim.report.movie import film
 
     if plan.has_solver:
@@ -119,8 +119,8 @@ def _film(plan: Plan, options: Namespace, form: str) -> Film:
     record = records[wanted_levels[0]]
     names = level_member.series(record)
     if not names:
-        rest = f"run one member alone: {called(command_to_run(f'{options.experiment}@{case}'))}"
-        raise VibsimError(f"{plan.key}: there are no series over time to be shown; {rest}")
+        hint = f"run one member alone: {called(command_to_run(f'{options.experiment}@{case}'))}"
+        raise VibsimError(f"{plan.key}: there are no series over time to be shown; {hint}")
     schemes = [chosen("--scheme", s, record.words("scheme")) for s in options.scheme or [None]]
     position = plan.experiment.model.definition.position
     wanted = options.quantity or (position if position in names else None)
@@ -132,8 +132,8 @@ def _film(plan: Plan, options: Namespace, form: str) -> Film:
     runs = [run(*pair) for pair in _pairs(wanted_levels, schemes)]
     if not (options.level or options.scheme) and len(made) > 1:
         records[made[0]] = level_member.of_level(plan, results, made[0], case)
-        others = [run(made[0], scheme) for scheme in record.words("scheme")]
-        other = max(others, key=lambda one: film.differs_visibly(one, runs[0]))
+        coarse = [run(made[0], scheme) for scheme in record.words("scheme")]
+        other = max(coarse, key=lambda candidate: film.differs_visibly(candidate, runs[0]))
         runs += [other] if film.differs_visibly(other, runs[0]) else []
     _check_times(options, runs)
     if any(level_member.is_outdated(plan, row, level, case) for level, row in records.items()):
@@ -146,7 +146,7 @@ def _film(plan: Plan, options: Namespace, form: str) -> Film:
 
 
 def _pairs(levels: Sequence[int], schemes: Sequence[str]) -> list[tuple[int, str]]:
-    """Return level and scheme of each run: what is named once holds for both."""
+    """Return level and scheme of each run; a single level or scheme applies to both runs."""
     count = max(len(levels), len(schemes))
     return [
         (levels[min(i, len(levels) - 1)], schemes[min(i, len(schemes) - 1)]) for i in range(count)
@@ -164,7 +164,7 @@ def _check_times(options: Namespace, runs: Sequence[Run]) -> None:
 
 
 def _check_folder(folder: Path, count: int) -> None:
-    """Refuse a folder with frames that would stay beside the new ones."""
+    """Refuse a folder with old frames that the new ones would not overwrite."""
     check_folder("--frames-to", folder)
     frame = re.compile(r"frame_(\d{4,})\.png")
     numbers = (frame.fullmatch(path.name) for path in folder.glob("frame_*.png"))
@@ -173,8 +173,8 @@ def _check_folder(folder: Path, count: int) -> None:
         raise refusal("--frames-to", folder, rule)
 
 
-def _kept(frames: Iterator[Pixels], folder: Path | None) -> Iterator[Pixels]:
-    """Yield frames, each after it was written to a folder."""
+def _saved(frames: Iterator[Pixels], folder: Path | None) -> Iterator[Pixels]:
+    """Yield the frames, and write each to a folder if there is one."""
     from vibsim.report.movie import encoding
 
     if folder is None:
@@ -187,7 +187,7 @@ def _kept(frames: Iterator[Pixels], folder: Path | None) -> Iterator[Pixels]:
 
 
 def _counted(frames: Iterator[Pixels], count: int) -> Iterator[Pixels]:
-    """Yield frames, and say on a terminal how many there are already."""
+    """Yield the frames, and show their number on a terminal."""
     is_shown = sys.stderr.isatty()
     for k, frame in enumerate(frames, 1):
         if is_shown:

@@ -1,4 +1,4 @@
-"""``vibsim new``: a commented experiment file to begin with, and the JSON Schema that its first line names."""
+"""``vibsim new``: write a commented experiment file to start from, and the JSON Schema that its first line names."""
 
 from __future__ import annotations
 
@@ -23,15 +23,15 @@ if TYPE_CHECKING:
     from vibsim.models import Model
 
 SCHEMA = "vibsim.schema.json"
-"""Name of the schema beside a file outside of the checkout."""
+"""Name of the schema that is written beside an experiment file outside of the checkout."""
 _NAME = re.compile("[a-z0-9_]+")
 EDITOR = "# yaml-language-server: $schema="
-"""Before the path of the JSON Schema, for editors that complete keys and mark faults."""
+"""Start of the line with the path of the JSON Schema, for editors that complete keys and mark faults."""
 _END, _FIRST, _LAST = 6.0, 6, 9
 _START = 0.5
-"""End of the time, levels, and initial value of the first position, with which every model resolves its motion."""
+"""End time, levels, and initial value of the first position: these levels resolve the motion of every model."""
 _WIDEST = 120
-"""Columns of a line at most."""
+"""Longest line [characters]."""
 STRUCTURE = [
     ("  mass: [1.0]", "M: its diagonal, rows, or a .mtx, .npy or .csv file"),
     ("  stiffness: [[1.0]]", "K, of as many rows as M"),
@@ -39,11 +39,11 @@ STRUCTURE = [
     ("  # load: {1: cos(0.5*t)}", "formulas in t by degree of freedom, counted from 1"),
     ("  # observe: {tip: 1}", "names of displacements; all when left out"),
 ]
-"""Lines of the section of a linear structure."""
+"""Lines of the model section of a linear structure, with comments."""
 
 
 def new(options: Namespace) -> int:
-    """Write a file of a model, or one like a shipped experiment; what is there already is not overwritten."""
+    """Write a new file for a model, or a copy of a shipped experiment; existing files are not overwritten."""
     file: Path = options.file
     if options.model and options.like:
         raise refusal("--like", options.like, "must not be given together with --model")
@@ -72,7 +72,7 @@ def new(options: Namespace) -> int:
 
 
 def _of_model(kind: str) -> list[str]:
-    """Return a file with a model, its default parameters, four levels and two checks."""
+    """Return the lines of a file with a model, its default parameters, four levels and two checks."""
     from vibsim.models import MODELS
 
     if kind not in MODELS:
@@ -81,7 +81,7 @@ def _of_model(kind: str) -> list[str]:
 
 
 def _like(word: str) -> tuple[list[str], dict[str, bytes]]:
-    """Return the lines of an experiment but that of its schema, and the tables that it names."""
+    """Return the lines of an experiment without that of its schema, and the tables that it names."""
     from vibsim.cli.chosen_plans import one_plan_of
 
     plan = one_plan_of(word)
@@ -91,17 +91,17 @@ def _like(word: str) -> tuple[list[str], dict[str, bytes]]:
     if plan.has_solver:
         rule = "has a solver of its own, whose programs and files are not copied; copy its folder"
         raise refusal("--like", word, rule)
-    found = {}
+    tables = {}
     for path, _ in plan.inputs:
         if Path(path).name != path:
             raise refusal("--like", word, f"it reads {path}, which is not in its own folder")
-        found[path] = (source.parent / path).read_bytes()
+        tables[path] = (source.parent / path).read_bytes()
     lines = source.read_text("utf-8").splitlines()
-    return [line for line in lines if not line.startswith(EDITOR)], found
+    return [line for line in lines if not line.startswith(EDITOR)], tables
 
 
 def _schema_of(file: Path) -> str:
-    """Return the path of the schema as the file names it: that of the checkout within it, else one beside the file."""
+    """Return the path of the schema relative to the file: within the checkout the shipped one, else one beside it."""
     root, folder = home(), file.parent.resolve()
     if folder.is_relative_to(root):
         return os.path.relpath(root / "workflow/schemas/experiment.schema.json", folder)
@@ -109,7 +109,7 @@ def _schema_of(file: Path) -> str:
 
 
 def _write_schema(path: Path) -> None:
-    """Write the schema of what is installed; one of an earlier vibsim is replaced, anything else is left alone."""
+    """Write the schema of the installed models and schemes; replace only a schema of vibsim."""
     from vibsim.experiment.schema.document import installed_schema
 
     content = installed_schema()
@@ -124,7 +124,7 @@ def _write_schema(path: Path) -> None:
 
 
 def _lines(model: Model) -> Iterator[str]:
-    """Yield the lines of a file of a model, behind that of its schema, with a comment on every key."""
+    """Yield the lines of the file for a model, after the line of its schema, with comments."""
     yield "# Check this file with `vibsim check FILE`, run it with `vibsim run FILE`, and see what it costs with"
     yield '# `vibsim plan FILE`. Numbers may have units: "50 cm".'
     yield f"title: {model.title} on four levels"
@@ -183,7 +183,7 @@ def _lines(model: Model) -> Iterator[str]:
 
 
 def _column(rows: list[tuple[str, str]]) -> Iterator[str]:
-    """Yield lines with their comments below each other; a long comment stands above its line."""
+    """Yield lines with their comments in one column; a long comment goes above its line."""
     width = max((len(line) for line, _ in rows), default=0)
     for line, comment in rows:
         if width + len(comment) + 4 > _WIDEST:

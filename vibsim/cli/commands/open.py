@@ -1,4 +1,4 @@
-"""``vibsim open``: the report of an experiment, or the index over all results, in the browser."""
+"""``vibsim open``: open the report of an experiment, or the index of all results, in the browser."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def open_(options: Namespace) -> int:
     Raises
     ------
     VibsimError
-        Where there is no such page yet.
+        Where the page does not exist yet.
     """
     results = chosen_results(options)
     word = options.experiment

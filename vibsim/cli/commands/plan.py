@@ -1,4 +1,4 @@
-"""``vibsim check`` and ``vibsim plan``: whether experiments are valid, and what a run would cost."""
+"""``vibsim check`` and ``vibsim plan``: validate experiments, and estimate the cost of a run."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ from vibsim.plan.forecast import RUN_SECONDS
 
 _WIDTHS = (7, 12, 12, 7, 14, 10, 10, 10)
 CORES = usable_cores()
-"""Cores at hand, as `vibsim run` uses them."""
+"""Number of cores that `vibsim run` uses by default."""
 SHORT = 1.0
-"""Seconds of a reference that is not worth a line."""
+"""Time below which a reference solution is not mentioned [s]."""
 _HEAD = ("level", "steps", "kept every", "files", "member-steps", "disk", "memory", "time")
 
 
 def check(options: Namespace) -> int:
-    """Validate experiment files and say that they are valid."""
+    """Validate experiment files; print a line for each valid one."""
     for item in plans_of(options.experiments, options.settings):
         levels = ", ".join(str(level.level) for level in item.levels)
         tell_notes([item])
@@ -38,7 +38,7 @@ def check(options: Namespace) -> int:
 
 
 def plan(options: Namespace) -> int:
-    """Show members, jobs, steps, memory, disk space and time; refuse what does not fit on this machine."""
+    """Print members, jobs, steps, memory, disk space and time; refuse plans that do not fit on this machine."""
     results = chosen_results(options)
     plans = plans_of(options.experiments, options.settings)
     tell_notes(plans)
@@ -78,7 +78,7 @@ def _members(item: Plan) -> str:
 
 
 def _solver_lines(item: Plan) -> Iterator[str]:
-    """Yield what is known of a solver of the user: its levels, and what each of them is to be given."""
+    """Yield the plan of a user's own solver: its levels with their sizes, and the resources of a job."""
     jobs, first = len(item.batches), item.batches[0]
     sizes: Mapping[str, Sequence[float]] = item.content["sizes"]
     yield f"{item.key}: {_members(item)}, {jobs} jobs of {item.content['solver']['text']}"
@@ -127,9 +127,9 @@ def _sum(plans: Sequence[Plan], results: Path) -> str:
 
 
 def _times(plans: Sequence[Plan]) -> str:
-    """Write the CPU time of a run of some plans, and how long it takes on the cores at hand, the start included."""
+    """Return the CPU time and the wall time of a run of `plans` on this machine as text, with the start of the run."""
     cpu = RUN_SECONDS + sum(item.cpu_seconds for item in plans)
-    # experiments run beside each other
+    # experiments run in parallel
     wall = RUN_SECONDS + max(
         *(item.wall_seconds(CORES) for item in plans), (cpu - RUN_SECONDS) / CORES
     )

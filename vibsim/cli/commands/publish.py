@@ -1,6 +1,6 @@
-"""``vibsim report NAME --publish DIR``: pages, data, experiment file and metadata in one folder that opens anywhere.
+"""``vibsim report NAME --publish DIR``: copy pages, data, experiment file and metadata to a self-contained folder.
 
-The metadata are an RO-Crate 1.1 (https://w3id.org/ro/crate/1.1), JSON-LD on every file and what made it.
+The metadata are an RO-Crate 1.1 (https://w3id.org/ro/crate/1.1): JSON-LD on every file and its provenance.
 """
 
 from __future__ import annotations
@@ -40,14 +40,14 @@ _TYPES = {
 
 
 def publish(options: Namespace) -> int:
-    """Copy whole and current results of one experiment to a new folder, with an index and metadata.
+    """Copy complete and current results of one experiment to a new folder, with an index and metadata.
 
     Raises
     ------
     InputError
-        Where the folder has something in it.
+        Where the folder is not empty.
     VibsimError
-        Where a file is damaged, missing, or not of this experiment as its file is now.
+        Where a file is damaged, missing, or older than a change of the experiment file.
     """
     target: Path = options.publish.absolute()
     if target.exists() and not (target.is_dir() and not any(target.iterdir())):
@@ -56,8 +56,8 @@ def publish(options: Namespace) -> int:
     with verify.locked(results):
         _check(plan, options, results)
         target.parent.mkdir(parents=True, exist_ok=True)
-        with TemporaryDirectory(prefix=f".{target.name}.", dir=target.parent) as place:
-            folder = Path(place) / "crate"
+        with TemporaryDirectory(prefix=f".{target.name}.", dir=target.parent) as temporary:
+            folder = Path(temporary) / "crate"
             _fill(folder, plan, results, options.license)
             folder.replace(target)
     print(f"published: {target / 'index.html'}")
@@ -94,7 +94,7 @@ def _fill(folder: Path, plan: Plan, results: Path, licence: str | None) -> None:
 
 
 def inputs(plan: Plan) -> Iterator[tuple[str, Path]]:
-    """Yield the experiment file and all that it names, by their paths in the crate: they keep their relation."""
+    """Yield the experiment file and all files that it names, by paths in the crate; relative paths stay valid."""
     main = plan.source_file
     if main is None:
         return
@@ -108,7 +108,7 @@ def inputs(plan: Plan) -> Iterator[tuple[str, Path]]:
 def metadata(
     folder: Path, plan: Plan, inputs: Sequence[str], licence: str | None = None
 ) -> dict[str, Any]:
-    """Return the metadata of a folder with results as JSON-LD; `inputs` are the files in it that they come from.
+    """Return the JSON-LD metadata of a folder with results; `inputs` are the experiment file and its tables.
 
     Source: RO-Crate Metadata Specification 1.1: the metadata descriptor and the root (section "Root Data Entity"),
     files ("Data Entities"), the licence ("Contextual Entities") and the run that made them ("Provenance of entities").
@@ -153,8 +153,8 @@ def metadata(
         },
     ]
     if is_address:
-        what = {"name": licence, "description": "The licence of these results."}
-        graph.append({"@id": licence, "@type": "CreativeWork", **what})
+        description = {"name": licence, "description": "The licence of these results."}
+        graph.append({"@id": licence, "@type": "CreativeWork", **description})
     return {"@context": _CONTEXT, "@graph": graph}
 
 
@@ -169,13 +169,13 @@ def _description(folder: Path, plan: Plan) -> str:
 
 
 def _references(names: Iterable[str]) -> Any:
-    """Return references to files: one alone is no list in compacted JSON-LD."""
-    found = [{"@id": _address(name)} for name in names]
-    return found[0] if len(found) == 1 else found
+    """Return references to files; a single one is not a list in compacted JSON-LD."""
+    references = [{"@id": _address(name)} for name in names]
+    return references[0] if len(references) == 1 else references
 
 
 def _address(name: str) -> str:
-    """Return a path as a relative IRI, in which letters of all alphabets stay."""
+    """Return a path as a relative IRI, which keeps non-ASCII letters."""
     return "".join(char if ord(char) > 127 else quote(char) for char in name)
 
 

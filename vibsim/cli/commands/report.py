@@ -1,4 +1,4 @@
-"""``vibsim report``: the job of the workflow, or what is to be published."""
+"""``vibsim report``: write a report or the index (the job of the workflow), or publish results."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from vibsim.cli.jobs.common import refusal
 
 
 def report(options: Namespace) -> int:
-    """Write a report or the index; or publish results that are there.
+    """Write a report or the index; or publish existing results.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""``vibsim show``: the verdicts of an experiment, and its solution drawn down the screen."""
+"""``vibsim show``: print the verdicts of an experiment, and its solution as a text plot."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 def show(options: Namespace) -> int:
-    """Draw the finest level that is there, and show the verdicts below it, where they come last on the screen."""
+    """Draw the finest existing level, and print the verdicts below it, where the user sees them last."""
     if options.what.endswith(".nc"):
         _draw(level_member.read(Path(options.what), options.case or 0), options, options.what)
         return 0
@@ -37,15 +37,15 @@ def show(options: Namespace) -> int:
         record = level_member.of_level(plan, results, level, case)
         _draw(record, options, f"{plan.key}, level {level}")
     if len(made) < len(levels):
-        one = len(made) == 1
-        there = f"level{'' if one else 's'} {shown(made)} {'is' if one else 'are'} there"
-        print(f"{there}, of levels {shown(levels)}; the others are not made yet")
+        is_one = len(made) == 1
+        text = f"level{'' if is_one else 's'} {shown(made)} {'is' if is_one else 'are'} there"
+        print(f"{text}, of levels {shown(levels)}; the others are not made yet")
     _verdicts(plan, results)
     return 0
 
 
 def _verdicts(plan: Plan, results: Path) -> None:
-    """Print every verdict of the experiment as it is now."""
+    """Print every verdict, with a note if the experiment has changed since."""
     path = results / plan.summary
     if not path.exists():
         print(f"{plan.key}: there are no verdicts yet")
@@ -83,7 +83,7 @@ def _draw(record: Record, options: Namespace, title: str) -> None:
 
 
 def _member(record: Record) -> str:
-    """Name the member of a sweep with its swept values; empty without a sweep."""
+    """Return the number of a member and its swept values as text; empty without a sweep."""
     swept = []
     for name, row in record.coords.items():
         if "sweep_key" in row.attrs:
@@ -98,22 +98,22 @@ def _series(record: Record, quantity: str, scheme: int) -> Series:
     row = record.variable(quantity)
     name = f"{quantity}_exact"
     exact: Floats | None = record[name][0] if name in record else None
-    # members that end at times of their own have these as fractions of them
+    # where members have different end times, t is the fraction of the end
     times = record["t"] * (float(record["end"][0]) if "end" in record.coords else 1.0)
     unit = str(row.attrs.get("units", ""))
     return Series(quantity, unit, times, row.values[scheme, 0], exact, _period(record, scheme))
 
 
 def _period(record: Record, scheme: int) -> float:
-    """Return the exact period, else the measured one, else that of small oscillations; NaN without any."""
+    """Return the exact period, else the measured one, else that of small oscillations; NaN if there is none."""
     frequency = _number(record, "natural_frequency", scheme)
-    found = [_number(record, name, scheme) for name in ("exact_period", "period")]
-    found.append(2 * math.pi / frequency if frequency > 0 else math.nan)
-    return next((period for period in found if math.isfinite(period) and period > 0), math.nan)
+    periods = [_number(record, name, scheme) for name in ("exact_period", "period")]
+    periods.append(2 * math.pi / frequency if frequency > 0 else math.nan)
+    return next((period for period in periods if math.isfinite(period) and period > 0), math.nan)
 
 
 def _number(record: Record, name: str, scheme: int) -> float:
-    """Return a number of the member; NaN where the file has none, or one for each level."""
+    """Return a scalar of the member; NaN if the file does not have it as one."""
     dims = record.variable(name).dims if name in record else ()
     if dims == ("scheme", "case"):
         return float(record[name][scheme, 0])

@@ -1,4 +1,4 @@
-"""``vibsim theory``: what a scheme makes of ``u'' + w^2 u = 0``, as formulas in ``p = w dt``.
+"""``vibsim theory``: print the theory of a scheme on ``u'' + w^2 u = 0`` as formulas in ``p = w dt``.
 
 Source: vibration text (B), sections 4.1, 4.3 and 5.6, exercises 7 and 17; the formulas are those of
 `vibsim.theory.symbolic`.
@@ -26,9 +26,9 @@ if TYPE_CHECKING:
     from vibsim.theory.operators import Equation, Term
 
 _LONGEST = 10**6
-"""Fractions with larger numbers, and roots, are written as decimals."""
+"""Fractions with larger numerators or denominators are written as decimals, as are roots."""
 _DIGITS, _PRECISE = 8, 40
-"""Digits that are written, and those that are computed with."""
+"""Digits of decimals in the output, and in the computation."""
 
 
 def theory(options: Namespace) -> int:
@@ -37,19 +37,21 @@ def theory(options: Namespace) -> int:
     Raises
     ------
     InputError
-        Where there is no such scheme or option, and for a scheme that chooses its own steps.
+        Where the scheme or an option is unknown, and for a scheme that chooses its own steps.
     """
     scheme = scheme_named(options.scheme)
     if scheme.adaptive:
         rule = "chooses its own steps: there is no theory in w dt"
         raise refusal("SCHEME", scheme.kind, rule)
-    given = _options(scheme, options.options)
-    print(*laid_out(theory_rows(scheme, given, options.terms, latex=options.latex)), sep="\n")
+    rows = theory_rows(
+        scheme, _options(scheme, options.options), options.terms, latex=options.latex
+    )
+    print(*laid_out(rows), sep="\n")
     return 0
 
 
 def theory_rows(scheme: Scheme, options: Options, terms: int, *, latex: bool) -> Iterator[Row]:
-    """Yield the theory of a scheme with equal steps; each series has `terms` terms."""
+    """Yield the theory of a scheme with constant steps; each series has `terms` terms."""
     from vibsim.theory import operators, symbolic
 
     stepper, notation = scheme.stepper(options), _Notation(latex)
@@ -79,7 +81,7 @@ def theory_rows(scheme: Scheme, options: Options, terms: int, *, latex: bool) ->
 def _series_rows(
     scheme: Scheme, options: Options, terms: int, notation: _Notation
 ) -> Iterator[Row]:
-    """Yield what is known as series in p; ValueError where the frequency does not begin with w."""
+    """Yield the results that are series in p; raise ValueError where the frequency does not tend to w."""
     from vibsim.theory import operators, symbolic
 
     stepper, write = scheme.stepper(options), notation.number
@@ -100,7 +102,7 @@ def _series_rows(
 
 
 def _limits(scheme: Scheme, options: Options, stepper: Stepper, notation: _Notation) -> str:
-    """Say what the frequency tends to for small steps, and where the scheme begins to grow."""
+    """Return the limits of the numerical frequency for small steps and at the stability limit."""
     from vibsim.theory import roots, stability_limit, symbolic
 
     small = f"w~/w -> {notation.number(symbolic.frequency_series(stepper, 1))} as p -> 0"
@@ -108,14 +110,14 @@ def _limits(scheme: Scheme, options: Options, stepper: Stepper, notation: _Notat
     if not 0.0 < limit < math.inf:
         return small
     angle = float(roots(stepper, limit).angle)
-    # where the roots meet, half of the digits are left
+    # at a double root only half of the digits are correct
     angle = next((x for x in (0.0, math.pi) if abs(angle - x) < 1e-6), angle)
     turned = "pi" if angle == math.pi else f"{angle:.6g}"
     return f"{small}; w~ dt -> {turned} and w~/w -> {angle / limit:.6g} as p -> {limit:.6g}"
 
 
 def _characteristic(factors: Sequence[Any], notation: _Notation) -> str:
-    """Write the characteristic polynomial, without roots that are 0, by powers of x."""
+    """Return the characteristic polynomial in powers of x, without its zero roots."""
     from vibsim.theory.symbolic import symbol
 
     powers = [symbol("x") ** k for k in reversed(range(len(factors)))]
@@ -123,7 +125,7 @@ def _characteristic(factors: Sequence[Any], notation: _Notation) -> str:
 
 
 def _in_operators(stepper: Stepper, notation: _Notation) -> Iterator[Row]:
-    """Yield a scheme with and without its velocity, and what the operators mean that were needed."""
+    """Yield the scheme in operator notation, without and with its velocity, and the definitions of the operators."""
     from vibsim.theory import operators
 
     equation = notation.equation
@@ -149,12 +151,12 @@ def _in_operators(stepper: Stepper, notation: _Notation) -> Iterator[Row]:
 
 @dataclass(frozen=True)
 class _Notation:
-    """How formulas are written: plainly, or as LaTeX."""
+    """Formats formulas as plain text or as LaTeX."""
 
     is_latex: bool
 
     def number(self, formula: Any) -> str:
-        """Write a formula or a number."""
+        """Return a formula or a number as text."""
         from sympy import latex, sstr
 
         write = latex if self.is_latex else sstr
@@ -162,33 +164,33 @@ class _Notation:
         return written if self.is_latex else written.replace("**", "^").replace("*", " ")
 
     def sum(self, terms: Iterable[tuple[Any, str]]) -> str:
-        """Write a sum of coefficients times what they are of, which may be nothing; those that are 0 are left out."""
+        """Return a sum of terms, each a coefficient and a possibly empty factor; zero terms are left out."""
         written = ""
-        for factor, of in terms:
-            if factor == 0:
+        for coefficient, factor in terms:
+            if coefficient == 0:
                 continue
-            number = self.number(factor)
-            is_less = number.startswith("-")
-            if is_less:
-                number = self.number(-factor)
-            if of and number == "1":
+            number = self.number(coefficient)
+            is_negative = number.startswith("-")
+            if is_negative:
+                number = self.number(-coefficient)
+            if factor and number == "1":
                 number = ""
-            elif of and not number.isalnum():
+            elif factor and not number.isalnum():
                 number = f"({number})"
-            sign = "-" if is_less else "+"
+            sign = "-" if is_negative else "+"
             written += f" {sign} " if written else sign.strip("+")
-            written += f"{number} {of}".strip()
+            written += f"{number} {factor}".strip()
         return written
 
-    def at(self, what: str, place: Fraction) -> str:
-        """Write something at the time ``n + place``."""
-        time = "n" + (f"{'+' if place > 0 else '-'}{abs(place)}" if place else "")
+    def at(self, quantity: str, shift: Fraction) -> str:
+        """Return a quantity at the time ``n + shift``."""
+        time = "n" + (f"{'+' if shift > 0 else '-'}{abs(shift)}" if shift else "")
         if self.is_latex:
-            return f"{what}^{{{time}}}"
-        return f"{what}^{time if place == 0 else f'({time})'}"
+            return f"{quantity}^{{{time}}}"
+        return f"{quantity}^{time if shift == 0 else f'({time})'}"
 
     def operator(self, name: str) -> str:
-        """Write the name of an operator."""
+        """Return the name of an operator."""
         if not self.is_latex:
             return name
         head, _, index = name.partition("_")
@@ -199,22 +201,22 @@ class _Notation:
         return f"{head}_{{{below}}}" + (f"^{{{above}}}" if above else "")
 
     def equation(self, equation: Equation) -> str:
-        """Write terms with their operators, in one pair of brackets where they belong to one time."""
+        """Return an equation with operators, in one pair of brackets if all terms are at the same time."""
         from vibsim.theory.symbolic import symbol
 
         places = {term.place for side in equation for term in side}
 
-        def term(one: Term) -> str:
-            names = [self.operator(name) for name in one.operators]
-            powers = (("w", one.powers[0]), ("dt", one.powers[1]))
+        def text(term: Term) -> str:
+            names = [self.operator(name) for name in term.operators]
+            powers = (("w", term.powers[0]), ("dt", term.powers[1]))
             scale = [self.number(symbol(name) ** power) for name, power in powers if power]
-            here = " ".join((*names, one.of))
+            operand = " ".join((*names, term.of))
             if len(places) > 1:
-                here = self.at(f"[{here}]" if names else one.of, one.place)
-            return " ".join((*scale, here))
+                operand = self.at(f"[{operand}]" if names else term.of, term.place)
+            return " ".join((*scale, operand))
 
         left, right = (
-            self.sum((one.factor, term(one)) for one in side) or "0" for side in equation
+            self.sum((term.factor, text(term)) for term in side) or "0" for side in equation
         )
         if len(places) > 1:
             return f"{left} = {right}"
@@ -222,7 +224,7 @@ class _Notation:
 
 
 def _short(formula: Any) -> Any:
-    """Write roots, and fractions of large numbers, as decimals."""
+    """Return a formula with roots, and fractions of large numbers, as decimals."""
     from sympy import Float, Integer, Pow, Rational, fraction, together
 
     from vibsim.theory.symbolic import symbol
@@ -231,25 +233,25 @@ def _short(formula: Any) -> Any:
     has_roots = any(x.is_number and not x.is_Rational for x in formula.atoms(Pow))
     if not is_long and not has_roots:
         return formula
-    above, below = (part.expand().evalf(_PRECISE) for part in fraction(together(formula)))
-    scale = below.subs(symbol("p"), 0)
-    rounded = ((above / scale).expand() / (below / scale).expand()).evalf(_DIGITS)
+    numerator, denominator = (x.expand().evalf(_PRECISE) for x in fraction(together(formula)))
+    scale = denominator.subs(symbol("p"), 0)
+    rounded = ((numerator / scale).expand() / (denominator / scale).expand()).evalf(_DIGITS)
     return rounded.xreplace({x: Integer(x) for x in rounded.atoms(Float) if float(x).is_integer()})
 
 
 def _options(scheme: Scheme, words: Sequence[str]) -> Options:
-    """Return the options of a scheme, some of them as ``NAME=VALUE``."""
+    """Return the options of a scheme: its defaults, changed by words of the form ``NAME=VALUE``."""
     known = {option.name: option for option in scheme.options}
-    found: dict[str, str | float | bool] = {**scheme.defaults()}
+    values: dict[str, str | float | bool] = {**scheme.defaults()}
     for word in words:
         name, equals, value = word.partition("=")
         if name not in known:
             hint = nearest(name, list(known)) if known else "it has none"
             raise refusal("OPTION", name, f"is no option of {scheme.kind}", hint)
         if not equals:
-            raise refusal("OPTION", word, "needs a value", f"such as {name}={found[name]}")
-        found[name] = _value(known[name], value)
-    return found
+            raise refusal("OPTION", word, "needs a value", f"such as {name}={values[name]}")
+        values[name] = _value(known[name], value)
+    return values
 
 
 def _value(option: AnyOption, text: str) -> str | float | bool:

@@ -1,7 +1,7 @@
-"""``vibsim verify``: whether files are those that their run wrote, and whether the same comes out again, bit for bit.
+"""``vibsim verify``: check that result files are unchanged, and that a new run gives the same bits.
 
 Files are compared with the manifest that jobs and runs write (`vibsim.cli.made_files`). Results are recomputed by a run
-in a temporary folder, and its manifest is compared with the files that are there.
+in a temporary folder, and its manifest is compared with the existing files.
 """
 
 from __future__ import annotations
@@ -27,26 +27,26 @@ from vibsim.experiment.collection import SITE
 from vibsim.plan import Plan, choose
 
 NO_RESULTS = ("logs", "benchmarks")
-"""Folders of an experiment with the messages and times of its jobs."""
+"""Folders of an experiment that hold the logs and times of its jobs, and no results."""
 TIMESTAMP = ".snakemake_timestamp"
-"""What Snakemake puts into a folder that a job made."""
+"""File that Snakemake puts into a folder that a job made."""
 LAST = ("convergence.nc", "summary.json", "report.html")
 """Files that every experiment has when its run ends."""
 _MANIFEST = re.compile(r"\w+\.\w+", re.ASCII)
-"""Name of the manifest of an experiment, whose collection and name have no point in them."""
+"""Name of the manifest of an experiment: collection and name, neither of which contains a dot."""
 SHOWN = 8
-"""Up to so many files are named that differ for the same reason."""
+"""Most files that are listed by name for the same cause."""
 _README = "README.md"
-"""Stands in the results folder of a checkout."""
+"""File in the results folder of a checkout."""
 
 
 def verify(options: Namespace) -> int:
-    """Compare files with their manifest; recompute named experiments, unless files alone are asked for.
+    """Compare files with their manifest, and recompute the named experiments, except with ``--files``.
 
     Raises
     ------
     InputError
-        Where a name or an experiment file is refused, or a program of the user is not allowed.
+        Where a name or an experiment file is refused, or a user's program is not allowed.
     VibsimError
         Where there are no results.
     """
@@ -62,11 +62,11 @@ def verify(options: Namespace) -> int:
     results_folder.check(results, filter(None, keys))
     with locked(results), temporary_folder() as folder:
         faults = sum(_tell_files(results, key) for key in keys)
-        # what was never run has nothing to compare with
+        # experiments without results have nothing to compare with
         known = experiments(results)
         plans = [plan for plan in plans if plan.key in known]
         if plans:
-            # verdicts are no news here, progress is
+            # only the progress is shown, not the verdicts
             run = [choice.word for choice in choices if choice.key in known]
             command = run_command(options, run, folder)
             status = supervise.child(command, is_heard=False)
@@ -78,53 +78,52 @@ def verify(options: Namespace) -> int:
 
 @contextmanager
 def locked(results: Path) -> Iterator[None]:
-    """Keep runs out of a results folder: what one is making is neither damaged nor missing."""
-    # where nothing can be written, there is no run
-    held = lock.hold(results) if os.access(results / ".vibsim", os.W_OK) else None
+    """Lock a results folder, since files that a run is making would seem damaged or missing."""
+    # no run can write to a read-only folder
+    descriptor = lock.hold(results) if os.access(results / ".vibsim", os.W_OK) else None
     try:
         yield
     finally:
-        if held is not None:
-            os.close(held)
+        if descriptor is not None:
+            os.close(descriptor)
 
 
 def experiments(results: Path) -> list[str]:
-    """Return the folders of all experiments that have a manifest or files, in order."""
+    """Return the keys of all experiments that have a manifest or a folder, sorted."""
     manifests = made_files.path(results, made_files.INDEX).parent.glob("*.*.jsonl")
-    inner = (folder for folder in results.glob("[!.]*/[!.]*") if folder.parent.name != SITE)
-    folders = (folder for folder in inner if folder.is_dir())
-    found = {file.stem.replace(".", "/") for file in manifests if _MANIFEST.fullmatch(file.stem)}
-    return sorted(found | {folder.relative_to(results).as_posix() for folder in folders})
+    paths = (path for path in results.glob("[!.]*/[!.]*") if path.parent.name != SITE)
+    keys = {file.stem.replace(".", "/") for file in manifests if _MANIFEST.fullmatch(file.stem)}
+    return sorted(keys | {path.relative_to(results).as_posix() for path in paths if path.is_dir()})
 
 
 def compare(results: Path, key: str) -> tuple[int, dict[str, str]]:
-    """Compare every file of an experiment, or those over all (`made_files.INDEX`), with the manifest; change nothing.
+    """Compare every file of an experiment, or of the index (`made_files.INDEX`), with the manifest; change nothing.
 
     Returns
     -------
     tuple[int, dict[str, str]]
-        How many files the manifest has; and what is wrong, by the path of the file from `results`.
+        The number of files in the manifest, and the problems by path relative to `results`.
     """
     folder = results / key
-    known, is_whole = made_files.read(results, key)
-    there = set(_files(folder, is_top=key == made_files.INDEX))
-    if not known and not there:
+    known, is_intact = made_files.read(results, key)
+    existing = set(_files(folder, is_top=key == made_files.INDEX))
+    if not known and not existing:
         return 0, {key or "index.html": "there are no results yet: run it first"}
-    found = {name: _problem(folder / name, entry) for name, entry in known.items()}
-    if is_whole:
+    texts = {name: _problem(folder / name, entry) for name, entry in known.items()}
+    if is_intact:
         rule = "is not in the manifest: no job that ended made it"
-        found |= dict.fromkeys(there - known.keys(), rule)
+        texts |= dict.fromkeys(existing - known.keys(), rule)
         for name in made_files.OVER_ALL if key == made_files.INDEX else LAST:
-            found.setdefault(name, "is not made yet: the last run did not end")
-    if LAST[-1] not in there:
-        # its job begins with figures and tables
-        begun = [name for name in found if name.startswith(BESIDE) and (folder / name).exists()]
-        found |= {name: found[name] and "is of a report that was not finished" for name in begun}
-    problems = {(Path(key) / name).as_posix(): text for name, text in sorted(found.items()) if text}
-    if not is_whole:
+            texts.setdefault(name, "is not made yet: the last run did not end")
+    if LAST[-1] not in existing:
+        # the report job writes figures and tables before the page
+        begun = [name for name in texts if name.startswith(BESIDE) and (folder / name).exists()]
+        texts |= {name: texts[name] and "is of a report that was not finished" for name in begun}
+    problems = {(Path(key) / name).as_posix(): text for name, text in sorted(texts.items()) if text}
+    if not is_intact:
         manifest = made_files.path(results, key)
         state = "is damaged" if manifest.exists() else "is missing"
-        number = len(there - known.keys())
+        number = len(existing - known.keys())
         text = f"the manifest {state}, so {number} files cannot be compared; run again"
         problems[manifest.relative_to(results).as_posix()] = text
     return len(known), problems
@@ -142,11 +141,11 @@ def _problem(file: Path, known: Entry) -> str:
 
 
 def _files(folder: Path, *, is_top: bool) -> Iterator[str]:
-    """Yield all results of an experiment, or what is beside the experiments, as paths from `folder`."""
-    for place, folders, names in os.walk(folder):
-        inner = Path(place).relative_to(folder)
+    """Yield the paths, relative to `folder`, of all results of an experiment, or with `is_top` of all other files."""
+    for parent, folders, names in os.walk(folder):
+        inner = Path(parent).relative_to(folder)
         if is_top:
-            # collections, but no experiments
+            # enter collections, but not experiments
             outer = [] if inner.parts else folders
             folders[:] = [name for name in outer if not name.startswith(".") and name != SITE]
         elif not inner.parts:
@@ -156,7 +155,7 @@ def _files(folder: Path, *, is_top: bool) -> Iterator[str]:
 
 
 def _tell_files(results: Path, key: str) -> int:
-    """Print what is wrong with the files of an experiment; return how many things."""
+    """Print the problems with the files of an experiment, and return their number."""
     number, problems = compare(results, key)
     for path, text in problems.items():
         print(clean(f"{path}: {text}"), flush=True)
@@ -166,7 +165,7 @@ def _tell_files(results: Path, key: str) -> int:
 
 
 def _report_recomputed(plan: Plan, results: Path, folder: Path) -> int:
-    """Print which recomputed files differ from those that are there, and why; return how many."""
+    """Print which recomputed files differ from the existing ones, and why; return their number."""
     causes = differences(plan, results, folder)
     for cause, names in causes.items():
         # data before pages, tables and figures
@@ -181,7 +180,7 @@ def _report_recomputed(plan: Plan, results: Path, folder: Path) -> int:
 
 
 def differences(plan: Plan, results: Path, folder: Path) -> dict[str, list[str]]:
-    """Return the files of `results` that are others than those just made in `folder`, by the cause."""
+    """Return by cause the files of `results` that differ from those just made in `folder`."""
     made, known = made_files.load(folder, plan.key), made_files.load(results, plan.key)
     causes: dict[str, list[str]] = {}
     for path in plan.files:
@@ -196,15 +195,15 @@ def differences(plan: Plan, results: Path, folder: Path) -> dict[str, list[str]]
 
 
 def _cause(plan: Plan, results: Path, known: Entry | None, again: Entry, name: str) -> str:
-    """Say what differs between the making of a file and of the same file again."""
+    """Return why a recomputed file differs from the existing one."""
     from vibsim.store.reading import read_provenance
 
     if known is None:
         return "the manifest does not have it"
     if problem := _problem(results / plan.key / name, known):
         return problem
-    if found := reasons.why(plan, results):
-        return found
+    if change := reasons.why(plan, results):
+        return change
     try:
         versions = reasons.versions(plan, read_provenance(results / plan.convergence))
     except FileError:

@@ -1,4 +1,4 @@
-"""``vibsim watch``: runs an experiment file again whenever it, or a table that it names, is saved."""
+"""``vibsim watch``: run an experiment file again whenever it, or a table that it names, is saved."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from vibsim.core.errors import VibsimError
 from vibsim.experiment.collection import ENDINGS
 
 PAUSE = 0.3
-"""Seconds between two looks at the files."""
+"""Time between two checks of the files [s]."""
 _Saved = dict[Path, tuple[int, int, int] | None]
-"""Time, size and inode of each file; None where it is not there, as some editors leave it for a moment."""
+"""Time, size and inode of each file; None for a missing file, since some editors remove a file before they save it."""
 
 
 def watch(options: Namespace) -> int:
@@ -26,7 +26,7 @@ def watch(options: Namespace) -> int:
     Raises
     ------
     InputError
-        Where there is no such file.
+        Where the experiment file does not exist.
     """
     file: Path = options.file
     if file.suffix not in ENDINGS or not file.is_file():
@@ -44,7 +44,7 @@ def watch(options: Namespace) -> int:
 
 
 def _files(file: Path, settings: Sequence[str]) -> list[Path]:
-    """Return the file and the tables that it names, these only as long as it is valid."""
+    """Return the experiment file, and the tables that it names if it is valid."""
     try:
         return [file, *(file.parent / name for name, _ in one_plan_of(str(file), settings).inputs)]
     except VibsimError:
@@ -52,11 +52,11 @@ def _files(file: Path, settings: Sequence[str]) -> list[Path]:
 
 
 def _saved(files: list[Path]) -> _Saved:
-    found: _Saved = {}
+    states: _Saved = {}
     for file in files:
         try:
             status = file.stat()
-            found[file] = status.st_mtime_ns, status.st_size, status.st_ino
+            states[file] = status.st_mtime_ns, status.st_size, status.st_ino
         except OSError:
-            found[file] = None
-    return found
+            states[file] = None
+    return states

@@ -1,1 +1,1 @@
-"""The jobs of the workflow, usable by hand."""
+"""The jobs of the workflow; a user can also call them directly."""

@@ -1,4 +1,4 @@
-"""The job that compares all levels of an experiment; usable by hand."""
+"""The job ``vibsim analyse``: compare all levels of an experiment and decide its checks."""
 
 from __future__ import annotations
 

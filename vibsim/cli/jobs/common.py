@@ -1,7 +1,7 @@
-"""What all jobs of the workflow share.
+"""Functions that the jobs of the workflow share.
 
-A job reads the plan of its experiment and refuses when it is not the plan that it was started for. It
-reads no file without its digest; one that is damaged or another job's is named and never used.
+A job loads the plan of its experiment and refuses to run if this is not the plan that it was started for. It checks the
+digest of every file that it reads; a file that is damaged or from another job is reported and never used.
 """
 
 from __future__ import annotations
@@ -27,52 +27,52 @@ if TYPE_CHECKING:
     from vibsim.core.record import Record
 
 COMPARED = ("convergence.nc", "summary.json")
-"""Files that a comparison of levels writes."""
+"""Files that the analysis writes."""
 
 
 def chosen_results(options: Namespace) -> Path:
-    """Return the results folder that was asked for, else the default one."""
+    """Return the results folder of the option ``--results``, or the default one."""
     folder: Path = options.results or default_results()
     check_folder("--results", folder)
     return folder.absolute()
 
 
 def check_folder(option: str, folder: Path) -> None:
-    """Refuse what is no folder, and cannot become one: a file, or a place within one."""
+    """Refuse a path that is not a folder and cannot become one: a file, or a path below a file."""
     try:
-        there = next(path for path in (folder, *folder.absolute().parents) if path.exists())
-        is_folder = there.is_dir()
+        existing = next(path for path in (folder, *folder.absolute().parents) if path.exists())
+        is_folder = existing.is_dir()
     except OSError as error:
-        # a name that is too long, a folder on the way that may not be entered
+        # e.g. the name is too long, or a parent folder may not be entered
         rule = f"cannot be used: {error.strerror}"
         raise refusal(option, f"{str(folder)[:80]} ...", rule) from None
     if not is_folder:
-        this = "this" if there == folder else there
+        this = "this" if existing == folder else existing
         raise refusal(option, folder, f"must be a folder, {this} is a file")
 
 
 def one_plan(options: Namespace) -> tuple[Plan, Path]:
-    """Return the plan of the experiment of a job, and the results folder."""
+    """Return the plan of a job's experiment, and the results folder."""
     results = chosen_results(options)
     plan = one_plan_of(options.experiment, options.settings)
     results_folder.check_folders(results, plan.key)
     return plan, results
 
 
-def check_digest(plan: Plan, wanted: str | None, found: str) -> None:
-    """Refuse to do another job than the one that was planned."""
-    if wanted is not None and wanted != found:
+def check_digest(plan: Plan, expected: str | None, actual: str) -> None:
+    """Refuse to run a job if its digest is not the expected one; None accepts any."""
+    if expected is not None and expected != actual:
         rule = "the experiment or the code changed after this job was planned; run again"
         raise InputError([Fault(plan.file, 0, "", "", rule)])
 
 
 def refusal(key: str, value: Any, rule: str, hint: str = "") -> InputError:
-    """Return the error of a command line."""
+    """Return the error for an invalid command-line argument."""
     return InputError([Fault("command line", 0, key, str(value), rule, hint)])
 
 
 def run_command(options: Namespace, experiments: Sequence[str], results: Path | None) -> list[str]:
-    """Return the words of ``vibsim run`` with those options of another command that both have."""
+    """Return the arguments of ``vibsim run``, with the options that it shares with another command."""
     words = ["run", *experiments]
     words += ["--results", str(results)] if results else []
     words += ["--cores", str(options.cores)] if options.cores else []
@@ -84,9 +84,9 @@ def run_command(options: Namespace, experiments: Sequence[str], results: Path | 
 def on_record(
     options: Namespace, results: Path, key: str, names: Sequence[str], job: str = ""
 ) -> Iterator[None]:
-    """Take files off the manifest while a job makes them, and put them back when it has; not those of ``--out``.
+    """Remove the manifest entries of files while a job makes them, and add new ones after that; not with ``--out``.
 
-    A job that is killed leaves none then that seems changed.
+    So no file of a killed job seems changed.
     """
     if options.out is not None:
         yield
@@ -99,12 +99,12 @@ def on_record(
 def read_all(
     options: Namespace, results: Path, readers: Mapping[str, Callable[[Path], Any]]
 ) -> dict[str, Any]:
-    """Read every file, and only then refuse: a run makes all that are bad again in one go."""
-    found: dict[str, Any] = {}
+    """Read all files before reporting errors, so that a run makes all bad files again at once."""
+    contents: dict[str, Any] = {}
     problems: list[str] = []
     for path, read in readers.items():
         try:
-            found[path] = read(results / path)
+            contents[path] = read(results / path)
         except FileError as error:
             problems.append(str(error))
             if options.discard:
@@ -114,28 +114,28 @@ def read_all(
                     problems.append(str(obstacle))
     if problems:
         raise VibsimError("\n".join(problems))
-    return found
+    return contents
 
 
 def titled(record: Record, title: str) -> Record:
-    """Return `record` with the title that its file needs."""
+    """Return `record` with a title, which every stored record needs."""
     return replace(record, attrs={**record.attrs, "title": title})
 
 
 def provenance(plan: Plan, uses: dict[str, Any]) -> dict[str, Any]:
-    """Return what a file says of its making."""
+    """Return the provenance of a file: the settings and versions that its job used."""
     python = ".".join(map(str, sys.version_info[:3]))
     versions = {"vibsim": vibsim.__version__, "python": python, **plan.versions}
     return {"experiment": uses, "versions": versions}
 
 
 def with_settings(plan: Plan, uses: dict[str, Any]) -> dict[str, Any]:
-    """Return what a file says of its making that also tells which settings the command line had."""
+    """Return the provenance of a file that also records the settings of the command line."""
     return provenance(plan, uses) | ({"settings": list(plan.settings)} if plan.settings else {})
 
 
 def check_levels(plan: Plan, options: Namespace, results: Path) -> None:
-    """Check all level files; VibsimError where files are damaged or another job's."""
+    """Check all level files; raise VibsimError if one is damaged or from another job."""
     from vibsim import store
 
     checks = {shard.path: partial(store.check, digest=shard.digest) for shard in plan.shards}
@@ -146,12 +146,12 @@ def check_levels(plan: Plan, options: Namespace, results: Path) -> None:
 def open_levels(
     plan: Plan, options: Namespace, results: Path
 ) -> Iterator[dict[int, Callable[[int, int], Record]]]:
-    """Check all level files, and open them; yield what reads a range of members of each level.
+    """Check and open all level files; yield for each level a function that reads members start..stop-1.
 
     Raises
     ------
     VibsimError
-        Where files are damaged or another job's.
+        Where a file is damaged or from another job.
     """
     from vibsim import store
 

@@ -1,4 +1,4 @@
-"""The job that extrapolates the solution of an experiment over all its levels; usable by hand."""
+"""The job ``vibsim extrapolate``: extrapolate the solution of an experiment over all its levels."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from vibsim.cli.jobs.common import (
 from vibsim.plan.digests import extrapolated
 
 PART_BYTES = 64 * 10**6
-"""Bytes of all levels together that an extrapolation reads at a time."""
+"""Bytes, over all levels, that an extrapolation reads at a time."""
 
 
 def extrapolate(options: Namespace) -> int:

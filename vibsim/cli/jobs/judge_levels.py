@@ -1,4 +1,4 @@
-"""The judging of the levels of a solver of the user, for the job ``analyse``."""
+"""The job ``vibsim analyse`` for the levels of a user's own solver."""
 
 from __future__ import annotations
 

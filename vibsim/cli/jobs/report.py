@@ -1,4 +1,4 @@
-"""The job that draws the report of an experiment, or the index over all results; usable by hand."""
+"""The job ``vibsim report``: write the report of an experiment, or the index of all results."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from vibsim.experiment import citation
 
 
 def report(options: Namespace) -> int:
-    """Write the report of one experiment, or the index over all results."""
+    """Write the report of one experiment, or the index of all results."""
     if options.experiment is None:
         return _index(options)
     formats = _formats(options)
@@ -39,19 +39,19 @@ def report(options: Namespace) -> int:
         plan.convergence: partial(store.read, digest=plan.analysis),
         plan.summary: partial(store.read_json, digest=plan.analysis, name=plan.key),
     }
-    found = read_all(options, results, readers)
-    summary = found[plan.summary]
-    named = {"title": plan.title, "source": citation.fields(plan.source)}
-    if summary != summary | named:
-        summary |= named
+    contents = read_all(options, results, readers)
+    summary = contents[plan.summary]
+    heading = {"title": plan.title, "source": citation.fields(plan.source)}
+    if summary != summary | heading:
+        summary |= heading
         if options.out is None:
-            # No number depends on title and source: after other ones the analysis need not run again.
+            # No number depends on title and source: if they change, the analysis does not run again.
             with on_record(options, results, plan.key, ["summary.json"], plan.analysis):
                 store.write_json(results / plan.summary, summary, digest=plan.analysis)
     with on_record(options, results, plan.key, ["report.html"], plan.report):
         write(
             plan,
-            found[plan.convergence],
+            contents[plan.convergence],
             summary,
             options.out or results / plan.key,
             formats=formats,
@@ -61,7 +61,7 @@ def report(options: Namespace) -> int:
 
 
 def _index(options: Namespace) -> int:
-    """Write the page over all results, which takes none of the options of one report."""
+    """Write the index of all results; options of a single report are refused."""
     for name in ("digest", "discard", "formats"):
         value = getattr(options, name)
         if value:
@@ -76,7 +76,7 @@ def _index(options: Namespace) -> int:
 
 
 def _formats(options: Namespace) -> list[str]:
-    """Return the formats of the figures, each of them known."""
+    """Return the formats of the figures; refuse unknown ones."""
     chosen = (options.formats or "svg").split(",")
     unknown = [name for name in chosen if name not in FIGURE_FORMATS]
     if unknown:

@@ -1,7 +1,7 @@
-"""The job that simulates: one shard of one level, or several cheap levels one after the other.
+"""The job ``vibsim simulate``: one shard of one level, or of several cheap levels one after the other.
 
-A file that is whole and up to date is kept, and a level that fails costs no other: Snakemake starts a job again as a
-whole, and what it has made already need not be made twice.
+A file that is intact and up to date is kept, and a level that fails does not stop the others: Snakemake repeats a whole
+job, and files that it has already made need not be made twice.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from vibsim.plan.digests import batch_digest
 
 
 def simulate(options: Namespace) -> int:
-    """Simulate one shard of one level to a file, or of several levels to the places of the plan."""
+    """Simulate one shard of a level into a given file, or of several levels into the files of the plan."""
     plan, results = one_plan(options)
     jobs = _jobs(plan, options.level, options.shard)
     check_digest(plan, options.digest, batch_digest([job.digest for job in jobs]))
@@ -64,7 +64,7 @@ def _jobs(plan: Plan, levels: Sequence[int], shard: int) -> list[ShardJob]:
 
 
 def is_made(path: Path, job: ShardJob) -> bool:
-    """Tell whether a file is whole and that of `job`."""
+    """Tell whether a file exists, is intact and was made by `job`."""
     from vibsim import store
 
     with suppress(FileError):
@@ -80,13 +80,13 @@ def _make(plan: Plan, level: int, job: ShardJob, path: Path, threads: int) -> No
     Raises
     ------
     VibsimError
-        With the level and the members.
+        Where this fails; it names the level and the members.
     """
     from vibsim import store
     from vibsim.plan.digests import simulated, values_digest
     from vibsim.simulation import simulate_record
 
-    # Should the process be killed, its log ends with what it was at.
+    # if the process is killed, the last line of its log shows where
     print(_named(plan, level, job), flush=True)
     experiment = plan.experiment
     uses = {

@@ -1,4 +1,4 @@
-"""The making of a level by a solver of the user, for the job ``simulate``; a command runs only where it is allowed."""
+"""The job ``vibsim simulate`` for a user's own solver; a program runs only where the command line allows it."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ FLAG = "--allow-commands"
 
 
 def check_allowed(plans: Iterable[Plan], allowed: bool) -> None:
-    """Refuse to run commands and functions of experiment files that nobody has allowed.
+    """Refuse commands and functions of experiment files unless the command line allows them.
 
     Raises
     ------
     InputError
-        With every one of them.
+        Lists all of them.
     """
     rule = "a program of the user runs only where it is allowed"
     faults = [
@@ -34,12 +34,12 @@ def check_allowed(plans: Iterable[Plan], allowed: bool) -> None:
 
 
 def make(plan: Plan, level: int, job: ShardJob, path: Path, threads: int) -> None:
-    """Make one level of one member and write it.
+    """Run the solver for one member at one level and write its result.
 
     Raises
     ------
     VibsimError
-        With the level and the member.
+        Where this fails; it names the level and the member.
     """
     from vibsim import store
     from vibsim.experiment.solver import restore
@@ -55,13 +55,13 @@ def make(plan: Plan, level: int, job: ShardJob, path: Path, threads: int) -> Non
     shutil.rmtree(work, ignore_errors=True)
     try:
         work.mkdir(parents=True)
-        found = run.make(experiment, level, job.start, work, threads)
-        record = level_output.record(experiment, level, job.start, found)
+        output = run.make(experiment, level, job.start, work, threads)
+        record = level_output.record(experiment, level, job.start, output)
         uses = {**solved(experiment, level, job.start), "level": level, "case": job.start}
         record = titled(record, f"{plan.key}: level {level}")
         store.write(path, record, digest=job.digest, provenance=provenance(plan, uses))
     except (VibsimError, MemoryError, OSError) as error:
-        # the folder is gone when somebody reads this
+        # the working folder is deleted before anybody reads the message
         raise VibsimError(f"{name}: {sentence(error).replace(f'{work}/', '')}") from error
     finally:
         shutil.rmtree(work, ignore_errors=True)

@@ -1,1 +1,1 @@
-"""``vibsim run``: from experiment files to verdicts."""
+"""``vibsim run``: run experiment files and show their verdicts."""

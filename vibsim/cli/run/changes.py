@@ -1,6 +1,6 @@
-"""What is in a results folder: files no longer as they were made, and files that nobody asks for any more.
+"""Find files in a results folder that were changed since they were made, and files that are no longer needed.
 
-A file is as it was made where size, time and inode are; where one of these differs, the content is compared.
+A file counts as unchanged if its size, time and inode are unchanged; if one of these differs, its content is compared.
 """
 
 from __future__ import annotations
@@ -19,35 +19,34 @@ from vibsim.plan import Plan
 from vibsim.store.atomic import abandoned
 
 _SEALED = (".nc", ".json")
-"""Files that say themselves whether they are whole."""
+"""Files with a seal, which shows whether they are intact."""
 _LEVEL = re.compile(r"level_\d{2,}")
 _NAMED = re.compile(r"level_\d{2,}(?:/shard_\d{4,})?\.nc|best\.nc")
 
 
 def changed(plans: Sequence[Plan], results: Path, *, every: bool) -> list[FileError]:
-    """Return the files to be made again; what only was copied or touched gets its time back.
+    """Return the files to be made again; files that were only copied or touched get their old time back.
 
-    The lock of `results` is held. With `every`, files are compared with their digests also where size, time and inode
-    are as they were.
+    The caller holds the lock of `results`. With `every`, the content of all files is compared with their digests.
     """
-    found: list[FileError] = []
+    errors: list[FileError] = []
     for plan in plans:
-        own = [path.removeprefix(f"{plan.key}/") for path in plan.files]
-        found.extend(_changed(results, plan.key, own, every))
-    found.extend(_changed(results, made_files.INDEX, made_files.OVER_ALL, every))
-    return found
+        names = [path.removeprefix(f"{plan.key}/") for path in plan.files]
+        errors.extend(_changed(results, plan.key, names, every))
+    errors.extend(_changed(results, made_files.INDEX, made_files.OVER_ALL, every))
+    return errors
 
 
-def _changed(results: Path, key: str, own: Iterable[str], every: bool) -> Iterator[FileError]:
+def _changed(results: Path, key: str, names: Iterable[str], every: bool) -> Iterator[FileError]:
     folder, known = results / key, made_files.load(results, key)
     now = dict(known)
-    bad = {name: problem for name in own if (problem := _problem(folder, name, now, every))}
+    bad = {name: problem for name in names if (problem := _problem(folder, name, now, every))}
     page = folder / "report.html"
     if page.exists() and page.name not in bad:
         for name in filter(lambda name: name.startswith(BESIDE), known):
             problem = _problem(folder, name, now, every)
             if problem or not (folder / name).exists():
-                # a report is made as a whole
+                # the report job makes the page and all its files at once
                 bad[page.name] = f"its file {name}: {problem or 'is missing'}"
     yield from (DamagedFileError(folder / name, problem) for name, problem in bad.items())
     if now != known:
@@ -55,7 +54,7 @@ def _changed(results: Path, key: str, own: Iterable[str], every: bool) -> Iterat
 
 
 def _problem(folder: Path, name: str, entries: dict[str, Entry], every: bool) -> str:
-    """Say what is wrong with a file, if there is one, and bring its entry up to date."""
+    """Return what is wrong with a file, empty if nothing or if there is no file, and update its manifest entry."""
     path, known = folder / name, entries.get(name)
     try:
         status = path.lstat()
@@ -79,37 +78,37 @@ def _problem(folder: Path, name: str, entries: dict[str, Entry], every: bool) ->
     else:
         entries[name] = known._replace(inode=status.st_ino)
         if status.st_mtime_ns != known.time:
-            # Where it cannot be set, only time is lost: Snakemake makes anew what seems older than its input.
+            # If this fails, only work is lost: Snakemake makes files again that seem older than their input.
             with suppress(OSError):
                 os.utime(path, ns=(status.st_atime_ns, known.time), follow_symlinks=False)
     return ""
 
 
 def stale(plans: Sequence[Plan], results: Path) -> list[FileError]:
-    """Return the files that another job is on record for; Snakemake misses them where its own record is lost."""
-    found: list[FileError] = []
+    """Return the files that, by the manifest, another job made; Snakemake misses them if its own record is lost."""
+    errors: list[FileError] = []
     for plan in plans:
         jobs = plan.files
         for name, entry in made_files.load(results, plan.key).items():
             path = f"{plan.key}/{name}"
             if entry.job and jobs.get(path, entry.job) != entry.job and (results / path).exists():
-                found.append(StaleFileError(results / path, "is of another input, title or code"))
-    return found
+                errors.append(StaleFileError(results / path, "is of another input, title or code"))
+    return errors
 
 
 def settle(plans: Sequence[Plan], results: Path, outputs: Iterable[str]) -> None:
-    """Write the manifests anew: without what was removed, and with the times of what jobs have just made.
+    """Rewrite the manifests: drop removed files, and record the new times of `outputs`, the files just made.
 
-    Snakemake sets these when a job has ended.
+    Snakemake sets these times after the job that made a file, and wrote its entry, has ended.
     """
     fresh = set(outputs)
-    wanted = {path for plan in plans for path in plan.files}
+    planned = {path for plan in plans for path in plan.files}
     for key in (*(plan.key for plan in plans), made_files.INDEX):
         known = made_files.load(results, key)
         now = {
             name: entry
             for name, entry in known.items()
-            if not key or name.startswith(BESIDE) or f"{key}/{name}" in wanted
+            if not key or name.startswith(BESIDE) or f"{key}/{name}" in planned
         }
         for name, entry in tuple(now.items()):
             path = Path(key, name).as_posix()
@@ -122,28 +121,28 @@ def settle(plans: Sequence[Plan], results: Path, outputs: Iterable[str]) -> None
 
 
 def leftovers(plans: Sequence[Plan], results: Path) -> list[Path]:
-    """Return the files under names that vibsim gives, and that these experiments have not; links are nobody's.
+    """Return the files that have names of vibsim but belong to no plan; links are left alone.
 
-    A temporary file that a killed job left counts as the file that it was to become.
+    The temporary file of a killed job counts as its target.
     """
-    wanted = {results / path for plan in plans for path in plan.files}
-    found = []
+    planned = {results / path for plan in plans for path in plan.files}
+    unused = []
     for folder in (results / plan.key for plan in plans):
-        of_levels = [place for place in sorted(folder.glob("level_*/")) if not place.is_symlink()]
-        for place in filter(Path.is_dir, (folder, *of_levels)):
-            targets = [(path, path) for path in sorted(place.glob("*.nc"))]
-            for path, target in [*targets, *abandoned(place)]:
+        levels = [path for path in sorted(folder.glob("level_*/")) if not path.is_symlink()]
+        for parent in filter(Path.is_dir, (folder, *levels)):
+            targets = [(path, path) for path in sorted(parent.glob("*.nc"))]
+            for path, target in [*targets, *abandoned(parent)]:
                 name = target.relative_to(folder).as_posix()
-                is_own = path.is_file() and not path.is_symlink() and _NAMED.fullmatch(name)
-                if is_own and target not in wanted:
-                    found.append(path)
-    return found
+                is_ours = path.is_file() and not path.is_symlink() and _NAMED.fullmatch(name)
+                if is_ours and target not in planned:
+                    unused.append(path)
+    return unused
 
 
 def remove(path: Path) -> None:
-    """Remove a file, and the folder of its level when that is empty."""
+    """Remove a file, and the folder of its level if that becomes empty."""
     path.unlink(missing_ok=True)
     if _LEVEL.fullmatch(path.parent.name):
-        # It is not empty while there is anything else in it.
+        # rmdir fails while the folder has other files
         with suppress(OSError):
             path.parent.rmdir()

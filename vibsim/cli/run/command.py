@@ -1,4 +1,4 @@
-"""``vibsim run``: from experiment files to verdicts, again and again until nothing is left to do."""
+"""``vibsim run``: run experiment files, repeating the workflow while results prove damaged, and show the verdicts."""
 
 from __future__ import annotations
 
@@ -24,11 +24,11 @@ from vibsim.core.temporary import temporary_folder
 from vibsim.plan import Plan
 
 _STAGES = 4
-"""How often the workflow is started at most: once, and once for each kind of file found bad."""
+"""Most starts of the workflow: one, and one more for each kind of file that may prove damaged or stale."""
 _PAGES = 5
-"""Up to so many experiments, the report of each is named."""
+"""Most experiments for which the path of each report is printed."""
 _NAMED = 5
-"""Up to so many experiments are named that run again for the same reason."""
+"""Most experiments that run again for the same reason and are still listed by name."""
 
 
 def run(options: Namespace) -> int:
@@ -42,26 +42,26 @@ def run(options: Namespace) -> int:
 
 def _run(options: Namespace) -> int:
     results = chosen_results(options)
-    # Everything is validated before anything is written but the cache of plans.
+    # Everything is validated before anything but the cache of plans is written.
     plans = plans_of(options.experiments, options.settings, cached=True)
     check_allowed(plans, options.allow_commands)
     results_folder.check(results, [plan.key for plan in plans])
-    where = executor.chosen(options, plans, results)
-    # on the command line: a profile has its own, and that programs may run is not heard from a file
-    config = [f"{key}={value}" for key, value in where.config.items()]
+    target = executor.chosen(options, plans, results)
+    # as arguments, since they override the profile and since no file may grant permission to run programs
+    config = [f"{key}={value}" for key, value in target.config.items()]
     config += ["allow_commands=true"] * options.allow_commands
     if config:
-        where = replace(where, arguments=["--config", *config, *where.arguments])
+        target = replace(target, arguments=["--config", *config, *target.arguments])
     is_quiet = options.detail == "quiet"
     if not is_quiet:
         tell_notes(plans)
     if options.dry_run and options.junit:
         raise refusal("--junit", options.junit, "a dry run has no verdicts to write")
     if options.dry_run:
-        return _dry_run(plans, results, where, options)
+        return _dry_run(plans, results, target, options)
     if options.junit:
         junit.check_place(options.junit)
-    held = lock.hold(results)
+    descriptor = lock.hold(results)
     lock.claim(plans, results)
     results_folder.deleted(results)
     _clear(plans, results, options)
@@ -70,7 +70,7 @@ def _run(options: Namespace) -> int:
     progress = None if is_quiet else Progress()
     jobs: list[Job] = []
     for _ in range(_STAGES):
-        ended = _workflow(plans, results, held, where, progress)
+        ended = _workflow(plans, results, descriptor, target, progress)
         if ended.jobs:
             _refuse_edited(plans, options)
         summaries = [outcome.collect(plan, results) for plan in plans]
@@ -88,19 +88,19 @@ def _run(options: Namespace) -> int:
 def _workflow(
     plans: Sequence[Plan],
     results: Path,
-    held: int,
-    where: Executor,
+    descriptor: int,
+    target: Executor,
     progress: Progress | None = None,
 ) -> snakemake.Outcome:
-    """Run Snakemake, once more where its own records end it: what they say, the manifest says as well."""
-    ended = snakemake.run(plans, results, held, where, progress)
+    """Run Snakemake; if it breaks on its own records, delete these, since the manifest suffices, and run it again."""
+    ended = snakemake.run(plans, results, descriptor, target, progress)
     if ended.broke and results_folder.forget(results):
-        return snakemake.run(plans, results, held, where, progress)
+        return snakemake.run(plans, results, descriptor, target, progress)
     return ended
 
 
 def _clear(plans: Sequence[Plan], results: Path, options: Namespace) -> None:
-    """Delete what is no longer as it was made, and remove what no experiment asks for any more."""
+    """Delete files that were changed since they were made, and files that no experiment needs any more."""
     for error in changes.changed(plans, results, every=options.verify):
         results_folder.delete(error, results)
     _tell_deleted(results)
@@ -111,19 +111,19 @@ def _clear(plans: Sequence[Plan], results: Path, options: Namespace) -> None:
 
 
 def _tell_changes(plans: Sequence[Plan], results: Path) -> None:
-    """Say why experiments run again that have results already; once for many with the same reason."""
-    found: dict[str, list[str]] = {}
+    """Print why experiments with results run again; many experiments with the same reason share a line."""
+    by_reason: dict[str, list[str]] = {}
     for plan in plans:
-        found.setdefault(reasons.why(plan, results), []).append(plan.key)
-    for reason, keys in found.items():
+        by_reason.setdefault(reasons.why(plan, results), []).append(plan.key)
+    for reason, keys in by_reason.items():
         if reason not in ("", reasons.NEW):
-            who = [f"{len(keys)} experiments"] if len(keys) > _NAMED else keys
-            for name in who:
+            names = [f"{len(keys)} experiments"] if len(keys) > _NAMED else keys
+            for name in names:
                 print(f"{name}: {reason}", file=sys.stderr, flush=True)
 
 
 def _tell_deleted(results: Path) -> bool:
-    """Say what was deleted; tell whether anything was."""
+    """Print what was deleted, and tell whether anything was."""
     notes = results_folder.deleted(results)
     for note in notes:
         print(f"vibsim: deleted, to be made again: {note}", file=sys.stderr)
@@ -131,7 +131,7 @@ def _tell_deleted(results: Path) -> bool:
 
 
 def _refuse_edited(plans: Sequence[Plan], options: Namespace) -> None:
-    """Refuse to go on with plans of files that say something else now: their results would be those of neither."""
+    """Refuse to go on if experiment files changed during the run: the results would belong to neither version."""
     now = plans_of(options.experiments, options.settings, cached=True)
     files = dict.fromkeys(plan.file for plan in plans if plan not in now)
     if files:
@@ -139,23 +139,23 @@ def _refuse_edited(plans: Sequence[Plan], options: Namespace) -> None:
         raise VibsimError("\n".join(f"{file}: {rule}" for file in files))
 
 
-def _dry_run(plans: Sequence[Plan], results: Path, where: Executor, options: Namespace) -> int:
-    """Show the jobs; a results folder that does not exist yet is not made for that."""
+def _dry_run(plans: Sequence[Plan], results: Path, target: Executor, options: Namespace) -> int:
+    """Show the jobs that a run would start, without creating the results folder."""
     with ExitStack() as stack:
         if not results.exists():
             results = stack.enter_context(temporary_folder())
-        held = lock.hold(results)
+        descriptor = lock.hold(results)
         lock.claim(plans, results, dry_run=True)
         bad = changes.changed(plans, results, every=options.verify)
         for error in bad:
             print(f"vibsim: would be deleted and made again: {error}", file=sys.stderr)
         for path in changes.leftovers(plans, results):
             print(f"vibsim: would be removed, no longer asked for: {path}", file=sys.stderr)
-        ended = _shown(plans, results, held, where, bad)
-        known = {results / path for job in ended.jobs for path in job.outputs}
-        if missed := [e for e in changes.stale(plans, results) if e.path not in known]:
-            ended = _shown(plans, results, held, where, [*bad, *missed])
-        jobs = list(_one_by_one(ended.jobs, plans, results))
+        ended = _preview(plans, results, descriptor, target, bad)
+        outputs = {results / path for job in ended.jobs for path in job.outputs}
+        if missed := [e for e in changes.stale(plans, results) if e.path not in outputs]:
+            ended = _preview(plans, results, descriptor, target, [*bad, *missed])
+        jobs = list(_by_file(ended.jobs, plans, results))
         words = list(reasons.in_words(jobs, plans, results))
     if options.json:
         entries = [{"job": str(job), "rule": job.rule, "reason": job.reason} for job in jobs]
@@ -167,21 +167,25 @@ def _dry_run(plans: Sequence[Plan], results: Path, where: Executor, options: Nam
     return 0
 
 
-def _shown(
-    plans: Sequence[Plan], results: Path, held: int, where: Executor, bad: Sequence[FileError]
+def _preview(
+    plans: Sequence[Plan],
+    results: Path,
+    descriptor: int,
+    target: Executor,
+    bad: Sequence[FileError],
 ) -> snakemake.Outcome:
-    """Ask Snakemake what it would do, if these files were not there."""
-    arguments = [*where.arguments, "--dry-run"]
+    """Ask Snakemake which jobs it would run if the files in `bad` were missing."""
+    arguments = [*target.arguments, "--dry-run"]
     if bad:
         paths = dict.fromkeys(error.path.relative_to(results).as_posix() for error in bad)
         arguments += ["--forcerun", *paths]
-    ended = _workflow(plans, results, held, replace(where, arguments=arguments))
+    ended = _workflow(plans, results, descriptor, replace(target, arguments=arguments))
     _check(ended)
     return ended
 
 
-def _one_by_one(jobs: Sequence[Job], plans: Sequence[Plan], results: Path) -> Iterator[Job]:
-    """Yield what a run would make, file by file: a job keeps those of its files that are up to date."""
+def _by_file(jobs: Sequence[Job], plans: Sequence[Plan], results: Path) -> Iterator[Job]:
+    """Split simulate jobs by file, and drop the files that are up to date, which a job would keep."""
     shards = {shard.path: shard for plan in plans for shard in plan.shards}
     for job in jobs:
         if not job.simulates:
@@ -193,7 +197,7 @@ def _one_by_one(jobs: Sequence[Job], plans: Sequence[Plan], results: Path) -> It
 
 
 def _check(ended: snakemake.Outcome) -> None:
-    """Refuse to go on where Snakemake itself failed, rather than one of its jobs."""
+    """Raise an error if Snakemake itself failed, rather than one of its jobs."""
     if ended.broke:
         raise VibsimError(f"the workflow failed: {ended.cause} {failure.save_text(ended.text)}")
 
@@ -208,7 +212,7 @@ def _show(
 ) -> int:
     _check(ended)
     failures = outcome.failed_jobs(ended.failed, plans, results)
-    # the index waits for every report: after a failure it is written from what there is
+    # Snakemake writes the index after all reports; after a failure it is written here, from the results that exist
     index = ["report", "--results", str(results)]
     has_index = not failures or supervise.child(index) == 0
     status = outcome.status(summaries, failures)
@@ -228,7 +232,7 @@ def _show(
         for line in outcome_text.of_failures(failures):
             print(line)
         print(f"\n{outcome_text.count(summaries, status)}")
-        # the index links to those of many experiments
+        # for many experiments, the index links to the reports
         pages = [results / plan.page for plan in plans] if len(plans) <= _PAGES else []
         for page in filter(Path.is_file, pages):
             print(f"report: {page}")

@@ -1,4 +1,4 @@
-"""Where the jobs of a run are done: on this machine, or where an executor of Snakemake sends them."""
+"""Where the jobs of a run are executed: on this machine, or through an executor plug-in of Snakemake."""
 
 from __future__ import annotations
 
@@ -17,36 +17,36 @@ from vibsim.core.errors import InputError, nearest
 from vibsim.core.home import home
 from vibsim.core.processes import usable_cores
 from vibsim.plan import Plan
-from vibsim.plan.workflow_names import GROUP, together
+from vibsim.plan.workflow_names import GROUP, group_size
 
 PLUG_IN = "snakemake_executor_plugin_"
 PROFILES = ("config.yaml", "config.v8+.yaml", "config.v9+.yaml")
-"""Names that the file of a profile may have."""
+"""Possible names of the file of a profile."""
 SHIPPED = ("slurm", "generic")
-"""The profiles in ``workflow/profiles``: one for the executor of its name, and one for any other."""
+"""The profiles in ``workflow/profiles``: one for SLURM, and one for any other executor."""
 CONFIGURED = ("cores", "overhead", "here")
-"""What a profile configures of vibsim: the cores of a job, the megabytes of the executor's processes beside it, and the
-seconds of work that are no jobs but done here."""
+"""Settings of vibsim in a profile: cores of a job, memory of the executor's own processes [MB], and the total time of
+analyses and pages up to which they run here and not as jobs [s]."""
 
 
 @dataclass(frozen=True)
 class Executor:
-    """What Snakemake is told of where jobs run."""
+    """Options of Snakemake that say where jobs run."""
 
     arguments: Sequence[str]
     config: Mapping[str, int] = field(default_factory=dict)
-    """What `vibsim.cli.workflow.names_of` takes beside experiments."""
+    """Settings for `vibsim.cli.workflow.names_of` (`CONFIGURED`)."""
     is_remote: bool = False
-    """Whether jobs run in other processes than those of this command, which it must cancel."""
+    """Whether jobs run outside of this command's processes, so that an interrupt must cancel them."""
 
 
 def chosen(options: Namespace, plans: Sequence[Plan], results: Path) -> Executor:
-    """Return the executor that a command line asks for; this machine must have room for what runs here.
+    """Return the executor that the command line requests.
 
     Raises
     ------
     InputError
-        Where there is no such executor or profile, or not enough room.
+        Where the executor or profile does not exist, or this machine has too little memory or disk for local jobs.
     """
     name, profile = options.executor, options.profile
     if not name and not profile:
@@ -55,7 +55,7 @@ def chosen(options: Namespace, plans: Sequence[Plan], results: Path) -> Executor
         resources.check(plans, results)
         allowed = str(options.cores or usable_cores())
         memory = f"mem_mb={resources.megabytes(plans)}"
-        return Executor(["--cores", allowed, "--resources", memory, *options.handed])
+        return Executor(["--cores", allowed, "--resources", memory, *options.for_snakemake])
     arguments: list[str] = []
     if name:
         _check_name(name)
@@ -72,18 +72,18 @@ def chosen(options: Namespace, plans: Sequence[Plan], results: Path) -> Executor
     config = _numbers(shipped / "generic", "config") | _numbers(folder, "config")
     if GROUP in (groups := _numbers(folder, "group-components")):
         seconds = [batch.seconds for plan in plans for batch in plan.batches]
-        groups[GROUP] = together(seconds, groups[GROUP])
+        groups[GROUP] = group_size(seconds, groups[GROUP])
         arguments += ["--group-components", *(f"{name}={many}" for name, many in groups.items())]
     if options.cores:
         arguments += ["--cores", str(options.cores)]
         config["cores"] = options.cores
-    return Executor([*arguments, *options.handed], config, is_remote=True)
+    return Executor([*arguments, *options.for_snakemake], config, is_remote=True)
 
 
 def _folder(profile: Path, shipped: Path) -> Path:
-    """Return the folder of a profile that is named: a folder, else the shipped one of that name."""
-    found = [profile.absolute(), *([shipped / profile] if str(profile) in SHIPPED else [])]
-    for folder in found:
+    """Return the folder of a profile, given as a folder or as the name of a shipped profile."""
+    candidates = [profile.absolute(), *([shipped / profile] if str(profile) in SHIPPED else [])]
+    for folder in candidates:
         if any((folder / file).is_file() for file in PROFILES):
             return folder
     rule = f"must be {' or '.join(SHIPPED)}, or a folder with the file {PROFILES[0]}"
@@ -91,11 +91,11 @@ def _folder(profile: Path, shipped: Path) -> Path:
 
 
 def _numbers(folder: Path, option: str) -> dict[str, int]:
-    """Return what the profile in a folder says of an option of Snakemake, as a mapping or as ``KEY=VALUE``."""
-    found = _read(folder).get(option) or {}
+    """Return the value of an option in the profile in a folder, written as a mapping or as a list of ``KEY=VALUE``."""
+    value = _read(folder).get(option) or {}
     try:
-        pairs = found.items() if isinstance(found, dict) else (row.split("=", 1) for row in found)
-        # others of `config` are no concern of vibsim, and may be of any type
+        pairs = value.items() if isinstance(value, dict) else (row.split("=", 1) for row in value)
+        # other keys of `config` are not for vibsim, and may have any type
         return {key: int(value) for key, value in pairs if option != "config" or key in CONFIGURED}
     except (ValueError, AttributeError, TypeError) as error:
         keys = f"{' and '.join(CONFIGURED)} in `config`" if option == "config" else f"`{option}`"
@@ -107,12 +107,12 @@ def _read(folder: Path) -> dict[str, Any]:
     import yaml
 
     try:
-        found = yaml.safe_load(_file(folder).read_text()) or {}
+        profile = yaml.safe_load(_file(folder).read_text()) or {}
     except (OSError, ValueError, yaml.YAMLError) as error:
         raise _unreadable(folder, "it must be YAML", error) from None
-    if not isinstance(found, dict):
-        raise _unreadable(folder, "it must be a mapping", type(found).__name__)
-    return found
+    if not isinstance(profile, dict):
+        raise _unreadable(folder, "it must be a mapping", type(profile).__name__)
+    return profile
 
 
 def _file(folder: Path) -> Path:
@@ -124,10 +124,10 @@ def _unreadable(folder: Path, rule: str, why: object) -> InputError:
 
 
 def _status_command() -> list[str]:
-    """Return what has jobs of SLURM followed by squeue where sacct has no accounts, and would be asked for ever."""
+    """Return the option to query SLURM by squeue if sacct fails (no accounting), since the executor would retry it."""
     try:
-        words = ["sacct", "--noheader", "--allocations", "--starttime", "now"]
-        ended = subprocess.run(words, capture_output=True, check=False, timeout=60)
+        command = ["sacct", "--noheader", "--allocations", "--starttime", "now"]
+        ended = subprocess.run(command, capture_output=True, check=False, timeout=60)
     except (OSError, subprocess.TimeoutExpired):
         return []
     return ["--slurm-status-command", "squeue"] if ended.returncode else []
@@ -136,8 +136,8 @@ def _status_command() -> list[str]:
 def _check_name(name: str) -> None:
     if find_spec(PLUG_IN + name.replace("-", "_")) is not None:
         return
-    found = (row.name for row in iter_modules() if row.name.startswith(PLUG_IN))
-    known = [module.removeprefix(PLUG_IN).replace("_", "-") for module in found]
+    modules = (row.name for row in iter_modules() if row.name.startswith(PLUG_IN))
+    known = [module.removeprefix(PLUG_IN).replace("_", "-") for module in modules]
     package = f"snakemake-executor-plugin-{name}"
     rule = f"there is no such executor; it comes with the package {package}"
     raise refusal("--executor", name, rule, nearest(name, sorted(known)))

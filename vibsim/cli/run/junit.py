@@ -1,7 +1,7 @@
-"""The verdicts as a JUnit report, which continuous integration shows: experiments are suites, checks are cases.
+"""Verdicts as a JUnit report for continuous integration: an experiment is a suite, a check is a test case.
 
-A check that fails is a failure, and so is one that decides nothing, with its reason. What has no verdict, because a job
-failed or a result is damaged, is an error.
+FAIL and INCONCLUSIVE are failures, with their reasons. Missing verdicts, because a job failed or a result is damaged,
+are errors.
 """
 
 from __future__ import annotations
@@ -17,16 +17,16 @@ from vibsim.cli.terminal import clean
 from vibsim.store import write_text
 
 JOBS = "jobs of the workflow"
-"""Name of the suite of jobs that failed."""
+"""Name of the suite of failed jobs."""
 
 
 def check_place(path: Path) -> None:
-    """Refuse a path where no report can be written, before anything runs, and remove the report of an earlier run.
+    """Check before a run that the report can be written to `path`, and remove the report of an earlier run.
 
     Raises
     ------
     InputError
-        Where its folder does not exist, or it is no file.
+        Where the folder does not exist, or `path` exists and is not a file.
     """
     rule = "" if path.parent.is_dir() else f"there is no folder {path.parent}"
     if path.exists() and not path.is_file():
@@ -82,8 +82,8 @@ def _case(
     message: str = "",
     text: str = "",
 ) -> Element:
-    of = f"{entry['collection']}.{entry['experiment']}"
-    case = SubElement(suite, "testcase", classname=of, name=clean(name))
+    experiment = f"{entry['collection']}.{entry['experiment']}"
+    case = SubElement(suite, "testcase", classname=experiment, name=clean(name))
     if problem:
         SubElement(case, problem, type=kind, message=clean(message)).text = text
     return case

@@ -1,10 +1,10 @@
-"""Whose a results folder is: that of one run at a time, and under each name the results of one file.
+"""Ownership of a results folder: one run at a time, and one experiment file for each name.
 
-The lock belongs to open descriptors and so vanishes with the last process that holds it, however it ends.
-A run hands its descriptor to Snakemake: should the run alone be killed, its orphan still holds the folder.
+The lock belongs to an open descriptor, so it vanishes with the last process that holds it, however that ends. Snakemake
+inherits the descriptor: if only the run is killed, the orphaned Snakemake still holds the folder.
 
-Two files of one name cannot have the same results. A file is the same under every spelling of its path, and where it
-was moved or copied together with the results. One that is no longer at its place gives its name to another.
+Two files of the same name cannot share results. A file is the same under every spelling of its path, and after it was
+moved or copied together with the results. If a file no longer exists, another one may take its name.
 """
 
 from __future__ import annotations
@@ -27,14 +27,15 @@ from vibsim.plan import Plan
 from vibsim.store.atomic import write_text
 
 Source = tuple[str, str]
-"""The file by its real path, and by its path from the results folder; one member of a sweep with its number."""
+"""Real path of an experiment file, and its path relative to the results folder; a single member adds ``@`` and its
+number."""
 
 _INHERITED = "VIBSIM_LOCK"
 _NO_LOCKS = (errno.ENOLCK, errno.ENOSYS, errno.EOPNOTSUPP)
 
 
 def hold(results: Path) -> int:
-    """Wait until no other run works in `results`, and keep others out until this process ends.
+    """Wait until no other run works in `results`, and lock it until this process ends.
 
     Returns
     -------
@@ -44,7 +45,7 @@ def hold(results: Path) -> int:
     Raises
     ------
     VibsimError
-        Where the folder cannot be written, or its file system has no locks: two runs would spoil each other's work.
+        Where the folder cannot be written, or its file system has no locks, so that runs could not be kept apart.
     """
     try:
         return _hold(results)
@@ -70,7 +71,7 @@ def _hold(results: Path) -> int:
         text = f"vibsim: waiting for another run in {results} (process {holder})"
         print(text, file=sys.stderr, flush=True)
         fcntl.flock(descriptor, fcntl.LOCK_EX)
-    # with a second name it may be another file elsewhere, too
+    # never write to a file with another hard link: it may be any file of the user
     if os.fstat(descriptor).st_nlink == 1:
         os.ftruncate(descriptor, 0)
         os.pwrite(descriptor, f"{supervise.known_pid()}\n".encode(), 0)
@@ -78,7 +79,7 @@ def _hold(results: Path) -> int:
 
 
 def inherited(descriptor: int) -> dict[str, str]:
-    """Return the environment that tells a child that it holds the lock with its parent."""
+    """Return the environment variable that tells a child that it has inherited the lock."""
     return {_INHERITED: _identity(descriptor)}
 
 
@@ -88,20 +89,20 @@ def _identity(descriptor: int) -> str:
 
 
 def claim(plans: Sequence[Plan], results: Path, *, dry_run: bool = False) -> None:
-    """Refuse the results of other files; put down whose the results are from now on, unless in a dry run.
+    """Refuse names that belong to other files, and record the files of these plans, except in a dry run.
 
     Raises
     ------
     InputError
-        With both files of every name that is taken.
+        Lists both files of every name that is taken.
     """
     record = results / ".vibsim/sources.json"
     known = _load(record)
-    own = {plan.key: _source(plan, results) for plan in plans if plan.collection == ADHOC}
+    sources = {plan.key: _source(plan, results) for plan in plans if plan.collection == ADHOC}
     faults = []
     for plan in plans:
         first = known.get(plan.key)
-        if plan.key not in own or first is None or set(first) & set(own[plan.key]):
+        if plan.key not in sources or first is None or set(first) & set(sources[plan.key]):
             continue
         if Path(_file(first[0])).exists():
             rule = f"{results / plan.key} has the results of another file of this name, {first[0]}"
@@ -109,9 +110,9 @@ def claim(plans: Sequence[Plan], results: Path, *, dry_run: bool = False) -> Non
             faults.append(Fault(plan.file, 0, "", "", rule, hint))
     if faults:
         raise InputError(faults)
-    now = known | own
+    now = known | sources
     if now != known and not dry_run:
-        # Results on a read-only medium keep what they have.
+        # a read-only results folder keeps its record
         with suppress(OSError):
             write_text(record, _text(now))
 
@@ -123,13 +124,13 @@ def _source(plan: Plan, results: Path) -> Source:
 
 
 def _file(word: str) -> str:
-    """Return the file in a word that may name one member of it."""
+    """Return the file named by a command-line word, without ``@`` and the number of a member."""
     name, at, case = word.rpartition("@")
     return name if at and case.isdigit() else word
 
 
 def _load(record: Path) -> dict[str, Source]:
-    """Return what is on record; nothing where it is damaged, rather than a file that has nothing to do with it."""
+    """Return the recorded sources by plan key; none if the record is damaged."""
     try:
         text = record.read_text(encoding="utf-8")
         known = {

@@ -1,4 +1,4 @@
-"""What a run found: status, reason and sentence of every check, as plain data or as JSON."""
+"""The outcome of a run: summaries of all experiments and failed jobs, as plain data or as JSON."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _LOG_LINES = 12
 
 
 def collect(plan: Plan, results: Path) -> Entry:
-    """Read the summary of an experiment; delete one that is damaged or outdated."""
+    """Return the summary of an experiment, or an entry with the error; a damaged or outdated summary is deleted."""
     path = results / plan.summary
     problem = "did not finish: it has no summary"
     if path.is_file():
@@ -39,8 +39,8 @@ def collect(plan: Plan, results: Path) -> Entry:
 
 
 def failed_jobs(jobs: Sequence[Job], plans: Sequence[Plan], results: Path) -> list[Entry]:
-    """Return the jobs that failed; of a group of jobs, which fails as a whole, those that did not make their files."""
-    wanted = {path: digest for plan in plans for path, digest in plan.files.items()}
+    """Return an entry for each failed job; of a group, which fails as a whole, only for jobs that miss their files."""
+    planned = {path: digest for plan in plans for path, digest in plan.files.items()}
     made = {
         f"{plan.key}/{name}": entry.job
         for plan in plans
@@ -50,7 +50,7 @@ def failed_jobs(jobs: Sequence[Job], plans: Sequence[Plan], results: Path) -> li
         job
         for job in jobs
         if any(
-            not (results / path).exists() or made.get(path) != wanted.get(path)
+            not (results / path).exists() or made.get(path) != planned.get(path)
             for path in job.outputs
         )
     ]
@@ -58,7 +58,7 @@ def failed_jobs(jobs: Sequence[Job], plans: Sequence[Plan], results: Path) -> li
 
 
 def _failed_job(job: Job, results: Path) -> Entry:
-    """Return a job that failed, with the end of its log, the reason of its executor and where that has its own log."""
+    """Return the entry of a failed job: the end of its log, the executor's reason and the path of its log, if any."""
     log = results / job.log
     try:
         lines = log.read_text(errors="replace").splitlines()
@@ -67,14 +67,14 @@ def _failed_job(job: Job, results: Path) -> Entry:
     tail = [line for line in lines if line.strip()][-_LOG_LINES:]
     tail += [job.reason] * bool(job.reason)
     tail += [f"log of the executor: {job.executor_log}"] * (results / job.executor_log).is_file()
-    # a job on a full disk cannot say so in its log
+    # on a full disk, a job cannot write its log
     tail = tail or [*resources.obstacle(results)]
     tail = tail or ["it left no message: it did not start, or was killed"]
     return {"job": str(job), "log": str(log), "tail": tail}
 
 
 def status(summaries: Sequence[Entry], failures: Sequence[Entry]) -> str:
-    """Return the status of the whole run: PASS where every check passed and every job ended well."""
+    """Return the status of the whole run: PASS if every check passed and no job failed."""
     return worst([entry["status"] for entry in summaries] + ["FAIL"] * bool(failures))
 
 

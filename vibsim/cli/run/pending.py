@@ -1,4 +1,4 @@
-"""Which submitted jobs wait, and for what, as SLURM says; other schedulers are not asked."""
+"""Report why submitted jobs are pending; only SLURM is queried."""
 
 from __future__ import annotations
 
@@ -12,55 +12,54 @@ from pathlib import Path
 from threading import Event, Thread
 
 INTERVAL = 60.0
-"""Seconds between two questions."""
-_LOG = 4096
-"""Width of the path of a log in the answer."""
-_REASON = 200
+"""Time between two queries [s]."""
+_LOG, _REASON = 4096, 200
+"""Widths of the columns with the path of the log and with the reason."""
 
 
 @contextmanager
 def reported(results: Path, clear: Callable[[], None]) -> Iterator[None]:
-    """While this lasts, say on stderr how many jobs of a run wait and why, whenever that has changed.
+    """Within the context, print on stderr how many jobs of a run wait and why, whenever this changes.
 
-    `clear` removes the line of the progress first.
+    `clear` is called first, to remove the progress line.
     """
     end = Event()
-    teller = Thread(target=_tell, args=(results, clear, end), daemon=True)
+    thread = Thread(target=_report, args=(results, clear, end), daemon=True)
     if shutil.which("squeue"):
-        teller.start()
+        thread.start()
     try:
         yield
     finally:
         end.set()
 
 
-def _tell(results: Path, clear: Callable[[], None], end: Event) -> None:
-    before = ""
+def _report(results: Path, clear: Callable[[], None], end: Event) -> None:
+    last = ""
     while not end.wait(INTERVAL):
-        now = in_words(reasons(results))
-        if now not in ("", before):
+        text = in_words(reasons(results))
+        if text not in ("", last):
             clear()
-            print(f"vibsim: {now}", file=sys.stderr, flush=True)
-        before = now
+            print(f"vibsim: {text}", file=sys.stderr, flush=True)
+        last = text
 
 
 def reasons(results: Path) -> Counter[str]:
-    """Return the reasons for which jobs wait whose logs are in a results folder, each with how many."""
-    rows = f"STDOUT:{_LOG},Reason:{_REASON}"
-    command = ["squeue", "--me", "--noheader", "--states", "PENDING", "--Format", rows]
+    """Return the number of pending jobs by reason; jobs of this run have their logs in `results`."""
+    columns = f"STDOUT:{_LOG},Reason:{_REASON}"
+    command = ["squeue", "--me", "--noheader", "--states", "PENDING", "--Format", columns]
     try:
         ended = subprocess.run(
             command, capture_output=True, text=True, check=True, timeout=INTERVAL
         )
     except (OSError, subprocess.SubprocessError):
-        # the executor has its own questions to the scheduler, and says what is wrong with it
+        # the executor queries the scheduler too, and reports its errors
         return Counter()
     lines = (line for line in ended.stdout.splitlines() if line.startswith(f"{results}/"))
     return Counter(line[-_REASON:].strip() for line in lines)
 
 
-def in_words(found: Counter[str]) -> str:
-    """Say how many jobs wait: ``3 jobs are pending: Priority (2); Resources (1)``."""
-    which = "; ".join(f"{reason} ({number})" for reason, number in found.most_common())
-    number = found.total()
-    return f"{number} job{'s are' if number > 1 else ' is'} pending: {which}" if number else ""
+def in_words(counts: Counter[str]) -> str:
+    """Return the counts as a sentence: ``3 jobs are pending: Priority (2); Resources (1)``."""
+    details = "; ".join(f"{reason} ({number})" for reason, number in counts.most_common())
+    number = counts.total()
+    return f"{number} job{'s are' if number > 1 else ' is'} pending: {details}" if number else ""

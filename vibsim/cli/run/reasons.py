@@ -1,6 +1,6 @@
-"""Why jobs run again, in words: ``model.w: 2.0 -> 2.5: levels 7 to 11, analysis, report``.
+"""Explain why jobs run again: ``model.w: 2.0 -> 2.5: levels 7 to 11, analysis, report``.
 
-Snakemake knows that a digest changed, but not what the digest is of. The results say what they were made from.
+Snakemake knows that a digest changed, but not which of its inputs did. The provenance in the results shows that.
 """
 
 from __future__ import annotations
@@ -21,14 +21,14 @@ from vibsim.store import read_json
 
 NEW = "not made yet"
 _SHOWN = 3
-"""So many changes are named."""
+"""Number of changes that are listed."""
 _LEVEL = re.compile(r"/level_(\d+)(?:/shard_\d+)?\.nc$")
 _DONE = {"analyse": "analysis", "extrapolate": "extrapolated solution"}
-"""What a job makes, where it has another name than the job."""
+"""Names of the products of jobs, where they differ from the rule name."""
 
 
 def why(plan: Plan, results: Path) -> str:
-    """Say what changed since the results of an experiment were made; empty where that is not known."""
+    """Return what changed since the results of an experiment were made; empty if unknown."""
     if not (results / plan.key).is_dir():
         return NEW
     try:
@@ -36,8 +36,7 @@ def why(plan: Plan, results: Path) -> str:
     except FileError:
         return "not finished yet"
     if summary.get("digest") == plan.analysis:
-        titles = (shown(title) for title in (summary.get("title"), plan.title))
-        title = Change("title", *titles)
+        title = Change("title", shown(summary.get("title")), shown(plan.title))
         return "" if title.old == title.new else str(title)
     from vibsim.store.reading import read_provenance
 
@@ -45,31 +44,31 @@ def why(plan: Plan, results: Path) -> str:
         made = read_provenance(results / plan.convergence)
     except FileError:
         return "not finished yet"
-    return _what_differs(plan, made)
+    return _changes(plan, made)
 
 
-def _what_differs(plan: Plan, made: Mapping[str, Any]) -> str:
-    found = differences(made["experiment"], analysed(plan.content))
-    if not found:
-        found = versions(plan, made)
-    if not found:
+def _changes(plan: Plan, made: Mapping[str, Any]) -> str:
+    changes = differences(made["experiment"], analysed(plan.content))
+    if not changes:
+        changes = versions(plan, made)
+    if not changes:
         before, now = (
             {set_options([text]).strip(): "given" for text in texts}
             for texts in (made.get("settings", ()), plan.settings)
         )
-        found = differences(before, now)
-    if not found:
+        changes = differences(before, now)
+    if not changes:
         solver = "the solver, its inputs or " if plan.has_solver else ""
-        own = ", ".join(kind for _, kind, _ in plan.packages)
-        return f"{solver}the code of {own + ' or of ' if own else ''}vibsim changed"
-    rest = [f"{len(found) - _SHOWN} more changes"] if len(found) > _SHOWN + 1 else []
-    named = found[:_SHOWN] if rest else found
-    return "; ".join([*map(str, named), *rest])
+        packages = ", ".join(kind for _, kind, _ in plan.packages)
+        return f"{solver}the code of {packages + ' or of ' if packages else ''}vibsim changed"
+    more = [f"{len(changes) - _SHOWN} more changes"] if len(changes) > _SHOWN + 1 else []
+    listed = changes[:_SHOWN] if more else changes
+    return "; ".join([*map(str, listed), *more])
 
 
 def versions(plan: Plan, made: Mapping[str, Any]) -> list[Change]:
-    """Return the versions that are others now than those that a result was made with (its provenance)."""
-    # an unknown version says nothing, and no record of it is no change
+    """Return the library versions that changed since a result was made, from its provenance `made`."""
+    # an unknown or unrecorded version does not count as changed
     now = provenance(plan, {})["versions"]
     match made.get("versions"):
         case dict() as before:
@@ -78,18 +77,18 @@ def versions(plan: Plan, made: Mapping[str, Any]) -> list[Change]:
 
 
 def in_words(jobs: Sequence[Job], plans: Sequence[Plan], results: Path) -> Iterator[str]:
-    """Yield a line for each experiment with jobs, why they are to run and what they make; below it the jobs."""
+    """Yield a line for each experiment, with the reason for its jobs and what they make, and below it the jobs."""
     known = {plan.key: plan for plan in plans}
     for folder in dict.fromkeys(job.folder for job in jobs):
-        own = [job for job in jobs if job.folder == folder]
+        subset = [job for job in jobs if job.folder == folder]
         if folder in known:
             reason = why(known[folder], results) or "files are missing or out of date"
-            yield f"{folder}: {reason}: {', '.join(what(own))}"
-        yield from (f"  {job}" for job in own)
+            yield f"{folder}: {reason}: {', '.join(products(subset))}"
+        yield from (f"  {job}" for job in subset)
 
 
-def what(jobs: Sequence[Job]) -> list[str]:
-    """Say what jobs of one experiment make: ``levels 7 to 11``, ``analysis``, ``report``."""
+def products(jobs: Sequence[Job]) -> list[str]:
+    """Return what the jobs of one experiment make: ``levels 7 to 11``, ``analysis``, ``report``."""
     levels = sorted(
         {
             int(match[1])

@@ -1,13 +1,13 @@
-"""What the executors of Snakemake do in another way under vibsim: how often they ask for jobs, what they tell of them.
+"""Changes to Snakemake's remote executors: how often they query the scheduler, and what they report of failed jobs.
 
-Executors ask their scheduler at a fixed interval, or ever more rarely while no job ends: that for SLURM waits 10 s
-longer each time, so half of a minute goes by after a job of a minute. Here the pause grows with the age of the jobs,
-and with nothing else. A job is missed for a fifth of its time at most, and a scheduler gets one question a minute for
-jobs that take long.
+Executors query their scheduler at a fixed interval, or with growing pauses while no job ends: the one for SLURM waits
+10 s longer each time, and notices the end of a one-minute job half a minute late. Here the pause grows with the age of
+the jobs only. The end of a job is noticed after at most a fifth of its run time, and long jobs cause one query per
+minute.
 
-Why a job failed is lost in Snakemake where it is one of a group; here each of the group is reported with the reason.
+Snakemake loses the reason why a job of a group failed; here each job of the group is reported with the reason.
 
-An interrupt cancels all jobs under way. The interface of Snakemake leaves out those whose states it is just asking for.
+An interrupt cancels all submitted jobs. Snakemake itself omits the jobs whose states it is just querying.
 """
 
 from __future__ import annotations
@@ -24,18 +24,18 @@ from snakemake_interface_executor_plugins.executors.remote import RemoteExecutor
 from snakemake_interface_executor_plugins.jobs import JobExecutorInterface
 
 SHARE = 0.2
-"""Pause over the mean age of the jobs."""
+"""Ratio of the pause to the mean age of the jobs."""
 LONGEST = 60.0
-"""Seconds of a pause at most, if the profile does not ask for more."""
+"""Longest pause [s], unless the profile requests a longer one."""
 
 
 def pause(ages: Sequence[float], shortest: float) -> float:
-    """Return the seconds until the next question about jobs that were submitted so many seconds ago."""
+    """Return the pause before the next query [s], from the times since the jobs were submitted [s]."""
     return max(shortest, min(LONGEST, SHARE * mean(ages))) if ages else shortest
 
 
 def ask_by_age() -> None:
-    """Have every executor that waits as the interface of Snakemake does ask by the age of its jobs.
+    """Make all executors that use Snakemake's default pause choose it from the age of their jobs.
 
     The shortest pause is ``--seconds-between-status-checks``.
     """
@@ -55,32 +55,32 @@ def ask_by_age() -> None:
 
 
 def cancel_all() -> None:
-    """Have an interrupt cancel every job that was submitted and has not ended, as far as is known.
+    """Make an interrupt cancel every job that was submitted and is not known to have ended.
 
-    Jobs are no longer in the list of `RemoteExecutor` while it asks for their states.
+    While `RemoteExecutor` queries the states of jobs, they are not in its own list.
     """
-    under_way: dict[JobExecutorInterface, SubmittedJobInfo] = {}
+    running: dict[JobExecutorInterface, SubmittedJobInfo] = {}
     submitted = RemoteExecutor.report_job_submission
     succeeded, failed = RemoteExecutor.report_job_success, RemoteExecutor.report_job_error
 
     def report_job_submission(
         self: RemoteExecutor, job_info: SubmittedJobInfo, *args: Any, **more: Any
     ) -> None:
-        under_way[job_info.job] = job_info
+        running[job_info.job] = job_info
         submitted(self, job_info, *args, **more)
 
     def report_job_success(self: RemoteExecutor, job_info: SubmittedJobInfo) -> None:
-        under_way.pop(job_info.job, None)
+        running.pop(job_info.job, None)
         succeeded(self, job_info)
 
     def report_job_error(
         self: RemoteExecutor, job_info: SubmittedJobInfo, *args: Any, **more: Any
     ) -> None:
-        under_way.pop(job_info.job, None)
+        running.pop(job_info.job, None)
         failed(self, job_info, *args, **more)
 
     def cancel(self: RemoteExecutor) -> None:
-        if jobs := list(under_way.values()):
+        if jobs := list(running.values()):
             self.cancel_jobs(jobs)
         self.shutdown()
 
@@ -91,7 +91,7 @@ def cancel_all() -> None:
 
 
 def tell_reasons() -> None:
-    """Have every job that failed reported with what its executor says of that, also where it is one of a group."""
+    """Make Snakemake report every failed job with its executor's message, also each job of a group."""
 
     def print_job_error(
         self: RemoteExecutor, job_info: SubmittedJobInfo, msg: str | None = None, **more: Any
@@ -105,9 +105,10 @@ def tell_reasons() -> None:
 
 
 def report_submissions() -> None:
-    """Have a group of jobs that SLURM does not take fail with the reason.
+    """Make a group of jobs that SLURM rejects fail with the reason.
 
-    The executor for SLURM stumbles over its own message there, in a thread that nobody asks, and waits for ever.
+    The SLURM executor raises an exception while it formats its own message, in a thread without a handler, and then
+    waits for ever.
     """
     module = sys.modules.get("snakemake_executor_plugin_slurm")
     if module is None:

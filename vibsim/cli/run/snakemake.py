@@ -1,4 +1,4 @@
-"""Start Snakemake and follow it: its jobs, how far it is, and how it ended."""
+"""Run Snakemake and follow its jobs, its progress and how it ends."""
 
 from __future__ import annotations
 
@@ -30,11 +30,11 @@ _SEARCH_PATHS = (
     *("PATH", "PYTHONPATH", "LD_LIBRARY_PATH", "PYTHONPYCACHEPREFIX"),
     *("BASH_ENV", "HDF5_PLUGIN_PATH", "MPLCONFIGDIR"),
 )
-"""Variables with folders and files that code is loaded from."""
+"""Environment variables with folders and files from which code or settings are loaded."""
 CANCELLING = 60.0
-"""Seconds that an executor has to cancel its jobs."""
+"""Time that an executor has to cancel its jobs [s]."""
 _TELLING = 3
-"""From so many finished jobs on, they tell how long the others take."""
+"""Number of finished jobs from which the remaining time is estimated."""
 
 
 @dataclass(frozen=True)
@@ -43,12 +43,12 @@ class Job:
 
     rule: str
     outputs: tuple[str, ...]
-    """The files that it makes, from the results folder."""
+    """The files that it makes, relative to the results folder."""
     log: str
     reason: str
-    """Why it is to run; of one that failed, what its executor says of that, if anything."""
+    """Why it runs; for a failed job the executor's message, if any."""
     executor_log: str = ""
-    """Path of what its executor wrote, of one that failed; empty where there is none."""
+    """Path of the executor's log of a failed job; empty if there is none."""
 
     @property
     def simulates(self) -> bool:
@@ -62,7 +62,7 @@ class Job:
         return "/".join(parts[:2]) if len(parts) > 2 else ""
 
     def __str__(self) -> str:
-        """Say what it does: ``simulate pendulum_lab/convergence level_06.nc to level_09.nc``."""
+        """Describe the job: ``simulate pendulum_lab/convergence level_06.nc to level_09.nc``."""
         if not self.folder:
             return self.rule
         if not self.simulates:
@@ -72,7 +72,7 @@ class Job:
 
 
 class Progress:
-    """Tells on stderr how far a run is: in one line that is rewritten, or plain lines where the output is kept."""
+    """Shows the progress of a run on stderr: in one line that is rewritten, or in a line per job if not a terminal."""
 
     def __init__(self) -> None:
         self.is_terminal = sys.stderr.isatty()
@@ -84,7 +84,7 @@ class Progress:
         self._show()
 
     def count(self, done: int, total: int) -> None:
-        """Take how many jobs are done of how many, both with the target of all, which is no job."""
+        """Record the number of finished jobs; the total includes the target rule ``all``, which is no job."""
         self.total = total - 1
         self.done = min(done, self.total)
         if not done:
@@ -93,7 +93,7 @@ class Progress:
         self._show()
 
     def start(self, job: Job) -> None:
-        """Take a job that has started."""
+        """Record that a job has started."""
         self.current = str(job)
         self.started += 1
         if not self.is_terminal:
@@ -112,7 +112,7 @@ class Progress:
             self._rewrite(f"{count}{self.current}")
 
     def _left(self) -> str:
-        """Say how long the rest takes if its jobs are like those that are done, where some are."""
+        """Return the remaining time, estimated from the mean time of the finished jobs, as text."""
         if self.done < _TELLING or self.done == self.total:
             return ""
         each = (time.monotonic() - self.began) / self.done
@@ -130,14 +130,14 @@ class Outcome:
 
     status: int = 0
     jobs: list[Job] = field(default_factory=list)
-    """Jobs that were started, or would be."""
+    """Jobs that Snakemake started, or would start in a dry run."""
     failed: list[Job] = field(default_factory=list)
     exception: str = ""
     """Name of the last exception that Snakemake logged; empty without one."""
     message: str = ""
-    """The message of that exception, in several lines."""
+    """The message of that exception, with several lines."""
     text: str = ""
-    """What Snakemake wrote for people."""
+    """Snakemake's output on stdout and stderr."""
 
     @property
     def broke(self) -> bool:
@@ -146,11 +146,11 @@ class Outcome:
 
     @property
     def cause(self) -> str:
-        """The exception with what it says in a line; where none was logged, the last line that was written."""
+        """The exception with its message in one line; if none was logged, the last line of the output."""
         lines = [line.strip() for line in (self.message or self.text).splitlines() if line.strip()]
         heads = [n for n, line in enumerate(lines) if line.startswith(self.exception or "\0")]
         cause, *more = lines[heads[-1] if heads else -1 :] or [""]
-        # such as `InputError in file "Snakefile", line 4:`, with the reason on the next line, or the files behind it
+        # e.g. `InputError in file "Snakefile", line 4:`, followed by lines with the reason or the files
         for line in more:
             if not cause.endswith(":"):
                 break
@@ -161,41 +161,41 @@ class Outcome:
 def run(
     plans: Sequence[Plan],
     results: Path,
-    held: int,
-    where: Executor,
+    descriptor: int,
+    target: Executor,
     progress: Progress | None = None,
 ) -> Outcome:
     """Run Snakemake on `plans` and return when it has ended.
 
     Parameters
     ----------
-    results, held
+    results, descriptor
         The results folder, and the descriptor of its lock, which Snakemake inherits.
-    where
+    target
         Where jobs run.
     progress
-        Told how far the run is.
+        Display of the progress, if any.
 
     Raises
     ------
     Interrupted
-        When Snakemake was ended by a signal that asks to end.
+        Where SIGHUP, SIGINT or SIGTERM ended Snakemake.
     VibsimError
-        When another signal killed it.
+        Where another signal killed it.
     """
     results_folder.clean(results, [plan.key for plan in plans])
-    config = _write_config(plans, results, where)
+    config = _write_config(plans, results, target)
     reading, writing = os.pipe()
-    if where.is_remote:
+    if target.is_remote:
         supervise.take_time(CANCELLING)
     with os.fdopen(reading, "rb") as events:
         try:
             process = subprocess.Popen(
-                _command(config, results, where, writing),
-                # Snakemake imports what it finds in .snakemake/pip-deployments of the folder that it is started in.
+                _command(config, results, target, writing),
+                # Snakemake imports modules from .snakemake/pip-deployments in its working directory.
                 cwd="/",
-                env=_environment() | lock.inherited(held),
-                pass_fds=(held, writing),
+                env=_environment() | lock.inherited(descriptor),
+                pass_fds=(descriptor, writing),
                 stdin=subprocess.DEVNULL,
                 stdout=subprocess.PIPE,
                 stderr=subprocess.STDOUT,
@@ -207,16 +207,16 @@ def run(
         reader.start()
         try:
             with ExitStack() as stack:
-                if progress and where.is_remote:
+                if progress and target.is_remote:
                     stack.enter_context(pending.reported(results, progress.clear))
                 ended = follow(events, progress)
             ended.status = _status(process)
         except supervise.Interrupted:
-            if where.is_remote:
+            if target.is_remote:
                 _cancel(process)
             raise
         finally:
-            # Where this is left early, nothing else is worth waiting for: the jobs here end with it.
+            # after an exception there is nothing to wait for: local jobs end with Snakemake
             process.kill()
             process.wait()
         reader.join()
@@ -224,32 +224,32 @@ def run(
     return ended
 
 
-def _write_config(plans: Sequence[Plan], results: Path, where: Executor) -> Path:
-    """Write what the workflow reads of a run, and return its path."""
+def _write_config(plans: Sequence[Plan], results: Path, target: Executor) -> Path:
+    """Write the configuration that the workflow reads, and return its path."""
     config = results / ".vibsim/run.json"
     content = {
         "experiments": [plan.file for plan in plans],
         "settings": plans[0].settings if plans else (),
         "results": str(results),
-        **where.config,
+        **target.config,
     }
     write_text(config, json.dumps(content))
     return config
 
 
-def _command(config: Path, results: Path, where: Executor, pipe: int) -> list[str]:
-    """Return the command that starts Snakemake, which writes its events to a pipe."""
+def _command(config: Path, results: Path, target: Executor, pipe: int) -> list[str]:
+    """Return the command that starts Snakemake, which writes its events to the descriptor `pipe`."""
     command = [sys.executable, "-P", "-m", "vibsim.cli.run.snakemake_process", str(os.getpid())]
-    command.append("remote" if where.is_remote else "here")
+    command.append("remote" if target.is_remote else "here")
     command += ["--logger", "vibsim", "--logger-vibsim-pipe", str(pipe)]
     command += ["--snakefile", str(home() / "Snakefile")]
     command += ["--workflow-profile", str(home() / "workflow/profiles/default")]
     command += ["--configfile", str(config), "--directory", str(results), "--nocolor"]
-    return [*command, *where.arguments]
+    return [*command, *target.arguments]
 
 
 def _cancel(process: subprocess.Popen[bytes]) -> None:
-    """Have Snakemake cancel the jobs that it has submitted, and wait until it has."""
+    """Make Snakemake cancel its submitted jobs, and wait for it."""
     print("vibsim: cancelling what was submitted", file=sys.stderr, flush=True)
     process.send_signal(signal.SIGTERM)
     with suppress(subprocess.TimeoutExpired):
@@ -262,45 +262,45 @@ def _read(file: BinaryIO, lines: list[bytes]) -> None:
 
 
 def follow(events: Iterable[bytes], progress: Progress | None = None) -> Outcome:
-    """Return what Snakemake did, from its events (`vibsim.cli.run.snakemake_process`) until there are no more."""
-    found = Outcome()
+    """Read events of Snakemake (`vibsim.cli.run.snakemake_process`) until they end, and return what it did."""
+    outcome = Outcome()
     for line in events:
-        # one that a kill cut short is recognised by the status
+        # a line is incomplete only if Snakemake was killed, which the exit status shows
         if line.endswith(b"\n"):
-            _take(json.loads(line), found, progress)
-    return found
+            _record(json.loads(line), outcome, progress)
+    return outcome
 
 
-def _take(event: dict[str, Any], found: Outcome, progress: Progress | None) -> None:
+def _record(event: dict[str, Any], outcome: Outcome, progress: Progress | None) -> None:
     match event:
         case {"event": "run_info", "stats": {"total": total}} if progress:
             progress.count(0, total)
         case {"event": "progress", "done": done, "total": total} if progress:
             progress.count(done, total)
         case {"event": "error"}:
-            found.exception, found.message = event["exception"], event["msg"]
-        # the target of all is no job
+            outcome.exception, outcome.message = event["exception"], event["msg"]
+        # the target rule is no job
         case {"rule_name": rule} if rule != "all":
             outputs = tuple(path.removesuffix(" (update)") for path in event["output"])
-            # behind its own log stands that of its executor
+            # its own log, then possibly the executor's
             log, executor_log = (*event["log"], "", "")[:2]
             reason = event.get("reason") or event.get("rule_msg") or ""
             job = Job(rule, outputs, log, reason, executor_log)
-            failed = [one for one in found.failed if one.outputs == job.outputs]
+            others = [failed for failed in outcome.failed if failed.outputs != job.outputs]
             if event["event"] == "job_error":
-                found.failed.append(job)
+                outcome.failed.append(job)
                 return
-            if failed:
-                # it is tried again
-                found.failed = [one for one in found.failed if one not in failed]
+            if len(others) < len(outcome.failed):
+                # a failed job is tried again
+                outcome.failed = others
                 return
-            found.jobs.append(job)
+            outcome.jobs.append(job)
             if progress:
                 progress.start(job)
 
 
 def _status(process: subprocess.Popen[bytes]) -> int:
-    """Return the exit status of Snakemake, which may have been killed."""
+    """Return the exit status of Snakemake; raise an error if a signal killed it."""
     status = process.wait()
     if number := supervise.ended_by(status):
         raise supervise.Interrupted(number)
@@ -313,23 +313,23 @@ def _status(process: subprocess.Popen[bytes]) -> int:
 def _environment() -> dict[str, str]:
     """Return the environment of Snakemake and its jobs, which work in the results folder.
 
-    What is relative, or empty, in a search path means the folder that the user is in, and would mean the results folder
-    there: programs and libraries would be loaded from it. Snakemake runs copies of its rules from the user's cache
-    folder, and gets another one where others can write to that.
+    Search paths become absolute: a relative or empty entry means the user's current folder, and would mean the results
+    folder there, from which no code may be loaded. Snakemake runs copies of its rules from the user's cache folder; it
+    gets another folder if other users can write to that.
     """
-    found = dict(os.environ)
+    variables = dict(os.environ)
     for name in _SEARCH_PATHS:
-        if value := found.get(name):
-            found[name] = os.pathsep.join(map(os.path.abspath, value.split(os.pathsep)))
+        if value := variables.get(name):
+            variables[name] = os.pathsep.join(map(os.path.abspath, value.split(os.pathsep)))
     try:
         caches = private_cache.general()
         private_cache.check(caches, writable=True)
     except OSError:
         caches = private_cache.place()
-        found["MPLCONFIGDIR"] = str(caches / "matplotlib")
+        variables["MPLCONFIGDIR"] = str(caches / "matplotlib")
     try:
         pwd.getpwuid(os.getuid())
     except KeyError:
-        # Snakemake does not start without a home and a name; nothing is kept there: the caches have places of their own
-        found |= {"HOME": str(private_cache.place()), "USER": str(os.getuid())}
-    return found | {"XDG_CACHE_HOME": str(caches)}
+        # Snakemake needs a home folder and a user name to start, but stores nothing there
+        variables |= {"HOME": str(private_cache.place()), "USER": str(os.getuid())}
+    return variables | {"XDG_CACHE_HOME": str(caches)}

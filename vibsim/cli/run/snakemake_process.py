@@ -1,8 +1,8 @@
-"""Snakemake as a child of a run: it tells the run what it does, ends with it, and at once when it is told to.
+"""The Snakemake process of a run: it reports its events to the run, ends with the run, and ends at once on a signal.
 
-What it does goes through a pipe to the run, one JSON object a line (`LogHandler`, a logger plug-in of Snakemake). Its
-own handler of SIGTERM takes a lock that the interrupted thread may hold, and then waits for ever; nothing is lost when
-it is killed instead, since every file appears whole.
+Events go through a pipe to the run, one JSON object per line (`LogHandler`, a logger plug-in of Snakemake). Snakemake's
+own handler of SIGTERM waits for a lock that the interrupted thread may hold, possibly for ever. To kill it instead
+loses nothing, because every file is written in one step.
 """
 
 import gc
@@ -33,7 +33,7 @@ FIELDS = {
     LogEvent.JOB_ERROR: ("rule_name", "output", "log", "rule_msg"),
     LogEvent.ERROR: ("exception", "msg"),
 }
-"""The events that a run follows, each with what it needs to know of it."""
+"""The events that a run follows, with the fields that it reads."""
 
 
 @dataclass
@@ -44,7 +44,7 @@ class LogHandlerSettings(LogHandlerSettingsBase):
 
 
 class LogHandler(LogHandlerBase):
-    """Writes events to the pipe; what people read goes to stderr as ever."""
+    """Writes events to the pipe; Snakemake's text output still goes to stderr."""
 
     writes_to_stream = False
     writes_to_file = False
@@ -54,7 +54,7 @@ class LogHandler(LogHandlerBase):
     settings: LogHandlerSettings
 
     def emit(self, record: LogRecord) -> None:
-        """Write the event of a record, if it has one that a run follows."""
+        """Write the event of a log record if it is one of `FIELDS`."""
         event = getattr(record, "event", None)
         if event in FIELDS:
             content = {"event": event, **{name: getattr(record, name) for name in FIELDS[event]}}
@@ -62,7 +62,7 @@ class LogHandler(LogHandlerBase):
 
 
 def main() -> None:
-    """Run Snakemake for the process that the first argument names; the second says where jobs run, others follow."""
+    """Run Snakemake. Arguments: the process to end with; ``remote`` or ``here``; those of Snakemake."""
     parent, where = int(sys.argv.pop(1)), sys.argv.pop(1)
     if where == "remote":
         supervise.end_in_order()
@@ -70,7 +70,7 @@ def main() -> None:
         supervise.end_at_once()
     end_with(parent)
     gc.set_threshold(YOUNG_OBJECTS)
-    # Snakemake imports every executor that is installed. That for SLURM takes half a second and needs pandas.
+    # Snakemake imports every installed executor. The one for SLURM takes half a second and needs pandas.
     if where == "remote":
         ExecutorPluginRegistry()
         remote.ask_by_age()
@@ -79,8 +79,8 @@ def main() -> None:
         remote.report_submissions()
     else:
         ExecutorPluginRegistry.module_prefix = "none of them"
-    # It starts in half the time without what no run of vibsim uses: numbers of NumPy in a profile, addresses in the
-    # web, reports of its own, and tables as parameters of rules.
+    # It starts in half the time without modules that no run of vibsim uses: NumPy numbers in profiles, web addresses,
+    # Snakemake's reports, and tables as parameters of rules.
     with _absent("numpy", "requests", "snakemake.report"):
         for name in ("smart_open", "yte"):
             import_module(name)
@@ -95,7 +95,7 @@ def main() -> None:
 
 @contextmanager
 def _absent(*names: str) -> Iterator[None]:
-    """Have modules count as not installed, as Python marks them, unless they are there already."""
+    """Within the context, mark modules as not installed, except those already imported."""
     names = tuple(name for name in names if name not in sys.modules)
     sys.modules.update(dict.fromkeys(names))  # type: ignore[arg-type]
     try:
