@@ -1,7 +1,7 @@
-"""Matrices and vectors beside an experiment file: Matrix Market, NumPy or CSV files.
+"""Read matrices and vectors from Matrix Market, NumPy or CSV files.
 
-A CSV file holds rows of numbers without a line of names; or, under the line ``row,column,value``, the entries that are
-not 0, counted from 1, and those of a symmetric matrix on both sides of the diagonal.
+A CSV file contains rows of numbers without a header or, with the header ``row,column,value``, the nonzero entries with
+indices from 1; those of a symmetric matrix on both sides of the diagonal.
 """
 
 from __future__ import annotations
@@ -24,15 +24,13 @@ from vibsim.models.structure import MOST_DOFS
 ENDINGS = (".mtx", ".npy", ".csv")
 SPARSE_HEADER = "row,column,value"
 MOST_DENSE = 2048
-"""Rows of a matrix that is written out with its zeros, at most."""
+"""Largest number of rows of a dense matrix."""
 
 
 def read(path: Path) -> tuple[Any, str]:
-    """Return what the file at `path` holds, and the SHA-256 of its bytes.
+    """Return the matrix or vector in the file at `path`, and the SHA-256 of its bytes.
 
-    It is an array of numbers of one or two dimensions, or a sparse array of SciPy.
-
-    TableError where the file cannot be read as numbers.
+    It is a one- or two-dimensional array, or a sparse array of SciPy. Raises `TableError` for anything else.
     """
     content = bytes_of(path, ENDINGS, "matrix")
     of_kind = {".mtx": _from_matrix_market, ".npy": _from_numpy, ".csv": _from_text}
@@ -115,7 +113,7 @@ def _from_text(content: bytes) -> Any:
 
 
 def _from_entries(entries: Floats | None) -> Any:
-    """Return the sparse matrix with these entries, of shape (entry, 3)."""
+    """Return the sparse matrix with `entries` (row, column, value), shape (entry, 3)."""
     from scipy.sparse import coo_array
 
     if entries is None or not len(entries):
@@ -135,10 +133,7 @@ def _first_line(error: Exception) -> str:
 
 
 def square(found: Any) -> Matrix:
-    """Return a square matrix; of one row or column of numbers the diagonal matrix.
-
-    TableError where it is not square.
-    """
+    """Return a square matrix; for a single row or column the diagonal matrix. Raises `TableError` if not square."""
     if isinstance(found, np.ndarray) and (found.ndim == 1 or 1 in found.shape):
         found = np.diag(np.ravel(found))
     rows, columns = found.shape
@@ -148,7 +143,7 @@ def square(found: Any) -> Matrix:
 
 
 def vector(found: Any) -> Floats:
-    """Return one row or column of numbers as a vector; TableError where there are several."""
+    """Return a single row or column as a vector; raise `TableError` for anything else."""
     dense = found if isinstance(found, np.ndarray) else found.toarray()
     if dense.ndim == 2 and 1 not in dense.shape:
         raise TableError(f"must be one column, has the shape {dense.shape[0]} x {dense.shape[1]}")
