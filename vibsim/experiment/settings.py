@@ -105,7 +105,7 @@ def _name(node: Node | None, path: Path_, rest: str) -> str:
 def _check_index(node: Node | None, path: Path_, place: int) -> None:
     where = dotted(path)
     if node is None or not isinstance(node.value, list):
-        raise _SettingError(f"{where or 'the file'} is no list")
+        raise _SettingError(f"{where or 'the file'} is not a list")
     count = len(node.value)
     if place >= count:
         there = f"choose from [0] to [{count - 1}]" if count else "it is empty"

@@ -75,7 +75,7 @@ class _Writer:
     def moved(self, model: dict[str, Any], key: str, value: Any, path: Path_) -> dict[str, Any]:
         """Return a section with the value from `path` added under `key`; report a fault if the key exists."""
         if key in model:
-            self.report.add_malformed(path, f"stands under `model: {key}`, too", at_key=True)
+            self.report.add_malformed(path, f"is also given under `model: {key}`", at_key=True)
             return model
         self._came_from(("model", key), path)
         return {**model, key: value}
@@ -102,7 +102,7 @@ class _Writer:
             return model
         known = {"coordinates", *OF_COORDINATE}
         for key in (key for key in OF_COORDINATE if key in model):
-            rule = "stands at the coordinates, too"
+            rule = "is also given at the coordinates"
             self.report.add_malformed(("model", key), rule, at_key=True)
         by_force = any("force" in entry or "mass" in entry for entry in coordinates.values())
         formulas: dict[str, dict[str, Any]] = {}
@@ -111,7 +111,7 @@ class _Writer:
             self._came_from(("model", "coordinates", i), path)
             for key, value in entry.items():
                 if key not in OF_COORDINATE:
-                    rule = f"is no formula of a coordinate: {', '.join(OF_COORDINATE)}"
+                    rule = f"is not a formula of a coordinate: {', '.join(OF_COORDINATE)}"
                     self.report.add_malformed((*path, key), rule, at_key=True)
                     continue
                 is_plain_acceleration = key == "acceleration" and by_force and len(entry) == 1
@@ -196,7 +196,7 @@ def solved(equation: str, others: Sequence[str]) -> tuple[str, str]:
 
     def named(match: re.Match[str]) -> str:
         if match[1] != name:
-            raise ExpressionError(equation, 0, f"'{match[0]}' is no derivative of {name}")
+            raise ExpressionError(equation, 0, f"'{match[0]}' is not a derivative of {name}")
         return _SECOND if match[2] == "''" else velocity
 
     texts = [_DERIVATIVE.sub(named, side) for side in sides]

@@ -127,7 +127,7 @@ def _by_formula(
     """Return the values of a formula in `level`: ints if all are whole and the text has no "/" or "."."""
     if not has_levels:
         hint = "give a list, or `levels: {from: 4, to: 8}`"
-        report.add(path, "a formula needs `levels` beside it", hint, text)
+        report.add(path, "a formula needs `levels`", hint, text)
         return ()
     try:
         tree = parse(text, ("level",))
@@ -277,7 +277,7 @@ def _check_template(
         report.add(path, "has no placeholder for the file that it writes", "{output}", text)
     for name in swept:
         if name not in used:
-            rule = f"is no placeholder of `{kind}:`, so it would change nothing"
+            rule = f"is not a placeholder of `{kind}:`, so it would change nothing"
             report.add(("sweep", name), rule, f"write {{{name}}} where it belongs", at_key=True)
 
 

@@ -281,7 +281,7 @@ def place_of_fault(body: str, error: SyntaxError) -> tuple[int, str, str]:
         return joined.end(), "expected an operator", hint
     unmatched = unpaired(body)
     if unmatched is not None:
-        return unmatched, "has a parenthesis without its partner", ""
+        return unmatched, "has an unmatched parenthesis", ""
     if "too many nested" in str(error.msg):
         return 0, TOO_DEEP, ""
     # Python reports an unfinished text at its start, or past its end

@@ -176,7 +176,7 @@ class _Marks:
             self.clear = self.clear or not _THOUSANDS.fullmatch(text)
             value = float(text.replace(",", "."))
         else:
-            rule, hint = "is no number" if text else "is empty", ""
+            rule, hint = "is not a number" if text else "is empty", ""
             if _GROUPED.fullmatch(text):
                 hint = "write it without separators of thousands"
             elif _FORTRAN.fullmatch(text):

@@ -55,18 +55,20 @@ def _from_matrix_market(content: bytes) -> Any:
     try:
         rows, columns, _, form, field, _ = mminfo(io.BytesIO(content))
         if field == "pattern":
-            raise TableError("holds a pattern alone, without the numbers of the matrix")
+            raise TableError("holds only the pattern of the matrix, without numbers")
         # before anything of that size is allocated
         _check_counts(rows, columns)
         if form == "array" and rows * columns > MOST_DENSE**2:
-            raise TableError(f"of more than {MOST_DENSE} rows only a coordinate matrix is read")
+            raise TableError(
+                f"a matrix of more than {MOST_DENSE} rows must be in coordinate format"
+            )
         if problem := guarded.problem(lambda: mmread(io.BytesIO(content)), len(content)):
             raise ValueError(problem)
         found = mmread(io.BytesIO(content), spmatrix=False)
     except TableError:
         raise
     except (ValueError, TypeError, OverflowError, RuntimeError, EOFError) as error:
-        raise TableError(f"is no Matrix Market file ({_first_line(error)})") from None
+        raise TableError(f"is not a Matrix Market file ({_first_line(error)})") from None
     return np.asarray(found, dtype=float) if isinstance(found, np.ndarray) else found
 
 
@@ -74,7 +76,7 @@ def _from_numpy(content: bytes) -> Any:
     try:
         found = np.load(io.BytesIO(content), allow_pickle=False)
     except (ValueError, OSError, EOFError, MemoryError, SyntaxError, TokenError) as error:
-        raise TableError(f"is no array of NumPy ({_first_line(error)})") from None
+        raise TableError(f"is not a NumPy array ({_first_line(error)})") from None
     is_array = isinstance(found, np.ndarray)
     if not is_array or found.dtype.kind not in "fiuc" or found.ndim not in (1, 2):
         raise TableError("must hold one array of numbers, of one or two dimensions")

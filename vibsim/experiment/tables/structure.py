@@ -181,7 +181,7 @@ def assemble(spec: StructureSpec, folder: Path, ratio: float | None = None) -> A
     if len(spec.ratios) > (len(structure.modes.frequencies) if not own.faults else size):
         rule = f"has ratios of {len(spec.ratios)} modes, the structure has {size}"
         if size > MOST_MODES:
-            rule = f"modes are found of up to {MOST_MODES} degrees of freedom, there are {size}"
+            rule = f"modes are computed for up to {MOST_MODES} degrees of freedom, there are {size}"
         own.add("damping_ratios", rule, "or take rayleigh" if size > MOST_MODES else "")
     elif not own.faults:
         _check_ratios(structure, spec.ratios, own)

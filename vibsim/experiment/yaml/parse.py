@@ -149,7 +149,7 @@ def parse(content: bytes, file: str, keys: Collection[str] = ()) -> Source:
         source = reader.source()
         if not keys or source.data.keys() & set(keys):
             return source
-        rule = f"is no experiment: it has none of the keys {', '.join(keys)}"
+        rule = f"is not an experiment: it has none of the keys {', '.join(keys)}"
         raise InputError([Fault(file, 0, "", "", rule)])
     except InputError as error:
         faults = error.faults
