@@ -121,7 +121,7 @@ def test_events_and_a_stop_are_read_and_written_back(tmp_path: Path) -> None:
         ({"model": OWN | {"stop": "u"}}, "model.stop", "must be a comparison"),
         ({"model": OWN | {"stop": "u == 0"}}, "model.stop", "must not compare by == or !="),
         ({"model": OWN | {"stop": "gap < 0"}}, "model.stop", "never changes"),
-        ({"model": OWN | {"stop": "u > gap"}}, "model.stop", "holds at the start already"),
+        ({"model": OWN | {"stop": "u > gap"}}, "model.stop", "already holds at the start"),
         ({"model": STRUCK | {"damping": {"coulomb": 0.1}}}, "model.damping.coulomb", "or a stop"),
         ({"model": STRUCK | {"exact": "sin(t)"}, "initial": {}}, "model.exact", "or a stop"),
         ({"model": STRUCK, "scaled": True}, "scaled", "its events are formulas in the units"),
@@ -156,7 +156,7 @@ def test_events_of_a_system_are_read_and_written_back(tmp_path: Path) -> None:
     ("changes", "key", "rule"),
     [
         ({"stop": "z < 0"}, "model.stop", "unknown name 'z'"),
-        ({"stop": "x < 2"}, "model.stop", "holds at the start already"),
+        ({"stop": "x < 2"}, "model.stop", "already holds at the start"),
         ({"events": [{"when": "u"}]}, "model.events[0].when", "unknown name 'u'"),
         ({"events": [{"when": "1"}]}, "model.events[0].when", "names neither t nor a state"),
         ({"events": [{"when": "x", "then": {"v": 1}}]}, "model.events[0].then.v", "unknown state"),

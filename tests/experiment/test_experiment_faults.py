@@ -383,24 +383,24 @@ CASES: list[tuple[dict[str, Any], str, str, str]] = [
     ),
     (value(value="maxx"), "checks[0].value", "unknown value", "did you mean 'max'?"),
     (value(quantity="thta"), "checks[0].quantity", "unknown quantity", "did you mean 'theta'?"),
-    (value(quantity="energy"), "checks[0].quantity", "is not known of this quantity", "theta"),
-    (value(quantity="energy_deviation"), "checks[0].quantity", "not known", "from theta, omega"),
+    (value(quantity="energy"), "checks[0].quantity", "is not defined for this quantity", "theta"),
+    (value(quantity="energy_deviation"), "checks[0].quantity", "not defined", "from theta, omega"),
     (
         value(value="max_abs", quantity="energy"),
         "checks[0].quantity",
-        "max_abs is not known of this quantity",
+        "max_abs is not defined for this quantity",
         "choose from theta, omega, energy_deviation",
     ),
     (
         value(value="max_abs_interior"),
         "checks[0].quantity",
-        "max_abs_interior is not known of this quantity",
+        "max_abs_interior is not defined for this quantity",
         "choose from energy_deviation",
     ),
     (
         value(value="max_abs_interior_ratio"),
         "checks[0].quantity",
-        "max_abs_interior_ratio is not known of this quantity",
+        "max_abs_interior_ratio is not defined for this quantity",
         "choose from energy_deviation",
     ),
     (value(quantity=None), "checks[0].quantity", "required key is missing", "theta"),
@@ -519,7 +519,7 @@ def test_nothing_is_compared_with_an_exact_value_that_is_not_known(
 @pytest.mark.parametrize(
     ("model", "why"),
     [
-        ({"kind": "oscillator", "stop": "u < -3"}, "not known, as of every motion with events of"),
+        ({"kind": "oscillator", "stop": "u < -3"}, "not known, as for every motion with events of"),
         (
             {"kind": "structure", "stiffness": [2], "load": {"1": "exp(-t)"}},
             "not known: it is where damping does not couple the modes, and loads are sums of",

@@ -287,7 +287,7 @@ def test_an_exact_degree_is_that_of_the_same_equation_of_another_model():
             {**PUSHED, "mass": {"x": {"x": 0, "y": 0.5}, "y": {"x": 0.5}}},
             [
                 "model.mass.x.x: 0: must be greater than 0, is 0",
-                "model.mass.y.x: is that of x and y, which stands there already: leave it out",
+                "model.mass.y.x: is that of x and y, which is given already: leave it out",
             ],
         ),
         (

@@ -91,7 +91,7 @@ def test_places_may_be_rounded_but_not_moved(tmp_path: Path) -> None:
         (ROWS[:40] + ROWS[41:], "line 42: 'x' must be equally spaced, but is 0.2", "0.1 apart"),
         ([*ROWS[:5], "0.5,nan", *ROWS[6:]], "line 7: 'h' is nan, and must be finite", ""),
         ([*ROWS[:5], "inf,1", *ROWS[6:]], "line 7: 'x' is inf, and must be finite", ""),
-        ([*ROWS[:5], "0.5,high", *ROWS[6:]], "line 7: the cell is no number, in column 'h'", ""),
+        ([*ROWS[:5], "0.5,high", *ROWS[6:]], "line 7: the cell is not a number, in column 'h'", ""),
         (
             [*ROWS[:5], "0.5", *ROWS[6:]],
             "line 7: has 1 cell between commas, and the table has 2 columns",

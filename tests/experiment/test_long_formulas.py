@@ -43,7 +43,7 @@ def faults_of(model: dict[str, Any], **more: Any) -> tuple[Fault, ...]:
     return ()
 
 
-NO_ENERGY = "its potential energy cannot be worked out"
+NO_ENERGY = "its potential energy cannot be computed"
 SLOW = {"marks": pytest.mark.slow}
 
 

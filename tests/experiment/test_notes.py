@@ -196,7 +196,7 @@ REFUSED = {
     ),
     "no force": (
         {"checks": [{"value": "steady_change", "quantity": "theta", "below": 1}]},
-        "checks[0].value: steady_change: is of the last period of a force",
+        "checks[0].value: steady_change: refers to the last period of a force",
     ),
     "schemes of a number": (
         {"checks": [{"value": "period", "schemes": ["central"], "below": 7}]},

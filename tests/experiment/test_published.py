@@ -197,7 +197,7 @@ def test_tables_are_no_part_of_a_simulation() -> None:
         (
             tables(FIELD | {"beside": ["running_max"]}),
             "[0].beside[0]",
-            "not known of the quantity",
+            "not defined for the quantity",
             "energy_deviation",
         ),
         (tables(TABLE | {"beside": ["predicted_frequency"]}), "[0].beside[0]", "linear models", ""),

@@ -189,7 +189,7 @@ def test_a_fault_of_a_chain_has_its_line(changes, line, told, tmp_path):
     [
         ({"x": {"force": "-x_(i+1)"}}, "model.repeat.i.x", "must hold the index i behind _: e.g. x_i"),
         ({"x_i": {"force": "x_i-1 - x_i"}}, "model.repeat.i.x_i.force", "write _(i-1), or spaces"),
-        ({"x_i": {"force": "-x_i", "potential": "0"}}, "model.repeat.i.x_i.potential", "no formula of"),
+        ({"x_i": {"force": "-x_i", "potential": "0"}}, "model.repeat.i.x_i.potential", "not a formula of"),
     ],
 )  # fmt: skip
 def test_a_slip_in_a_chain_is_one_fault(chain, key, told):

@@ -118,21 +118,21 @@ def test_defaults_of_the_checks() -> None:
         (EQUAL | {"equal": ["rk4", "othr"]}, "equal[1]", "not a scheme", "did you mean 'other'?"),
         (EQUAL | {"equal": ["rk4", "exakt"]}, "equal[1]", "not a scheme", "did you mean 'exact'?"),
         (EQUAL | {"equal": ["exact", "rk4"]}, "equal[0]", "must be a scheme", ""),
-        (EQUAL | {"equal": ["rk4", "rk4"]}, "equal[1]", "must be another", ""),
+        (EQUAL | {"equal": ["rk4", "rk4"]}, "equal[1]", "must differ from the first", ""),
         (EQUAL | {"quantity": "theta"}, "quantity", "unknown quantity", "choose from"),
         (
             EQUAL | {"equal": ["rk4", "discrete"], "quantity": "energy"},
             "quantity",
-            "discrete is not known",
+            "discrete is not defined",
             "choose from u, v",
         ),
         (
             EQUAL | {"equal": ["rk4", "exact"], "quantity": "kinetic_energy"},
             "quantity",
-            "exact is not known",
+            "exact is not defined",
             "choose from u, v",
         ),
-        (EQUAL | {"equal": [REFERENCE, "discrete"]}, "equal[0]", "has no steps of its own", ""),
+        (EQUAL | {"equal": [REFERENCE, "discrete"]}, "equal[0]", "chooses its own steps", ""),
         (
             EQUAL | {"equal": ["central", "rk4"], "quantity": "v_d2t"},
             "equal[0]",
@@ -166,7 +166,7 @@ def test_theory_knows_linear_models_without_damping(monkeypatch: pytest.MonkeyPa
     check = {"equal": ["rk4", "discrete"], "quantity": "u"}
     spring(check)
     fault = only_fault(schemes=["rk4"], checks=[check | {"quantity": "theta"}])
-    assert "linear models without damping only, not of pendulum" in fault.rule
+    assert "only for linear models without damping, not for pendulum" in fault.rule
     names = [row.name for row in VALUES.values() if row.needs_linear]
     assert {"predicted_frequency", "predicted_growth_per_period", "discrete_error"} <= set(names)
     for name in names:

@@ -95,7 +95,7 @@ FAULTS = {
     "missing": ("model={g: 1}", "model.kind: required key is missing"),
     "word": ("schemes[1].kind=rk5", "schemes[1].kind: rk5: unknown scheme: did you mean 'rk4'?"),
     "index": ("schemes[2]=rk4", "schemes has no entry [2]: choose from [0] to [1]"),
-    "no list": ("model[0]=1", "model is no list"),
+    "no list": ("model[0]=1", "model is not a list"),
     "list": ("levels.to=3", "levels is a list: name an entry by its number, e.g. levels[0]"),
     "no keys": ("model.g.x=3", "model.g is a value and has no keys"),
     "no value": ("model.g", "must be KEY=VALUE, e.g. model.g=1.62"),

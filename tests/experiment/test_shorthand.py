@@ -153,7 +153,7 @@ def test_equations_are_solved(equation: str, name: str, acceleration: float) -> 
         ("u'' = u = 0", "must have one ="),
         ("u' = u", "second derivative of one coordinate"),
         ("x'' + y'' = 0", "second derivative of one coordinate"),
-        ("u'' + x' = 0", "no derivative of u"),
+        ("u'' + x' = 0", "not a derivative of u"),
         ("u''*u'' = u", "linear in u''"),
         ("sin(u'') = u", "linear in u''"),
         ("0*u'' = u", "vanishes"),
@@ -184,7 +184,7 @@ def test_an_unknown_name_of_an_equation_is_told_the_nearest_or_where_its_value_b
         ),
         (
             "model:\n  kind: system\n  coordinates:\n    x:\n      acceleration: -x\n      drag: 1",
-            "one.yaml:6: model.coordinates.x.drag: 1: is no formula of a coordinate: acceleration, mass, force",
+            "one.yaml:6: model.coordinates.x.drag: 1: is not a formula of a coordinate: acceleration, mass, force",
         ),
         (
             "model: {kind: system, coordinates: {x: {drag: 1}}}",
@@ -192,15 +192,15 @@ def test_an_unknown_name_of_an_equation_is_told_the_nearest_or_where_its_value_b
         ),
         (
             "model: {kind: system, equation: \"u'' + x' = 0\"}",
-            "one.yaml:1: model.equation: u'' + x' = 0: 'x'' is no derivative of u",
+            "one.yaml:1: model.equation: u'' + x' = 0: 'x'' is not a derivative of u",
         ),
         (
             "model: {kind: system, equation: \"u'' + u = 0\", acceleration: -u}",
-            "one.yaml:1: model.equation: u'' + u = 0: stands under `model: acceleration`, too",
+            "one.yaml:1: model.equation: u'' + u = 0: is also given under `model: acceleration`",
         ),
         (
             "model: {kind: oscillator, spring: u, stop: u < 0}\ninitial: {u: 1}\nstop: u < 0.5",
-            "one.yaml:3: stop: u < 0.5: stands under `model: stop`, too",
+            "one.yaml:3: stop: u < 0.5: is also given under `model: stop`",
         ),
         (
             "model: {kind: bouncing_ball}\nstop: h < 1",
@@ -224,12 +224,12 @@ def test_an_unknown_name_of_an_equation_is_told_the_nearest_or_where_its_value_b
         ),
         (
             "model: {kind: structure, M: [2, 1], mass: [2, 1], K: [1, 1]}",
-            "one.yaml:1: model.M: stands under `model: mass`, too",
+            "one.yaml:1: model.M: is also given under `model: mass`",
         ),
         (
             "model: {kind: pendulum}\ninitial: {theta: 1}\nsweep: {model.L: [1, 2], model.g: [1, 2]}\n"
             "checks: [{value: period, over: cases, take: largest, below: 20}]",
-            "checks[0].over: cases: is no swept key with numbers",
+            "checks[0].over: cases: is not a swept key with numbers",
         ),
     ],
 )  # fmt: skip

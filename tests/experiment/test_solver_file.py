@@ -87,7 +87,7 @@ REFUSED = [
     ("flux: {}", "flux: {noise: -1}", ["6: quantities.flux.noise: -1: must be at least 0"]),
     ("--dt {h}", "", ["3: solver.command: ", "has no placeholder that differs between levels"]),
     ("--out {output}", "", ["3: solver.command: ", "has no placeholder for the file that it wr"]),
-    ("{kappa} ", "1 ", ["8: sweep.kappa: is no placeholder of `command:`"]),
+    ("{kappa} ", "1 ", ["8: sweep.kappa: is not a placeholder of `command:`"]),
     ("--dt {h}", "--dt {h:.3f}", ["3: solver.command: ", "must have a name alone between braces"]),
     ("--dt {h}", "{h} }", ["3: solver.command: ", "must have a name alone between braces"]),
     ("--dt", "'--dt", ["3: solver.command: ", "cannot be split into arguments (No closing quot"]),

@@ -199,7 +199,7 @@ def test_a_degree_of_freedom_has_the_names_that_it_has_in_results():
 def test_a_pattern_has_no_numbers(tmp_path):
     file = tmp_path / "pattern.mtx"
     file.write_text("%%MatrixMarket matrix coordinate pattern general\n2 2 2\n1 1\n2 2\n")
-    with pytest.raises(TableError, match="holds a pattern alone, without the numbers"):
+    with pytest.raises(TableError, match="holds only the pattern of the matrix, without numbers"):
         read(file)
 
 

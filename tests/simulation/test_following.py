@@ -172,7 +172,7 @@ def test_a_member_that_follows_is_not_run_alone() -> None:
 @pytest.mark.parametrize(
     ("sections", "message"),
     [
-        ({"sweep": {"model.omega": [1, 2], "follow": "model.omeg"}}, "no swept key.*model.omega"),
+        ({"sweep": {"model.omega": [1, 2], "follow": "model.omeg"}}, "not a swept key.*model.omega"),
         ({"sweep": {"model.omega": [1, 2], "follow": True}}, "must name a swept key"),
         (
             {"sweep": {"model.omega": [1, 2], "model.gamma": [1, 2], "follow": "model.omega"}},
@@ -207,11 +207,11 @@ def test_a_member_that_follows_is_not_run_alone() -> None:
         ),
         (
             {"checks": [{"value": "error_l2", "quantity": "u", "below": 1}]},
-            "not known of members that start",
+            "not known for members that start",
         ),
         (
             {"checks": [{"equal": ["rk4", "exact"], "quantity": "u", "atol": 1}]},
-            "not known of members that start",
+            "not known for members that start",
         ),
         ({"output": "best"}, "start as the file says"),
         ({"levels": None, "tolerance": 1e-3}, "start as the file says"),

@@ -139,7 +139,7 @@ def test_what_may_be_no_table_is_not_shown(tmp_path: Path) -> None:
         ("flux\n", "has no row"),
         ("fluxes\n1\n", "flux: the table has no such column: did you mean 'fluxes'?"),
         ("flux,flux\n1,2\n", "flux: the table has more than one such column"),
-        ("flux\nabc\n", ":2: flux: abc: is no number"),
+        ("flux\nabc\n", ":2: flux: abc: is not a number"),
     ],
 )
 def test_a_faulty_table_is_refused_with_its_place(tmp_path: Path, text: str, rule: str) -> None:

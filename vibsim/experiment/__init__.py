@@ -1,6 +1,6 @@
-"""From a YAML file to a validated, frozen experiment; every fault of a file is reported at once, with its line.
+"""Read a YAML file as a validated, immutable experiment; all faults of a file are reported at once, with lines.
 
-The public names are imported on first use: a plan that is kept on disk needs neither numpy nor the validation library.
+Public names are imported on first use, because a plan stored on disk needs neither numpy nor pydantic.
 """
 
 from __future__ import annotations

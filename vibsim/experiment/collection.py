@@ -1,4 +1,4 @@
-"""The collection of an experiment file; imports little, for whoever asks before anything is validated."""
+"""The collection of an experiment file. Imports little, because it is used before anything is validated."""
 
 from __future__ import annotations
 
@@ -10,18 +10,18 @@ from vibsim.core.home import home
 ADHOC = "adhoc"
 """Collection of a file outside the shipped ``configs/``."""
 SITE = "docs"
-"""Folder of the results where a collection would be, with the documentation that ``make docs`` makes."""
+"""Folder among the collections of the results, with the documentation built by ``make docs``."""
 ENDINGS = (".yaml", ".yml")
-"""Of the name of an experiment file."""
+"""Endings of the names of experiment files."""
 
 
 def collection_of(file: Path, configs: Path | None = None) -> str:
-    """Name the collection of an experiment file: its folder where that is a folder of `configs`, else ``adhoc``.
+    """Return the collection of an experiment file: the name of its folder if that is in `configs`, else ``adhoc``.
 
-    `configs` is by default the folder of the shipped collections.
+    The default of `configs` is the folder of the shipped collections.
     """
     if configs is None:
         configs = home() / "configs"
-    # Path.resolve raises where links go in a circle
+    # Path.resolve raises an error for circular links
     folder = Path(os.path.realpath(file)).parent
     return folder.name if folder.parent == configs.resolve() else ADHOC

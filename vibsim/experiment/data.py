@@ -422,8 +422,8 @@ def check_member(case: int, members: int, name: str) -> None:
 def schemes_of(experiment: ExperimentSpec, check: Check) -> tuple[int, ...]:
     """Return the indices of the schemes that a check applies to, increasing; a claim applies where its check does.
 
-    A check that names no schemes applies to all fixed-step schemes that have its quantity: only schemes with a velocity
-    of their own have the centred one beside it.
+    A check that names no schemes applies to all fixed-step schemes that have its quantity: only schemes whose velocity
+    differs from the centred difference have both.
     """
     inner = check.measured
     named: tuple[str, ...] | None

@@ -1,4 +1,4 @@
-"""Experiments made from another one: a member of its sweep alone, or the levels chosen for its tolerance."""
+"""Derive an experiment from another one: a single member of its sweep, or the levels chosen for its tolerance."""
 
 from __future__ import annotations
 
@@ -35,10 +35,10 @@ AnyAt = TypeVar("AnyAt", bound=PublishedAt)
 def alone(experiment: AnyExperiment, case: int) -> AnyExperiment:
     """Return the experiment of member `case`, without a sweep, named ``<name>_case_<case>``.
 
-    Its checks are those that speak of this member or of every one; without any of them the position must converge, as
-    in a file without checks.
+    It has the checks that apply to this member or to all; if there are none, the position must converge, as in a file
+    without checks.
 
-    InputError where there is no such member, or it starts from the last state of another one.
+    Raises `InputError` if there is no such member, or if it starts from the final state of another one.
     """
     check_member(case, experiment.members, str(experiment.file or experiment.name))
     if case % experiment.chain:
@@ -48,34 +48,34 @@ def alone(experiment: AnyExperiment, case: int) -> AnyExperiment:
     own = columns(experiment, case, case + 1)
     swept = {key: column[0].item() for key, column in own.items()}
     parameters = _filled(swept, "model", experiment.model.parameters)
-    # a term that is 0 for this member alone stays, and with it every bit
+    # terms that are 0 only for this member stay in the equation, so all bits stay the same
     model = experiment.model.model_copy(update={"parameters": parameters})
     initial = _filled(swept, "initial", experiment.initial)
     if model.definition.start is not None:
-        here = model.definition.start(parameters).items()
-        initial = FrozenDict({name: float(value) for name, value in here})
+        start = model.definition.start(parameters).items()
+        initial = FrozenDict({name: float(value) for name, value in start})
     end = swept.get("time.end", float(experiment.natural_end(parameters)))
-    # where times are fractions of a member's end, they become times
+    # times that are fractions of the end of a member become times
     unit = end if experiment.end_varies else 1.0
-    published = _published_of(experiment, case, unit, own)
-    ours = [
+    published = _tables_of_member(experiment, case, unit, own)
+    matching = [
         check
         for check in experiment.written
         if check.measured.member in (None, case)
-        # what is of all members together is of none alone
+        # a reduction over members does not apply to a single one
         and getattr(check.measured, "take", None) is None
         and members_with(own, check.measured.swept, 1).all()
     ]
-    checks: list[Check] = [_of_member(check, unit) for check in ours]
+    checks: list[Check] = [_check_of_member(check, unit) for check in matching]
     checks += claims(published)
     positions = model.definition.positions if not checks else ()
     checks += [ConvergesCheck(id=f"check_{i}", converges=u) for i, u in enumerate(positions, 1)]
-    # nothing is divided by members any more
+    # one member needs no panels or figures per member
     figures = tuple(
         row.model_copy(update={"panels": row.panels if row.panels == LEVEL else None, "each": None})
         for row in experiment.figures
     )
-    found = experiment.model_copy(
+    single = experiment.model_copy(
         update={
             "name": f"{experiment.name}_case_{case}",
             "model": model,
@@ -88,45 +88,44 @@ def alone(experiment: AnyExperiment, case: int) -> AnyExperiment:
             "figures": figures,
         }
     )
-    return update_tables(found)
+    return update_tables(single)
 
 
 def _filled(swept: dict[str, Any], section: str, values: Mapping[str, Any]) -> FrozenDict:
-    own = ((name, swept.get(f"{section}.{name}", value)) for name, value in values.items())
-    return FrozenDict(own)
+    return FrozenDict((name, swept.get(f"{section}.{name}", x)) for name, x in values.items())
 
 
 def _scheme(swept: dict[str, Any], scheme: SchemeSpec) -> SchemeSpec:
-    found = _filled(swept, f"schemes.{scheme.name}", scheme.options)
-    options = {name: as_option(scheme.options[name], value) for name, value in found.items()}
+    values = _filled(swept, f"schemes.{scheme.name}", scheme.options)
+    options = {name: as_option(scheme.options[name], value) for name, value in values.items()}
     return scheme.model_copy(update={"options": FrozenDict(options)})
 
 
-def _published_of(
+def _tables_of_member(
     experiment: ExperimentSpec, case: int, unit: float, own: Mapping[str, Column]
 ) -> tuple[PublishedTable, ...]:
-    """Return the rows of printed tables that are of a member with its `own` swept values."""
-    found = []
+    """Return the printed tables with only the rows that apply to a member with `own` swept values."""
+    tables = []
     for table in experiment.published:
-        ours = (
+        matching = (
             row
             for row in table.rows
             if row.at.case in (None, case) and members_with(own, row.at.swept, 1).all()
         )
-        rows = tuple(row.model_copy(update={"at": _at_of_member(row.at, unit)}) for row in ours)
+        rows = tuple(row.model_copy(update={"at": _at_of_member(row.at, unit)}) for row in matching)
         if rows:
-            found.append(table.model_copy(update={"rows": rows}))
-    return tuple(found)
+            tables.append(table.model_copy(update={"rows": rows}))
+    return tuple(tables)
 
 
-def _of_member(check: Check, unit: float) -> Check:
+def _check_of_member(check: Check, unit: float) -> Check:
     if isinstance(check, ClaimCheck):
-        return check.model_copy(update={"that": _of_member(check.that, unit)})
+        return check.model_copy(update={"that": _check_of_member(check.that, unit)})
     if isinstance(check, ValueCheck):
         return check.model_copy(update={"at": _at_of_member(check.at, unit)})
     update: dict[str, Any] = {"at": check.at.without_members()}
-    of_every = isinstance(check, ConvergesCheck | AccurateCheck)
-    return check.model_copy(update=update if of_every else update | {"case": None})
+    has_no_case = isinstance(check, ConvergesCheck | AccurateCheck)
+    return check.model_copy(update=update if has_no_case else update | {"case": None})
 
 
 def _at_of_member(at: AnyAt, unit: float) -> AnyAt:
@@ -134,10 +133,10 @@ def _at_of_member(at: AnyAt, unit: float) -> AnyAt:
 
 
 def with_levels(experiment: AnyExperiment, levels: Sequence[int]) -> AnyExperiment:
-    """Return `experiment` with `levels`, held to every rule that levels of a file are held to.
+    """Return `experiment` with `levels`, which must satisfy all rules for levels of a file.
 
-    InputError where they are no levels (none at all, not increasing, or out of range), what they ask for cannot be run,
-    or a check names a time that they do not store.
+    Raises `InputError` if they are not valid levels (empty, not increasing, or out of range), exceed a size limit, or
+    do not store a time that a check names.
     """
     report = Report(Source(str(experiment.file or experiment.name), {}))
     rising = rising_levels(read_value(("levels",), list(levels), Levels, report), report)
@@ -151,7 +150,7 @@ def with_levels(experiment: AnyExperiment, levels: Sequence[int]) -> AnyExperime
         sweep=experiment.sweep or Sweep(axes=()),
         samples=experiment.samples,
     )
-    # the check of a claim has its id from the claim
+    # the check inside a claim gets its id from the claim again
     without_id = {"id": ""}
     written = [
         check.model_copy(update={"that": check.that.model_copy(update=without_id)})
@@ -163,7 +162,7 @@ def with_levels(experiment: AnyExperiment, levels: Sequence[int]) -> AnyExperime
     finish_checks(written, setting, report)
     check_published(experiment.published, (), setting, report)
     report.raise_any()
-    found = experiment.model_copy(update={"levels": setting.levels})
-    size_limits.check_files(found, report)
+    result = experiment.model_copy(update={"levels": setting.levels})
+    size_limits.check_files(result, report)
     report.raise_any()
-    return update_tables(found)
+    return update_tables(result)

@@ -1,6 +1,6 @@
-"""`Experiment`: an experiment with the ways to read one, to make another one of it, and to store it as JSON.
+"""`Experiment`: the public class, with methods to read an experiment, to derive another one, and to store it as JSON.
 
-The modules behind the ways are imported when they are taken: a job, which restores its experiment, needs none of them.
+Methods import their modules when called: a job, which restores its experiment, needs none of them.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 class Experiment(ExperimentSpec):
-    """One experiment. Build it from a file, from what a file would hold, or from models and schemes of your own."""
+    """An experiment. Build it from a file, from the content of a file, or from models and schemes of your own."""
 
     def __init__(
         self,
@@ -32,25 +32,25 @@ class Experiment(ExperimentSpec):
         collection: str = ADHOC,
         **sections: Any,
     ) -> None:
-        """Build an experiment in memory; everything is checked as in a file.
+        """Build an experiment in memory; it is validated like a file.
 
         Parameters
         ----------
         model
-            A model, the name of a registered one, or what a file has under ``model``, whose ``kind`` may be a model.
+            A model, the name of a registered one, or the content of a section ``model``, whose ``kind`` may be a model.
         schemes
-            A list of schemes, each likewise.
+            A list of schemes, each given in the same way.
         parameters
-            What a file has under ``model`` beside ``kind``: parameters that are not to have their default.
+            Further content of the section ``model``: parameters that differ from their default.
         title
             A line for pages and messages.
         sections
-            The other sections of a file by their names: ``initial``, ``time``, ``levels``, ``sweep``, ``checks``, ...
+            The other sections of a file by name: ``initial``, ``time``, ``levels``, ``sweep``, ``checks``, ...
 
         Raises
         ------
         InputError
-            With every fault.
+            With all faults.
         """
         from vibsim.experiment.reading import from_objects
 
@@ -65,10 +65,10 @@ class Experiment(ExperimentSpec):
 
     @classmethod
     def made_of(cls, spec: ExperimentSpec) -> Self:
-        """Return the experiment of this class with all that `spec` holds, which is checked already."""
-        made = cls.__new__(cls)
-        made.__setstate__(spec.__getstate__())
-        return made
+        """Return an experiment of this class with the content of `spec`, which is already validated."""
+        experiment = cls.__new__(cls)
+        experiment.__setstate__(spec.__getstate__())
+        return experiment
 
     @classmethod
     def from_yaml(
@@ -79,24 +79,24 @@ class Experiment(ExperimentSpec):
         configs: Path | None = None,
         settings: Sequence[str] = (),
     ) -> Self:
-        """Read an experiment file, whose name without the ending is the experiment's.
+        """Read an experiment file, whose name without the ending is the name of the experiment.
 
         Parameters
         ----------
         path
             A YAML file.
         collection
-            Name of the collection; by default that of `vibsim.experiment.collection.collection_of`.
+            Name of the collection; by default the result of `vibsim.experiment.collection.collection_of`.
         configs
-            The folder of collections; by default that of the checkout.
+            The folder of collections; by default that of vibsim.
         settings
-            Values in place of those of the file, each as ``KEY=VALUE`` with a dotted key and YAML behind it:
+            Overrides of values of the file, each as ``KEY=VALUE`` with a dotted key and a value in YAML:
             ``model.g=1.62``, ``schemes[0].start=first_order``.
 
         Raises
         ------
         InputError
-            With every fault of the file.
+            With all faults of the file.
         """
         from vibsim.experiment.reading import from_file
 
@@ -106,30 +106,30 @@ class Experiment(ExperimentSpec):
     def from_dict(
         cls, data: Mapping[str, Any], *, name: str = "experiment", collection: str = ADHOC
     ) -> Self:
-        """Build an experiment from what a file would hold; InputError with every fault of it."""
+        """Build an experiment from the content of a file; raise `InputError` with all its faults."""
         from vibsim.experiment.reading import from_content
 
         return cls.made_of(from_content(data, name, collection))
 
     def alone(self, case: int) -> Self:
-        """Return the experiment of one member, without a sweep; see `vibsim.experiment.derived`."""
+        """Return the experiment of one member, without a sweep; see `vibsim.experiment.derived.alone`."""
         from vibsim.experiment.derived import alone
 
         return alone(self, case)
 
     def with_levels(self, levels: Sequence[int]) -> Self:
-        """Return the experiment with the `levels` chosen by its tolerance; see `vibsim.experiment.derived`."""
+        """Return the experiment with `levels` chosen for its tolerance; see `vibsim.experiment.derived.with_levels`."""
         from vibsim.experiment.derived import with_levels
 
         return with_levels(self, levels)
 
 
 def canonical(experiment: Experiment) -> dict[str, Any]:
-    """Return `experiment` as JSON-able data: the same for files that mean the same.
+    """Return `experiment` as JSON data, which is the same for files with the same meaning.
 
-    The sections stand apart, so that a digest can take those that a job uses: ``collection``, ``name``, ``title``,
+    Sections are separate, so that a digest can cover those that a job uses: ``collection``, ``name``, ``title``,
     ``source``, ``model``, ``initial``, ``time``, ``levels``, ``schemes``, ``sweep``, ``samples``, ``output``,
-    ``tolerance``, ``checks``, and ``follow``, ``published``, ``figures``, ``units`` and ``scaling`` where there is any.
+    ``tolerance``, ``checks``, and, if present, ``follow``, ``published``, ``figures``, ``units`` and ``scaling``.
     """
     data = experiment.model_dump(mode="json", exclude={"checks"})
     sweep = data["sweep"]
@@ -149,14 +149,14 @@ def canonical(experiment: Experiment) -> dict[str, Any]:
 def restore(
     content: Mapping[str, Any], file: Path | None = None, settings: tuple[str, ...] = ()
 ) -> Experiment:
-    """Return the experiment that `content`, made by `canonical`, describes.
+    """Return the experiment described by `content`, a result of `canonical`.
 
-    `file` is where it was read, if known, and `settings` are what a command line gave in place of its values.
+    `file` is the file from which it was read, if known, and `settings` are the overrides of the command line.
 
     Raises
     ------
     InputError
-        Where a table of it cannot be read, or has other numbers than it had.
+        If a table cannot be read, or its numbers have changed.
     """
     data = dict(content)
     follow = data.pop("follow", None)

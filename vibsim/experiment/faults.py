@@ -61,7 +61,7 @@ _MEANT = {"tolerance": "atol", "tol": "atol", "at_least": "above", "at_most": "b
 _PLACES = {"schemes": "scheme", "levels": "level", "cases": "case"} | {
     name: name for name in ("t", "step", "event", "case", "level", "best", "scheme")
 }
-"""Keys that belong into the section `at` of a check of a number, by what is written outside of it."""
+"""Keys that are often written outside of the section `at` of a check, and the key of `at` that is meant."""
 
 
 class Report:

@@ -253,7 +253,7 @@ def check_names(experiment: str, collection: str, report: Report) -> None:
         elif len(name) > MAX_NAME:
             report.add((), f"{who} must not be longer than {MAX_NAME} characters")
         elif _PERIODIC.search(name):
-            report.add((), f"{who} must not end with {MAX_REPEATS} times the same")
+            report.add((), f"{who} must not end with the same text {MAX_REPEATS} times")
 
 
 def _keys(section: Any) -> Iterator[str]:
@@ -322,7 +322,7 @@ def _check_output(document: Any, setting: size_limits.Setting, report: Report) -
     if model is not None and not model.is_alone:
         rule = f"extrapolates a motion of one coordinate, {model.kind} has {model.coordinates}"
         if model.loaded is not None:
-            rule = "extrapolates a motion with the energies of its own states, which a structure has not"
+            rule = "extrapolates a motion whose energies follow from its states, unlike those of a structure"
         if document.tolerance is not None:
             report.add(("tolerance",), rule, "give levels", document.tolerance)
         if document.output == "best":

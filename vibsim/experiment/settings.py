@@ -1,7 +1,6 @@
-"""Values that a command line gives in place of those of an experiment file: ``model.g=1.62``, ``schemes[0].start=...``.
+"""Settings of the command line that override values of a file: ``model.g=1.62``, ``schemes[0].start=...``.
 
-The value is YAML, read as in a file. The rest of the content keeps its lines, and a fault names the setting that a
-value came from.
+The value is YAML, as in a file. All other content keeps its lines, and faults name the setting that a value came from.
 """
 
 from __future__ import annotations
@@ -19,19 +18,19 @@ from vibsim.experiment.yaml.parse import Node, Path_, Source, dotted, parse
 FORM = "must be KEY=VALUE, e.g. model.g=1.62 or schemes[0].kind=rk4"
 _VALUE = "value"
 _INDEX = re.compile(r"\[(\d{1,9})\]\.?")
-_OF_MEMBERS = (("sweep",), ("at",))
-"""Sections of which keys have dots themselves: those that are swept."""
+_DOTTED_SECTIONS = (("sweep",), ("at",))
+"""Sections whose keys are dotted keys of swept parameters."""
 
 
 def with_settings(source: Source, settings: Sequence[str]) -> Source:
-    """Return the content of a file with values replaced or added, one setting after the other.
+    """Return the content of a file with values replaced or added by all settings, in order.
 
-    InputError with every setting that cannot be read, or that names no place.
+    Raises `InputError` with every setting that is invalid, or whose key does not exist.
     """
     faults: list[Fault] = []
     for text in settings:
         try:
-            source = _with_one(source, text)
+            source = _with_setting(source, text)
         except InputError as error:
             faults.extend(error.faults)
     if faults:
@@ -40,10 +39,10 @@ def with_settings(source: Source, settings: Sequence[str]) -> Source:
 
 
 class _SettingError(Exception):
-    """The rule that a setting breaks, and how to keep it."""
+    """The rule that a setting breaks, and a hint."""
 
 
-def _with_one(source: Source, text: str) -> Source:
+def _with_setting(source: Source, text: str) -> Source:
     key, is_given, value = text.partition("=")
     key = key.strip()
     file = set_in(source.file, shorten(text))
@@ -60,22 +59,22 @@ def _with_one(source: Source, text: str) -> Source:
 
 
 def _node(value: str) -> Node:
-    """Return what a value means, read as behind a key of a file."""
+    """Return the node of a value, parsed as YAML after a key."""
     try:
-        found = parse(f"{_VALUE}: {value}".encode(), "")
-        faults = found.faults
+        source = parse(f"{_VALUE}: {value}".encode(), "")
+        faults = source.faults
     except InputError as error:
         faults = error.faults
     if faults:
         raise _SettingError(faults[0].rule.partition(", first on line")[0], faults[0].hint)
-    top = found.top
+    top = source.top
     if top is None or top.children is None or top.children.keys() != {_VALUE}:
         raise _SettingError("must be one value")
     return top.children[_VALUE]
 
 
 def _path(top: Node, key: str) -> Path_:
-    """Return the place that a key means in the content of a file: a key there may itself have dots."""
+    """Return the path of a dotted key in the content of a file, whose keys may themselves contain dots."""
     path: Path_ = ()
     node: Node | None = top
     rest = key
@@ -95,18 +94,18 @@ def _path(top: Node, key: str) -> Path_:
 
 
 def _name(node: Node | None, path: Path_, rest: str) -> str:
-    """Return the next key: the longest one that is there, else up to the next dot, of swept keys up to the end."""
-    there = filter(None, (node.keys if node else None) or ())
-    known = [key for key in there if rest == key or rest.startswith((f"{key}.", f"{key}["))]
-    end = r"[^\[]*" if path[-1:] in _OF_MEMBERS else r"[^.\[]*"
-    found = re.match(end, rest)
-    return max(known, key=len) if known else found[0] if found else ""
+    """Return the next key of `rest`: the longest existing one, else up to the next dot (a swept key: up to the end)."""
+    keys = filter(None, (node.keys if node else None) or ())
+    known = [key for key in keys if rest == key or rest.startswith((f"{key}.", f"{key}["))]
+    end = r"[^\[]*" if path[-1:] in _DOTTED_SECTIONS else r"[^.\[]*"
+    match = re.match(end, rest)
+    return max(known, key=len) if known else match[0] if match else ""
 
 
 def _check_index(node: Node | None, path: Path_, place: int) -> None:
     where = dotted(path)
     if node is None or not isinstance(node.value, list):
-        raise _SettingError(f"{where or 'the file'} is no list")
+        raise _SettingError(f"{where or 'the file'} is not a list")
     count = len(node.value)
     if place >= count:
         there = f"choose from [0] to [{count - 1}]" if count else "it is empty"
@@ -123,12 +122,12 @@ def _check_name(node: Node | None, path: Path_) -> None:
 
 
 def _is_scheme(path: Path_, node: Node) -> bool:
-    """Tell whether an entry of `schemes` is a plain word, which stands for its kind."""
+    """Tell whether an entry of `schemes` is a plain word, its kind."""
     return len(path) == 2 and path[0] == "schemes" and isinstance(node.value, str)
 
 
 def _put(node: Node, path: Path_, new: Node, setting: str, above: Path_ = ()) -> Node:
-    """Return a copy of a node with `new` at a place in it; the node itself may stand elsewhere, too, as an alias."""
+    """Return a copy of a node with `new` at a path inside; a copy, because aliases may share the node."""
     if not path:
         return new
     if _is_scheme(above, node):

@@ -1,12 +1,10 @@
-"""Other ways to write a model, brought to the one that everything else reads.
-
-That happens to the content of a file behind `vibsim.experiment.repeat`:
+"""Rewrite alternative notations of a file to the standard one, after `vibsim.experiment.repeat`:
 
 - ``equation: u'' + (u**2 - 1)*u' + u = 0`` becomes the acceleration of a system of one coordinate;
-- ``coordinates`` with formulas of each, ``{x: {mass: 2, force: -x}}``, become a list and the formulas by name;
-- ``stop`` and ``events`` beside the section ``model`` become part of it;
-- the letters ``M``, ``C`` and ``K`` of a structure become ``mass``, ``damping`` and ``stiffness``;
-- ``over: cases`` of a check becomes the only swept key, and ``take: where`` is ``where_largest``.
+- ``coordinates`` with their formulas, ``{x: {mass: 2, force: -x}}``, become a list and the formulas by name;
+- ``stop`` and ``events`` outside of the section ``model`` move into it;
+- ``M``, ``C`` and ``K`` of a structure become ``mass``, ``damping`` and ``stiffness``;
+- ``over: cases`` of a check becomes the only swept key, and ``take: where`` becomes ``where_largest``.
 """
 
 from __future__ import annotations
@@ -45,7 +43,7 @@ _DERIVATIVE = re.compile(r"([A-Za-z_]\w*)('{1,2})(?!')")
 
 
 def write_usual_form(report: Report) -> None:
-    """Bring the model in the content that `report` speaks of to its usual form; faults are noted."""
+    """Rewrite the content of `report` in the standard notation, and report faults."""
     source, data = report.source, report.source.data
     if not isinstance(data, Mapping) or not isinstance(section := data.get("model"), Mapping):
         return
@@ -53,9 +51,9 @@ def write_usual_form(report: Report) -> None:
     model = writer.of_structure(section) if section.get("kind") == "structure" else dict(section)
     if section.get("kind") == "system":
         model = writer.of_equation(writer.of_coordinates(model))
-    rest = {key: value for key, value in data.items() if key not in BESIDE_MODEL}
+    content = {key: value for key, value in data.items() if key not in BESIDE_MODEL}
     if isinstance(checks := data.get("checks"), list | tuple):
-        rest["checks"] = [_over_a_key(check, data.get("sweep")) for check in checks]
+        content["checks"] = [_with_swept_key(check, data.get("sweep")) for check in checks]
     known = report.kinds.model(section.get("kind"))
     for key in (key for key in BESIDE_MODEL if key in data):
         if known is None or known.takes_events:
@@ -64,20 +62,20 @@ def write_usual_form(report: Report) -> None:
             rule = f"the model {known.kind} takes none"
             report.add_malformed((key,), rule, "`kind: system` does", at_key=True)
     origins = {**source.origins, **writer.origins}
-    report.source = replace(source, data={**rest, "model": model}, origins=origins)
+    report.source = replace(source, data={**content, "model": model}, origins=origins)
 
 
 class _Writer:
-    """Writes a section ``model`` anew, and remembers where its parts stand in the file."""
+    """Rewrites a section ``model``, and records the paths of its values in the file."""
 
     def __init__(self, report: Report) -> None:
         self.source, self.report = report.source, report
         self.origins: dict[Path_, Path_] = {}
 
     def moved(self, model: dict[str, Any], key: str, value: Any, path: Path_) -> dict[str, Any]:
-        """Return a section with the value at `path` under a key, unless that is there already."""
+        """Return a section with the value from `path` added under `key`; report a fault if the key exists."""
         if key in model:
-            self.report.add_malformed(path, f"stands under `model: {key}`, too", at_key=True)
+            self.report.add_malformed(path, f"is also given under `model: {key}`", at_key=True)
             return model
         self._came_from(("model", key), path)
         return {**model, key: value}
@@ -86,7 +84,7 @@ class _Writer:
         self.origins[path] = self.source.origin(written) or written
 
     def of_structure(self, section: Mapping[str, Any]) -> dict[str, Any]:
-        """Return a structure with words for the letters of its matrices."""
+        """Return a structure with names in place of the letters of its matrices."""
         model = {key: value for key, value in section.items() if key not in LETTERS}
         for letter in section.keys() & LETTERS.keys():
             model = self.moved(model, LETTERS[letter], section[letter], ("model", letter))
@@ -95,92 +93,94 @@ class _Writer:
     def of_coordinates(self, model: dict[str, Any]) -> dict[str, Any]:
         """Return a system with the formulas of its coordinates by name.
 
-        Where one coordinate has a force, all have: an acceleration is the force on the mass 1.
+        If one coordinate has a force, all need one: an acceleration becomes the force on mass 1.
         """
-        each = model.get("coordinates")
-        if not isinstance(each, Mapping) or not all(map(_has_formulas, each.values())):
+        coordinates = model.get("coordinates")
+        if not isinstance(coordinates, Mapping) or not all(
+            map(_has_formulas, coordinates.values())
+        ):
             return model
         known = {"coordinates", *OF_COORDINATE}
         for key in (key for key in OF_COORDINATE if key in model):
-            rule = "stands at the coordinates, too"
+            rule = "is also given at the coordinates"
             self.report.add_malformed(("model", key), rule, at_key=True)
-        by_force = any("force" in own or "mass" in own for own in each.values())
-        found: dict[str, dict[str, Any]] = {}
-        for i, (name, own) in enumerate(each.items()):
+        by_force = any("force" in entry or "mass" in entry for entry in coordinates.values())
+        formulas: dict[str, dict[str, Any]] = {}
+        for i, (name, entry) in enumerate(coordinates.items()):
             path: Path_ = ("model", "coordinates", name)
             self._came_from(("model", "coordinates", i), path)
-            for key, value in own.items():
+            for key, value in entry.items():
                 if key not in OF_COORDINATE:
-                    rule = f"is no formula of a coordinate: {', '.join(OF_COORDINATE)}"
+                    rule = f"is not a formula of a coordinate: {', '.join(OF_COORDINATE)}"
                     self.report.add_malformed((*path, key), rule, at_key=True)
                     continue
-                is_alone = key == "acceleration" and by_force and len(own) == 1
-                if is_alone:
-                    found.setdefault("mass", {})[name] = 1
-                new = "force" if is_alone else key
-                found.setdefault(new, {})[name] = value
-                self._came_from(("model", new, name), (*path, key))
+                is_plain_acceleration = key == "acceleration" and by_force and len(entry) == 1
+                if is_plain_acceleration:
+                    formulas.setdefault("mass", {})[name] = 1
+                target = "force" if is_plain_acceleration else key
+                formulas.setdefault(target, {})[name] = value
+                self._came_from(("model", target, name), (*path, key))
         return {
             **{key: value for key, value in model.items() if key not in known},
-            "coordinates": list(each),
-            **found,
+            "coordinates": list(coordinates),
+            **formulas,
         }
 
     def of_equation(self, model: dict[str, Any]) -> dict[str, Any]:
-        """Return a system with the acceleration of its only coordinate in place of an equation."""
+        """Return a system with its equation solved for the acceleration of the only coordinate."""
         path: Path_ = ("model", EQUATION)
-        written = model.get(EQUATION)
-        if isinstance(written, Mapping):
+        equation = model.get(EQUATION)
+        if isinstance(equation, Mapping):
             rule = "must be the equation of one coordinate"
             hint = "of several give each its `acceleration`, or `force` and `mass`"
             self.report.add_malformed(path, rule, hint)
-            rest = {key: value for key, value in model.items() if key != EQUATION}
-            return {**rest, "acceleration": dict.fromkeys(map(str, written), "0")}
-        if not isinstance(written, str):
+            others = {key: value for key, value in model.items() if key != EQUATION}
+            return {**others, "acceleration": dict.fromkeys(map(str, equation), "0")}
+        if not isinstance(equation, str):
             return model
         try:
             parameters = model.get("parameters")
             known = [*parameters] if isinstance(parameters, Mapping) else []
-            name, acceleration = solved(written, ["t", INPUT, *map(str, known)])
+            name, acceleration = solved(equation, ["t", INPUT, *map(str, known)])
         except ExpressionError as error:
-            self.report.add_malformed(path, error.rule, error.hint, written)
+            self.report.add_malformed(path, error.rule, error.hint, equation)
             acceleration, name = "0", "u"
-        rest = {key: value for key, value in model.items() if key != EQUATION}
-        # the velocity of u alone is v
-        found = rest if name == "u" else {"coordinates": [name], **rest}
-        return self.moved(found, "acceleration", acceleration, path)
+        others = {key: value for key, value in model.items() if key != EQUATION}
+        # u is the default coordinate, with velocity v
+        system = others if name == "u" else {"coordinates": [name], **others}
+        return self.moved(system, "acceleration", acceleration, path)
 
 
-def _over_a_key(check: Any, sweep: Any) -> Any:
-    """Return a check of all cases as one over the swept key, if there is one only."""
+def _with_swept_key(check: Any, sweep: Any) -> Any:
+    """Return a check with ``over: cases`` replaced by the only swept key, and ``take: where`` written out."""
     if not isinstance(check, Mapping):
         return check
     if "that" in check:
-        return {**check, "that": _over_a_key(check["that"], sweep)}
-    found = dict(check)
+        return {**check, "that": _with_swept_key(check["that"], sweep)}
+    result = dict(check)
     if check.get("take") == "where":
-        found["take"] = "where_largest"
+        result["take"] = "where_largest"
     if check.get("over") == "cases" and isinstance(sweep, Mapping):
         fixed = check["at"] if isinstance(check.get("at"), Mapping) else {}
-        together = sweep.get("zip")
-        own = [key for key in sweep if "." in str(key) and key not in fixed]
-        if isinstance(together, Mapping) and not together.keys() & fixed.keys():
-            # those that vary together are one
-            own += list(together)[:1]
-        if len(own) == 1:
-            found["over"] = own[0]
-    return found
+        zipped = sweep.get("zip")
+        keys = [key for key in sweep if "." in str(key) and key not in fixed]
+        if isinstance(zipped, Mapping) and not zipped.keys() & fixed.keys():
+            # keys that vary together count as one
+            keys += list(zipped)[:1]
+        if len(keys) == 1:
+            result["over"] = keys[0]
+    return result
 
 
-def _has_formulas(own: Any) -> bool:
-    return isinstance(own, Mapping) and not own.keys().isdisjoint(OF_COORDINATE)
+def _has_formulas(entry: Any) -> bool:
+    return isinstance(entry, Mapping) and not entry.keys().isdisjoint(OF_COORDINATE)
 
 
 def solved(equation: str, others: Sequence[str]) -> tuple[str, str]:
     """Return the coordinate of an equation such as ``m*u'' + k*u = F``, and its acceleration as a formula.
 
-    ExpressionError where it is no equation of one coordinate, linear in the second derivative, or names something else
-    than the coordinate, its derivatives and `others`.
+    Raises `ExpressionError` if it is not an equation of one coordinate that is linear in the second derivative, or if
+    it contains names other than the coordinate, its derivatives and `others`.
     """
     sides = equation.split("=")
     if len(sides) != 2:
@@ -196,7 +196,7 @@ def solved(equation: str, others: Sequence[str]) -> tuple[str, str]:
 
     def named(match: re.Match[str]) -> str:
         if match[1] != name:
-            raise ExpressionError(equation, 0, f"'{match[0]}' is no derivative of {name}")
+            raise ExpressionError(equation, 0, f"'{match[0]}' is not a derivative of {name}")
         return _SECOND if match[2] == "''" else velocity
 
     texts = [_DERIVATIVE.sub(named, side) for side in sides]
@@ -223,7 +223,7 @@ def solved(equation: str, others: Sequence[str]) -> tuple[str, str]:
 
 
 def _terms(node: Expression, *, is_minus: bool = False) -> Iterator[Expression]:
-    """Yield the terms of a sum."""
+    """Yield the terms of a sum, with their signs."""
     match node:
         case Binary("+" | "-" as sign, left, right):
             yield from _terms(left, is_minus=is_minus)

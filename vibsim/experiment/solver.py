@@ -1,7 +1,7 @@
-"""An experiment whose levels a solver of the user makes, as data: its levels, its members, and what makes each.
+"""An experiment with a solver of the user, as data: its levels, its members, and the command of each.
 
-A level is a set of sizes that are refined together, the coarsest first; a member of the sweep is a set of parameters.
-Text of the file becomes arguments here, and nothing is run.
+A level is a set of sizes that are refined together, the coarsest first. A member of the sweep is a set of parameters.
+This module turns text of the file into arguments, but runs nothing.
 """
 
 from __future__ import annotations
@@ -27,35 +27,35 @@ from vibsim.experiment.schema.solver import (
 )
 
 Argument = int | float | str
-"""A size or a parameter; what a file writes as a whole number is one."""
+"""A size or a parameter; an int if the file has a whole number."""
 OUTPUTS = (PLACE, f"{PLACE}.nc", f"{PLACE}.csv")
-"""Placeholders of the file that a command writes; the first is the second."""
+"""Placeholders of the file that a command writes; the first two are equivalent."""
 
 
 class SolverSpec(Section):
-    """How a level is made."""
+    """How a level is computed."""
 
     kind: Kind
     text: Text
     """The command, `module:function`, or the path of a file, with placeholders."""
     inputs: tuple[Text, ...] = ()
-    """Paths of files that it depends on, from the folder of the experiment file."""
+    """Paths of files that the solver depends on, relative to the folder of the experiment file."""
 
 
 class SolverExperiment(ReadExperiment):
-    """One experiment with a solver of the user."""
+    """An experiment with a solver of the user."""
 
     solver: SolverSpec
     sizes: Annotated[dict[str, tuple[int | float, ...]], AfterValidator(FrozenDict)]
-    """Of every level, the coarsest first; the first name is the step size."""
+    """Sizes by name, for every level, the coarsest first. The first name is the step size."""
     numbers: tuple[int, ...] = ()
-    """What `level` is of each level, where sizes are formulas in it."""
+    """Value of `level` at each level, if sizes are formulas in it."""
     quantities: Annotated[dict[str, QuantitySection], AfterValidator(FrozenDict)]
     sweep: Sweep | None = None
     whole: tuple[str, ...] = ()
-    """Swept names whose values are all written as whole numbers."""
+    """Swept names whose values in the file are all whole numbers."""
     values: Annotated[dict[str, Argument], AfterValidator(FrozenDict)] = FrozenDict()
-    """Parameters of one member alone."""
+    """Parameters, if this is a single member of a sweep."""
     resources: ResourcesSection
     checks: tuple[SolverCheck, ...]
 
@@ -75,16 +75,16 @@ class SolverExperiment(ReadExperiment):
         return self.sweep.count if self.sweep else 1
 
     def sizes_of(self, level: int) -> dict[str, int | float]:
-        """Return the sizes of a level by their names."""
+        """Return the sizes of a level by name."""
         return {name: values[level] for name, values in self.sizes.items()}
 
     def parameters_of(self, member: int) -> dict[str, Argument]:
-        """Return the parameters of a member by their names."""
-        found: dict[str, Argument] = dict(self.values)
+        """Return the parameters of a member by name."""
+        parameters: dict[str, Argument] = dict(self.values)
         for name, column in self._columns.items():
             value = column[member]
-            found[name] = int(value) if name in self.whole else value
-        return found
+            parameters[name] = int(value) if name in self.whole else value
+        return parameters
 
     @cached_property
     def _columns(self) -> dict[str, list[Any]]:
@@ -96,25 +96,25 @@ class SolverExperiment(ReadExperiment):
         return {name: column.tolist() for name, column in columns.items()}
 
     def words(self, level: int, member: int) -> dict[str, str]:
-        """Return what stands for the placeholders of a level, without those of the output and of threads."""
-        found = {**self.parameters_of(member), **self.sizes_of(level)}
+        """Return the text of the placeholders of a level, without those for the output and the threads."""
+        values = {**self.parameters_of(member), **self.sizes_of(level)}
         if self.numbers:
-            found["level"] = self.numbers[level]
-        return {name: str(value) for name, value in found.items()}
+            values["level"] = self.numbers[level]
+        return {name: str(value) for name, value in values.items()}
 
     def arguments(self, level: int, member: int, more: Mapping[str, str]) -> list[str]:
-        """Return the program of a command and its arguments; `more` stands for further placeholders."""
+        """Return the program and arguments of a command; `more` holds the text of further placeholders."""
         words = {**self.words(level, member), **more}
         return [filled(part, words) for part in shlex.split(self.solver.text)]
 
     def path(self, level: int, member: int) -> str:
-        """Return the path of the file of a level that is there, from the folder of the experiment file."""
+        """Return the path of the existing file of a level, relative to the folder of the experiment file."""
         return filled(self.solver.text, self.words(level, member))
 
     def alone(self, member: int) -> SolverExperiment:
         """Return the experiment of one member, without a sweep, named ``<name>_case_<member>``.
 
-        InputError where there is no such member.
+        Raises `InputError` if there is no such member.
         """
         check_member(member, self.members, str(self.file or self.name))
         update = {
@@ -123,13 +123,13 @@ class SolverExperiment(ReadExperiment):
             "whole": (),
             "values": FrozenDict(self.parameters_of(member)),
         }
-        found = self.model_copy(update=update)
-        found.__dict__.pop("_columns", None)
-        return found
+        single = self.model_copy(update=update)
+        single.__dict__.pop("_columns", None)
+        return single
 
     @property
     def content(self) -> dict[str, Any]:
-        """The experiment as JSON-able data, which `restore` reads."""
+        """The experiment as JSON data, for `restore`."""
         data = self.model_dump(mode="json", exclude={"checks"})
         return data | {"checks": [as_data(check) for check in self.checks]}
 
@@ -137,15 +137,15 @@ class SolverExperiment(ReadExperiment):
 def restore(
     content: Mapping[str, Any], file: Path | None, settings: tuple[str, ...] = ()
 ) -> SolverExperiment:
-    """Return the experiment with this `content`; `file` is where it was read, with which `settings`."""
+    """Return the experiment with this `content`; `file` and `settings` are those with which it was read."""
     checks = [without_kind(check) for check in content["checks"]]
-    found = SolverExperiment.model_validate({**content, "checks": checks})
-    found._file, found._settings = file, settings
-    return found
+    experiment = SolverExperiment.model_validate({**content, "checks": checks})
+    experiment._file, experiment._settings = file, settings
+    return experiment
 
 
 def placeholders(template: str) -> Iterator[str]:
-    """Yield the names between braces; ValueError where braces do not match, or hold more than a name."""
+    """Yield the names in braces; raise `ValueError` if braces do not match, or contain more than a name."""
     for _, name, form, conversion in Formatter().parse(template):
         if form or conversion:
             raise ValueError("braces hold a name and nothing else")
@@ -154,6 +154,6 @@ def placeholders(template: str) -> Iterator[str]:
 
 
 def filled(template: str, words: Mapping[str, str]) -> str:
-    """Return a template with words in place of its placeholders; doubled braces are single ones."""
+    """Return a template with its placeholders replaced; doubled braces become single ones."""
     parts = Formatter().parse(template)
     return "".join(text + (words[name] if name is not None else "") for text, name, *_ in parts)

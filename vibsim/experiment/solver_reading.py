@@ -1,4 +1,4 @@
-"""From a file to an experiment with a solver of the user: all sections are read before anything is refused."""
+"""Read an experiment with a solver of the user; all sections are read before any fault is raised."""
 
 from __future__ import annotations
 
@@ -40,32 +40,32 @@ _NAME = "must be a name of letters, digits and _"
 
 
 def from_file(path: Path) -> SolverExperiment:
-    """Read the file of an experiment with a solver; InputError with every fault of it."""
+    """Read the file of an experiment with a solver; raise `InputError` with all its faults."""
     return read_solver(read(path, KEYS), collection_of(path), path)
 
 
 def read_solver(source: Source, collection: str, file: Path) -> SolverExperiment:
-    """Validate what `source` holds and fill in every default; InputError with every fault of the file."""
+    """Validate the content of `source` and fill in defaults; raise `InputError` with all faults of the file."""
     report, name = Report(source), file.stem
     check_names(name, collection, report)
     document = read_document(report, SolverDocument)
     numbers, sizes = _sizes(document.refine, report)
     sweep, whole = _sweep(document.sweep, report)
-    # as written, faulty or not: nothing more is said about placeholders of what is faulty
-    refined, swept = _keys(source.data.get("refine")), list(_written(source.data.get("sweep")))
+    # names from the raw file: placeholders of faulty values are no further fault
+    refined, swept = _keys(source.data.get("refine")), list(_raw_values(source.data.get("sweep")))
     size_names = [name for name in refined if name != "levels"]
     swept_names = [name for name, _ in swept]
     _check_names(size_names, swept_names, document.quantities, report)
-    of_level = [*size_names, *(["level"] if "levels" in refined else [])]
-    solver = _solver(document.solver, of_level, swept_names, report)
+    level_names = [*size_names, *(["level"] if "levels" in refined else [])]
+    solver = _solver(document.solver, level_names, swept_names, report)
     checks = _checks(document, report)
-    numbers_of = [name for name, values in swept if not _is_text(values)]
-    _check_exact(document.quantities, numbers_of, report)
+    numeric = [name for name, values in swept if not _is_text(values)]
+    _check_exact(document.quantities, numeric, report)
     report.raise_any()
     assert solver is not None
     step = next(iter(sizes))
     order = sorted(range(len(sizes[step])), key=lambda i: -sizes[step][i])
-    found = SolverExperiment(
+    experiment = SolverExperiment(
         collection=collection,
         name=name,
         title=document.title,
@@ -79,37 +79,37 @@ def read_solver(source: Source, collection: str, file: Path) -> SolverExperiment
         resources=document.resources,
         checks=checks,
     )
-    found._file, found._settings = file, source.settings
-    _check_files(found, report)
+    experiment._file, experiment._settings = file, source.settings
+    _check_files(experiment, report)
     report.raise_any()
-    return found
+    return experiment
 
 
 # ---- sizes
 
 
 def _sizes(section: Any, report: Report) -> tuple[tuple[int, ...], dict[str, tuple[Any, ...]]]:
-    """Return the numbers of levels, where there are any, and the sizes of every level by name."""
+    """Return the values of `level` (empty without them), and the sizes of all levels by name."""
     if section is None:
         return (), {}
     numbers = rising_levels(section.levels, report, ("refine", "levels"))
     if not section.sizes:
         report.add(("refine",), "must name a step size", "e.g. h: [0.1, 0.05, 0.025]")
-    found: dict[str, tuple[Any, ...]] = {}
+    sizes: dict[str, tuple[Any, ...]] = {}
     raw = report.source.data["refine"]
-    for name, written in section.sizes.items():
-        if isinstance(written, str):
-            values = _by_formula(("refine", name), written, numbers, "levels" in raw, report)
+    for name, value in section.sizes.items():
+        if isinstance(value, str):
+            values = _by_formula(("refine", name), value, numbers, "levels" in raw, report)
         else:
-            values = tuple(map(int, written)) if _is_whole(raw[name]) else written
+            values = tuple(map(int, value)) if _is_whole(raw[name]) else value
         if values:
-            found[name] = values
-    step, steps = next(iter(found.items()), ("", ()))
+            sizes[name] = values
+    step, steps = next(iter(sizes.items()), ("", ()))
     count = len(numbers) or len(steps)
-    for name, values in found.items():
+    for name, values in sizes.items():
         if len(values) != count:
-            of = "there are levels" if numbers else f"{step} has"
-            rule = f"must have as many values as {of}, {count}, has {len(values)}"
+            reference = "there are levels" if numbers else f"{step} has"
+            rule = f"must have as many values as {reference}, {count}, has {len(values)}"
             report.add(("refine", name), rule, at_key=True)
     if count > MOST_LEVELS:
         report.add(("refine",), f"must not have more than {MOST_LEVELS} levels, has {count}")
@@ -118,16 +118,16 @@ def _sizes(section: Any, report: Report) -> tuple[tuple[int, ...], dict[str, tup
             report.add(("refine", step, i), "a step size must be greater than 0", value=size)
         elif size in steps[:i]:
             report.add(("refine", step, i), "a step size must not be repeated", value=size)
-    return numbers, found
+    return numbers, sizes
 
 
 def _by_formula(
     path: Path_, text: str, numbers: Sequence[int], has_levels: bool, report: Report
 ) -> tuple[Any, ...]:
-    """Return the values of a formula in `level`: whole numbers where none has a fraction and nothing is divided."""
+    """Return the values of a formula in `level`: ints if all are whole and the text has no "/" or "."."""
     if not has_levels:
         hint = "give a list, or `levels: {from: 4, to: 8}`"
-        report.add(path, "a formula needs `levels` beside it", hint, text)
+        report.add(path, "a formula needs `levels`", hint, text)
         return ()
     try:
         tree = parse(text, ("level",))
@@ -146,10 +146,10 @@ def _by_formula(
 
 
 def _sweep(section: Any, report: Report) -> tuple[Sweep | None, tuple[str, ...]]:
-    """Return the sweep, None without one, and the names whose values are all written as whole numbers."""
+    """Return the sweep (None without one), and the names whose values in the file are all whole numbers."""
     if section is None:
         return None, ()
-    raw = dict(_written(report.source.data["sweep"]))
+    raw = dict(_raw_values(report.source.data["sweep"]))
     types = {name: Text if _is_text(values) else Number for name, values in raw.items()}
     axes = [axis for axis in SweepReader(types, report).axes(section) if axis is not None]
     if not raw:
@@ -161,8 +161,8 @@ def _keys(section: Any) -> list[str]:
     return list(section) if isinstance(section, Mapping) else []
 
 
-def _written(section: Any) -> Iterator[tuple[str, Any]]:
-    """Yield the names of a sweep with what is written of each."""
+def _raw_values(section: Any) -> Iterator[tuple[str, Any]]:
+    """Yield the names of a sweep with their raw values in the file."""
     for key, value in section.items() if isinstance(section, Mapping) else ():
         inner = value.get("over") if key == "sample" and isinstance(value, Mapping) else value
         if key in ("zip", "sample"):
@@ -171,9 +171,9 @@ def _written(section: Any) -> Iterator[tuple[str, Any]]:
             yield key, value
 
 
-def _is_text(written: Any) -> bool:
-    """Say whether a list holds text that is no constant formula."""
-    for entry in written if isinstance(written, list) else ():
+def _is_text(raw: Any) -> bool:
+    """Tell whether a list contains text that is not a constant formula."""
+    for entry in raw if isinstance(raw, list) else ():
         if isinstance(entry, str):
             try:
                 constant(entry)
@@ -182,12 +182,12 @@ def _is_text(written: Any) -> bool:
     return False
 
 
-def _is_whole(written: Any) -> bool:
-    """Say whether all numbers of a list, or of a range, are written as whole ones."""
-    if isinstance(written, Mapping):
-        written = written.get("range")
-    is_list = isinstance(written, list)
-    return is_list and all(isinstance(x, int) and not isinstance(x, bool) for x in written)
+def _is_whole(raw: Any) -> bool:
+    """Tell whether all numbers of a list, or of a range, are ints."""
+    if isinstance(raw, Mapping):
+        raw = raw.get("range")
+    is_list = isinstance(raw, list)
+    return is_list and all(isinstance(x, int) and not isinstance(x, bool) for x in raw)
 
 
 # ---- names and placeholders
@@ -200,8 +200,8 @@ def _is_name(text: str) -> bool:
 def _check_names(
     sizes: Sequence[str], swept: Sequence[str], quantities: Mapping[str, Any], report: Report
 ) -> None:
-    """Check that names of sizes, parameters, quantities and coordinates can stand side by side."""
-    taken: dict[str, str] = {}
+    """Check that names of sizes, parameters, quantities and coordinates are valid and distinct."""
+    used: dict[str, str] = {}
     places: list[tuple[Path_, str, str]] = [
         *((("refine", name), name, "a size") for name in sizes),
         *((("sweep", name), name, "a swept parameter") for name in swept),
@@ -213,8 +213,8 @@ def _check_names(
         elif name in RESERVED:
             rule = "means something else here: " + ", ".join(RESERVED)
             report.add(path, f"'{name}' {rule}", "choose another name", at_key=True)
-        elif taken.setdefault(name, what) != what:
-            report.add(path, f"is the name of {taken[name]}, too", "choose another", at_key=True)
+        elif used.setdefault(name, what) != what:
+            report.add(path, f"is the name of {used[name]}, too", "choose another", at_key=True)
     for name, quantity in quantities.items():
         for i, coordinate in enumerate(quantity.coordinates or ()):
             path = ("quantities", name, "coordinates", i)
@@ -222,15 +222,15 @@ def _check_names(
                 report.add(path, "a coordinate must not be repeated", value=coordinate)
             elif not _is_name(coordinate):
                 report.add(path, _NAME, value=coordinate)
-            elif coordinate in taken or coordinate in RESERVED:
-                what = taken.get(coordinate, "something else")
+            elif coordinate in used or coordinate in RESERVED:
+                what = used.get(coordinate, "something else")
                 report.add(path, f"is the name of {what}, too", "choose another", coordinate)
 
 
 def _solver(
-    section: Any, of_level: Sequence[str], swept: Sequence[str], report: Report
+    section: Any, level_names: Sequence[str], swept: Sequence[str], report: Report
 ) -> SolverSpec | None:
-    """Return how levels are made, by names `of_level` and `swept` ones; None where that is faulty."""
+    """Return the solver; None if it is faulty. Its placeholders are `level_names` and `swept` names."""
     kind = None if section is None else given_one(section, KINDS, (SOLVER,), report)
     if not kind:
         return None
@@ -239,15 +239,15 @@ def _solver(
         rule = "belong to a command or a function: a file that is there is an input itself"
         report.add((SOLVER, "inputs"), rule, at_key=True)
     if kind != "python":
-        _check_template(kind, text, of_level, swept, report)
+        _check_template(kind, text, level_names, swept, report)
     known: Kind = next(name for name in KINDS if name == kind)
     return SolverSpec.model_construct(kind=known, text=text, inputs=section.inputs)
 
 
 def _check_template(
-    kind: str, text: str, of_level: Sequence[str], swept: Sequence[str], report: Report
+    kind: str, text: str, level_names: Sequence[str], swept: Sequence[str], report: Report
 ) -> None:
-    """Check the placeholders of a command or of the path of a file."""
+    """Check the placeholders of a command or a file path."""
     path = (SOLVER, kind)
     try:
         used = list(placeholders(text))
@@ -264,27 +264,27 @@ def _check_template(
         report.add(path, "must name a program", value=text)
     if kind == "files" and not text.lower().endswith(ENDINGS):
         report.add(path, f"must end with {' or '.join(ENDINGS)}", value=text)
-    known = [*of_level, *swept]
+    known = [*level_names, *swept]
     known += [*OUTPUTS, "threads"] if kind == "command" else []
-    # without sizes, which is a fault of its own, no name is known
-    unknown = [name for name in dict.fromkeys(used) if of_level and name not in known]
+    # missing sizes are reported elsewhere; then no name is known
+    unknown = [name for name in dict.fromkeys(used) if level_names and name not in known]
     for name in unknown:
         report.add(path, f"unknown placeholder {{{name}}}", nearest(name, known), text)
-    if not set(used) & set(of_level) and of_level and not unknown:
-        hint = "e.g. {" + of_level[0] + "}"
+    if not set(used) & set(level_names) and level_names and not unknown:
+        hint = "e.g. {" + level_names[0] + "}"
         report.add(path, "has no placeholder that differs between levels", hint, text)
     if kind == "command" and not set(used) & set(OUTPUTS) and not unknown:
         report.add(path, "has no placeholder for the file that it writes", "{output}", text)
     for name in swept:
         if name not in used:
-            rule = f"is no placeholder of `{kind}:`, so it would change nothing"
+            rule = f"is not a placeholder of `{kind}:`, so it would change nothing"
             report.add(("sweep", name), rule, f"write {{{name}}} where it belongs", at_key=True)
 
 
 def _check_exact(
     quantities: Mapping[str, QuantitySection], swept: Sequence[str], report: Report
 ) -> None:
-    """Check that exact values are formulas in what is known of a quantity."""
+    """Check that exact values are formulas in coordinates of their quantity and swept numbers."""
     for name, quantity in quantities.items():
         path: Path_ = ("quantities", name, "exact")
         known = (*(quantity.coordinates or ()), *swept)
@@ -294,21 +294,21 @@ def _check_exact(
             if not parse(quantity.exact, known).names:
                 constant(quantity.exact)
         except ExpressionError as error:
-            of = f" in {', '.join(known)}" if known else ", here without names"
+            variables = f" in {', '.join(known)}" if known else ", here without names"
             hint = error.hint or ("" if quantity.coordinates else "name its coordinates as well")
-            report.add(path, f"must be a formula{of} ({error.rule})", hint, quantity.exact)
+            report.add(path, f"must be a formula{variables} ({error.rule})", hint, quantity.exact)
 
 
 # ---- checks and files
 
 
 def _checks(document: Any, report: Report) -> tuple[SolverCheck, ...]:
-    """Return the checks of a file, or that every quantity converges."""
+    """Return the checks of a file; by default every quantity converges."""
     known = list(document.quantities)
-    given = document.checks or [SolverConvergesCheck(converges=name) for name in known]
-    ids = check_ids(given, False, report)
-    found = []
-    for i, check in enumerate(given):
+    checks = document.checks or [SolverConvergesCheck(converges=name) for name in known]
+    ids = check_ids(checks, False, report)
+    finished = []
+    for i, check in enumerate(checks):
         if check is None:
             continue
         path: Path_ = ("checks", i)
@@ -322,12 +322,12 @@ def _checks(document: Any, report: Report) -> tuple[SolverCheck, ...]:
                 report.add((*path, "at_least"), rule, at_key=True)
         else:
             given_one(check, ("relative", "absolute"), path, report)
-        found.append(check.model_copy(update={"id": ids[i]}))
-    return tuple(found)
+        finished.append(check.model_copy(update={"id": ids[i]}))
+    return tuple(finished)
 
 
 def _check_files(experiment: SolverExperiment, report: Report) -> None:
-    """Check that files that are to be there are, and that there are not too many of those to be made."""
+    """Check that required files exist, and that the levels do not have too many files."""
     count = len(experiment.levels) * experiment.members
     if count > MAX_FILES:
         rule = f"the levels must not have more than {MAX_FILES} files, they have {count}"
@@ -339,7 +339,7 @@ def _check_files(experiment: SolverExperiment, report: Report) -> None:
         _check_function(experiment, report)
     elif experiment.solver.kind == "command":
         program = shlex.split(experiment.solver.text)[0]
-        # what has no folder is looked for where it runs, which may be another machine
+        # a program without a folder is searched where it runs, maybe on another machine
         if "/" in program and not list(placeholders(program)):
             place = (SOLVER, "command")
             _check_file(experiment.folder / program, place, f"{program}: ", report)
@@ -359,13 +359,13 @@ def _check_files(experiment: SolverExperiment, report: Report) -> None:
 
 
 def _check_function(experiment: SolverExperiment, report: Report) -> None:
-    """Check that a module beside the experiment file has the function, and with these arguments; it is read alone."""
+    """Check, by reading and not running it, that a module next to the file has the function with these arguments."""
     module, _, name = experiment.solver.text.partition(":")
     file = experiment.folder.joinpath(*module.split(".")).with_suffix(".py")
     try:
         tree = ast.parse(file.read_bytes())
     except (OSError, SyntaxError, ValueError):
-        return  # an installed module, or a fault that Python tells with its line
+        return  # an installed module, or an error that Python reports with its line
     nodes = list(ast.walk(tree))
     functions = [node.name for node in nodes if isinstance(node, ast.FunctionDef | ast.ClassDef)]
     assigned = {node.id for node in nodes if isinstance(node, ast.Name)}
@@ -379,17 +379,17 @@ def _check_function(experiment: SolverExperiment, report: Report) -> None:
         rule, hint = f"{file.name} has no function {name}", nearest(name, functions)
         report.add((SOLVER, "python"), rule, hint, experiment.solver.text)
     defined = [node for node in tree.body if getattr(node, "name", "") == name]
-    # what a decorator makes of a function may take other arguments
+    # a decorator may change the arguments
     if defined and isinstance(last := defined[-1], ast.FunctionDef) and not last.decorator_list:
         _check_arguments(last, experiment, report)
 
 
 def _check_arguments(node: ast.FunctionDef, experiment: SolverExperiment, report: Report) -> None:
-    """Check that a function takes the sizes and the parameters of the experiment by their names."""
-    given = {**experiment.sizes_of(experiment.levels[0]), **experiment.parameters_of(0)}
-    if misfits := misfit_of(signature_of(node), **given):
+    """Check that a function takes the sizes and the parameters of the experiment by name."""
+    arguments = {**experiment.sizes_of(experiment.levels[0]), **experiment.parameters_of(0)}
+    if misfits := misfit_of(signature_of(node), **arguments):
         takes, why = misfits
-        rule = f"is called with {', '.join(given)}, but takes {takes} ({why})"
+        rule = f"is called with {', '.join(arguments)}, but takes {takes} ({why})"
         hint = "it gets sizes and parameters by their names"
         report.add((SOLVER, "python"), rule, hint, experiment.solver.text)
 

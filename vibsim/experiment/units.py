@@ -1,10 +1,10 @@
-"""Numbers with units in the content of a file: replaced by numbers in the units of the model before any check.
+"""Convert numbers with units in the content of a file to plain numbers in the units of the model.
 
-What follows sees plain numbers alone. Units may stand where a model or the time has a unit: in ``model``, ``initial``,
-``time`` and the values of ``sweep`` over those. Their names are those of a small registry of pint's, which is loaded
-when the first unit of a file is met. Text of a user never reaches pint's expression evaluator: single names are looked
-up, and what they stand for is multiplied here, in fractions, so that ``250 g`` is the same double as ``0.25``. Angles
-are a dimension of their own: a hertz is no radian per second.
+The conversion precedes all rules, which see plain numbers only. Units are valid where the model or the time has a unit:
+in ``model``, ``initial``, ``time``, and values of ``sweep`` over those. Their names are in a small pint registry, which
+is loaded at the first unit of a file. Text of a user never reaches pint's expression evaluator: names are looked up one
+by one, and multiplied here in fractions, so ``250 g`` is the same double as ``0.25``. Angle is a dimension: a hertz is
+not a radian per second.
 """
 
 from __future__ import annotations
@@ -27,26 +27,26 @@ from vibsim.formula import CONSTANTS, FUNCTIONS, ExpressionError, constant
 from vibsim.models import Model
 
 MAX_OWN = 50
-"""Units of one file."""
+"""Largest number of units defined in one file."""
 MAX_POWER = 99
 """Largest exponent of a base unit."""
 _ANY = ""
-"""In place of a unit: any is right, and SI base units are what follows."""
+"""Marks a key that accepts any unit; the value is converted to SI base units."""
 _UNKNOWN = "?"
-"""In place of a unit: the key does not exist, which is said elsewhere, and the value does not count."""
+"""Marks a key that does not exist, which is reported elsewhere."""
 _STAND_IN = 1.0
-"""Takes the place of what is refused, until it is taken out; nothing objects to it."""
+"""Temporary placeholder for a refused value; valid everywhere."""
 
 
 class Units:
-    """The units of a file, with which its values become plain numbers."""
+    """The units of a file, and the conversion of its values to plain numbers."""
 
     def __init__(self, data: Mapping[str, Any], report: Report) -> None:
         self.report = report
         self.own: dict[str, Any] = {}
         """Units that the file defines."""
         self.broken: set[str] = set()
-        """Names of units whose definition is refused; nothing is said about what is measured in them."""
+        """Names of units with a faulty definition; values in these units are not reported."""
         self.model = report.kinds.model_of(data.get("model"))
         self.units, self.texts = _wanted_units(self.model)
         if isinstance(data.get("units"), dict):
@@ -58,10 +58,10 @@ class Units:
         return {name: f"{float(unit.factor):.10g} {unit.text}" for name, unit in self.own.items()}
 
     def plain(self, path: Path_, written: Any) -> tuple[Any, set[str | int]]:
-        """Return what is written at `path` with numbers in place of those with units.
+        """Return the value at `path` with plain numbers in place of those with units.
 
-        Also return the keys or positions in it where something is refused, with a fault; 1 stands in for that. Where it
-        is itself refused, `path` becomes one of the faulty places.
+        Also return the keys or positions inside it that are refused, each with a fault and replaced by 1. If the value
+        itself is refused, `path` is added to `report.faulty`.
         """
         refused: set[str | int] = set()
         if _is_swept_value(path) and isinstance(written, str):
@@ -75,10 +75,10 @@ class Units:
         if isinstance(written, dict):
             entries = written.items()
         elif isinstance(written, list) and path[0] == "sweep":
-            # the last one is a count
+            # the last entry is a count
             entries = enumerate(written[: 2 if path[-1] in ("linspace", "logspace") else None])
         others = [(key, value) for key, value in entries if not isinstance(value, float | int)]
-        # with more of them the list is refused
+        # longer lists are refused by validation
         if not others or len(others) > MAX_FORMULAS:
             return written, refused
         found = written.copy()
@@ -112,7 +112,7 @@ class Units:
             return _STAND_IN
 
     def _refuse(self, path: Path_, error: UnitError, text: object) -> None:
-        """Note a fault; nothing more is said about its place."""
+        """Report a fault, and suppress further ones at its path."""
         if error.rule:
             self.report.add(path, error.rule, error.hint, text)
         self.report.faulty.add(path)
@@ -138,12 +138,12 @@ class Units:
 
 
 def _is_swept_value(path: Path_) -> bool:
-    """Tell whether a check or a printed number names a swept value there: ``checks[0].at.model.omega``."""
+    """Tell whether `path` is a swept value in a check or a printed number: ``checks[0].at.model.omega``."""
     return path[0] in ("checks", "published") and path[-2:-1] == ("at",) and "." in str(path[-1])
 
 
 def _check_name(name: str) -> None:
-    """Refuse names that mean something already, or that could not be told from what stands beside them."""
+    """Refuse names that already have a meaning, or are ambiguous in a formula."""
     if not NAME.fullmatch(name) or keyword.iskeyword(name):
         raise UnitError("the name of a unit must consist of letters and _, and begin with a letter")
     if name in CONSTANTS or name in FUNCTIONS:
@@ -173,9 +173,9 @@ def _constant(value: Any) -> float:
 
 
 def _wanted_units(model: Model | None) -> tuple[dict[str, str], set[str]]:
-    """Return the unit of every dotted key that has one, and the keys of names, formulas and counts, which have none.
+    """Return the units by dotted key, and the keys without units: names, formulas and counts.
 
-    Of a key with ``.*`` behind it these are all keys below.
+    A key that ends with ``.*`` stands for all keys below it.
     """
     units = {"time.end": "s", "time.base_dt": "s"}
     units |= {"time.periods": "1", "time.steps_per_period": "1"}
@@ -231,12 +231,12 @@ percent = 0.01 = %
 degree_Celsius = kelvin; offset: 273.15 = degC = celsius
 degree_Fahrenheit = 5 / 9 * kelvin; offset: 255.372222 = degF = fahrenheit
 """
-"""In the notation of pint's definition files."""
+"""Definitions of units, in the notation of pint."""
 _OFFERED = """
 m km cm mm kg g s ms min h day rad deg turn rpm Hz N kN Pa J W A V C ohm F H K t % percent
 metre meter gram second minute hour sec radian degree newton joule
 """
-"""What a message offers in place of an unknown name."""
+"""Names that messages suggest in place of an unknown unit."""
 _WORDS = """
 1: a plain number; m: a length; s: a time; kg: a mass; rad: an angle; m s-1: a velocity
 m s-2: an acceleration; rad s-1: an angular velocity; rad s-2: an angular acceleration; s-1: a frequency
@@ -245,12 +245,12 @@ kg m-1: a quadratic damping; m2: an area; m3: a volume; kg m2: a moment of inert
 A: a current; V: a voltage; C: a charge; ohm: a resistance; F: a capacitance; H: an inductance
 K: a temperature
 """
-"""What is measured in some units, for messages."""
+"""Names of quantities by unit, for messages."""
 _DIMENSIONS = ("[angle]", "[mass]", "[length]", "[time]", "[current]", "[temperature]")
 _SYMBOLS = dict(zip(_DIMENSIONS, ("rad", "kg", "m", "s", "A", "K"), strict=True))
 """The base unit of every dimension, in the order of messages."""
 _OFFSET = ("degree_Celsius", "degree_Fahrenheit")
-"""Units that are measured from a zero of their own."""
+"""Units with an offset."""
 
 
 @dataclass(frozen=True)
@@ -259,11 +259,11 @@ class Unit:
 
     factor: Fraction = Fraction(1)
     powers: Mapping[str, int] = field(default_factory=dict)
-    """Exponents of the base units by their symbols, none of them 0."""
+    """Nonzero exponents of the base units, by symbol."""
 
     @property
     def text(self) -> str:
-        """The base units as in models: ``kg m s-2``, ``1``."""
+        """The unit in base units, as models write it: ``kg m s-2``, ``1``."""
         parts = (
             symbol + (str(self.powers[symbol]) if self.powers[symbol] != 1 else "")
             for symbol in _SYMBOLS.values()
@@ -273,11 +273,11 @@ class Unit:
 
     @property
     def words(self) -> str:
-        """What is measured in it: ``a length``."""
+        """The quantity measured in the unit: ``a length``."""
         return _words().get(self.text, f"a quantity in {self.text}")
 
     def fits(self, wanted: Unit) -> bool:
-        """Whether a number with this unit may stand where `wanted` is: an angle may be a plain number, its radians."""
+        """Whether a number with this unit is valid where `wanted` is expected; an angle is also a plain number."""
         return self.powers == wanted.powers or (not wanted.powers and self.powers == {"rad": 1})
 
     def times(self, other: Unit, exponent: int) -> Unit:
@@ -299,7 +299,7 @@ def _words() -> Mapping[str, str]:
 
 @cache
 def registry() -> Any:
-    """Return pint's registry of the units above, in exact fractions."""
+    """Return the pint registry of `DEFINITIONS`, with exact fractions."""
     import pint
 
     found: Any = pint.UnitRegistry(None, non_int_type=Fraction, on_redefinition="raise")
@@ -309,9 +309,9 @@ def registry() -> Any:
 
 @cache
 def unit_named(name: str) -> Unit | None:
-    """Return the unit of one name, with or without a prefix; None where there is none.
+    """Return the unit of a name, with or without a prefix; None if there is none.
 
-    One whose zero is not that of the base unit, so that it cannot be a factor, raises UnitError.
+    Raises `UnitError` for a unit with an offset, which cannot be a factor.
     """
     found = registry().parse_unit_name(name)
     if not found:
@@ -323,12 +323,12 @@ def unit_named(name: str) -> Unit | None:
     factor, _ = registry().get_root_units(prefix + base)
     dimensions = registry().get_dimensionality(prefix + base)
     powers = {_SYMBOLS[name]: int(power) for name, power in dimensions.items()}
-    # pint's root unit of a mass is the gram
+    # pint's root unit of mass is the gram
     return Unit(Fraction(factor) / 1000 ** powers.get("kg", 0), powers)
 
 
 def meaning(text: str, own: Mapping[str, Unit] = MappingProxyType({})) -> Unit:
-    """Return what a unit is; `own` holds the names that a file defines. UnitError where there is no such unit."""
+    """Return the unit of a text; `own` holds the units that a file defines. Raises `UnitError` for an unknown unit."""
     unit = Unit()
     for factor in factors(text) if text != "1" else ():
         named = own.get(factor.name) or unit_named(factor.name)
@@ -342,10 +342,10 @@ def meaning(text: str, own: Mapping[str, Unit] = MappingProxyType({})) -> Unit:
 
 
 def converted(number: float, text: str, wanted: str, own: Mapping[str, Unit]) -> float:
-    """Return a number with the unit `text` in the unit `wanted`, correctly rounded.
+    """Return a number with unit `text` converted to the unit `wanted`, correctly rounded.
 
-    The number counts as the shortest decimal that is read as it: 0.3 is three tenths. Where nothing particular is
-    `wanted`, it is returned in SI base units. UnitError where the two are of different kinds, or it is too large.
+    The number stands for its shortest decimal representation: 0.3 is three tenths. An empty `wanted` means SI base
+    units. Raises `UnitError` if the dimensions differ, or the result is too large.
     """
     unit = meaning(text, own)
     target = meaning(wanted) if wanted else Unit(powers=unit.powers)
@@ -358,7 +358,7 @@ def converted(number: float, text: str, wanted: str, own: Mapping[str, Unit]) ->
 
 
 def finite(number: Fraction) -> float:
-    """Return `number` as a float; UnitError where it is too large."""
+    """Return `number` as a float; raise `UnitError` if it is too large."""
     try:
         return float(number)
     except OverflowError:

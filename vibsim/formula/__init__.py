@@ -1,9 +1,8 @@
-"""Formulas as text: read safely, kept as a frozen tree, written out for the engine.
+"""Formulas as text: parsed safely into an immutable expression graph, and written as source for the engine.
 
-A formula is read with Python's grammar (``**`` binds tighter than a sign on its left, ``-x**2`` is ``-(x**2)``) and an
-allow-list of what it may hold: numbers, declared names, ``+ - * / **``, comparisons, also in chains and joined by
-``and``, ``or`` and ``not``, ``yes if condition else no``, and calls of `FUNCTIONS`. Text of a user is never compiled or
-evaluated as Python.
+A formula has Python's grammar (``-x**2`` is ``-(x**2)``), restricted by an allow-list: numbers, declared names,
+``+ - * / **``, comparisons, also in chains and joined by ``and``, ``or`` and ``not``, ``yes if condition else no``,
+and calls of `FUNCTIONS`. Text of a user is never compiled or evaluated as Python.
 """
 
 from vibsim.formula.algebra import is_multiple, is_zero, tidied

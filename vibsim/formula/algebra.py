@@ -1,4 +1,4 @@
-"""Formulas made of formulas, and what is seen of one without values for its names."""
+"""Symbolic operations: substitution, simplification, and properties that hold for all values of the names."""
 
 from __future__ import annotations
 
@@ -34,22 +34,22 @@ def _pattern(text: str, names: tuple[str, ...]) -> Expression:
 
 
 def filled(text: str, **formulas: Expression) -> Expression:
-    """Return the formula of a text, with other formulas in the places of its names."""
+    """Parse a text and substitute other formulas for its names."""
     return replacing(formulas)(_pattern(text, tuple(formulas)))
 
 
 def tidied(node: Expression) -> Expression:
-    """Return a formula without sums with 0, products with 0 and 1, and operations on numbers alone.
+    """Return a formula simplified by removing terms 0 and factors 0 and 1, and by constant folding.
 
-    Raises `ExpressionError` where numbers alone have no value: 1/0.
+    Raises `ExpressionError` for a constant without a value, such as 1/0.
     """
 
-    def tidy(part: Expression) -> Expression:
-        if isinstance(part, Binary) and part.operator in _OPERATIONS:
-            part = _OPERATIONS[part.operator](part.left, part.right)
-        if part.names or isinstance(part, Number):
-            return part
-        return number(evaluate(part, {}))
+    def tidy(inner: Expression) -> Expression:
+        if isinstance(inner, Binary) and inner.operator in _OPERATIONS:
+            inner = _OPERATIONS[inner.operator](inner.left, inner.right)
+        if inner.names or isinstance(inner, Number):
+            return inner
+        return number(evaluate(inner, {}))
 
     return rebuilding(tidy)(node)
 
@@ -60,15 +60,15 @@ def is_zero(node: Expression) -> bool:
 
 
 def is_multiple(node: Expression, slope: Expression, name: str) -> bool:
-    """Tell whether a formula with that derivative is a factor times `name`, whatever the parameters."""
+    """Tell whether a formula with derivative `slope` is a constant times `name`, for all values of the parameters."""
 
-    def vanishes(part: Expression) -> bool:
-        """Tell whether a part is seen to be 0 where `name` is."""
-        match part:
+    def vanishes(inner: Expression) -> bool:
+        """Tell whether a subexpression is certainly 0 at `name` = 0."""
+        match inner:
             case Number(value):
                 return value == 0.0
-            case Name(own):
-                return own == name
+            case Name(variable):
+                return variable == name
             case Negate(operand) | Binary("/", operand, _):
                 return vanishes(operand)
             case Binary("*", left, right):
@@ -79,40 +79,40 @@ def is_multiple(node: Expression, slope: Expression, name: str) -> bool:
                 return (literal(exponent) or 0.0) > 0.0 and vanishes(base)
         return False
 
-    # the derivative does not tell of a jump
-    jumps = (part for part in walk(node) if is_jump(part))
-    varies = name in slope.names or any(name in part.names for part in jumps)
+    # the derivative ignores jumps
+    jumps = (inner for inner in walk(node) if is_jump(inner))
+    varies = name in slope.names or any(name in inner.names for inner in jumps)
     return not varies and vanishes(node)
 
 
 def is_jump(node: Expression) -> bool:
-    """Tell whether the value jumps where an operand varies."""
+    """Tell whether the operation is discontinuous in its operands."""
     return isinstance(node, Compare) or (
         isinstance(node, Call) and node.function in STEPS | {"mod"}
     )
 
 
 def slope_of(node: Expression, name: str, *, with_start: bool = True) -> Expression | None:
-    """Return the a of a formula ``a x + b``, or of ``a x`` alone; None where it is another one."""
+    """Return the slope a of a formula ``a x + b``, or of ``a x`` without `with_start`; None for any other form."""
 
     def inner(part: Expression) -> Expression | None:
         return slope_of(part, name, with_start=with_start)
 
     match node:
-        case Name(own) if own == name:
+        case Name(variable) if variable == name:
             return ONE
         case Negate(operand):
-            found = inner(operand)
-            return None if found is None else Negate(found)
+            slope = inner(operand)
+            return None if slope is None else Negate(slope)
         case Binary("+" | "-", left, right) if with_start and name not in right.names:
             return inner(left)
         case Binary("+" | "-" as symbol, left, right) if with_start and name not in left.names:
-            found = inner(right)
-            return Negate(found) if found is not None and symbol == "-" else found
+            slope = inner(right)
+            return Negate(slope) if slope is not None and symbol == "-" else slope
         case Binary("*", left, right) if name not in left.names:
-            found = inner(right)
-            return None if found is None else left * found
+            slope = inner(right)
+            return None if slope is None else left * slope
         case Binary("*" | "/" as symbol, left, right) if name not in right.names:
-            found = inner(left)
-            return None if found is None else _OPERATIONS[symbol](found, right)
+            slope = inner(left)
+            return None if slope is None else _OPERATIONS[symbol](slope, right)
     return None

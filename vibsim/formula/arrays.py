@@ -1,8 +1,7 @@
-"""Values of formulas for arrays, and bounds over intervals of names, by numpy: not for steps.
+"""Values of formulas for arrays, and bounds over intervals of names, by numpy. Time steps do not use them.
 
-Bounds say what lies between two samples and no sample shows: interval arithmetic, without rounding outward, because
-bounds say where to look, and values decide what is there. An operation that has no value somewhere in its intervals is
-unbounded.
+Bounds cover what happens between two samples. They come from interval arithmetic without outward rounding: bounds only
+direct a search, and values decide. An operation that is undefined somewhere in its intervals is unbounded.
 """
 
 from __future__ import annotations
@@ -43,11 +42,11 @@ _FUNCTIONS: Mapping[str, Callable[..., Any]] = {
 FALLING = frozenset(("acos", "erfc"))
 EVEN = frozenset(("abs", "cosh"))
 TURNS = {"sin": 0.25, "cos": 0.0}
-"""Where the first maximum of a periodic function lies, in periods."""
+"""Position of the first maximum of a periodic function, in periods."""
 
 
 def values(expression: Expression, numbers: Mapping[str, Any]) -> Floats:
-    """Return the values of a formula; NaN or infinite where it has none.
+    """Return the values of a formula; NaN or infinite where it is undefined.
 
     Parameters
     ----------
@@ -58,17 +57,17 @@ def values(expression: Expression, numbers: Mapping[str, Any]) -> Floats:
 
 
 def values_of(expressions: Sequence[Expression], numbers: Mapping[str, Any]) -> list[Floats]:
-    """Return the values of some formulas; what they have in common is worked out once."""
+    """Return the values of several formulas; common subexpressions are evaluated once."""
     with np.errstate(all="ignore"):
-        found = folded(expressions, partial(_value_of, numbers))
-    return [np.asarray(value, dtype=np.float64) for value in found]
+        results = folded(expressions, partial(_value_of, numbers))
+    return [np.asarray(value, dtype=np.float64) for value in results]
 
 
 def _value_of(numbers: Mapping[str, Any], node: Expression, *operands: Any) -> Any:
     """Return the value of a formula from those of its operands."""
     match node:
         case Number(value):
-            # of numpy, whose division by zero is infinite
+            # a numpy number, whose division by zero is infinite
             return np.float64(value)
         case Name(name):
             return np.asarray(numbers[name], dtype=np.float64)
@@ -84,28 +83,28 @@ def _value_of(numbers: Mapping[str, Any], node: Expression, *operands: Any) -> A
             return _FUNCTIONS[function](*operands)
 
 
-def _raised(base: Floats, exponent: Floats, written: float | None) -> Any:
-    """Return a power: by multiplication where a whole exponent is written as a number, as in the engine."""
-    if written is not None and written.is_integer():
-        return whole_power(base, int(written))
+def _raised(base: Floats, exponent: Floats, constant: float | None) -> Any:
+    """Return a power, by multiplication if the exponent is an integer `constant`, as in the engine."""
+    if constant is not None and constant.is_integer():
+        return whole_power(base, int(constant))
     return on_arrays.power(base, exponent)
 
 
 def bounds(expression: Expression, numbers: Mapping[str, Any]) -> Interval:
-    """Return the least and the largest value that a formula may have.
+    """Return bounds of the values of a formula.
 
     Parameters
     ----------
     numbers
-        Of every name its value, or a pair of its least and largest value; arrays that broadcast against each other.
+        For every name its value, or a pair of bounds; arrays that broadcast against each other.
     """
     with np.errstate(all="ignore"):
         [(low, high)] = folded([expression], partial(_bounds_of, numbers))
-        return _known(low, high)
+        return _or_unbounded(low, high)
 
 
-def _known(low: Any, high: Any) -> Interval:
-    """Return bounds, without any where there is no value."""
+def _or_unbounded(low: Any, high: Any) -> Interval:
+    """Return bounds, infinite where they are NaN."""
     unknown = np.isnan(low) | np.isnan(high)
     return np.where(unknown, -np.inf, low), np.where(unknown, np.inf, high)
 
@@ -116,8 +115,8 @@ def _bounds_of(numbers: Mapping[str, Any], node: Expression, *operands: Interval
         case Number(value):
             return np.asarray(value, dtype=float), np.asarray(value, dtype=float)
         case Name(name):
-            found = numbers[name]
-            return found if isinstance(found, tuple) else (np.asarray(found), np.asarray(found))
+            value = numbers[name]
+            return value if isinstance(value, tuple) else (np.asarray(value), np.asarray(value))
         case Negate():
             [(low, high)] = operands
             return -high, -low
@@ -125,35 +124,35 @@ def _bounds_of(numbers: Mapping[str, Any], node: Expression, *operands: Interval
             base, power = operands
             return _power(base, power, literal(exponent))
         case Binary("*"):
-            return _known(*_times(*operands))
+            return _or_unbounded(*_product(*operands))
         case Binary("/"):
-            return _known(*_over(*operands))
+            return _or_unbounded(*_quotient(*operands))
         case Binary(symbol):
-            return _known(*_corners(OPERATORS[symbol], *operands))
+            return _or_unbounded(*_corners(OPERATORS[symbol], *operands))
         case Compare(symbol):
-            return _compared(symbol, *operands)
+            return _comparison(symbol, *operands)
         case Call(function):
-            return _known(*_called(function, operands))
+            return _or_unbounded(*_call(function, operands))
     raise AssertionError(node)
 
 
-def _times(a: Interval, b: Interval) -> Interval:
-    # an end that is 0 bounds what is multiplied by it, however large that is
+def _product(a: Interval, b: Interval) -> Interval:
+    # 0 times infinity is 0 here: 0 bounds the product with any finite value
     products = [np.nan_to_num(x * y, nan=0.0, posinf=np.inf, neginf=-np.inf) for x in a for y in b]
     return np.minimum.reduce(products), np.maximum.reduce(products)
 
 
-def _over(a: Interval, b: Interval) -> Interval:
+def _quotient(a: Interval, b: Interval) -> Interval:
     has_pole = (b[0] <= 0.0) & (b[1] >= 0.0)
-    low, high = _times(a, (1.0 / b[1], 1.0 / b[0]))
+    low, high = _product(a, (1.0 / b[1], 1.0 / b[0]))
     return np.where(has_pole, -np.inf, low), np.where(has_pole, np.inf, high)
 
 
 def _power(base: Interval, exponent: Interval, number: float | None) -> Interval:
     if number is not None and number == round(number):
         if number < 0:
-            return _over((np.ones(()), np.ones(())), _power(base, exponent, -number))
-        low, high = _sizes(base) if number % 2 == 0 else base
+            return _quotient((np.ones(()), np.ones(())), _power(base, exponent, -number))
+        low, high = _absolute(base) if number % 2 == 0 else base
         return whole_power(low, int(number)), whole_power(high, int(number))
     low, high = _corners(on_arrays.power, base, exponent)
     has_value = base[0] >= 0.0
@@ -162,18 +161,18 @@ def _power(base: Interval, exponent: Interval, number: float | None) -> Interval
 
 def _corners(function: Callable[..., Any], a: Interval, b: Interval) -> Interval:
     """Return the bounds of a function that is monotone in both arguments."""
-    found = [function(x, y) for x in a for y in b]
-    return np.minimum.reduce(found), np.maximum.reduce(found)
+    corners = [function(x, y) for x in a for y in b]
+    return np.minimum.reduce(corners), np.maximum.reduce(corners)
 
 
-def _sizes(a: Interval) -> Interval:
+def _absolute(a: Interval) -> Interval:
     """Return the bounds of the absolute value."""
     ends = np.abs(a[0]), np.abs(a[1])
     has_zero = (a[0] <= 0.0) & (a[1] >= 0.0)
     return np.where(has_zero, 0.0, np.minimum(*ends)), np.maximum(*ends)
 
 
-def _compared(symbol: str, a: Interval, b: Interval) -> Interval:
+def _comparison(symbol: str, a: Interval, b: Interval) -> Interval:
     low, high = _corners(np.subtract, a, b)
     sure = {
         "<": (high < 0.0, low >= 0.0),
@@ -187,41 +186,43 @@ def _compared(symbol: str, a: Interval, b: Interval) -> Interval:
     return np.where(is_true, 1.0, 0.0), np.where(is_false, 0.0, 1.0)
 
 
-def _called(function: str, inner: Sequence[Interval]) -> Interval:
+def _call(function: str, arguments: Sequence[Interval]) -> Interval:
     match function:
         case "min" | "max" | "hypot":
-            a, b = (_sizes(x) for x in inner) if function == "hypot" else inner
-            return _value(function, a[0], b[0]), _value(function, a[1], b[1])
+            a, b = (_absolute(x) for x in arguments) if function == "hypot" else arguments
+            return _function_value(function, a[0], b[0]), _function_value(function, a[1], b[1])
         case "atan2":
-            is_right = inner[1][0] > 0.0
-            low, high = _corners(on_arrays.atan2, *inner)
+            is_right = arguments[1][0] > 0.0
+            low, high = _corners(on_arrays.atan2, *arguments)
             return np.where(is_right, low, -np.pi), np.where(is_right, high, np.pi)
         case "mod":
-            return _modulo(*inner)
+            return _modulo(*arguments)
         case "where":
-            return _chosen(*inner)
+            return _where(*arguments)
         case "sin" | "cos":
-            return _periodic(function, inner[0])
+            return _periodic(function, arguments[0])
         case "tan":
-            low, high = (_value("tan", x) for x in inner[0])
-            is_one = np.floor(inner[0][0] / np.pi - 0.5) == np.floor(inner[0][1] / np.pi - 0.5)
-            return np.where(is_one, low, -np.inf), np.where(is_one, high, np.inf)
-    ends = _sizes(inner[0]) if function in EVEN else inner[0]
-    low, high = (_value(function, x) for x in ends)
+            low, high = (_function_value("tan", x) for x in arguments[0])
+            on_one_branch = np.floor(arguments[0][0] / np.pi - 0.5) == np.floor(
+                arguments[0][1] / np.pi - 0.5
+            )
+            return np.where(on_one_branch, low, -np.inf), np.where(on_one_branch, high, np.inf)
+    ends = _absolute(arguments[0]) if function in EVEN else arguments[0]
+    low, high = (_function_value(function, x) for x in ends)
     return (high, low) if function in FALLING else (low, high)
 
 
-def _value(function: str, *arguments: Floats) -> Floats:
+def _function_value(function: str, *arguments: Floats) -> Floats:
     names = [f"x{i}" for i in range(len(arguments))]
     call = Call(function, tuple(Name(name) for name in names))
     return values(call, dict(zip(names, arguments, strict=True)))
 
 
 def _periodic(function: str, x: Interval) -> Interval:
-    """Return the bounds of sine or cosine: 1 where a maximum lies between the ends, -1 where a minimum does."""
-    ends = [_value(function, end) for end in x]
+    """Return the bounds of sine or cosine: 1 if a maximum lies between the ends, -1 if a minimum does."""
+    ends = [_function_value(function, end) for end in x]
     turns = [end / (2.0 * np.pi) - TURNS[function] for end in x]
-    # an infinite end says nothing of where it is
+    # true for infinite ends, too
     wide = ~(turns[1] - turns[0] < 1.0)
     top = wide | (np.ceil(turns[0]) <= np.floor(turns[1]))
     bottom = wide | (np.ceil(turns[0] - 0.5) <= np.floor(turns[1] - 0.5))
@@ -230,15 +231,15 @@ def _periodic(function: str, x: Interval) -> Interval:
 
 def _modulo(x: Interval, y: Interval) -> Interval:
     whole = [np.floor(end / y[0]) for end in x]
-    is_one = (whole[0] == whole[1]) & (y[0] == y[1])
+    on_one_branch = (whole[0] == whole[1]) & (y[0] == y[1])
     low, high = (end - whole[0] * y[0] for end in x)
     return (
-        np.where(is_one, np.minimum(low, high), np.minimum(y[0], 0.0)),
-        np.where(is_one, np.maximum(low, high), np.maximum(y[1], 0.0)),
+        np.where(on_one_branch, np.minimum(low, high), np.minimum(y[0], 0.0)),
+        np.where(on_one_branch, np.maximum(low, high), np.maximum(y[1], 0.0)),
     )
 
 
-def _chosen(condition: Interval, yes: Interval, no: Interval) -> Interval:
+def _where(condition: Interval, yes: Interval, no: Interval) -> Interval:
     never = (condition[0] == 0.0) & (condition[1] == 0.0)
     always = (condition[0] > 0.0) | (condition[1] < 0.0)
     low, high = np.minimum(yes[0], no[0]), np.maximum(yes[1], no[1])

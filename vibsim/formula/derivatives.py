@@ -1,4 +1,4 @@
-"""Derivatives of formulas, as formulas: for Newton's method."""
+"""Symbolic derivatives of formulas, for Newton's method."""
 
 from __future__ import annotations
 
@@ -29,15 +29,15 @@ _RULES = {
     "log": "1/x",
     "sinh": "cosh(x)",
     "cosh": "sinh(x)",
-    # 1 - tanh(x)**2 has no digits left for large x
+    # 1 - tanh(x)**2 cancels for large x
     "tanh": "1/cosh(x)**2",
-    # in factors: 1 - x**2 cancels near 1
+    # factorised, because 1 - x**2 cancels near 1
     "asin": "1/sqrt((1 - x)*(1 + x))",
     "acos": "-(1/sqrt((1 - x)*(1 + x)))",
     "atan": "1/(1 + x**2)",
-    # sqrt(1 + x**2) overflows before its inverse vanishes
+    # not 1/sqrt(1 + x**2): x**2 would overflow where the quotient is not yet 0
     "asinh": "1/hypot(1, x)",
-    # a product of roots, which has no value below 1
+    # a product of roots, which is undefined below 1 like acosh itself
     "acosh": "1/(sqrt(x - 1)*sqrt(x + 1))",
     "atanh": "1/((1 - x)*(1 + x))",
     "log10": "0.4342944819032518/x",
@@ -50,27 +50,27 @@ _RULES = {
     "sqrt": "0.5/f",
     "abs": "sign(x)",
 }
-"""Derivative of a function of one argument x, whose value is f."""
+"""Derivatives of functions of one argument x with value f."""
 
 
 def derivative(node: Expression, name: str) -> Expression:
-    """Return the derivative of a formula by one of its names.
+    """Return the derivative of a formula with respect to one of its names.
 
-    Where a formula has a corner or a jump (``abs``, ``min``, ``max``, ``mod``, ``where``, a comparison, one of `STEPS`)
-    the derivative is that of the branch taken; jumps count as flat.
+    At corners and jumps (``abs``, ``min``, ``max``, ``mod``, ``where``, comparisons, `STEPS`) it is the derivative of
+    the active branch; jumps contribute nothing.
     """
-    for part in parts_of(node, but=lambda part: name not in part.names or name in part.slopes):
-        part.slopes[name] = _slope(part, name)
-    return _known(node, name)
+    for inner in parts_of(node, but=lambda inner: name not in inner.names or name in inner.slopes):
+        inner.slopes[name] = _slope(inner, name)
+    return _cached(node, name)
 
 
-def _known(node: Expression, name: str) -> Expression:
+def _cached(node: Expression, name: str) -> Expression:
     return node.slopes.get(name, ZERO)
 
 
 def _slope(node: Expression, name: str) -> Expression:
     """Return the derivative of a formula from those of its operands."""
-    d = [_known(operand, name) for operand in node.operands]
+    d = [_cached(operand, name) for operand in node.operands]
     match node:
         case Name():
             return ONE
@@ -83,8 +83,8 @@ def _slope(node: Expression, name: str) -> Expression:
         case Binary("*", left, right):
             return d[0] * right + left * d[1]
         case Binary("/", _, right):
-            # not over right**2, which overflows before the quotient does
-            return _over(d[0] - node * d[1], right)
+            # not divided by right**2, which overflows before the quotient does
+            return _quotient(d[0] - node * d[1], right)
         case Binary("**", base, exponent):
             value = literal(exponent)
             if value is not None:
@@ -94,42 +94,42 @@ def _slope(node: Expression, name: str) -> Expression:
             lowered = Binary("**", base, Binary("-", exponent, ONE))
             return exponent * lowered * d[0] + node * Call("log", (base,)) * d[1]
         case Call(function, arguments):
-            return _of_call(node, function, arguments, d)
+            return _call_slope(node, function, arguments, d)
     return ZERO
 
 
-def _of_call(
+def _call_slope(
     node: Expression,
     function: str,
     arguments: tuple[Expression, ...],
     slopes: Sequence[Expression],
 ) -> Expression:
-    dx, *others = slopes
-    if all(entry == ZERO for entry in (dx, *others)) or function in STEPS:
+    dx, *other_slopes = slopes
+    if all(entry == ZERO for entry in (dx, *other_slopes)) or function in STEPS:
         return ZERO
-    x, *more = arguments
+    x, *other_arguments = arguments
     if function in _RULES:
         return filled(_RULES[function], x=x, f=node) * dx
     if function == "where":
-        return Call("where", (x, *others))
-    [y], [dy] = more, others
+        return Call("where", (x, *other_slopes))
+    [y], [dy] = other_arguments, other_slopes
     match function:
         case "min":
             return filled("where(x <= y, dx, dy)", x=x, y=y, dx=dx, dy=dy)
         case "max":
             return filled("where(x >= y, dx, dy)", x=x, y=y, dx=dx, dy=dy)
         case "atan2":
-            return _over(y * dx - x * dy, filled("x**2 + y**2", x=x, y=y))
+            return _quotient(y * dx - x * dy, filled("x**2 + y**2", x=x, y=y))
         case "hypot":
-            # 0 where both are 0, as that of abs
+            # 0 where both are 0, like the derivative of abs
             by_x, by_y = (filled("part/(f + (f == 0))", part=part, f=node) for part in (x, y))
             return by_x * dx + by_y * dy
         case "mod":
-            # the whole number that mod has taken away, which a rounded quotient may miss by 1
-            taken = filled("round((x - f)/y)", x=x, y=y, f=node)
-            return dx - taken * dy
+            # the multiple of y that mod subtracts; floor(x/y) may be off by 1
+            multiple = filled("round((x - f)/y)", x=x, y=y, f=node)
+            return dx - multiple * dy
     raise NotImplementedError(f"{function} has no derivative here")
 
 
-def _over(left: Expression, right: Expression) -> Expression:
+def _quotient(left: Expression, right: Expression) -> Expression:
     return ZERO if left == ZERO else Binary("/", left, right)

@@ -1,19 +1,18 @@
-"""Where a formula has corners, jumps, and pulses between the times at which it is looked at, which no step knows of.
+"""Find corners and jumps of a formula, and pulses between the times at which it is sampled.
 
-A pulse is recognised by what steps see: between two times the formula leaves, by far, all values that it has at these
-and at those beside them. Bounds of the formula over intervals of time (`vibsim.formula.arrays`) say where that may be:
-these are halved until a value is found there, or none can be.
+*Pulses.* Between two sample times the formula deviates by far from its values at these and the adjacent times. Bounds
+of the formula over intervals of time (`vibsim.formula.arrays`) show where that is possible. These intervals are
+bisected until a sample hits the pulse, or the bounds exclude one.
 
-The derivative of a formula leaves jumps out, so that its integral is not the difference of the formula. Over a piece of
-time [a, b] the difference D of ``f(b) - f(a)`` and the integral of f' vanishes for a continuous f and a piece that is
-short enough. At a jump it stays what it is, however short the piece becomes. So pieces with a D are halved, on the side
-where more of it lies, until it has gone or nothing is left to halve. Where a pulse lies between the ends of a piece,
-the piece ends within it: its jumps would cancel.
+*Jumps.* The derivative of a formula ignores jumps. So over an interval [a, b] the defect D, which is ``f(b) - f(a)``
+minus the integral of f', tends to 0 with the length of the interval for a continuous f, but stays constant across a
+jump. Intervals with a defect are bisected, towards the larger defect, until it vanishes or the interval is tiny. An
+interval that contains a pulse is split inside it, because the two jumps of the pulse would cancel.
 
-As *switches*: a function with a corner or a jump looks at a quantity: ``abs(x)`` at x, ``min(x, y)`` at x - y,
-``floor(x)`` at x, ``mod(x, y)`` at x/y. What it does with it follows from the *mode* of the quantity: the whole number
-below it where it is floored, and elsewhere 0 above 0 and -1 below it. With the modes held, the formula goes on as it
-was beyond the place where a mode changes: it is smooth there, if the functions in it are.
+*Switches.* A function with a corner or a jump depends on a quantity: ``abs(x)`` on x, ``min(x, y)`` on x - y,
+``floor(x)`` on x, ``mod(x, y)`` on x/y. Its branch is given by the *mode* of the quantity: its floor for rounding
+functions and ``mod``, otherwise 0 above 0 and -1 below. With modes held constant, the formula continues its branch
+beyond the point where the mode changes, and is smooth there if the functions in it are.
 """
 
 from __future__ import annotations
@@ -44,39 +43,39 @@ from vibsim.formula.tree import (
 
 HALVINGS = 48
 MOST_INTERVALS = 2**14
-"""Intervals that are looked at together, at most: those that may hold the largest values."""
+"""Largest number of intervals that are kept: those with the largest possible deviations."""
 PULSE_RATIO = 2.0
-"""A pulse leaves the values around it by more than so many times their range, ..."""
+"""A pulse deviates from the values around it by more than this multiple of their range, ..."""
 SMALLEST_PULSE = 1e-9
-"""... and by this part of the largest value at all times."""
+"""... plus this fraction of the largest value at all times."""
 HEIGHT_AT_ENDS = 0.5
-"""What a pulse still has of its height at its ends."""
+"""Fraction of the height of a pulse at which its width is measured."""
 
 PIECES = 1024
-"""Of the whole interval."""
+"""Number of intervals into which the whole time is divided."""
 MOST_PULSES = 8
-"""So many pulses between the ends of pieces are looked at."""
+"""Largest number of pulses inside intervals that are searched for."""
 UNEVEN = 0.37
-"""How far their ends are moved, in pieces, so that they do not keep step with a square wave."""
+"""Amplitude by which the ends of intervals are shifted, in intervals, so that no square wave is in phase with them."""
 JUMP_HALVINGS = 50
 SMALLEST_JUMP = 1e-6
-"""A jump is larger than this part of the formula's largest value."""
+"""Smallest jump, relative to the largest value of the formula."""
 GENTLE = frozenset(
     ("sin", "cos", "exp", "expm1", "sinh", "cosh", "tanh", "atan", "asinh", "erf", "erfc")
 )
-"""Functions that are smooth wherever they are taken."""
+"""Functions that are smooth for all arguments."""
 
 
 @dataclass(frozen=True)
 class Pulses:
-    """One pulse of every member that has any, shape (case,)."""
+    """At most one pulse of every member, shape (case,)."""
 
     time: Floats
-    """A time within it; NaN where there is none."""
+    """A time within the pulse; NaN if the member has none."""
     width: Floats
 
     def and_others(self, other: Pulses) -> Pulses:
-        """Return these, and others of members that have none of these."""
+        """Return these pulses, and those of `other` for members without one."""
         none = np.isnan(self.time)
         return Pulses(
             np.where(none, other.time, self.time), np.where(none, other.width, self.width)
@@ -84,16 +83,16 @@ class Pulses:
 
 
 def hidden_pulses(formula: Expression, numbers: Mapping[str, Floats], t: Floats) -> Pulses:
-    """Find a pulse of every member between the times at which it is looked at.
+    """Find a pulse of every member between its sample times.
 
     Parameters
     ----------
     formula
-        In ``t`` and other names.
+        A formula in ``t`` and other names.
     numbers
-        Values of these, each of shape (case, gap) or (case, 1): what they are behind each of the times but the last.
+        Values of the other names, of shape (case, gap) or (case, 1): those that apply after each sample time.
     t
-        The times, shape (case, gap + 1), ascending; NaN behind the last one of a member.
+        The sample times, shape (case, gap + 1), ascending; NaN after the last time of a member.
     """
     cases, count = len(t), t.shape[1] - 1
     time, width = np.full(cases, np.nan), np.full(cases, np.nan)
@@ -105,16 +104,16 @@ def hidden_pulses(formula: Expression, numbers: Mapping[str, Floats], t: Floats)
     begin, end = t[:, :-1].ravel(), t[:, 1:].ravel()
 
     def excess(row: Integers, at: Floats) -> Floats:
-        """Return how far values at times in some gaps are from being none of a pulse; 0 or less where they are none."""
-        own = {name: x[row] for name, x in flat.items()}
-        value = np.broadcast_to(values(formula, {**own, "t": at}), at.shape)
+        """Return by how much values at times in some gaps exceed the limits; positive in a pulse only."""
+        parameters = {name: x[row] for name, x in flat.items()}
+        value = np.broadcast_to(values(formula, {**parameters, "t": at}), at.shape)
         return np.maximum(low[row] - value, value - high[row])
 
     def width_of(row: Integers, at: Floats) -> float:
-        """Return the time over which the pulse around a time has half its height or more, to a factor of 2."""
+        """Return the width at half height of the pulse around a time, to a factor of 2."""
         reach = float(end[row][0] - begin[row][0]) * 0.5 ** np.arange(HALVINGS)
-        rows, least = np.broadcast_to(row, reach.shape), HEIGHT_AT_ENDS * excess(row, at)[0]
-        sides = (excess(rows, at + side * reach) >= least for side in (-1.0, 1.0))
+        rows, lowest = np.broadcast_to(row, reach.shape), HEIGHT_AT_ENDS * excess(row, at)[0]
+        sides = (excess(rows, at + side * reach) >= lowest for side in (-1.0, 1.0))
         return sum(float(reach[np.argmax(high)]) if high.any() else 0.0 for high in sides)
 
     with np.errstate(all="ignore"):
@@ -122,18 +121,22 @@ def hidden_pulses(formula: Expression, numbers: Mapping[str, Floats], t: Floats)
         row = np.flatnonzero(np.isfinite(low + high + end))
         a, b = begin[row], end[row]
         for _ in range(HALVINGS):
-            own = {name: x[row] for name, x in flat.items()}
-            least, most = bounds(formula, {**own, "t": (a, b)})
-            largest = np.broadcast_to(np.maximum(low[row] - least, most - high[row]), a.shape)
-            left = np.flatnonzero((largest > 0.0) & np.isnan(time[case[row]]))
-            if len(left) > MOST_INTERVALS:
-                left = left[np.argsort(-largest[left], kind="stable")[:MOST_INTERVALS]]
-            row, a, b = row[left], a[left], b[left]
+            parameters = {name: x[row] for name, x in flat.items()}
+            lowest, highest = bounds(formula, {**parameters, "t": (a, b)})
+            excess_bound = np.broadcast_to(
+                np.maximum(low[row] - lowest, highest - high[row]), a.shape
+            )
+            remaining = np.flatnonzero((excess_bound > 0.0) & np.isnan(time[case[row]]))
+            if len(remaining) > MOST_INTERVALS:
+                remaining = remaining[
+                    np.argsort(-excess_bound[remaining], kind="stable")[:MOST_INTERVALS]
+                ]
+            row, a, b = row[remaining], a[remaining], b[remaining]
             if not len(row):
                 break
             middle = 0.5 * (a + b)
             hits = np.flatnonzero(excess(row, middle) > 0.0)
-            # of several the first one in time stays
+            # the earliest of several hits is written last
             for i in hits[np.argsort(-middle[hits], kind="stable")]:
                 time[case[row[i]]] = middle[i]
                 width[case[row[i]]] = width_of(row[i : i + 1], middle[i : i + 1])
@@ -142,29 +145,29 @@ def hidden_pulses(formula: Expression, numbers: Mapping[str, Floats], t: Floats)
 
 
 def _limits(formula: Expression, numbers: Mapping[str, Floats], t: Floats) -> tuple[Floats, Floats]:
-    """Return the least and the largest value in every gap that are no pulse, flat over members."""
+    """Return the limits beyond which a value is a pulse, for every gap, flattened over members."""
     count = t.shape[1] - 1
-    around = np.arange(count)[:, None] + np.array([-1, 0, 1, 2])
-    places = np.take(t, np.clip(around, 0, count), axis=1)
-    own = {name: np.broadcast_to(x, (len(t), count))[..., None] for name, x in numbers.items()}
-    beside = np.broadcast_to(values(formula, {**own, "t": places}), places.shape)
-    # behind the last time of a member nothing is known
-    beside = np.where(np.isfinite(places), beside, beside[..., 1:2])
-    low, high = np.min(beside, axis=-1), np.max(beside, axis=-1)
+    indices = np.arange(count)[:, None] + np.array([-1, 0, 1, 2])
+    times = np.take(t, np.clip(indices, 0, count), axis=1)
+    columns = {name: np.broadcast_to(x, (len(t), count))[..., None] for name, x in numbers.items()}
+    samples = np.broadcast_to(values(formula, {**columns, "t": times}), times.shape)
+    # no values after the last time of a member
+    samples = np.where(np.isfinite(times), samples, samples[..., 1:2])
+    low, high = np.min(samples, axis=-1), np.max(samples, axis=-1)
     size = np.nanmax(
-        np.abs(np.where(np.isfinite(beside), beside, np.nan)), axis=(1, 2), initial=0.0
+        np.abs(np.where(np.isfinite(samples), samples, np.nan)), axis=(1, 2), initial=0.0
     )
-    room = PULSE_RATIO * (high - low) + SMALLEST_PULSE * size[:, None]
-    return (low - room).ravel(), (high + room).ravel()
+    margin = PULSE_RATIO * (high - low) + SMALLEST_PULSE * size[:, None]
+    return (low - margin).ravel(), (high + margin).ravel()
 
 
 def first_jump(formula: Expression, numbers: Mapping[str, float], end: float) -> float | None:
-    """Return the time of the first jump of a formula in ``t`` from 0 to `end`; None where it has none.
+    """Return the time of the first jump of a formula in ``t`` between 0 and `end`; None if it has none.
 
     Parameters
     ----------
     numbers
-        Values of its other names.
+        Values of the other names.
     """
     if not any(
         isinstance(part, Compare) or (isinstance(part, Call) and part.function not in GENTLE)
@@ -172,79 +175,79 @@ def first_jump(formula: Expression, numbers: Mapping[str, float], end: float) ->
     ):
         return None
     slope = derivative(formula, "t")
-    place, weight = np.polynomial.legendre.leggauss(3)
+    node, weight = np.polynomial.legendre.leggauss(3)
 
-    def missing(a: Floats, b: Floats) -> Floats:
-        """Return D of some pieces."""
-        t = a + 0.5 * (b - a) * (1.0 + place[:, None])
+    def defect(a: Floats, b: Floats) -> Floats:
+        """Return the defect D of intervals."""
+        t = a + 0.5 * (b - a) * (1.0 + node[:, None])
         mean = 0.5 * weight @ np.broadcast_to(values(slope, {**numbers, "t": t}), t.shape)
         ends = [np.broadcast_to(values(formula, {**numbers, "t": x}), x.shape) for x in (a, b)]
-        found: Floats = np.abs(ends[1] - ends[0] - (b - a) * mean)
-        return np.where(np.isfinite(found), found, 0.0)
+        result: Floats = np.abs(ends[1] - ends[0] - (b - a) * mean)
+        return np.where(np.isfinite(result), result, 0.0)
 
     k = np.arange(PIECES + 1.0)
     edges = end / PIECES * (k + np.where(k % PIECES == 0.0, 0.0, UNEVEN * on_arrays.sin(1.7 * k)))
     edges = _with_pulses(formula, numbers, edges)
     with np.errstate(all="ignore"):
         size = np.abs(np.broadcast_to(values(formula, {**numbers, "t": edges}), edges.shape))
-        least = SMALLEST_JUMP * float(np.max(size, initial=0.0, where=np.isfinite(size)))
+        threshold = SMALLEST_JUMP * float(np.max(size, initial=0.0, where=np.isfinite(size)))
         a, b = edges[:-1], edges[1:]
-        kept = missing(a, b) > least
-        a, b = a[kept], b[kept]
+        has_defect = defect(a, b) > threshold
+        a, b = a[has_defect], b[has_defect]
         for _ in range(JUMP_HALVINGS):
             middle = 0.5 * (a + b)
-            left, right = missing(a, middle), missing(middle, b)
+            left, right = defect(a, middle), defect(middle, b)
             is_left = left >= right
             a, b = np.where(is_left, a, middle), np.where(is_left, middle, b)
-            kept = np.maximum(left, right) > least
-            a, b = a[kept], b[kept]
+            has_defect = np.maximum(left, right) > threshold
+            a, b = a[has_defect], b[has_defect]
     return float(b[0]) if len(b) else None
 
 
 def _with_pulses(formula: Expression, numbers: Mapping[str, float], edges: Floats) -> Floats:
-    """Return the ends of pieces with times in and around the pulses between them."""
+    """Return the ends of intervals, with further ones inside and next to pulses."""
     columns = {name: np.full((1, 1), float(value)) for name, value in numbers.items()}
     for _ in range(MOST_PULSES):
-        found = hidden_pulses(formula, columns, edges[None])
-        if np.isnan(found.time[0]):
+        pulses = hidden_pulses(formula, columns, edges[None])
+        if np.isnan(pulses.time[0]):
             break
-        around = found.time[0] + found.width[0] * np.array([-1.0, 0.0, 1.0])
+        around = pulses.time[0] + pulses.width[0] * np.array([-1.0, 0.0, 1.0])
         edges = np.unique(np.append(edges, np.clip(around, edges[0], edges[-1])))
     return edges
 
 
 @dataclass(frozen=True)
 class Switch:
-    """A quantity at whose changes of mode a formula has a corner or a jump."""
+    """A quantity whose changes of mode are corners or jumps of a formula."""
 
     quantity: Expression
-    """In the names of the formula and the modes of switches before this one."""
+    """A formula in the names of the original formula and the modes of earlier switches."""
     whole: bool
-    """Whether the mode changes at every whole number, not only at 0."""
+    """Whether the mode changes at every integer, not only at 0."""
     mode: str
-    """Name of its mode; no user can write it."""
+    """Name of its mode, which is not valid in formulas of users."""
 
 
 def held(
     formulas: Iterable[Expression], moving: Collection[str]
 ) -> tuple[tuple[Expression, ...], tuple[Switch, ...]]:
-    """Return formulas with the modes of their switches in place of corners and jumps, and the switches.
+    """Return formulas in which modes replace corners and jumps, and the switches of these modes.
 
     Parameters
     ----------
     moving
-        Names whose values change along a motion; what is made of others alone has no switch.
+        Names whose values change during a motion. Quantities in other names have no switch.
     """
-    found: dict[tuple[Expression, bool], Switch] = {}
+    switches: dict[tuple[Expression, bool], Switch] = {}
 
     def mode(quantity: Expression, whole: bool = False) -> Name:
         key = quantity, whole
-        if key not in found:
-            found[key] = Switch(quantity, whole, f"_mode_{len(found)}")
-        return Name(found[key].mode)
+        if key not in switches:
+            switches[key] = Switch(quantity, whole, f"_mode_{len(switches)}")
+        return Name(switches[key].mode)
 
     def sides(left: Expression, right: Expression) -> tuple[Expression, Expression]:
-        """Return what is 1 where `left` is larger than `right`, else 0, and the other way round."""
+        """Return the indicators of ``left > right`` and of ``left < right``."""
         if is_zero(left) and not is_zero(right):
             smaller, larger = sides(right, left)
             return larger, smaller
@@ -252,10 +255,10 @@ def held(
         return filled("side + 1", side=side), Negate(side)
 
     def change(node: Expression) -> Expression:
-        """Return a node, whose operands are held already, without its corner or jump."""
+        """Return a node without its corner or jump; its operands are already converted."""
         match node:
             case Compare("==" | "!=" as symbol, left, right) if moves("-", left, right):
-                # true, or false, at single moments only
+                # its value differs at isolated times only
                 return Number(float(symbol == "!="))
             case Compare(symbol, left, right) if moves("-", left, right):
                 larger, smaller = sides(left, right)
@@ -265,20 +268,20 @@ def held(
                 return Call("where", (larger, x, y) if function == "max" else (smaller, x, y))
             case Call("mod", (x, y)) if moves("/", x, y):
                 return filled("x - mode*y", x=x, y=y, mode=mode(Binary("/", x, y), whole=True))
-            case Call(function, (x,)) if function in _HELD and varies(x, moving):
+            case Call(function, (x,)) if function in _WITH_MODE and varies(x, moving):
                 is_rounded = function in ("floor", "ceil", "round")
                 quantity = filled("x + 0.5", x=x) if function == "round" else x
-                return filled(_HELD[function], x=x, mode=mode(quantity, is_rounded))
+                return filled(_WITH_MODE[function], x=x, mode=mode(quantity, is_rounded))
         return node
 
     def moves(symbol: str, left: Expression, right: Expression) -> bool:
         return varies(Binary(symbol, left, right), moving)
 
-    made = tuple(map(rebuilding(change), formulas))
-    return made, tuple(found.values())
+    converted = tuple(map(rebuilding(change), formulas))
+    return converted, tuple(switches.values())
 
 
-_HELD = {
+_WITH_MODE = {
     "abs": "(2*mode + 1)*x",
     "sign": "2*mode + 1",
     "heaviside": "mode + 1",
@@ -286,13 +289,13 @@ _HELD = {
     "ceil": "mode + 1",
     "round": "mode",
 }
-"""Functions of one argument x, with the mode of what they look at."""
+"""Functions of one argument x, given the mode of their quantity."""
 
 
 def varies(node: Expression, moving: Collection[str]) -> bool:
-    """Tell whether the value changes along a motion otherwise than by jumps."""
+    """Tell whether the value changes continuously during a motion, not only by jumps."""
 
-    def does(part: Expression, *operands: bool) -> bool:
+    def changes(part: Expression, *operands: bool) -> bool:
         match part:
             case Name(name):
                 return name in moving
@@ -304,4 +307,4 @@ def varies(node: Expression, moving: Collection[str]) -> bool:
                 return any(operands[1:])
         return any(operands)
 
-    return folded([node], does)[0]
+    return folded([node], changes)[0]

@@ -1,4 +1,4 @@
-"""Read a formula: Python's `ast` for the grammar, an allow-list for the content."""
+"""Parse a formula: the grammar is Python's (`ast`), the content is restricted by an allow-list."""
 
 from __future__ import annotations
 
@@ -28,9 +28,9 @@ from vibsim.formula.tree import (
 
 MAX_CHARACTERS = 2000
 MOST_SHOWN = 60
-"""Characters of a formula in a message."""
+"""Largest number of characters of a formula in a message."""
 MAX_POWER = 1024
-"""Largest whole exponent: it is written out as multiplications."""
+"""Largest exponent: integer powers are expanded into multiplications."""
 
 _BINARY = {ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/", ast.Pow: "**"}
 _COMPARE = {ast.Lt: "<", ast.LtE: "<=", ast.Gt: ">", ast.GtE: ">=", ast.Eq: "==", ast.NotEq: "!="}
@@ -38,10 +38,10 @@ _FOREIGN = re.compile(r"[^A-Za-z0-9_.+\-*/()<>=!, ]")
 _NUMBER = re.compile(r"(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?")
 MAX_DEPTH = 100
 TERMS = 16
-"""Terms of a long sum that are added one after the other."""
+"""Number of terms of a long sum that are added sequentially; these partial sums are added pairwise."""
 TOO_DEEP = f"must not nest deeper than {MAX_DEPTH} operations"
 _JOINED = re.compile(r"(?<![A-Za-z0-9_.])(\d+\.?\d*|\.\d+)(?=[A-Za-z_])(?![eE][+-]?\d)")
-"""A number that runs into a name: a forgotten ``*``."""
+"""Matches a number directly followed by a name: a missing ``*``."""
 _EQUALS = re.compile(r"(?<![<>=!])=(?!=)")
 _UNFINISHED = re.compile(r"([+\-*/<>=!,(]|\b(and|or|not|if|else))$")
 INSTEAD = {
@@ -51,7 +51,7 @@ INSTEAD = {
     **{"'": "the name of the velocity, such as v", "\u2019": "the name of the velocity, such as v"},
     **{"\u00f7": "/", "\u00b2": "**2", "\u00b3": "**3"},
 }
-"""What to write for a character that is not allowed."""
+"""Replacements for characters that are not allowed."""
 REFUSED: dict[type[ast.AST], str] = {
     ast.Attribute: "attribute access is not allowed",
     ast.Tuple: "a list of values is not allowed",
@@ -60,18 +60,18 @@ REFUSED: dict[type[ast.AST], str] = {
     ast.NamedExpr: "':=' is not allowed",
     ast.FloorDiv: "'//' is not allowed; use floor(a/b)",
 }
-"""What is refused by its name."""
+"""Messages for Python syntax that is refused."""
 OTHER_NAMES = {
     **{f"arc{name}": f"a{name}" for name in ("cos", "cosh", "sin", "sinh", "tan", "tan2", "tanh")},
     **{"Abs": "abs", "fabs": "abs", "ln": "log", "fmod": "mod", "rint": "round", "pow": "a**b"},
     **{"step": "heaviside", "Heaviside": "heaviside"},
     **{"maximum": "max", "minimum": "min", "power": "a**b", "sgn": "sign"},
 }
-"""What functions are called elsewhere."""
+"""Names of functions in other programs, and their names here."""
 
 
 class ExpressionError(VibsimError):
-    """A formula that is refused: where in its text (from 0), what is wrong or was expected there, and a hint."""
+    """An invalid formula: position in its text (from 0), the rule that it breaks, and a hint."""
 
     def __init__(self, text: str, position: int, rule: str, hint: str = "") -> None:
         self.text, self.position, self.rule, self.hint = text, position, rule, hint
@@ -83,19 +83,19 @@ class ExpressionError(VibsimError):
 
 
 def parse(text: str, names: Collection[str]) -> Expression:
-    """Read a formula.
+    """Parse a formula.
 
     Parameters
     ----------
     text
         The formula, at most `MAX_CHARACTERS` long.
     names
-        What it may name besides `CONSTANTS` and `FUNCTIONS`: states, time, parameters.
+        Valid names besides `CONSTANTS` and `FUNCTIONS`: states, time, parameters.
 
     Raises
     ------
     ExpressionError
-        Where the text is no formula, or holds anything outside the allow-list.
+        If the text is not a formula, or contains anything outside the allow-list.
     """
     if len(text) > MAX_CHARACTERS:
         rule = f"must have at most {MAX_CHARACTERS} characters, has {len(text)}"
@@ -114,7 +114,7 @@ def parse(text: str, names: Collection[str]) -> Expression:
 
 @dataclass(frozen=True)
 class _Reader:
-    """One formula on its way from Python's tree to ours; remembers the text for messages."""
+    """Converts Python's syntax tree of a formula to an `Expression`; holds the text for messages."""
 
     text: str
     body: str
@@ -158,8 +158,8 @@ class _Reader:
                     return paired(parts, partial(Binary, "*"))
                 return paired(parts, lambda left, right: Call("max", (left, right)))
             case ast.IfExp():
-                ways = (node.test, node.body, node.orelse)
-                return Call("where", tuple(self.convert(part, depth + 1) for part in ways))
+                arguments = (node.test, node.body, node.orelse)
+                return Call("where", tuple(self.convert(part, depth + 1) for part in arguments))
             case ast.BinOp() if depth + _terms(node) > MAX_DEPTH:
                 return self.long_sum(node, depth)
             case ast.BinOp() if type(node.op) in _BINARY:
@@ -202,7 +202,7 @@ class _Reader:
         return Binary(_BINARY[type(node.op)], left, right)
 
     def long_sum(self, node: ast.expr, depth: int) -> Expression:
-        """Read a sum that would be nested too deeply: as sums of some terms, which are added in pairs."""
+        """Convert a sum that would nest too deeply: partial sums of `TERMS` terms are added pairwise."""
         terms: list[tuple[ast.expr, bool]] = []
         while isinstance(node, ast.BinOp) and isinstance(node.op, ast.Add | ast.Sub):
             terms.append((node.right, isinstance(node.op, ast.Sub)))
@@ -212,31 +212,31 @@ class _Reader:
         below = depth + TERMS + (len(terms) // TERMS).bit_length()
         sums = []
         for first in range(0, len(terms), TERMS):
-            (head, is_taken), *rest = terms[first : first + TERMS]
+            (head, is_negative), *rest = terms[first : first + TERMS]
             total = self.convert(head, below)
-            total = Negate(total) if is_taken else total
-            for term, is_taken in rest:
-                total = Binary("-" if is_taken else "+", total, self.convert(term, below))
+            total = Negate(total) if is_negative else total
+            for term, is_negative in rest:
+                total = Binary("-" if is_negative else "+", total, self.convert(term, below))
             sums.append(total)
         return paired(sums, partial(Binary, "+"))
 
     def compare(self, node: ast.Compare, depth: int) -> Expression:
-        """Read a comparison; a chained one is the product of its links."""
+        """Convert a comparison; a chain is the product of its comparisons."""
         if any(type(operator) not in _COMPARE for operator in node.ops):
             raise self.fault(node, "'in' and 'is' are not allowed", "compare with < <= > >= == !=")
-        # a tree as deep as the product of the links
+        # depth of the product
         below = depth + 1 + (len(node.ops) - 1).bit_length()
         sides = [self.convert(side, below) for side in (node.left, *node.comparators)]
-        for side, written in zip(sides[1:-1], node.comparators, strict=False):
-            # it stands in two links: chains within chains would double and double
+        for side, source in zip(sides[1:-1], node.comparators, strict=False):
+            # an inner side occurs twice, so nested chains would grow exponentially
             if any(isinstance(part, Compare) for part in walk(side)):
                 hint = "join two comparisons with and"
-                raise self.fault(written, "a comparison within a chain of comparisons", hint)
+                raise self.fault(source, "a comparison within a chain of comparisons", hint)
         signs = [_COMPARE[type(operator)] for operator in node.ops]
         return paired(list(map(Compare, signs, sides[:-1], sides[1:])), partial(Binary, "*"))
 
     def condition(self, node: ast.expr, depth: int) -> Expression:
-        """Read what is 1 or 0."""
+        """Convert an expression that must be a condition, with value 1 or 0."""
         match node:
             case ast.Compare() | ast.BoolOp() | ast.UnaryOp(op=ast.Not()):
                 return self.convert(node, depth)
@@ -262,7 +262,7 @@ class _Reader:
 
 
 def _terms(node: ast.expr) -> int:
-    """Return how many terms a sum has; 0 of anything else."""
+    """Return the number of terms of a sum; 0 for anything else."""
     count = 0
     while isinstance(node, ast.BinOp) and isinstance(node.op, ast.Add | ast.Sub):
         node, count = node.left, count + 1
@@ -270,21 +270,21 @@ def _terms(node: ast.expr) -> int:
 
 
 def shorten(text: str) -> str:
-    """Return a text, cut to `MOST_SHOWN` characters."""
+    """Return a text cut to `MOST_SHOWN` characters."""
     return text if len(text) <= MOST_SHOWN else text[: MOST_SHOWN - 3] + "..."
 
 
 def place_of_fault(body: str, error: SyntaxError) -> tuple[int, str, str]:
-    """Return where a text is no formula, what was expected there, and a hint: Python's messages speak of programs."""
+    """Return position, rule and hint of a syntax error, since Python's own messages are about programs."""
     if joined := _JOINED.search(body):
         hint = f"write {joined.group()}*{body[joined.end()]}..."
         return joined.end(), "expected an operator", hint
-    lonely = unpaired(body)
-    if lonely is not None:
-        return lonely, "has a parenthesis without its partner", ""
+    unmatched = unpaired(body)
+    if unmatched is not None:
+        return unmatched, "has an unmatched parenthesis", ""
     if "too many nested" in str(error.msg):
         return 0, TOO_DEEP, ""
-    # a text that is cut short is reported at its beginning, or past its end
+    # Python reports an unfinished text at its start, or past its end
     if _UNFINISHED.search(body):
         return len(body), "ends where a number, a name or '(' was expected", ""
     if equals := _EQUALS.search(body):
@@ -294,7 +294,7 @@ def place_of_fault(body: str, error: SyntaxError) -> tuple[int, str, str]:
 
 
 def unpaired(text: str) -> int | None:
-    """Return where a parenthesis without its partner stands, None where there is none."""
+    """Return the position of an unmatched parenthesis, None if there is none."""
     opened: list[int] = []
     for position, character in enumerate(text):
         if character == "(":

@@ -1,7 +1,7 @@
-"""What becomes of a formula: a number, or source text for the engine.
+"""Evaluate a formula, or write it as text or as source for the engine.
 
-Both take the operations in the formula's own order, whole powers by multiplication, so that a constant has the same
-bits whether it was worked out here or in the engine.
+Evaluation and source use the order of operations of the formula, and multiplications for integer powers. So a constant
+has the same bits here and in the engine.
 """
 
 from __future__ import annotations
@@ -30,16 +30,16 @@ from vibsim.formula.tree import (
 )
 
 MAX_NESTING = 120
-"""Parentheses in each other from which `to_statements` gives a part a name: Python reads 200, derivatives have more."""
+"""Nesting of parentheses above which `to_statements` splits an expression; Python's limit is 200."""
 
 
 def constant(text: str) -> float:
-    """Work out a formula without names, e.g. ``2*pi/30``.
+    """Return the value of a formula without names, e.g. ``2*pi/30``.
 
     Raises
     ------
     ExpressionError
-        Where the text is no formula, names something, or has no finite value.
+        If the text is not a formula, contains names, or has no finite value.
     """
     value = evaluate(parse(text, ()), {}, text)
     if not math.isfinite(value):
@@ -48,12 +48,12 @@ def constant(text: str) -> float:
 
 
 def evaluate(expression: Expression, values: Mapping[str, float], text: str = "") -> float:
-    """Return the value of `expression` at the given `values` of its names.
+    """Return the value of `expression` for the given `values` of its names.
 
     Raises
     ------
     ExpressionError
-        Where the value does not exist: division by zero, overflow, root of a negative number.
+        If the value does not exist: division by zero, overflow, root of a negative number.
     """
     try:
         return float(_value(expression, values))
@@ -79,19 +79,19 @@ def _value(node: Expression, values: Mapping[str, float]) -> float:
         case Binary(symbol, left, right) | Compare(symbol, left, right):
             return float(OPERATORS[symbol](_value(left, values), _value(right, values)))
         case Call("where", (condition, yes, no)):
-            # the other one need not exist
+            # the other branch need not have a value
             chosen = _value(condition, values)
             if math.isnan(chosen):
                 raise ValueError
             return _value(yes if chosen != 0.0 else no, values)
         case Call(function, arguments):
-            found = [_value(argument, values) for argument in arguments]
-            return _existing(FUNCTIONS[function][1](*found))
+            numbers = [_value(argument, values) for argument in arguments]
+            return _finite(FUNCTIONS[function][1](*numbers))
     raise AssertionError(node)
 
 
-def _existing(value: float) -> float:
-    """Return what a function gave; raise where it does not exist, as the operators of Python do."""
+def _finite(value: float) -> float:
+    """Return the result of a function; raise an error if it is not finite, as operators of Python do."""
     if math.isnan(value):
         raise ValueError
     if math.isinf(value):
@@ -99,25 +99,25 @@ def _existing(value: float) -> float:
     return value
 
 
-def _power(base: float, exponent: float, written: float | None) -> float:
-    """Return a power: by multiplication where a whole exponent is written as a number, as in the engine."""
-    if written is None or not exponent.is_integer():
-        return _existing(ELEMENTARY["power"].full(base, exponent))
+def _power(base: float, exponent: float, constant: float | None) -> float:
+    """Return a power, by multiplication if the exponent is an integer constant, as in the engine."""
+    if constant is None or not exponent.is_integer():
+        return _finite(ELEMENTARY["power"].full(base, exponent))
     return float(whole_power(base, int(exponent)))
 
 
 def to_formula(expression: Expression) -> str:
-    """Write `expression` as a formula, with no more parentheses than needed: `parse` gives the same tree again."""
-    return _written(expression)[0]
+    """Return the text of a formula with minimal parentheses; `parse` returns the same expression for it."""
+    return _text_of(expression)[0]
 
 
-_BINDING = {"+": 2, "-": 2, "*": 3, "/": 3}
+_PRECEDENCE = {"+": 2, "-": 2, "*": 3, "/": 3}
 _COMPARED, _NEGATED, _POWER, _ATOM = 1, 4, 5, 6
-"""How tightly a comparison, a sign, a power and anything that cannot be taken apart bind."""
+"""Precedence of a comparison, a sign, a power, and an atom or call."""
 
 
-def _written(node: Expression) -> tuple[str, int]:
-    """Return the text of a formula and how tightly its last operation binds."""
+def _text_of(node: Expression) -> tuple[str, int]:
+    """Return the text of a formula and the precedence of its outermost operation."""
     match node:
         case Number(value):
             return f"{value:.0f}" if value < 1e15 and value.is_integer() else repr(value), _ATOM
@@ -126,13 +126,13 @@ def _written(node: Expression) -> tuple[str, int]:
         case Negate(operand):
             return f"-{_within(operand, _NEGATED)}", _NEGATED
         case Binary("**", base, exponent):
-            # a power takes a sign behind it, and is itself taken from right to left
+            # powers are right-associative, and an exponent may have a sign
             return f"{_within(base, _ATOM)}**{_within(exponent, _NEGATED)}", _POWER
         case Binary(symbol, left, right):
-            own = _BINDING[symbol]
-            gap = " " if own == _BINDING["+"] else ""
-            text = f"{_within(left, own)}{gap}{symbol}{gap}{_within(right, own + 1)}"
-            return text, own
+            binding = _PRECEDENCE[symbol]
+            gap = " " if binding == _PRECEDENCE["+"] else ""
+            text = f"{_within(left, binding)}{gap}{symbol}{gap}{_within(right, binding + 1)}"
+            return text, binding
         case Compare(symbol, left, right):
             least = _COMPARED + 1
             return f"{_within(left, least)} {symbol} {_within(right, least)}", _COMPARED
@@ -142,18 +142,18 @@ def _written(node: Expression) -> tuple[str, int]:
 
 
 def _within(node: Expression, least: int) -> str:
-    text, binding = _written(node)
+    text, binding = _text_of(node)
     return text if binding >= least else f"({text})"
 
 
 def to_statements(formulas: Mapping[str, Expression]) -> list[str]:
-    """Write formulas as assignments of Python for the engine, each of the last ones to the name of a result.
+    """Return formulas as Python assignments for the engine; the last ones assign to the keys of `formulas`.
 
-    What several of their parts use is worked out once: ``sin(x)*sin(x)`` becomes ``_1 = sin(x)`` and
-    ``result = (_1 * _1)``. Every operation has its parentheses, so that their order is the formula's. There are
-    numbers, names, ``+ - * /``, comparisons, and calls of `FUNCTIONS`, and of ``power(base, exponent)`` where an
-    exponent is not a whole number. A whole power is squared and multiplied from the exponent's leading bit on. No name
-    of a formula begins with ``_``.
+    Common subexpressions are evaluated once: ``sin(x)*sin(x)`` becomes ``_1 = sin(x)`` and ``result = (_1 * _1)``.
+    Every operation has parentheses, which fixes the order. The source contains numbers, names, ``+ - * /``,
+    comparisons, calls of `FUNCTIONS`, and ``power(base, exponent)`` for exponents that are not integer constants.
+    Integer powers are expanded by repeated squaring from the leading bit of the exponent. No name of a formula
+    starts with ``_``.
     """
     lines: list[str] = []
     parts = parts_of(*formulas.values())
@@ -171,34 +171,34 @@ def to_statements(formulas: Mapping[str, Expression]) -> list[str]:
             return f"power({base}, {exponent})"
         if whole == 0.0:
             return "1.0"
-        factor = found = named(base)
+        factor = product = named(base)
         for bit in bin(abs(int(whole)))[3:]:
-            half = named(found)
-            found = f"({half} * {half})"
+            half = named(product)
+            product = f"({half} * {half})"
             if bit == "1":
-                found = f"({found} * {factor})"
-        return found if whole > 0.0 else f"(1.0 / {found})"
+                product = f"({product} * {factor})"
+        return product if whole > 0.0 else f"(1.0 / {product})"
 
     def source(node: Expression, *operands: str) -> str:
         match node:
             case Number(value):
-                found = repr(value)
+                text = repr(value)
             case Name(name):
-                found = name
+                text = name
             case Negate():
-                found = f"(-{operands[0]})"
+                text = f"(-{operands[0]})"
             case Binary("**", _, exponent):
-                found = power(operands[0], operands[1], literal(exponent))
+                text = power(operands[0], operands[1], literal(exponent))
             case Binary(symbol) | Compare(symbol):
-                found = f"({operands[0]} {symbol} {operands[1]})"
+                text = f"({operands[0]} {symbol} {operands[1]})"
             case Call(function):
-                found = f"{function}({', '.join(operands)})"
+                text = f"{function}({', '.join(operands)})"
         is_shared = uses[node] > 1 and literal(node) is None
-        is_deep = found.count("(") > MAX_NESTING and _nesting(found) > MAX_NESTING
-        return named(found) if is_shared or is_deep else found
+        is_deep = text.count("(") > MAX_NESTING and _nesting(text) > MAX_NESTING
+        return named(text) if is_shared or is_deep else text
 
-    found = folded(list(formulas.values()), source)
-    return lines + [f"{result} = {last}" for result, last in zip(formulas, found, strict=True)]
+    sources = folded(list(formulas.values()), source)
+    return lines + [f"{result} = {last}" for result, last in zip(formulas, sources, strict=True)]
 
 
 def _nesting(source: str) -> int:

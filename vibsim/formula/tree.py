@@ -1,7 +1,7 @@
-"""The graph of a formula: six kinds of node, all frozen, of which the operators ``+ - * /`` make further formulas.
+"""The expression graph of a formula: six kinds of immutable nodes, combined by the operators ``+ - * /``.
 
-Formulas that read alike are one object. So two are equal where they are the same, and what formulas have in common is
-looked at once: written out, equations that are solved for the accelerations would be longer than any memory.
+Nodes are interned: equal formulas are the same object, so equality is identity and common subexpressions are processed
+once. Without that, equations solved for the accelerations would not fit into memory.
 """
 
 from __future__ import annotations
@@ -19,36 +19,36 @@ from vibsim.elementary import ELEMENTARY
 T = TypeVar("T")
 
 
-class _Alike(type):
-    """What makes nodes: one that reads as another does is that one."""
+class _Interned(type):
+    """Metaclass that returns the existing node with the same fields, if there is one."""
 
     def __call__(cls, *fields: Any) -> Any:
         key = (cls, *fields)
-        found = _nodes.get(key)
-        return _nodes.setdefault(key, super().__call__(*fields)) if found is None else found
+        node = _nodes.get(key)
+        return _nodes.setdefault(key, super().__call__(*fields)) if node is None else node
 
 
 _nodes: WeakValueDictionary[tuple[Any, ...], Expression] = WeakValueDictionary()
 
 
-class Expression(metaclass=_Alike):
-    """A formula. A sum, product or quotient of two has no terms 0 and no factors 1; a product with 0 is 0."""
+class Expression(metaclass=_Interned):
+    """A formula. Its operators drop terms 0 and factors 1, and a product with 0 is 0."""
 
     __match_args__: tuple[str, ...]
     operands: tuple[Expression, ...]
-    """In the order of the formula."""
+    """The operands, in the order of the formula."""
     names: KeysView[str]
-    """Names in it, in the order of their first use."""
+    """The names in the formula, in the order of first use."""
     slopes: dict[str, Expression]
-    """Derivatives that are known already, by name (`vibsim.formula.derivatives`)."""
+    """Cached derivatives, by name (`vibsim.formula.derivatives`)."""
 
     def __post_init__(self) -> None:
         fields = (x if isinstance(x, tuple) else (x,) for x in vars(self).values())
         operands = tuple(x for field in fields for x in field if isinstance(x, Expression))
-        own = {self.name: None} if isinstance(self, Name) else {}
-        names, *others = [part.names for part in operands] or [own.keys()]
-        if not all(more <= names for more in others):
-            names = dict.fromkeys(name for part in operands for name in part.names).keys()
+        own_name = {self.name: None} if isinstance(self, Name) else {}
+        names, *others = [operand.names for operand in operands] or [own_name.keys()]
+        if not all(other <= names for other in others):
+            names = dict.fromkeys(name for operand in operands for name in operand.names).keys()
         vars(self).update(operands=operands, names=names, slopes={})
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -80,7 +80,7 @@ class Expression(metaclass=_Alike):
 
 @dataclass(frozen=True, eq=False)
 class Number(Expression):
-    """A finite number that is not negative."""
+    """A finite, non-negative number."""
 
     value: float
 
@@ -101,7 +101,7 @@ class Negate(Expression):
 
 @dataclass(frozen=True, eq=False)
 class Binary(Expression):
-    """``left operator right`` with an operator out of ``+ - * / **``."""
+    """``left operator right`` with one of the operators ``+ - * / **``."""
 
     operator: str
     left: Expression
@@ -110,7 +110,7 @@ class Binary(Expression):
 
 @dataclass(frozen=True, eq=False)
 class Compare(Expression):
-    """``left operator right`` with an operator out of ``< <= > >= == !=``; its value is 1 or 0."""
+    """``left operator right`` with one of the operators ``< <= > >= == !=``; its value is 1 or 0."""
 
     operator: str
     left: Expression
@@ -128,7 +128,7 @@ class Call(Expression):
 ZERO: Expression = Number(0.0)
 ONE: Expression = Number(1.0)
 CONSTANTS: Mapping[str, float] = {"pi": math.pi, "e": math.e}
-"""Names that stand for a number wherever a formula does not declare them otherwise."""
+"""Names of numbers, unless a formula declares them otherwise."""
 
 _ARGUMENTS = {"atan2": 2, "hypot": 2, "max": 2, "min": 2, "mod": 2, "where": 3}
 FUNCTIONS: Mapping[str, tuple[int, Callable[..., float]]] = {
@@ -142,18 +142,18 @@ OPERATORS: Mapping[str, Callable[[Any, Any], Any]] = {
     **{"<": operator.lt, "<=": operator.le, ">": operator.gt, ">=": operator.ge},
     **{"==": operator.eq, "!=": operator.ne},
 }
-"""What operators do with floats and with arrays; a power is another one for each."""
+"""Operators for floats and arrays. Powers are missing because they differ between the two."""
 STEPS = frozenset({"ceil", "floor", "heaviside", "round", "sign"})
-"""Functions that are constant but for jumps."""
+"""Piecewise constant functions."""
 
 
 def number(value: float) -> Expression:
-    """Return a number of either sign."""
+    """Return the formula of a number of either sign."""
     return Negate(Number(-value)) if value < 0.0 else Number(value)
 
 
 def literal(node: Expression) -> float | None:
-    """Return the value of a number with signs before it, None for anything else."""
+    """Return the value of a number with any number of minus signs; None for other formulas."""
     match node:
         case Number(value):
             return value
@@ -163,68 +163,69 @@ def literal(node: Expression) -> float | None:
     return None
 
 
-def _nothing(_: Expression) -> bool:
+def _never(_: Expression) -> bool:
     return False
 
 
-def parts_of(
-    *formulas: Expression, but: Callable[[Expression], bool] = _nothing
-) -> list[Expression]:
-    """Return the distinct parts of formulas, operands before what uses them, from left to right.
+def parts_of(*formulas: Expression, but: Callable[[Expression], bool] = _never) -> list[Expression]:
+    """Return the distinct subexpressions of formulas in topological order: operands first, from left to right.
 
     Parameters
     ----------
     but
-        Tells of parts that are left out, with all that they alone use.
+        Predicate for subexpressions to leave out, with all that only they use.
     """
-    found: dict[Expression, None] = {}
-    waiting = [*reversed(formulas)]
-    while waiting:
-        node = waiting[-1]
-        missing = [part for part in node.operands if part not in found and not but(part)]
+    ordered: dict[Expression, None] = {}
+    stack = [*reversed(formulas)]
+    while stack:
+        node = stack[-1]
+        missing = [
+            operand for operand in node.operands if operand not in ordered and not but(operand)
+        ]
         if missing and not but(node):
-            waiting += reversed(missing)
+            stack += reversed(missing)
             continue
-        waiting.pop()
+        stack.pop()
         if not but(node):
-            found[node] = None
-    return list(found)
+            ordered[node] = None
+    return list(ordered)
 
 
 def folded(formulas: Sequence[Expression], work_out: Callable[..., T]) -> list[T]:
-    """Return what is worked out of each formula: of a part, and of what was worked out of its operands.
+    """Return the result of a bottom-up evaluation of each formula.
 
-    It is done once for each distinct part, and what no other part needs any more is forgotten.
+    `work_out` maps a node and the results of its operands to the result of the node. It is called once per distinct
+    subexpression, and results are dropped after their last use.
     """
-    found: dict[Expression, T] = {}
-    for part, done in _in_order(tuple(formulas)):
-        found[part] = work_out(part, *[found[operand] for operand in part.operands])
-        for operand in done:
-            del found[operand]
-    return [found[formula] for formula in formulas]
+    results: dict[Expression, T] = {}
+    for node, last_uses in _in_order(tuple(formulas)):
+        results[node] = work_out(node, *[results[operand] for operand in node.operands])
+        for operand in last_uses:
+            del results[operand]
+    return [results[formula] for formula in formulas]
 
 
 @lru_cache(maxsize=64)
 def _in_order(formulas: tuple[Expression, ...]) -> list[tuple[Expression, list[Expression]]]:
-    """Return the parts of formulas, each with those that no part behind it uses."""
-    parts, later = parts_of(*formulas), set(formulas)
-    found = []
-    for part in reversed(parts):
-        done = [operand for operand in dict.fromkeys(part.operands) if operand not in later]
-        later.update(done)
-        found.append((part, done))
-    return found[::-1]
+    """Return the subexpressions of formulas in topological order, each with the operands that it is the last to use."""
+    nodes, later = parts_of(*formulas), set(formulas)
+    ordered = []
+    for node in reversed(nodes):
+        last_uses = [operand for operand in dict.fromkeys(node.operands) if operand not in later]
+        later.update(last_uses)
+        ordered.append((node, last_uses))
+    return ordered[::-1]
 
 
 def rebuilding(change: Callable[[Expression], Expression]) -> Callable[[Expression], Expression]:
-    """Return what applies `change` to every part of formulas, to operands before what uses them."""
-    made: dict[Expression, Expression] = {}
+    """Return a function that applies `change` to every subexpression of a formula, operands first."""
+    results: dict[Expression, Expression] = {}
 
     def rebuilt(node: Expression) -> Expression:
-        for part in parts_of(node, but=made.__contains__):
-            operands = tuple(made[operand] for operand in part.operands)
-            made[part] = change(_with_operands(part, operands))
-        return made[node]
+        for inner in parts_of(node, but=results.__contains__):
+            operands = tuple(results[operand] for operand in inner.operands)
+            results[inner] = change(_with_operands(inner, operands))
+        return results[node]
 
     return rebuilt
 
@@ -241,31 +242,31 @@ def _with_operands(node: Expression, operands: tuple[Expression, ...]) -> Expres
 
 
 def replacing(formulas: Mapping[str, Expression]) -> Callable[[Expression], Expression]:
-    """Return what puts formulas in the places of names."""
+    """Return a function that substitutes formulas for names."""
     return rebuilding(
         lambda part: formulas.get(part.name, part) if isinstance(part, Name) else part
     )
 
 
 def put(node: Expression, name: str, what: Expression) -> Expression:
-    """Return a formula with another one in the place of a name."""
+    """Return a formula with `what` substituted for a name."""
     return replacing({name: what})(node)
 
 
 def walk(node: Expression) -> Iterator[Expression]:
-    """Yield each distinct part of a formula, `node` first, in the order of the formula."""
+    """Yield each distinct subexpression of a formula in pre-order, `node` first."""
     seen: set[Expression] = set()
-    waiting = [node]
-    while waiting:
-        part = waiting.pop()
-        if part not in seen:
-            seen.add(part)
-            yield part
-            waiting += reversed(part.operands)
+    stack = [node]
+    while stack:
+        inner = stack.pop()
+        if inner not in seen:
+            seen.add(inner)
+            yield inner
+            stack += reversed(inner.operands)
 
 
 def paired(terms: Sequence[Expression], join: Callable[..., Expression]) -> Expression:
-    """Return terms joined in pairs, so that the tree stays flat."""
+    """Return terms joined pairwise, so that the depth grows only logarithmically."""
     while len(terms) > 1:
         pairs = [join(*pair) for pair in zip(terms[::2], terms[1::2], strict=False)]
         terms = [*pairs, *terms[len(terms) - len(terms) % 2 :]]

@@ -286,7 +286,7 @@ def test_what_cannot_be_taken_is_refused(keys: dict[str, Any], told: str) -> Non
 
 
 def test_without_a_sweep_there_is_nothing_to_take() -> None:
-    with pytest.raises(InputError, match="is no swept key with numbers: there is no sweep"):
+    with pytest.raises(InputError, match="is not a swept key with numbers: there is no sweep"):
         resonance(CURVE | {"take": "mean", "below": 1}, sweep=None)
 
 

@@ -138,7 +138,7 @@ class Scope:
             self.at("step").refuse("must not be given together with t", at_key=True)
         self.check_scheme_and_case(at)
         if at.scheme in setting.adaptive and (row.fixed_step or at.level == "best"):
-            rule = f"{row.name} does not exist of a scheme that chooses its own steps"
+            rule = f"{row.name} does not exist for a scheme that chooses its own steps"
             self.at("scheme").refuse(rule, value=at.scheme)
         level = self._level(at, row)
         if setting.by_tolerance and at.step is not None and "step" in row.at:
@@ -157,7 +157,7 @@ class Scope:
         if time is None:
             return
         if time.frequency is None or time.periods is None:
-            rule = "is of the last period of a force, and time names no frequency"
+            rule = "refers to the last period of a force, but time names no frequency"
             hint = "give time as periods, steps_per_period and frequency, e.g. model.omega"
             # `at` may be absent, so the fault is reported at `value`
             parent = self.path[:2] if self.path[0] == "published" else self.path[:-1]
@@ -180,7 +180,7 @@ class Scope:
             return levels[-1] if levels else None
         if at.level == "best":
             if not row.best and (levels or by_tolerance):
-                place.refuse(f"{row.name} does not exist of the extrapolated solution")
+                place.refuse(f"{row.name} does not exist for the extrapolated solution")
             # the extrapolated solution has the times of the coarsest level
             return levels[0] if levels else None
         if not place.check_level(at.level, "level: best can") or not levels:

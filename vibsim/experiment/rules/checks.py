@@ -69,8 +69,8 @@ def _check_table(table: Any, scope: Scope) -> None:
             # a value that needs a quantity has that of the table
             choices = _allowed(other, scope.setting)
             if choices and table.quantity not in choices:
-                rule = f"{name} is not known of the quantity of this table"
-                place.refuse(rule, "it is of " + ", ".join(choices), name)
+                rule = f"{name} is not defined for the quantity of this table"
+                place.refuse(rule, "it is defined for " + ", ".join(choices), name)
             _check_support(other, table.quantity, place)
     for printed, place in rows:
         if row is not None:
@@ -269,7 +269,7 @@ def _check_reduction(check: ValueCheck, scope: Scope) -> None:
     keys = [key for axis in axes for key in axis.keys if not key.startswith("schemes.")]
     if check.over not in keys:
         hint = nearest(check.over, keys) if keys else "there is no sweep of numbers"
-        scope.at("over").refuse("is no swept key with numbers", hint, check.over)
+        scope.at("over").refuse("is not a swept key with numbers", hint, check.over)
         return
     if check.at.case is not None or check.over in check.at.swept:
         scope.at("over").refuse("is fixed by `at:`", "leave one of them out", check.over)
@@ -292,7 +292,7 @@ def _check_equal(check: EqualCheck, scope: Scope) -> None:
         return
     first, second = scope.at("equal", 0), scope.at("equal", 1)
     if check.first in SOLUTIONS:
-        first.refuse("must be a scheme: what it equals stands behind it", value=check.first)
+        first.refuse("must be a scheme: what it must equal comes second", value=check.first)
     else:
         first.check_scheme(check.first)
     named = [(check.first, first)]
@@ -300,7 +300,7 @@ def _check_equal(check: EqualCheck, scope: Scope) -> None:
         second.check_scheme(check.second, SOLUTIONS)
         named.append((check.second, second))
         if check.first == check.second:
-            second.refuse("must be another one than the first", value=check.second)
+            second.refuse("must differ from the first", value=check.second)
     setting, what, choices = scope.setting, "", scope.setting.quantities
     if check.second in SOLUTIONS and setting.model is not None:
         what, choices = check.second, tuple(state.name for state in setting.model.states)
@@ -317,7 +317,7 @@ def _check_equal(check: EqualCheck, scope: Scope) -> None:
         elif check.second == "discrete":
             _check_theory(check.second, second)
     if check.second == "discrete" and check.first in setting.adaptive:
-        first.refuse("has no steps of its own that theory could know", value=check.first)
+        first.refuse("chooses its own steps, for which theory knows no solution", value=check.first)
 
 
 def _is_quantity(name: str, choices: tuple[str, ...], scope: Scope, what: str = "") -> bool:
@@ -332,7 +332,7 @@ def _is_quantity(name: str, choices: tuple[str, ...], scope: Scope, what: str = 
         scope.refuse(rule, f"ask for {plain_name(name)}", name)
         return False
     known = name in scope.setting.quantities
-    rule = f"{what} is not known of this quantity" if known else "unknown quantity"
+    rule = f"{what} is not defined for this quantity" if known else "unknown quantity"
     hint = "choose from " + ", ".join(choices) if known else nearest(name, choices)
     scope.refuse(rule, hint, name)
     return False
@@ -365,10 +365,10 @@ def _check_value(row: Value, quantity: str | None, best: bool, scope: Scope) -> 
     choices = _allowed(row, scope.setting, best)
     if row.of == "none":
         if quantity is not None:
-            rule = f"{row.name} is of the motion as a whole and takes no quantity"
+            rule = f"{row.name} belongs to the motion as a whole and takes no quantity"
             place.refuse(rule, at_key=True)
     elif quantity is None:
-        rule = f"required key is missing: {row.name} is of a quantity"
+        rule = f"required key is missing: {row.name} needs a quantity"
         place.refuse(rule, "choose from " + ", ".join(choices))
     else:
         only_there = best and quantity in _allowed(row, scope.setting, False)
@@ -397,8 +397,8 @@ def _check_support(row: Value, quantity: str | None, scope: Scope) -> None:
 
         if not applies(model):
             rule = (
-                "is known of one coordinate without events, with an acceleration of + - * /, whole powers and abs; "
-                f"that of {model.kind} here is another one"
+                "is known for one coordinate without events whose acceleration has only + - * /, whole powers and abs; "
+                f"that of {model.kind} here has others"
             )
             scope.refuse(rule, value=row.name)
     if row.needs_linear:
@@ -427,11 +427,11 @@ def _why_unsolved(model: Model) -> str:
     if has_solution(model):
         return ""
     if isinstance(model.events, Crossings):
-        return ", as of every motion with events of formulas or a stop"
+        return ", as for every motion with events of formulas or a stop"
     if model.loaded is None:
         return ""
     if not model.loaded.structure.has_all_modes:
-        return f", as of every structure of more than {MOST_MODES} degrees of freedom"
+        return f", as for every structure of more than {MOST_MODES} degrees of freedom"
     return (
         ": it is where damping does not couple the modes, and loads are sums of constants, sines and "
         "cosines"
@@ -439,7 +439,7 @@ def _why_unsolved(model: Model) -> str:
 
 
 def _refuse_followers(value: str, scope: Scope) -> None:
-    rule = "the exact solution is not known of members that start from the last state of others"
+    rule = "the exact solution is not known for members that start from the last state of others"
     scope.refuse(rule, "leave out `follow`", value)
 
 
@@ -447,7 +447,7 @@ def _check_theory(value: str, scope: Scope) -> None:
     """Check that the model is linear and undamped, as the theory of schemes requires."""
     model = scope.setting.model
     if model is not None and not (model.linear and model.conservative):
-        rule = f"{value} is known of linear models without damping only, not of {model.kind}"
+        rule = f"{value} is known only for linear models without damping, not for {model.kind}"
         scope.refuse(rule, value=value)
 
 

@@ -33,7 +33,7 @@ def check_follow(follow: str, axes: Sequence[Axis], report: Report) -> None:
     known = [key for axis in axes for key in axis.keys]
     last = axes[-1].keys
     if follow not in known:
-        report.add(KEY, "is no swept key", nearest(follow, known), follow)
+        report.add(KEY, "is not a swept key", nearest(follow, known), follow)
     elif follow not in last:
         rule = "must vary fastest, so that members which follow each other are neighbours"
         report.add(KEY, rule, f"write {follow} last in sweep", follow)
@@ -52,7 +52,9 @@ def check_equation(model: Model, numbers: MemberNumbers, report: Report) -> None
         report.add(KEY, f"{rule}, and the exact solution says where these start")
         return
     if not why_not_free(model):
-        report.add(KEY, "needs a steady state to start from, which a free linear motion has not")
+        report.add(
+            KEY, "needs a steady state to start from, which a free linear motion does not have"
+        )
         return
     forces = [tree(model, formula) for formula in model.accelerations]
     if not any("t" in force.names for force in forces):

@@ -25,7 +25,7 @@ def check_figures(figures: Sequence[Any], setting: Setting, report: Report) -> N
 def _figure(figure: Any, scope: Scope) -> None:
     time = scope.setting.time
     if figure.shows == "poincare" and time is not None and time.frequency is None:
-        rule = "shows the state after every period of a force, and time names no frequency"
+        rule = "shows the state after every period of a force, but time names no frequency"
         scope.at("shows").refuse(rule, "give time as periods, steps_per_period and frequency")
     if figure.shows not in (None, "over_time"):
         for key in OVER_TIME:

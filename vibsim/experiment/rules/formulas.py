@@ -82,7 +82,7 @@ def read_formulas(
     tables: dict[str, TableSpec] = {}
     looked_up = {row.name for row in model.formulas if row.tabled and getattr(section, row.name)}
     for name in looked_up & {*(state.name for state in model.states), *declared}:
-        rule = "a table is looked up under that name, which is another's already"
+        rule = "a table is looked up under that name, which is already in use"
         report.add(("model", name), rule, "rename the state or the parameter", at_key=True)
     for row in model.formulas:
         value = getattr(section, row.name)
@@ -233,7 +233,7 @@ def _pair_formulas(
             hint = nearest(unknown[0], list(model.positions))
             report.add(path, "unknown coordinate", hint, at_key=True)
         elif names[0] != names[-1] and names[::-1] in formulas and names > names[::-1]:
-            rule = f"is that of {names[1]} and {names[0]}, which stands there already"
+            rule = f"is that of {names[1]} and {names[0]}, which is given already"
             report.add(path, rule, "leave it out", at_key=True)
         elif is_valid_formula(text, row, path, known, report):
             valid[".".join((row.name, *names))] = text.strip()

@@ -154,7 +154,7 @@ def check_ends(numbers: MemberNumbers, report: Report) -> None:
             elif numbers.time.periods is not None:
                 key, rule = "periods", "the model has no natural period"
             else:
-                key, rule = "steps_per_point", "the vehicle never comes to the end of the table"
+                key, rule = "steps_per_point", "the vehicle never reaches the end of the table"
             report.add(("time", key), f"{rule} where {who}", "leave that member out, or give end")
             return
 
@@ -275,7 +275,7 @@ def check_starts(members: MemberNumbers, formulas: Mapping[str, str], report: Re
             now, rate_now = values(guard, numbers), values(slope, numbers)
             return np.asarray((now < 0.0) | ((now == 0.0) & (rate_now < 0.0)))
 
-        rule = "holds at the start already{}: nothing would move"
+        rule = "already holds at the start{}: nothing would move"
         refuse(holds, ("model", STOP), rule, "begin outside of it")
     if any(key.split(".")[0] == MASS for key in formulas) and model.formulas:
         known = tuple(row.name for row in model.parameters)

@@ -49,12 +49,12 @@ def check_potential(
         rule = f"is not the integral of the spring: its slope differs near u = {u[wrong][0]:.3g}"
         report.add(("model", "potential"), rule, value=texts["potential"])
     elif is_given and not is_compared.any():
-        rule = "cannot be compared with the spring: one of them has a value nowhere"
+        rule = "cannot be compared with the spring: one of them is defined nowhere"
         report.add(("model", "potential"), rule, value=texts["potential"])
     elif not is_given and not has_rule(spring, model.position):
         wrong = np.isfinite(work) & ~(is_known & is_right)
         if wrong.any():
-            rule = "its potential energy cannot be worked out: it has corners, is singular or varies fast"
+            rule = "its potential energy cannot be computed: it has corners, is singular or varies fast"
             hint = "write the energy as `potential`, a formula whose slope is the spring"
             report.add(("model", "spring"), rule, hint)
 

@@ -72,7 +72,7 @@ def _check_names(specs: list[SchemeSpec], i: int, first: dict[str, int], report:
     """Check the names of the schemes of entry number `i`; `first` holds the first entry with each name."""
     for j, spec in enumerate(specs):
         if spec.name in SOLUTIONS:
-            rule = f"'{spec.name}' is what checks compare a scheme with, and names none"
+            rule = f"'{spec.name}' is a word of checks, and cannot name a scheme"
             report.add(("schemes", i, "label"), rule, value=spec.name)
         elif spec.name in [other.name for other in specs[:j]]:
             report.add(("schemes", i, TOLERANCE, j), "a tolerance must not be repeated")

@@ -134,7 +134,7 @@ def _by_table(
         return None
     end = float(table_end(model, parameters))
     if not (math.isfinite(end) and end > 0.0):
-        rule = "the vehicle never comes to the end of the table with these parameters"
+        rule = "the vehicle never reaches the end of the table with these parameters"
         report.add(("time", "steps_per_point"), rule)
         return None
     return TimeSpec(end=end, base_steps=spacings * steps, steps_per_point=steps)

@@ -33,7 +33,7 @@ def note_unlikely(checks: Sequence[Check | None], setting: Setting, report: Repo
         path: Path_ = ("checks", i) if inner is check else ("checks", i, "that")
         match inner:
             case AccurateCheck(relative=float(bound)) if bound >= 1.0:
-                rule = f"is {bound:g} times the size of {inner.accurate}, which nearly everything is below"
+                rule = f"is {bound:g} times the size of {inner.accurate}, and nearly every error is below that"
                 report.note((*path, "relative"), rule, f"{bound:g} percent are {bound / 100:g}")
             case ConvergesCheck(order=float(order)) if inner.tolerance >= order:
                 rule = f"lets every order up to {order + inner.tolerance:g} pass"

@@ -120,9 +120,9 @@ class StructureSection(Section):
     damping: MatrixText | None = None
     """C: a .mtx, .npy or .csv file, rows, or its diagonal; 0 when left out"""
     rayleigh: Rayleigh | None = None
-    """damping alpha M + beta K beside C"""
+    """damping alpha M + beta K in addition to C"""
     damping_ratios: RatiosText | None = None
-    """damping ratio of every mode, or those of the lowest modes, beside C"""
+    """damping ratio of every mode, or those of the lowest modes, in addition to C"""
     load: Load | None = None
     """p(t): formulas in t and parameters or tables by degree of freedom, or a shape times one of them"""
     start: Start | None = None

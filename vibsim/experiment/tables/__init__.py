@@ -1,1 +1,1 @@
-"""Tables beside an experiment file."""
+"""Read tables and matrices that an experiment file names."""

@@ -1,4 +1,4 @@
-"""The bytes of a table or a matrix beside an experiment file, or why they cannot be had."""
+"""Read the bytes of a table or matrix file."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from vibsim.experiment.schema.fields import TABLE
 from vibsim.experiment.yaml.file_content import MOST_BYTES, content_of
 
 MOST_LISTED = 8
-"""Files that a message lists, at most."""
+"""Largest number of files listed in a message."""
 
 
 class TableError(ValueError):
-    """A table or a matrix that is refused: the rule that it breaks, how to keep it, and for tables the key at fault."""
+    """An invalid table or matrix: the rule that it breaks, a hint, and for tables the faulty key."""
 
     def __init__(self, rule: str, hint: str = "", key: str = TABLE) -> None:
         self.rule, self.hint, self.key = rule, hint, key
@@ -21,7 +21,7 @@ class TableError(ValueError):
 
 
 def bytes_of(path: Path, endings: tuple[str, ...], what: str) -> bytes:
-    """Return the bytes of the file at `path`, whose name must have one of some endings; TableError without any."""
+    """Return the bytes of the file at `path`; raise `TableError` if it cannot be read, or has none of the `endings`."""
     if path.suffix.lower() not in endings:
         known = " or ".join(endings) if len(endings) == 2 else ", ".join(endings)
         raise TableError(f"the name of a {what} must end with {known}")
@@ -39,7 +39,7 @@ def bytes_of(path: Path, endings: tuple[str, ...], what: str) -> bytes:
 
 
 def reason(error: Exception) -> str:
-    """Return what an error of the system or of a library says."""
+    """Return the message of an error of the system or a library."""
     return getattr(error, "strerror", None) or str(error)
 
 

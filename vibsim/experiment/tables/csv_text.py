@@ -1,9 +1,8 @@
-"""Numbers from CSV text: a line with the names of the columns, then a line of cells for each row.
+"""Read numbers from CSV text: a header with the names of the columns, then one line of cells per row.
 
-Cells are separated by commas, semicolons or tabs, whichever the line of names has. Empty lines and lines that begin
-with ``#`` do not count; a byte order mark, quotes around cells, spaces around them, any end of line, and one separator
-at the end of a line are allowed. A decimal comma is read where a cell can hold one: between semicolons or tabs, or in
-quotes. What could be read in two ways is refused.
+The header determines the separator: comma, semicolon or tab. Empty lines and lines that begin with ``#`` are skipped. A
+byte order mark, quotes and spaces around cells, any line ending, and one separator at the end of a line are allowed. A
+decimal comma is accepted between semicolons or tabs, or in quotes. Ambiguous numbers are refused.
 """
 
 from __future__ import annotations
@@ -20,11 +19,11 @@ import numpy as np
 from vibsim.core.array_types import Floats, Integers
 
 MOST_LINES = 2**21
-"""Lines of a text, the empty ones and the comments too."""
+"""Largest number of lines, including empty lines and comments."""
 MOST_CHARACTERS = 2**16
-"""Of a line."""
+"""Largest number of characters of a line."""
 SEPARATORS = {";": "semicolons", "\t": "tabs", ",": "commas"}
-"""In the order in which they are looked for: a name may hold a comma where cells have another separator."""
+"""Separators in the order in which they are tried: with another separator, names may contain a comma."""
 
 _QUOTED = re.compile(r'"[^"]*"')
 _DECIMAL_COMMA = re.compile(r"[+-]?([0-9]+,[0-9]*|,[0-9]+)([eE][+-]?[0-9]+)?")
@@ -36,17 +35,17 @@ _POINTS = "write all numbers with points"
 
 
 class CsvError(ValueError):
-    """Text that is no table of numbers.
+    """Text that is not a table of numbers.
 
     Parameters
     ----------
     rule, hint
-        The rule that is broken, and how to keep it.
+        The rule that is broken, and a hint.
     line
-        Line of the text, from 1; 0 where it is none of its own.
+        Line of the text, from 1; 0 if no particular line is faulty.
     column, cell
-        Name of the column and the cell that is at fault; empty where it is none. They are the content of a file that
-        may be no table at all, and belong in no message unless the reader named that file.
+        Name of the faulty column, and text of the faulty cell; empty if there is none. The file may not be a table at
+        all, so messages show its content only to a user who named the file.
     """
 
     def __init__(
@@ -57,10 +56,10 @@ class CsvError(ValueError):
 
 
 class _Rows:
-    """The cells of every line of a text that counts; `line` is the number of the last one."""
+    """Iterates over the rows of cells of a text, without skipped lines; `line` is the number of the current line."""
 
     def __init__(self, content: bytes) -> None:
-        # counted first: each line costs more than a look at its bytes
+        # counting lines is cheaper than parsing them
         if max(content.count(b"\n"), content.count(b"\r")) > MOST_LINES:
             raise CsvError(f"must not have more than {MOST_LINES} lines")
         try:
@@ -104,21 +103,21 @@ def read(
     most: int,
     written: list[list[str]] | None = None,
 ) -> tuple[list[Floats], Integers]:
-    """Return columns of the bytes of a file, of equal length, and the line of every row, from 1.
+    """Return the chosen columns of the content of a file, and the line number of every row, from 1.
 
-    CsvError where it is no table of numbers in these columns.
+    Raises `CsvError` if these columns are not a table of numbers.
 
     Parameters
     ----------
     choose
-        Returns the numbers of the columns that are to be read, from 0; the others may hold anything. It gets the names
-        of all columns, and whether two cells at least of the line below are numbers: else the text may be no table, and
-        is not shown.
+        Returns the indices of the columns to read, from 0; the others may contain anything. Its arguments are the names
+        of all columns, and whether the first row has at least two numbers; otherwise the text may not be a table, and
+        messages do not show it.
     most
-        Number of rows that are read at most.
+        Largest number of rows.
     written
-        Takes the cells of these columns, row by row, with decimal points: zeros at the end are digits of what was
-        printed.
+        If given, the cells of these columns are appended to it, row by row, with decimal points. They keep zeros at
+        the end, which are digits of what was printed.
     """
     source = _Rows(content)
     rows = iter(source)
@@ -145,7 +144,7 @@ def read(
 
 
 def _check_width(row: list[str], names: list[str], source: _Rows) -> None:
-    """Refuse a row with another number of cells than there are columns, but for a separator at its end."""
+    """Refuse a row whose number of cells differs from that of columns; a separator at its end is allowed."""
     found, wanted, separator = len(row), len(names), source.separator
     if found == wanted + 1 and not row[-1].strip():
         return
@@ -162,14 +161,14 @@ def _check_width(row: list[str], names: list[str], source: _Rows) -> None:
 
 
 class _Marks:
-    """Reads cells, all with the same decimal mark."""
+    """Reads cells, which must all have the same decimal mark."""
 
     def __init__(self, separator: str) -> None:
         self.separator = separator
         self.points = self.commas = 0
-        """Line of the first cell with such a mark."""
+        """Line of the first cell with a decimal point, and with a decimal comma; 0 if there is none."""
         self.clear = False
-        """Whether a comma was seen that separates no thousands."""
+        """Whether some comma is certainly a decimal mark, not a thousands separator."""
 
     def number(self, cell: str, column: str, line: int, *, is_first: bool) -> float:
         """Return the number in a cell."""
@@ -185,7 +184,7 @@ class _Marks:
             self.clear = self.clear or not _THOUSANDS.fullmatch(text)
             value = float(text.replace(",", "."))
         else:
-            rule, hint = "is no number" if text else "is empty", ""
+            rule, hint = "is not a number" if text else "is empty", ""
             if _GROUPED.fullmatch(text):
                 hint = "write it without separators of thousands"
             elif _FORTRAN.fullmatch(text):
@@ -199,7 +198,7 @@ class _Marks:
         return value
 
     def finish(self) -> None:
-        """Refuse a table whose commas may all separate thousands."""
+        """Refuse a table whose commas may all be thousands separators."""
         if self.commas and not self.clear and self.separator != ";":
             rule = "the comma may be a decimal mark or separate thousands"
             raise CsvError(rule, _POINTS, self.commas)
@@ -214,5 +213,5 @@ def _is_number(cell: str) -> bool:
 
 
 def is_shown(cell: str) -> bool:
-    """Tell whether a cell is made of what numbers are made of, so that a message may show it whatever the file is."""
+    """Tell whether a cell contains only characters of numbers, so that any message may show it."""
     return _NUMERIC.fullmatch(cell) is not None

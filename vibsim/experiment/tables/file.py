@@ -1,6 +1,6 @@
-"""Tables beside an experiment file: equally spaced places and a value at each, from CSV text or a netCDF file.
+"""Read tables from CSV or netCDF files: values at equally spaced abscissae, or loads over time.
 
-A CSV file is UTF-8 text (`vibsim.experiment.tables.csv_text`). A netCDF file has two variables of one dimension.
+A CSV file is UTF-8 text (`vibsim.experiment.tables.csv_text`). A netCDF file has two one-dimensional variables.
 """
 
 from __future__ import annotations
@@ -24,22 +24,22 @@ from vibsim.models.table import FEWEST_POINTS, Table
 ENDINGS = (".csv", ".nc")
 MOST_POINTS = 2**20
 EVEN = 1e-3
-"""How far a place may be from where equal spacing has it, in spacings: a file may have rounded it."""
+"""Tolerance for equal spacing of abscissae, in spacings: a file may have rounded them."""
 UNIT = "m"
 WORDS = {"x": "places", "t": "times"}
-"""What the first column holds, by its key."""
+"""Name of the content of the first column, by its key."""
 MOST_SHOWN = 40
-"""Characters of a name that a message shows, at most."""
+"""Largest number of characters of a name in a message."""
 
 
 _Columns = tuple[Floats, Floats, Callable[[Any], str]]
-"""Places and values, and what says where a point stands."""
+"""Abscissae, values, and a function that gives the place of a point in the file, for messages."""
 
 
 def read(path: Path, keys: tuple[str, str], names: tuple[str, str]) -> tuple[Table, str]:
-    """Return the table in the file at `path`, and the SHA-256 of its bytes; TableError where it is none.
+    """Return the table in the file at `path`, and the SHA-256 of its bytes; raise `TableError` if it is invalid.
 
-    Under `keys` an experiment gives the `names` of the columns of places and values.
+    `names` are those of the columns of abscissae and values; `keys` are the keys of the experiment that give them.
     """
     columns, content = _read(path, keys, names, UNIT)
     return _table(columns, names), content
@@ -48,7 +48,7 @@ def read(path: Path, keys: tuple[str, str], names: tuple[str, str]) -> tuple[Tab
 def read_history(path: Path, names: tuple[str, str]) -> tuple[Floats, str]:
     """Return times and loads in the file at `path`, shape (2, point), and the SHA-256 of its bytes.
 
-    Times rise and begin at 0 or below, in steps of any length. TableError where the file is no such table.
+    Times increase from 0 or below, with any spacing. Raises `TableError` if the file is not such a table.
     """
     columns, content = _read(path, ("t", "p"), names, "")
     t, p, _ = columns
@@ -87,7 +87,7 @@ def _from_text(content: bytes, keys: tuple[str, str], names: tuple[str, str]) ->
     except csv_text.CsvError as error:
         rule = error.rule
         if error.line:
-            # the file may be anything that a link leads to
+            # a link may lead to a private file, so show numbers only
             cell = f"'{error.cell}' " if error.cell and csv_text.is_shown(error.cell) else ""
             column = f", in column '{error.column}'" if error.column else ""
             what = "" if cell or not error.column else "the cell "
@@ -97,7 +97,7 @@ def _from_text(content: bytes, keys: tuple[str, str], names: tuple[str, str]) ->
 
 
 def _found(names: list[str], name: str, key: str, word: str, *, may_list: bool = True) -> int:
-    """Return the number of the column `name`; `may_list`: a message may list the others."""
+    """Return the index of the column `name`; `may_list`: messages may list the other names."""
     if name not in names:
         hint = nearest(name, [known[:MOST_SHOWN] for known in names]) if may_list else ""
         if len(names) > MOST_LISTED and not hint.startswith("did"):
@@ -124,7 +124,7 @@ def _from_netcdf(
 
 
 def _variable(dataset: Any, key: str, name: str, unit: str) -> Floats:
-    """Return a variable of one dimension, in `unit` if any, as numbers; what is missing in it is NaN."""
+    """Return a one-dimensional variable as floats, with NaN for missing values; its unit must be `unit`, if given."""
     known = list(dataset.variables)
     variable = dataset.variables[known[_found(known, name, key, "variable")]]
     if len(variable.dimensions) != 1:
@@ -146,7 +146,7 @@ def _late(name: str, first: float) -> str:
 
 
 def _check_rising(columns: _Columns, names: tuple[str, str]) -> None:
-    """Refuse numbers that are not finite, and places that do not increase."""
+    """Refuse non-finite numbers, and abscissae that do not increase."""
     x, h, place_of = columns
     for name, values in zip(names, (x, h), strict=True):
         wrong = np.flatnonzero(~np.isfinite(values))
@@ -171,7 +171,7 @@ def _table(columns: _Columns, names: tuple[str, str]) -> Table:
     gaps, even = np.diff(x), x[0] + np.arange(len(x)) * spacing
     usual = float(np.median(gaps))
     if np.any(np.abs(x - even) > EVEN * usual):
-        # where places leave the spacing that most of them have
+        # the first gap that differs from the median gap
         odd = np.flatnonzero(np.abs(gaps - usual) > EVEN * usual)
         i = min(int(odd[0] if len(odd) else np.argmax(np.abs(x - even))), len(gaps) - 1)
         rule = f"'{names[0]}' must be equally spaced, but is {gaps[i]:.10g} further than the point before"
@@ -187,9 +187,9 @@ def _table(columns: _Columns, names: tuple[str, str]) -> Table:
 
 
 def attach(experiment: ExperimentSpec) -> None:
-    """Read the tables of an experiment that was kept without their numbers.
+    """Read the tables of an experiment that was restored without their numbers.
 
-    InputError where one cannot be read, or has other numbers than it had.
+    Raises `InputError` if one cannot be read, or its numbers have changed.
     """
     keys = {row.name: row.table or ("", "") for row in experiment.model.base.formulas}
     for name, spec in experiment.model.tables.items():

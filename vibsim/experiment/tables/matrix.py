@@ -1,7 +1,7 @@
-"""Matrices and vectors beside an experiment file: Matrix Market, NumPy or CSV files.
+"""Read matrices and vectors from Matrix Market, NumPy or CSV files.
 
-A CSV file holds rows of numbers without a line of names; or, under the line ``row,column,value``, the entries that are
-not 0, counted from 1, and those of a symmetric matrix on both sides of the diagonal.
+A CSV file contains rows of numbers without a header or, with the header ``row,column,value``, the nonzero entries with
+indices from 1; those of a symmetric matrix on both sides of the diagonal.
 """
 
 from __future__ import annotations
@@ -24,15 +24,13 @@ from vibsim.models.structure import MOST_DOFS
 ENDINGS = (".mtx", ".npy", ".csv")
 SPARSE_HEADER = "row,column,value"
 MOST_DENSE = 2048
-"""Rows of a matrix that is written out with its zeros, at most."""
+"""Largest number of rows of a dense matrix."""
 
 
 def read(path: Path) -> tuple[Any, str]:
-    """Return what the file at `path` holds, and the SHA-256 of its bytes.
+    """Return the matrix or vector in the file at `path`, and the SHA-256 of its bytes.
 
-    It is an array of numbers of one or two dimensions, or a sparse array of SciPy.
-
-    TableError where the file cannot be read as numbers.
+    It is a one- or two-dimensional array, or a sparse array of SciPy. Raises `TableError` for anything else.
     """
     content = bytes_of(path, ENDINGS, "matrix")
     of_kind = {".mtx": _from_matrix_market, ".npy": _from_numpy, ".csv": _from_text}
@@ -57,18 +55,20 @@ def _from_matrix_market(content: bytes) -> Any:
     try:
         rows, columns, _, form, field, _ = mminfo(io.BytesIO(content))
         if field == "pattern":
-            raise TableError("holds a pattern alone, without the numbers of the matrix")
+            raise TableError("holds only the pattern of the matrix, without numbers")
         # before anything of that size is allocated
         _check_counts(rows, columns)
         if form == "array" and rows * columns > MOST_DENSE**2:
-            raise TableError(f"of more than {MOST_DENSE} rows only a coordinate matrix is read")
+            raise TableError(
+                f"a matrix of more than {MOST_DENSE} rows must be in coordinate format"
+            )
         if problem := guarded.problem(lambda: mmread(io.BytesIO(content)), len(content)):
             raise ValueError(problem)
         found = mmread(io.BytesIO(content), spmatrix=False)
     except TableError:
         raise
     except (ValueError, TypeError, OverflowError, RuntimeError, EOFError) as error:
-        raise TableError(f"is no Matrix Market file ({_first_line(error)})") from None
+        raise TableError(f"is not a Matrix Market file ({_first_line(error)})") from None
     return np.asarray(found, dtype=float) if isinstance(found, np.ndarray) else found
 
 
@@ -76,7 +76,7 @@ def _from_numpy(content: bytes) -> Any:
     try:
         found = np.load(io.BytesIO(content), allow_pickle=False)
     except (ValueError, OSError, EOFError, MemoryError, SyntaxError, TokenError) as error:
-        raise TableError(f"is no array of NumPy ({_first_line(error)})") from None
+        raise TableError(f"is not a NumPy array ({_first_line(error)})") from None
     is_array = isinstance(found, np.ndarray)
     if not is_array or found.dtype.kind not in "fiuc" or found.ndim not in (1, 2):
         raise TableError("must hold one array of numbers, of one or two dimensions")
@@ -115,7 +115,7 @@ def _from_text(content: bytes) -> Any:
 
 
 def _from_entries(entries: Floats | None) -> Any:
-    """Return the sparse matrix with these entries, of shape (entry, 3)."""
+    """Return the sparse matrix with `entries` (row, column, value), shape (entry, 3)."""
     from scipy.sparse import coo_array
 
     if entries is None or not len(entries):
@@ -135,10 +135,7 @@ def _first_line(error: Exception) -> str:
 
 
 def square(found: Any) -> Matrix:
-    """Return a square matrix; of one row or column of numbers the diagonal matrix.
-
-    TableError where it is not square.
-    """
+    """Return a square matrix; for a single row or column the diagonal matrix. Raises `TableError` if not square."""
     if isinstance(found, np.ndarray) and (found.ndim == 1 or 1 in found.shape):
         found = np.diag(np.ravel(found))
     rows, columns = found.shape
@@ -148,7 +145,7 @@ def square(found: Any) -> Matrix:
 
 
 def vector(found: Any) -> Floats:
-    """Return one row or column of numbers as a vector; TableError where there are several."""
+    """Return a single row or column as a vector; raise `TableError` for anything else."""
     dense = found if isinstance(found, np.ndarray) else found.toarray()
     if dense.ndim == 2 and 1 not in dense.shape:
         raise TableError(f"must be one column, has the shape {dense.shape[0]} x {dense.shape[1]}")

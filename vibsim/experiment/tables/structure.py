@@ -1,4 +1,4 @@
-"""From what an experiment says of a structure, and the files that it names, to the numbers of the structure."""
+"""Assemble the matrices of a structure from an experiment and its files."""
 
 from __future__ import annotations
 
@@ -22,33 +22,33 @@ from vibsim.models.structure import HISTORY, LOAD, MOST_DOFS, MOST_MODES, MOST_O
 MATRICES = ("mass", "stiffness", "damping")
 STARTS = ("start.displacement", "start.velocity")
 SYMMETRIC = 1e-12
-"""A matrix is symmetric whose entries differ by no more, to the largest one: files are rounded."""
+"""Tolerance of symmetry, relative to the largest entry: files are rounded."""
 SAME_FREQUENCY = 1e-9
-"""Frequencies that differ by a smaller part are the same: an eigensolver finds any mixture of their shapes."""
+"""Relative tolerance of multiple frequencies, whose shapes an eigensolver may mix arbitrarily."""
 FLAT = 1e-9
-"""An observed displacement below this part of the largest entry of a mode cannot scale it."""
+"""Smallest observed displacement that can scale a mode, relative to its largest entry."""
 
 
 @dataclass
 class Assembly:
-    """The numbers of a structure as far as they are sound, and what is wrong with them."""
+    """The valid numbers of a structure, and the faults of the others."""
 
     spec: StructureSpec
     folder: Path
     faults: list[tuple[str, str, str]] = field(default_factory=list)
-    """The dotted key in the section ``model``, the rule that is broken, and how to keep it."""
+    """Dotted key in the section ``model``, broken rule, and hint."""
     structure: Structure | None = None
     unnamed: int = 0
-    """Degrees of freedom, where they are too many to be observed without names."""
+    """Number of degrees of freedom, if it is too large to observe all of them; else 0."""
     digests: dict[str, tuple[str, str]] = field(default_factory=dict)
-    """By key the SHA-256 of the numbers of an array, and that of the bytes of its file; empty without one."""
+    """SHA-256 of the numbers of each array, and of the bytes of its file (empty without a file), by key."""
 
     def add(self, key: str, rule: str, hint: str = "") -> None:
-        """Note a fault."""
+        """Record a fault."""
         self.faults.append((key, rule, hint))
 
     def complete(self, size: int, ratio: float | None) -> None:
-        """Name every degree of freedom where nothing is observed by name, and give every mode one damping ratio."""
+        """Fill in defaults: observe every degree of freedom, and give every mode the damping ratio `ratio`, if any."""
         update: dict[str, Any] = {} if ratio is None else {"ratios": (ratio,) * size}
         if not self.spec.observe:
             self.unnamed = size if size > MOST_OBSERVED else 0
@@ -58,7 +58,7 @@ class Assembly:
         self.spec = self.spec.model_copy(update=update)
 
     def matrices(self) -> dict[str, Matrix]:
-        """Return the matrices that are sound."""
+        """Return the valid matrices."""
         found = {}
         for key in MATRICES:
             if key not in self.spec.arrays:
@@ -78,7 +78,7 @@ class Assembly:
         return found
 
     def _array(self, key: str) -> Any:
-        """Return the numbers of an array as they stand."""
+        """Return the numbers of an array, unchecked."""
         row = self.spec.arrays[key]
         content = ""
         if row.file is not None:
@@ -96,7 +96,7 @@ class Assembly:
         return found
 
     def histories(self) -> tuple[tuple[int, Floats], ...]:
-        """Return the tables of loads that are sound, each behind the number of its load."""
+        """Return the valid load tables, each with the number of its load."""
         found = []
         for key in self.spec.arrays:
             if key.startswith(f"{HISTORY}."):
@@ -107,7 +107,7 @@ class Assembly:
         return tuple(found)
 
     def vector(self, key: str, size: int) -> Floats:
-        """Return a vector of as many numbers as the structure has degrees of freedom; 0 where it is not sound."""
+        """Return a vector of length `size`, the number of degrees of freedom; zeros if it is faulty."""
         row, found = self.spec.arrays[key], np.zeros(size)
         if row.entries:
             for dof, value in row.entries:
@@ -141,9 +141,9 @@ def _digest(found: Any) -> str:
 
 
 def assemble(spec: StructureSpec, folder: Path, ratio: float | None = None) -> Assembly:
-    """Read what `spec` names, its paths relative to `folder`, and put the structure together.
+    """Read the arrays of `spec`, with paths relative to `folder`, fill in defaults, and assemble the structure.
 
-    `ratio` is the damping ratio of every mode, where there is one. What `spec` leaves out is filled in.
+    `ratio` is the damping ratio of all modes, if there is a single one.
     """
     from scipy.sparse import eye_array
 
@@ -181,7 +181,7 @@ def assemble(spec: StructureSpec, folder: Path, ratio: float | None = None) -> A
     if len(spec.ratios) > (len(structure.modes.frequencies) if not own.faults else size):
         rule = f"has ratios of {len(spec.ratios)} modes, the structure has {size}"
         if size > MOST_MODES:
-            rule = f"modes are found of up to {MOST_MODES} degrees of freedom, there are {size}"
+            rule = f"modes are computed for up to {MOST_MODES} degrees of freedom, there are {size}"
         own.add("damping_ratios", rule, "or take rayleigh" if size > MOST_MODES else "")
     elif not own.faults:
         _check_ratios(structure, spec.ratios, own)
@@ -206,7 +206,7 @@ def assemble(spec: StructureSpec, folder: Path, ratio: float | None = None) -> A
 
 
 def _check_ratios(structure: Structure, ratios: Sequence[float], own: Assembly) -> None:
-    """Refuse ratios that differ between modes of the same frequency: no shape belongs to either of them."""
+    """Refuse different ratios for modes of the same frequency, whose shapes are not unique."""
     if not any(ratios):
         return
     w = structure.modes.frequencies
@@ -220,7 +220,7 @@ def _check_ratios(structure: Structure, ratios: Sequence[float], own: Assembly) 
 
 
 def _check_stiffness(structure: Structure, own: Assembly) -> None:
-    """Refuse a structure that is pushed away from rest, and a large one that is not held."""
+    """Refuse an unstable structure, and a large one with rigid body motions."""
     if structure.has_all_modes:
         if not np.isfinite(structure.modes.frequencies).all():
             rule = "must not have a negative eigenvalue: in that direction it pushes away from rest"
@@ -254,7 +254,7 @@ def _started(own: Assembly, key: str, structure: Structure, observed: Floats) ->
 
 
 def with_digests(own: Assembly) -> StructureSpec:
-    """Return what was assembled with the digests of its numbers, holding its structure."""
+    """Return the assembled specification with the digests of its numbers and its structure attached."""
     spec = own.spec
     assert own.structure is not None
     rows = {
@@ -267,9 +267,9 @@ def with_digests(own: Assembly) -> StructureSpec:
 
 
 def attach(experiment: ExperimentSpec) -> None:
-    """Read the numbers of a structure that was kept without them.
+    """Read the numbers of a structure that was restored without them.
 
-    InputError where a file cannot be read, or has other numbers than it had.
+    Raises `InputError` if a file cannot be read, or its numbers have changed.
     """
     spec = experiment.model.structure
     assert spec is not None

@@ -1,1 +1,1 @@
-"""From the bytes of a file to plain data that remembers its lines."""
+"""Read the bytes of a file as plain data with line numbers."""

@@ -1,4 +1,4 @@
-"""The bytes of a user's files, never more of them than are allowed; imports no reader of YAML."""
+"""Read the bytes of a user's files, up to a limit; does not import the YAML library."""
 
 from __future__ import annotations
 
@@ -8,15 +8,15 @@ from vibsim.core import regular_files
 from vibsim.core.errors import Fault, InputError, likely
 
 MAX_BYTES = 2**20
-"""Of an experiment file."""
+"""Largest size of an experiment file [bytes]."""
 MOST_BYTES = 2**26
-"""Of a table beside it."""
+"""Largest size of a table [bytes]."""
 
 
 def read_bytes(path: Path, most: int = MAX_BYTES) -> bytes:
     """Return the content of the file at `path`, by default an experiment file.
 
-    InputError when it cannot be read, is no regular file (a pipe, a device, a folder) or has more than `most` bytes.
+    Raises `InputError` if it cannot be read, is not a regular file (but a pipe, a device, a folder), or is too long.
     """
     size = f"{most} bytes" if most == MAX_BYTES else f"{most >> 20} MiB"
     rule, hint = f"must not be larger than {size}", ""
@@ -26,25 +26,25 @@ def read_bytes(path: Path, most: int = MAX_BYTES) -> bytes:
             return content
     except (OSError, ValueError) as error:
         rule = f"cannot be read ({getattr(error, 'strerror', None) or error})"
-        hint = _alike(path) if isinstance(error, FileNotFoundError) else ""
+        hint = _similar_name(path) if isinstance(error, FileNotFoundError) else ""
     raise InputError([Fault(str(path), 0, "", "", rule, hint)])
 
 
-def _alike(path: Path) -> str:
-    """Name a file of the same kind beside one that is not there, if its name is near; empty else."""
+def _similar_name(path: Path) -> str:
+    """Return a hint with a similar name of an existing file with the same ending; empty if there is none."""
     try:
         stems = sorted(file.stem for file in path.parent.iterdir() if file.suffix == path.suffix)
     except OSError:
         return ""
-    # an ending that both have makes no names alike
+    # endings are left out, because a common ending would make all names similar
     hint = likely(path.stem, stems)
     return f"{hint[:-2]}{path.suffix}'?" if hint else ""
 
 
 def content_of(path: Path, most: int) -> bytes:
-    """Return the content of the file at `path`, of a longer one `most` bytes and one more.
+    """Return the content of the file at `path`, at most its first `most` + 1 bytes.
 
-    OSError where it cannot be read, or is no regular file.
+    Raises `OSError` if it cannot be read, or is not a regular file.
     """
     with regular_files.reading(path) as stream:
         return stream.read(most + 1)

@@ -1,10 +1,10 @@
-"""Read YAML into plain data that remembers its lines.
+"""Read YAML as plain data with line numbers.
 
-The tree is built from the parser's events, and its depth and size are bounded on the way: a small file can be deep, and
-a few aliases can stand for billions of nodes.
+The tree is built from the events of the parser. Its depth and size are bounded meanwhile, because a small file can be
+deep, and a few aliases can expand to billions of nodes.
 
 Plain scalars follow the core schema of YAML 1.2: `1e-3`, `1.`, `.5` and `1E5` are numbers; `yes`, `no`, `on`, `off`,
-`1_000` and `1:30` are text; `0o10` is 8 and `0x10` is 16. `010`, which is 10 there and 8 in YAML 1.1, is refused.
+`1_000` and `1:30` are text; `0o10` is 8 and `0x10` is 16. `010`, which is 10 in YAML 1.2 and 8 in 1.1, is refused.
 Source: YAML 1.2.2 (2021), section 10.3.2.
 """
 
@@ -24,17 +24,17 @@ from vibsim.experiment.yaml.file_content import read_bytes
 MAX_FAULTS = 1000
 MAX_ALIASES = 50
 MAX_NODES = 200_000
-"""Nodes of a file when every alias is written out."""
+"""Largest number of nodes of a file with all aliases expanded."""
 MAX_DEPTH = 32
 
 Path_ = tuple[str | int, ...]
-"""Where a value stands: keys and list positions from the top."""
+"""Path of a value: keys and list positions from the top."""
 
 _NOT_PRINTABLE = re.compile("[^\t\n\r\x20-\x7e\x85\xa0-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
-"""What YAML 1.2.2, section 5.1, does not allow in a file."""
+"""Characters that YAML 1.2.2, section 5.1, does not allow."""
 
 MAX_DIGITS = 1000
-"""Whole numbers of more digits are read as floats, i.e. as infinity, which is then refused."""
+"""Integers with more digits are read as floats, i.e. as infinity, which is then refused."""
 
 _NULL = frozenset({"", "~", "null", "Null", "NULL"})
 _TRUE = frozenset({"true", "True", "TRUE"})
@@ -49,37 +49,37 @@ _INVALID = "is not valid YAML"
 _TAB = re.compile(" *\t")
 _TIGHT_COLON = re.compile(r"\s*(- )?\w+:[^\s:/]")
 _INDEX = re.compile(r"\w\{\w+([+-]\d+)?\}")
-"""A name with an index of `repeat`, as it stands in an experiment file."""
+"""Matches a name with an index of `repeat`."""
 _Loader: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 
 
 @dataclass(slots=True)
 class Node:
-    """A node of the file."""
+    """A node of the YAML tree."""
 
     value: Any
     line: int
     text: str = ""
     size: int = 1
-    """How many nodes it stands for when aliases are written out."""
+    """Number of nodes in it, with all aliases expanded."""
     is_open: bool = False
     keys: dict[Any, int] | None = None
     """Line of every key of a mapping."""
     children: dict[Any, Node] | None = None
     setting: str = ""
-    """What the command line says of it and of all in it, where that stands in place of the file."""
+    """The command-line setting that the node and all nodes in it come from; empty if they are in the file."""
 
 
 @dataclass(frozen=True)
 class Place:
-    """Where a value and its key stand."""
+    """The lines of a value and its key."""
 
     line: int
     key_line: int
     text: str
-    """The value as written, if it is a scalar."""
+    """The text of the value in the file, if it is a scalar."""
     setting: str = ""
-    """The setting of the command line that it came from; empty where it stands in the file."""
+    """The command-line setting that it comes from; empty if it is in the file."""
 
 
 @dataclass(frozen=True)
@@ -87,25 +87,25 @@ class Source:
     """The content of an experiment file, as plain data."""
 
     file: str
-    """Name of the file as the user gave it."""
+    """Name of the file, as given by the user."""
     data: Any
     top: Node | None = None
     faults: tuple[Fault, ...] = ()
-    """What is wrong with the file although it could be read: duplicate keys and tags."""
+    """Faults that did not prevent reading: duplicate keys and tags."""
     settings: tuple[str, ...] = ()
-    """What a command line gave in place of values of the file, as ``KEY=VALUE``."""
+    """Overrides of the command line, as ``KEY=VALUE``."""
     origins: Mapping[Path_, Path_] = field(default_factory=dict)
-    """Where in the file stands what `repeat` has written out, by its place in the data."""
+    """Path in the file of every value that `repeat` expanded, by its path in the data."""
 
     def origin(self, path: Path_) -> Path_ | None:
-        """Return where in the file the value at `path` was written for `repeat`, None where it was not."""
+        """Return the path in the file from which `repeat` expanded the value at `path`; None if it was not expanded."""
         for length in range(len(path), 0, -1):
             if path[:length] in self.origins:
                 return self.origins[path[:length]] + path[length:]
         return None
 
     def place(self, path: Path_) -> Place | None:
-        """Return where the value at `path` stands, None where nothing stands there."""
+        """Return the place of the value at `path`, None if there is no value."""
         node = self.top
         key_line, setting = 0, ""
         for key in self.origin(path) or path:
@@ -118,22 +118,22 @@ class Source:
 
 
 def read(path: Path, keys: Collection[str] = ()) -> Source:
-    """Read the file at `path`; InputError where there is none, or it is no YAML of the allowed kind: see `parse`."""
+    """Read the file at `path`; raise `InputError` if it cannot be read, or is not valid YAML (see `parse`)."""
     return parse(read_bytes(path), str(path), keys)
 
 
 def parse(content: bytes, file: str, keys: Collection[str] = ()) -> Source:
-    """Build the data of one YAML document.
+    """Return the data of one YAML document.
 
-    InputError at the first fault of syntax, with the duplicate keys and the tags before it.
+    Raises `InputError` at the first syntax error, together with the duplicate keys and tags before it.
 
     Parameters
     ----------
     file
-        Its name in messages.
+        Name of the file in messages.
     keys
-        Keys of which a file has one at least: else it is no file for vibsim, and no message shows what is in it. None
-        means that any file will do.
+        Keys of which an experiment file has at least one. Messages show no content of any other file, which may be
+        private. Empty accepts any file.
     """
     try:
         text = content.decode("utf-8-sig")
@@ -149,7 +149,7 @@ def parse(content: bytes, file: str, keys: Collection[str] = ()) -> Source:
         source = reader.source()
         if not keys or source.data.keys() & set(keys):
             return source
-        rule = f"is no experiment: it has none of the keys {', '.join(keys)}"
+        rule = f"is not an experiment: it has none of the keys {', '.join(keys)}"
         raise InputError([Fault(file, 0, "", "", rule)])
     except InputError as error:
         faults = error.faults
@@ -159,10 +159,10 @@ def parse(content: bytes, file: str, keys: Collection[str] = ()) -> Source:
         faults = (Fault(file, 0, "", "", _INVALID, str(error).partition("\n")[0]),)
     finally:
         reader.loader.dispose()
-    found = {*reader.faults, *faults}
+    shown = {*reader.faults, *faults}
     if keys and not set(reader.top.keys or () if reader.top else ()) & set(keys):
-        found = {replace(fault, key="", value="") for fault in faults}
-    raise InputError(found)
+        shown = {replace(fault, key="", value="") for fault in faults}
+    raise InputError(shown)
 
 
 def _syntax(error: yaml.MarkedYAMLError, text: str, file: str) -> Fault:
@@ -192,7 +192,7 @@ def _syntax(error: yaml.MarkedYAMLError, text: str, file: str) -> Fault:
 
 
 def _stray_colon(lines: list[str], line: int) -> str:
-    """Say what is wrong where a key stands that YAML does not expect: the usual slips, the likeliest first."""
+    """Return the most likely cause of an unexpected colon."""
     above = next((k for k in range(line - 1, 0, -1) if lines[k - 1].strip()), 0)
     if any(_TIGHT_COLON.match(lines[k - 1]) for k in (above, line) if k):
         number = above if above and _TIGHT_COLON.match(lines[above - 1]) else line
@@ -248,7 +248,7 @@ class _Reader:
         return Source(self.file, self.top.value, self.top, tuple(self.faults))
 
     def node(self, path: Path_, depth: int, *, is_key: bool = False) -> Node:
-        """Read the node at `path` (of a key: the mapping), inside so many others."""
+        """Read the node at `path` (for a key: the path of its mapping) at nesting `depth`."""
         event = self.loader.get_event()
         if is_key and not isinstance(event, yaml.ScalarEvent):
             raise self.refuse(event, path, "a key must be plain text")
@@ -277,8 +277,8 @@ class _Reader:
             self.mapping(node, path, depth + 1)
         elif isinstance(event, yaml.SequenceStartEvent):
             while not self.loader.check_event(yaml.SequenceEndEvent):
-                place = len(node.value)
-                self.keep(node, place, self.node((*path, place), depth + 1), path)
+                position = len(node.value)
+                self.keep(node, position, self.node((*path, position), depth + 1), path)
             self.loader.get_event()
         node.is_open = False
         return node
@@ -296,15 +296,15 @@ class _Reader:
             self.keep(node, key.text, self.node((*path, key.text), depth), path)
         self.loader.get_event()
 
-    def keep(self, parent: Node, place: str | int, node: Node, path: Path_) -> None:
-        """Put a node into its parent; of two values of one key the first counts."""
+    def keep(self, parent: Node, key: str | int, node: Node, path: Path_) -> None:
+        """Add a node to its parent; of duplicate keys the first counts."""
         self.grow(parent, node, path)
         assert parent.children is not None
-        parent.children.setdefault(place, node)
-        if isinstance(place, int):
+        parent.children.setdefault(key, node)
+        if isinstance(key, int):
             parent.value.append(node.value)
         else:
-            parent.value.setdefault(place, node.value)
+            parent.value.setdefault(key, node.value)
 
     def grow(self, parent: Node, node: Node, path: Path_) -> None:
         parent.size += node.size
@@ -328,7 +328,7 @@ class _Reader:
         return InputError([Fault(self.file, _line(event), dotted(path), value, rule, hint)])
 
     def note(self, fault: Fault) -> None:
-        """Keep a fault that does not hinder reading on; its node counts as if it were sound."""
+        """Record a fault that does not prevent further reading; its node counts as valid."""
         self.faults.append(fault)
         if len(self.faults) >= MAX_FAULTS:
             raise InputError([Fault(self.file, 0, "", "", "has more faults than are listed")])
@@ -339,7 +339,7 @@ def _line(event: Any) -> int:
 
 
 def dotted(path: Path_) -> str:
-    """Write a path as in messages: ``checks[2].order``."""
+    """Return a path in the notation of messages: ``checks[2].order``."""
     text = ""
     for part in path:
         text += f"[{part}]" if isinstance(part, int) else f".{part}" if text and part else part
