@@ -1,12 +1,12 @@
 """The elementary functions of the engine, in strict ``+ - * /`` and square roots.
 
-A member's numbers must not depend on the lane or the machine that computes them, so its forces never call the C
-library, whose last digit differs between versions. One text serves every lane: plain Python runs it as it stands, the
-compiled lanes compile it without contraction. Only taking a double apart is written per lane (`primitives`).
+Results must not depend on the lane or the machine, so forces never call the C library, whose last digit differs between
+versions. One text serves every lane: plain Python executes it, the compiled lanes compile it without contraction. Only
+access to the parts of a double differs between lanes (`primitives`).
 
-Sine and cosine have an error below 2.5 units in the last place over all doubles, every other function below 1 (test:
-against 50 digits). All have the special values of C99, annex F, except that a comparison with NaN gives
-NaN, and so does `hypot`.
+Sine and cosine have an error below 2.5 units in the last place over all doubles, every other function below 1 (tested
+against 50 digits). All have the special values of C99, annex F, except that a comparison with NaN gives NaN, and so
+does `hypot`.
 """
 
 from __future__ import annotations
@@ -51,13 +51,13 @@ __all__ = ["ELEMENTARY", "Elementary"]
 
 @dataclass(frozen=True)
 class Elementary:
-    """One function in two texts, which are one where it needs no branches."""
+    """One function in two versions, which are the same if it needs no branches."""
 
     full: Callable[..., float]
-    """Right for every double."""
+    """Valid for every double."""
     fast: Callable[..., float]
-    """Free of branches, so that a loop over members becomes vector instructions: the bits of `full`, or NaN outside
-    the range that it states and for NaN."""
+    """Branch-free, so that a loop over members can be vectorised: the bits of `full`, or NaN outside its stated range
+    and for NaN."""
 
 
 _WITH_BRANCHES: dict[str, tuple[Callable[..., float], Callable[..., float]]] = {
@@ -78,4 +78,4 @@ ELEMENTARY: Mapping[str, Elementary] = MappingProxyType(
         for name in sorted((*_WITH_BRANCHES, *_WITHOUT))
     }
 )
-"""The functions that a formula may call, by the names that formulas use, and ``power``."""
+"""The functions that a formula may call, by their names in formulas, and ``power``."""

@@ -1,21 +1,21 @@
 r"""Sine, cosine and tangent.
 
-``r = x - k pi`` with pi in three parts (Cody and Waite; k times a part of 35 bits is exact for \|k\| < 2^17), then ``r
-+ r^3 P(r^2)`` on [-pi/2, pi/2], P of degree 7 (least squares with rounded coefficients, relative error 5e-19), summed
-in Estrin's form because the length of the chain of dependent operations is what a step costs. The part of r that
-rounding drops is carried in first order. The cosine is the same with a k that lies half way between whole numbers.
-Beyond 1e5, 15 000 turns from home, the reduction is done in whole numbers.
+``r = x - k pi`` with pi in three parts (Cody and Waite; k times a part of 35 bits is exact for \|k\| < 2^17), then
+``r + r^3 P(r^2)`` on [-pi/2, pi/2], P of degree 7 (least squares with rounded coefficients, relative error 5e-19),
+summed in Estrin's form because the longest chain of dependent operations determines the cost of a step. The rounding
+error of r is included to first order. The cosine is the same with k half way between integers. Beyond 1e5, about 15 000
+turns, the reduction is done in integer arithmetic.
 
-Sines and cosines are most of what a pendulum costs, and a force that is wrong by two units in its last place moves no
-solution. Where a sine is only a step on the way (the tangent), and beyond 1e5, `sine_parts` gives it in two parts: ``r
-- r^3/6 + r^5 Q(r^2)``, Q of degree 6 (Remez, relative error 4e-19), the larger part of the cubic term exact.
+Sines and cosines dominate the cost of a pendulum, and errors of two units in the last place of the force do not matter
+there. For intermediate results (the tangent), and beyond 1e5, `sine_parts` gives the sine in two parts:
+``r - r^3/6 + r^5 Q(r^2)``, Q of degree 6 (Remez, relative error 4e-19), the larger part of the cubic term exact.
 
 The tangent is the quotient of sine and cosine, both in two parts.
 
-Reduction in whole numbers: ``x = M 2^E`` with a whole M below 2^53. Of 1/pi only the digits matter that do not become
-multiples of whole turns by the multiplication, and are not too small to count: seven digits of 30 bits, whose products
-are exact in 64 bits. They leave an error of 2^-127 of half a turn. No double is nearer to a multiple of pi/2 than about
-2^-62, so that the remainder has 64 right bits or more.
+Reduction in integer arithmetic: ``x = M 2^E`` with an integer M < 2^53. Only those digits of 1/pi are used whose
+product with x is neither a multiple of a full turn nor negligible: seven digits of 30 bits, whose products are exact in
+64 bits. They leave an error of 2^-127 of half a turn. No double is closer to a multiple of pi/2 than about 2^-62, so
+the remainder has at least 64 correct bits.
 
 Source: W. J. Cody and W. Waite, Software Manual for the Elementary Functions (1980), chapter 8; M. Payne and R. Hanek,
 Radian reduction for trigonometric functions, SIGNUM Newsletter 18 (1983); J.-M. Muller, Elementary Functions, 3rd ed.
@@ -29,7 +29,7 @@ import math
 from vibsim.elementary.doubled import fast_two_sum, nearest_whole, quotient, two_product
 from vibsim.elementary.primitives import exponent_of, mantissa_of, two_to
 
-# 1/pi in digits of 30 bits, two zeros first so that every argument begins behind its first digit
+# 1/pi in digits of 30 bits; the leading zeros let every argument begin after the first digit
 _INVERSE_PI_DIGITS = (
     0, 0,
     341782637, 846340265, 335040175, 687512174, 941321298, 751428124, 545520802, 836104029,
@@ -74,7 +74,7 @@ def sin(x: float) -> float:
     The sine of -0 is 0: its sign would cost a twentieth of a step.
     """
     if abs(x) <= HALF_PI:
-        # k = 0: the same result as below without its latency
+        # k = 0: the same result as below, with less latency
         return sine_of(x, 0.0)
     if abs(x) <= _ONE_HALF_TURN:
         # k = 1 or -1: likewise
@@ -125,13 +125,13 @@ def cos_fast(x: float) -> float:
 
 
 def parity_sign(k: float) -> float:
-    """Return 1 for even and -1 for odd whole k."""
+    """Return 1 for even and -1 for odd integers k."""
     odd = k - 2.0 * nearest_whole(0.5 * k)
     return 1.0 - 2.0 * (odd * odd)
 
 
 def reduced(x: float, k: float, sign: float) -> tuple[float, float]:
-    """Return r and a rest with ``x = k pi + sign (r + rest)``, where twice k is whole."""
+    """Return r and `rest` with ``x = k pi + sign (r + rest)``, for k or k + 1/2 an integer."""
     coarse = x - k * _PI_1
     fine = k * _PI_2
     r = coarse - fine
@@ -139,7 +139,7 @@ def reduced(x: float, k: float, sign: float) -> tuple[float, float]:
 
 
 def reduced_half(y: float, k: float, sign: float) -> tuple[float, float]:
-    """Return the same for ``y >= 0`` and k half way between whole numbers: at y < 1, ``y - pi/2`` is not exact."""
+    """Return the same for ``y >= 0`` and k + 1/2 an integer; for y < 1, ``y - pi/2`` is not exact."""
     r, rest = reduced(y, k, sign)
     far = k * _PI_1
     return r, rest + sign * (y - ((y - far) + far))
@@ -175,7 +175,7 @@ def sine_parts(r: float, rest: float) -> tuple[float, float]:
 
 
 def sine_far(y: float, quarters: int) -> tuple[float, float]:
-    """Return the sine of ``y + quarters pi/2`` for finite y >= 1 in two parts, by the reduction in whole numbers."""
+    """Return the sine of ``y + quarters pi/2`` for finite y >= 1 in two parts, with integer reduction."""
     q, r, rest = quarter_turns(y)
     q = (q + quarters) & 3
     sign = 1.0 if q < 2 else -1.0
@@ -213,7 +213,7 @@ def tangent_near(x: float) -> float:
     k = nearest_whole(x * PER_PI)
     r, rest = reduced(x, k, 1.0)
     s, s_behind = sine_parts(r, rest)
-    # both of r = x - k pi, whose signs differ from those of x alike for odd k
+    # sine and cosine of r = x - k pi; for odd k both have the opposite sign, which cancels
     y = abs(r)
     r, rest_c = reduced_half(y, 0.5, -1.0)
     c, c_behind = sine_parts(r, rest_c - (rest if s > 0.0 else -rest))
@@ -221,7 +221,7 @@ def tangent_near(x: float) -> float:
 
 
 def quarter_turns(y: float) -> tuple[int, float, float]:
-    r"""Return q in 0 ... 3, r and a rest with ``y = (q + 4 n) pi/2 + r + rest``, \|r\| <= pi/4.
+    r"""Return q in 0 ... 3, r and `rest` with ``y = (q + 4 n) pi/2 + r + rest``, \|r\| <= pi/4.
 
     For finite y >= 1; error below 2^-64 of r.
     """
@@ -230,7 +230,7 @@ def quarter_turns(y: float) -> tuple[int, float, float]:
     shift = 30 * (first + 1) - exponent
     whole = int(mantissa_of(y) * 4503599627370496.0)
     high, low = whole >> 30, whole & _DIGIT
-    # the digits of M/pi, last one first: schoolbook multiplication
+    # the digits of M/pi, the last first, by schoolbook multiplication
     behind = carry = 0
     d_6 = d_5 = d_4 = d_3 = d_2 = d_1 = 0
     for j in range(first + 6, first - 1, -1):

@@ -1,4 +1,7 @@
-"""Rounding without a call, and sums and products with their rounding errors, without a fused multiply-add.
+"""Rounding to integers, and error-free sums and products, without a library call or fused multiply-add.
+
+A number "in two parts" is an unevaluated sum of two doubles, the larger part first. The smaller part of ``x`` is called
+``x_behind`` throughout this package.
 
 Source: T. J. Dekker, A floating-point technique for extending the available precision, Numerische Mathematik 18 (1971);
 J.-M. Muller et al., Handbook of Floating-Point Arithmetic, 2nd ed. (2018), sections 4.3 and 4.4.
@@ -9,16 +12,16 @@ from __future__ import annotations
 import math
 
 _SPLIT = 134217729.0  # 2^27 + 1
-_ROUND = 6755399441055744.0  # 1.5 * 2^52: there doubles are whole numbers
+_ROUND = 6755399441055744.0  # 1.5 * 2^52: doubles of this size are integers
 
 
 def nearest_whole(x: float) -> float:
-    r"""Return the whole number nearest to `x`, the even one of two, for \|x\| <= 2^51."""
+    r"""Return the integer nearest to `x`, ties to even, for \|x\| <= 2^51."""
     return (x + _ROUND) - _ROUND
 
 
 def two_product(a: float, b: float) -> tuple[float, float]:
-    """Return ``a b`` rounded, and its error; exact unless something over- or underflows (sizes up to 2^996)."""
+    """Return ``a b`` rounded, and its error; exact without over- and underflow (sizes up to 2^996)."""
     c = _SPLIT * a
     a_1 = c - (c - a)
     a_2 = a - a_1
@@ -45,7 +48,7 @@ def fast_two_sum(a: float, b: float) -> tuple[float, float]:
 def quotient(a: float, a_behind: float, b: float, b_behind: float) -> float:
     r"""Return ``(a + a_behind)/(b + b_behind)`` with an error below 0.51 units in the last place.
 
-    The larger part first; b not zero; the quotient's size between 2^-960 and 2^990.
+    b must not be zero, and the size of the quotient must be between 2^-960 and 2^990.
     """
     q, behind = quotient_parts(a, a_behind, b, b_behind)
     return q + behind
@@ -62,7 +65,7 @@ def quotient_parts(a: float, a_behind: float, b: float, b_behind: float) -> tupl
 
 
 def root_parts(h: float, behind: float) -> tuple[float, float]:
-    """Return ``sqrt(h + behind)`` in two parts, the larger part first; 0 for h below 0."""
+    """Return ``sqrt(h + behind)`` in two parts; 0 for h below 0."""
     root = math.sqrt(h if h > 0.0 else 0.0)
     p, error = two_product(root, root)
     return root, 0.5 * (((h - p) - error) + behind) / (root if root > 0.0 else 1.0)

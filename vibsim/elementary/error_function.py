@@ -1,10 +1,10 @@
 r"""Error function and its complement.
 
-Below 0.65 ``erf x = x + x P(x^2)``, P of degree 10 (relative error 1e-17). From there on
-``erfc x = e^(-x^2) G(q)/(x + 5/8)`` with ``q = (x - 17/4)/(x + 17/4)`` in -0.74 ... 0.74, where
-``(x + 5/8) e^(x^2) erfc x`` lies between 0.56 and 0.71 and is level at the lower end, so that the rounding of q is not
-felt: G of degree 21 (relative error 2e-18), its first coefficient in two parts, x^2 in two parts as well. P and G are
-weighted least squares at Chebyshev's points with rounded coefficients.
+Below 0.65 ``erf x = x + x P(x^2)``, P of degree 10 (relative error 1e-17). Above,
+``erfc x = e^(-x^2) G(q)/(x + 5/8)`` with ``q = (x - 17/4)/(x + 17/4)`` in -0.74 ... 0.74. There
+``(x + 5/8) e^(x^2) erfc x`` is between 0.56 and 0.71 and flat at the lower end, so that the rounding of q does not
+matter: G of degree 21 (relative error 2e-18), its first coefficient and x^2 in two parts. P and G are weighted
+least-squares fits at Chebyshev points with rounded coefficients.
 
 Source: the variable q after M. M. Shepherd and J. G. Laframboise, Chebyshev approximation of (1 + 2x) exp(x^2) erfc x
 in 0 <= x < oo, Mathematics of Computation 36 (1981).

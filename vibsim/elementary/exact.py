@@ -1,11 +1,11 @@
-"""What chooses between values, rounding to whole numbers, remainder and square root: exact or correctly rounded.
+"""Selection, sign, rounding to integers, remainder and square root: exact or correctly rounded.
 
-Unlike Python's `min` and `max`, NaN in any argument that decides gives NaN: a fast function says by NaN that it has no
-value, which a comparison would swallow.
+Unlike Python's `min` and `max`, these functions return NaN for NaN in any argument that decides: NaN marks a missing
+value of a fast function, which a comparison would hide.
 
-Doubles from 2^52 on are whole numbers; below, adding and subtracting 2^52 rounds. The remainder ``a - q b`` of positive
-numbers is a double, whichever whole quotient leaves it below b: with a product in two parts while q fits into a double,
-else in whole numbers, ten bits of the quotient at a time.
+Doubles of at least 2^52 are integers; smaller ones are rounded by adding and subtracting 2^52. The remainder
+``a - q b`` of positive numbers is exactly a double: it is computed with a product in two parts while q fits into a
+double, otherwise in integer arithmetic, ten bits of the quotient at a time.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ _QUOTIENT_BITS = 10
 
 
 def absolute(x: float) -> float:
-    """Return the size of `x`."""
+    """Return the absolute value of `x`."""
     return math.fabs(x)
 
 
@@ -46,48 +46,48 @@ def sign(x: float) -> float:
 
 
 def heaviside(x: float) -> float:
-    """Return Heaviside's step: 0 below 0, 1/2 at 0, 1 above; NaN for NaN."""
+    """Return Heaviside's step function: 0 below 0, 1/2 at 0, 1 above; NaN for NaN."""
     value = 1.0 if x > 0.0 else 0.0
     value = 0.5 if x == 0.0 else value
     return value if x == x else x
 
 
 def smaller(a: float, b: float) -> float:
-    """Return the smaller one, `a` where they are equal; NaN where one is NaN."""
+    """Return the smaller argument, `a` if they are equal; NaN if one is NaN."""
     least = b if b < a else a
     return least if b == b else b
 
 
 def larger(a: float, b: float) -> float:
-    """Return the larger one, `a` where they are equal; NaN where one is NaN."""
+    """Return the larger argument, `a` if they are equal; NaN if one is NaN."""
     most = b if b > a else a
     return most if b == b else b
 
 
 def where(condition: float, yes: float, no: float) -> float:
-    """Return `yes` where the condition is not zero, else `no`; NaN where the condition is NaN."""
+    """Return `yes` if the condition is not zero, otherwise `no`; NaN if the condition is NaN."""
     chosen = yes if condition != 0.0 else no
     return chosen if condition == condition else math.nan
 
 
 def nearest(x: float) -> float:
-    """Return the whole number nearest to `x`, the even one of two, for every double."""
+    """Return the integer nearest to `x`, ties to even, for every double."""
     value = math.copysign((abs(x) + _TWO_52) - _TWO_52, x)
     return value if abs(x) < _TWO_52 else x
 
 
 def floor(x: float) -> float:
-    """Return the largest whole number that is not above `x`."""
+    """Return the largest integer that is not above `x`."""
     return rounded_down(x)
 
 
 def ceil(x: float) -> float:
-    """Return the smallest whole number that is not below `x`."""
+    """Return the smallest integer that is not below `x`."""
     return -rounded_down(-x)
 
 
 def rounded_down(x: float) -> float:
-    """Return the same as `floor`: a kernel may compile what formulas call in another way than what functions call."""
+    """Return the same as `floor`: a kernel may compile a function that formulas call separately."""
     value = nearest(x)
     return value - 1.0 if value > x else value
 
@@ -95,7 +95,7 @@ def rounded_down(x: float) -> float:
 def mod(x: float, y: float) -> float:
     """Return ``x - floor(x/y) y``, correctly rounded: between 0 and y, with the sign of y, as Python's ``%``.
 
-    NaN for an infinite x and for y = 0, where Python refuses.
+    NaN for an infinite x and for y = 0, where Python raises.
     """
     a, b = abs(x), abs(y)
     if x != x or y != y or a > _LARGEST_DOUBLE or b == 0.0:
@@ -108,7 +108,7 @@ def mod(x: float, y: float) -> float:
 
 
 def mod_fast(x: float, y: float) -> float:
-    r"""Return `mod` where \|y\| is in 1e-270 ... 1e270 and \|x\| up to 1e15 of it; else NaN."""
+    r"""Return `mod` for \|y\| in 1e-270 ... 1e270 and \|x\| <= 1e15 \|y\|; otherwise NaN."""
     a, b = abs(x), abs(y)
     usual = (b >= _SMALLEST_DIVISOR) & (b <= _LARGEST_DIVISOR) & (a <= _LARGEST_QUOTIENT * b)
     b = b if usual else 1.0
@@ -117,7 +117,7 @@ def mod_fast(x: float, y: float) -> float:
 
 
 def signed(rest: float, b: float, x: float, y: float) -> float:
-    """Return the remainder of x and y from that of their sizes, the second of which is b."""
+    """Return the remainder of x and y from that of their absolute values; b is the absolute value of y."""
     size = rest if (x < 0.0) == (y < 0.0) else b - rest
     return math.copysign(0.0 if rest == 0.0 else size, y)
 
@@ -131,7 +131,7 @@ def remainder_near(a: float, b: float) -> float:
 
 
 def remainder_far(a: float, b: float) -> float:
-    """Return the remainder of finite ``a >= b > 0``, in whole numbers."""
+    """Return the remainder of finite ``a >= b > 0``, in integer arithmetic."""
     rest, exponent_a = whole_and_exponent(a)
     divisor, exponent_b = whole_and_exponent(b)
     rest %= divisor
@@ -144,7 +144,7 @@ def remainder_far(a: float, b: float) -> float:
 
 
 def whole_and_exponent(x: float) -> tuple[int, int]:
-    """Return M below 2^53 and E with ``x = M 2^E``, for finite x > 0."""
+    """Return integers M < 2^53 and E with ``x = M 2^E``, for finite x > 0."""
     tiny = x < _SMALLEST_NORMAL
     normal = x * _TO_NORMAL if tiny else x
     exponent = int(exponent_of(normal)) - (106 if tiny else 52)
@@ -152,7 +152,7 @@ def whole_and_exponent(x: float) -> tuple[int, int]:
 
 
 def whole_power(base: Any, exponent: int) -> Any:
-    """Return a power of a float or an array by multiplication, as kernels have it where the exponent is written."""
+    """Return an integer power of a float or an array by multiplication, with the bits of kernels."""
     if exponent == 0:
         return 1.0
     result = base

@@ -2,20 +2,20 @@ r"""Exponential function, logarithms, powers, cube root, and the length of a vec
 
 ``e^x = 2^k e^r`` with ``k = round(x/ln 2)``, so that \|r\| <= 0.3466, and ``e^r = 1 + r + r^2/2 + r^3 P(r)``, P of
 degree 8 (Remez with rounded coefficients, relative error 6e-18). ln 2 is in two parts, the first of 40 bits, so that
-its product with k is exact. For ``e^x - 1`` the 1 is taken away before the parts are added.
+its product with k is exact. For ``e^x - 1`` the 1 is subtracted before the parts are added.
 
 Logarithms: ``x = 2^k m`` with m in [sqrt(1/2), sqrt(2)), ``s = (m - 1)/(m + 1)``, ``log m = 2 artanh s`` with \|s\| <=
 0.1716.
 
-The general power is ``x^y = e^(y log x)`` with the logarithm in two doubles. The logarithm has an error of 2^-63 of it,
-and y log x is below 746 in size, so that the result has a relative error of 2^-53.5 before its last rounding. Special
+The general power is ``x^y = e^(y log x)`` with the logarithm in two doubles. The logarithm has a relative error of
+2^-63, and y log x is below 746 in size, so the result has a relative error of 2^-53.5 before its last rounding. Special
 values are those of IEEE 754 (C99, annex F.9.4.4).
 
 The cube root: ``x = 2^(3j) m`` with m in [1/2, 4). A cubic polynomial (relative error 5e-3) and one step of Halley's
-leave 1e-7 of the root of m; rounded to 17 bits, so that its cube is exact, it is t, and the root is ``t (1 + d)^(1/3)``
+method give the root of m to 1e-7. Rounded to 17 bits it is t, whose cube is exact, and the root is ``t (1 + d)^(1/3)``
 with ``d = (m - t^3)/t^3`` below 2^-14, by three terms of the series.
 
-``sqrt(x^2 + y^2)`` takes the squares in two parts, scaled so that they neither over- nor underflow.
+``sqrt(x^2 + y^2)`` uses the squares in two parts, scaled against over- and underflow.
 
 Source: W. J. Cody and W. Waite, Software Manual for the Elementary Functions (1980), chapter 6; J.-M. Muller,
 Elementary Functions, 3rd ed. (2016), section 11.3, and 5.3 for the cube root; J.-M. Muller et al., Handbook of
@@ -102,7 +102,7 @@ def expm1(x: float) -> float:
     # k = 0: nothing cancels
     near, near_cut = fast_two_sum(r, 0.5 * z)
     a, cut = fast_two_sum(1.0, r)
-    # where 1 is too small to count it need not be right
+    # a 1 that is too small to matter need not be accurate
     a, a_cut = two_sum(a, -two_to(-100.0 if k > 100.0 else -k))
     a, z_cut = two_sum(a, 0.5 * z)
     far = scaled(a + ((cut + a_cut) + (z_cut + (behind + behind * r)) + rest), k)
@@ -111,13 +111,13 @@ def expm1(x: float) -> float:
 
 
 def within(x: float) -> float:
-    """Return `x` or the nearest number whose exponential has a value of its own; NaN for NaN."""
+    """Return `x` limited to the range in which the exponential neither overflows nor vanishes; NaN for NaN."""
     x = 710.0 if x > 710.0 else x
     return -746.0 if x < -746.0 else x
 
 
 def scaled(x: float, k: float) -> float:
-    """Return ``x 2^k`` for whole k in -2044 ... 2046, rounded once where it is subnormal."""
+    """Return ``x 2^k`` for an integer k in -2044 ... 2046, rounded once if the result is subnormal."""
     half = nearest_whole(0.5 * k)
     return x * two_to(half) * two_to(k - half)
 
@@ -142,7 +142,7 @@ def exp_reduced(x: float, rest: float) -> tuple[float, float, float, float]:
 
 def log(x: float) -> float:
     """Return the natural logarithm, error below 1 unit in the last place; -inf for zero, NaN below."""
-    # a stand-in where there is no logarithm: plain Python refuses to divide by zero
+    # 1 replaces arguments without a logarithm, because plain Python raises for a division by zero
     k, m = halves(x if x > 0.0 else 1.0)
     f = m - 1.0
     s = f / (2.0 + f)
@@ -216,7 +216,7 @@ def log_parts(x: float) -> tuple[float, float]:
 def log_of_sum(x: float, rest: float, doublings: float) -> tuple[float, float]:
     """Return the logarithm of ``2^doublings (x + rest)`` in two parts, for normal x and a rest within its last bit."""
     k, m = halves(x)
-    # where the rest is too small to count it need not be right
+    # a rest that is too small to matter need not be accurate
     rest = rest * two_to(-100.0 if k > 100.0 else -k)
     f = m - 1.0
     bottom, cut = fast_two_sum(2.0, f)
@@ -274,9 +274,9 @@ def power(base: float, exponent: float) -> float:
 
 
 def power_fast(base: float, exponent: float) -> float:
-    r"""Return `power` for finite base > 0 with any exponent up to 1e9 in size.
+    r"""Return `power` for exponents up to 1e9 in size and finite base > 0.
 
-    Also for base < 0 and whole exponents, and for base = 0 and exponents > 0 that are not odd; else NaN.
+    Also for base < 0 and integer exponents, and for base = 0 and exponents > 0 that are not odd; otherwise NaN.
     """
     size = abs(base)
     bounded = abs(exponent) <= _LARGEST_FAST_EXPONENT
@@ -303,7 +303,7 @@ def power_of(x: float, y: float) -> float:
 
 
 def parity(y: float) -> tuple[bool, bool]:
-    """Tell whether `y` is an odd, and whether it is a whole number, for y other than 0; infinities are even."""
+    """Tell whether `y` is odd, and whether it is an integer, for y other than 0; infinities are even."""
     if abs(y) < 1.0:
         return False, False
     if abs(y) >= _LARGEST_WHOLE:

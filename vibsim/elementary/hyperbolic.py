@@ -1,13 +1,13 @@
 r"""Hyperbolic sine, cosine and tangent, and their inverses from the logarithm in two doubles.
 
-``e^y = 2^k (a + b)`` for y = \|x\|; with the inverse of it ``2 cosh y = 2^k (a + b) + 2^-k/(a + b)``, ``2 sinh y`` the
-difference. Below 1 the difference would cancel, and ``sinh y = y + y^3 P(y^2)`` takes its place, P of degree 6 (Remez
-with rounded coefficients, relative error 3e-19).
+``e^y = 2^k (a + b)`` for y = \|x\|; then ``2 cosh y = 2^k (a + b) + 2^-k/(a + b)``, and ``2 sinh y`` is the difference.
+Below 1 the difference would cancel, and is replaced by ``sinh y = y + y^3 P(y^2)``, P of degree 6 (Remez with rounded
+coefficients, relative error 3e-19).
 
 ``asinh y = log(y + sqrt(1 + y^2))`` and ``acosh y = log(y + sqrt((y - 1)(y + 1)))`` with the sum in two parts, whose
-distance from 1 is known to 2^-75 of it at the least; beyond 1e10 both are ``log 2y``. ``2 atanh y`` is
+distance from 1 has a relative error of at most 2^-75; beyond 1e10 both are ``log 2y``. ``2 atanh y`` is
 ``log((1 + y)/(1 - y))``: with the quotient ``2^k m``, m in [sqrt(1/2), sqrt(2)), it is ``k log 2 + 2 artanh s``,
-``s = ((1 + y) - 2^k (1 - y))/((1 + y) + 2^k (1 - y))``, which is y itself where k = 0.
+``s = ((1 + y) - 2^k (1 - y))/((1 + y) + 2^k (1 - y))``, which is y itself if k = 0.
 
 Source: J.-M. Muller, Elementary Functions, 3rd ed. (2016), section 10.3.
 """
@@ -65,7 +65,7 @@ def hyperbolic_parts(y: float) -> tuple[float, float, float, float, float]:
     """Return k, ``2^(1-k) sinh y`` and ``2^(1-k) cosh y``, both in two parts, for ``y >= 0``; NaN for NaN."""
     k, a, b = exp_parts(711.0 if y > 711.0 else y, 0.0)
     a, b = fast_two_sum(a, b)
-    # where the inverse is too small to count it need not be right
+    # an inverse that is too small to matter need not be accurate
     near = 100.0 if k > 100.0 else k
     inverse = two_to(-2.0 * near) / a
     inverse_behind = -b * inverse / a
@@ -116,7 +116,7 @@ def acosh(x: float) -> float:
 
 
 def log_of_argument_and_root(y: float, w: float, root: float, behind: float) -> float:
-    """Return the logarithm of ``w + root + behind``, or of 2y where y is above w."""
+    """Return the logarithm of ``w + root + behind``, or of 2y if y exceeds w."""
     u, cut = two_sum(w, root)
     u, rest = fast_two_sum(u, cut + behind)
     far = y > w

@@ -1,9 +1,9 @@
 r"""Inverse circular functions, all from the angle of a point ``(c, s)``.
 
-``atan(s/c)`` with 0 <= s <= c after a reflection; where ``s > tan(pi/8) c`` the angle is ``pi/4 + atan((s-c)/(s+c))``.
-What is left is ``t + t^3 P(t^2)`` with \|t\| <= tan(pi/8), P of degree 10 (Remez with rounded coefficients, relative
-error 2e-18). ``asin x`` is the angle of ``(sqrt(1 - x^2), x)`` with the root in two parts, ``acos x`` that of its
-reflection.
+``atan(s/c)`` with 0 <= s <= c after a reflection; if ``s > tan(pi/8) c`` the angle is ``pi/4 + atan((s-c)/(s+c))``. The
+remaining arctangent is ``t + t^3 P(t^2)`` with \|t\| <= tan(pi/8), P of degree 10 (Remez with rounded coefficients,
+relative error 2e-18). ``asin x`` is the angle of ``(sqrt(1 - x^2), x)`` with the root in two parts, ``acos x`` that of
+its reflection.
 
 Source: J.-M. Muller, Elementary Functions, 3rd ed. (2016), section 11.3.
 """
@@ -81,7 +81,7 @@ def atan2(y: float, x: float) -> float:
 
 
 def atan2_fast(y: float, x: float) -> float:
-    """Return `atan2` where x and y are finite and not both zero, and y/x is 0 or its size above 1e-100; else NaN."""
+    r"""Return `atan2` for finite x and y, not both zero, with y/x = 0 or \|y/x\| > 1e-100; otherwise NaN."""
     c, s = abs(x), abs(y)
     positive = math.copysign(1.0, x) > 0.0
     usual = (c <= _LARGEST_DOUBLE) & (s <= _LARGEST_DOUBLE) & (c + s > 0.0)
@@ -100,7 +100,7 @@ def angle_from(s: float, c: float, positive: bool) -> float:
 
 
 def mirrored(value: float, behind: float, stays: bool) -> float:
-    """Return the sum of the parts of an angle, or pi minus it."""
+    """Return the sum of the parts of an angle, or pi minus that sum."""
     other, cut = fast_two_sum(_PI, -value)
     behind = behind if stays else cut + (_PI_REST - behind)
     return (value if stays else other) + behind
@@ -137,7 +137,7 @@ def angle_of(s: float, s_behind: float, c: float, c_behind: float) -> tuple[floa
 def arctangent(
     top: float, top_behind: float, bottom: float, bottom_behind: float
 ) -> tuple[float, float]:
-    """Return the angle whose tangent is a quotient of size up to tan(pi/8), in two parts."""
+    """Return the angle whose tangent is a quotient, at most tan(pi/8) in size, in two parts."""
     inverse = 1.0 / bottom
     t = top * inverse
     p, error = two_product(t, bottom)

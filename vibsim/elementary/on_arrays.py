@@ -1,8 +1,8 @@
-"""The elementary functions on arrays: what is computed of numbers that are stored has the same bits on every machine.
+"""The elementary functions on arrays, with the same bits on every machine, for numbers that are stored.
 
-Those of numpy and of the C library differ in the last digit between processors. Here the texts of this folder are
-compiled, one kernel for each function: a loop without branches, which becomes vector instructions, and behind it one
-over the numbers for which that has no value.
+The functions of numpy and the C library differ in the last digit between processors. Here the functions of this package
+are compiled, one kernel each: a branch-free loop, which LLVM vectorises, then a loop over entries for which the first
+gave NaN.
 """
 
 from __future__ import annotations
@@ -31,9 +31,9 @@ from vibsim.native.kernel_cache import Kernel, load
 
 _TEXTS = (circular, doubled, error_function, exact, exponential, hyperbolic, inverse)
 MOST_PLAIN = 20_000
-"""Numbers that take as long in plain Python as LLVM takes to be loaded, which also takes 60 MB. [measured]"""
+"""Number of values that take as long in plain Python as loading LLVM, which also takes 60 MB. [measured]"""
 _PLAIN = {"numbers": 0}
-"""How many there were in this process."""
+"""Number of values computed in plain Python by this process."""
 _LOOP = """
 @entry
 def kernel({names}, found):
@@ -46,7 +46,7 @@ def kernel({names}, found):
 
 
 def _is_plain(count: int) -> bool:
-    """Say whether so many numbers more are worked out in plain Python, with the same bits, since LLVM is not loaded."""
+    """Tell whether `count` more values are computed in plain Python, with the same bits, because LLVM is not loaded."""
     if "llvmlite" in sys.modules:
         return False
     _PLAIN["numbers"] += count
@@ -59,7 +59,7 @@ def named(name: str) -> Callable[..., Any]:
 
     def function(*arguments: Any) -> Any:
         if all(isinstance(x, int | float) for x in arguments):
-            # of numpy, whose division by zero is infinite
+            # a numpy number, whose division by zero does not raise
             return np.float64(full(*map(float, arguments)))
         arrays = [np.asarray(x, dtype=np.float64, order="C") for x in arguments]
         if len(arrays) > 1:
@@ -77,16 +77,16 @@ def named(name: str) -> Callable[..., Any]:
 
 
 def _of_one_shape(arrays: list[Floats]) -> list[Floats]:
-    """Return arrays that broadcast as arrays of the same shape, each with entries of its own in a row."""
+    """Return arrays that broadcast as contiguous arrays of one shape."""
     shape = np.broadcast(*arrays).shape
-    found = []
+    result = []
     for array in arrays:
         if array.shape != shape:
-            # several times as fast as `np.broadcast_to`, and few numbers are many calls
-            array, given = np.empty(shape), array
-            array[...] = given
-        found.append(array)
-    return found
+            # for small arrays several times as fast as `np.broadcast_to`
+            array, source = np.empty(shape), array
+            array[...] = source
+        result.append(array)
+    return result
 
 
 acos, asin, atan, atan2, cos, sin, tan = map(
@@ -98,14 +98,14 @@ LN_2 = exponential.log(2.0)
 
 
 def complex_of(real: Any, imaginary: Any) -> Any:
-    """Return complex numbers with these parts, of which one may be infinite."""
+    """Return complex numbers with these parts, which may be infinite."""
     found = np.empty(np.broadcast_shapes(np.shape(real), np.shape(imaginary)), dtype=complex)
     found.real, found.imag = real, imaginary
     return found[()]
 
 
 def complex_product(a: Any, b: Any) -> Any:
-    """Return the product of complex numbers; that of numpy is rounded once less where the processor can do so."""
+    """Return the product of complex numbers; numpy's uses fused operations on some processors."""
     x, y, u, v = np.real(a), np.imag(a), np.real(b), np.imag(b)
     return complex_of(x * u - y * v, x * v + y * u)
 
@@ -139,19 +139,19 @@ def _kernel(name: str) -> Kernel:
         fast=function.fast.__name__,
         full=function.full.__name__,
     )
-    # to write the module down takes longer than to load what was made of it
+    # the module is only written if it is not cached, because writing takes longer than loading
     return load(_texts() + loop, "f1 " * (len(names) + 1), lambda: _module() + loop)
 
 
 @cache
 def _texts() -> str:
-    """Return the text of all functions as it stands in their files."""
+    """Return the source files of all functions, joined."""
     return "\n".join(Path(str(module.__file__)).read_text(encoding="utf-8") for module in _TEXTS)
 
 
 @cache
 def _module() -> str:
-    """Return all functions as a module that can be compiled."""
+    """Return all functions as the text of a module that can be compiled."""
     constants = {
         name: value
         for module in _TEXTS
@@ -164,7 +164,7 @@ def _module() -> str:
 
 
 def _plain(function: ast.FunctionDef) -> str:
-    """Return the text of a function without what is for readers, marked by how it is compiled."""
+    """Return the text of a function without docstring and annotations, with the decorator for its compilation."""
     has_loop = any(isinstance(node, ast.For | ast.While) for node in ast.walk(function))
     function.body, function.returns = function.body[1:], None
     for argument in function.args.args:

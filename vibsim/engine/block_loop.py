@@ -1,15 +1,15 @@
 """The loop over blocks of members, then steps, then the members of a block: many members at once.
 
-The members of a block take each step together in a loop without branches, which the compiler turns into vector
-instructions; what a step reads and writes stays in the first-level cache. Whatever needs a branch is rare and is done
-member by member after that loop: a peak, a turn, a sample, an overflow, and an elementary function outside the range
-of its branch-free form, which gives NaN there: the step of such a member is taken again with the full functions.
+The members of a block take each step together in a loop without branches, which the compiler vectorises; the data of a
+step stay in the L1 cache. Whatever needs a branch is rare and is done member by member after that loop: a peak, a turn,
+a sample, an overflow, or an elementary function outside the range of its branch-free form. The latter gives NaN there,
+and the step of such a member is repeated with the full functions.
 
-Every operation on a member's numbers is one that `vibsim.engine.member_loop` does, in the same order, so that the bits
-are the same. `rows` is the scratch memory of one block, flat: a row has `LANES` numbers, and lane j of it is
-``rows[ROW + j]``, because a distance that the compiler knows tells it that rows do not overlap. Two sets of rows, of
-the last step and of this one, swap their parts at each step; each holds the scheme's state, the position and the
-scheme's own velocity, and where extrema are kept the position before.
+The operations on a member's numbers are those of `vibsim.engine.member_loop`, in the same order, so that the bits are
+the same. `rows` is the flat scratch memory of one block: a row has `LANES` numbers, and lane j of it is
+``rows[ROW + j]``, because constant offsets tell the compiler that rows do not overlap. Two sets of rows, for the
+previous and the current step, swap roles at each step. A set holds the scheme's state, the position, the scheme's own
+velocity and, if extrema are kept, the previous position.
 """
 
 from __future__ import annotations
@@ -41,24 +41,23 @@ from vibsim.engine.gather import (
 from vibsim.engine.kernel_stubs import P, called, unbound
 
 LANES = 64
-"""Members of a block."""
+"""Number of members in a block."""
 VECTOR = 8
-"""Lanes of the widest vector instruction; fewer divide it."""
+"""Number of lanes of the widest vector instruction; narrower ones divide it."""
 
 ROWS = ("DT", "ENERGY", "BOTTOM", "VELOCITY", "TWO_BEFORE", "INTERIOR", "ALIVE", "EVENT", "EXTREMA")
-"""Rows behind the two sets: step, initial energy, multiple of a turn below, velocity at this point and two points
-before, largest deviation before this point, 1 for a lane that goes on, 1 for one with something to note, and from
-``EXTREMA`` on the entries of `vibsim.engine.gather.Extrema`; behind those, from ``FIRST_PARAMETER`` on, the
-parameters."""
-ROWS_BEHIND = (
+"""Rows after the two sets: step, initial energy, multiple of a turn below, velocity at this point and two points
+before, largest deviation before this point, 1 for an active lane, 1 for a lane with something to note, and from
+``EXTREMA`` on the entries of `vibsim.engine.gather.Extrema`. The parameters follow, from ``FIRST_PARAMETER`` on."""
+FURTHER_ROWS = (
     *("RATE", "PENDING", "LARGEST_D2T", "SLOPE", "SLOPE_BEFORE", "DISSIPATED", "DRIVEN"),
     "FIRST_KEPT",
 )
-"""Rows behind the parameters: where `D2T` is ``1/(2 dt)``, the deviation by ``[D_2t u]`` at this point and the largest
-one before; where peaks are found by that velocity (`STAGGERED`), it at this point and the one before; the sums of
-powers for `WORK`; and from ``FIRST_KEPT`` on what is kept from stage to stage."""
+"""Rows after the parameters. With `D2T`: ``1/(2 dt)``, the deviation by ``[D_2t u]`` at this point and the largest
+before. With `STAGGERED`: ``[D_2t u]`` at this point and at the previous one. With `WORK`: the sums of the powers. From
+``FIRST_KEPT`` on: values kept for later stages."""
 
-# bound by the kernel (`vibsim.engine.kernel_stubs`); of rows, where they begin (`row_places`)
+# bound by the kernel (`vibsim.engine.kernel_stubs`); names of rows are their offsets (`row_places`)
 D2T = GATHER = KEEP = SERIES = STAGED = STAGGERED = WORK = True
 ALIVE = BEFORE = BOTTOM = DEVIATION_SO_FAR = DISSIPATED = DRIVEN = DT = ENERGY = EVENT = 1
 FIRST_PARAMETER = INTERIOR = LARGEST_D2T = OWN = PARAMETERS = PENDING = POSITION = RATE = SET = 1
@@ -68,26 +67,27 @@ parameters_of = powers = powers_fast = put_extrema = put_states = stages_of = st
 states_in = step = step_end = step_fast = total = unbound
 
 Lane = tuple[int, int, int, int, int]
-"""Where the set before a step and that behind it begin, the member, its lane, and the number of the step."""
+"""Offsets of the set before and after a step, the member, its lane, and the number of the step."""
 
 
 def row_places(states: int, parameters: int, with_peaks: bool) -> dict[str, int]:
-    """Return where every row begins.
+    """Return the offset of every row by name.
 
-    ``POSITION, OWN, BEFORE``: within a set, behind the state: the position, the scheme's own velocity, the position
-    before. ``SET``: the second set. Then the rows behind both, and the parameters.
+    ``POSITION, OWN, BEFORE`` are relative to a set, after the state: the position, the scheme's own velocity, the
+    previous position. ``SET`` is the second set. `ROWS`, the parameters and `FURTHER_ROWS` follow.
     """
     within = {"POSITION": states, "OWN": states + 1, "BEFORE": states + 2}
-    one = states + (3 if with_peaks else 2)
-    behind = {name: 2 * one + i for i, name in enumerate(ROWS)}
-    first = behind["EXTREMA"] + N_EXTREMA
-    last = {name: first + parameters + i for i, name in enumerate(ROWS_BEHIND)}
-    behind |= {"DEVIATION_SO_FAR": behind["EXTREMA"] + LARGEST_DEVIATION, "FIRST_PARAMETER": first}
-    return {name: row * LANES for name, row in {**within, "SET": one, **behind, **last}.items()}
+    size = states + (3 if with_peaks else 2)
+    shared = {name: 2 * size + i for i, name in enumerate(ROWS)}
+    first = shared["EXTREMA"] + N_EXTREMA
+    further = {name: first + parameters + i for i, name in enumerate(FURTHER_ROWS)}
+    shared |= {"DEVIATION_SO_FAR": shared["EXTREMA"] + LARGEST_DEVIATION, "FIRST_PARAMETER": first}
+    places = {**within, "SET": size, **shared, **further}
+    return {name: row * LANES for name, row in places.items()}
 
 
-def run(members: Any, span: Any, settings: Any, found: Any, rows: Any) -> None:
-    """Step some members of one scheme: see `vibsim.engine.member_loop.run`.
+def run(members: Any, span: Any, settings: Any, results: Any, rows: Any) -> None:
+    """Step a range of members by one scheme: see `vibsim.engine.member_loop.run`.
 
     Parameters
     ----------
@@ -97,10 +97,10 @@ def run(members: Any, span: Any, settings: Any, found: Any, rows: Any) -> None:
     parameters, table, initial, dt = members
     first, stop = span
     steps, every, variant, end_rule, turn = settings
-    samples = found[0]
+    samples = results[0]
     for base in range(first, stop, LANES):
         width = min(LANES, stop - base)
-        # whole vectors: the lanes behind the last member repeat it and are never written
+        # whole vectors: surplus lanes repeat the last member and are never written
         filled = (width + VECTOR - 1) // VECTOR * VECTOR
         for j in range(filled):
             case = base + min(j, width - 1)
@@ -130,12 +130,12 @@ def run(members: Any, span: Any, settings: Any, found: Any, rows: Any) -> None:
             if step_lanes(rows, filled, n) or is_last:
                 for j in range(width):
                     if rows[ALIVE + j] != 0.0:
-                        mend(rows, (old, new, base + j, j, n), is_last, end_rule, every, found)
+                        mend(rows, (old, new, base + j, j, n), is_last, end_rule, every, results)
             if GATHER:  # noqa: SIM102
                 if gather_lanes(rows, filled, n, turn):
                     for j in range(width):
                         if rows[EVENT + j] != 0.0 and rows[ALIVE + j] != 0.0:
-                            note(rows, (old, new, base + j, j, n), turn, found)
+                            note(rows, (old, new, base + j, j, n), turn, results)
             if n == due:
                 for j in range(width):
                     if rows[ALIVE + j] != 0.0:
@@ -147,7 +147,7 @@ def run(members: Any, span: Any, settings: Any, found: Any, rows: Any) -> None:
                 due += every
         for j in range(width):
             if rows[ALIVE + j] != 0.0:
-                finish(rows, base + j, j, steps, every, found)
+                finish(rows, base + j, j, steps, every, results)
 
 
 @called
@@ -177,14 +177,14 @@ def begin(rows: Any, j: int, variant: int, u: float, v: float, h: float, turn: f
 
 @called
 def step_lanes(rows: Any, filled: int, n: int) -> int:
-    """Take step n of every lane: with its sets as numbers the compiler sees that they are not the same."""
+    """Take step n of every lane, with constant offsets of the sets, so that the compiler sees that they differ."""
     if n & 1:
         return step_block(rows, 0, SET, filled, n)
     return step_block(rows, SET, 0, filled, n)
 
 
 def step_block(rows: Any, old: int, new: int, filled: int, n: int) -> int:
-    """Take step n of every lane; return whether one may have failed or left the range of a fast function."""
+    """Take step n of every lane; return whether some lane may have failed or left the range of a fast function."""
     bad = 0
     if STAGED:
         stages_of(rows, old, filled, n)
@@ -208,8 +208,8 @@ def step_block(rows: Any, old: int, new: int, filled: int, n: int) -> int:
 
 
 @called
-def mend(rows: Any, lane: Lane, is_last: bool, end_rule: int, every: int, found: Any) -> None:
-    """Take step n of a lane again where the fast one gave NaN; end the velocity; let a member that failed rest."""
+def mend(rows: Any, lane: Lane, is_last: bool, end_rule: int, every: int, results: Any) -> None:
+    """Repeat step n of a lane with full functions if it gave NaN; apply the end rule; finish a member that failed."""
     old, new, case, j, n = lane
     h = rows[DT + j]
     state = states_in(rows, old, j)
@@ -225,9 +225,9 @@ def mend(rows: Any, lane: Lane, is_last: bool, end_rule: int, every: int, found:
         v = end_velocity(end_rule, own, before, rows[TWO_BEFORE + j], backward(state, h))
     rows[VELOCITY + j] = v
     if not abs(state[0]) + abs(v) < OVERFLOW:
-        # of a member that failed, all points came before the last one
+        # for a failed member, all points precede the last one
         rows[INTERIOR + j] = rows[DEVIATION_SO_FAR + j]
-        finish(rows, case, j, n - 1, every, found)
+        finish(rows, case, j, n - 1, every, results)
         rows[ALIVE + j] = 0.0
         rows[VELOCITY + j] = 0.0
         for i in range(0, SET, LANES):
@@ -236,14 +236,14 @@ def mend(rows: Any, lane: Lane, is_last: bool, end_rule: int, every: int, found:
 
 @called
 def gather_lanes(rows: Any, filled: int, n: int, turn: float) -> int:
-    """Gather what step n has, as `step_lanes` takes it."""
+    """Gather the statistics of step n, with constant offsets of the sets as in `step_lanes`."""
     if n & 1:
         return gather_block(rows, 0, SET, filled, n, turn)
     return gather_block(rows, SET, 0, filled, n, turn)
 
 
 def gather_block(rows: Any, old: int, new: int, filled: int, n: int, turn: float) -> int:
-    """Gather what every lane has at step n; return whether one has something to note."""
+    """Gather the statistics of every lane at step n; return whether some lane has something to note."""
     events = 0
     for j in range(filled):
         u = rows[new + POSITION + j]
@@ -286,7 +286,7 @@ def velocity_d2t(rows: Any, old: int, new: int, j: int) -> float:
 
 
 def deviation_d2t(rows: Any, old: int, new: int, j: int, n: int) -> float:
-    """Return the size of the energy deviation by ``[D_2t u]^n`` of a lane, or NaN; the potential energy is known."""
+    """Return the absolute energy deviation by ``[D_2t u]^n`` of a lane, or NaN outside the range of fast functions."""
     kinetic, potential = energies_fast(
         rows[new + POSITION + j],
         velocity_d2t(rows, old, new, j),
@@ -298,7 +298,7 @@ def deviation_d2t(rows: Any, old: int, new: int, j: int, n: int) -> float:
 
 @called
 def take_series(rows: Any, lane: Lane, sample: int, samples: Any) -> None:
-    """Write what samples have of a lane beside position and velocity."""
+    """Write the further rows of a sample of a lane."""
     old, new, case, j, _ = lane
     samples[RUNNING_ROW, case, sample] = rows[DEVIATION_SO_FAR + j]
     if D2T:
@@ -310,9 +310,9 @@ def take_series(rows: Any, lane: Lane, sample: int, samples: Any) -> None:
 
 
 @called
-def note(rows: Any, lane: Lane, turn: float, found: Any) -> None:
-    """Note the peak, trough or turn of a lane at step n, and an energy that no fast function could give."""
-    _, stats, counts, kept = found
+def note(rows: Any, lane: Lane, turn: float, results: Any) -> None:
+    """Note the peak, trough or turn of a lane at step n, and repeat energies that fast functions could not give."""
+    _, stats, counts, kept = results
     old, new, case, j, n = lane
     h, p = rows[DT + j], parameters_in(rows, j)
     u, v = rows[new + POSITION + j], rows[VELOCITY + j]
@@ -344,9 +344,9 @@ def note(rows: Any, lane: Lane, turn: float, found: Any) -> None:
 
 
 @called
-def finish(rows: Any, case: int, j: int, good: int, every: int, found: Any) -> None:
-    """Write what was gathered of a member that has arrived, or that failed after step `good`."""
-    samples, stats, counts, _ = found
+def finish(rows: Any, case: int, j: int, good: int, every: int, results: Any) -> None:
+    """Write the statistics of a member whose last finite step is `good`."""
+    samples, stats, counts, _ = results
     if GATHER:
         note_extrema(stats, case, 0, extrema_in(rows, j), rows[INTERIOR + j])
     if D2T:

@@ -1,10 +1,9 @@
-"""Several coordinates: a scheme that is written for one coordinate stands for vectors as it is.
+"""Several coordinates: the text of a scheme for one coordinate works on vectors unchanged.
 
-In the text of a scheme every position, velocity and acceleration is one number. For a model with several coordinates
-they are vectors. A sum of vectors, a number times a vector, and ``abs`` of a vector, which is its Euclidean norm, are
-worked out component by component, so that uncoupled coordinates move as each would alone, to the last bit. Anything
-else (a product of two vectors, a comparison, a number added to a vector) is refused. In compiled code every tuple of
-floats is a vector (`vibsim.native`), in plain Python a `Vector` is one.
+For a model with several coordinates positions, velocities and accelerations are vectors. Sums of vectors and products
+with numbers are computed component by component, so that uncoupled coordinates have the same bits as each alone;
+``abs`` is the Euclidean norm. Anything else (a product of two vectors, a comparison, a number added to a vector) is
+refused. In compiled code a vector is a tuple of floats (`vibsim.native`), in plain Python a `Vector`.
 """
 
 from __future__ import annotations
@@ -62,12 +61,12 @@ class Vector(tuple[float, ...]):
 
 
 def vector(*components: float) -> Vector:
-    """Return a vector: what the text of a kernel calls by this name."""
+    """Return a vector; kernels call this name."""
     return Vector(components)
 
 
 def put_vectors(module: Module, stepper: Stepper, count: int) -> None:
-    """Write what stands for functions of the schemes that are written for numbers alone."""
+    """Write vector versions of functions of the schemes that work on numbers only."""
     used = stepper.step.__globals__
     for stages, function in enumerate((newton.solved, newton.solved_together), 1):
         if used.get(function.__name__) is function:
@@ -78,9 +77,9 @@ def put_vectors(module: Module, stepper: Stepper, count: int) -> None:
 
 
 def put_moves(module: Module, count: int) -> None:
-    """Write what moves positions and velocities from and to arrays with a row of each component."""
+    """Write the functions that read and write positions and velocities in arrays with a row for each component."""
 
-    def together(parts: list[str]) -> str:
+    def joined(parts: list[str]) -> str:
         return f"vector({', '.join(parts)})" if count > 1 else parts[0]
 
     def components(name: str) -> list[str]:
@@ -91,7 +90,7 @@ def put_moves(module: Module, count: int) -> None:
         ("point_of(values, case, k)", "values[{}, case, k]"),
     ):
         rows = [f"float({place.format(row)})" for row in range(2 * count)]
-        module.define(head, f"return {together(rows[:count])}, {together(rows[count:])}")
+        module.define(head, f"return {joined(rows[:count])}, {joined(rows[count:])}")
     for head, parts in (
         ("put_components(samples, first, case, k, w)", components("w")),
         ("put_moving(samples, case, k, q, w)", components("q") + components("w")),
@@ -102,7 +101,7 @@ def put_moves(module: Module, count: int) -> None:
     module.define("first_of(q)", f"return {components('q')[0]}")
     pairs = zip(components("q"), components("w"), strict=True)
     terms = [f"abs({part})" for pair in pairs for part in pair]
-    # by halves: no addition waits for all others, and nothing is nested deeply
+    # pairwise: a short chain of dependent additions, and no deep nesting
     while len(terms) > 1:
         terms = [f"({a} + {b})" for a, b in zip(terms[::2], terms[1::2], strict=False)] + terms[
             len(terms) - len(terms) % 2 :
@@ -111,7 +110,7 @@ def put_moves(module: Module, count: int) -> None:
 
 
 def put_further(module: Module, count: int) -> None:
-    """Write what gathers the extrema of coordinates behind the first."""
+    """Write the functions that gather the extrema of the coordinates after the first."""
     for text in (gather.first_extrema, gather.next_extrema, gather.note_extrema):
         collect(module, text, text.__name__, {})
     further = range(1, count)

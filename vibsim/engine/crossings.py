@@ -1,18 +1,18 @@
-"""The events that a user writes as formulas (`vibsim.models.events.Crossings`): guards that change their signs.
+"""Events that a user writes as formulas (`vibsim.models.events.Crossings`): guards that change their signs.
 
-Modes: 0 where the motion has ended; else 1 and, for every guard k of n that is above 0, 2**k more, and 2**(n + k) more
-where a coordinate is in *contact* with the fixed stop of which it is the guard. An event is *watched* while the guard
-is on the side from which its crossing counts. It goes over to the other side by a crossing, which is an event where it
-is watched; else that is noted where a smooth piece ends. Behind an event the guard that has fired is 0 but for
-rounding, and its rate tells the side into which the motion goes: a body that bounces off is watched again, one that
-goes through is not before it has come back. A guard that a jump of the state steps over has no event.
+Mode: 0 after the motion has ended; otherwise 1, plus 2**k for every guard k of n that is above 0, plus 2**(n + k) for
+every coordinate that is in *contact* with the fixed stop whose guard is k. A guard is *watched* while it is on the side
+from which a crossing counts. A crossing of a watched guard is an event; a crossing in the other direction only updates
+the mode at the end of a smooth piece. After an event the guard that fired is 0 up to rounding, and its rate decides
+which side the motion enters: after a bounce the guard is watched again, after a passage only once it has come back. A
+jump of the state across another guard is no event of that guard.
 
-Flights between a body and a stop become ever shorter where it loses speed. Where one is too short to be told from 0, or
-there are too many, the body stays: its coordinate rests on the stop, while all others move on, until the force on it
-turns away from the stop. Guards that are no fixed stops have no such rest: the member breaks down.
+Flights of a body that loses speed at a stop become ever shorter. When one is too short to be resolved, or there are too
+many, the coordinate rests on the stop, while all others move on, until the force on it points away from the stop. There
+is no such rest for guards that are not fixed stops: the member fails.
 
-A kernel of such a model binds these functions; they know the model by ``guards``, ``guard_rates``, ``crossed`` and
-``is_end``, and a loop over the guards is written out.
+A kernel of such a model binds these functions; they reach the model through ``guards``, ``guard_rates``, ``crossed``
+and ``is_end``. Loops over guards are unrolled.
 """
 
 from __future__ import annotations
@@ -30,29 +30,29 @@ from vibsim.models.base import tree
 from vibsim.models.events import Crossings
 
 # bound by the kernel (`vibsim.engine.kernel_stubs`)
-contact_with = contacts_behind = contacts_of = crossed = energies = first_crossed = unbound
+contact_with = contacts_after = contacts_of = crossed = energies = first_crossed = unbound
 guard_curvatures = guard_rates = guards = is_end = is_ended_by = is_unresolved = least_pressure = (
     unbound
 )
-mode_of = nearest_watched = placed = sides_behind = sides_followed = sides_of = unbound
+mode_of = nearest_watched = placed = sides_after = sides_followed = sides_of = unbound
 size_of = stopped = unbound
 
 AT_ONCE = 2.0**-50
-"""Within this part of the time two events are at the same time."""
+"""Events closer than this, relative to the time, are simultaneous."""
 LEAST_HEIGHT = 32.0
-"""Twice the factor on the rounding of a guard up to which a flight over it is not resolved: rounding adds up."""
+"""Twice the height of the lowest resolved flight over a guard, in units of the guard's rounding error."""
 
 
 @cache
 def fixed_stops(model: Model, events: Crossings) -> dict[int, int]:
-    """Return rows whose guard is a place of one coordinate and that change its velocity alone, with the coordinate."""
-    found, moving = {}, {*model.positions, *model.velocities, "t"}
+    """Return rows that are fixed stops, with their coordinates: the guard is a place, only the velocity changes."""
+    stops, moving = {}, {*model.positions, *model.velocities, "t"}
     for k, row in enumerate(events.rows):
-        read = moving & set(tree(model, row.guard).names)
+        used = moving & set(tree(model, row.guard).names)
         for i, names in enumerate(zip(model.positions, model.velocities, strict=True)):
-            if (read, [name for name, _ in row.then]) == ({names[0]}, [names[1]]):
-                found[k] = i
-    return found
+            if (used, [name for name, _ in row.then]) == ({names[0]}, [names[1]]):
+                stops[k] = i
+    return stops
 
 
 def coordinates_with_stops(model: Model, events: Crossings) -> list[int]:
@@ -61,7 +61,7 @@ def coordinates_with_stops(model: Model, events: Crossings) -> list[int]:
 
 
 def put_free(module: Module, model: Model, events: Crossings) -> None:
-    """Write for each coordinate with stops what is 0 where it rests on one, else 1."""
+    """Write for each coordinate with stops a function that returns 0 while it rests on one, otherwise 1."""
     stops, count = fixed_stops(model, events), len(events.rows)
     collect(module, is_in_contact, is_in_contact.__name__, {})
     for i in coordinates_with_stops(model, events):
@@ -70,13 +70,13 @@ def put_free(module: Module, model: Model, events: Crossings) -> None:
 
 
 def places(model: Model, events: Crossings) -> dict[str, Expression]:
-    """Return the formulas of where bodies rest on fixed stops: on the side of their guards that they have left."""
-    found: dict[str, Expression] = {}
+    """Return formulas of the places of rest on fixed stops, reflected to the side from which the body came."""
+    formulas: dict[str, Expression] = {}
     for k, i in fixed_stops(model, events).items():
         guard, name = tree(model, events.rows[k].guard), model.positions[i]
-        beyond = Binary("/", guard, derivative(guard, name))
-        found[f"place_{k}"] = Binary("-", Name(name), Binary("*", Number(2.0), beyond))
-    return found
+        overshoot = Binary("/", guard, derivative(guard, name))
+        formulas[f"place_{k}"] = Binary("-", Name(name), Binary("*", Number(2.0), overshoot))
+    return formulas
 
 
 def _components(name: str, model: Model) -> list[str]:
@@ -90,18 +90,18 @@ def _joined(components: Sequence[str]) -> str:
 
 
 def _contact(k: int, count: int) -> float:
-    """Return the place in the mode of the contact with stop k of so many rows."""
+    """Return the bit of the mode for a contact with stop k, of `count` rows."""
     return 2.0 ** (count + k)
 
 
 def put_rows(module: Module, model: Model, events: Crossings, *, is_located: bool) -> None:
-    """Write what goes through all guards, and what tells one event from another.
+    """Write the functions that evaluate all guards and select an event.
 
-    On the mesh a guard that is noticed late may have turned back: an event happens where it still goes its way, and the
-    motion ends whatever it does. Nothing is in contact there.
+    On the mesh a guard that is noticed late may already go back: it is then no event, unless it ends the motion. There
+    are no contacts on the mesh.
     """
     for text in (
-        *(side_of, is_watched, nearer, free_side, has_just_left, side_behind, on_its_side),
+        *(side_of, is_watched, nearer, free_side, has_just_left, side_after, on_its_side),
         *(is_in_contact, rests, is_too_short),
     ):
         collect(module, text, text.__name__, {})
@@ -131,9 +131,9 @@ def put_rows(module: Module, model: Model, events: Crossings, *, is_located: boo
     )
     fires = "{apart} and side_of(mode, {s}) * g[{k}] < 0.0 and is_watched(side_of(mode, {s}), {d})"
     goes_on = " and side_of(mode, {s}) * r[{k}] < 0.0"
-    # what is beyond 0 by rounding and goes back was not the first
-    tests = [(own, fires + ("" if own[1].ends else goes_on)) for own in rows]
-    tests += [(own, fires) for own in rows] if is_located else []
+    # guards that go on come first: one that is beyond 0 by rounding and goes back did not fire first
+    tests = [(guard, fires + ("" if guard[1].ends else goes_on)) for guard in rows]
+    tests += [(guard, fires) for guard in rows] if is_located else []
     module.define(
         "first_crossed(mode, g, r)",
         *(
@@ -147,9 +147,9 @@ def put_rows(module: Module, model: Model, events: Crossings, *, is_located: boo
         "return -1.0",
     )
     module.define(
-        "sides_behind(mode, fired, g, b, h, r, q, t)",
+        "sides_after(mode, fired, g, b, h, r, q, t)",
         total(
-            "{place} * side_behind(side_of(mode, {place}), fired == {k}.0 or "
+            "{place} * side_after(side_of(mode, {place}), fired == {k}.0 or "
             "has_just_left(side_of(mode, {place}), g[{k}], b[{k}], t), g[{k}], h[{k}], r[{k}], "
             "q[{k}], {direction})"
         ),
@@ -162,17 +162,18 @@ def put_rows(module: Module, model: Model, events: Crossings, *, is_located: boo
     module.define("is_end(k)", f"return {' or '.join(ends) or 'k != k'}")
     jumped = [f"(h[{k}] < 0.0 and h[{k}] != g[{k}])" for k, row, *_ in rows if row.ends]
     module.define("is_ended_by(g, h)", f"return {' or '.join(jumped) or 'False'}")
-    behind = [f"crossed_{k}(u, v, t, p)" for k, *_ in rows]
-    _put_choice(module, "crossed(k, u, v, t, p)", dict(enumerate(behind[:-1])), behind[-1])
+    states = [f"crossed_{k}(u, v, t, p)" for k, *_ in rows]
+    _put_choice(module, "crossed(k, u, v, t, p)", dict(enumerate(states[:-1])), states[-1])
 
 
 def _put_contacts(
     module: Module, model: Model, events: Crossings, stops: Mapping[int, int]
 ) -> None:
-    """Write what begins, keeps and ends the contact of coordinates with these stops."""
+    """Write the functions that begin, keep and end contacts of coordinates with these stops."""
     count = len(events.rows)
-    every = 2.0**count
-    module.define("contacts_of(mode)", f"return {every} * math.floor((mode - 1.0) / {every})")
+    no_contact = 2.0**count
+    line = f"return {no_contact} * math.floor((mode - 1.0) / {no_contact})"
+    module.define("contacts_of(mode)", line)
     rows = [
         (k, f"side_of(mode, {2.0**k})", f"is_in_contact(mode, {_contact(k, count)})") for k in stops
     ]
@@ -188,7 +189,7 @@ def _put_contacts(
         "least_pressure(mode, u, v, t, p)",
         "least = math.inf",
         *(
-            (f"if mode > {every}:", "    q = guard_curvatures(u, v, t, p)", *pressed)
+            (f"if mode > {no_contact}:", "    q = guard_curvatures(u, v, t, p)", *pressed)
             if rows
             else ()
         ),
@@ -200,7 +201,7 @@ def _put_contacts(
         for k, side, touching in rows
     ]
     module.define(
-        "contacts_behind(mode, fired, g, h, r, q)", f"return {' + '.join(['0.0', *terms])}"
+        "contacts_after(mode, fired, g, h, r, q)", f"return {' + '.join(['0.0', *terms])}"
     )
     short = {
         k: f"is_too_short(side_of(mode, {2.0**k}), g[{k}], b[{k}], q[{k}])" for k in range(count)
@@ -225,13 +226,13 @@ def _put_contacts(
 
 
 def _put_choice(module: Module, head: str, results: Mapping[int, str], otherwise: str) -> None:
-    """Write a function of the number k of a row, and more: the result that stands under that number."""
-    chosen = (f"if k == {float(k)}: return {result}" for k, result in results.items())
-    module.define(head, *chosen, f"return {otherwise}")
+    """Write a function that selects its result by the row number k."""
+    cases = (f"if k == {float(k)}: return {result}" for k, result in results.items())
+    module.define(head, *cases, f"return {otherwise}")
 
 
 def side_of(mode: float, place: float) -> float:
-    """Return 1 for a guard above 0, -1 for one below, from its `place` in the mode, a power of 2."""
+    """Return 1 for a guard above 0, -1 for one below, from its bit `place` in the mode, a power of 2."""
     return 1.0 if math.floor((mode - 1.0) / place) % 2 == 1 else -1.0
 
 
@@ -241,15 +242,15 @@ def is_watched(side: float, direction: float) -> bool:
 
 
 def nearer(least: float, side: float, value: float, direction: float) -> float:
-    """Return the smaller one of a guard and the least one so far, positive before its event."""
+    """Return the smaller of `least` and a watched guard, with the sign that is positive before its event."""
     ahead = side * value
     return ahead if is_watched(side, direction) and ahead < least else least
 
 
 def free_side(value: float, rate: float, side: float, direction: float) -> float:
-    """Return 1 for a guard above 0, else 0.
+    """Return 1 for a guard above 0, otherwise 0.
 
-    On 0 its rate tells; where that vanishes too, the guard is on the side that is watched, or keeps `side`.
+    At 0 its rate decides; if that vanishes too, the guard is on its watched side, or keeps `side` if both are watched.
     """
     if value == 0.0:
         if rate == 0.0:
@@ -259,11 +260,11 @@ def free_side(value: float, rate: float, side: float, direction: float) -> float
 
 
 def has_just_left(side: float, value: float, rate: float, t: float) -> bool:
-    """Tell whether a guard was 0 at the same time: its own event was the one before."""
+    """Tell whether a guard was 0 at the same time, because its own event was the previous one."""
     return side * rate > 0.0 and side * value >= 0.0 and abs(value) <= AT_ONCE * (abs(rate) * t)
 
 
-def side_behind(
+def side_after(
     side: float,
     fired: bool,
     value: float,
@@ -272,20 +273,20 @@ def side_behind(
     curvature: float,
     direction: float,
 ) -> float:
-    """Return 1 for a guard that is above 0 behind an event, else 0.
+    """Return 1 for a guard that is above 0 after an event, otherwise 0.
 
     Parameters
     ----------
     side
-        The one before.
+        The side before the event.
     fired
-        Whether the event is its own, or its own was at the same time.
+        Whether the event is its own, or simultaneous with its own.
     value, ahead, rate, curvature
-        The guard before the event; the guard and its derivatives behind it.
+        The guard before the event; the guard and its derivatives after it.
     """
     if fired and abs(ahead) <= abs(value):
         if rate == 0.0 and side * curvature >= 0.0:
-            # it stays at 0 or goes back: what it is beyond 0 by rounding is no crossing
+            # it stays at 0 or goes back: an excess by rounding is no crossing
             return 0.5 - 0.5 * side
         return free_side(0.0, rate, side, direction)
     if ahead == value and is_watched(side, direction):
@@ -295,49 +296,49 @@ def side_behind(
 
 
 def on_its_side(side: float, value: float, direction: float) -> float:
-    """Return 1 for a guard that is above 0 where a smooth piece ends, else 0; one that is watched has not crossed."""
+    """Return 1 for a guard above 0 at the end of a smooth piece, otherwise 0; a watched guard has not crossed."""
     if side * value < 0.0 and not is_watched(side, direction):
         return 0.5 - 0.5 * side
     return 0.5 + 0.5 * side
 
 
 def is_in_contact(mode: float, place: float) -> bool:
-    """Tell whether a coordinate is in contact with a stop, from its `place` in the mode."""
+    """Tell whether a coordinate is in contact with a stop, from its bit `place` in the mode."""
     return math.floor((mode - 1.0) / place) % 2 == 1
 
 
 def rests(is_there: bool, side: float, rate: float, curvature: float, direction: float) -> float:
-    """Return 1 for a guard whose coordinate rests on the stop and is pressed against it, else 0.
+    """Return 1 if a coordinate rests on the stop of a guard and is pressed against it, otherwise 0.
 
     Parameters
     ----------
     is_there
         Whether the guard is 0.
     rate, curvature
-        Its first derivative by time, and the second one without the stop.
+        Its first time derivative, and its second without the stop.
     """
     stays = is_there and rate == 0.0 and side * curvature < 0.0 and is_watched(side, direction)
     return 1.0 if stays else 0.0
 
 
 def is_too_short(side: float, value: float, rate: float, curvature: float) -> bool:
-    """Tell whether a guard that seems to have crossed 0 is on its way back, behind an event of its own.
+    """Tell whether the flight between two events of a guard is too short to be resolved.
 
-    It was beyond 0 by rounding already, and does not reach the side from which it came: ``rate^2/(2 curvature)`` is how
-    far it would get.
+    The guard is beyond 0 by rounding, but already on its way back. ``rate^2/(2 curvature)`` is the height that it would
+    reach.
     """
     return side * rate > 0.0 and rate * rate <= LEAST_HEIGHT * abs(curvature * value)
 
 
 def first_mode(u: float, v: float, t: float, p: P) -> float:
-    """Return the mode at the beginning."""
+    """Return the initial mode."""
     g, r = guards(u, v, t, p), guard_rates(u, v, t, p)
     mode = sides_of(g, r)
-    return mode + contacts_behind(mode, -1.0, g, g, r, guard_curvatures(u, v, t, p))
+    return mode + contacts_after(mode, -1.0, g, g, r, guard_curvatures(u, v, t, p))
 
 
 def guard(u: float, v: float, t: float, p: P) -> float:
-    """Return a number that falls below 0 where a guard that is watched crosses 0, or a coordinate leaves its stop."""
+    """Return a number that falls below 0 when a watched guard crosses 0 or a coordinate leaves its stop."""
     mode = mode_of(p)
     if mode == 0.0:
         return 1.0
@@ -347,7 +348,7 @@ def guard(u: float, v: float, t: float, p: P) -> float:
 
 
 def guard_on_mesh(u: float, v: float, t: float, p: P) -> float:
-    """Return a number below 0 at a grid point where an event happens, or the motion ends."""
+    """Return a number below 0 at a grid point where an event happens or the motion ends."""
     mode = mode_of(p)
     if mode == 0.0:
         return 1.0
@@ -356,13 +357,13 @@ def guard_on_mesh(u: float, v: float, t: float, p: P) -> float:
 
 
 def followed(u: float, v: float, t: float, p: P) -> float:
-    """Return the mode at the end of a smooth piece: guards that are not watched may have crossed 0."""
+    """Return the mode at the end of a smooth piece, in which guards that are not watched may have crossed 0."""
     mode = mode_of(p)
     return 0.0 if mode == 0.0 else sides_followed(mode, guards(u, v, t, p)) + contacts_of(mode)
 
 
 def held(v: float) -> float:
-    """Return the velocity of a motion that has ended: the one that it had."""
+    """Return the velocity of a motion that has ended: unchanged."""
     return v
 
 
@@ -374,12 +375,12 @@ def landed(u: float, v: float) -> tuple[float, float]:
 def settled(
     u: float, v: float, t: float, before: float, is_last: bool, p: P
 ) -> tuple[float, float, float]:
-    """Return position, velocity and mode behind an event."""
+    """Return position, velocity and mode after an event."""
     mode = mode_of(p)
     g, b, q = guards(u, v, t, p), guard_rates(u, v, t, p), guard_curvatures(u, v, t, p)
     fired = first_crossed(mode, g, b)
     if fired < 0.0:
-        return u, v, sides_followed(mode, g) + contacts_behind(mode, fired, g, g, b, q)
+        return u, v, sides_followed(mode, g) + contacts_after(mode, fired, g, g, b, q)
     if is_end(fired):
         return u, v, 0.0
     if is_last or is_unresolved(fired, mode, g, b, q):
@@ -392,32 +393,32 @@ def settled(
     if is_ended_by(g, h):
         return ahead, own, 0.0
     curvatures = guard_curvatures(ahead, own, t, p)
-    contacts = contacts_behind(mode, fired, g, h, r, curvatures)
+    contacts = contacts_after(mode, fired, g, h, r, curvatures)
     if contacts > contacts_of(mode):
         ahead = placed(fired, ahead, own, t, p)
-    return ahead, own, sides_behind(mode, fired, g, b, h, r, curvatures, t) + contacts
+    return ahead, own, sides_after(mode, fired, g, b, h, r, curvatures, t) + contacts
 
 
 def counts_as_event(before: float, after: float, came: Any, goes: Any) -> bool:
-    """Tell an event from a coordinate that leaves its stop, whose state does not change."""
+    """Tell whether a change counts as an event; a coordinate that merely leaves its stop does not."""
     changed = size_of(goes[0] - came[0], goes[1] - came[1])
     return after == 0.0 or changed > 0.0 or not contacts_of(after) < contacts_of(before)
 
 
 def spent(u: float, ahead: float) -> float:
-    """Return what a smooth piece costs: nothing."""
+    """Return the cost of a smooth piece: 0."""
     return 0.0
 
 
 def lost(came: Any, goes: Any, t: float, p: P) -> float:
-    """Return the energy that goes at an event, below 0 where the event adds some."""
+    """Return the energy lost at an event; negative if the event adds energy."""
     kinetic, potential = energies(came[0], came[1], t, p)
-    kinetic_behind, potential_behind = energies(goes[0], goes[1], t, p)
-    return (kinetic + potential) - (kinetic_behind + potential_behind)
+    kinetic_after, potential_after = energies(goes[0], goes[1], t, p)
+    return (kinetic + potential) - (kinetic_after + potential_after)
 
 
 def turning(before: float, after: float, v: float, own: float) -> float:
-    """Return 1 where the velocity becomes negative at an event, which is a peak, -1 for a trough, 0 for neither."""
+    """Return 1 if the velocity becomes negative at an event, which is a peak, -1 for a trough, 0 for neither."""
     if after == 0.0 or not v * own < 0.0:
         return 0.0
     return 1.0 if v > 0.0 else -1.0

@@ -1,12 +1,12 @@
-"""Steps of a model with events (`vibsim.models.events`): smooth steps, divided where an event lies.
+"""Steps of a model with events (`vibsim.models.events`): smooth steps, divided at events.
 
-Events that are *located* are found by taking the step again with another length: the length tau with which it lands on
-the event is a root, and as accurate as the scheme itself, whatever its order. There the state changes, and the scheme
-starts anew: once for the rest of the step, and once more at the grid point, since the steps of a multistep scheme must
-be equal. Events that are left to the *mesh* are noticed at the grid point behind them, and treated there.
+Events that are *located* are found by repeating the step with a different length: the length tau with which it ends at
+the event is a root, as accurate as the scheme itself, whatever its order. There the state changes, and the scheme
+restarts: once for the rest of the step, and once more at the grid point, because a multistep scheme needs equal steps.
+Events that are left to the *mesh* are noticed at the next grid point, and treated there.
 
-The time of a scheme begins at 0 when it starts anew. What is added to it stands behind the parameters of the member,
-after the mode, so that its forces are those of the right time and of the mode.
+The time of a scheme begins at 0 when it restarts. Mode and time of the restart follow the parameters of the member, so
+that forces are evaluated at the right time and in the right mode.
 """
 
 from __future__ import annotations
@@ -27,12 +27,11 @@ landed = lost = mode_of = powers = settled = spent = start = start_of = step = t
     with_mode
 ) = unbound
 
-# Columns of `stats` behind those of `vibsim.engine.gather`. HALTED and HALTED_GRID: the mode before the body came to
-# rest, and the grid point behind, since it may leave the other way, which is a turn. LOST: what sliding or impacts have
-# cost so far. DONE, TAKEN: work of driving forces and of damping so far, whose powers have corners at events: summed
-# piece by piece.
-# TURN_TIME, TURN: time and height of the last event that was a peak, and behind them of the last that was a trough.
-# Behind all of these stand the times of the first events, as many as there is room for.
+# Columns of `stats`, after those of `vibsim.engine.gather`. HALTED and HALTED_GRID: the mode before the body came to
+# rest, and the next grid point; if it leaves in the other direction, it has turned there. LOST: cost of sliding or
+# impacts so far. DONE, TAKEN: work of driving forces and of damping so far, summed piece by piece, because the powers
+# have corners at events. TURN_TIME, TURN: time and height of the last event that was a peak, followed by those of the
+# last that was a trough. The times of the first events follow, as many as fit.
 EVENT_COUNT, FIRST_EVENT, LAST_EVENT, REST_TIME = range(N_STATS, N_STATS + 4)
 HALTED, HALTED_GRID, LOST, DONE, TAKEN, TURN_TIME, TURN = range(N_STATS + 4, N_STATS + 11)
 N_STATS_EVENTS = N_STATS + 13
@@ -42,22 +41,22 @@ _COLUMNS = (
 )
 
 MOST_EVENTS = 256
-"""Events of a step; behind the last one the body rests, until its force says otherwise."""
+"""Largest number of events in a step; after the last one the body rests until its force moves it."""
 MOST_TRIALS = 200
-"""Trials for the time of an event: every third halves the interval."""
+"""Largest number of trials for the time of an event; every third halves the interval."""
 SHARP = 2.0**-52
-"""The time is known to this part of the step."""
+"""Tolerance of the time of an event, relative to the step."""
 
 
 def columns(coordinates: int) -> dict[str, int]:
-    """Return the numbers of these columns, by their names here, behind those of all coordinates."""
+    """Return the indices of these columns by name, after those of all coordinates."""
     further = (coordinates - 1) * N_STATS
     return {name: globals()[name] + further for name in _COLUMNS}
 
 
 @called
 def begun(stats: Any, case: int, u: float, v: float, p: P) -> P:
-    """Return the parameters with the mode of the beginning."""
+    """Return the parameters with the initial mode, and initialise the columns of events."""
     mode = first_mode(u, v, 0.0, p)
     if GATHER:
         stats[case, EVENT_COUNT] = 0.0
@@ -73,7 +72,7 @@ def begun(stats: Any, case: int, u: float, v: float, p: P) -> P:
 def passed(
     record: Any, variant: int, n: int, dt: float, u: float, v: float, state: State, p: P
 ) -> tuple[float, State, float, P, int]:
-    """Return position, next state, velocity and parameters at step `n`, and how many events lie before it.
+    """Return position, next state, velocity and parameters at step `n`, and the number of events since step n - 1.
 
     Parameters
     ----------
@@ -82,7 +81,7 @@ def passed(
     u, v
         Position and velocity at step n - 1.
     state
-        At step n; what it holds of a member at rest means nothing.
+        State of the scheme at step n; meaningless for a member at rest.
     """
     t = n * dt
     if mode_of(p) == 0.0:
@@ -117,7 +116,7 @@ def passed(
 def across(
     record: Any, variant: int, n: int, dt: float, u: float, v: float, p: P
 ) -> tuple[float, float, P, int]:
-    """Return position, velocity and parameters at step `n` behind all events since step n - 1, and their number."""
+    """Return position, velocity and parameters at step `n` after all events since step n - 1, and their number."""
     t, end = (n - 1) * dt, n * dt
     for count in range(2 * MOST_EVENTS):
         left = end - t
@@ -131,7 +130,7 @@ def across(
         ahead, own = landed(ahead, own)
         if GATHER:
             note_piece(record, variant, (u, v, ahead, own, t, tau), p)
-        # the last event of a step may lie on its end
+        # the last event of a step may be at its end
         t = t + tau if tau < left else end
         before = mode_of(p)
         u, v, mode = settled(ahead, own, t, math.inf, count >= MOST_EVENTS - 1, p)
@@ -143,12 +142,12 @@ def across(
 
 @called
 def note_piece(record: Any, variant: int, piece: tuple[float, ...], p: P) -> None:
-    """Add what a smooth piece costs, and the work of damping and driving forces along it, by Simpson's rule.
+    """Add the cost of a smooth piece, and the work of damping and driving forces along it, by Simpson's rule.
 
     Parameters
     ----------
     piece
-        Position and velocity at its beginning, and at its end; time at its beginning, and its length.
+        Position and velocity at its beginning, position and velocity at its end, time at its beginning, length.
     """
     stats, _, case = record
     u, v, ahead, own, t, dt = piece
@@ -167,13 +166,13 @@ def note_piece(record: Any, variant: int, piece: tuple[float, ...], p: P) -> Non
 
 @called
 def anew(variant: int, u: float, v: float, dt: float, p: P) -> State:
-    """Return the state of a scheme that starts anew, after its first step."""
+    """Return the state of a restarted scheme after its first step."""
     return start(variant, u, v, dt, p)
 
 
 @called
 def leap(variant: int, u: float, v: float, t: float, dt: float, p: P) -> tuple[float, float]:
-    """Return position and velocity after one step of length `dt` from time `t`, in the present mode."""
+    """Return position and velocity after one step of length `dt` from time `t`, in the current mode."""
     if mode_of(p) == 0.0 or not dt > 0.0:
         return u, v
     here = with_mode(p, mode_of(p), t)
@@ -183,11 +182,10 @@ def leap(variant: int, u: float, v: float, t: float, dt: float, p: P) -> tuple[f
 
 @called
 def landing(variant: int, u: float, v: float, t: float, left: float, p: P) -> float:
-    """Return the length of the step that lands on the event, at most `left`, behind which the guard is below 0.
+    """Return the length of the step that ends at the event; the guard is below 0 after a step of length `left`.
 
-    The regula falsi in the form of Illinois, and every third time a bisection: the interval shrinks whatever the guard
-    does, and the event that is found is one. That the guard is 0 at the beginning, where an event has just been, does
-    not count.
+    Regula falsi (Illinois variant), with a bisection every third time, so that the interval shrinks for any guard. A
+    guard that is 0 at the beginning, because of the previous event, does not count as the root.
     """
     low, high = 0.0, left
     behind = guard(u, v, t, p)
@@ -198,7 +196,7 @@ def landing(variant: int, u: float, v: float, t: float, left: float, p: P) -> fl
         tau = 0.5 * (low + high)
         if k % 3 != 2 and behind > 0.0:
             guess = high - beyond * ((high - low) / (beyond - behind))
-            # not within rounding of an end, which would say nothing
+            # not within rounding of an end, which would gain nothing
             least = 0.25 * SHARP * left
             guess = low + least if guess < low + least else guess
             guess = high - least if guess > high - least else guess
@@ -224,16 +222,16 @@ def landing(variant: int, u: float, v: float, t: float, left: float, p: P) -> fl
 def note_event(
     record: Any, t: float, grid: float, came: Any, before: float, goes: Any, after: float, p: P
 ) -> None:
-    """Write the event at time `t`, where the member came to rest there, and the peak or trough that it is.
+    """Write the event at time `t`: its time, whether the member comes to rest, and whether it is a peak or a trough.
 
-    A member that rests and then leaves the way it came has turned where it came to rest.
+    A member that rests and then leaves in the direction from which it came has turned when it came to rest.
 
     Parameters
     ----------
     came, before
-        Position and velocity before the event, and the mode.
+        Position and velocity, and mode before the event.
     goes, after
-        The same behind it.
+        The same after the event.
     """
     stats, counts, case = record
     stats[case, LOST] = stats[case, LOST] + lost(came, goes, t, p)
@@ -264,9 +262,9 @@ def note_event(
 
 @called
 def put_turned(stats: Any, counts: Any, kept: Any, case: int, dt: float) -> None:
-    """Give the last peak and the last trough that were kept the time and the height of the event that they are.
+    """Correct time and height of the last peak and the last trough if they are events.
 
-    The parabola through three points knows nothing of the corner between them.
+    The parabola through three points ignores the corner between them.
     """
     for kind in range(2):
         place = counts[case, PEAK_COUNT + kind] - 1

@@ -1,17 +1,17 @@
-"""Local extrema of the position: on the grid as the vibration text has them, and on the parabola through three points.
+"""Local extrema of the position: on the grid as in the vibration text, and on the parabola through three points.
 
 A peak is a point with ``u^(n-1) < u^n > u^(n+1)``, a trough one with ``u^(n-1) > u^n < u^(n+1)``, n = 1, ..., N-1:
-vibration text (B), section 3.5, equations (14) and (15). Neither the first nor the last point is one. Where successive
-points are equal, B finds none; here a plateau with lower ground on both sides is one peak, at the first of its points.
+vibration text (B), section 3.5, equations (14) and (15). The first and the last point never count. Between equal points
+B finds no extremum; here a plateau that is higher than both sides is one peak, at the first of its points.
 
-The parabola through the three points has its top ``(left - right)/(2 (left + right)) dt`` behind the middle one, with
-``left = u^n - u^(n-1)`` and ``right = u^n - u^(n+1)``. Where ``u'''`` vanishes at the peak, as in every motion that no
-force drives or damps, its time is off by O(dt^3) and its height by O(dt^4); elsewhere by O(dt^2) and O(dt^3). Of two
-equal points it finds the middle; of a longer plateau, which resolves nothing, the middle is taken as well.
+The vertex of the parabola through the three points is ``(left - right)/(2 (left + right)) dt`` after the middle point,
+with ``left = u^n - u^(n-1)`` and ``right = u^n - u^(n+1)``. If ``u'''`` vanishes at the peak, as in every undriven,
+undamped motion, the error of its time is O(dt^3) and that of its height O(dt^4); otherwise O(dt^2) and O(dt^3).
+Between two equal points the vertex is their middle; a longer plateau resolves nothing, and its middle is taken as well.
 
-A turn that is a located event has the time and the height of that (`vibsim.engine.events.put_turned`).
+An extremum that is a located event gets the time and the height of the event (`vibsim.engine.events.put_turned`).
 
-Point n - 1 is judged at step n, when both of its neighbours are known to be sound.
+Point n - 1 is examined at step n, when both of its neighbours are known to be finite.
 """
 
 from __future__ import annotations
@@ -24,12 +24,12 @@ from vibsim.engine.kernel_stubs import called
 TIME, HEIGHT, TIME_GRID, HEIGHT_GRID, OF_A_KIND = range(5)
 N_KEPT = 2 * OF_A_KIND
 
-# Columns of `counts`, behind those of `vibsim.engine.gather`; troughs are counted behind peaks.
+# Columns of `counts`, after those of `vibsim.engine.gather`.
 PEAK_COUNT, TROUGH_COUNT, PLATEAU_STEP, PLATEAU_SIDE, N_COUNTS_KEPT = range(3, 8)
 
 
 def is_turned(behind: float, middle: float, ahead: float) -> bool:
-    """Say whether `note_turned` has something to write, without a branch: an extremum, or either end of a plateau."""
+    """Tell, without a branch, whether `note_turned` has something to write: an extremum, or either end of a plateau."""
     tops = (behind < middle) & (ahead <= middle)
     bottoms = (behind > middle) & (ahead >= middle)
     leaves = (behind == middle) & (ahead != middle)
@@ -40,14 +40,14 @@ def is_turned(behind: float, middle: float, ahead: float) -> bool:
 def note_turned(
     kept: Any, counts: Any, case: int, n: int, dt: float, behind: float, middle: float, ahead: float
 ) -> None:
-    """Write the extremum at step `n`, if there is one, or where a plateau begins there.
+    """Write the extremum at step `n`, if there is one, or note that a plateau begins there.
 
     Parameters
     ----------
     kept
-        Shape (`N_KEPT`, case, extremum): the first of every kind, as many as there is room for.
+        Shape (`N_KEPT`, case, extremum): the first extrema of each kind, as many as fit.
     counts
-        Shape (case, `N_COUNTS_KEPT`): all of them.
+        Shape (case, `N_COUNTS_KEPT`): the numbers of all extrema, and the current plateau.
     behind, middle, ahead
         Positions at steps n - 1, n and n + 1.
     """
@@ -56,7 +56,7 @@ def note_turned(
         first = counts[case, PLATEAU_STEP]
         counts[case, PLATEAU_SIDE] = 0
         if (side > 0 and ahead < middle) or (side < 0 and ahead > middle):
-            # of two points the parabola has a height
+            # only a plateau of two points has a parabola above it
             height = middle + (0.125 * (middle - ahead) if n - first == 1 else 0.0)
             kind = 0 if side > 0 else 1
             keep(kept, counts, case, kind, 0.5 * (first + n) * dt, height, first * dt, middle)
@@ -73,7 +73,7 @@ def note_turned(
 def keep(
     kept: Any, counts: Any, case: int, kind: int, t: float, u: float, t_grid: float, u_grid: float
 ) -> None:
-    """Count a peak (`kind` 0) or a trough (1), and write it where there is room."""
+    """Count a peak (`kind` 0) or a trough (1), and write it if it fits."""
     place = counts[case, PEAK_COUNT + kind]
     if place < kept.shape[2]:
         row = OF_A_KIND * kind

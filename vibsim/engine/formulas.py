@@ -1,4 +1,4 @@
-"""The text of a model's formulas: acceleration, energies, powers and the like as functions of ``(u, v, t, p)``."""
+"""The text of a model's formulas: acceleration, energies, powers and others as functions of ``(u, v, t, p)``."""
 
 from __future__ import annotations
 
@@ -22,27 +22,27 @@ from vibsim.models.table import BEND, BENDS, HEADER, HEIGHT, HEIGHTS
 from vibsim.schemes.base import Stepper
 
 MOST_INLINE = 64
-"""Calls of functions up to which each becomes part of the formula: each then takes 0.1 s to compile, and 3 MB."""
+"""Largest number of calls of elementary functions that are inlined: each takes 0.1 s and 3 MB to compile."""
 _MODE = "mode"
 _FREE = "_free_"
-"""Before the number of a coordinate: 0 where it rests on a stop, else 1."""
+"""Prefix of the index of a coordinate, in the name of a number that is 0 while it rests on a stop and 1 otherwise."""
 _OF_CONTACTS = ("acceleration", "slopes", "guard_curvatures")
-"""Functions whose formulas depend on what rests on a stop."""
+"""Functions whose formulas depend on contacts with stops."""
 _TUPLES = ("guards", "guard_rates", "guard_curvatures")
-"""Functions that return a tuple, however many results they have."""
+"""Functions that return a tuple even of a single result."""
 _MARK = "_"
-"""Behind the names of states and parameters in a kernel."""
+"""Suffix of the names of states and parameters in a kernel."""
 
 
 def n_parameters(stepper: Stepper, model: Model) -> int:
-    """Return how many parameters a member has: those of the model, and the factors of `Stepper.scaling` behind them."""
+    """Return the number of parameters of a member, including the factors of `Stepper.scaling`."""
     return len(model.parameters) + (2 if stepper.scaling else 0)
 
 
 def n_between(model: Model) -> int:
-    """Return how much stands between the parameters of a member and the factors behind them.
+    """Return the number of entries between the parameters of the model and the factors of `Stepper.scaling`.
 
-    Of a model with events, mode and start; of one that looks a table up, the table.
+    These are mode and start of a model with events, or the table of a model that has one.
     """
     return 2 if model.events is not None else 1 if model.lookup is not None else 0
 
@@ -57,18 +57,18 @@ def put_formulas(
     with_kinetic: bool = False,
     with_work: bool = False,
 ) -> None:
-    """Write the model's acceleration and energies as functions of ``(u, v, t, p)``, and what they call.
+    """Write the model's acceleration and energies as functions of ``(u, v, t, p)``, with the functions that they call.
 
     Parameters
     ----------
     suffix
         ``_fast`` for formulas without branches.
-    is_rare
-        Whether they are seldom needed, so that elementary functions are not compiled into them.
     stepper
-        For whom: an implicit one needs derivatives too, one with `Stepper.scaling` a factor.
+        If it is implicit, derivatives are written too; if it has `Stepper.scaling`, forces have a factor.
+    is_rare
+        Whether elementary functions are called rather than inlined.
     with_kinetic
-        Whether the kinetic energy is needed for itself.
+        Whether the kinetic energy is needed separately.
     with_work
         Whether the powers of damping and of driving forces are needed.
     """
@@ -116,9 +116,9 @@ def put_formulas(
 
 
 def put_energy_with(module: Module, model: Model) -> None:
-    """Write the energy at another velocity, for which a potential energy is known unless it depends on that.
+    """Write the energy at another velocity, which reuses the potential energy unless that depends on the velocity.
 
-    Uncompiled, nobody else would see that it is the same again.
+    A compiler would find this by itself; the plain lane has none.
     """
     potential = tree(model, model.potential_energy)
     line = "kinetic = kinetic_energy(u, v, t, p)"
@@ -128,12 +128,12 @@ def put_energy_with(module: Module, model: Model) -> None:
 
 
 def marked(model: Model) -> Callable[[Formula], Expression]:
-    """Return what reads a formula, its names marked so that no name of a user is one of the kernel's text."""
+    """Return a function that parses a formula and marks its names, so that they cannot clash with names of a kernel."""
     states = (state.name for state in model.states)
-    put = expression.replacing(
+    mark = expression.replacing(
         {name: Name(name + _MARK) for name in (*states, *parameter_names(model))}
     )
-    return lambda formula: put(tree(model, formula))
+    return lambda formula: mark(tree(model, formula))
 
 
 def put_functions(
@@ -146,14 +146,14 @@ def put_functions(
     scaled: Collection[str] = (),
     always_tuple: bool = False,
 ) -> None:
-    """Write functions of ``(u, v, t, p)``, each with the formulas of its results by their names.
+    """Write functions of ``(u, v, t, p)``, given by name with the formulas of their results.
 
     Parameters
     ----------
     scaled
-        Functions whose results are multiplied by a factor that stands behind the parameters.
+        Functions whose results are multiplied by the first factor of `Stepper.scaling`.
     always_tuple
-        Whether a function with one result returns a tuple too.
+        Whether functions return a tuple even of a single result.
     """
     names = parameter_names(model)
     unpack = [f"{name}{_MARK} = p[{i}]" for i, name in enumerate(names)]
@@ -195,7 +195,7 @@ def put_functions(
 
 
 def _looking_up(module: Module, model: Model, formulas: Iterable[Expression]) -> list[str]:
-    """Return what a function does first whose formulas look a table up; nothing where they do not."""
+    """Return the lines that look up the table of the model, if some formula uses it."""
     used = {name for formula in formulas for name in formula.names}
     if model.lookup is None or not used & {HEIGHT, BEND}:
         return []
@@ -205,16 +205,16 @@ def _looking_up(module: Module, model: Model, formulas: Iterable[Expression]) ->
 
 
 def looked_up(rows: Any, x: float) -> tuple[float, float]:
-    """Return height and second derivative of a table at the place x, which lies within it (`vibsim.models.table`).
+    """Return height and second derivative of a table at the place x (`vibsim.models.table`).
 
-    The table is one array that all members share. It stands among the parameters of a member, behind its numbers, so
-    that no number of it is in the text of a kernel. A place lies between points of its own for every member, which
-    vector instructions cannot fetch together: such models are not stepped in blocks.
+    The table is an array that all members share. It is an entry of a member's parameters, so that the text of a kernel
+    does not depend on its numbers. Each member reads it between different points, which vector instructions cannot do,
+    so such models are not stepped in blocks.
 
     Parameters
     ----------
     rows
-        `vibsim.models.table.Table.rows`; behind its ends the last pieces go on.
+        `vibsim.models.table.Table.rows`; the end pieces are extrapolated.
     """
     spacing = float(rows[HEADER, 1])
     way = (x - float(rows[HEADER, 0])) / spacing
@@ -228,7 +228,7 @@ def looked_up(rows: Any, x: float) -> tuple[float, float]:
 
 
 def put_parameters(module: Module, model: Model, more: int = 0, *, tabulated: bool = False) -> None:
-    """Write what makes the parameters of a member a tuple, with `more` numbers and a table behind them."""
+    """Write the function that returns the tuple of a member's parameters, with `more` factors and tabulated points."""
     first = len(model.parameters)
     count = first + more
     places = [f"float(parameters[case, {i}])" for i in range(count)]
@@ -240,7 +240,7 @@ def put_parameters(module: Module, model: Model, more: int = 0, *, tabulated: bo
 
 
 def _with_stops(model: Model, events: Crossings) -> list[Expression]:
-    """Return the accelerations, which vanish where a coordinate rests on a stop."""
+    """Return the accelerations, which vanish while a coordinate rests on a stop."""
     stopped = coordinates_with_stops(model, events)
     formulas = [tree(model, formula) for formula in model.accelerations]
     return [
@@ -250,17 +250,17 @@ def _with_stops(model: Model, events: Crossings) -> list[Expression]:
 
 
 def _curvatures(model: Model, events: Crossings, rates: Sequence[Expression]) -> list[Expression]:
-    """Return the second derivatives of the guards by time: those of stops as if nothing rested on them.
+    """Return the second time derivatives of the guards; for guards of stops, as if no coordinate rested on them.
 
-    That of a guard with velocities in it would need the derivatives of the forces: it is 0.
+    For a guard that depends on velocities it would need derivatives of the forces, and is set to 0.
     """
     held, stops = _with_stops(model, events), fixed_stops(model, events)
-    found: list[Expression] = []
+    curvatures: list[Expression] = []
     for k, (row, speed) in enumerate(zip(events.rows, rates, strict=True)):
         is_of_positions = not set(model.velocities) & set(tree(model, row.guard).names)
         curvature = rate(model, speed, None if k in stops else held)
-        found.append(curvature if is_of_positions else Number(0.0))
-    return found
+        curvatures.append(curvature if is_of_positions else Number(0.0))
+    return curvatures
 
 
 def _of_events(
@@ -298,7 +298,7 @@ def _of_events(
 
 
 def _with_functions(module: Module, suffix: str, is_rare: bool, node: Expression) -> Expression:
-    """Collect the function that a part of a formula calls, and call it by its name in the kernel."""
+    """Replace a call or power in a formula by a call of the kernel's function, and collect that function."""
     match node:
         case Binary("**", base, exponent):
             value = expression.literal(exponent)
@@ -306,10 +306,10 @@ def _with_functions(module: Module, suffix: str, is_rare: bool, node: Expression
             power = Call("power", (base, exponent))
             return node if is_whole else _with_functions(module, suffix, is_rare, power)
         case Compare(_, x, y) if suffix:
-            # what is 0, or NaN where x or y is: a comparison would hide that of a fast function out of its range
+            # add 0, or NaN if x or y is NaN: the comparison alone would hide the NaN of a fast function
             return filled("node + ((x - x + (y - y)) - (x - x + (y - y)))", node=node, x=x, y=y)
         case Compare():
-            # as a number: a truth value knows no -0, which the fast text would give
+            # as a number: a bool has no -0, which the fast text may give
             return filled("1*node", node=node)
         case Call(function, arguments):
             if function not in ELEMENTARY:

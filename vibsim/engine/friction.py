@@ -1,7 +1,7 @@
-"""The events of Coulomb friction (`vibsim.models.events.Friction`): where a body stops, sticks, turns and leaves.
+"""Events of Coulomb friction (`vibsim.models.events.Friction`): a body stops, sticks, turns and slides again.
 
-Modes: 1 and -1 for the direction in which the body slides, 0 where it sticks. A kernel of a model with friction binds
-these functions; they know the model by ``drive`` and ``limit``.
+Modes: 1 and -1 for the direction in which the body slides, 0 while it sticks. A kernel of a model with friction binds
+these functions; they reach the model through ``drive`` and ``limit``.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ drive = limit = mode_of = unbound
 
 
 def slip(u: float, t: float, p: P) -> float:
-    """Return the direction in which a body at rest starts to slide; 0 where it sticks."""
+    """Return the direction in which a body at rest starts to slide; 0 if it sticks."""
     force = drive(u, 0.0, t, p)
     if abs(force) <= limit(u, 0.0, t, p):
         return 0.0
@@ -23,14 +23,14 @@ def slip(u: float, t: float, p: P) -> float:
 
 
 def first_mode(u: float, v: float, t: float, p: P) -> float:
-    """Return the mode at the beginning."""
+    """Return the initial mode."""
     if v == 0.0:
         return slip(u, t, p)
     return 1.0 if v > 0.0 else -1.0
 
 
 def guard(u: float, v: float, t: float, p: P) -> float:
-    """Return a number that falls below 0 at the event: the speed, or what friction can still hold."""
+    """Return the guard, which falls below 0 at the event: the speed, or what friction can still hold."""
     mode = mode_of(p)
     if mode == 0.0:
         return limit(u, 0.0, t, p) - abs(drive(u, 0.0, t, p))
@@ -38,12 +38,12 @@ def guard(u: float, v: float, t: float, p: P) -> float:
 
 
 def guard_on_mesh(u: float, v: float, t: float, p: P) -> float:
-    """Return what `guard` does."""
+    """Return the guard on the mesh: the same as `guard`."""
     return guard(u, v, t, p)
 
 
 def followed(u: float, v: float, t: float, p: P) -> float:
-    """Return the mode at the end of a smooth piece, without an event: the same."""
+    """Return the mode at the end of a smooth piece without an event: unchanged."""
     return mode_of(p)
 
 
@@ -60,7 +60,7 @@ def landed(u: float, v: float) -> tuple[float, float]:
 def settled(
     u: float, v: float, t: float, before: float, is_last: bool, p: P
 ) -> tuple[float, float, float]:
-    """Return position, velocity and mode behind an event; on the mesh the velocity is what it has become."""
+    """Return position, velocity and mode after an event; on the mesh the velocity may already have changed its sign."""
     if is_last:
         return u, 0.0, 0.0
     direction = slip(u, t, p)
@@ -70,7 +70,7 @@ def settled(
 
 
 def counts_as_event(before: float, after: float, came: Any, goes: Any) -> bool:
-    """Tell whether a change of the mode is an event: each is."""
+    """Tell whether a change of the mode counts as an event: always."""
     return True
 
 
@@ -80,12 +80,12 @@ def is_at_rest(mode: float) -> bool:
 
 
 def spent(u: float, ahead: float) -> float:
-    """Return the path between two positions, without a turn."""
+    """Return the length of the path between two positions, without a turn in between."""
     return abs(ahead - u)
 
 
 def lost(came: Any, goes: Any, t: float, p: P) -> float:
-    """Return what an event costs beside the path: nothing."""
+    """Return the cost of an event in addition to the path: 0."""
     return 0.0
 
 

@@ -1,12 +1,13 @@
-"""What is gathered from every step without storing the steps: extrema, norms, peaks, turns, energy deviation.
+"""Statistics over all steps, without storing the steps: extrema, norms, peaks, turns, energy deviation.
 
-The functions work on one member at a time, in ``+ - * /`` and comparisons only (see `vibsim.elementary`).
-What changes at every step is a tuple of floats, which stays in registers; what changes at a peak or a turn stays in
-the member's row of `stats` and `counts`.
+The functions work on one member at a time, with ``+ - * /`` and comparisons only (see `vibsim.elementary`). Values that
+change at every step form a tuple of floats, which stays in registers; values that change at a peak or a turn are in the
+member's row of `stats` and `counts`.
 
-A peak of the position is where the velocity falls through zero, found by linear interpolation of the velocity: at a
-peak the third derivative of the position vanishes with the velocity, so the time has an error of dt^3 while the
-scheme's own is dt^2. The time at grid points is the larger neighbour's, as in the vibration text (B), section 3.5.
+A peak of the position is where the velocity falls through zero, located by linear interpolation of the velocity: the
+third derivative of the position vanishes there with the velocity, so the interpolation error of the time is O(dt^3)
+while the scheme's is O(dt^2). The time on the grid is that of the larger neighbour, as in the vibration text (B),
+section 3.5.
 """
 
 from __future__ import annotations
@@ -20,13 +21,13 @@ from vibsim.engine.kernel_stubs import called
 SERIES = True  # bound by the kernel (`vibsim.engine.kernel_stubs`)
 
 OVERFLOW = 1e150
-"""A member that grows beyond has failed: its energy could no longer be stored."""
+"""A member that exceeds this size has failed: its energy would soon overflow."""
 FARTHEST = 1e12
-"""An angle beyond does not resolve a turn to four digits; passes over the top are not noted there."""
+"""Largest angle at which turns are noted: beyond it, rounding leaves fewer than four digits of a turn."""
 
 Extrema = tuple[float, float, float, float, float, float, float, float, float]
 """Least and largest position, least and largest velocity, largest absolute energy deviation; sums of absolute values
-and of squares of position and velocity: the first columns of `stats`, in their order."""
+and of squares of position and velocity: the first columns of `stats`, in this order."""
 N_EXTREMA = 9
 LARGEST_DEVIATION = 4
 
@@ -40,16 +41,16 @@ FIRST_TURN_TIME, LAST_TURN_TIME, DEVIATION_D2T, N_STATS = range(17, 21)
 # Columns of `counts`.
 PEAKS, TURNS, LAST_STEP, N_COUNTS = range(4)
 
-# Rows of `samples` behind position and velocity of one coordinate, where series are kept of more.
+# Further rows of `samples`, after position and velocity of a single coordinate.
 RUNNING_ROW, VELOCITY_D2T_ROW, RUNNING_D2T_ROW, DISSIPATED_ROW, DRIVEN_ROW, LOST_ROW = range(2, 8)
 
 
 def sample_rows(coordinates: int) -> dict[str, int]:
-    """Return the numbers of these rows, by their names here, behind all positions and all velocities."""
+    """Return the indices of these rows by name, after all positions and all velocities."""
     running = 2 * coordinates
     names = ("RUNNING_D2T_ROW", "DISSIPATED_ROW", "DRIVEN_ROW", "LOST_ROW")
-    behind = {name: running + 1 + coordinates + i for i, name in enumerate(names)}
-    return {"RUNNING_ROW": running, "VELOCITY_D2T_ROW": running + 1, **behind}
+    further = {name: running + 1 + coordinates + i for i, name in enumerate(names)}
+    return {"RUNNING_ROW": running, "VELOCITY_D2T_ROW": running + 1, **further}
 
 
 def end_velocity(end_rule: int, own: Any, v_before: Any, v_two_before: Any, backward: Any) -> Any:
@@ -67,16 +68,16 @@ def centred_difference(ahead: Any, before: Any, rate: float) -> Any:
 
 
 def larger(size: float, largest: float) -> float:
-    """Return the larger one, and `largest` where `size` is NaN."""
+    """Return the larger value, or `largest` if `size` is NaN."""
     return size if size > largest else largest
 
 
 @called
 def note_d2t(stats: Any, samples: Any, case: int, good: int, every: int, largest: float) -> None:
-    """Write the largest energy deviation by ``[D_2t u]`` of a member whose last sound point is number `good`.
+    """Write the largest energy deviation by ``[D_2t u]`` of a member whose last finite point is number `good`.
 
-    The centred difference has no value there: a sample that was taken of it is taken back. Nor has it at t = 0, so that
-    a largest one takes two points more.
+    The centred difference is undefined at that point, so its sample there is reset to NaN. It is also undefined at
+    t = 0, so a largest deviation requires ``good > 1``.
     """
     value = largest if good > 1 else math.nan
     stats[case, DEVIATION_D2T] = value
@@ -110,9 +111,9 @@ def next_extrema(extrema: Extrema, u: float, v: float, deviation: float) -> Extr
 
 
 def note_extrema(stats: Any, case: int, first: int, extrema: Extrema, interior: float) -> None:
-    """Write the extrema and sums of a member that has arrived, and its largest deviation without the last point.
+    """Write the extrema and sums of a finished member, and its largest deviation without the last point.
 
-    Columns count from `first`: those of each further coordinate stand behind all of the one before.
+    Columns begin at `first`; each coordinate has `N_STATS` columns.
     """
     for i in range(N_EXTREMA):
         stats[case, first + i] = extrema[i]
@@ -120,7 +121,7 @@ def note_extrema(stats: Any, case: int, first: int, extrema: Extrema, interior: 
 
 
 def is_event(turn: float, bottom: float, v_before: float, u: float, v: float) -> bool:
-    """Say whether `note_events` has something to write, without a branch."""
+    """Tell, without a branch, whether `note_events` has something to write."""
     falls = (v_before >= 0.0) & (v < 0.0)
     rises = (v_before <= 0.0) & (v > 0.0)
     turns = (turn > 0.0) & (abs(u - bottom) > 0.5 * turn) & (abs(u) < FARTHEST)
@@ -131,15 +132,15 @@ def is_event(turn: float, bottom: float, v_before: float, u: float, v: float) ->
 def note_events(
     stats: Any, counts: Any, case: int, turn: float, bottom: float, step: tuple[float, ...]
 ) -> float:
-    """Write the peak, the trough or the turn in a step, if there is one; return the bottom.
+    """Write the peak, the trough or the turn in a step, if there is one; return the new bottom.
 
-    At the top, half a turn ahead of the bottom, the acceleration vanishes, so that the linear interpolation of the
-    position has an error of dt^3 as well. A step of more than a turn counts once; such a member is far from resolved.
+    At the top, half a turn from the bottom, the acceleration vanishes, so the linear interpolation of the position has
+    an error of O(dt^3) as well. A step of more than one turn counts once; such a member is far from resolved.
 
     Parameters
     ----------
     step
-        Time at its end and length, position and velocity before, position and velocity at its end.
+        Time at its end, its length, position and velocity at its beginning, position and velocity at its end.
     """
     t, dt, u_before, v_before, u, v = step
     if (v_before >= 0.0 and v < 0.0) or (v_before <= 0.0 and v > 0.0):
@@ -161,7 +162,7 @@ def note_events(
 def note_turning(
     stats: Any, counts: Any, case: int, t: float, grid: float, u: float, kind: float
 ) -> None:
-    """Write the peak (`kind` > 0) at time `t`, on the grid at `grid`, or the height of a trough."""
+    """Write the peak (`kind` > 0) at time `t`, on the grid at `grid`; of a trough, only its height."""
     if kind > 0.0:
         stats[case, LAST_PEAK_TIME] = t
         stats[case, LAST_PEAK_TIME_GRID] = grid
@@ -176,5 +177,5 @@ def note_turning(
 
 
 def bottom_of(u: float, turn: float) -> float:
-    """Return the multiple of `turn` nearest to `u`; 0 where there is no turn."""
+    """Return the multiple of `turn` nearest to `u`; 0 if `turn` is 0."""
     return turn * nearest_whole(u / turn) if turn > 0.0 else 0.0

@@ -1,7 +1,7 @@
-"""The events of a body that bounces (`vibsim.models.events.Impact`): impacts on the ground, and rest.
+"""Events of a bouncing body (`vibsim.models.events.Impact`): impacts on the ground, and rest.
 
-Modes: 1 in flight, 0 at rest on the ground, for ever. A kernel of such a model binds these functions; they know the
-model by ``impact_of``.
+Modes: 1 in flight, 0 at rest on the ground, for ever. A kernel of such a model binds these functions; they reach the
+model through ``impact_of``.
 """
 
 from __future__ import annotations
@@ -15,22 +15,22 @@ impact_of = mode_of = unbound
 
 
 def first_mode(u: float, v: float, t: float, p: P) -> float:
-    """Return the mode at the beginning: rest for a body that is slow and on the ground."""
+    """Return the initial mode: at rest if the body is slow and on the ground."""
     return 0.0 if u <= 0.0 and abs(v) <= impact_of(u, v, t, p)[2] else 1.0
 
 
 def guard(u: float, v: float, t: float, p: P) -> float:
-    """Return a number that falls below 0 at an impact: the height."""
+    """Return the guard, which falls below 0 at an impact: the height."""
     return 1.0 if mode_of(p) == 0.0 else u
 
 
 def guard_on_mesh(u: float, v: float, t: float, p: P) -> float:
-    """Return a number below 0 at a grid point where the body falls and is near the ground (text, section 10.9)."""
+    """Return the guard, below 0 at a grid point where the body falls and is near the ground (text, section 10.9)."""
     return 1.0 if mode_of(p) == 0.0 or v > 0.0 else u - impact_of(u, v, t, p)[1]
 
 
 def followed(u: float, v: float, t: float, p: P) -> float:
-    """Return the mode at the end of a smooth piece, without an event: the same."""
+    """Return the mode at the end of a smooth piece without an event: unchanged."""
     return mode_of(p)
 
 
@@ -47,11 +47,11 @@ def landed(u: float, v: float) -> tuple[float, float]:
 def settled(
     u: float, v: float, t: float, before: float, is_last: bool, p: P
 ) -> tuple[float, float, float]:
-    """Return position, velocity and mode behind an impact.
+    """Return position, velocity and mode after an impact.
 
-    On the mesh a body that falls is below the ground already. It stays there and rises from there, since a body that
-    were lifted would win energy and bounce for ever. It also comes to rest where it has not left the ground at the
-    point before: two impacts on end mean that the motion has stopped (text, exercise 20).
+    On the mesh a falling body is already below the ground. It rises from there, because lifting it to the ground would
+    add energy and make it bounce for ever. It also comes to rest if it had not left the ground at the previous point:
+    two consecutive impacts mean that the motion has stopped (text, exercise 20).
     """
     restitution, near, slow = impact_of(u, v, t, p)
     speed = restitution * abs(v)
@@ -61,7 +61,7 @@ def settled(
 
 
 def counts_as_event(before: float, after: float, came: Any, goes: Any) -> bool:
-    """Tell whether a change of the mode is an event: each is."""
+    """Tell whether a change of the mode counts as an event: always."""
     return True
 
 
@@ -71,16 +71,16 @@ def is_at_rest(mode: float) -> bool:
 
 
 def spent(u: float, ahead: float) -> float:
-    """Return what a flight costs: nothing."""
+    """Return the cost of a flight: 0."""
     return 0.0
 
 
 def lost(came: Any, goes: Any, t: float, p: P) -> float:
-    """Return half of what the square of the velocity has lost."""
+    """Return the decrease of ``v^2/2``."""
     before, after = came[1], goes[1]
     return 0.5 * (before * before - after * after)
 
 
 def turning(before: float, after: float, v: float, own: float) -> float:
-    """Return -1 where the body bounces, which is a trough, and 0 where it stays."""
+    """Return -1 for a bounce, which is a trough, and 0 if the body stays."""
     return -1.0 if after != 0.0 else 0.0

@@ -1,10 +1,10 @@
-"""From (model, scheme) to one function that steps members: text first, then a lane.
+"""From (model, scheme) to one function that steps members: first as source text, then in a lane.
 
-A kernel is written out as one Python module that holds everything it runs: the elementary functions, the gathering,
-the scheme's functions, the model's formulas and a loop. The *plain* lane runs the loop over one member as it stands,
-which needs no compiler; the *scalar* lane compiles the same text; the *blocks* lane compiles the loop over blocks of
-members. `vibsim.native` compiles strictly (no contraction, no reassociation), so that all give the same bits. The text
-is also the key of the cache: a changed formula, scheme or loop is another kernel.
+A kernel is generated as one self-contained Python module: elementary functions, statistics of every step, the scheme's
+functions, the model's formulas and a loop. The *plain* lane runs the loop over single members in Python; the *scalar*
+lane compiles the same text; the *blocks* lane compiles the loop over blocks of members. `vibsim.native` compiles
+strictly (no contraction, no reassociation), so all lanes give the same bits. The text is also the key of the cache: a
+changed formula, scheme or loop makes another kernel.
 """
 
 from __future__ import annotations
@@ -62,13 +62,13 @@ def kernel(
 ):
     members, settings = (parameters, table, initial, dt), (steps, every, variant, end_rule, turn)
     run(members, (first, stop), settings, (samples, stats, counts, kept), rows)"""
-"""What is called from outside, with `vibsim.engine.member_loop.run` or that of blocks."""
+"""Entry point of a kernel; it calls `run` of `vibsim.engine.member_loop` or `vibsim.engine.block_loop`."""
 _STEPPING = "f2 f2 f2 f1 i i i i i i f f3 f2 i2 f3 f1"
-"""Its arguments, as `vibsim.native.linking.link` has them."""
+"""Argument types of the entry point, as in `vibsim.native.linking.link`."""
 _OF_EVENTS = {Friction: friction, Impact: impact, Crossings: crossings}
-"""What a kernel binds for each kind of events."""
+"""Module with the functions that a kernel binds, by kind of events."""
 _OBSERVING = "f2 f2 f1 i i f3 f3"
-"""Arguments of `vibsim.engine.member_loop.observe`."""
+"""Argument types of `vibsim.engine.member_loop.observe`."""
 
 
 @cache
@@ -87,16 +87,15 @@ def kernel(
     lane
         One of `LANES`: the same bits at different speeds.
     with_gathered
-        Whether energies, extrema, norms, peaks and turns are gathered, and beside the energy by the scheme's own
-        velocity that by ``[D_2t u]``.
+        Whether energies (also with ``[D_2t u]`` as velocity), extrema, norms, peaks and turns are gathered.
     with_series, with_peaks
-        Whether samples have more rows than position and velocity (`vibsim.engine.gather`), and whether local extrema
-        are kept (`vibsim.engine.extrema`), where anything is gathered.
+        Whether, if anything is gathered, samples have further rows (`vibsim.engine.gather`), and whether local extrema
+        are kept (`vibsim.engine.extrema`).
 
     Raises
     ------
     SimulationError
-        Where the kernel cannot be compiled, or a model that has events or looks a table up is to be stepped in blocks.
+        If the kernel cannot be compiled, or the model cannot be stepped in blocks.
     """
     if lane == "blocks":
         for reason, holds in (
@@ -112,7 +111,7 @@ def kernel(
 
 @cache
 def observer(model: Model, formulas: tuple[Formula, ...], lane: str) -> Kernel:
-    """Return the function that works out formulas of samples (`vibsim.engine.member_loop.observe`)."""
+    """Return the function that evaluates formulas at samples (`vibsim.engine.member_loop.observe`)."""
     count = model.coordinates
     module = _module(lane, {})
     coordinates.put_moves(module, count)
@@ -132,7 +131,7 @@ def source(
     with_series: bool = False,
     with_peaks: bool = False,
 ) -> str:
-    """Return the text of the kernel of `model` and `stepper`, without the head that says what compiles it."""
+    """Return the text of the kernel of `model` and `stepper`, without the head that binds the compiler."""
     return _written(model, stepper, lane, with_gathered, with_series, with_peaks).text
 
 
@@ -150,7 +149,7 @@ def _written(
     module = _module(lane, settings)
     again = lane != "blocks" and bool(settings["D2T"])
     with_work = bool(settings["WORK"])
-    # with events a step stands at several places, and would take long to compile
+    # with events a step occurs at several places, and inlining it would take long to compile
     rare = lane == "blocks" or model.events is not None
     put_formulas(module, model, "", stepper, is_rare=rare, with_kinetic=again, with_work=with_work)
     if again:
@@ -187,7 +186,7 @@ def _settings(
     with_series: bool,
     with_peaks: bool,
 ) -> dict[str, object]:
-    """Return the constants of a kernel by their names: what it does, and where its rows and columns are."""
+    """Return the constants of a kernel by name: its settings, and the positions of its rows and columns."""
     count, parameters = model.coordinates, n_parameters(stepper, model)
     with_peaks = with_peaks and with_gathered
     settings: dict[str, object] = {
@@ -213,12 +212,12 @@ def _settings(
 def _put_step_of_blocks(
     module: Module, model: Model, stepper: Stepper, settings: Mapping[str, object]
 ) -> None:
-    """Write the step of a block of members, which takes fast functions."""
+    """Write the step of a block of members, with fast elementary functions."""
     put_formulas(module, model, "_fast", stepper, with_work=bool(settings["WORK"]))
     functions = (n for n, v in stepper.step.__globals__.items() if isinstance(v, FunctionType))
     renamed = {name: f"{name}_fast" for name in (*HANDED, *functions)}
     if stepper.implicit:
-        # where an iteration ends is a comparison, which would hide the NaN of a fast function out of its range
+        # the convergence test would hide the NaN of a fast function outside its range
         module.define("step_fast(state, t, dt, p)", "return step(state, t, dt, p)")
     elif settings["STAGED"]:
         rows.put_stages(module, stepper, renamed, settings)
@@ -227,7 +226,7 @@ def _put_step_of_blocks(
 
 
 def carried(stepper: Stepper, model: Model) -> int:
-    """Return how many floats the state of a scheme has, by asking for one."""
+    """Return the number of floats in the state of a scheme, by computing one."""
     p: tuple[Any, ...] = (1.0,) * (n_parameters(stepper, model) + n_between(model))
     p += ((0.0,) * 4,) if stepper.tabulated else ()
     start = handed(stepper.start, lambda u, v, t, p: 0.0, lambda u, v, t, p: (0.0, 0.0))
@@ -235,7 +234,7 @@ def carried(stepper: Stepper, model: Model) -> int:
 
 
 def _put_events(module: Module, model: Model, stepper: Stepper) -> None:
-    """Write what tells modes apart, and the events of the model."""
+    """Write the functions of the mode and the events of the model."""
     first = len(model.parameters)
     places = [f"p[{i}]" for i in range(n_parameters(stepper, model) + n_between(model))]
     places[first : first + 2] = ["mode", "start"]

@@ -1,7 +1,7 @@
-"""The loop over members, then steps: one member at a time, its whole state in registers.
+"""The loop over members and then steps: one member at a time, its whole state in registers.
 
-`vibsim.engine.kernel` binds the functions of the scheme and the model, runs this text as it stands in the plain lane
-and compiles it for the scalar one. What happens in a step is written once, in the scheme, the model and
+`vibsim.engine.kernel` binds the functions of the scheme and the model, runs this text in Python in the plain lane and
+compiles it for the scalar lane. The contents of a step are written once, in the scheme, the model and
 `vibsim.engine.gather`; `vibsim.engine.block_loop` does the same steps in another order.
 """
 
@@ -42,37 +42,37 @@ next_further = note_further = observed = parameters_of = point_of = powers = unb
 put_components = put_moving = size_of = start = step = unbound
 
 
-def run(members: Any, span: Any, settings: Any, found: Any, rows: Any) -> None:
-    """Step some members of one scheme, and fill what is found.
+def run(members: Any, span: Any, settings: Any, results: Any, rows: Any) -> None:
+    """Step a range of members by one scheme, and fill the results.
 
     Parameters
     ----------
     members
-        ``parameters``, shape (case, n_parameters). ``table``, shape (row, point), empty where no formula looks anything
-        up (`vibsim.models.table`). ``initial``, shape (case, state): positions, then velocities. ``dt``, shape (case,).
+        ``parameters``, shape (case, n_parameters). ``table``, shape (row, point), empty if the model has none
+        (`vibsim.models.table`). ``initial``, shape (case, state): positions, then velocities. ``dt``, shape (case,).
     span
-        The first member, and the one behind the last.
+        First member and end of the range, exclusive.
     settings
         ``steps, every``: number of steps; a sample is stored at each multiple of `every`, which divides `steps`.
-        ``variant``: which of its starts the scheme takes. ``end_rule``: velocity at the last point, index into
-        `vibsim.schemes.base.END_RULES`. ``turn``: angle of a whole turn; 0 where the position is no angle.
-    found
+        ``variant``: variant of the scheme's start. ``end_rule``: velocity at the last point, index into
+        `vibsim.schemes.base.END_RULES`. ``turn``: angle of a full turn; 0 if the position is not an angle.
+    results
         ``samples``, shape (rows, case, n_samples), filled with NaN: positions, velocities, and the rows of
         `vibsim.engine.gather`. ``stats``, shape (case, `N_STATS`), filled with NaN: columns of `vibsim.engine.gather`.
-        ``counts``, shape (case, `N_COUNTS`), filled with zeros: columns of `vibsim.engine.gather`, and behind them
-        those of `vibsim.engine.extrema`. ``kept``, shape (`N_KEPT`, case, extremum), filled with NaN: rows of
+        ``counts``, shape (case, `N_COUNTS`), filled with zeros: columns of `vibsim.engine.gather`, then those of
+        `vibsim.engine.extrema`. ``kept``, shape (`N_KEPT`, case, extremum), filled with NaN: rows of
         `vibsim.engine.extrema`.
     rows
-        Scratch of `vibsim.engine.block_loop`, which this loop does without.
+        Scratch memory of `vibsim.engine.block_loop`, unused here.
     """
     parameters, table, initial, dt = members
     first, stop = span
     steps, every, variant, end_rule, turn = settings
-    samples, stats, counts, kept = found
+    samples, stats, counts, kept = results
     for case in range(first, stop):
         h = float(dt[case])
         p = parameters_of(parameters, table, case)
-        # positions and velocities are vectors for several coordinates; u and v are those of the first one
+        # with several coordinates q and w are vectors; u and v are position and velocity of the first
         q, w = initial_of(initial, case)
         u, v = first_of(q), first_of(w)
         if EVENTS:
@@ -84,7 +84,7 @@ def run(members: Any, span: Any, settings: Any, found: Any, rows: Any) -> None:
             energy_0 = kinetic + potential
         work = first_work(q, w, p)
         if D2T:
-            # deviation of the energy by the centred difference: at this point, and the largest one before it
+            # deviation of the energy by the centred difference: at this point, and the largest before it
             pending = largest_d2t = 0.0
         put_moving(samples, case, 0, q, w)
         if SERIES:
@@ -116,7 +116,7 @@ def run(members: Any, span: Any, settings: Any, found: Any, rows: Any) -> None:
             if n == steps:
                 w = end_velocity(end_rule, own, w_before, w_two_before, backward(state, h))
             if EVENTS:  # noqa: SIM102
-                # a formula over points on both sides of an event, or of a member at rest, gives no velocity
+                # end formulas are invalid across an event and at rest
                 if n - last_event < 2 or mode_of(p) == 0.0:
                     w = own
             state = following
@@ -125,12 +125,12 @@ def run(members: Any, span: Any, settings: Any, found: Any, rows: Any) -> None:
                 break
             good = n
             u, v = first_of(q), first_of(w)
-            # the scheme's own velocity: an end formula would move a peak in the last step
+            # with the scheme's own velocity, because an end formula would move a peak in the last step
             slope_before, slope = slope, first_of(own)
             if STAGGERED:
                 slope = (first_of(following[0]) - u_before) * (0.5 / h)
             if EVENTS:  # noqa: SIM102
-                # events have noted themselves whether they are peaks, also one at rest on the point before
+                # peaks at events were noted with the event, also at a point of rest just before
                 if n == last_event or (n - 1 == last_event and slope_before == 0.0):
                     slope_before = math.nan
             if GATHER:
@@ -144,7 +144,7 @@ def run(members: Any, span: Any, settings: Any, found: Any, rows: Any) -> None:
             if WORK:
                 work = next_work(work, stats, case, (q, w, t, p))
             if D2T:
-                # that of the point before counts now that this one is sound, since it rests on it
+                # the deviation at the previous point depends on this point, which is now known to be finite
                 largest_d2t = larger(pending, largest_d2t)
                 velocity_d2t = centred_difference(following[0], q_before, 0.5 / h)
                 pending = abs(energy_with(q, velocity_d2t, t, p, potential) - energy_0)
@@ -166,7 +166,7 @@ def run(members: Any, span: Any, settings: Any, found: Any, rows: Any) -> None:
                 sample += 1
                 due += every
         if GATHER:
-            # of a member that failed, all points came before the last one
+            # for a failed member, all points precede the last one
             interior = interior if good == steps else extrema[LARGEST_DEVIATION]
             note_extrema(stats, case, 0, extrema, interior)
             note_further(stats, case, further)
@@ -176,7 +176,7 @@ def run(members: Any, span: Any, settings: Any, found: Any, rows: Any) -> None:
 
 
 def first_work(q: Any, w: Any, p: P) -> tuple[float, float]:
-    """Return the powers of damping and of driving forces at t = 0; with events, their work so far."""
+    """Return the powers of damping and of driving forces at t = 0; with events, their work, which is 0."""
     work = 0.0, 0.0
     if WORK:
         if EVENTS:
@@ -186,7 +186,7 @@ def first_work(q: Any, w: Any, p: P) -> tuple[float, float]:
 
 
 def next_work(work: tuple[float, float], stats: Any, case: int, point: Any) -> tuple[float, float]:
-    """Return the sums of the powers after one more point: position, velocity, time and parameters."""
+    """Return the sums of the powers after one more point (q, w, t, p); with events, the work so far."""
     if EVENTS:
         return stats[case, TAKEN], stats[case, DONE]
     q, w, t, p = point
@@ -203,28 +203,28 @@ def put_work(samples: Any, stats: Any, case: int, k: int, work: tuple[float, flo
 
 
 def observe(
-    parameters: Any, table: Any, dt: Any, every: int, first: int, samples: Any, found: Any
+    parameters: Any, table: Any, dt: Any, every: int, first: int, samples: Any, results: Any
 ) -> None:
-    """Fill `found` with formulas of stored samples, for as many members as it has from member `first` on.
+    """Fill `results` with values of formulas at stored samples, for its number of members from member `first` on.
 
     Parameters
     ----------
     parameters
         Shape (case, n_parameters).
     table
-        What formulas look up, shape (row, point); empty where they do not.
+        Table of the model, shape (row, point); empty if it has none.
     dt, every
         Step of each member, shape (case,), and steps between samples.
     samples
         All positions and all velocities, shape (state, case, n_samples).
-    found
-        A row of each formula, shape (formula, members, n_samples); NaN where the samples are.
+    results
+        Shape (formula, members, n_samples); NaN where the samples are NaN.
     """
-    for member in range(found.shape[1]):
+    for member in range(results.shape[1]):
         case = first + member
         p = parameters_of(parameters, table, case)
-        for k in range(found.shape[2]):
+        for k in range(results.shape[2]):
             u, v = point_of(samples, case, k)
             values = observed(u, v, (k * every) * float(dt[case]), p)
-            for i in range(found.shape[0]):
-                found[i, member, k] = values[i]
+            for i in range(results.shape[0]):
+                results[i, member, k] = values[i]

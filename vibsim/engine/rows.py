@@ -1,4 +1,4 @@
-"""Text of the functions that move numbers into and out of the rows of `vibsim.engine.block_loop`."""
+"""Text of the functions that read and write the rows of `vibsim.engine.block_loop`."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from vibsim.schemes.base import Stepper
 
 
 def put_rows(module: Module, states: int, parameters: int, begin: Mapping[str, object]) -> None:
-    """Write the functions that move tuples; `begin` says where rows begin."""
+    """Write the functions that read and write tuples; `begin` has the offsets of rows."""
     for name, argument, first, count in (
         ("states", "first, ", "first", states),
         ("extrema", "", begin["EXTREMA"], gather.N_EXTREMA),
@@ -30,7 +30,7 @@ def put_rows(module: Module, states: int, parameters: int, begin: Mapping[str, o
 def put_stages(
     module: Module, stepper: Stepper, renamed: Mapping[str, str], begin: Mapping[str, object]
 ) -> None:
-    """Write the stages of a step as functions, and the loops over lanes that take all but the last."""
+    """Write the stages of a step as functions, and ``stages_of`` with a loop over lanes for each stage but the last."""
     places = {
         name: f"rows[{begin['FIRST_KEPT']} + {i * LANES} + j]"
         for i, name in enumerate(kept_names(stepper.step))

@@ -1,12 +1,11 @@
-"""A step cut into stages, each up to one evaluation of the force, for the loop over blocks.
+"""A step cut into stages for the loop over blocks, each with one evaluation of the force.
 
-Where each evaluation waits for the one before, a processor that works on a whole step of a few members at a time has
-little to do meanwhile. A loop for each stage over all members of a block keeps it busy: every iteration then has one
-evaluation, and the next one does not wait for it. What a later stage needs of an earlier one is kept in rows. Every
-operation on a member's numbers stays the same one, in the same order.
+Evaluations within a step depend on each other, so a processor that does whole steps of a few members stalls. A loop for
+each stage over all members of a block has independent iterations instead. Values that later stages need are kept in
+rows. The operations on a member's numbers stay the same, in the same order.
 
-Only a step in straight lines is cut, in which every evaluation stands for itself, ``name = acceleration(...)``, and no
-name gets a second value; `vibsim.schemes.code_generation` writes such steps.
+A step is cut only if it is straight-line code in which every evaluation is an assignment, ``name = acceleration(...)``,
+and no name is assigned twice, as `vibsim.schemes.code_generation` writes it.
 """
 
 from __future__ import annotations
@@ -28,14 +27,14 @@ class Stage:
 
     tree: ast.FunctionDef
     before: tuple[str, ...]
-    """Names whose values it takes, in `kept`."""
+    """Names of its inputs from earlier stages, in `kept`."""
     after: tuple[str, ...]
-    """Names whose values it returns; those of the last one, which returns what the step does, are none."""
+    """Names of its outputs; empty for the last stage, which returns the result of the step."""
 
 
 @cache
 def stages(step: Callable[..., Any]) -> tuple[Stage, ...]:
-    """Return the stages of a step; none where it has one evaluation of the force, or cannot be cut."""
+    """Return the stages of a step; empty if it has a single evaluation of the force, or cannot be cut."""
     tree = definition(step, "step")
     parts = _parts(tree.body)
     if len(parts) < 2:
@@ -44,7 +43,7 @@ def stages(step: Callable[..., Any]) -> tuple[Stage, ...]:
     unpacking = [line for line in parts[0] if _value_name(line) == arguments[0]]
     given = {*arguments, *_names(unpacking, ast.Store)}
     head = f"def step({', '.join((*arguments[:4], 'kept', *arguments[4:]))}):\n    pass"
-    found = []
+    result = []
     before: tuple[str, ...] = ()
     for i, part in enumerate(parts):
         later = _names((line for lines in parts[i + 1 :] for line in lines), ast.Load)
@@ -52,21 +51,21 @@ def stages(step: Callable[..., Any]) -> tuple[Stage, ...]:
         after = tuple(sorted(known & later))
         [function] = ast.parse(head).body
         assert isinstance(function, ast.FunctionDef)
-        taken = ast.parse(f"({', '.join(before)},) = kept").body if before else []
-        returned = ast.parse(f"return ({', '.join(after)},)").body if after else []
-        function.body = [*(unpacking if i else ()), *taken, *part, *returned]
-        found.append(Stage(function, before, after))
+        inputs = ast.parse(f"({', '.join(before)},) = kept").body if before else []
+        outputs = ast.parse(f"return ({', '.join(after)},)").body if after else []
+        function.body = [*(unpacking if i else ()), *inputs, *part, *outputs]
+        result.append(Stage(function, before, after))
         before = after
-    return tuple(found)
+    return tuple(result)
 
 
 def kept_names(step: Callable[..., Any]) -> tuple[str, ...]:
-    """Return every name whose value is kept from one stage to a later one, each of which needs a row."""
+    """Return every name whose value is kept for a later stage, each in a row of its own."""
     return tuple(sorted({name for stage in stages(step) for name in stage.after}))
 
 
 def _parts(body: Sequence[ast.stmt]) -> list[list[ast.stmt]]:
-    """Cut behind every evaluation of the force but the last; one part where that cannot be done."""
+    """Cut after every evaluation of the force but the last; return a single part if that cannot be done."""
     *lines, end = body
     straight = isinstance(end, ast.Return) and all(isinstance(line, ast.Assign) for line in lines)
     stored = [node.id for node in _nodes(lines) if isinstance(node.ctx, ast.Store)]
@@ -83,7 +82,7 @@ def _parts(body: Sequence[ast.stmt]) -> list[list[ast.stmt]]:
 
 
 def _value_name(line: ast.stmt) -> str:
-    """Return the name whose value a line assigns, with parentheses where it is called; else nothing."""
+    """Return the name that a line assigns from, with ``()`` if it is called; empty for any other line."""
     match line:
         case ast.Assign(value=ast.Name(id=name)):
             return name

@@ -1,7 +1,7 @@
-"""The source text of functions, collected into one flat module.
+"""Source text of functions, collected into one flat module.
 
-A function is taken with whatever it uses of its own module: numbers and tuples of numbers are written out, plain
-functions are collected in their turn. Anything else is refused.
+A function is collected together with the globals that it uses: numbers and tuples of numbers are written out, plain
+functions are collected recursively. Anything else is refused.
 """
 
 from __future__ import annotations
@@ -21,32 +21,32 @@ from vibsim.schemes.base import HANDED
 
 @dataclass
 class Module:
-    """A flat module that is being written."""
+    """A flat module under construction."""
 
     entry: str
-    """The function that is called from outside."""
+    """Name of the entry point."""
     settings: Mapping[str, object] = field(default_factory=dict)
-    """Numbers that take the place of those in the modules that functions come from."""
+    """Constants that override those in the modules of the collected functions."""
     given: Collection[str] = ()
     """Names that the head of the module defines."""
     parts: dict[str, str] = field(default_factory=dict)
-    """Text by name, each after what it uses."""
+    """Definitions by name, each after those that it uses."""
 
     @property
     def text(self) -> str:
-        """The whole text, without a head that says what ``compiled``, ``called`` and ``entry`` are."""
+        """The whole text, without the head that defines ``compiled``, ``called`` and ``entry``."""
         return "import math\n\n" + "\n\n".join(self.parts.values()) + "\n"
 
     def put(self, name: str, text: str) -> None:
-        """Add a part.
+        """Add a definition.
 
-        Raises `SimulationError` where the name stands for something else already.
+        Raises `SimulationError` if the name already has another definition.
         """
         if self.parts.setdefault(name, text) != text:
             raise SimulationError(f"{name} means two things in one kernel")
 
     def define(self, head: str, *lines: str) -> None:
-        """Add a function with these lines, which becomes part of its callers."""
+        """Add a function with these lines, which is inlined into its callers."""
         body = "\n    ".join(lines)
         self.put(head.partition("(")[0], f"@compiled\ndef {head}:\n    {body}")
 
@@ -59,28 +59,28 @@ def collect(
     *,
     is_called: bool = False,
 ) -> None:
-    """Write `function` under `name`, after whatever it uses.
+    """Write `function` under `name`, after everything that it uses.
 
     Parameters
     ----------
     renamed
-        Names of the text that stand for others here.
+        New names for names in the text.
     is_called
-        Whether it is compiled for itself (`vibsim.engine.kernel_stubs.called`).
+        Whether it is compiled separately (`vibsim.engine.kernel_stubs.called`).
 
-    Raises `SimulationError` where it uses something that cannot enter a kernel.
+    Raises `SimulationError` if it uses something that cannot enter a kernel.
     """
     used = _names(function, name)
-    answers = {k: v for k, v in module.settings.items() if isinstance(v, bool) and k in used}
-    others = {old: new for old, new in renamed.items() if old in used}
-    text = _text(function, name, frozenset(answers.items()), frozenset(others.items()))
+    flags = {k: v for k, v in module.settings.items() if isinstance(v, bool) and k in used}
+    renamed_here = {old: new for old, new in renamed.items() if old in used}
+    text = _text(function, name, frozenset(flags.items()), frozenset(renamed_here.items()))
     _put(module, function, text, name, renamed, is_called=is_called)
 
 
 def definition(function: Callable[..., Any], name: str) -> ast.FunctionDef:
-    """Return the parsed text of a function that is to stand under `name`.
+    """Return the syntax tree of a function that is to be written under `name`.
 
-    Raises `SimulationError` where it is no plain function, so that it cannot enter a kernel.
+    Raises `SimulationError` if it is not a plain function, which cannot enter a kernel.
     """
     if not isinstance(function, types.FunctionType):
         raise SimulationError(f"{name} is no plain Python function, so it cannot enter a kernel")
@@ -103,23 +103,23 @@ def enter(
     name: str,
     renamed: Mapping[str, str],
 ) -> None:
-    """Write the text `tree`, which is that of `function` or a part of it, under `name`: see `collect`."""
+    """Write `tree`, the syntax tree of `function` or a part of it, under `name`: see `collect`."""
     _put(module, function, _text_of(function, tree, name, module.settings, renamed), name, renamed)
 
 
 @dataclass(frozen=True)
 class _Text:
-    """A function as it stands in a kernel."""
+    """The text of a function in a kernel."""
 
     body: str
-    """Without a mark that says how it is compiled."""
+    """Without the decorator that says how it is compiled."""
     used: tuple[str, ...]
-    """Names that are not its own, as the module has them that it comes from."""
+    """Global names that it uses, as named in its own module."""
     is_marked: bool
     has_loop: bool
 
 
-# kernels have most of their functions in common, and to parse one takes milliseconds
+# cached, because kernels share most of their functions, and parsing one takes milliseconds
 
 
 @cache
@@ -173,7 +173,7 @@ def _put(
     *,
     is_called: bool = False,
 ) -> None:
-    """Put a function into a module, after whatever it uses."""
+    """Put a function into a module, after everything that it uses."""
     mark = _mark(module, function, text, name, is_called)
     for other in text.used:
         if other not in function.__globals__ or other in module.given:
@@ -182,7 +182,7 @@ def _put(
         if other in module.settings:
             module.put(other, f"{other} = {module.settings[other]!r}")
         elif isinstance(value, types.FunctionType):
-            # what is there already was bound by whoever makes the kernel
+            # a name that is already defined was bound by `vibsim.engine.kernel`
             if new not in module.parts:
                 collect(module, value, new, renamed)
         elif _is_constant(value):
@@ -197,11 +197,11 @@ def _put(
 def _mark(
     module: Module, function: Callable[..., Any], text: _Text, name: str, is_called: bool
 ) -> str:
-    """Say how a function is compiled: into its callers, or for itself."""
+    """Return the decorator of a function: inlined into its callers, or compiled separately."""
     if name == module.entry:
         return "entry"
     if known := module.parts.get(name):
-        # another function that uses it has brought it already
+        # it was already collected for another function
         return known.partition("\n")[0].removeprefix("@")
     is_elementary = function.__module__.startswith("vibsim.elementary")
     is_alone = is_called or text.is_marked or (text.has_loop and is_elementary)
@@ -215,7 +215,7 @@ def _is_constant(value: object) -> bool:
 
 
 def _strip(tree: ast.FunctionDef, name: str) -> None:
-    """Rename a function; drop its docstring, its annotations, and the functions it is handed."""
+    """Rename a function; drop its docstring, its annotations, and the arguments of `HANDED`."""
     tree.name = name
     tree.returns = None
     tree.args.args = [argument for argument in tree.args.args if argument.arg not in HANDED]
@@ -230,21 +230,21 @@ def _strip(tree: ast.FunctionDef, name: str) -> None:
 
 
 class _Settled(ast.NodeTransformer):
-    """Keeps of ``if NAME: ... else: ...`` what a setting says, without the question."""
+    """Replaces ``if NAME: ... else: ...`` by the branch that the setting NAME selects."""
 
     def __init__(self, settings: Mapping[str, object]) -> None:
         self.settings = settings
 
     def visit_If(self, node: ast.If) -> ast.AST | list[ast.stmt] | None:
         self.generic_visit(node)
-        answer = self.settings.get(node.test.id) if isinstance(node.test, ast.Name) else None
-        if not isinstance(answer, bool):
+        value = self.settings.get(node.test.id) if isinstance(node.test, ast.Name) else None
+        if not isinstance(value, bool):
             return node
-        return (node.body if answer else node.orelse) or None
+        return (node.body if value else node.orelse) or None
 
 
 def divided(a: Any, b: Any) -> Any:
-    """Return a/b as IEEE 754 has it, where Python raises at b = 0; of a vector a, too."""
+    """Return a/b by IEEE 754, also for b = 0, where Python raises; a may be a vector."""
     if b != 0.0 or isinstance(a, tuple):
         return a / b
     return (
@@ -268,12 +268,12 @@ class _Quotients(ast.NodeTransformer):
 
 
 def with_quotients(text: str) -> ast.Module:
-    """Return a module for plain Python in which division by zero is no error, as in compiled code."""
+    """Return a module for plain Python in which division by zero does not raise, as in compiled code."""
     tree: ast.Module = _Quotients().visit(ast.parse(text))
     return ast.fix_missing_locations(tree)
 
 
 @lru_cache(maxsize=4096)
 def plain_code(text: str) -> types.CodeType:
-    """Return the code of `with_quotients`; kernels have most of their parts in common."""
+    """Return the code of `with_quotients`, cached because kernels share most of their parts."""
     return compile(with_quotients(text), "<kernel>", "exec")

@@ -18,15 +18,15 @@ from vibsim.schemes import Scheme
 from vibsim.schemes.base import END_RULES, Options, Stepper
 
 TASK = 16 * block_loop.LANES
-"""Members that a thread takes at a time."""
+"""Number of members per task of a thread."""
 
 
 def lane_for(members: int, steps: int, *, alone: bool = False) -> str:
     """Choose the lane from the size of the work; the bits are the same in every lane.
 
-    Members are stepped each `alone` where no vector instruction can step them together: an implicit step iterates as
-    often as its member needs, an event of a member divides its step, it has several coordinates, or it looks a table up
-    at a place of its own.
+    `alone` says that members cannot be stepped together by vector instructions: the step is implicit and iterates as
+    often as its member needs, the model has events, which divide the steps of a member, or several coordinates, or a
+    table, which each member looks up at its own place.
     """
     if members * steps <= PLAIN_MEMBER_STEPS:
         return "plain"
@@ -63,24 +63,24 @@ def integrate(
     steps, every
         Number of steps N, and the stride of the samples, a divisor of N.
     lane
-        One of `LANES`; chosen by `lane_for` where None.
+        One of `LANES`; None: chosen by `lane_for`.
     threads
-        How many threads share the members.
+        Number of threads that share the members.
     with_gathered
         Whether extrema, norms, peaks, turns and energies are gathered at every step.
     with_series
         Whether samples have more than position and velocity.
     n_extrema
-        How many peaks and troughs of a member are kept.
+        Largest number of peaks, and of troughs, that are kept per member.
     n_events
-        Of how many events of a member the times are kept, where anything is gathered.
+        Largest number of event times that are kept per member, if anything is gathered.
 
     Raises
     ------
     SimulationError
-        Where the kernel cannot be compiled.
+        If the kernel cannot be compiled.
     ValueError
-        Where there are not as many parameters as the model has, or not an initial value of every state.
+        If parameters or initial values do not have the shape that the model requires.
     """
     members, count = len(dt), model.coordinates
     _check_shapes(model, parameters, initial, members)
@@ -90,7 +90,7 @@ def integrate(
     lane = lane or lane_for(members, steps, alone=alone)
     run = kernel(model, stepper, lane, with_gathered, with_series, n_extrema > 0)
 
-    # what the kernel fills; numbers are NaN until they are known
+    # arrays that the kernel fills; NaN until known
     n_rows = _n_rows(model, stepper) if with_series else 2 * count
     n_columns = events.columns(count)["N_STATS_EVENTS"] + n_events
     n_columns = n_columns if has_events else count * gather.N_STATS
@@ -116,7 +116,7 @@ def integrate(
     if threads == 1:
         task(0)
     else:
-        # kernels let go of the interpreter
+        # kernels release the GIL
         with ThreadPoolExecutor(threads) as pool:
             list(pool.map(task, range(0, members, TASK)))
     return Trajectories(
@@ -130,7 +130,7 @@ def integrate(
 
 
 def _n_rows(model: Model, stepper: Stepper) -> int:
-    """Return how many rows samples have, up to the last one that the kernel has a use for."""
+    """Return the number of rows of samples, up to the last that the kernel uses."""
     last = "RUNNING_D2T_ROW" if stepper.own_velocity else "RUNNING_ROW"
     if has_budget(model):
         last = "DRIVEN_ROW" if model.events is None else "LOST_ROW"
@@ -138,32 +138,32 @@ def _n_rows(model: Model, stepper: Stepper) -> int:
 
 
 def extrema_of(u: Floats, dt: float) -> results.Extrema:
-    """Return peaks and troughs of positions at equal steps, shape (n_samples,), as a run finds those of one member.
+    """Return peaks and troughs of positions at equal steps, shape (n_samples,), by the code of the kernels.
 
     Source: vibration text, section 3.5.
     """
     kept = np.full((extrema.N_KEPT, 1, len(u)), np.nan)
     counts = np.zeros((1, extrema.N_COUNTS_KEPT), dtype=np.int64)
-    for n, near in enumerate(zip(*(u[i:].tolist() for i in range(3)), strict=False), 1):
-        if extrema.is_turned(*near):
-            extrema.note_turned(kept, counts, 0, n, dt, *near)
+    for n, triple in enumerate(zip(*(u[i:].tolist() for i in range(3)), strict=False), 1):
+        if extrema.is_turned(*triple):
+            extrema.note_turned(kept, counts, 0, n, dt, *triple)
     most = counts[0, [extrema.PEAK_COUNT, extrema.TROUGH_COUNT]].max()
     return results.extrema_of(kept[:, :, :most], counts)
 
 
 def _check_shapes(model: Model, parameters: Floats, initial: Floats, members: int) -> None:
-    known, wanted = len(model.parameters), (members, len(model.states))
-    # what is tabulated stands behind the parameters
-    if parameters.shape[1] < known:
-        raise ValueError(f"{model.kind} has {known} parameters, not {parameters.shape[1]}")
-    if initial.shape != wanted:
+    count, shape = len(model.parameters), (members, len(model.states))
+    # tabulated points may follow the parameters
+    if parameters.shape[1] < count:
+        raise ValueError(f"{model.kind} has {count} parameters, not {parameters.shape[1]}")
+    if initial.shape != shape:
         raise ValueError(
-            f"initial values of {model.kind} have the shape {wanted}, not {initial.shape}"
+            f"initial values of {model.kind} have the shape {shape}, not {initial.shape}"
         )
 
 
 def _scaled(model: Model, stepper: Stepper, parameters: Floats, dt: Floats) -> Floats:
-    """Put the factors of `Stepper.scaling` behind the parameters of every member."""
+    """Append the factors of `Stepper.scaling` to the parameters of every member."""
     if stepper.scaling is None:
         return parameters
     named = {row.key: parameters[:, i] for i, row in enumerate(model.parameters)}
@@ -172,7 +172,7 @@ def _scaled(model: Model, stepper: Stepper, parameters: Floats, dt: Floats) -> F
 
 
 def _table(model: Model) -> Floats:
-    """Return what formulas of the model look up, shape (row, point)."""
+    """Return the table of the model, shape (row, point); empty if it has none."""
     return _NO_TABLE if model.lookup is None else model.lookup.table.rows
 
 
@@ -180,12 +180,12 @@ _NOTHING, _NO_TABLE = np.empty(0), np.empty((0, 0))
 
 
 def _aligned(size: int) -> Floats:
-    """Return an array that begins with a cache line: a vector that lies across two of them costs twice."""
+    """Return an array aligned to a cache line: access to a vector across two lines costs twice."""
     if size == 0:
         return _NOTHING
-    room = np.empty(size + 8)
-    first = -room.__array_interface__["data"][0] % 64 // 8
-    return room[first : first + size]
+    buffer = np.empty(size + 8)
+    first = -buffer.__array_interface__["data"][0] % 64 // 8
+    return buffer[first : first + size]
 
 
 def _contiguous(*arrays: Floats) -> list[Floats]:
@@ -217,7 +217,7 @@ def observed(
     *,
     lane: str,
 ) -> Floats:
-    """Return formulas of a model at the samples of `integrate`, shape (formula, case, n_samples).
+    """Return values of formulas of a model at the samples of `integrate`, shape (formula, case, n_samples).
 
     Parameters
     ----------
@@ -227,10 +227,10 @@ def observed(
     Raises
     ------
     SimulationError
-        Where the kernel cannot be compiled.
+        If the kernel cannot be compiled.
     """
     samples = np.ascontiguousarray(states)
-    found = np.empty((len(formulas), *samples.shape[1:]))
+    values = np.empty((len(formulas), *samples.shape[1:]))
     run = observer(model, formulas, "plain" if lane == "plain" else "scalar")
-    run(*_contiguous(parameters, _table(model), dt), every, 0, samples, found)
-    return found
+    run(*_contiguous(parameters, _table(model), dt), every, 0, samples, values)
+    return values

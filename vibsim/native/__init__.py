@@ -1,9 +1,9 @@
-"""Machine code from plain Python functions over floats, whole numbers, truth values, tuples and arrays.
+"""A compiler for plain Python functions on floats, integers, booleans, tuples and arrays.
 
-The text of a module is read with `ast`, its kinds are inferred, and LLVM makes machine code of it: strictly, operation
-by operation as it is written, so that compiled code gives the bits that the same text gives in Python. Nothing here
-knows what the functions are for.
+The text of a module is parsed with `ast`, its types ("kinds") are inferred, and LLVM generates machine code: strictly,
+operation by operation as written, so that compiled code gives the same bits as the text in Python. This package does
+not depend on what the functions compute.
 
-`vibsim.native.machine.machine_code` compiles; `vibsim.native.linking.link` makes what was compiled callable, which
-needs no more than LLVM.
+`vibsim.native.machine.machine_code` compiles; `vibsim.native.linking.link` makes an object file callable, with LLVM
+alone.
 """

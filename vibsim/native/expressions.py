@@ -1,7 +1,7 @@
-"""Expressions as instructions of LLVM, and the variables that they read.
+"""Expressions as LLVM instructions, and the variables that they read.
 
-Variables live in slots, which LLVM turns into registers; those that are given one value, once, need none. Tuples are
-their entries.
+Variables are stored in stack slots, which LLVM turns into registers; variables that are assigned once need no slot.
+Tuples are represented by their entries.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ Call = Callable[[ir.IRBuilder, str, Sequence[Value]], Value]
 
 
 class Expressions:
-    """Variables and expressions of one function that is being written, still empty."""
+    """Writer of the variables and expressions of one function."""
 
     def __init__(self, call: Call, inference: Inference, function: ir.Function) -> None:
         self.call = call
@@ -49,7 +49,7 @@ class Expressions:
         self.function = function
         self.builder = ir.IRBuilder(function.append_basic_block("entry"))
         self.values: dict[str, Value] = {}
-        """What has one value throughout."""
+        """Values of variables without a slot."""
         self.slots: dict[str, list[ir.Value]] = {}
         counts = assigned(self.node)
         words = iter(function.args)
@@ -60,7 +60,7 @@ class Expressions:
                 self.store(name, value)
             else:
                 self.values[name] = value
-        # in a branch or a loop it need not have its value
+        # only at the top level: in a branch or a loop an assignment may not be executed
         at_the_top = assigned(*(line for line in self.node.body if isinstance(line, ast.Assign)))
         once = {name for name in at_the_top if counts[name] == 1}
         self.single = once - self.slots.keys()
@@ -68,7 +68,7 @@ class Expressions:
             self._make_slot(name)
 
     def blocks(self, *names: str) -> list[ir.Block]:
-        """Return new blocks of instructions."""
+        """Append basic blocks."""
         return [self.function.append_basic_block(name) for name in names]
 
     def _make_slot(self, name: str) -> None:
@@ -77,13 +77,13 @@ class Expressions:
             self.slots[name] = [self.builder.alloca(word) for word in types]
 
     def store(self, name: str, value: Value) -> None:
-        """Give a variable a value, in its slot."""
+        """Store a value in the slot of a variable."""
         words = words_of(self.turned(value, self.inference.variables[name]))
         for word, slot in zip(words, self.slots[name], strict=True):
             self.builder.store(word, slot)
 
     def turned(self, value: Value, kind: Kind) -> Value:
-        """Return a value as one of a wider kind."""
+        """Convert a value to a wider kind."""
         if isinstance(value, tuple):
             return tuple([self.turned(a, b) for a, b in zip(value, cast(Any, kind), strict=True)])
         if isinstance(value, Array):
@@ -91,18 +91,18 @@ class Expressions:
         return Number(cast(str, kind), operations.turned(self.builder, value, cast(str, kind)))
 
     def number(self, node: ast.expr) -> Number:
-        """Work out an expression that gives a number."""
+        """Evaluate an expression whose value is a number."""
         value = self.value(node)
         if not isinstance(value, Number):
             raise refusal(node, f"it is a {kind_of(value)}, not a number")
         return value
 
     def truth(self, node: ast.expr) -> ir.Value:
-        """Work out whether an expression holds, as a bit."""
+        """Evaluate the truth of an expression, as a bit."""
         return operations.turned(self.builder, self.number(node), TRUTH)
 
     def value(self, node: ast.expr) -> Value:
-        """Work out an expression."""
+        """Evaluate an expression."""
         known = self.source.constant(node, self.inference.local)
         if known is not None:
             return _literal(known)
@@ -117,14 +117,14 @@ class Expressions:
             case ast.Tuple(elts=parts):
                 return tuple([self.value(part) for part in parts])
             case ast.BinOp(left=left, op=op, right=right):
-                one, other = self.value(left), self.value(right)
-                kind = operations.kind_of_binary(node, op, kind_of(one), kind_of(other))
-                return self._binary(op, kind, one, other)
+                a, b = self.value(left), self.value(right)
+                kind = operations.kind_of_binary(node, op, kind_of(a), kind_of(b))
+                return self._binary(op, kind, a, b)
             case ast.UnaryOp(op=ast.Not(), operand=operand):
                 return Number(TRUTH, self.builder.not_(self.truth(operand)))
             case ast.UnaryOp(op=op, operand=operand):
-                given = self.value(operand)
-                return self._negated(given, operations.kind_of_unary(node, op, kind_of(given)))
+                value = self.value(operand)
+                return self._negated(value, operations.kind_of_unary(node, op, kind_of(value)))
             case ast.Compare(left=left, ops=ops, comparators=others):
                 sides = [self.number(part) for part in (left, *others)]
                 bits = map(partial(operations.compared, self.builder), ops, sides, sides[1:])
@@ -144,7 +144,7 @@ class Expressions:
         raise refusal(node, "this cannot be compiled")
 
     def _binary(self, op: ast.operator, kind: Kind, left: Value, right: Value) -> Value:
-        """Work out ``left op right``, of a vector component by component."""
+        """Evaluate ``left op right``, for vectors component by component."""
         if isinstance(kind, tuple):
             sides = (x if isinstance(x, tuple) else (x,) * len(kind) for x in (left, right))
             pairs = zip(*sides, strict=True)
@@ -159,7 +159,7 @@ class Expressions:
         return Number(cast(str, kind), operations.negated(self.builder, cast(Number, value)))
 
     def _bool(self, node: ast.BoolOp) -> Value:
-        """Work out ``and`` or ``or``: what stands behind is worked out only where it decides."""
+        """Evaluate ``and`` or ``or``, with short-circuiting."""
         [end] = self.blocks("decided")
         result: list[tuple[ir.Value, ir.Block]] = []
         for value in node.values[:-1]:
@@ -185,9 +185,9 @@ class Expressions:
         with self.builder.if_else(bit) as branches:
             for branch, part in zip(branches, (body, orelse), strict=True):
                 with branch:
-                    found = words_of(self.turned(self.value(part), kind))
-                    ways.append((found, self.builder.block))
-        columns = zip(*[found for found, _ in ways], strict=True)
+                    result = words_of(self.turned(self.value(part), kind))
+                    ways.append((result, self.builder.block))
+        columns = zip(*[words for words, _ in ways], strict=True)
         blocks = [block for _, block in ways]
         words = [self._merged(list(zip(column, blocks, strict=True))) for column in columns]
         return value_of(kind, iter(words))
@@ -213,7 +213,7 @@ class Expressions:
         return self._picked(node, of)
 
     def _picked(self, node: ast.Subscript, of: tuple[Any, ...]) -> Value:
-        """Return an entry of a tuple of numbers at a place that is known only when the code runs."""
+        """Return an entry of a tuple of numbers at an index that is only known at run time."""
         kind = self.inference.kind(node)
         if not isinstance(kind, str):
             raise refusal(node, "only of a tuple of numbers an entry is found at run time")
@@ -240,7 +240,7 @@ class Expressions:
         return Array(ArrayKind(array.kind.entry, 1), self.pointer(array, first), (length,))
 
     def pointer(self, array: Array, place: ast.expr) -> ir.Value:
-        """Return where an entry of an array stands."""
+        """Return the address of an entry of an array."""
         parts = place.elts if isinstance(place, ast.Tuple) else [place]
         numbers = [self.number(part) for part in parts]
         if len(numbers) != array.kind.dims or any(number.kind != WHOLE for number in numbers):
@@ -269,7 +269,7 @@ def _literal(value: Any) -> Value:
 
 
 def _is_plain(node: ast.expr) -> bool:
-    """Say whether an expression costs nothing and can do no harm where it is not wanted."""
+    """Tell whether an expression is free and without side effects, so that it may be evaluated unconditionally."""
     match node:
         case ast.Name() | ast.Constant() | ast.Attribute(value=ast.Name(id="math")):
             return True

@@ -1,7 +1,7 @@
-"""Of which kind every variable and every result is, before any code is written.
+"""Type inference: the kind of every variable and every result.
 
-A variable has one kind throughout its function: the smallest that holds all it is given. What widens one may widen
-another, so a function is gone through until nothing changes.
+A variable has one kind throughout its function: the smallest that holds all values assigned to it. Widening one
+variable may widen others, so a function is traversed until nothing changes.
 """
 
 from __future__ import annotations
@@ -23,12 +23,12 @@ class Inference:
 
     source: Source
     results: dict[tuple[str, tuple[Kind, ...]], Inference]
-    """What is known of functions by name and kinds of their arguments, shared by all of them."""
+    """Inferences of all functions, by name and kinds of the arguments; shared."""
     function: ast.FunctionDef
     arguments: tuple[Kind, ...]
     variables: dict[str, Kind] = field(default_factory=dict)
     result: Kind | None = None
-    """None until a ``return`` was seen."""
+    """Kind of the result; None until a ``return`` was seen."""
 
     @classmethod
     def of(
@@ -38,7 +38,7 @@ class Inference:
         name: str,
         arguments: tuple[Kind, ...],
     ) -> Inference:
-        """Return what is known of a function for arguments of these kinds."""
+        """Return the inference of a function for arguments of these kinds."""
         key = (name, arguments)
         if key not in results:
             results[key] = cls(source, results, source.functions[name], arguments)
@@ -47,7 +47,7 @@ class Inference:
 
     @cached_property
     def local(self) -> frozenset[str]:
-        """Names that the function gives values itself."""
+        """Arguments, and names that are assigned in the function."""
         return frozenset(assigned(self.function)) | frozenset(arguments_of(self.function))
 
     def _settle(self) -> None:
@@ -171,7 +171,7 @@ class Inference:
 def branches(
     source: Source, node: ast.If, local: frozenset[str]
 ) -> tuple[Sequence[ast.stmt]] | None:
-    """Return the one branch that is taken where that is known before anything runs, else None."""
+    """Return the branch that is taken if the test is constant, otherwise None."""
     known = source.constant(node.test, local)
     if known is None:
         return None
@@ -186,7 +186,7 @@ def kind_of_constant(value: Any) -> Kind:
 
 
 def row_from(node: ast.Subscript) -> ast.expr | None:
-    """Return where a part of a row begins, which goes on to its end: the b of ``array[..., b:]``."""
+    """Return the start b of a slice ``array[..., b:]`` of a row; None for any other subscript."""
     last = node.slice.elts[-1] if isinstance(node.slice, ast.Tuple) else node.slice
     if isinstance(last, ast.Slice) and last.lower and not last.upper and not last.step:
         return last.lower

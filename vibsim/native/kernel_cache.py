@@ -1,8 +1,8 @@
-"""Compiled kernels on disk: machine code under the digest of the text that it was compiled from.
+"""Cache of compiled kernels on disk, named by the digest of their text.
 
-What is kept is an object file, and beside it its text, to be read by people. A file is written once and never changed:
-a kernel of other text, another compiler or another processor is another file. Loading one runs it, so that they lie in
-the private cache alone (`vibsim.core.private_cache`); without one, kernels are compiled in memory.
+An entry is an object file, with its text beside it for human readers. Files are never changed: another text, compiler
+or processor makes another file. Loading an object file executes it, so they are kept only in the private cache
+(`vibsim.core.private_cache`); without one, kernels are compiled in memory.
 """
 
 from __future__ import annotations
@@ -15,28 +15,28 @@ from vibsim.core import private_cache
 Kernel = Callable[..., None]
 
 ENTRY = "kernel"
-"""Name of the function that is called."""
+"""Name of the entry point."""
 
 
 def load(text: str, kinds: str, written: Callable[[], str] | None = None) -> Kernel:
-    """Return the function ``kernel`` of the module `text`, compiled now or before.
+    """Return the function ``kernel`` of the module `text`, compiled or from the cache.
 
     Parameters
     ----------
     kinds
-        Kinds of its arguments (`vibsim.native.linking.link`).
+        Types of its arguments (`vibsim.native.linking.link`).
     written
-        Writes the module, where `text` is only what it is made of.
+        Function that returns the text of the module, if `text` only identifies it.
 
-    Raises `SimulationError` where the text cannot be compiled.
+    Raises `SimulationError` if the text cannot be compiled.
     """
-    # what only plans, analyses or draws needs no LLVM
+    # imported late: planning, analysis and drawing need no LLVM
     from vibsim.native.linking import identity, link
 
     name = hashlib.sha256("\n".join((text, kinds, identity())).encode()).hexdigest()
 
     def make() -> bytes:
-        # what finds its kernel needs no compiler
+        # imported late: a cached kernel needs no compiler
         from vibsim.native.machine import machine_code
 
         module = written() if written else text

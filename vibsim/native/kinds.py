@@ -1,7 +1,7 @@
-"""Kinds of values: what a variable of compiled code may hold, and the words of the machine that hold it.
+"""Kinds (types) of values in compiled code, and the machine words that hold them.
 
-A float has 64 bits, a whole number 64 with a sign, a truth value one. An array is a pointer with its lengths,
-C-contiguous. A tuple is its entries, one after the other: it is never an object of its own.
+A float has 64 bits, an integer 64 bits with sign, a boolean one bit. An array is a pointer with lengths, C-contiguous.
+A tuple is the sequence of its entries, without an object of its own.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ BIT = ir.IntType(1)
 FLOAT, WHOLE, TRUTH = "float", "whole number", "truth value"
 """Kinds of numbers."""
 NOTHING: tuple[()] = ()
-"""What a function returns that returns nothing."""
+"""Kind and value of the result of a function that returns nothing."""
 
 _WORDS: dict[str, ir.Type] = {FLOAT: DOUBLE, WHOLE: WORD, TRUTH: BIT}
 _RANKS = (TRUTH, WHOLE, FLOAT)
@@ -27,7 +27,7 @@ _RANKS = (TRUTH, WHOLE, FLOAT)
 
 @dataclass(frozen=True)
 class ArrayKind:
-    """An array of floats or of whole numbers."""
+    """An array of floats or of integers."""
 
     entry: str
     dims: int
@@ -67,12 +67,12 @@ def kind_of(value: Value) -> Kind:
 
 
 def is_vector(kind: Kind) -> bool:
-    """Say whether a kind is that of a vector: a tuple of floats, of which there are sums, multiples and a norm."""
+    """Tell whether a kind is a vector: a tuple of floats, which supports sums, multiples and a norm."""
     return isinstance(kind, tuple) and set(kind) == {FLOAT}
 
 
 def joined(one: Kind, other: Kind) -> Kind | None:
-    """Return the kind that holds what both kinds hold, None where there is none."""
+    """Return the smallest common kind of two kinds; None if there is none."""
     if one == other:
         return one
     if isinstance(one, str) and isinstance(other, str):
@@ -84,7 +84,7 @@ def joined(one: Kind, other: Kind) -> Kind | None:
 
 
 def types_of(kind: Kind) -> list[ir.Type]:
-    """Return the types of the words that hold a value of that kind."""
+    """Return the LLVM types of the words that hold a value of a kind."""
     if isinstance(kind, tuple):
         return [word for part in kind for word in types_of(part)]
     if isinstance(kind, ArrayKind):
@@ -100,7 +100,7 @@ def words_of(value: Value) -> list[ir.Value]:
 
 
 def value_of(kind: Kind, words: Iterator[ir.Value]) -> Value:
-    """Return the value of that kind which the next words hold."""
+    """Return the value of a kind that the next words hold."""
     if isinstance(kind, tuple):
         return tuple([value_of(part, words) for part in kind])
     if isinstance(kind, ArrayKind):

@@ -1,4 +1,4 @@
-"""An object file in memory, ready to be called; and what its code depends on."""
+"""Loading of object files as callable functions, and the identity of the compiler and processor."""
 
 from __future__ import annotations
 
@@ -13,18 +13,18 @@ from llvmlite import binding
 
 _TYPES = {"f": ctypes.c_double, "i": ctypes.c_int64}
 _KEPT: list[Any] = []
-"""What must live as long as the code that is called."""
+"""Engines that must live as long as their code may be called."""
 
 
 def link(code: bytes, name: str, kinds: str) -> Callable[..., None]:
-    """Load an object file and return its function `name`, which lets go of the interpreter.
+    """Load an object file and return its function `name`, which releases the GIL.
 
-    It takes numbers as they are, and arrays, C-contiguous with 64 bits an entry, as pointers and lengths.
+    The function takes numbers, and C-contiguous arrays with 64-bit entries.
 
     Parameters
     ----------
     kinds
-        What it takes, as `vibsim.native.machine.machine_code` has it.
+        Types of its arguments, as in `vibsim.native.machine.machine_code`.
     """
     make_ready()
     target = binding.Target.from_default_triple().create_target_machine()
@@ -52,7 +52,7 @@ def link(code: bytes, name: str, kinds: str) -> Callable[..., None]:
 
 
 def _address(array: Any) -> int:
-    """Return where the data of an array stand, the quick way where it is open."""
+    """Return the address of the data of an array."""
     try:
         return ctypes.addressof(ctypes.c_char.from_buffer(array))
     except (TypeError, ValueError):  # read-only, or empty
@@ -61,14 +61,14 @@ def _address(array: Any) -> int:
 
 @cache
 def make_ready() -> None:
-    """Make LLVM ready for this machine."""
+    """Initialise LLVM for this machine."""
     binding.initialize_native_target()
     binding.initialize_native_asmprinter()
 
 
 @cache
 def identity() -> str:
-    """Say what machine code depends on beside its text: the processor and what it can do, LLVM, and this compiler."""
+    """Return everything that machine code depends on except its text: processor and features, LLVM, this compiler."""
     make_ready()
     digest = hashlib.sha256()
     for file in sorted(Path(__file__).parent.glob("*.py")):

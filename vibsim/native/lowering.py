@@ -1,7 +1,7 @@
-"""Functions as instructions of LLVM: one for every set of kinds of arguments with which a function is called.
+"""Functions as LLVM instructions: one function for every combination of argument kinds with which it is called.
 
-A function takes the words of its arguments and returns those of its result, side by side. LLVM writes what is marked
-so into its callers, and drops what nobody calls any more.
+A function takes the words of its arguments and returns a struct of the words of its result. LLVM inlines functions that
+are marked so, and drops those that are no longer called.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ _PREFIX = "text."
 
 @dataclass
 class Program:
-    """Functions as instructions, each for the kinds of arguments with which it is called."""
+    """Functions as instructions, by name and kinds of the arguments with which they are called."""
 
     source: Source
     module: ir.Module = field(default_factory=lambda: ir.Module("kernel"))
@@ -51,10 +51,10 @@ class Program:
         if key not in self.written:
             takes = [word for kind in arguments for word in types_of(kind)]
             signature = ir.FunctionType(result_type(result), takes)
-            # LLVM takes a function called `round` or `sin` for that of the C library
+            # a prefix, because LLVM would take a function called `round` or `sin` for that of the C library
             unique = self.module.get_unique_name(f"{_PREFIX}{name}")
             function = ir.Function(self.module, signature, unique)
-            # dropped where nobody calls it any more
+            # dropped if it is no longer called
             function.linkage = "linkonce_odr"
             function.attributes.add("nounwind")
             if is_inline(inference.function):
@@ -66,15 +66,15 @@ class Program:
     def call(self, builder: ir.IRBuilder, name: str, arguments: Sequence[Value]) -> Value:
         """Call a function; return its result."""
         function, kind = self.function(name, tuple(map(kind_of, arguments)))
-        given = builder.call(function, [word for value in arguments for word in words_of(value)])
+        result = builder.call(function, [word for value in arguments for word in words_of(value)])
         count = len(types_of(kind))
         if count < 2:
-            return value_of(kind, iter([given] * count))
-        return value_of(kind, iter([builder.extract_value(given, i) for i in range(count)]))
+            return value_of(kind, iter([result] * count))
+        return value_of(kind, iter([builder.extract_value(result, i) for i in range(count)]))
 
 
 def result_type(kind: Kind) -> ir.Type:
-    """Return the type of what a function returns: nothing, a word, or several side by side."""
+    """Return the LLVM type of a result: void, a word, or a struct of several words."""
     types = types_of(kind)
     if not types:
         return ir.VoidType()
@@ -82,12 +82,12 @@ def result_type(kind: Kind) -> ir.Type:
 
 
 class _Statements(Expressions):
-    """One function that is being written, statement by statement."""
+    """Writer of one function, statement by statement."""
 
     def __init__(self, call: Call, inference: Inference, function: ir.Function) -> None:
         super().__init__(call, inference, function)
         self.ends: list[ir.Block] = []
-        """Where ``break`` goes, innermost last."""
+        """Targets of ``break``, innermost loop last."""
 
     def write(self) -> None:
         """Write the whole function."""

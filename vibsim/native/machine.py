@@ -17,10 +17,10 @@ _LETTERS = {"f": FLOAT, "i": WHOLE}
 
 
 LONG = 11_000
-"""Characters of a text, from which on operations that are alike are taken together as vectors, with the same bits.
+"""Length of a text, in characters, above which superword-level (SLP) vectorisation is used; it gives the same bits.
 
-Kernels of 8 coordinates are longer, and take a half or a third of the time. Those of one are shorter, and would lose
-a tenth. [measured]
+Kernels for 8 coordinates are longer and become two to three times as fast; those for one coordinate are shorter and
+would become 10 % slower. [measured]
 """
 
 
@@ -30,26 +30,26 @@ def machine_code(text: str, function: str, kinds: str) -> bytes:
     Parameters
     ----------
     text
-        A module: functions marked ``@compiled`` (which become part of their callers) or ``@called``, numbers, tuples
-        of numbers.
+        A module: functions marked ``@compiled`` (inlined into their callers) or ``@called``, numbers, tuples of
+        numbers.
     function
-        The function that is called from outside, which returns nothing. In the object file it has the same name, and
-        takes arrays as a pointer and lengths.
+        The entry point, which returns nothing. In the object file it has the same name, and takes arrays as a pointer
+        and lengths.
     kinds
-        A word for each of its arguments: ``f3`` is an array of floats with three dimensions, ``i2`` one of whole
-        numbers with two, ``f`` and ``i`` are a float and a whole number.
+        A word for each of its arguments: ``f3`` is a three-dimensional array of floats, ``i2`` a two-dimensional array
+        of integers, ``f`` a float and ``i`` an integer.
 
     Raises
     ------
     NativeError
-        Where the text cannot be compiled.
+        If the text cannot be compiled.
     """
     code: bytes = _target().emit_object(optimised(text, function, kinds))
     return code
 
 
 def optimised(text: str, function: str, kinds: str) -> Any:
-    """Return the instructions of which `machine_code` makes an object file, a module of LLVM; ``str`` shows them."""
+    """Return the optimised LLVM module from which `machine_code` makes an object file; ``str`` shows it."""
     program = Program(Source.read(text))
     _write_entry(program, function, tuple(map(_kind, kinds.split())))
     module = binding.parse_assembly(str(program.module))
@@ -84,7 +84,7 @@ def _optimise(module: Any, target: Any, has_many_alike: bool) -> None:
 
 @cache
 def _target() -> Any:
-    """Return this machine: its processor with all that it can do."""
+    """Return the target machine: this processor with all its features."""
     make_ready()
     return binding.Target.from_default_triple().create_target_machine(
         opt=3,

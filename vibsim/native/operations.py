@@ -1,6 +1,6 @@
-"""Operators and library functions: the kind of what they give, and the instructions that work it out.
+"""Operators and library functions: the kinds of their results, and their instructions.
 
-Every operation is rounded by itself, as IEEE 754 and Python have it; division by zero gives an infinity or a NaN, never
+Every operation is rounded individually, as in IEEE 754 and Python; division by zero gives an infinity or a NaN, never
 an error.
 """
 
@@ -69,7 +69,7 @@ def kind_of_unary(node: ast.expr, op: ast.unaryop, kind: Kind) -> Kind:
 
 
 def turned(builder: ir.IRBuilder, value: Number, kind: str) -> ir.Value:
-    """Return a number as one of that kind: truth values are 0 and 1, and what is not 0 is true."""
+    """Convert a number to a kind: booleans are 0 and 1, and every number but 0 is true."""
     if value.kind == kind:
         return value.word
     if kind == TRUTH:
@@ -101,13 +101,13 @@ def binary(
 
 
 def _floor_divided(builder: ir.IRBuilder, a: ir.Value, b: ir.Value) -> tuple[ir.Value, ir.Value]:
-    """Return quotient, rounded down, and remainder of two whole numbers."""
-    quotient, rest = builder.sdiv(a, b), builder.srem(a, b)
-    differs = builder.icmp_signed("<", builder.xor(rest, b), WORD(0))
-    is_low = builder.and_(builder.icmp_signed("!=", rest, WORD(0)), differs)
+    """Return quotient, rounded down, and remainder of two integers."""
+    quotient, remainder = builder.sdiv(a, b), builder.srem(a, b)
+    differs = builder.icmp_signed("<", builder.xor(remainder, b), WORD(0))
+    is_low = builder.and_(builder.icmp_signed("!=", remainder, WORD(0)), differs)
     return (
         builder.select(is_low, builder.sub(quotient, WORD(1)), quotient),
-        builder.select(is_low, builder.add(rest, b), rest),
+        builder.select(is_low, builder.add(remainder, b), remainder),
     )
 
 
@@ -125,7 +125,7 @@ def norm(builder: ir.IRBuilder, vector: Sequence[Number]) -> ir.Value:
 
 
 def compared(builder: ir.IRBuilder, op: ast.cmpop, left: Number, right: Number) -> ir.Value:
-    """Return a comparison as a bit: with a NaN only ``!=`` is true."""
+    """Return a comparison as a bit; with NaN only ``!=`` is true."""
     kind = joined(left.kind, right.kind)
     assert isinstance(kind, str)
     kind = WHOLE if kind == TRUTH else kind
@@ -162,7 +162,7 @@ def _absolute(builder: ir.IRBuilder, arguments: Sequence[Number]) -> ir.Value:
 
 
 def _choice(op: ast.cmpop) -> Build:
-    """Return ``min`` or ``max``, which keep the first of what cannot be told apart."""
+    """Return the instructions of ``min`` or ``max``, which return the first of equal arguments."""
 
     def build(builder: ir.IRBuilder, arguments: Sequence[Number]) -> ir.Value:
         kind = _widest([argument.kind for argument in arguments])
@@ -203,7 +203,7 @@ def _mantissa_of(builder: ir.IRBuilder, arguments: Sequence[Number]) -> ir.Value
 
 
 _SAME = ""
-"""Kind of a result that is that of the widest argument."""
+"""Marks a result with the kind of the widest argument."""
 
 _CALLS: dict[str, tuple[int, str, Build]] = {
     "abs": (1, _SAME, _absolute),
@@ -219,12 +219,12 @@ _CALLS: dict[str, tuple[int, str, Build]] = {
     "exponent_of": (1, FLOAT, _exponent_of),
     "mantissa_of": (1, FLOAT, _mantissa_of),
 }
-"""Number of arguments (0: at least one), kind and instructions by name. The last three are those of
-`vibsim.elementary.primitives`, in a form that becomes vector instructions."""
+"""Number of arguments (0: at least one), kind of the result and instructions, by name. The last three are those of
+`vibsim.elementary.primitives`, in a form that LLVM can vectorise."""
 
 
 def kind_of_call(node: ast.expr, name: str, arguments: Sequence[Kind]) -> Kind:
-    """Return the kind of what a library function gives."""
+    """Return the kind of the result of a library function."""
     if name == "vector":
         return (FLOAT,) * len(arguments)
     if name == "abs" and is_vector(arguments[0]):
@@ -239,12 +239,12 @@ def kind_of_call(node: ast.expr, name: str, arguments: Sequence[Kind]) -> Kind:
 
 
 def call(builder: ir.IRBuilder, name: str, kind: str, arguments: Sequence[Number]) -> Number:
-    """Return what a library function gives (`kind_of_call`)."""
+    """Return the result of a library function; `kind` is that of `kind_of_call`."""
     return Number(kind, _CALLS[name][2](builder, arguments))
 
 
 def literal(value: float) -> Number:
-    """Return a number that is known before anything runs."""
+    """Return a constant."""
     if isinstance(value, bool):
         return Number(TRUTH, BIT(int(value)))
     return Number(WHOLE, WORD(value)) if isinstance(value, int) else Number(FLOAT, DOUBLE(value))

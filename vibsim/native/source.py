@@ -1,4 +1,4 @@
-"""The module that is compiled: its functions and numbers by name, and how they are found."""
+"""The module that is compiled: its functions and constants by name."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from typing import Any
 from vibsim.core.errors import SimulationError
 
 INLINE = "compiled"
-"""Decorator of a function that becomes part of its callers."""
+"""Decorator of a function that is inlined into its callers."""
 COMPILED_ALONE = ("called", "entry")
-"""Decorators of functions that are compiled for themselves, where LLVM does not think better of it."""
+"""Decorators of functions that are compiled separately, unless LLVM decides to inline them."""
 
 _OPERATIONS = {ast.Add: operator.add, ast.Sub: operator.sub, ast.Mult: operator.mul}
 _NUMBERS = {"nan": math.nan, "inf": math.inf, "pi": math.pi, "e": math.e}
@@ -25,22 +25,22 @@ class NativeError(SimulationError):
 
 
 def refusal(node: ast.AST, why: str) -> NativeError:
-    """Return the error of a part of the text: line, text, and why it is refused."""
+    """Return the error for a node of the text: line, text, and why it is refused."""
     line = getattr(node, "lineno", 0)
     return NativeError(f"line {line} of the kernel: `{ast.unparse(node)}`: {why}")
 
 
 @dataclass(frozen=True)
 class Source:
-    """Functions and numbers of a module."""
+    """Functions and constants of a module."""
 
     functions: dict[str, ast.FunctionDef]
     constants: dict[str, Any]
-    """Floats, whole numbers, truth values, and tuples of them."""
+    """Floats, integers, booleans, and tuples of them."""
 
     @classmethod
     def read(cls, text: str) -> Source:
-        """Read the text of a module: functions with one decorator each, numbers, and ``import math``."""
+        """Parse the text of a module: functions with one decorator each, constants, and ``import math``."""
         functions, constants = {}, {}
         for node in ast.parse(text).body:
             match node:
@@ -57,7 +57,7 @@ class Source:
         return cls(functions, constants)
 
     def constant(self, node: ast.expr, local: frozenset[str]) -> Any:
-        """Return the value that an expression has before anything runs, None where it has none."""
+        """Return the value of a constant expression; None if it is not constant."""
         match node:
             case ast.Constant(value=bool() | int() | float() as value):
                 return value
@@ -76,7 +76,7 @@ class Source:
 
 
 def is_inline(function: ast.FunctionDef) -> bool:
-    """Say whether a function becomes part of its callers."""
+    """Tell whether a function is inlined into its callers."""
     match function.decorator_list:
         case [ast.Name(id=mark)] if mark == INLINE or mark in COMPILED_ALONE:
             return mark == INLINE
@@ -84,21 +84,22 @@ def is_inline(function: ast.FunctionDef) -> bool:
 
 
 def assigned(*body: ast.AST) -> Counter[str]:
-    """Return how often each name is given a value in some parts of the text."""
+    """Return the number of assignments to each name in parts of the text."""
     nodes = (node for part in body for node in ast.walk(part) if isinstance(node, ast.Name))
     return Counter(node.id for node in nodes if isinstance(node.ctx, ast.Store))
 
 
 def arguments_of(function: ast.FunctionDef) -> list[str]:
-    """Return the names of the arguments, which have no defaults."""
-    rest = function.args
-    if rest.defaults or rest.vararg or rest.kwarg or rest.kwonlyargs or rest.posonlyargs:
+    """Return the names of the arguments, which must be positional without defaults."""
+    arguments = function.args
+    other = arguments.vararg or arguments.kwarg or arguments.kwonlyargs or arguments.posonlyargs
+    if arguments.defaults or other:
         raise refusal(function, "a function takes arguments by their places alone")
-    return [argument.arg for argument in rest.args]
+    return [argument.arg for argument in arguments.args]
 
 
 def loaded(target: ast.expr) -> ast.expr:
-    """Return what is written to, a variable or an entry, as something that is read."""
+    """Convert the target of an assignment, a variable or an entry, to an expression that reads it."""
     match target:
         case ast.Name(id=name):
             return ast.copy_location(ast.Name(name, ast.Load()), target)

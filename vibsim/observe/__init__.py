@@ -1,1 +1,1 @@
-"""What is measured of the motion of a block of members: oscillation, energy, phase and amplitude, stiffness."""
+"""Measurements on the motion of a block of members: oscillation, energy, phase and amplitude, stiffness."""

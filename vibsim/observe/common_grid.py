@@ -1,9 +1,9 @@
-"""Whether level data belong together, and the coarsest common grid of several levels, from whole numbers of steps.
+"""Consistency of level data, and the coarsest common grid of several levels.
 
-A comparison of levels that are strangers would still give numbers, so they are refused.
+A comparison of levels of different problems would still give numbers, so such levels are refused.
 
-Sample k of a level is its step k*every, at the fraction k*every/steps of the whole time. Fractions are compared as
-whole numbers: comparing floating-point times would lose points, or pair wrong ones.
+Sample k of a level is its step k*every, at the fraction k*every/steps of the run. Fractions are compared in integer
+arithmetic: comparing floating-point times would lose points, or pair wrong ones.
 """
 
 from __future__ import annotations
@@ -24,10 +24,10 @@ from vibsim.experiment import Experiment
 from vibsim.observe.thresholds import SAME_START
 
 SAME_AT_EVERY_LEVEL = frozenset({"natural_frequency", "exact_period"})
-"""What the levels hold of every member and does not depend on the step."""
+"""Variables of members that do not depend on the step."""
 MEASURED = ("period", "period_count", "first_peak", "last_peak")
 NEEDED = ("omega_dt", "natural_frequency", "status", "energy_initial", *MEASURED)
-"""What the analysis needs of every member at every level, besides the states and the extrema of the position."""
+"""Variables of members that the analysis needs at every level, besides the states and the extrema of the position."""
 
 
 @dataclass(frozen=True)
@@ -37,8 +37,8 @@ class Grid:
     levels: tuple[int, ...]  # strictly increasing
     steps: tuple[int, ...]  # number of steps of every level
     strides: tuple[int, ...]  # distance between common points, in stored samples of each level
-    t: Floats  # common times, shape (t,); fractions of the end where that differs between members
-    dt: Floats  # shape (level, case), with one case where all members have the same
+    t: Floats  # common times, shape (t,); fractions of the end time if that differs between members
+    dt: Floats  # shape (level, case), with one case if it is the same for all members
     stride: int  # distance between common points, in steps of the coarsest level
     end_included: bool  # whether the last common point is the end of the time interval
 
@@ -48,15 +48,15 @@ class Grid:
         return np.asarray(self.dt[0] * self.stride, dtype=np.float64)
 
     def times(self, end: Floats) -> Floats:
-        """Return the common times of members that end at `end`, shape (case, t): the bits of those in level files."""
+        """Return the common times of members that end at `end`, shape (case, t), with the bits of the level files."""
         number = self.stride * np.arange(len(self.t), dtype=np.int64)
         return number * (end / self.steps[0])[:, None]
 
 
 def common_grid(records: Mapping[int, Record]) -> Grid:
-    """Find the common grid of the records of a ladder, which have the attributes ``steps`` and ``every``.
+    """Return the common grid of level records, which have the attributes ``steps`` and ``every``.
 
-    VibsimError where there is no level, or the levels have fewer than two sample times in common.
+    Raises VibsimError if there is no level, or the levels have fewer than two sample times in common.
     """
     if not records:
         raise VibsimError("analysis needs the data of at least one level")
@@ -97,12 +97,12 @@ def _stride(grid: Grid, record: Record) -> int:
 
 
 def whole(record: Record, name: str) -> int:
-    """Return a whole number among the attributes of a Record."""
+    """Return an integer attribute of a Record."""
     return int(np.asarray(record.attrs[name]).item())
 
 
 def _step(record: Record) -> Floats:
-    """Return dt, shape (case,) where the end differs between members, else (1,)."""
+    """Return dt, shape (case,) if the end time differs between members, otherwise (1,)."""
     t = record["t"]
     fraction = float(t[-1]) / ((np.size(t) - 1) * whole(record, "every"))
     end = record["end"] if "end" in record else np.ones(1)
@@ -110,11 +110,11 @@ def _step(record: Record) -> Floats:
 
 
 def check_belonging(experiment: Experiment, records: Mapping[int, Record]) -> None:
-    """Refuse level Records that are not those of `experiment`, or not of one and the same problem.
+    """Check that level Records belong to `experiment` and to the same problem.
 
-    VibsimError with every fault: a level that the experiment does not have, another model, other schemes, members,
-    numbers of steps, end times or parameters than the other levels or the experiment, other values at t = 0, a variable
-    that is missing.
+    Raises VibsimError with all faults: a level that the experiment does not have, a model, schemes, members, numbers of
+    steps, end times or parameters that differ from the other levels or the experiment, different values at t = 0,
+    missing variables.
     """
     faults = [
         f"level {level}: {fault}"
@@ -149,14 +149,14 @@ def _faults(experiment: Experiment, level: int, record: Record, other: Record) -
     if missing:
         yield f"{', '.join(missing)} {'are' if len(missing) > 1 else 'is'} missing"
         return
-    # what belongs to a member and not to a level: parameters, period, end time
+    # values of members that do not depend on the level: parameters, period, end time
     constants = [name for name, variable in record.coords.items() if variable.dims == ("case",)]
     for name in (*constants, *sorted(SAME_AT_EVERY_LEVEL & record.variables.keys())):
         if name not in other or not _equal(record[name], other[name]):
             yield f"{name} differs from the finest level's"
     if not np.isclose(record["t"][-1], other["t"][-1], rtol=1e-12, atol=0.0):
         yield f"it ends at {record['t'][-1]:g}, the finest level at {other['t'][-1]:g}"
-    # members that start from others start at every level from what that level has
+    # in a chain the initial values depend on the level, except those of the first member
     starts = np.asarray(record["case"]) % experiment.chain == 0
     for state in model.states:
         yield from _start(record, other, state.name, starts)
@@ -170,11 +170,11 @@ def _start(record: Record, other: Record, name: str, starts: Flags) -> Iterator[
     compared = [(name, other, "the finest level's")]
     if f"{name}_exact" in record:
         compared.append((f"{name}_exact", record, "the exact solution's"))
-    own = np.asarray(record[name], dtype=np.float64)[:, starts]
+    values = np.asarray(record[name], dtype=np.float64)[:, starts]
     for other_name, source, words in compared:
-        known = np.asarray(source[other_name], dtype=np.float64)[..., starts, :]
-        # a level that blows up is larger than the motion
-        largest = [np.fmax.reduce(np.abs(values), axis=-1) for values in (own, known)]
-        size = np.maximum(np.abs(known[..., 0]), np.fmin(*largest))
-        if np.any(np.abs(own[..., 0] - known[..., 0]) > SAME_START * size):
+        expected = np.asarray(source[other_name], dtype=np.float64)[..., starts, :]
+        # the smaller size of the two, because an unstable level is larger than the motion
+        largest = [np.fmax.reduce(np.abs(series), axis=-1) for series in (values, expected)]
+        size = np.maximum(np.abs(expected[..., 0]), np.fmin(*largest))
+        if np.any(np.abs(values[..., 0] - expected[..., 0]) > SAME_START * size):
             yield f"{name} at t = 0 differs from {words}"

@@ -1,26 +1,26 @@
-r"""How the error of the energy grows with time: none, bounded, linear, quadratic or exponential.
+r"""Growth of the energy error with time: none, bounded, linear, quadratic or exponential.
 
-What is fitted is M(t), the largest absolute deviation at every step so far. Let m1, m2, m3 be its means over
-[T/2, T], [T/4, T/2] and [T/8, T/4]. Where ``M = a + b t^k``, whatever a and b, ``(m1 - m2)/(m2 - m3) = 2^k``: a means
-smooths the stairs in which a drift climbs under an oscillation, and the oscillation itself is a. So, in this order:
+The fitted quantity is M(t), the largest absolute deviation over all steps so far. Let m1, m2, m3 be its means over
+[T/2, T], [T/4, T/2] and [T/8, T/4]. If ``M = a + b t^k``, ``(m1 - m2)/(m2 - m3) = 2^k`` for any a and b: the means
+smooth the steps in which a drift rises under an oscillation, and a is the oscillation itself. The rules, in order:
 
-- ``none``: M(T) is no more than `ABOVE_ROUND_OFF` times the predicted round-off of the energy;
-- ``unclear``: fewer than `LEAST_PERIODS` periods, in which the window from T/8 on would not see the whole of an
-  oscillation, or fewer than `LEAST_SAMPLES` samples;
-- ``exponential``: the energy itself has changed by more than a factor e^`LARGE_CHANGE` and the k of ``|ln(E/E(0))|``
-  is nearer to 1 than that of M. A smaller change cannot be told from a linear one, and the linear one is meant then;
-  An energy that falls below the smallest normal number is fitted above it alone, and is never bounded;
-- ``bounded``: m1 is above m2 by less than `STILL` of M(T), or it creeps only: k below `CREEP`, m1 above m2 by less
-  than `STILL_CREEPS` (finer sampling of the same maximum); and so does the range of the deviation so far, which a drift
-  widens from the start on, where M stands until the drift has overtaken an oscillation to the other side;
-- ``linear``, ``quadratic``: k, of M or of that range, within `NEAR_POWER` of 1 or 2 (of the range where that says 1 and
-  M says 2: M seems to rise so when a drift has just overtaken); the range, and M where it has
-  risen by less than `SMALL_RISE` of itself, must still grow in the last T/8, by `STILL_WIDENS` of what a drift would:
-  an oscillation whose middle moves slowly, or one of several frequencies, widens them for a while. A drift that is
-  seen in the range alone, or in a small rise of M, moves both ends of the range the same way;
-- else ``unclear``.
+- ``none``: M(T) is at most `ABOVE_ROUND_OFF` times the predicted round-off of the energy;
+- ``unclear``: fewer than `LEAST_PERIODS` periods, so that the window from T/8 on does not contain a whole oscillation,
+  or fewer than `LEAST_SAMPLES` samples;
+- ``exponential``: the energy itself has changed by more than a factor e^`LARGE_CHANGE`, and the k of ``|ln(E/E(0))|``
+  is closer to 1 than that of M. A smaller change cannot be distinguished from a linear one, and counts as linear. An
+  energy that falls below the smallest normal number is only fitted above it, and is never bounded;
+- ``bounded``: m1 exceeds m2 by less than `STILL` of M(T), or M only creeps: k below `CREEP`, and m1 exceeds m2 by less
+  than `STILL_CREEPS` (finer sampling of the same maximum). The same must hold for the range of the deviation so far,
+  which a drift widens from the start, while M is constant until the drift exceeds the opposite swing of an oscillation;
+- ``linear``, ``quadratic``: k of M or of that range is within `NEAR_POWER` of 1 or 2. The range decides if it gives 1
+  and M gives 2, because M may seem quadratic when a drift has just begun to dominate. The range, and M if it has risen
+  by less than `SMALL_RISE` of itself, must still grow in the last T/8, by at least `STILL_WIDENS` of a steady drift:
+  an oscillation with a slowly moving centre, or with several frequencies, widens them temporarily. A drift that only
+  shows in the range, or in a small rise of M, must move both ends of the range in the same direction;
+- otherwise ``unclear``.
 
-A drift so slow that a run shows less than `STILL` of it is called bounded: a longer run decides.
+A drift of less than `STILL` over the run is called bounded; a longer run would show it.
 """
 
 from __future__ import annotations
@@ -47,27 +47,27 @@ NONE, BOUNDED, LINEAR, QUADRATIC, EXPONENTIAL, UNCLEAR = range(len(DRIFTS))
 
 @dataclass(frozen=True)
 class Drift:
-    """How the energy error of members grows; arrays of shape (scheme, case)."""
+    """Growth of the energy error of members; arrays of shape (scheme, case)."""
 
     kind: Codes  # index into `vocabulary.DRIFTS`
-    # of a linear or quadratic drift the relative energy error per period, or per period squared; of an exponential one
-    # the change of ln E per period; 0 for none and bounded, NaN for unclear
+    # linear, quadratic: relative energy error per period, or per period squared; exponential: change of ln E per
+    # period; none, bounded: 0; unclear: NaN
     rate: Floats
-    power: Floats  # k; NaN where it cannot be told
-    largest: Floats  # M(T) over the energy at the start; NaN where that vanishes
+    power: Floats  # k; NaN if undetermined
+    largest: Floats  # M(T) over the energy at the start; NaN if that is 0
     means: Floats  # m3, m2 and m1, of M or of the range, as energies, shape (scheme, case, 3)
     round_off: Floats  # M(T) up to which the drift is ``none``, in the unit of the energy
 
 
 def drift_at(block: MemberBlock, level: int, name: str = "energy_deviation") -> Drift:
-    """Find how an energy deviation grows at a level, with the suffix `CENTRED` or without.
+    """Return the growth of an energy deviation at a level; `name` may have the suffix `CENTRED`.
 
     NaN rows of its series are ``unclear``.
     """
     record, index = block.records[level], block.grid.levels.index(level)
     initial = energy_at_start(record)
     deviation = stored_or_nan(record, name, (*block.shape, len(record["t"])))
-    # over every step so far; where storage is bounded, over the samples so far
+    # over all steps so far, or over the samples so far if that is not stored
     if f"{name}_running_max" in record:
         running = np.asarray(record[f"{name}_running_max"], dtype=float)
     else:
@@ -75,31 +75,32 @@ def drift_at(block: MemberBlock, level: int, name: str = "energy_deviation") -> 
         if name.endswith(CENTRED):
             running[..., [0, -1]] = 0.0
         running = np.asarray(np.maximum.accumulate(running, axis=-1))
-    # of the energy itself, which has more digits where it decays
+    # from the energy itself if stored, which has more digits if it decays
     plain = name.replace("_deviation", "")
     energy = record[plain] if plain in record else initial[..., None] + deviation
     ratio = safe_ratio(*np.broadcast_arrays(energy, initial[..., None]))
     if name.endswith(CENTRED):
         ratio[..., 0] = 1.0
     size = np.abs(initial) + solution_size([np.nan_to_num(deviation)])
-    # an energy without bound has a floor without bound
+    # for members that grow without bound the floor overflows
     with np.errstate(over="ignore", invalid="ignore"):
-        grows = _conditioned(block, level, size)
-        # a motion that magnifies a disturbance shifts it in time, which leaves the energy as it is
-        floor = block.floor_of(name, size * grows / block.magnified)[..., index]
-        floor = np.maximum(floor, _of_steps(block, level) * size * grows)
-    # the tolerance of an adaptive scheme is an error that it makes, and no round-off
+        condition = _condition(block, level, size)
+        # not magnified by the motion, which shifts a disturbance in time but conserves the energy
+        floor = block.floor_of(name, size * condition / block.magnified)[..., index]
+        floor = np.maximum(floor, _of_steps(block, level) * size * condition)
+    # for an adaptive scheme the floor contains its tolerance, which is not round-off
     floor[block.adaptive] = SPACING_AT_ONE * size[block.adaptive]
     w = np.asarray(record["natural_frequency"], dtype=float)
     return drift_of(running, ratio, initial, floor, w * block.group.end / (2.0 * np.pi), deviation)
 
 
-def _conditioned(block: MemberBlock, level: int, size: Floats) -> Floats:
-    """Return the factor by which rounding of the states is felt by the energy of a size, at least 1, (scheme, case).
+def _condition(block: MemberBlock, level: int, size: Floats) -> Floats:
+    """Return the condition number of the energy with respect to the states, at least 1, shape (scheme, case).
 
-    A conserved energy keeps every error dE that a rounded state dx makes: ``dE = sum of (dE/dx) dx``, with dx relative
-    to the size of x. Relative to the energy that is 2 of an oscillation about 0, which counts as 1, and much more where
-    positions are large beside the swing. An energy that is not conserved follows the motion, with what that magnifies.
+    A conserved energy keeps the error of every rounding of the states, ``dE = sum of (dE/dx) dx``, with dx relative to
+    the size of x. Relative to the energy (`size`) it is 2 for an oscillation about 0, which counts as 1, and much more
+    if positions are large compared with the amplitude. An energy that is not conserved follows the motion and its
+    magnification.
     """
     model, record = block.model, block.records[level]
     if not model.conservative:
@@ -112,17 +113,16 @@ def _conditioned(block: MemberBlock, level: int, size: Floats) -> Floats:
         for name, values_of in states.items():
             slope = values(derivative(energy, name), numbers)
             square = square + (slope * largest(values_of)[..., None]) ** 2
-        felt = 0.5 * safe_ratio(np.sqrt(largest(square)), size)
-    return np.asarray(np.fmax(felt, 1.0))
+        condition = 0.5 * safe_ratio(np.sqrt(largest(square)), size)
+    return np.asarray(np.fmax(condition, 1.0))
 
 
 def _of_steps(block: MemberBlock, level: int) -> Floats:
-    """Return what rounding adds to the energy in proportion to the size of a step, shape (scheme, case).
+    """Return the part of the round-off of the energy that depends on the step, shape (scheme, case).
 
-    It is relative to the energy, over `ABOVE_ROUND_OFF`.
-    Rounded coefficients make every step, of the size p = w dt, larger or smaller by the same: N p. Steps larger than a
-    radian are differences of numbers p^2 large, which are rounded otherwise each time: ``N^(1/2) p^2``. Centred
-    differences have a prediction of their own for each way of writing them.
+    It is relative to the energy, over `ABOVE_ROUND_OFF`. Rounded coefficients change every step, of size p = w dt, by
+    the same relative error: N p. Steps larger than a radian are differences of numbers of size p^2, with independent
+    rounding errors: ``N^(1/2) p^2``. Centred differences have their own prediction for each arithmetic.
     """
     kinds = [scheme.method for scheme in block.experiment.schemes]
     plain = np.array([kind.round_off is round_off for kind in kinds])
@@ -140,21 +140,21 @@ def drift_of(
     periods: Floats,
     deviation: Floats | None = None,
 ) -> Drift:
-    """Find how the energy error grows.
+    """Return the growth of the energy error.
 
     Parameters
     ----------
     running, ratio
-        M, and the energy over that at the start, shape (scheme, case, t), evenly sampled from 0 to the end.
+        M, and the energy over its initial value, shape (scheme, case, t), evenly sampled from 0 to the end.
     energy, floor
         The energy at the start, and its predicted round-off at the end, shape (scheme, case).
     periods
         Length of the run in natural periods, shape (case,).
     deviation
-        The deviation with its sign, of the shape of M; M alone decides where None.
+        The deviation with its sign, in the shape of M; None: only M is used.
     """
     samples = running.shape[-1] - 1
-    # a one-sided velocity at the last point says nothing about the drift
+    # without the last point, whose velocity may be one-sided
     end = np.fmax.reduce(running[..., :-1], axis=-1)
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         change = on_arrays.log(np.abs(ratio))
@@ -174,8 +174,7 @@ def drift_of(
         stops |= ~moves
     has_stopped = (rise < th.SMALL_RISE * size) & stops
     if deviation is not None:
-        # M stands still until a drift has overtaken an oscillation to the other side; just behind that it may seem to
-        # rise as any power
+        # M is constant until a drift exceeds the opposite swing of an oscillation; shortly after, its k is arbitrary
         so_far = _range(deviation)
         of_range = _means(so_far)
         range_rise, range_k = _rise(of_range)
@@ -226,24 +225,24 @@ def _is_near(k: Floats, power: int) -> Flags:
 
 
 def _is_still(rise: Floats, k: Floats, size: Floats) -> Flags:
-    """Say where a largest value so far no longer grows, or creeps only."""
+    """Tell whether a running maximum no longer grows, or only creeps."""
     creeps = (rise <= th.STILL_CREEPS * size) & (k <= th.CREEP)
     return np.asarray((rise <= th.STILL * size) | creeps)
 
 
 def _range(deviation: Floats) -> Floats:
-    """Return the largest less the least deviation so far, that at the start among them."""
+    """Return the largest minus the least deviation so far, including 0 at the start."""
     inner = deviation.copy()
-    # one-sided velocities at the ends say nothing about the drift
+    # without the end points, whose velocities may be one-sided
     inner[..., 0], inner[..., -1] = 0.0, inner[..., -2]
     highest, lowest = (f.accumulate(inner, axis=-1) for f in (np.maximum, np.minimum))
     return np.asarray(highest - lowest)
 
 
 def _shifts_the_range(deviation: Floats) -> Flags:
-    """Say whether both ends of the range move the same way from the third quarter to the last, as those of a drift do.
+    """Tell whether both ends of the range move in the same direction from the third quarter to the last, as in a drift.
 
-    An oscillation of several frequencies may grow to one side for a while, and stay on the other one.
+    An oscillation with several frequencies may temporarily grow on one side only.
     """
     n = deviation.shape[-1] - 1
     if n < th.LEAST_SAMPLES:
@@ -256,45 +255,45 @@ def _shifts_the_range(deviation: Floats) -> Flags:
 
 
 def _last_rise(values: Floats) -> Floats:
-    """Return m1 - m2 as the mean over the last eighth and that over the eighth before give it where k is 1."""
+    """Return an estimate of m1 - m2 from the means over the last two eighths, exact for k = 1."""
     n = max(values.shape[-1] - 1, 1)
     width = max(n // 8, 1)
-    last, before = (
+    last, previous = (
         values[..., n - width : n],
         values[..., max(n - 2 * width, 0) : max(n - width, 1)],
     )
-    return np.asarray(3.0 * (np.mean(last, axis=-1) - np.mean(before, axis=-1)))
+    return np.asarray(3.0 * (np.mean(last, axis=-1) - np.mean(previous, axis=-1)))
 
 
 def _decay(change: Floats, is_normal: Flags) -> tuple[float, float]:
-    """Return the rate of an exponential decay up to the last normal number, per sample, and k; NaN where it is none.
+    """Return the rate of an exponential decay up to the last normal number, per sample, and k; NaN for other decays.
 
-    Too few samples for a fit have their mean rate.
+    With too few samples for a fit it is the mean rate.
     """
-    above = change[: np.flatnonzero(is_normal)[-1] + 1]
-    if len(above) <= th.LEAST_SAMPLES:
-        return float(above[-1] / (len(above) - 1)) if len(above) > 1 else -np.inf, np.nan
-    fall, k = _power(np.abs(above))
-    n = len(above) - 1
+    normal = change[: np.flatnonzero(is_normal)[-1] + 1]
+    if len(normal) <= th.LEAST_SAMPLES:
+        return float(normal[-1] / (len(normal) - 1)) if len(normal) > 1 else -np.inf, np.nan
+    fall, k = _power(np.abs(normal))
+    n = len(normal) - 1
     rise, _ = _power(np.arange(n + 1.0))
     return float(-fall / rise) if abs(k - 1.0) <= th.NEAR_POWER else np.nan, float(k)
 
 
 def _power(values: Floats) -> tuple[Floats, Floats]:
-    """Return by how much the mean over the last window exceeds the one before, and k."""
+    """Return m1 - m2 and k of a series."""
     return _rise(_means(values))
 
 
 def _means(values: Floats) -> Floats:
     """Return m3, m2 and m1, along a new last dimension in place of the time."""
     n = values.shape[-1] - 1
-    # each with its last point, but for the end of the run
+    # each includes its last point, except at the end of the run
     windows = [(n // 8, n // 4 + 1), (n // 4, n // 2 + 1), (n // 2, max(n, n // 2 + 1))]
     return np.stack([np.mean(values[..., a:b], axis=-1) for a, b in windows], axis=-1)
 
 
 def _rise(means: Floats) -> tuple[Floats, Floats]:
-    """Return m1 - m2, and k."""
+    """Return m1 - m2 and k from `_means`."""
     third, second, first = (means[..., i] for i in range(3))
     rise = np.asarray(first - second)
     with np.errstate(divide="ignore", invalid="ignore"):

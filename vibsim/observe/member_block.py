@@ -1,4 +1,4 @@
-"""The level data of some members on their common grid, and what all quantities of these members have in common."""
+"""The level data of a block of members on their common grid, with the data that all their quantities share."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ from vibsim.simulation.members import Members, members
 
 @dataclass(frozen=True)
 class MemberBlock:
-    """Some members of an experiment, or all; s, c and l stand for schemes, cases and levels."""
+    """A block of members of an experiment; s, c and l stand for schemes, cases and levels."""
 
     experiment: Experiment
     records: Mapping[int, Record]  # level Records
@@ -44,16 +44,18 @@ class MemberBlock:
     exact: Mapping[str, Floats]  # states on the common grid, shape (c, t); empty if not known
     magnified: Floats  # factor by which disturbances grow, shape (c,)
     relative_floor: Floats  # predicted round-off relative to the solution, shape (s, 1 or c, l)
-    stored_floor: Floats  # of storing, relative to the solution, shape (l,): 0 for double precision
+    stored_floor: Floats  # round-off of storage, relative to the solution, shape (l,): 0 for double
     omega_dt: Floats  # w dt, shape (c, l)
-    fastest: Floats  # the same of the highest frequency, which a step has to resolve
-    decay: Floats  # the largest rate at which damping takes a velocity away, shape (s, c)
-    failed: Flags  # whether a level broke down, shape (s, c, l)
-    group: Members  # the numbers of the members
+    fastest: Floats  # the same for the highest frequency, which steps must resolve
+    decay: Floats  # the largest rate at which damping reduces a velocity, shape (s, c)
+    failed: Flags  # whether a run failed, shape (s, c, l)
+    group: Members  # the values of the members
     stability_limit: Floats  # largest stable w dt, infinite for none, shape (s, 1 or c)
     adaptive: Flags  # whether a scheme chooses its own steps and so has no levels, shape (s,)
-    left_to_the_mesh: Floats  # power of errors where the mesh decides, else NaN, shape (s, c)
-    corners: Corners  # where the force has its first corner within a step
+    left_to_the_mesh: (
+        Floats  # order of errors if events or corners are left to the mesh, else NaN, shape (s, c)
+    )
+    corners: Corners  # the first corner of the force within a step
     missed: Missed  # pulses of the force between the points of every level
     growth: Floats  # largest position over the largest exact one, shape (s, c, l); NaN if not known
     eventless: Flags  # whether a model with events met none on the finest level, shape (s, c)
@@ -75,34 +77,34 @@ class MemberBlock:
         return schemes, cases
 
     def series(self, name: str) -> list[Floats]:
-        """Return a quantity at every level, coarse to fine, each of shape (s, c, t); NaN where it is not stored.
+        """Return a quantity at every level, coarse to fine, each of shape (s, c, t); NaN if it is not stored.
 
-        ``[D_2t u]`` does not exist at the first and the last step. There both the quantity and its exact values count
-        as 0, so that differences and errors vanish and norms are those of the other points.
+        ``[D_2t u]`` does not exist at the first and the last step. There both the quantity and its exact values are set
+        to 0, so that differences and errors vanish and norms are those of the other points.
         """
         if any(name not in self.records[level] for level in self.grid.levels):
             return [np.full((*self.shape, len(self.grid.t)), np.nan) for _ in self.grid.levels]
-        found = [take(self.grid, self.records[level], name) for level in self.grid.levels]
+        series = [take(self.grid, self.records[level], name) for level in self.grid.levels]
         if not name.endswith(CENTRED):
-            return found
-        found = [values.copy(order="K") for values in found]
-        for values in found:
+            return series
+        series = [values.copy(order="K") for values in series]
+        for values in series:
             exists = np.any(np.isfinite(values), axis=-1)
             for place in self.ends():
                 values[..., place] = np.where(exists, 0.0, np.nan)
-        return found
+        return series
 
     def ends(self) -> list[int]:
-        """Return the places on the common grid of the first and the last step, as far as they are on it."""
+        """Return the indices of the first and the last step on the common grid, if they are on it."""
         return [0, -1] if self.grid.end_included else [0]
 
     def exact_of(self, name: str) -> Floats | None:
-        """Return a quantity's exact values, which broadcast against (s, c, t); None where they are not known."""
+        """Return a quantity's exact values, which broadcast against (s, c, t); None if they are not known."""
         plain = plain_name(name)
         if plain in self.exact:
-            found = self.exact[plain][None]
+            exact = self.exact[plain][None]
         elif self.model.conservative and plain == "energy":
-            found = energy_at_start(self.finest)[..., None]
+            exact = energy_at_start(self.finest)[..., None]
         elif self.model.conservative and plain == "energy_deviation":
             return np.zeros((1, 1, 1))
         else:
@@ -110,68 +112,68 @@ class MemberBlock:
             known = known_values(self.model, plain, self.exact, t, self.group)
             if known is None:
                 return None
-            found = known[None]
+            exact = known[None]
         if plain == name:
-            return found
-        # as the series itself, see `series`
+            return exact
+        # 0 at the ends, like the series: see `series`
         inside = np.ones(len(self.grid.t))
         inside[self.ends()] = 0.0
-        # without a bound there is none at the ends either
+        # infinite values give NaN at the ends
         with np.errstate(invalid="ignore"):
-            return np.asarray(found * inside)
+            return np.asarray(exact * inside)
 
     def size(self, name: str, values: list[Floats], sizes: Mapping[str, Floats]) -> Floats:
-        """Return the size that round-off of a quantity is relative to, shape (s, c), from known sizes of others.
+        """Return the size to which round-off of a quantity is relative, shape (s, c), given sizes of other quantities.
 
-        What is left of an energy is known no better than the energy itself; a velocity is known no better than what
-        the rounding of the position leaves of it over the run, or over a swing.
+        The round-off of a part of the energy is relative to the whole energy. That of a velocity includes the rounding
+        of the position, divided by the duration of the run or of an oscillation.
         """
         plain = plain_name(name)
         if plain in ENERGIES:
             return sizes["energy"]
-        own = solution_size(values)
+        size = solution_size(values)
         if plain in BUDGET:
-            return np.asarray(np.maximum(own, sizes["energy"]))
+            return np.asarray(np.maximum(size, sizes["energy"]))
         if plain in self.model.positions:
-            return np.asarray(np.maximum(own, sizes.get(plain, own)))
+            return np.asarray(np.maximum(size, sizes.get(plain, size)))
         if plain not in self.model.velocities:
-            return own
+            return size
         duration = self.grid.dt[0] * self.grid.steps[0]
         # a motion without small oscillations has no frequency
         rate = np.fmax(self.finest["natural_frequency"], 1.0 / duration)
         position = self.model.positions[self.model.velocities.index(plain)]
-        return np.asarray(np.maximum(own, sizes[position] * rate))
+        return np.asarray(np.maximum(size, sizes[position] * rate))
 
     def safety(self, irregular: float) -> Floats:
-        """Return the factor on what levels bound, shape (c,): `irregular` where events or tables divide steps."""
+        """Return the factor on bounds from levels, shape (c,): `irregular` if events or tables divide steps."""
         has_places = self.corners.of_tables | (self.model.events is not None)
         return np.where(has_places, irregular, 1.0)
 
     def unseen_at_corner(self, size: Floats) -> Floats:
-        """Return how far a quantity of a size may be off at a corner of the force, shape (s, c); 0 without a corner."""
+        """Return a bound of the error of a quantity of given size due to a corner of the force, shape (s, c)."""
         part = self.corners.unseen(self.group.end, self.grid.steps, self.omega_dt[:, -1])
         return np.multiply(part, size, out=np.zeros(self.shape), where=part > 0.0)
 
     def floor_of(self, name: str, size: Floats) -> Floats:
-        """Return the predicted round-off of a quantity of a size, shape (s, c, l), or what its storing leaves of it.
+        """Return the predicted round-off of a quantity of given size, shape (s, c, l), at least that of its storage.
 
-        A motion magnifies the former alone. ``[D_2t u]`` divides the last digit of the position by dt: eps/(w dt) of
-        the velocity's size.
+        The motion magnifies the former only. ``[D_2t u]`` divides the last digit of the position by dt: eps/(w dt)
+        relative to the velocity.
         """
         relative = self.relative_floor
         if name.endswith(CENTRED):
             with np.errstate(divide="ignore"):
                 relative = relative + SPACING_AT_ONE / self.omega_dt
-        # what grew without bound has a floor without bound
+        # for members that grow without bound the floor overflows
         with np.errstate(over="ignore", invalid="ignore"):
             computed = relative * (size * self.magnified)[..., None]
             return np.asarray(np.maximum(computed, self.stored_floor * size[..., None]))
 
 
 def block_of(experiment: Experiment, records: Mapping[int, Record]) -> MemberBlock:
-    """Bring the level Records of some members together.
+    """Return the block of the members in level Records.
 
-    VibsimError where there is no level, the levels have no times in common, or they do not belong together.
+    Raises VibsimError if there is no level, or the levels have no times in common or do not belong together.
     """
     grid = common_grid(records)
     check_belonging(experiment, records)
@@ -220,12 +222,12 @@ def block_of(experiment: Experiment, records: Mapping[int, Record]) -> MemberBlo
 
 
 def by_level(values: list[Floats]) -> Floats:
-    """Return arrays side by side along a new last dimension, which is the outermost one in memory."""
+    """Return arrays stacked along a new last dimension, which is the outermost one in memory."""
     return np.moveaxis(np.stack([np.asarray(row, dtype=np.float64) for row in values]), 0, -1)
 
 
 def stored_or_nan(record: Record, name: str, shape: tuple[int, ...]) -> Floats:
-    """Return what a level holds, broadcast to a shape; NaN where it does not hold it."""
+    """Return a variable of a level, broadcast to a shape; NaN if the level does not have it."""
     values = np.asarray(record[name], dtype=np.float64) if name in record else np.float64(np.nan)
     return np.broadcast_to(values, shape)
 
@@ -236,20 +238,20 @@ def fastest(record: Record) -> Floats:
 
 
 def energy_at_start(record: Record) -> Floats:
-    """Return the energy that members of a level start with, shape (scheme, case)."""
+    """Return the energy at t = 0, shape (scheme, case)."""
     return np.asarray(record["energy_initial"], dtype=np.float64)
 
 
 def _fastest(motion: Motion, rows: list[Record]) -> Floats:
-    """Return the angular frequency that a step has to resolve times the step of every level, shape (case, level)."""
-    natural, w, end = by_level([fastest(row) for row in rows]), stiffest(motion), motion.group.end
-    own = np.asarray(motion.finest["natural_frequency"], dtype=float)
+    """Return the angular frequency that steps must resolve times the step of every level, shape (case, level)."""
+    stored, w, end = by_level([fastest(row) for row in rows]), stiffest(motion), motion.group.end
+    natural = np.asarray(motion.finest["natural_frequency"], dtype=float)
     steps = np.array(motion.grid.steps, dtype=np.float64)
-    return np.where((w == own)[:, None], natural, (w * end)[:, None] / steps)
+    return np.where((w == natural)[:, None], stored, (w * end)[:, None] / steps)
 
 
 def _norms(experiment: Experiment) -> tuple[str, ...]:
-    """Name the norms that a lean analysis keeps: the typical one, and those that checks ask for."""
+    """Return the norms that a lean analysis keeps: the typical one, and those that checks use."""
     named: set[str] = {TYPICAL_NORM}
     for check in experiment.checks:
         inner = check.measured
@@ -261,20 +263,20 @@ def _norms(experiment: Experiment) -> tuple[str, ...]:
 
 
 def _growth(model: Model, rows: list[Record], grid: Grid, exact: Mapping[str, Floats]) -> Floats:
-    """Compare the largest position of every level with the largest exact one; NaN without an exact solution.
+    """Return the largest position of every level over the largest exact one; NaN without an exact solution.
 
-    Levels alone do not tell a growth that is the motion's own, as on the way to an escape. Where times that all levels
-    have are few to a period, they may all lie where the exact motion passes through 0: the amplitude that its velocity
-    has there counts as well.
+    Levels alone do not distinguish instability from growth of the exact motion, as before an escape. If there are few
+    common times per period, the exact motion may pass through 0 at all of them, so the amplitude of its velocity counts
+    as well.
     """
     position = model.position
     ends = [by_level([row[f"{position}_{end}"] for row in rows]) for end in ("min", "max")]
-    most = np.maximum(*(np.abs(end) for end in ends))
+    computed = np.maximum(*(np.abs(end) for end in ends))
     if position not in exact:
-        return np.full(most.shape, np.nan)
+        return np.full(computed.shape, np.nan)
     w = np.asarray(rows[-1]["natural_frequency"], dtype=np.float64)
     with np.errstate(all="ignore"):
-        swung = np.where(w * grid.dt[0] > FEW_RADIANS, largest(exact[model.velocity]) / w, 0.0)
-    reference = np.fmax(largest(exact[position]), swung)[:, None]
-    usable = np.isfinite(most) & (reference > 0)
-    return np.where(usable, most, np.nan) / np.where(usable, reference, 1.0)
+        by_speed = np.where(w * grid.dt[0] > FEW_RADIANS, largest(exact[model.velocity]) / w, 0.0)
+    reference = np.fmax(largest(exact[position]), by_speed)[:, None]
+    usable = np.isfinite(computed) & (reference > 0)
+    return np.where(usable, computed, np.nan) / np.where(usable, reference, 1.0)

@@ -1,4 +1,4 @@
-"""Pulses of the force in time that lie between the points of every level, so that no level knows of them."""
+"""Pulses of the force in time that lie between the points of every level, so that no level sees them."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ AROUND = np.arange(-2, 4)  # points around a pulse
 
 @dataclass(frozen=True)
 class Missed:
-    """One pulse of every member whose force has any that no level sees, shape (case,); NaN where there is none."""
+    """For every member a pulse of the force that no level sees, shape (case,); NaN if there is none."""
 
     time: Floats
     width: Floats
@@ -29,22 +29,23 @@ class Missed:
 
 
 def missed_pulses(model: Model, finest: Record, group: Members) -> Missed:
-    """Find a pulse of the force between the points of the finest level, whose points hold those of all others."""
+    """Return a pulse of the force between the points of the finest level, which include those of all other levels."""
     parameters = {
         row.name: np.asarray(group.parameters[row.key], dtype=float) for row in model.parameters
     }
     steps = int(np.asarray(finest.attrs["steps"]).item())
-    own = table_pulses(model, parameters, group.end, steps)
-    of_table = np.isfinite(own.time)
+    of_tables = table_pulses(model, parameters, group.end, steps)
+    in_tables = np.isfinite(of_tables.time)
     if not varies_in_time(model):
-        return Missed(own.time, own.width, of_table)
-    found = _of_formulas(model, finest, group, parameters)
-    both = Pulses(found.time, found.width).and_others(own)
-    return Missed(both.time, both.width, found.jumps | (np.isnan(found.time) & of_table))
+        return Missed(of_tables.time, of_tables.width, in_tables)
+    of_formulas = _of_formulas(model, finest, group, parameters)
+    both = Pulses(of_formulas.time, of_formulas.width).and_others(of_tables)
+    jumps = of_formulas.jumps | (np.isnan(of_formulas.time) & in_tables)
+    return Missed(both.time, both.width, jumps)
 
 
 def may_miss_pulses(model: Model) -> bool:
-    """Tell whether the force of a model may have pulses in time, by formulas or by tables."""
+    """Tell whether the force of a model may have pulses in time, in formulas or tables."""
     return varies_in_time(model) or has_tables(model)
 
 
@@ -53,12 +54,12 @@ def _of_formulas(
 ) -> Missed:
     cases = len(group.end)
     states = np.stack([np.asarray(finest[state.name], dtype=float) for state in model.states])
-    # of the first scheme that is finite throughout
+    # states of the first scheme that is finite throughout
     scheme = np.argmax(np.isfinite(states).all(axis=(0, -1)), axis=0)
     samples = states.shape[-1] - 1
 
     def pulses(t: Floats, *, smooth: bool) -> Pulses:
-        """Find a pulse of every member between times of shape (case, gap + 1)."""
+        """Return a pulse of every member between times of shape (case, gap + 1)."""
         place = (t[:, :-1] / group.end[:, None] * samples).astype(np.int64)
         at = states[:, scheme[:, None], np.arange(cases)[:, None], np.clip(place, 0, samples)]
         return pulses_of_force(model, parameters, at, t, smooth=smooth)
@@ -67,11 +68,11 @@ def _of_formulas(
     while cases * gaps > MOST_GAPS and gaps % 2 == 0:
         gaps //= 2
     t = np.arange(gaps + 1) * (group.end / gaps)[:, None]
-    found = pulses(t, smooth=False)
-    is_there = np.isfinite(found.time)
-    time, width = found.time, found.width
+    coarse = pulses(t, smooth=False)
+    is_there = np.isfinite(coarse.time)
+    time, width = coarse.time, coarse.width
     if gaps < steps:
-        # those that lie between points of the finest level, too
+        # keep pulses that also lie between points of the finest level
         dt = group.end / steps
         first = np.maximum(np.floor(np.nan_to_num(time) / dt) + AROUND[0], 0.0)
         near = pulses((first[:, None] + (AROUND - AROUND[0])) * dt[:, None], smooth=False)

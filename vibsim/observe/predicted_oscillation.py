@@ -1,7 +1,7 @@
-"""What theory predicts of the schemes of an experiment on its members, from w dt: growth, frequency, phase error.
+"""Predictions of theory for the schemes of an experiment, as functions of w dt: growth, frequency, phase error.
 
-The theory is that of ``u'' + w^2 u = 0``; it is worked out once for every value of w dt that occurs. Arrays have the
-shape (scheme, case), with NaN for schemes that choose their own steps, and where the model is another one.
+The theory is that of ``u'' + w^2 u = 0``, evaluated once for every value of w dt that occurs. Arrays have the shape
+(scheme, case), with NaN for adaptive schemes, and if the model is a different one.
 """
 
 from __future__ import annotations
@@ -20,12 +20,12 @@ from vibsim.schemes import Options, Scheme
 
 
 def is_simple(block: MemberBlock) -> bool:
-    """Tell whether the model is the one that the theory is of: linear, without damping and forcing."""
+    """Tell whether the theory applies to the model: linear, without damping and forcing."""
     return block.model.linear and block.model.conservative
 
 
 def steppers(block: MemberBlock, scheme: int) -> list[tuple[Options, Integers | slice]]:
-    """Return the options of one scheme, and the members that have them; empty for one that chooses its own steps."""
+    """Return the options of one scheme, each with its members; empty for an adaptive scheme."""
     if block.adaptive[scheme]:
         return []
     groups = sweep_columns.option_groups(block.experiment, scheme, block.columns)
@@ -35,16 +35,16 @@ def steppers(block: MemberBlock, scheme: int) -> list[tuple[Options, Integers | 
 def of_schemes(
     block: MemberBlock, function: Callable[[Scheme, Options, Integers | slice], Any]
 ) -> Floats:
-    """Return a function of every scheme, its options and the members that have them."""
-    found = np.full(block.shape, np.nan)
+    """Return the values of a function of scheme, options and the members with these options."""
+    result = np.full(block.shape, np.nan)
     for i, scheme in enumerate(block.experiment.schemes):
         for options, where in steppers(block, i):
-            found[i, where] = function(scheme.method, options, where)
-    return found
+            result[i, where] = function(scheme.method, options, where)
+    return result
 
 
 def _dominant(block: MemberBlock, level: int, which: int) -> Floats:
-    """Return growth per period (0) or angle per step (1) of the root that a long run is left with."""
+    """Return growth per period (`which` 0) or angle per step (1) of the dominant root."""
     p = _step(block, level)
 
     def of_root(scheme: Scheme, options: Options, where: Integers | slice) -> Floats:
@@ -57,12 +57,12 @@ def _dominant(block: MemberBlock, level: int, which: int) -> Floats:
 
 
 def dominant_growth(block: MemberBlock, level: int) -> Floats:
-    """Return the factor of the amplitude per natural period, of small oscillations of any model."""
+    """Return the growth factor of the amplitude per natural period, for small oscillations of any model."""
     return _dominant(block, level, 0)
 
 
 def growth_per_period(block: MemberBlock, level: int) -> Floats:
-    """Return the same where the model is that of the theory."""
+    """Return `dominant_growth` if the theory applies to the model, otherwise NaN."""
     return dominant_growth(block, level) if is_simple(block) else np.full(block.shape, np.nan)
 
 
@@ -74,7 +74,7 @@ def frequency(block: MemberBlock, level: int) -> Floats:
 
 
 def phase_error(block: MemberBlock, level: int) -> Floats:
-    """Return the time by which peaks come early, per period; minus infinity without any."""
+    """Return the time by which peaks come early, per period; minus infinity without peaks."""
     if not is_simple(block):
         return np.full(block.shape, np.nan)
     angle = _dominant(block, level, 1)
@@ -84,7 +84,7 @@ def phase_error(block: MemberBlock, level: int) -> Floats:
 
 
 def _step(block: MemberBlock, level: int) -> Floats:
-    """Return w dt, of several coordinates that of their fastest oscillation, shape (case,)."""
+    """Return w dt, with several coordinates for the fastest oscillation, shape (case,)."""
     return block.fastest[:, block.grid.levels.index(level)]
 
 
@@ -94,7 +94,7 @@ def natural_frequency(block: MemberBlock) -> Floats:
 
 
 def limits(block: MemberBlock) -> Floats:
-    """Return the largest stable w dt: 0 where every step grows."""
+    """Return the largest stable w dt: 0 if every step is unstable."""
     return of_schemes(block, lambda scheme, options, where: limit_of(scheme, options))
 
 

@@ -6,9 +6,9 @@ With n + 1 samples ``u_j`` of the period, at ``t_j = T - P + j P/n``, and half t
 
     c = (2/n) sum u_j exp(-i w t_j),    u = A cos(w t - phase) + other harmonics,    A = |c|, phase = -arg c,
 
-where the end T is a whole number of periods P = 2 pi/w, so that ``w t_j = 2 pi j/n`` but for whole turns. Of a periodic
-motion the sum is exact up to the harmonics n - 1, n + 1, ..., which are smaller than any power of the sampling step.
-Every level has its own samples: with those that all levels have, few at the coarsest, such harmonics would count.
+where the end T is a whole number of periods P = 2 pi/w, so that ``w t_j = 2 pi j/n`` modulo 2 pi. For a periodic motion
+the sum is exact apart from the harmonics n - 1, n + 1, ..., which are smaller than any power of the sampling step.
+Every level uses all its samples: with the few common ones these harmonics would not be negligible.
 
 Source: A. H. Nayfeh, D. T. Mook, Nonlinear Oscillations (Wiley, 1979), section 4.1, for the response of driven
 oscillators; L. N. Trefethen, J. A. C. Weideman, The exponentially convergent trapezoidal rule, SIAM Review 56 (2014)
@@ -28,15 +28,15 @@ from vibsim.observe.common_grid import take, take_all
 from vibsim.observe.member_block import MemberBlock
 
 SAME_STATE = 1e-3
-"""How near a state must come to itself to be the same, of the largest value that it has."""
+"""Distance at which a state counts as repeated, relative to its largest value."""
 LEAST_PERIODS = 4
-"""Whose changes tell what is left of the start."""
+"""Number of periods whose changes give the remaining transient."""
 REST_SAFETY = 2.0
-"""Two modes, or the two conjugate factors of one, make an estimate too small: enough for 98 of 100. [calibrated]"""
+"""Safety factor of that estimate, which two modes or a conjugate pair make too small: covers 98 of 100. [calibrated]"""
 
 
 def samples_a_period(block: MemberBlock) -> int:
-    """Return how many intervals of the common grid a period of the force has; 0 where no force is named."""
+    """Return the number of intervals of the common grid in a period of the force; 0 if no force is named."""
     time = block.experiment.time
     if time.frequency is None or time.periods is None:
         return 0
@@ -44,18 +44,18 @@ def samples_a_period(block: MemberBlock) -> int:
 
 
 def harmonic(block: MemberBlock, level: int, quantity: str, back: int = 0) -> Complexes:
-    """Return ``A exp(-i phase)`` of the last period but `back`, shape (scheme, case); NaN where there is none."""
+    """Return ``A exp(-i phase)`` of the period `back` before the last, shape (scheme, case); NaN if there is none."""
     record, n = block.records[level], samples_a_period(block)
     if quantity not in record or n == 0 or len(block.grid.t) - back * n <= n:
         return np.full(block.shape, np.nan, dtype=np.complex128)
     n *= block.grid.strides[block.grid.levels.index(level)]
     series = take_all(block.grid, record, quantity)
     stop = series.shape[-1] - back * n
-    own = series[..., stop - n - 1 : stop]
+    samples = series[..., stop - n - 1 : stop]
     angle = 2.0 * np.pi / n * np.arange(n + 1)
     weight = np.where((angle == 0.0) | (angle == angle[-1]), 1.0 / n, 2.0 / n)
     real, imaginary = (
-        np.sum(own * weight * f(angle), axis=-1) for f in (on_arrays.cos, on_arrays.sin)
+        np.sum(samples * weight * f(angle), axis=-1) for f in (on_arrays.cos, on_arrays.sin)
     )
     return np.asarray(real - 1j * imaginary)
 
@@ -69,19 +69,19 @@ def section(block: MemberBlock, level: int, quantity: str) -> Floats:
 
 
 def section_period(block: MemberBlock, level: int) -> Floats:
-    """Return after how many periods of the force the state is the same again, shape (scheme, case).
+    """Return the period of the Poincare section in periods of the force, shape (scheme, case).
 
-    In the second half of the run, every state must return to `SAME_STATE` of the largest value that it has at these
-    times. 0 where it does so after none of the numbers that this half holds twice: it is chaotic, or not yet steady.
+    It is taken from the second half of the run, in which every state must repeat to `SAME_STATE`. 0 if there is no
+    period of at most half that time: the motion is chaotic, or not yet steady.
     """
     rows = np.stack([section(block, level, state.name) for state in block.model.states])
     rows = rows[..., rows.shape[-1] // 2 :]
-    found = np.zeros(block.shape)
+    period = np.zeros(block.shape)
     size = np.max(np.abs(rows), axis=-1, initial=0.0)
     for k in range(rows.shape[-1] // 2, 0, -1):
         distance = np.max(np.abs(rows[..., k:] - rows[..., :-k]), axis=-1)
-        found = np.where((distance <= SAME_STATE * size).all(axis=0), float(k), found)
-    return np.where(np.isfinite(rows).all(axis=(0, -1)) & (rows.shape[-1] >= 2), found, np.nan)
+        period = np.where((distance <= SAME_STATE * size).all(axis=0), float(k), period)
+    return np.where(np.isfinite(rows).all(axis=(0, -1)) & (rows.shape[-1] >= 2), period, np.nan)
 
 
 def amplitude(block: MemberBlock, level: int, quantity: str) -> Floats:
@@ -91,29 +91,28 @@ def amplitude(block: MemberBlock, level: int, quantity: str) -> Floats:
 
 def phase(block: MemberBlock, level: int, quantity: str) -> Floats:
     """Return the angle by which the harmonic lags behind ``cos(w t)`` [rad]."""
-    found = harmonic(block, level, quantity)
-    return np.asarray(-on_arrays.atan2(found.imag, found.real))
+    c = harmonic(block, level, quantity)
+    return np.asarray(-on_arrays.atan2(c.imag, c.real))
 
 
 def change(block: MemberBlock, level: int, quantity: str) -> Floats:
-    """Return how far the harmonic is from that of the period before, over its amplitude."""
+    """Return the change of the harmonic in the last period, relative to its amplitude."""
     now, before = (harmonic(block, level, quantity, back) for back in (0, 1))
     return safe_ratio(np.abs(now - before), np.abs(now))
 
 
 def distance(block: MemberBlock, level: int, quantity: str) -> Floats:
-    """Return a bound of how far the harmonic is from that of the steady motion, shape (scheme, case).
+    """Return a bound of the distance of the harmonic from that of the steady motion, shape (scheme, case).
 
-    What is left of the start changes by a complex factor z in each period. From the last change c it then keeps
-    ``c z/(z - 1)``; without damping, as much as at the start. The larger one of the last two such estimates is taken
-    `REST_SAFETY` times. Infinite where there are fewer than `LEAST_PERIODS`.
+    The transient is multiplied by a complex factor z in each period, so that its last change c leaves ``c z/(z - 1)``.
+    The larger of the last two such estimates is multiplied by `REST_SAFETY`. Infinite with fewer than `LEAST_PERIODS`.
     """
     rows = [harmonic(block, level, quantity, back) for back in range(LEAST_PERIODS)]
     changes = [now - before for now, before in itertools.pairwise(rows)]
     with np.errstate(divide="ignore", invalid="ignore"):
-        left = [
+        transients = [
             np.where(last == 0.0, 0.0, np.abs(last / (1.0 - before / last)))
             for last, before in itertools.pairwise(changes)
         ]
-    bound = REST_SAFETY * np.maximum(*left)
+    bound = REST_SAFETY * np.maximum(*transients)
     return np.where(np.isfinite(bound), bound, np.inf)

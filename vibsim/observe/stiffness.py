@@ -1,13 +1,13 @@
-"""The frequency and the decay that a step has to resolve: those of the place where the motion is.
+"""The frequency and the decay rate that steps must resolve, measured along the motion.
 
-Small oscillations about 0 have the natural frequency. Of a nonlinear spring it counts where the motion is as stiff for
-a while; elsewhere (a motion about another place, a formula that is singular at 0) the mean stiffness along the motion
-takes its place: ``w^2 = mean of -da/du``, NaN where it does not pull back in the mean.
+Small oscillations about 0 have the natural frequency. With a nonlinear spring it is used if the motion is about as
+stiff for part of the time. Otherwise (a motion about another place, a formula that is singular at 0) the mean stiffness
+along the motion replaces it: ``w^2 = mean of -da/du``, NaN if that is not positive.
 
-Damping takes velocities away at the rate ``-da/dv``. Where that is large for a moment only, an implicit scheme with
-long steps keeps what should have gone within it: the largest rate along the motion counts.
+Damping reduces velocities at the rate ``-da/dv``. Even if that is large only for a moment, an implicit scheme with long
+steps keeps velocities that should have decayed, so the largest rate along the motion counts.
 
-The motion is that of the finest level at the common times; exact states, of shape (case, t), take its place.
+The motion is the exact one if it is known, otherwise that of the finest level, at the common times.
 """
 
 from __future__ import annotations
@@ -27,13 +27,13 @@ from vibsim.simulation.members import Members
 
 
 def applies(model: Model) -> bool:
-    """Tell whether the motion of a model decides on the frequency: one coordinate, a nonlinear force, no events."""
+    """Tell whether the frequency is measured along the motion: one coordinate, a nonlinear force, no events."""
     return not model.linear and model.is_alone and model.events is None
 
 
 @dataclass(frozen=True)
 class Motion:
-    """The motion of some members, with what its formulas need."""
+    """The motion of members, with the data that formulas need."""
 
     model: Model
     grid: Grid
@@ -42,7 +42,7 @@ class Motion:
     exact: Mapping[str, Floats]
 
     def fall(self, acceleration: Formula, state: str, states: Mapping[str, Floats]) -> Floats:
-        """Return minus the derivative of an acceleration by a state along a motion, of the shape of its states."""
+        """Return minus the derivative of an acceleration with respect to a state, in the shape of the states."""
         slope = derivative(tree(self.model, acceleration), state)
         times = self.grid.times(self.group.end)
         numbers = {**self.group.by_name(self.model), **states, "t": times}
@@ -50,17 +50,18 @@ class Motion:
 
 
 def stiffest(motion: Motion) -> Floats:
-    """Return the angular frequency that a step has to resolve, shape (case,); by the first scheme that is sound."""
+    """Return the angular frequency that steps must resolve, shape (case,), from the first scheme that did not fail."""
     model, finest = motion.model, motion.finest
     natural = np.asarray(finest["natural_frequency"], dtype=np.float64)
     if not applies(model):
         return natural
-    sound = np.argmin(np.asarray(finest["status"]) != 0, axis=0)
+    scheme = np.argmin(np.asarray(finest["status"]) != 0, axis=0)
     states = {}
     for state in model.states:
-        own = take(motion.grid, finest, state.name)[sound, np.arange(len(sound))]
-        known = np.asarray(motion.exact.get(state.name, own))
-        states[state.name] = np.where(np.isfinite(known).all(axis=-1, keepdims=True), known, own)
+        computed = take(motion.grid, finest, state.name)[scheme, np.arange(len(scheme))]
+        exact = np.asarray(motion.exact.get(state.name, computed))
+        is_known = np.isfinite(exact).all(axis=-1, keepdims=True)
+        states[state.name] = np.where(is_known, exact, computed)
     stiffness = motion.fall(model.acceleration, model.position, states)
     known = np.isfinite(stiffness)
     count = np.maximum(np.count_nonzero(known, axis=-1), 1)
@@ -78,15 +79,15 @@ def is_damped(model: Model) -> bool:
 
 
 def decay_rate(motion: Motion) -> Floats:
-    """Return the largest rate at which the force takes a velocity away, 0 for none, shape (scheme, case)."""
+    """Return the largest rate at which damping reduces a velocity, 0 without damping, shape (scheme, case)."""
     model, fastest = motion.model, np.zeros(np.shape(motion.finest["status"]))
     if not is_damped(model):
         return fastest
     states = {}
     for state in model.states:
-        own = take(motion.grid, motion.finest, state.name)
-        known = np.asarray(motion.exact.get(state.name, own))
-        states[state.name] = np.where(np.isfinite(known), known, own)
+        computed = take(motion.grid, motion.finest, state.name)
+        exact = np.asarray(motion.exact.get(state.name, computed))
+        states[state.name] = np.where(np.isfinite(exact), exact, computed)
     with np.errstate(all="ignore"):
         for row, velocity in zip(model.accelerations, model.velocities, strict=True):
             rate = motion.fall(row, velocity, states)

@@ -1,9 +1,8 @@
 """From an experiment and a level to the data of that level: every scheme, every member, one record.
 
-The record holds what a level file holds: the states, the energies, their exact values where they are known, and what
-was gathered over every step. Shapes are (scheme, case, t), (case, t), (scheme, case) or (case,). Where storage
-is bounded (`vibsim.experiment.storage.is_lean`), of the series only those of
-`vibsim.experiment.storage.lean_series`.
+The record has the content of a level file: states, energies, exact values if they are known, and statistics over all
+steps. Shapes are (scheme, case, t), (case, t), (scheme, case) or (case,). If storage is bounded
+(`vibsim.experiment.storage.is_bounded`), it has only the series that are needed.
 """
 
 from __future__ import annotations

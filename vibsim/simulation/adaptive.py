@@ -1,16 +1,15 @@
-"""Members integrated by SciPy, each alone and once per tolerance, and sampled at the points of a level.
+"""Members integrated by SciPy, once per member and tolerance, and sampled at the points of a level.
 
-The steps are the solver's own and depend on no level. What a level has of them is the dense output at its N + 1 points:
-extrema, periods, norms and energies are gathered over these points by the loop that gathers those of every other
-scheme, so that a number means the same for all. Radau's dense output is a polynomial of degree 3 and between its steps
-less accurate than at them.
+The solver chooses its steps independently of the level. A level uses its dense output at N + 1 points: the engine's
+loop gathers extrema, periods, norms and energies over these points, so that a number means the same as for other
+schemes. Radau's dense output is a polynomial of degree 3, less accurate between its steps than at them.
 
 A step is accepted when its error estimate is below ``rtol |y| + atol``, for position and velocity, with ``rtol`` the
 tolerance (SciPy takes 2.2e-14 at least) and ``atol`` the tolerance times the size of the problem:
-``max(|u_0|, |v_0|/w)`` for the position, w times that for the velocity, w the natural frequency; 1 where both vanish.
+``max(|u_0|, |v_0|/w)`` for the position, w times that for the velocity, w the natural frequency; 1 if both vanish.
 
-The forces are those of the engine, in plain Python. The implicit methods get the model's own derivative. The last bits
-depend on SciPy's version and on the machine, but on nothing else: not on the level, the shard or the number of cores.
+The forces are those of the engine's plain lane. The implicit methods get the exact Jacobian. The last bits depend on
+SciPy's version and on the machine, but not on the level, the shard or the number of cores.
 
 Source: vibration text (B), exercise 4.
 """
@@ -38,11 +37,11 @@ from vibsim.schemes.base import Options, Scheme, Stepper
 from vibsim.schemes.code_generation import written
 
 MOST_STEPS = 2**20
-"""Steps after which a run is given up, as one that fails: some minutes of work."""
+"""Steps after which a run counts as failed: some minutes of work."""
 CACHED_STEPS = 140_000
-"""Steps that are kept in the process for the other levels of a job, of all runs together."""
+"""Total number of steps of all runs that are cached in the process for the other levels of a job."""
 POINTS_AT_A_TIME = 2**20
-"""Points that are worked out at a time."""
+"""Number of points that are evaluated at a time."""
 
 CLASSES = {"dop853": "DOP853", "lsoda": "LSODA", "radau": "Radau"}
 """SciPy's name of each scheme."""
@@ -50,7 +49,7 @@ CLASSES = {"dop853": "DOP853", "lsoda": "LSODA", "radau": "Radau"}
 
 @dataclass(frozen=True)
 class Problem:
-    """One member and how it is to be integrated; equal problems have the same run."""
+    """One member with its integration method; equal problems share a run."""
 
     model: Model
     kind: str
@@ -62,7 +61,7 @@ class Problem:
 
     @property
     def scale(self) -> tuple[float, ...]:
-        """Sizes of positions and velocities that the absolute tolerances are relative to."""
+        """Sizes of positions and velocities; absolute tolerances are relative to them."""
         count = self.model.coordinates
         named = {row.key: x for row, x in zip(self.model.parameters, self.parameters, strict=True)}
         w = float(self.model.natural_frequency(named))
@@ -76,38 +75,38 @@ class Problem:
 
 @dataclass(frozen=True)
 class Run:
-    """What SciPy did with a problem."""
+    """The integration of a problem by SciPy."""
 
     times: list[float]
-    """Ends of the accepted steps, from 0 on."""
+    """Time 0 and the ends of the accepted steps."""
     pieces: list[Any]
     """The dense output of every step: SciPy's functions of time."""
     force_evaluations: int
-    """Evaluations of the acceleration, with those for the error estimates and for the dense output."""
+    """Evaluations of the acceleration, including those for error estimates and dense output."""
     states: int = 2
 
     def at(self, t: Floats) -> Floats:
-        """Return the states at ascending times, shape (state, n_t); NaN behind the last step."""
-        found = np.full((self.states, len(t)), np.nan)
-        which = np.searchsorted(self.times, t, side="left") - 1
-        first = np.searchsorted(which, np.arange(len(self.pieces) + 1))
+        """Return the states at ascending times, shape (state, n_t); NaN after the last step."""
+        states = np.full((self.states, len(t)), np.nan)
+        step = np.searchsorted(self.times, t, side="left") - 1
+        first = np.searchsorted(step, np.arange(len(self.pieces) + 1))
         for piece, start, stop in zip(self.pieces, first[:-1], first[1:], strict=True):
             if start < stop:
-                found[:, start:stop] = piece(t[start:stop])
-        return found
+                states[:, start:stop] = piece(t[start:stop])
+        return states
 
 
 @cache
 def along_a_table(coordinates: int) -> Stepper:
-    """Return steps along a table of points, which stands behind the parameters and ends with one more point.
+    """Return a stepper that reads known points from a table, which follows the parameters and has one surplus point.
 
-    A point has all positions and then all velocities. A step gives the next point and the velocity at this one.
+    A point has all positions and then all velocities. A step returns the next point and the current velocity.
     """
     place = ", ".join(f"float(p[-1][first + {k}])" for k in range(coordinates))
     speed = ", ".join(f"float(p[-1][first + {k}])" for k in range(coordinates, 2 * coordinates))
     if coordinates > 1:
         place, speed = f"vector({place})", f"vector({speed})"
-    behind = place.replace("first", f"first + {2 * coordinates}")
+    following = place.replace("first", f"first + {2 * coordinates}")
     start = (
         "def start_tabulated(variant, u, v, dt, p, acceleration):\n"
         f"    first = {2 * coordinates}\n"
@@ -116,7 +115,7 @@ def along_a_table(coordinates: int) -> Stepper:
     step = (
         "def step_tabulated(state, t, dt, p, acceleration):\n"
         f"    first = {2 * coordinates} * int(state[1])\n"
-        f"    return ({behind}, state[1] + 1.0), {speed}\n"
+        f"    return ({following}, state[1] + 1.0), {speed}\n"
     )
     return Stepper(
         start=written(start),
@@ -138,7 +137,7 @@ def gather_over(
     every: int,
     **more: Any,
 ) -> Trajectories:
-    """Gather over the points of a table, shape (case, steps + 2, state), as `vibsim.engine.integrate` does over steps.
+    """Run the loop of `vibsim.engine.integrate` over a table of points, shape (case, steps + 2, state).
 
     See `along_a_table`.
     """
@@ -158,7 +157,7 @@ def gather_over(
 
 
 def pieces(where: Integers, steps: int) -> Iterator[Integers]:
-    """Yield as many members at a time as `integrate` may hold the points of."""
+    """Yield members in groups whose points `integrate` can hold in memory."""
     size = max(POINTS_AT_A_TIME // (steps + 1), 1)
     for first in range(0, len(where), size):
         yield where[first : first + size]
@@ -177,12 +176,12 @@ def integrate(
 ) -> Trajectories:
     """Integrate every member, and gather over the points of a level; see `vibsim.engine.integrate`.
 
-    A member whose integration fails, or that grows beyond what can be stored, ends there, and the others go on.
+    A member whose integration fails or overflows ends there; the others go on.
     """
     members = len(dt)
     states = len(model.states)
     table = np.zeros((members, steps + 2, states))
-    done = np.empty((2, members))
+    counts = np.empty((2, members))
     for i in range(members):
         problem = Problem(
             model=model,
@@ -193,24 +192,24 @@ def integrate(
             end=steps * float(dt[i]),
         )
         run = solved(problem)
-        # the loop over the points has the first one from elsewhere
+        # the first point is the initial state
         for first in range(1, steps + 1, POINTS_AT_A_TIME):
             n = np.arange(first, min(first + POINTS_AT_A_TIME, steps + 1))
             table[i, n] = run.at(n * dt[i]).T
-        done[:, i] = len(run.pieces), run.force_evaluations
-    found = gather_over(
+        counts[:, i] = len(run.pieces), run.force_evaluations
+    result = gather_over(
         model, scheme, options, parameters, table, initial, dt, steps, every, **more
     )
-    assert found.gathered is not None
-    counts = replace(found.gathered, accepted_steps=done[0], force_evaluations=done[1])
-    return replace(found, gathered=counts)
+    assert result.gathered is not None
+    gathered = replace(result.gathered, accepted_steps=counts[0], force_evaluations=counts[1])
+    return replace(result, gathered=gathered)
 
 
 _cache: OrderedDict[Problem, Run] = OrderedDict()
 
 
 def solved(problem: Problem) -> Run:
-    """Return the run of a problem: that of another level, where it is still kept."""
+    """Return the run of a problem, from the cache if another level has left it there."""
     run = _cache.pop(problem, None) or solve(problem)
     _cache[problem] = run
     total = sum(len(other.pieces) for other in _cache.values())
@@ -220,14 +219,14 @@ def solved(problem: Problem) -> Run:
 
 
 def solve(problem: Problem) -> Run:
-    """Integrate a problem to its end, or as far as it goes."""
+    """Integrate a problem to its end, or until the solver fails or the solution overflows."""
     from scipy import integrate as scipy_integrate
 
     right, jacobian = _right_hand_side(problem)
     more = {} if problem.kind == "dop853" else {"jac": jacobian}
     times: list[float] = [0.0]
-    found: list[Any] = []
-    # what overflows or is no number is a result; LSODA warns why it stops, and all of them of small tolerances
+    pieces: list[Any] = []
+    # no warnings: overflow and NaN are results; LSODA warns when it stops, all solvers warn of small tolerances
     with warnings.catch_warnings(), np.errstate(all="ignore"):
         warnings.simplefilter("ignore")
         solver = getattr(scipy_integrate, CLASSES[problem.kind])(
@@ -235,28 +234,28 @@ def solve(problem: Problem) -> Run:
             0.0,
             problem.initial,
             problem.end,
-            # SciPy takes its least one where this is less, and warns
+            # below its smallest tolerance SciPy uses that, and warns
             rtol=problem.tolerance,
             atol=problem.tolerance * np.array(problem.scale),
             **more,
         )
-        # a first step that is no number would be tried for ever
+        # a first step of NaN would be tried for ever
         going = math.isfinite(getattr(solver, "h_abs", 0.0))
-        while going and solver.status == "running" and len(found) < MOST_STEPS:
+        while going and solver.status == "running" and len(pieces) < MOST_STEPS:
             solver.step()
             # written so that NaN ends it as well
             going = solver.t > times[-1] and bool(np.abs(solver.y).sum() < OVERFLOW)
             if going and solver.status != "failed":
-                found.append(solver.dense_output())
+                pieces.append(solver.dense_output())
                 times.append(float(solver.t))
-    return Run(times, found, solver.nfev, len(problem.initial))
+    return Run(times, pieces, solver.nfev, len(problem.initial))
 
 
 def _right_hand_side(problem: Problem) -> tuple[Callable[..., Any], Callable[..., Any]]:
-    """Return the derivative of (u, v), and that derivative's own derivative."""
+    """Return the right-hand side for the state (u, v), and its Jacobian."""
     acceleration, slopes = _forces(problem.model)
     half, lookup = problem.model.coordinates, problem.model.lookup
-    # what is looked up stands behind the parameters (`vibsim.engine.formulas`)
+    # the table follows the parameters (`vibsim.engine.formulas`)
     p: tuple[Any, ...] = (*problem.parameters, *([lookup.table.rows] if lookup else []))
 
     def halves(y: Floats) -> tuple[Any, Any]:
@@ -278,7 +277,7 @@ def _right_hand_side(problem: Problem) -> tuple[Callable[..., Any], Callable[...
 
 @cache
 def _forces(model: Model) -> tuple[Callable[..., float], Callable[..., tuple[float, float]]]:
-    """Return the acceleration of a model and its slopes, as plain functions of (u, v, t, p)."""
+    """Return the acceleration of a model and its slopes, as Python functions of (u, v, t, p)."""
     stepper = replace(along_a_table(model.coordinates), implicit=True)
     plain: Any = kernel(model, stepper, "plain", False)
     return plain.__globals__["acceleration"], plain.__globals__["slopes"]

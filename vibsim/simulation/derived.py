@@ -1,4 +1,4 @@
-"""Series that follow from the stored states: energies, the work of forces, and what else a model gives out."""
+"""Series that follow from the stored states: energies, the work of forces, and the outputs of a model."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ from vibsim.models.base import Formula, rate
 from vibsim.simulation.members import Members
 
 SAMPLES_AT_A_TIME = 2**16
-"""Samples that are worked on at a time, so that little memory is needed beside what is kept."""
+"""Number of samples that are processed at a time, to bound temporary memory."""
 
 
 @dataclass(frozen=True)
 class _Samples:
-    """The stored samples of some members of one scheme, (case, t), with the numbers of these members."""
+    """The stored samples of members of one scheme, (case, t), with the parameters of these members."""
 
     model: Model
     parameters: Floats
@@ -31,10 +31,10 @@ class _Samples:
     series: Series | None
     lane: str
     own_energies: Floats | None
-    """Kinetic and potential energy, shape (case, 2, t), where states do not tell them."""
+    """Kinetic and potential energy, shape (case, 2, t), if they do not follow from the states."""
 
     def energies(self, velocities: Floats) -> tuple[Floats, Floats]:
-        """Return kinetic and potential energy with those velocities, shape (coordinate, case, t)."""
+        """Return kinetic and potential energy, shape (case, t), with velocities of shape (coordinate, case, t)."""
         if self.own_energies is not None:
             return self.own_energies[:, 0], self.own_energies[:, 1]
         states = np.concatenate([self.states[: self.model.coordinates], velocities])
@@ -54,14 +54,14 @@ def derived(
     every: int,
     wanted: Iterable[str],
 ) -> dict[str, Floats]:
-    """Work out series from the stored states, and for the work of forces from what was summed at every step.
+    """Return series computed from the stored states, and the work of forces from sums over every step.
 
     Parameters
     ----------
     solution
         See `vibsim.simulation.solution.solve`.
     wanted
-        Names out of `vibsim.models.quantities`, the states and the centred velocity excepted.
+        Names from `vibsim.models.quantities`, except states and centred velocities.
 
     Returns
     -------
@@ -69,8 +69,8 @@ def derived(
         Name to series, shape (scheme, case, t); and ``energy_initial``, shape (scheme, case).
     """
     schemes, _, cases, times = solution.states.shape
-    found = {name: np.empty((schemes, cases, times)) for name in wanted}
-    found["energy_initial"] = np.empty((schemes, cases))
+    result = {name: np.empty((schemes, cases, times)) for name in wanted}
+    result["energy_initial"] = np.empty((schemes, cases))
     parameters = group.numbers(model)
     lane, piece = lane_for(cases, schemes * times), max(SAMPLES_AT_A_TIME // times, 1)
     for s in range(schemes):
@@ -86,25 +86,25 @@ def derived(
                 lane=lane,
                 own_energies=None if solution.energies is None else solution.energies[s, part],
             )
-            for name, values in _series(samples, found.keys()):
-                if name in found:
-                    found[name][s, part] = values
-    return found
+            for name, values in _series(samples, result.keys()):
+                if name in result:
+                    result[name][s, part] = values
+    return result
 
 
 def _part(series: Series, scheme: int, part: slice) -> Series:
-    def of(row: Any) -> Any:
+    def subset(row: Any) -> Any:
         return None if row is None else row[scheme, part]
 
-    return Series(**{field.name: of(getattr(series, field.name)) for field in fields(series)})
+    return Series(**{field.name: subset(getattr(series, field.name)) for field in fields(series)})
 
 
 def _series(samples: _Samples, wanted: Iterable[str]) -> Iterator[tuple[str, Floats]]:
-    """Yield series of shape (case, t), those that cost much only where they are wanted."""
+    """Yield series of shape (case, t) by name; expensive ones only if they are wanted."""
     kinetic, potential = samples.energies(samples.states[samples.model.coordinates :])
     energy = kinetic + potential
     start = energy[:, :1]
-    # an energy that is too large for a number has no deviation; of a member that grows without bound, all are
+    # members that grow without bound overflow
     with np.errstate(over="ignore", invalid="ignore"):
         yield "kinetic_energy", kinetic
         yield "potential_energy", potential
@@ -117,9 +117,9 @@ def _series(samples: _Samples, wanted: Iterable[str]) -> Iterator[tuple[str, Flo
             yield energy_d2t, by_differences
             yield deviation_d2t, by_differences - start
         if set(BUDGET).intersection(wanted):
-            dissipated, done = _work(samples)
-            budget = (energy - start) + dissipated - done
-            yield from zip(BUDGET, (dissipated, done, budget), strict=True)
+            dissipated, driven = _work(samples)
+            budget = (energy - start) + dissipated - driven
+            yield from zip(BUDGET, (dissipated, driven, budget), strict=True)
     outputs = [output for output in samples.model.outputs if output.name in wanted]
     if outputs:
         values = samples.values(tuple(output.formula for output in outputs))
@@ -127,7 +127,7 @@ def _series(samples: _Samples, wanted: Iterable[str]) -> Iterator[tuple[str, Flo
 
 
 def _energy_d2t(samples: _Samples) -> Floats:
-    """Return the energy with ``[D_2t u]`` as the velocity; NaN where there is none or it overflows."""
+    """Return the energy with ``[D_2t u]`` as the velocity; NaN where that is undefined or overflows."""
     assert samples.series is not None
     velocities = samples.series.velocities_d2t
     if np.isnan(velocities).all():
@@ -140,9 +140,9 @@ def _energy_d2t(samples: _Samples) -> Floats:
 def _work(samples: _Samples) -> tuple[Floats, Floats]:
     """Return the energy that damping took and the work of driving forces since the start.
 
-    The integral of a power P is the trapezoidal sum over every step, ``dt (sum P - (P_0 + P_n)/2)``, corrected at both
-    ends by ``-dt^2/12 (P'_n - P'_0)``: the formula of Euler and Maclaurin, of fourth order where P is smooth. Where
-    there are events it is not, and the engine has summed both piece by piece (`vibsim.engine.events.note_piece`).
+    The integral of a power P is the trapezoidal sum over every step, ``dt (sum P - (P_0 + P_n)/2)``, with the end
+    correction ``-dt^2/12 (P'_n - P'_0)`` (Euler-Maclaurin, of fourth order for smooth P). With events P is not smooth,
+    and the engine integrates both powers piece by piece (`vibsim.engine.events.note_piece`).
     """
     model, series = samples.model, samples.series
     assert series is not None

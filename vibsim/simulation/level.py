@@ -1,4 +1,4 @@
-"""One level as a record: what is stored of it, under which names."""
+"""One level as a record: its stored variables with names, units and descriptions."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 STATUS = ("ok", "non_finite")
 """Meaning of the variable ``status``."""
 MOST_REFERENCES = 1024
-"""Of more members no reference is computed where the exact solution is not known."""
+"""Largest number of members for which reference solutions are computed if the exact solution is not known."""
 
 _ENERGY_WORDS = {
     "kinetic_energy": "kinetic energy",
@@ -54,7 +54,7 @@ _BUDGET_WORDS = (
 )
 
 Row = tuple[str, Any, str, str]
-"""Name of a variable, its values, what they are in words, and their unit."""
+"""Name of a variable, its values, its description, and its unit."""
 
 
 def simulate(experiment: Experiment, level: int, *, threads: int = 1) -> xarray.Dataset:
@@ -63,20 +63,20 @@ def simulate(experiment: Experiment, level: int, *, threads: int = 1) -> xarray.
     Parameters
     ----------
     threads
-        How many threads share the members; no number depends on it.
+        Number of threads that share the members; results do not depend on it.
 
     Returns
     -------
     xarray.Dataset
-        What the file ``level_LL.nc`` holds: states, energies and outputs at the times that are kept, their exact values
-        where they are known, and of every step the extrema, periods and status of each member.
+        The content of the file ``level_LL.nc``: states, energies and outputs at the stored times, exact values if they
+        are known, and extrema, periods and status of each member, taken over every step.
 
     Raises
     ------
     ValueError
-        Where the experiment does not have the level.
+        If the experiment does not have the level.
     SimulationError
-        Where a kernel cannot be compiled.
+        If a kernel cannot be compiled.
     """
     return simulate_record(experiment, level, threads=threads).to_xarray()
 
@@ -153,16 +153,17 @@ def simulate_record(
 def coordinates(
     model: Model, schemes: list[str], group: Members, steps: int, every: int, *, same_end: bool
 ) -> dict[str, Variable]:
-    """Return the coordinates of some members at every `every`-th of `steps` steps.
+    """Return the coordinates of members at every `every`-th of `steps` steps.
 
     Parameters
     ----------
     schemes
         Names of the schemes.
     group
-        The members; each swept key becomes a coordinate of them.
+        The members; each swept key becomes a coordinate along ``case``.
     same_end
-        Whether all members of the experiment end at the same time, so that ``t`` is a time and no fraction of the end.
+        Whether all members of the experiment end at the same time; ``t`` is then a time, otherwise a fraction of the
+        end time.
     """
     number = np.arange(0, steps + 1, every, dtype=np.int64)
     t = number * (group.end[0] / steps) if same_end else number / steps
@@ -183,7 +184,7 @@ def coordinates(
 
 
 def _plain_name(key: str, taken: Container[str]) -> str:
-    """Return a name for a swept key that netCDF programs can work with; labels of schemes may hold anything."""
+    """Return a netCDF name for a swept key, which may contain any characters of a scheme's label."""
     name = "".join(c if c.isascii() and c.isalnum() else "_" for c in key)
     return next(n for n in chain([name], (f"{name}_{i}" for i in count(2))) if n not in taken)
 
@@ -237,11 +238,11 @@ def _series(
 def _exact(
     experiment: Experiment, group: Members, number: Integers, steps: int
 ) -> dict[str, Variable]:
-    """Return the exact states, or a reference for them where they are not known."""
+    """Return the exact states, or reference solutions if they are not known."""
     model = experiment.model.definition
     if model.exact is None:
         few = has_solution(model) and experiment.members <= MOST_REFERENCES
-        # members that start from others have starts of every level's own
+        # in a chain the initial values depend on the level
         few = few and experiment.chain == 1
         return _computed(model, group, number / steps) if few else {}
     exact = group.exact(model, number * (group.end / steps)[:, None])
@@ -253,7 +254,7 @@ def _exact(
 
 
 def _computed(model: Model, group: Members, fraction: Floats) -> dict[str, Variable]:
-    """Return reference solutions with the bounds of their errors; nothing where no member has one."""
+    """Return reference solutions with the bounds of their errors; empty if no member has one."""
     with np.errstate(all="ignore"):
         series, bounds = reference(model, group, fraction)
     if not np.isfinite(bounds[model.position]).any():
@@ -282,14 +283,14 @@ def _constants(model: Model, group: Members, steps: int) -> Iterable[Row]:
 
 
 def _ranges(model: Model, run: Gathered) -> Iterable[Row]:
-    """Yield what was gathered of states and energies over every step; arrays of shape (scheme, case)."""
+    """Yield the extrema and norms of states and energies over every step; arrays of shape (scheme, case)."""
     for k, state in enumerate(model.states):
         for i, (end, words) in enumerate((("min", "least"), ("max", "largest"))):
             long_name = f"{words} {state.long_name} over every step"
             yield f"{state.name}_{end}", run.ranges[..., k, i], long_name, state.unit
         long_name = f"norm of the {state.long_name} over every step"
         yield f"{state.name}_l1", run.norms[..., k, 0], f"l1 {long_name}", _times_second(state.unit)
-        # udunits knows no root of a unit
+        # udunits does not support square roots of units
         words = f"l2 {long_name} (times the square root of s)"
         yield f"{state.name}_l2", run.norms[..., k, 1], words, state.unit
     words, unit = "largest absolute energy deviation over every step", model.energy_unit
@@ -327,7 +328,7 @@ def _ends(found: Trajectories, end: Floats, steps: int) -> Iterable[Row]:
 
 
 def _extrema(model: Model, found: Extrema) -> dict[str, Variable]:
-    """Return the local extrema of the position, and how many there are (vibration text, section 3.5)."""
+    """Return the local extrema of the position, and their numbers (vibration text, section 3.5)."""
     unit, parabola = model.states[0].unit, "on the parabola through three points"
     parabola += " or of the event" if model.events is not None else ""
     table: dict[str, Variable] = {}
@@ -362,7 +363,7 @@ def _event_times(found: EventTimes) -> dict[str, Variable]:
 
 
 def _own_steps(run: Gathered) -> Iterable[Row]:
-    """Yield what adaptive schemes did of their own; NaN where steps are fixed."""
+    """Yield counts of adaptive schemes; NaN for other schemes."""
     words = "of an adaptive scheme, whatever the level"
     yield "accepted_steps", run.accepted_steps, f"accepted steps {words}", "1"
     evaluations = f"evaluations of the acceleration {words}, with those for its dense output"

@@ -1,4 +1,4 @@
-"""The numbers of members: parameters, initial values and end times, from the experiment and its sweep."""
+"""Numerical values of members: parameters, initial values and end times, from the experiment and its sweep."""
 
 from __future__ import annotations
 
@@ -19,38 +19,38 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Members:
-    """The numbers of members start..stop-1; every array has shape (case,)."""
+    """Values of members start..stop-1; every array has shape (case,)."""
 
     index: Integers
     columns: Mapping[str, NDArray[Any]]
     """Swept values by dotted key: numbers, or words for options of schemes."""
     parameters: Mapping[str, Floats]
     initial: Mapping[str, Floats]
-    """NaN for a member that starts from the last state of the one before, which no file tells."""
+    """NaN for a member that starts from the last state of the previous member."""
     end: Floats
 
     def numbers(self, model: Model) -> Floats:
         """Return the parameters in the order of a model, shape (case, parameter)."""
-        found = [self.parameters[row.key] for row in model.parameters]
-        return np.stack(found, axis=-1) if found else np.empty((len(self.end), 0))
+        columns = [self.parameters[row.key] for row in model.parameters]
+        return np.stack(columns, axis=-1) if columns else np.empty((len(self.end), 0))
 
     def by_name(self, model: Model) -> dict[str, Floats]:
-        """Return the parameters by the names that formulas have for them, shape (case, 1), beside which times stand."""
+        """Return the parameters by their names in formulas, shape (case, 1), which broadcasts against times."""
         return {row.name: self.parameters[row.key][:, None] for row in model.parameters}
 
     def exact(self, model: Model, t: Floats) -> dict[str, Floats]:
-        """Return the exact states of a model that has them, at times t, shape (case, t)."""
+        """Return the exact states at times t, shape (case, t); the model must have an exact solution."""
         assert model.exact is not None
         return model.exact(t, in_columns(self.initial), in_columns(self.parameters))
 
 
 def in_columns(table: Mapping[str, Floats]) -> dict[str, Floats]:
-    """Return numbers of members in the shape (case, 1), beside which times stand."""
+    """Return arrays of members with shape (case, 1), which broadcasts against times."""
     return {name: values[:, None] for name, values in table.items()}
 
 
 def members(experiment: Experiment, start: int, stop: int) -> Members:
-    """Work out the numbers of members start..stop-1."""
+    """Return the values of members start..stop-1."""
     columns = sweep_columns.columns(experiment, start, stop)
     parameters, initial = numbers_of(experiment, columns, stop - start)
     if experiment.chain > 1:
@@ -66,19 +66,19 @@ def members(experiment: Experiment, start: int, stop: int) -> Members:
 def numbers_of(
     experiment: Experiment, columns: Mapping[str, NDArray[Any]], size: int
 ) -> tuple[dict[str, Floats], dict[str, Floats]]:
-    """Return parameters and initial values of the members that swept values belong to, arrays of shape (size,)."""
+    """Return parameters and initial values of `size` members with these swept values, arrays of shape (size,)."""
     parameters = _filled("model", experiment.model.parameters, columns, size)
     initial = _filled("initial", experiment.initial, columns, size)
-    known = experiment.model.definition.start
-    if known is not None:
-        initial |= {name: np.full(size, value) for name, value in known(parameters).items()}
+    start = experiment.model.definition.start
+    if start is not None:
+        initial |= {name: np.full(size, value) for name, value in start(parameters).items()}
     return parameters, initial
 
 
 def _filled(
     section: str, values: Mapping[str, float], columns: Mapping[str, NDArray[Any]], size: int
 ) -> dict[str, Floats]:
-    """Return the values of a section, swept or the same for every member."""
+    """Return the values of a section, swept or equal for all members."""
     return {
         name: columns.get(f"{section}.{name}", np.full(size, value, dtype=float))
         for name, value in values.items()

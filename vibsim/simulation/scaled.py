@@ -1,4 +1,4 @@
-"""Records of a run in characteristic units: without units, and with the factors that lead back."""
+"""Records of a run in characteristic units: dimensionless, with the scales as attributes."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ if TYPE_CHECKING:
     from vibsim.experiment import Experiment
 
 TIMELESS = "time_units"
-"""Attribute of a Record whose times have no unit although it is no scaled one."""
+"""Attribute of a Record whose time is dimensionless although the run is not scaled."""
 
 
 def in_scales(record: Record, experiment: Experiment) -> Record:
-    """Return `record` with unit 1 and ``scale_<name>`` for every scale, where the run is a scaled one.
+    """Return `record`, if the run is scaled with unit 1 and an attribute ``scale_<name>`` for every scale.
 
-    Of a model that is dimensionless by itself the time has no unit either.
+    For a dimensionless model the time has unit 1 as well.
     """
     model = experiment.model.definition
     if experiment.scaling is None:
@@ -34,12 +34,12 @@ def in_scales(record: Record, experiment: Experiment) -> Record:
 
 
 def has_time_unit(record: Record) -> bool:
-    """Tell whether times have a unit: not those of a scaled run, nor of a model that is dimensionless by itself."""
+    """Tell whether times have a unit: not in a scaled run, and not for a dimensionless model."""
     return not {"scale_t", TIMELESS} & record.attrs.keys()
 
 
 def _plain(record: Record, attrs: Mapping[str, Any], units: Container[str] | None = None) -> Record:
-    """Return a record with more attributes, and unit 1 in place of any other, or of some units."""
+    """Return a record with further attributes, and unit 1 in place of `units` (None: of any unit)."""
 
     def plain(row: Variable) -> Variable:
         if "units" not in row.attrs or (units is not None and row.attrs["units"] not in units):

@@ -1,11 +1,12 @@
-"""Linear structures stepped as a whole, member by member, and sampled by what is observed of them.
+"""Linear structures stepped as a whole, member by member, and their observed displacements.
 
-A step solves with one symmetric matrix (`vibsim.schemes.newmark`), which SuperLU factors once for each length of step
-and damping. What is kept of every step are the observed displacements and velocities and the energies of the whole
-structure. They are put into a table, over which the loop of every other scheme gathers extrema, norms and periods, with
-the energies as one more coordinate (`vibsim.simulation.adaptive.gather_over`).
+A step solves with one symmetric matrix (`vibsim.schemes.newmark`), which SuperLU factors once for each step length and
+damping. Every step keeps the observed displacements and velocities and the energies of the whole structure in a table.
+The engine's loop then gathers extrema, norms and periods over the table, with the energies as one more coordinate
+(`vibsim.simulation.adaptive.gather_over`).
 
-The last bits depend on the versions of SciPy and of its linear algebra, and on the machine, but on no other member.
+The last bits depend on the versions of SciPy and its linear algebra libraries and on the machine, but not on other
+members.
 """
 
 from __future__ import annotations
@@ -28,7 +29,7 @@ from vibsim.schemes.base import Options, Scheme, Weights
 from vibsim.simulation.adaptive import gather_over
 
 KINETIC, POTENTIAL = "_kinetic", "_potential"
-"""States that carry the energies along."""
+"""Names of the additional states that hold the energies."""
 
 
 def integrate(
@@ -47,7 +48,7 @@ def integrate(
     Returns
     -------
     Trajectories
-        Of what is observed, with the energies of the whole structure beside it.
+        Trajectories of the observed states, with the energies of the whole structure.
     """
     assert model.loaded is not None
     assert scheme.weights is not None
@@ -71,24 +72,25 @@ def integrate(
         potential_energy=Name(POTENTIAL),
         loaded=None,
     )
-    found = gather_over(
+    run = gather_over(
         wide, scheme, options, parameters, table, table[:, 0], dt, steps, every, **more
     )
-    return _without_energies(found, count)
+    return _without_energies(run, count)
 
 
-def _without_energies(found: Trajectories, count: int) -> Trajectories:
-    """Take the energies out of the states."""
-    own = [*range(count), *range(count + 1, 2 * count + 1)]
-    energies = found.states[[count, 2 * count + 1]]
-    gathered, series = found.gathered, found.series
+def _without_energies(run: Trajectories, count: int) -> Trajectories:
+    """Move the energies from the states to `Trajectories.energies`."""
+    observed = [*range(count), *range(count + 1, 2 * count + 1)]
+    energies = run.states[[count, 2 * count + 1]]
+    gathered, series = run.gathered, run.series
     if gathered is not None:
-        gathered = replace(gathered, ranges=gathered.ranges[:, own], norms=gathered.norms[:, own])
+        ranges, norms = gathered.ranges[:, observed], gathered.norms[:, observed]
+        gathered = replace(gathered, ranges=ranges, norms=norms)
     if series is not None:
         series = replace(series, velocities_d2t=series.velocities_d2t[:, :count])
     return replace(
-        found,
-        states=np.ascontiguousarray(found.states[own]),
+        run,
+        states=np.ascontiguousarray(run.states[observed]),
         energies=np.moveaxis(energies, 1, 0),
         gathered=gathered,
         series=series,
@@ -96,9 +98,14 @@ def _without_energies(found: Trajectories, count: int) -> Trajectories:
 
 
 def points(
-    own: Loaded, weights: Weights, named: dict[str, float], initial: Floats, dt: float, steps: int
+    loaded: Loaded,
+    weights: Weights,
+    named: dict[str, float],
+    initial: Floats,
+    dt: float,
+    steps: int,
 ) -> Floats:
-    """Return what a step keeps, at every one of `steps` steps of the length `dt` and at t = 0.
+    """Return the observed states and the energies at t = 0 and after each of `steps` steps of length `dt`.
 
     Parameters
     ----------
@@ -110,26 +117,26 @@ def points(
     Returns
     -------
     ndarray
-        Shape (step, 2 count + 2): observed displacements, kinetic energy, observed velocities, potential energy. NaN
-        behind the last step that can be stored.
+        Shape (steps + 1, 2 count + 2): observed displacements, kinetic energy, observed velocities, potential energy.
+        NaN after an overflow.
 
     Raises
     ------
     SimulationError
-        Where the matrix of a step is not positive definite.
+        If the matrix of a step is not positive definite.
     """
-    structure = own.structure
+    structure = loaded.structure
     m, k = structure.mass.sparse.tocsr(), structure.stiffness.sparse.tocsr()
-    c = _damping(own, named["alpha"], named["beta"])
-    first, solve = _factors(own, weights, named["alpha"], named["beta"], dt)
+    c = _damping(loaded, named["alpha"], named["beta"])
+    solve_mass, solve_step = _factors(loaded, weights, named["alpha"], named["beta"], dt)
     late, near = 1.0 - weights.gamma, 0.5 - weights.beta
     share, old = 1.0 - weights.alpha_f, weights.alpha_f
-    loads = own.forces(np.arange(steps + 1, dtype=np.float64) * dt, named)
+    loads = loaded.forces(np.arange(steps + 1, dtype=np.float64) * dt, named)
     count = len(structure.names)
-    found = np.full((steps + 1, 2 * count + 2), np.nan)
+    table = np.full((steps + 1, 2 * count + 2), np.nan)
     u, v = structure.start_of(initial)
 
-    def left(n: int, u: Floats, v: Floats) -> Floats:
+    def net_force(n: int, u: Floats, v: Floats) -> Floats:
         """Return ``p - C v - K u`` at step n."""
         force: Floats = -(k @ u) if c is None else -(k @ u) - c @ v
         if len(loads):
@@ -137,51 +144,51 @@ def points(
         return force
 
     with np.errstate(over="ignore", invalid="ignore"):
-        force = left(0, u, v)
-        a = first(force)
+        force = net_force(0, u, v)
+        a = solve_mass(force)
         for n in range(steps + 1):
             if n:
                 reach = u + dt * (v + dt * near * a)
                 push = v + (dt * late) * a
-                right = share * left(n, reach, push)
+                right = share * net_force(n, reach, push)
                 if old or weights.alpha_m:
                     right += old * force - weights.alpha_m * (m @ a)
-                a = solve(right)
+                a = solve_step(right)
                 u, v = reach + (weights.beta * dt * dt) * a, push + (weights.gamma * dt) * a
-                force = left(n, u, v) if old else force
+                force = net_force(n, u, v) if old else force
             # written so that NaN fails as well
             if not np.abs(u).sum() + np.abs(v).sum() < OVERFLOW:
                 break
-            found[n, :count], found[n, count + 1 : -1] = (
+            table[n, :count], table[n, count + 1 : -1] = (
                 structure.observed @ u,
                 structure.observed @ v,
             )
-            found[n, count], found[n, -1] = 0.5 * (v @ (m @ v)), 0.5 * (u @ (k @ u))
-    return found
+            table[n, count], table[n, -1] = 0.5 * (v @ (m @ v)), 0.5 * (u @ (k @ u))
+    return table
 
 
-def _damping(own: Loaded, alpha: float, beta: float) -> Any:
-    """Return the matrix C of a member, sparse; None where there is none."""
-    structure, found = own.structure, own.structure.own_damping
+def _damping(loaded: Loaded, alpha: float, beta: float) -> Any:
+    """Return the matrix C of a member, sparse; None if it is 0."""
+    structure, total = loaded.structure, loaded.structure.own_damping
     for factor, matrix in ((alpha, structure.mass), (beta, structure.stiffness)):
         if factor:
             part = factor * matrix.sparse
-            found = part if found is None else found + part
-    return None if found is None else found.tocsr()
+            total = part if total is None else total + part
+    return None if total is None else total.tocsr()
 
 
 @lru_cache(maxsize=8)
-def _factors(own: Loaded, weights: Weights, alpha: float, beta: float, dt: float) -> Any:
-    """Return what solves with M, and with the matrix of a step."""
-    structure, c = own.structure, _damping(own, alpha, beta)
+def _factors(loaded: Loaded, weights: Weights, alpha: float, beta: float, dt: float) -> Any:
+    """Return the functions that solve with M and with the matrix of a step."""
+    structure, c = loaded.structure, _damping(loaded, alpha, beta)
     share = 1.0 - weights.alpha_f
     step = (1.0 - weights.alpha_m) * structure.mass.sparse
     if weights.beta:
         step = step + (share * weights.beta * dt * dt) * structure.stiffness.sparse
     if c is not None:
         step = step + (share * weights.gamma * dt) * c
-    found = factored(structure.mass.sparse), factored(step.tocsc())
-    if None in found:
+    factors = factored(structure.mass.sparse), factored(step.tocsc())
+    if None in factors:
         rule = f"the matrix of a step of dt = {dt:g} is not positive definite, because the damping is not"
         raise SimulationError(rule)
-    return tuple(row.solve for row in found)
+    return tuple(row.solve for row in factors)

@@ -1,8 +1,7 @@
-"""What theory predicts of a scheme from its own step, by one piece of code for every scheme.
+"""Theory of schemes, derived from the functions of their steps by one code for every scheme.
 
-On the linear problem ``u'' + g w u' + w^2 u = 0``, `vibsim.theory.basis` lets its functions run on unit vectors, and
-all else follows from the matrix that comes out. On polynomials, `vibsim.theory.polynomial` lets them run on
-exact series.
+On the linear problem ``u'' + g w u' + w^2 u = 0``, `vibsim.theory.basis` runs these functions on unit vectors, and
+everything else follows from the resulting matrix. On polynomials, `vibsim.theory.polynomial` runs them on exact series.
 """
 
 from vibsim.theory.degrees import Miss, Residual, exact_degree, fitted_force, miss, reproduces

@@ -1,4 +1,4 @@
-"""What kinds of numbers share that theory runs the functions of a scheme on, and the algebra that takes any kind."""
+"""Base class of the number types on which theory runs the functions of a scheme, and algebra for any of them."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ import numpy as np
 
 
 class Arithmetic:
-    """The operators that follow from ``+ * /``, the sign and `lift`, which makes a number of another kind one of this.
+    """Operators that follow from ``+ * /``, negation and `lift`, which converts a number to this type.
 
-    A comparison answers for an array as a whole: ``>`` and ``>=`` whether any number is larger, ``<`` and ``<=``
-    whether every one is smaller. A loop that goes on while a correction is large goes on until none is.
+    Comparisons reduce arrays: ``>`` and ``>=`` tell whether any entry is larger, ``<`` and ``<=`` whether all are
+    smaller. So a loop that continues while a correction is large ends when all are small.
     """
 
     __slots__ = ()
@@ -23,7 +23,7 @@ class Arithmetic:
     __truediv__: Any
     lift: Any
     nearest: Any
-    """Floats with the signs of the numbers."""
+    """Floats with the same signs."""
 
     def __pos__(self) -> Any:
         return self
@@ -59,7 +59,7 @@ class Arithmetic:
 def characteristic(matrix: Any) -> list[Any]:
     """Return the coefficients of the characteristic polynomial, the highest power first, by Leverrier's method.
 
-    The matrix has shape (..., s, s), in twice the precision or as an array of objects; a coefficient has shape (...).
+    The matrix has shape (..., s, s), in double-double precision or as an object array; coefficients have shape (...).
     """
     size = matrix.shape[-1]
     coefficients, product = [matrix[..., 0, 0] * 0.0 + 1.0], matrix
@@ -74,9 +74,9 @@ def characteristic(matrix: Any) -> list[Any]:
 
 
 def by_quadratic(polynomial: Sequence[Any], trace: Any, determinant: Any) -> list[Any]:
-    """Divide a polynomial, the highest power first, by ``x^2 - T x + D``: the quotient, then two numbers left.
+    """Divide a polynomial, the highest power first, by ``x^2 - T x + D``; return the quotient and two remainder terms.
 
-    These are ``b_k = a_k + T b_(k-1) - D b_(k-2)``.
+    All of them are ``b_k = a_k + T b_(k-1) - D b_(k-2)``.
     """
     quotient: list[Any] = []
     for k, value in enumerate(polynomial):
@@ -89,7 +89,7 @@ def by_quadratic(polynomial: Sequence[Any], trace: Any, determinant: Any) -> lis
 
 
 def bairstow(polynomial: Sequence[Any], trace: Any, determinant: Any) -> tuple[Any, Any]:
-    """Return by how much T rises and D falls in a step of Bairstow's method to a ``x^2 - T x + D`` that divides."""
+    """Return the increase of T and the decrease of D in a step of Bairstow's method for ``x^2 - T x + D``."""
     b = by_quadratic(polynomial, trace, determinant)
     slopes = by_quadratic(b[:-1], trace, determinant)
     one, zero = b[-2], b[-1]

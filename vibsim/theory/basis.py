@@ -1,10 +1,9 @@
-r"""The step of a scheme on ``u'' + g w u' + w^2 u = 0``, applied to unit vectors: any scheme, any kind of number.
+r"""The step of a scheme on ``u'' + g w u' + w^2 u = 0``, applied to unit vectors: any scheme, any type of number.
 
-Time is counted in steps, so that dt = 1 and the acceleration is ``-p^2 u - g p v`` with ``p = w dt``; velocities are
-``v dt``. The functions of the scheme itself run, on numbers that have ``+ - * /``: twice the precision
-(`vibsim.theory.doubled`), bounds of rounding (`vibsim.theory.rounding`), series in p (`vibsim.theory.laurent`), or
-functions of p (`vibsim.theory.symbolic`). Coefficients that are formulas enter as formulas, not as the floats they were
-rounded to.
+Time is measured in steps, so that dt = 1 and the acceleration is ``-p^2 u - g p v`` with ``p = w dt``; velocities are
+``v dt``. The functions of the scheme itself run on numbers with ``+ - * /``: double-double (`vibsim.theory.doubled`),
+with bounds of rounding (`vibsim.theory.rounding`), series in p (`vibsim.theory.laurent`), or functions of p
+(`vibsim.theory.symbolic`). Coefficients enter as formulas, not as rounded floats.
 """
 
 from __future__ import annotations
@@ -25,35 +24,35 @@ from vibsim.schemes.base import Stepper, handed
 from vibsim.schemes.code_generation import exact_names
 
 LARGEST = 1000
-"""The largest denominator of a fraction that a float is taken for."""
+"""Largest denominator of the fractions that floats are converted to."""
 Reader = Callable[[str], Any]
-"""Makes a number of the formula of a coefficient."""
+"""Function that converts the formula of a coefficient to a number."""
 Substitutes = Mapping[Callable[..., Any], Callable[..., Any]]
-"""What runs in place of functions that a step calls."""
+"""Replacements of functions that a step calls."""
 
 _DIGITS = 60
 _ROOT = ELEMENTARY["sqrt"].full
-"""The one elementary function that steps call; no coefficients are in it."""
+"""The only elementary function that steps call; it contains no coefficients."""
 _NONE: Substitutes = MappingProxyType({})
 
 
 @dataclass(frozen=True)
 class UnitSteps:
-    """What became of unit vectors; lists of numbers, one list per vector."""
+    """Images of unit vectors; lists of numbers, one list per vector."""
 
     step: Sequence[Sequence[Any]]
     """The next state of each unit state."""
     velocity: Sequence[Any]
     """The scheme's own velocity of each unit state, times dt."""
     start: Sequence[Sequence[Any]]
-    """State 1 from ``u_0 = 1`` and from ``v_0 dt = 1``; empty where it was not wanted."""
+    """State at step 1 from ``u_0 = 1`` and from ``v_0 dt = 1``; empty if not requested."""
     backward: Sequence[Any] | None
-    """The one-sided velocity of each unit state, times dt, of a scheme that ends with it."""
+    """The one-sided velocity of each unit state, times dt, if the scheme ends with it."""
 
 
 @lru_cache(maxsize=256)
 def _carried(stepper: Stepper) -> int:
-    """Return how many numbers make a state."""
+    """Return the number of entries of a state."""
     start = handed(stepper.start, lambda u, v, t, q: 0.0, lambda u, v, t, q: (0.0, 0.0))
     return len(start(stepper.variant, 0.0, 0.0, 1.0, ()))
 
@@ -69,10 +68,10 @@ def unit_steps(
     substitutes: Substitutes = _NONE,
     with_start: bool = True,
 ) -> UnitSteps:
-    """Return what a step and the start make of unit vectors.
+    """Return the images of unit vectors under a step and the start.
 
-    p, ``w dt``, is of the kind of number that is wanted, `zero` nothing of that kind and shape, `square` ``p^2`` where
-    it is more than the product, `damping` g, None for none.
+    `p` is ``w dt`` in the type of number to use, `zero` a zero of that type and shape, `square` is ``p^2`` if that
+    differs from the product, and `damping` is g (None for no damping).
     """
     one = zero + 1.0
     force, push = stepper.scaling(p) if stepper.scaling else (one, one)
@@ -86,8 +85,8 @@ def unit_steps(
         return -stiffness, zero
 
     def bound(function: Callable[..., Any]) -> Callable[..., Any]:
-        own = rebound(function, read, substitutes)
-        return handed(own, acceleration, slopes, lambda u, v, t, q: rate)
+        exact = rebound(function, read, substitutes)
+        return handed(exact, acceleration, slopes, lambda u, v, t, q: rate)
 
     size = range(_carried(stepper))
     units = [tuple(one if i == j else zero for i in size) for j in size]
@@ -109,20 +108,20 @@ def unit_steps(
 def rebound(
     function: Callable[..., Any], read: Reader, substitutes: Substitutes = _NONE
 ) -> Callable[..., Any]:
-    """Return a function whose named coefficients are numbers made by `read`, in all that it calls as well."""
+    """Return a function with its coefficients converted by `read`, also in all functions that it calls."""
     if function in substitutes:
         return substitutes[function]
     if not isinstance(function, FunctionType):
         return function
     formulas = exact_names(function)
-    known = dict(function.__globals__)
+    names = dict(function.__globals__)
     for name in function.__code__.co_names:
         if name in formulas:
-            known[name] = read(formulas[name])
-        elif isinstance(known.get(name), FunctionType):
-            known[name] = rebound(known[name], read, substitutes)
+            names[name] = read(formulas[name])
+        elif isinstance(names.get(name), FunctionType):
+            names[name] = rebound(names[name], read, substitutes)
     copy = FunctionType(
-        function.__code__, known, function.__name__, function.__defaults__, function.__closure__
+        function.__code__, names, function.__name__, function.__defaults__, function.__closure__
     )
     copy.__kwdefaults__ = function.__kwdefaults__
     return copy
@@ -130,10 +129,10 @@ def rebound(
 
 def reads(stepper: Stepper) -> set[str]:
     """Return the formulas of all coefficients of a scheme."""
-    found: set[str] = set()
+    formulas: set[str] = set()
     for function in (stepper.start, stepper.step, stepper.backward):
-        rebound(function, lambda formula: found.add(formula), {_ROOT: _ROOT})
-    return found
+        rebound(function, lambda formula: formulas.add(formula), {_ROOT: _ROOT})
+    return formulas
 
 
 @lru_cache(maxsize=1024)
@@ -150,9 +149,9 @@ def decimal(formula: str) -> Decimal:
 
 
 def fraction_of(number: float) -> Fraction:
-    """Return the number that a float was written as: the fraction of small numbers that it is, or else its decimal.
+    """Return the number that a float was written as: a fraction with a small denominator, or its decimal.
 
-    An option `1/12` reaches a step as a float. As a decimal it would leave a rest of 1e-18 where terms cancel.
+    An option `1/12` reaches a step as a float. As a decimal it would leave 1e-18 where terms cancel.
     """
     small = Fraction(number).limit_denominator(LARGEST)
     return small if float(small) == number else Fraction(repr(number))
@@ -161,7 +160,7 @@ def fraction_of(number: float) -> Fraction:
 def exact(
     formula: str, number: Callable[[Fraction], Any], power: Callable[[Any, Fraction], Any]
 ) -> Any:
-    """Return the value of a coefficient in numbers of any kind, as `value_of`; ValueError where it has more in it."""
+    """Return the value of a coefficient in numbers of any type; arguments and ValueError as for `value_of`."""
     try:
         return value_of(parse(formula, ()), number, power, {})
     except ValueError:
@@ -176,12 +175,11 @@ def value_of(
     power: Callable[[Any, Fraction], Any],
     names: Mapping[str, Any],
 ) -> Any:
-    """Return the value of a formula in numbers of any kind.
+    """Return the value of a formula in numbers of any type.
 
-    `number` makes such a number of a fraction (a decimal of the formula stands for itself, or for the fraction that it
-    was rounded from, not for the nearest float), `power` raises one to a power, which is a constant of the formula,
-    `names` are numbers for the names of the formula. ValueError where it has more in it than ``+ - * / **``, ``sqrt``
-    and ``abs``.
+    `number` converts a fraction (a decimal stands for itself, or for the fraction that it was rounded from, not for the
+    nearest float), `power` raises a number to a constant power, `names` gives values of the names in the formula.
+    Raises ValueError if the formula contains anything but ``+ - * / **``, ``sqrt`` and ``abs``.
     """
 
     def value(node: Expression) -> Any:

@@ -1,15 +1,15 @@
-r"""Which polynomials a scheme reproduces exactly, and why it does not reproduce the next one.
+r"""Polynomials that a scheme reproduces exactly, and the reason why it does not reproduce the next degree.
 
-A polynomial is reproduced where the positions that the scheme computes lie on it for any time step. Whatever else
-follows from the functions of the scheme itself, in exact numbers (`vibsim.theory.polynomial`):
+A polynomial is reproduced if the computed positions lie on it for any time step. The residuals follow from the
+functions of the scheme in exact arithmetic (`vibsim.theory.polynomial`):
 
-- the *first step* is what its start makes of the initial values, less the state that moves along the polynomial;
-- a *step* begins on that state, at any time t, and its residual is what it then is off by;
-- the *cause* of a step's residual is the first of these in which it is there: the motion without forces, so that the
-  scheme's differences or sums are at fault; with the forces on a body at rest, whose argument is then wrong within
-  the step; with damping.
+- the residual of the *first step* is the state that the start computes, minus the state on the polynomial;
+- the residual of a *step* is the state that it computes from the state on the polynomial at any time t, minus the state
+  on the polynomial at t + dt;
+- the *cause* of a step's residual is the first of these cases in which it occurs: without forces, so that differences
+  or sums are at fault; with the forces on a body at rest, whose arguments are then wrong; with damping.
 
-That holds as long as the velocity does not change its sign where a formula has its absolute value.
+That holds as long as the velocity does not change its sign if a formula contains its absolute value.
 
 Source: vibration text (B), sections 2.2 and 8.5, problem 1 and exercise 9; `errata`, 8.5 and exercise 1 e.
 """
@@ -34,26 +34,26 @@ from vibsim.theory.polynomial import (
 )
 
 HIGHEST_DEGREE = 8
-"""Degree at which the search ends."""
+"""Highest degree that is tried."""
 KNOWN_POWERS = 12
-"""Power of dt from which on nothing is known of a residual: twice that of any scheme at these degrees."""
+"""Power of dt at which residuals are truncated: twice that of any scheme at these degrees."""
 FOLLOWED_STEPS = 4
-"""Steps that a polynomial must be followed for: more than any scheme carries points."""
+"""Number of steps for which a polynomial must be reproduced: more than any scheme carries points."""
 ROUNDED = 1e-13
-"""Size of a term that is none: some schemes state their coefficients to 16 decimals."""
+"""Size below which a term is a rounding error: some schemes state their coefficients to 16 decimals."""
 OF = ("position", "velocity", "state")
 State = tuple[Laurent, ...]
 
 
 @dataclass(frozen=True)
 class Residual:
-    """The first term of what a scheme is off by, ``coefficient dt^power``, computed less exact."""
+    """The leading term of a residual, ``coefficient dt^power``, computed minus exact."""
 
     of: str
-    """``position``; where that is exact, ``velocity`` or else ``state``, for what lies behind these two."""
+    """``position``; if that is exact, ``velocity``; otherwise ``state``, for the remaining entries of the state."""
     power: int
     coefficient: Any
-    """Of SymPy, in the symbols t, c_0, c_1, ..., the parameters of the model and w_0, its natural frequency."""
+    """SymPy expression in the symbols t, c_0, c_1, ..., the parameters of the model and w_0, its natural frequency."""
 
 
 @dataclass(frozen=True)
@@ -62,15 +62,15 @@ class Miss:
 
     degree: int
     start: Residual | None
-    """Of the first step; None where it is exact."""
+    """Residual of the first step; None if it is exact."""
     step: Residual | None
-    """Of every further step."""
+    """Residual of every further step; None if it is exact."""
     cause: str
-    """Of the residual of a step: a value of `Forces`; empty where it is exact."""
+    """Cause of the residual of a step, a value of `Forces`; empty if it is exact."""
 
 
 def applies(model: Model) -> bool:
-    """Tell whether the acceleration of a model can be worked out in exact numbers, and never jumps."""
+    """Tell whether the acceleration of a model can be evaluated in exact arithmetic, and never jumps."""
     if model.events is not None or not model.is_alone:
         return False
     return is_rational(restoring(model))
@@ -82,9 +82,9 @@ def _refuse(model: Model) -> None:
 
 
 def reproduces(stepper: Stepper, model: Model, degree: int) -> bool:
-    """Tell whether a scheme reproduces polynomials of a degree, as solutions of a model with a force for them.
+    """Tell whether a scheme reproduces polynomials of a degree, as manufactured solutions of a model.
 
-    The stepper is that of `vibsim.schemes.Scheme.stepper_for`. ValueError where the model has no rational formulas.
+    The stepper is that of `vibsim.schemes.Scheme.stepper_for`. Raises ValueError unless `applies` holds for the model.
     """
     _refuse(model)
     course = with_numbers(stepper, model, degree, KNOWN_POWERS)
@@ -98,49 +98,49 @@ def reproduces(stepper: Stepper, model: Model, degree: int) -> bool:
 
 @lru_cache(maxsize=256)
 def exact_degree(stepper: Stepper, model: Model) -> int:
-    """Return the highest degree up to which polynomials are reproduced, -1 for none, `HIGHEST_DEGREE` for all tried."""
+    """Return the highest degree up to which polynomials are reproduced: -1 for none, at most `HIGHEST_DEGREE`."""
     missed = (d for d in range(HIGHEST_DEGREE + 1) if not reproduces(stepper, model, d))
     return next(missed, HIGHEST_DEGREE + 1) - 1
 
 
 @lru_cache(maxsize=256)
 def miss(stepper: Stepper, model: Model, degree: int) -> Miss:
-    """Return what the first step and every further one are off by, on polynomials of a degree."""
+    """Return the residuals of the first and every further step on polynomials of a degree, with their cause."""
     _refuse(model)
     course = with_numbers(stepper, model, degree, KNOWN_POWERS)
-    first, step = (_residual(course, off) for off in (_first, _step))
+    first, step = (_leading(course, residual) for residual in (_of_start, _of_step))
     if step is None:
         return Miss(degree, first, step, "")
-    acting = (forces for forces in Forces if _is_off(_step(replace(course, forces=forces))))
-    cause = next((forces.value for forces in acting), "")
+    causes = (f for f in Forces if not _vanishes(_of_step(replace(course, forces=f))))
+    cause = next((forces.value for forces in causes), "")
     return Miss(degree, first, step, cause)
 
 
-def _first(course: Course) -> State:
-    """Return what the state at step 1 is off by."""
-    return _less(course.start(), course.state(course.dt))
+def _of_start(course: Course) -> State:
+    """Return the residual of the state at step 1."""
+    return _minus(course.start(), course.state(course.dt))
 
 
-def _step(course: Course) -> State:
-    """Return what a step from the polynomial at time t is off by."""
+def _of_step(course: Course) -> State:
+    """Return the residual of a step from the polynomial at time t."""
     t = course.names["t"]
-    return _less(course.step(course.state(t), t), course.state(t + course.dt))
+    return _minus(course.step(course.state(t), t), course.state(t + course.dt))
 
 
-def _less(state: State, exact: State) -> State:
+def _minus(state: State, exact: State) -> State:
     return tuple(a - b for a, b in zip(state, exact, strict=True))
 
 
-def _is_off(state: State) -> bool:
-    return any(x.leading is not None for x in state)
+def _vanishes(state: State) -> bool:
+    return all(x.leading is None for x in state)
 
 
-def _residual(course: Course, off: Callable[[Course], State]) -> Residual | None:
-    """Return the first term of the first number of a state that is off; its power from a point, the rest in symbols."""
+def _leading(course: Course, residual: Callable[[Course], State]) -> Residual | None:
+    """Return the leading term of the first nonzero entry of a residual: its power numerically, then symbolically."""
     from sympy import factor
 
-    for index, number in enumerate(off(course)):
-        # terms that are no rounding of a scheme's coefficients
+    for index, number in enumerate(residual(course)):
+        # skip terms that are due to rounding of a scheme's coefficients
         powers = (
             k
             for k in range(number.first, number.end)
@@ -150,26 +150,26 @@ def _residual(course: Course, off: Callable[[Course], State]) -> Residual | None
         if power is not None:
             known = power + 1 + (KNOWN_POWERS - number.end)
             symbolic = with_symbols(course.stepper, course.model, course.degree, known)
-            coefficient = factor(off(symbolic)[index].at(power).as_expr())
+            coefficient = factor(residual(symbolic)[index].at(power).as_expr())
             return Residual(OF[min(index, 2)], power, coefficient)
     return None
 
 
 def fitted_force(stepper: Stepper, model: Model, degree: int) -> Any:
-    """Return what must be added to the acceleration of every step, but not of the start, to reproduce polynomials.
+    """Return the force that must be added to the acceleration in steps, but not in the start, to reproduce polynomials.
 
-    Of centred differences with quadratic damping by the geometric mean and degree 2 it is ``-b c_2^2 dt^2/m``: the
-    force F^n is reduced by ``b c_2^2 dt^2`` for n >= 1, and F^0 stays (`errata`, 8.5).
-    An expression of SymPy in dt and the symbols of `Residual`; ValueError where no such force does it.
+    For centred differences with quadratic damping by the geometric mean and degree 2 it is ``-b c_2^2 dt^2/m``: the
+    force F^n is reduced by ``b c_2^2 dt^2`` for n >= 1, and F^0 is unchanged (`errata`, 8.5).
+    A SymPy expression in dt and the symbols of `Residual`. Raises ValueError if there is no such force.
     """
     from sympy import Symbol
 
     _refuse(model)
     course = with_symbols(stepper, model, degree, KNOWN_POWERS)
-    before, ahead = (_step(replace(course, fitted=x))[0] for x in (0.0, 1.0))
-    fitted = -before / (ahead - before)
-    fits = not _is_off((*_first(course), *_step(replace(course, fitted=fitted))))
-    # it must not go on in the second half of what is known of it
+    without, with_force = (_of_step(replace(course, fitted=x))[0] for x in (0.0, 1.0))
+    fitted = -without / (with_force - without)
+    fits = _vanishes((*_of_start(course), *_of_step(replace(course, fitted=fitted))))
+    # it must be a polynomial: no terms in the second half of the known powers
     if not fits or any(fitted.at(k) for k in range(fitted.end // 2, fitted.end)):
         raise ValueError(f"no force at the inner points makes degree {degree} exact")
     powers = range(fitted.first, fitted.end)

@@ -1,9 +1,9 @@
-r"""The exact solution of the discrete equations on ``u'' + w^2 u = 0``: what a scheme would give without rounding.
+r"""The exact solution of the discrete equations on ``u'' + w^2 u = 0``: the result of a scheme without rounding.
 
-``state^n = matrix^(n-1) state^1``. The power is taken by repeated squaring in twice the precision, never through
-eigenvectors: it does not matter whether the matrix has any (at w dt = 2 the centred scheme has one too few), nor
-whether the solution grows. The error is about n 1e-32, so that a result is rounded once for every n that a run can
-reach. Powers of two are kept beside the matrices, and nothing overflows but the result.
+``state^n = matrix^(n-1) state^1``. The power is computed by repeated squaring in double-double precision, not from
+eigenvectors: the matrix may be defective (that of the centred scheme at w dt = 2), and the solution may grow. The error
+is about n 1e-32, so results are correctly rounded for every n that a run can reach. Matrices carry separate exponents,
+so that only results can overflow.
 
 Source: vibration text (B), section 4.2, equation (20); section 5.6, equations (43)-(44); exercises 10 and 17.
 """
@@ -21,18 +21,18 @@ from vibsim.theory.doubled import Doubled, doubled, product, stacked
 from vibsim.theory.roots import Amplification, amplification
 
 _BITS = 5
-"""Bits of n that one multiplication works off where there are many n."""
+"""Bits of n per multiplication if there are many n."""
 _AT_ONCE = 2**15
-"""States that are worked out at a time."""
+"""Number of states that are computed at a time."""
 
 
 @dataclass(frozen=True)
 class Scaled:
-    """Numbers ``2^exponent number``: one exponent for each matrix or vector."""
+    """Matrices or vectors ``2^exponent number``, each with its own exponent."""
 
     number: Doubled
     exponent: Integers
-    """The shape of the number without the axes of its matrix or vector."""
+    """In the shape of `number` without the axes of the matrix or vector."""
 
 
 def discrete(
@@ -44,12 +44,12 @@ def discrete(
     n: ArrayLike,
     steps: int | None = None,
 ) -> tuple[Floats, Floats]:
-    """Return position and velocity at step n of the exact discrete solution, every number rounded once.
+    """Return position and velocity at step n of the exact discrete solution, correctly rounded.
 
-    Frequency, step and initial values are numbers, or arrays of shape (case,); n, from 0, is a whole number or an array
-    of shape (k,); a run ends at `steps`, with the velocity of `Stepper.end`, or never (None). The shape is (case, k)
-    without the axes of what was given as a number. The velocity is the scheme's own, at n = 0 the initial one. What is
-    too large for a float is infinite.
+    Frequency, step and initial values are numbers, or arrays of shape (case,); n >= 0 is an integer or an array of
+    shape (k,). A run ends at `steps`, with the velocity of `Stepper.end`; None for no end. The result has shape
+    (case, k) without the axes of scalar arguments. The velocity is the scheme's own, at n = 0 the initial one. Overflow
+    gives infinity.
     """
     members = np.broadcast_arrays(*(np.asarray(x, dtype=float) for x in (w, dt, u_0, v_0)))
     flat = np.atleast_1d(np.asarray(n, dtype=np.int64))
@@ -68,8 +68,8 @@ def discrete(
         u, v = at(flat)
         if steps is not None and stepper.end != "own":
             if parts.backward is not None:
-                (found,) = _read(parts.matrix, first, np.array([steps]), [parts.backward])
-                end = found[:, 0] / dt
+                (backward,) = _read(parts.matrix, first, np.array([steps]), [parts.backward])
+                end = backward[:, 0] / dt
             else:
                 _, last = at(np.maximum([steps - 1, steps - 2], 0))
                 end = 2.0 * last[:, 0] - last[:, 1]
@@ -79,7 +79,7 @@ def discrete(
 
 
 def first_state(parts: Amplification, dt: Floats, u_0: Floats, v_0: Floats) -> Doubled:
-    """Return state 1, shape (case, s)."""
+    """Return the state at step 1, shape (case, s)."""
     return parts.start[..., 0] * u_0[:, None] + parts.start[..., 1] * product(v_0, dt)[:, None]
 
 
@@ -98,30 +98,30 @@ def _read(matrix: Doubled, first: Scaled, n: Integers, rows: list[Doubled]) -> l
     half = (int(n.max()) - 1).bit_length() // 2
     highs, high = np.unique((n - 1) >> half, return_inverse=True)
     lows, low = np.unique((n - 1) & (2**half - 1), return_inverse=True)
-    behind = applied(matrix, first, lows)
-    ahead = [applied(transposed(matrix), scaled(row, 1), highs << half) for row in rows]
+    states = applied(matrix, first, lows)
+    powers = [applied(transposed(matrix), scaled(row, 1), highs << half) for row in rows]
     cases = matrix.shape[0]
-    found = [np.empty((cases, len(n))) for _ in rows]
+    result = [np.empty((cases, len(n))) for _ in rows]
     width = max(1, _AT_ONCE // cases)
     for k in range(0, len(n), width):
         part = slice(k, k + width)
         i, j = high[part], low[part]
-        for values, row in zip(found, ahead, strict=True):
-            total = row.number[:, i, 0] * behind.number[:, j, 0]
+        for values, row in zip(result, powers, strict=True):
+            total = row.number[:, i, 0] * states.number[:, j, 0]
             for entry in range(1, matrix.shape[-1]):
-                total = total + row.number[:, i, entry] * behind.number[:, j, entry]
-            exponent = row.exponent[:, i] + behind.exponent[:, j]
+                total = total + row.number[:, i, entry] * states.number[:, j, entry]
+            exponent = row.exponent[:, i] + states.exponent[:, j]
             values[:, part] = np.ldexp(total.rounded, exponent)
-    return found
+    return result
 
 
 def transposed(matrix: Doubled) -> Doubled:
-    """Return an array of matrices with rows for columns."""
+    """Return an array of transposed matrices."""
     return matrix.mapped(lambda x: np.swapaxes(x, -1, -2))
 
 
 def scaled(number: Doubled, axes: int, exponent: Integers | int = 0) -> Scaled:
-    """Return a number with its largest entry near 1; the last `axes` axes share an exponent."""
+    """Return ``2^exponent number``, with largest entries near 1; the last `axes` axes share an exponent."""
     over = tuple(range(-axes, 0))
     _, shift = np.frexp(np.max(np.abs(number.high), axis=over))
     back = -np.expand_dims(shift, over)
@@ -131,28 +131,28 @@ def scaled(number: Doubled, axes: int, exponent: Integers | int = 0) -> Scaled:
 
 
 def applied(matrix: Doubled, vector: Scaled, times: Integers) -> Scaled:
-    """Return ``matrix^times vector``, shape (case, k, s), for one vector and matrix per member, k numbers `times`."""
+    """Return ``matrix^times vector``, shape (case, k, s), for a matrix and vector per member and k integers `times`."""
     bits = _BITS if len(times) > 2**_BITS else 1
     shape = (matrix.shape[0], len(times), matrix.shape[-1])
     state = vector.number.mapped(lambda x: np.array(np.broadcast_to(x[:, None], shape)))
     exponent = np.array(np.broadcast_to(vector.exponent[:, None], shape[:2]))
-    factor, left = scaled(matrix, 2), times
-    while left.any():
+    factor, remaining = scaled(matrix, 2), times
+    while remaining.any():
         table = [factor]
         for _ in range(2**bits - 2):
             table.append(_times(table[-1], factor))
-        digits = left & (2**bits - 1)
+        digits = remaining & (2**bits - 1)
         rows = np.flatnonzero(digits)
         if len(rows):
-            # digit 0 leaves a state as it is
+            # digit 0 leaves a state unchanged
             chosen = digits[rows] - 1
             power = stacked([x.number for x in table], matrix.shape, axis=1)[:, chosen]
             shift = np.stack([x.exponent for x in table], axis=1)[:, chosen]
-            ahead = (power @ state[:, rows][..., None])[..., 0]
-            new = scaled(ahead, 1, shift + exponent[:, rows])
+            moved = (power @ state[:, rows][..., None])[..., 0]
+            new = scaled(moved, 1, shift + exponent[:, rows])
             state.high[:, rows], state.low[:, rows] = new.number.high, new.number.low
             exponent[:, rows] = new.exponent
-        left = left >> bits
+        remaining = remaining >> bits
         factor = _times(table[-1], factor)
     return Scaled(state, exponent)
 

@@ -1,7 +1,7 @@
-"""Numbers of twice the precision, about 32 digits, whole arrays at a time.
+"""Arrays of double-double numbers: about 32 digits.
 
-A number is the unevaluated sum of two floats. That is enough for the matrix of a step to be raised to any power that
-a run can reach, and for the growth of a scheme that grows by 1e-20 per step.
+A number is the unevaluated sum of two floats. That suffices to raise the matrix of a step to any power that a run can
+reach, and to resolve a growth of 1e-20 per step.
 
 Source: T. J. Dekker, A floating-point technique for extending the available precision, Numer. Math. 18 (1971); sums
 by D. E. Knuth, The Art of Computer Programming, volume 2, section 4.2.2.
@@ -71,17 +71,17 @@ class Doubled(Arithmetic):
 
     @staticmethod
     def lift(other: Any) -> Doubled:
-        """Return a number of any kind that `doubled` takes."""
+        """Convert a number of any type that `doubled` accepts."""
         return doubled(other)
 
     @property
     def nearest(self) -> Floats:
-        """The larger parts, which have the signs of the numbers."""
+        """The high parts, which have the signs of the numbers."""
         return self.high
 
     @property
     def rounded(self) -> Floats:
-        """The nearest floats."""
+        """The numbers rounded to floats."""
         return self.high + self.low
 
     @property
@@ -90,12 +90,12 @@ class Doubled(Arithmetic):
         return self.high.shape
 
     def mapped(self, function: Callable[[Floats], Any]) -> Doubled:
-        """Return what a function that rounds nothing makes of both parts."""
+        """Apply a function without rounding errors to both parts."""
         return Doubled(function(self.high), function(self.low))
 
 
 def doubled(value: Any) -> Doubled:
-    """Return a number, an array or a `Decimal` as it is, in twice the precision."""
+    """Convert a number, an array or a `Decimal` to double-double."""
     if isinstance(value, Doubled):
         return value
     if isinstance(value, Decimal):
@@ -106,12 +106,12 @@ def doubled(value: Any) -> Doubled:
 
 
 def product(a: ArrayLike, b: ArrayLike) -> Doubled:
-    """Return the product of two arrays of floats without rounding."""
+    """Return the exact product of two arrays of floats."""
     return Doubled(*_two_product(np.asarray(a, dtype=float), np.asarray(b, dtype=float)))
 
 
 def stacked(numbers: Sequence[Any], shape: tuple[int, ...], axis: int = -1) -> Doubled:
-    """Return numbers as one array, each broadcast to a shape, with an axis for them."""
+    """Return numbers, each broadcast to a shape, stacked along a new axis."""
     parts = [doubled(number) for number in numbers]
     highs, lows = [part.high for part in parts], [part.low for part in parts]
     return Doubled(
@@ -121,7 +121,7 @@ def stacked(numbers: Sequence[Any], shape: tuple[int, ...], axis: int = -1) -> D
 
 
 def root(x: Doubled) -> Doubled:
-    """Return the square root; 0 where the number is not positive."""
+    """Return the square root; 0 for numbers that are not positive."""
     positive = x.high > 0
     first = np.sqrt(np.where(positive, x.high, 1.0))
     rest = x - product(first, first)
@@ -136,7 +136,7 @@ def _two_sum(a: Floats, b: Floats) -> tuple[Floats, Floats]:
 
 
 def _fast_two_sum(a: Floats, b: Floats) -> tuple[Floats, Floats]:
-    """Return the sum and what it lacks, for ``|a| >= |b|``."""
+    """Return the sum and its rounding error, for ``|a| >= |b|``."""
     total = a + b
     return total, b - (total - a)
 

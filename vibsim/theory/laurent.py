@@ -1,13 +1,13 @@
-r"""Series in the time step with exact coefficients, as numbers that the step of a scheme can run on.
+r"""Truncated series in the time step with exact coefficients, on which the step of a scheme can run.
 
-``c_k h^k + c_(k+1) h^(k+1) + ...`` from any whole k, also below 0, with coefficients in a domain of SymPy: rational
-numbers, those with roots, or quotients of polynomials in symbols. A series knows how far it is known, and no operation
-claims more. Of a comparison only a sign is asked, for which `Field.value` gives the first coefficient at one point.
+``c_k h^k + c_(k+1) h^(k+1) + ...`` from any integer k, also negative, with coefficients in a SymPy domain: rational
+numbers, algebraic numbers, or rational functions of symbols. A series carries its truncation order, and operations
+propagate it. Comparisons only need the sign of the leading coefficient, which `Field.value` evaluates at one point.
 SymPy is imported on first use.
 
-The equation of an implicit step is solved by what Newton's method stands for: ``x = a(u + d_u x, v + d_v x, t)`` is put
-into itself until x stays. The factors d_u and d_v begin with h, or the force does, so that every turn settles one more
-power, and the series is the one solution near the present acceleration.
+The equation of an implicit step, ``x = a(u + d_u x, v + d_v x, t)``, is solved by fixed-point iteration until x no
+longer changes. The factors d_u and d_v, or the force, begin with h, so every iteration adds a correct power, and the
+series is the unique solution near the current acceleration.
 """
 
 from __future__ import annotations
@@ -30,21 +30,21 @@ HALF = Fraction(1, 2)
 
 @dataclass(frozen=True, eq=False)
 class Field:
-    """Where coefficients lie."""
+    """Domain of the coefficients, with the truncation order."""
 
     domain: Any
-    """Of SymPy."""
+    """SymPy domain."""
     known: int
-    """Power of h from which on every series is cut off."""
+    """Power of h at which every series is truncated."""
     at_point: Callable[[Any], float] | None = None
-    """The value of an element with symbols, at one point."""
+    """Function that evaluates an element with symbols at one point; None without symbols."""
 
     def number(self, fraction: Fraction) -> Any:
-        """Return the element that a fraction is."""
+        """Convert a fraction to an element."""
         return self.domain.convert(fraction.numerator) / self.domain.convert(fraction.denominator)
 
     def value(self, element: Any) -> float:
-        """Return the value of an element, of one with symbols at one point."""
+        """Return the value of an element, with symbols at one point."""
         return (
             float(self.domain.to_sympy(element))
             if self.at_point is None
@@ -52,34 +52,34 @@ class Field:
         )
 
     def series(self, element: Any, power: int = 0) -> Laurent:
-        """Return ``element h^power``, known as far as series are."""
+        """Return ``element h^power``, truncated at `known`."""
         return Laurent(self, power, [element, *[self.domain.zero] * (self.known - power - 1)])
 
     def constant(self, number: float | Fraction) -> Laurent:
-        """Return a number of a step's text; a float is the fraction or the decimal that it was written as."""
+        """Convert a constant of a step; a float stands for the fraction or decimal that it was written as."""
         fraction = number if isinstance(number, Fraction) else fraction_of(float(number))
         return self.series(self.number(fraction))
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Laurent(Arithmetic):
-    """A series; the number of its coefficients says how far it is known."""
+    """A truncated series; the number of coefficients determines the truncation order."""
 
     field: Field
     first: int
-    """Power of h that the first coefficient belongs to."""
+    """Power of h of the first coefficient."""
     coefficients: Sequence[Any]
 
     @property
     def end(self) -> int:
-        """The first power that is not known."""
+        """The first unknown power."""
         return self.first + len(self.coefficients)
 
     @property
     def leading(self) -> tuple[int, Any] | None:
-        """Power and coefficient of the first term; None where all that is known is 0."""
-        found = ((self.first + k, c) for k, c in enumerate(self.coefficients) if c)
-        return next(found, None)
+        """Power and coefficient of the leading term; None if all known coefficients are 0."""
+        terms = ((self.first + k, c) for k, c in enumerate(self.coefficients) if c)
+        return next(terms, None)
 
     @property
     def nearest(self) -> float:
@@ -92,7 +92,7 @@ class Laurent(Arithmetic):
         return self.coefficients[index] if index >= 0 else self.field.domain.zero
 
     def lift(self, other: Any) -> Laurent:
-        """Return a number as a series."""
+        """Convert a number to a series."""
         return other if isinstance(other, Laurent) else self.field.constant(other)
 
     def shifted(self, power: int) -> Laurent:
@@ -100,20 +100,20 @@ class Laurent(Arithmetic):
         return Laurent(self.field, self.first + power, self.coefficients)
 
     def __add__(self, other: Any) -> Laurent:
-        given = self.lift(other)
-        first, end = min(self.first, given.first), min(self.end, given.end)
-        return Laurent(self.field, first, [self.at(k) + given.at(k) for k in range(first, end)])
+        b = self.lift(other)
+        first, end = min(self.first, b.first), min(self.end, b.end)
+        return Laurent(self.field, first, [self.at(k) + b.at(k) for k in range(first, end)])
 
     def __neg__(self) -> Laurent:
         return Laurent(self.field, self.first, [-c for c in self.coefficients])
 
     def __mul__(self, other: Any) -> Laurent:
-        given = self.lift(other)
-        first = self.first + given.first
-        length = min(len(self.coefficients), len(given.coefficients), self.field.known - first)
+        factor = self.lift(other)
+        first = self.first + factor.first
+        length = min(len(self.coefficients), len(factor.coefficients), self.field.known - first)
         product = [self.field.domain.zero] * length
         for i, a in enumerate(self.coefficients[:length]):
-            for j, b in enumerate(given.coefficients[: length - i] if a else ()):
+            for j, b in enumerate(factor.coefficients[: length - i] if a else ()):
                 if b:
                     product[i + j] = product[i + j] + a * b
         return Laurent(self.field, first, product)
@@ -131,7 +131,7 @@ class Laurent(Arithmetic):
         return self * Laurent(self.field, -power, inverse)
 
     def __pow__(self, exponent: int | Fraction) -> Laurent:
-        """Return a whole power, or any one of a series that begins with 1 (else ValueError), by Miller's recurrence."""
+        """Return a nonnegative integer power, or by Miller's recurrence any power of a series that begins with 1."""
         if exponent >= 0 and exponent == int(exponent):
             return math.prod([self] * int(exponent), start=self.lift(1.0))
         domain = self.field.domain
@@ -157,7 +157,7 @@ class Laurent(Arithmetic):
         return Laurent(self.field, 1, [c / k for k, c in enumerate(slope.coefficients, 1)])
 
     def square_of_angle(self) -> Laurent:
-        """Return the square of an angle with this cosine, 1 at h = 0: ``sum 2 (2 y)^k/(k^2 C(2k, k))``, y = 1 - cos."""
+        """Return the square of the angle with this cosine (1 at h = 0): ``sum 2 (2 - 2 cos)^k/(k^2 C(2k, k))``."""
         y: Laurent = 1.0 - self
         power, total, k = y, y * 2.0, 1
         while power.leading is not None:
@@ -168,9 +168,9 @@ class Laurent(Arithmetic):
 
 @lru_cache(maxsize=64)
 def coefficients(stepper: Stepper) -> tuple[Any, Mapping[str, Any]]:
-    """Return the least domain with all coefficients of a scheme, and the element of it that each formula is.
+    """Return the smallest domain with all coefficients of a scheme, and the element of each formula.
 
-    ValueError where a coefficient is not algebraic.
+    Raises ValueError if a coefficient is not algebraic.
     """
     from sympy import QQ, Pow, Rational
 
@@ -188,7 +188,7 @@ def coefficients(stepper: Stepper) -> tuple[Any, Mapping[str, Any]]:
 def _solved(
     x: Any, u: Any, d_u: Any, v: Any, d_v: Any, t: Any, p: Any, acceleration: Any, slopes: Any
 ) -> Any:
-    """Return what `vibsim.schemes.newton.solved` does, as a series."""
+    """Solve the equation of `vibsim.schemes.newton.solved` as a series."""
     while True:
         before, x = x, acceleration(u + d_u * x, v + d_v * x, t, p)
         if (x - before).leading is None:
@@ -198,7 +198,7 @@ def _solved(
 def _solved_together(
     x: Any, y: Any, u: Any, d_u: Any, v: Any, d_v: Any, t: Any, p: Any, acceleration: Any, slopes: Any
 ) -> Any:  # fmt: skip
-    """Return what `vibsim.schemes.newton.solved_together` does, as series."""
+    """Solve the equations of `vibsim.schemes.newton.solved_together` as series."""
     while True:
         before = x, y
         u_1, u_2 = u[0] + (d_u[0] * x + d_u[1] * y), u[1] + (d_u[2] * x + d_u[3] * y)
@@ -213,4 +213,4 @@ SUBSTITUTES: Mapping[Callable[..., Any], Callable[..., Any]] = {
     solved_together: _solved_together,
     ELEMENTARY["sqrt"].full: lambda x: x**HALF,
 }
-"""What runs on series in place of functions that only run on floats."""
+"""Replacements on series for functions that only run on floats."""

@@ -1,9 +1,9 @@
 r"""Orders of the phase and of the amplitude of a scheme's error on ``u'' + g u' + u = 0``, from its step and its start.
 
-Time is counted in units of ``1/w``, so that ``h = w dt`` and ``g = c/w`` for a damping rate c. The functions of the
-scheme itself run on series in h with exact coefficients (`vibsim.theory.laurent`). Of the eigenvalues of its step two
-tend to ``exp(lambda h)``, ``lambda = -g/2 +- i w_d``; they are the roots of ``x^2 - T x + D``. The part of the start
-that lies in their plane, the principal part y, is all that is left of a solution once parasitic parts have died out:
+Time is measured in units of ``1/w``, so that ``h = w dt`` and ``g = c/w`` for a damping rate c. The functions of the
+scheme itself run on series in h with exact coefficients (`vibsim.theory.laurent`). Two of the eigenvalues of its step
+tend to ``exp(lambda h)``, ``lambda = -g/2 +- i w_d``; they are the roots of ``x^2 - T x + D``. The component of the
+start in their plane, the principal part y, is the solution after parasitic parts have decayed:
 
     y(t) = Re(B~ exp(lambda~ t)),      lambda~ = s~ +- i w~,   D = exp(2 s~ h),   T = 2 exp(s~ h) cos(w~ h)
 
@@ -11,13 +11,13 @@ The exact motion is ``Re(B exp(lambda t))``, so that
 
     L(t)  =  (lambda~ - lambda) t + log(B~/B),      phi  =  Im L/w_d,      alpha  =  Re L + (g/2) phi
 
-are the time by which it is early and the logarithm of the factor of its amplitude, both linear in t:
-``u_h = exp(alpha(t)) U(t + phi(t))``. What grows with t is of the step alone; what is there from the first step on,
-``B~/B``, is of the start, and depends on the initial values. What parasitic roots take away of the position at t = 0 is
-there for one sample, and is an error of both. The order of a part is the lowest of the three. A part that vanishes in
-every power of h that is known (twice as many as any scheme has) is exact: its order is infinite.
+are the time by which it is early and the logarithm of its amplitude factor, both linear in t:
+``u_h = exp(alpha(t)) U(t + phi(t))``. The growth with t depends on the step alone; the constant part, ``B~/B``, on the
+start and the initial values. The parasitic part of the position at t = 0 affects one sample, and is an error of both.
+The order of phase or amplitude is the lowest of these three. If all known powers of h vanish (twice as many as any
+scheme has), the part is exact: its order is infinite.
 
-Initial values count as what they are: the first power of h whose coefficient is not 0 *for them* is the order.
+The order holds for the given initial values: it is the first power of h whose coefficient is not 0 for them.
 
 Source: vibration text (B), sections 4.1-4.4, 5.6 and 7.1 with `errata`; exercises 10 and 17.
 """
@@ -43,26 +43,26 @@ from vibsim.theory.degrees import ROUNDED
 from vibsim.theory.laurent import HALF, SUBSTITUTES, Field, Laurent, coefficients
 
 CRITICAL = 2.0
-"""The damping rate over w from which on nothing oscillates."""
+"""Critical damping rate over w: from here on nothing oscillates."""
 KNOWN_POWERS = 14
-"""Power of h from which on nothing is known; quotients by powers of h lose some of them."""
+"""Power of h at which series are truncated; division by powers of h loses some of them."""
 _FEW = 64
-"""So many starts at most are remembered: every sentence on a result asks for its order again."""
+"""Largest number of starts whose results are cached: every sentence on a result needs its order again."""
 
 Pair = NDArray[Any]
-"""Two series: what belongs to ``u_0`` and to V in something linear in the initial values."""
+"""Two series: the coefficients of ``u_0`` and V in an expression that is linear in the initial values."""
 
 
 @dataclass(frozen=True, eq=False)
 class Principal:
-    """A step and its quadratic factor with the principal roots, as series in h."""
+    """A step, and the quadratic factor of its characteristic polynomial with the principal roots, as series in h."""
 
     matrix: NDArray[Any]
     """Shape (s, s)."""
     starts: NDArray[Any]
-    """State 1 from the position 1, and from the velocity 1 (in units of w) at the start, shape (2, s)."""
+    """State at step 1 from the initial position 1, and from the initial velocity 1 (in units of w), shape (2, s)."""
     polynomial: list[Laurent]
-    """The characteristic polynomial, the highest power first, without the roots that are 0 for every h."""
+    """The characteristic polynomial, the highest power first, without roots that are 0 for every h."""
     trace: Laurent
     determinant: Laurent
 
@@ -73,10 +73,10 @@ class Principal:
 
 
 def principal(stepper: Stepper, damping: float, known: int) -> Principal:
-    """Return a step on ``u'' + g u' + u = 0`` in series that are known up to a power of h.
+    """Return a step on ``u'' + g u' + u = 0`` in series that are truncated at the power `known` of h.
 
-    The factor is ``(x - 1)^2`` at h = 0, where the quotient has no root 1 in a scheme that converges: so it exists and
-    is unique (Hensel), and Bairstow's method doubles the powers that are right.
+    The factor is ``(x - 1)^2`` at h = 0, where the quotient has no root 1 if the scheme converges. So it exists and is
+    unique (Hensel's lemma), and Bairstow's method doubles the number of correct powers.
     """
     domain, elements = coefficients(stepper)
     field = Field(domain, known)
@@ -112,9 +112,9 @@ class Mode:
     frequency: Laurent
     """``w~/w_d``."""
     position: Pair
-    """``y(0)`` where the position is 1 at the start, and where the velocity is (in units of w)."""
+    """``y(0)`` for the initial position 1, and for the initial velocity 1 (in units of w)."""
     slope: Pair
-    """``y'(0) - s~ y(0)`` of both."""
+    """``y'(0) - s~ y(0)`` for both."""
 
 
 @lru_cache(maxsize=1024)
@@ -127,7 +127,7 @@ def principal_mode(stepper: Stepper, damping: float) -> Mode:
     for k in range(1, KNOWN_POWERS // 2 + 1):
         sinc, power = sinc + power * Fraction((-1) ** k, math.factorial(2 * k + 1)), power * square
     firsts = [_first_two(step, start) for start in step.starts]
-    # what is left of y_1 without growth and turning, over sin(w~ h)/(w~ h) h
+    # y_1 without growth and minus the cosine part, over sin(w~ h)/(w~ h) h
     slopes = [((one * decay - nought * cosine) / sinc).shifted(-1) for nought, one in firsts]
     half = Fraction(repr(damping)) / 2
     return Mode(
@@ -141,52 +141,52 @@ def principal_mode(stepper: Stepper, damping: float) -> Mode:
 def _first_two(step: Principal, start: NDArray[Any]) -> tuple[Laurent, Laurent]:
     """Return ``y_0`` and ``y_1``, the positions of the principal part of a solution at the first two steps.
 
-    With the characteristic polynomial ``(x^2 - T x + D) q(x)``, q of the matrix takes a state into the plane of the
-    principal roots, and a first-degree polynomial, the inverse of q modulo the quadratic, takes it to its place there.
+    With the characteristic polynomial ``(x^2 - T x + D) q(x)``, q of the matrix maps a state into the plane of the
+    principal roots. The inverse of q modulo the quadratic, a linear polynomial, then gives the projection.
     """
     t, d = step.trace, step.determinant
-    rest = by_quadratic(step.polynomial, t, d)[:-2]
-    state = start * rest[0]
-    for coefficient in rest[1:]:
+    quotient = by_quadratic(step.polynomial, t, d)[:-2]
+    state = start * quotient[0]
+    for coefficient in quotient[1:]:
         state = step.matrix @ state + start * coefficient
-    *_, by_x, left = by_quadratic([t.lift(0.0), *rest], t, d)
-    beside = left - t * by_x
-    turned = by_x * t + beside
-    bottom = beside * turned + by_x * by_x * d
+    # q modulo the quadratic is by_x x + constant
+    *_, by_x, last = by_quadratic([t.lift(0.0), *quotient], t, d)
+    constant = last - t * by_x
+    turned = by_x * t + constant
+    denominator = constant * turned + by_x * by_x * d
     images = [state]
     for _ in range(2):
         images.append(step.matrix @ images[-1])
-    one, two = ((turned * a[0] - by_x * b[0]) / bottom for a, b in pairwise(images))
-    return (t * one - two) / d, one
+    y_1, y_2 = ((turned * a[0] - by_x * b[0]) / denominator for a, b in pairwise(images))
+    return (t * y_1 - y_2) / d, y_1
 
 
 def part_orders(
     stepper: Stepper, damping: float, u: ArrayLike, v: ArrayLike
 ) -> tuple[Floats, Floats]:
-    """Return the orders of phase and amplitude; infinite where a part is exact, NaN where nothing oscillates.
+    """Return the orders of phase and amplitude; infinite if a part is exact, NaN if nothing oscillates.
 
-    The stepper is that on a linear model without forces in time (`Scheme.stepper_for`), the damping ``c/w``; u and v
-    are the initial position, measured from rest, and the initial velocity over w, in the same unit, of any one shape.
-    The arrays are read-only.
+    The stepper is that on a linear model without forces in time (`Scheme.stepper_for`), the damping is ``c/w``. u and v
+    are the initial position relative to the equilibrium, and the initial velocity over w, in the same unit; they
+    broadcast against each other. The arrays are read-only.
     """
     start = np.stack(np.broadcast_arrays(*(np.asarray(x, dtype=float) for x in (u, v))))
-    found = _of_few if start[0].size <= _FEW else _of_bytes
-    phase, amplitude = found(stepper, damping, start.shape, start.tobytes())
+    function = _cached_orders if start[0].size <= _FEW else _orders
+    phase, amplitude = function(stepper, damping, start.shape, start.tobytes())
     return phase, amplitude
 
 
-def _of_bytes(
-    stepper: Stepper, damping: float, shape: tuple[int, ...], given: bytes
+def _orders(
+    stepper: Stepper, damping: float, shape: tuple[int, ...], start: bytes
 ) -> tuple[Floats, Floats]:
-    """Return `part_orders` for the floats in `given`, of shape (2, ...)."""
-    start = np.frombuffer(given).reshape(shape)
-    found = _part_orders(stepper, damping, start)
-    for orders in found:
+    """Return `part_orders` for the floats in `start`, of shape (2, ...)."""
+    result = _part_orders(stepper, damping, np.frombuffer(start).reshape(shape))
+    for orders in result:
         orders.flags.writeable = False
-    return found
+    return result
 
 
-_of_few = lru_cache(maxsize=4096)(_of_bytes)
+_cached_orders = lru_cache(maxsize=4096)(_orders)
 
 
 def _part_orders(stepper: Stepper, damping: float, start: Floats) -> tuple[Floats, Floats]:
@@ -194,48 +194,48 @@ def _part_orders(stepper: Stepper, damping: float, start: Floats) -> tuple[Float
         start = start / np.max(np.abs(start), axis=0)
     moving = np.isfinite(start).all(axis=0)
     if not abs(damping) < CRITICAL:
-        nothing = np.full(moving.shape, np.nan)
-        return nothing, nothing
+        missing = np.full(moving.shape, np.nan)
+        return missing, missing
     terms = _terms(stepper, float(damping))
     at_start = _at_start(terms, damping, np.where(moving, start, 1.0))
-    gone = _order(np.tensordot(start, terms.gone, axes=(0, 0)))
+    parasitic = _order(np.tensordot(start, terms.parasitic, axes=(0, 0)))
     rates = (terms.phase_rate[0], terms.amplitude_rate[0])
     phase, amplitude = (
-        np.where(moving, np.minimum(np.minimum(_order(rate), gone), own), np.nan)
-        for rate, own in zip(rates, at_start, strict=True)
+        np.where(moving, np.minimum(np.minimum(_order(rate), parasitic), initial), np.nan)
+        for rate, initial in zip(rates, at_start, strict=True)
     )
     return phase, amplitude
 
 
 def _order(coefficients: Floats) -> Floats:
-    """Return the first power whose coefficient is no rounding, infinite for none; powers lie along the last axis."""
-    found = np.abs(coefficients) > ROUNDED
-    return np.where(found.any(axis=-1), np.argmax(found, axis=-1), np.inf)
+    """Return the first power whose coefficient exceeds rounding, infinite if none; powers are along the last axis."""
+    is_term = np.abs(coefficients) > ROUNDED
+    return np.where(is_term.any(axis=-1), np.argmax(is_term, axis=-1), np.inf)
 
 
 @dataclass(frozen=True, eq=False)
 class _Terms:
-    """Coefficients of h^k; those of quadratic forms belong to ``u_0^2``, ``u_0 V`` and ``V^2``."""
+    """Coefficients of h^k; three rows are a quadratic form in ``u_0^2``, ``u_0 V`` and ``V^2``."""
 
     phase_rate: Floats
-    """Of ``(w~ - w_d)/w_d``, shape (1, k)."""
+    """``(w~ - w_d)/w_d``, shape (1, k)."""
     amplitude_rate: Floats
-    """Of ``s~ - s + (g/2) (w~ - w_d)/w_d``, shape (1, k)."""
+    """``s~ - s + (g/2) (w~ - w_d)/w_d``, shape (1, k)."""
     turned: Floats
-    """Of ``w_d Im(B~ B*)``, shape (3, k)."""
+    """``w_d Im(B~ B*)``, shape (3, k)."""
     along: Floats
-    """Of ``Re(B~ B*)``, shape (3, k)."""
+    """``Re(B~ B*)``, shape (3, k)."""
     grown: Floats
-    """Of ``|B~|^2 - |B|^2``, shape (3, k)."""
+    """``|B~|^2 - |B|^2``, shape (3, k)."""
     size: Floats
-    """Of ``|B|^2``, shape (3, k)."""
-    gone: Floats
-    """Of the position at t = 0 less ``y(0)``, for ``u_0`` and V, shape (2, k)."""
+    """``|B|^2``, shape (3, k)."""
+    parasitic: Floats
+    """The position at t = 0 minus ``y(0)``, for ``u_0`` and V, shape (2, k)."""
 
 
 @lru_cache(maxsize=1024)
 def _terms(stepper: Stepper, damping: float) -> _Terms:
-    """Work the coefficients out in exact numbers, and round them once."""
+    """Compute the coefficients in exact arithmetic, and round them once."""
     mode = principal_mode(stepper, damping)
     half = Fraction(repr(damping)) / 2
     right = 1 - half * half
@@ -253,7 +253,7 @@ def _terms(stepper: Stepper, damping: float) -> _Terms:
         "along": _form(mode.position, position) + _form(slopes / right, slope),
         "grown": later - size,
         "size": size,
-        "gone": position - mode.position,
+        "parasitic": position - mode.position,
     }
     known = min(series.end for row in rows.values() for series in row)
     floats = {
@@ -264,7 +264,7 @@ def _terms(stepper: Stepper, damping: float) -> _Terms:
 
 
 def _form(a: Pair, b: Pair) -> NDArray[Any]:
-    """Return the product of two numbers that are linear in the initial values, as a quadratic form."""
+    """Return the product of two expressions that are linear in the initial values, as a quadratic form."""
     return np.array([a[0] * b[0], a[0] * b[1] + a[1] * b[0], a[1] * b[1]], dtype=object)
 
 

@@ -1,8 +1,8 @@
-r"""A scheme's own functions on a motion that is a polynomial, ``u_e = c_0 + c_1 t + ... + c_d t^d``, in exact numbers.
+r"""The functions of a scheme on a polynomial motion ``u_e = c_0 + c_1 t + ... + c_d t^d``, in exact arithmetic.
 
-To the acceleration ``a(u, v, t)`` of a model the force is added that makes u_e a solution (a manufactured solution):
-``u_e''(t) - a(u_e(t), u_e'(t), t)``. All numbers are series in dt (`vibsim.theory.laurent`), with a coefficient for
-every c_k, every parameter of the formula and the time t, or with values for all of them.
+The force that makes u_e a solution (a manufactured solution), ``u_e''(t) - a(u_e(t), u_e'(t), t)``, is added to the
+acceleration ``a(u, v, t)`` of a model. All numbers are series in dt (`vibsim.theory.laurent`), whose coefficients
+contain symbols for every c_k, every parameter of the formula and the time t, or values for all of them.
 
 Source: vibration text (B), sections 2.2 and 8.5, problem 1 and exercise 9.
 """
@@ -35,12 +35,12 @@ from vibsim.theory.basis import rebound, value_of
 from vibsim.theory.laurent import SUBSTITUTES, Field, Laurent, coefficients
 
 _COEFFICIENTS, _FREQUENCY = "c", "w"
-"""Letters of the symbols c_0, c_1, ..., and of w_0, the natural frequency, for schemes that are corrected by it."""
+"""Letters of the symbols c_0, c_1, ..., and of w_0, the natural frequency, which frequency correction uses."""
 
 
 @cache
 def restoring(model: Model) -> Expression:
-    """Return the acceleration without the terms that name no state: the force for the polynomial cancels them."""
+    """Return the acceleration without terms that do not depend on states, which the added force cancels."""
     states = {state.name for state in model.states}
 
     def is_constant(node: Expression) -> bool:
@@ -67,7 +67,7 @@ def restoring(model: Model) -> Expression:
 
 
 def is_rational(node: Expression) -> bool:
-    """Tell whether a formula has ``+ - * /``, whole powers and absolute values only."""
+    """Tell whether a formula contains only ``+ - * /``, nonnegative integer powers and absolute values."""
 
     def is_known(part: Expression) -> bool:
         match part:
@@ -83,7 +83,7 @@ def is_rational(node: Expression) -> bool:
 
 @cache
 def _symbol(model: Model, letter: str, k: int) -> str:
-    """Return ``letter_k``, with the letter as often as it takes to be no name of the model: ``cc_0`` beside a c_0."""
+    """Return ``letter_k``, with the letter repeated until no name of the model begins like it: ``cc_0`` beside c_0."""
     taken = restoring(model).names
     while any(name.startswith(f"{letter}_") for name in taken):
         letter += letter[0]
@@ -91,19 +91,19 @@ def _symbol(model: Model, letter: str, k: int) -> str:
 
 
 def _names(model: Model, degree: int) -> tuple[str, ...]:
-    """Name everything that a residual may depend on, but dt."""
+    """Return the names of everything that a residual may depend on, except dt."""
     states = {state.name for state in model.states}
-    own = [name for name in restoring(model).names if name not in states and name != "t"]
+    parameters = [name for name in restoring(model).names if name not in states and name != "t"]
     of_solution = (_symbol(model, _COEFFICIENTS, k) for k in range(degree + 1))
-    return ("t", *of_solution, *own, _symbol(model, _FREQUENCY, 0))
+    return ("t", *of_solution, *parameters, _symbol(model, _FREQUENCY, 0))
 
 
 class Forces(StrEnum):
-    """Which forces of a model act beside the one for the polynomial, and what is at fault for a residual with them."""
+    """The forces of a model that act beside the added one; the value is the cause of a residual that they introduce."""
 
     NONE = "differences"
     AT_REST = "force"
-    """Those on a body at rest: all but damping."""
+    """Forces on a body at rest: all but damping."""
     ALL = "damping"
 
 
@@ -116,12 +116,12 @@ class Course:
     degree: int
     field: Field
     names: Mapping[str, Laurent]
-    """What stands for t, the coefficients of the polynomial, the parameters and the natural frequency."""
+    """Values of t, the coefficients of the polynomial, the parameters and the natural frequency."""
     read: Callable[[str], Laurent]
-    """What stands for the formula of a scheme's coefficient."""
+    """Function that converts the formula of a scheme's coefficient."""
     forces: Forces = Forces.ALL
     fitted: Any = 0.0
-    """What is added to the acceleration in steps, but not in the start."""
+    """Acceleration that is added in steps, but not in the start."""
 
     @property
     def dt(self) -> Laurent:
@@ -137,7 +137,7 @@ class Course:
         return result
 
     def state(self, t: Any) -> tuple[Any, ...]:
-        """Return the state at time t that moves along the polynomial."""
+        """Return the state on the polynomial at time t."""
         u, v, a = (lambda time, k=k: self.solution(k, time) for k in range(3))
         return tuple(self.stepper.carried(u, v, a, t, self.dt))
 
@@ -155,7 +155,7 @@ class Course:
         return tuple(following)
 
     def _bound(self, function: Callable[..., Any], more: Any) -> Callable[..., Any]:
-        """Return a function of the scheme on series, handed the forces."""
+        """Return a function of the scheme on series, bound to the forces."""
         force, _ = self._scaling()
         damping = self.model.damping if self.forces is Forces.ALL else None
         rate = self._value(tree(self.model, damping.rate), {}) if damping else 0.0
@@ -167,8 +167,8 @@ class Course:
         def slopes(u: Any, v: Any, t: Any, p: Any) -> Any:
             raise ValueError("what solves the equation of a step by series asks for no slopes")
 
-        own = rebound(function, self.read, SUBSTITUTES)
-        return handed(own, acceleration, slopes, lambda u, v, t, p: rate)
+        exact_function = rebound(function, self.read, SUBSTITUTES)
+        return handed(exact_function, acceleration, slopes, lambda u, v, t, p: rate)
 
     def _of_model(self, u: Any, v: Any, t: Any) -> Any:
         if self.forces is Forces.NONE:
@@ -190,7 +190,7 @@ class Course:
 
 
 def _samples(model: Model, degree: int) -> dict[str, Fraction]:
-    """Return a positive value for each name, none of them a simple ratio of the others."""
+    """Return a positive value for each name; no value is a simple ratio of others."""
     primes = (7, 11, 13, 17, 19, 23, 29, 31, 37, 41, 43, 47, 53, 59, 61, 67, 71, 73, 79, 83, 89, 97)
     return {
         name: Fraction(primes[i % 22], primes[(i + 5) % 22] + i // 22)
@@ -199,7 +199,7 @@ def _samples(model: Model, degree: int) -> dict[str, Fraction]:
 
 
 def with_numbers(stepper: Stepper, model: Model, degree: int, known: int) -> Course:
-    """Return a course on which every name has a value, known up to a power of dt."""
+    """Return a course in which every name has a value, with series truncated at the power `known` of dt."""
     domain, elements = coefficients(stepper)
     field = Field(domain, known)
     names = {name: field.constant(x) for name, x in _samples(model, degree).items()}
@@ -207,7 +207,7 @@ def with_numbers(stepper: Stepper, model: Model, degree: int, known: int) -> Cou
 
 
 def with_symbols(stepper: Stepper, model: Model, degree: int, known: int) -> Course:
-    """Return a course on which every name is a symbol; signs are those of `with_numbers`."""
+    """Return a course in which every name is a symbol; signs are those of `with_numbers`."""
     from sympy import field as fractions_of
 
     domain, elements = coefficients(stepper)
@@ -217,8 +217,8 @@ def with_symbols(stepper: Stepper, model: Model, degree: int, known: int) -> Cou
 
     def at_samples(element: Any) -> float:
         parts = (part.evaluate(values) for part in (element.numer, element.denom))
-        above, below = (float(domain.to_sympy(domain.convert(part))) for part in parts)
-        return above / below
+        numerator, denominator = (float(domain.to_sympy(domain.convert(part))) for part in parts)
+        return numerator / denominator
 
     field = Field(fractions.to_domain(), known, at_samples)
     names = {name: field.series(x) for name, x in zip(samples, generators, strict=True)}

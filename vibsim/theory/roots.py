@@ -1,15 +1,13 @@
-r"""The step of a scheme as a matrix, and its roots: growth, numerical frequency, phase error, and limit of stability.
+r"""The step of a scheme as a matrix, and its roots: growth, numerical frequency, phase error, and stability limit.
 
-On ``u'' + w^2 u = 0`` the step is a matrix on the state that a scheme carries (the companion form of a multistep
-method), and a solution of the discrete equations is a sum of powers of its eigenvalues. Two of them, the principal
-ones, tend to ``exp(+-i w dt)`` as dt vanishes; the others are parasitic. The principal ones are the roots of
-``x^2 - T x + D``: as long as they are complex, ``D^(1/2)`` is the growth per step and ``arccos(T/(2 D^(1/2)))`` the
-angle ``w~ dt``. T and D are real and smooth, also where the two roots meet, so they are what is worked out: from the
-eigenvalues first, then by Bairstow's method on the characteristic polynomial in twice the precision, so that a growth
-of 1e-20 per step is seen.
+On ``u'' + w^2 u = 0`` the step is a matrix acting on the carried state (the companion form of a multistep method), and
+a solution of the discrete equations is a sum of powers of its eigenvalues. Two of them, the principal roots, tend to
+``exp(+-i w dt)`` as dt vanishes; the others are parasitic. The principal roots are those of ``x^2 - T x + D``: if they
+are complex, ``D^(1/2)`` is the growth per step and ``arccos(T/(2 D^(1/2)))`` the angle ``w~ dt``. T and D are real and
+smooth, even where the two roots meet, so these are computed: first from the eigenvalues, then by Bairstow's method on
+the characteristic polynomial in double-double precision, which resolves a growth of 1e-20 per step.
 
-Source: vibration text (B), sections 4.1, 4.5 and 5.6, equations (18), (23) and (43)-(44), where two schemes are done
-by hand.
+Source: vibration text (B), sections 4.1, 4.5 and 5.6, equations (18), (23) and (43)-(44), which treat two schemes.
 """
 
 from __future__ import annotations
@@ -31,28 +29,28 @@ from vibsim.theory.basis import UnitSteps, decimal, unit_steps
 from vibsim.theory.doubled import Doubled, doubled, root, stacked
 
 GRID = np.concatenate([0.02 * np.arange(1, 401), np.geomspace(8.0, 1000.0, 61)[1:]])
-"""Where the principal roots are followed, p = w dt: close enough for each pair to lie next to the one before."""
+"""Values of p = w dt at which the principal roots are tracked: so dense that each pair is closest to the previous."""
 
 _REFINEMENTS = 3
 _LARGER = 1e-6
-"""Growth per period by which a parasitic root outgrows the principal pair."""
+"""Excess of growth per period above which a parasitic root dominates the principal pair."""
 _FEW = 64
-"""So many values of p at most are remembered: all levels and parts of a sweep ask for the same ones."""
+"""Largest number of values of p whose results are cached: all levels and parts of a sweep need the same ones."""
 _PARTS = 65
 _ROUNDS = 9
 _FAR = np.geomspace(GRID[-1], 1e8, 101)[1:]
-"""Where implicit schemes are looked at beyond `GRID`: the limit of Newmark's scheme goes to infinity as beta to 1/4."""
+"""Further values of p for implicit schemes: the limit of Newmark's scheme tends to infinity as beta tends to 1/4."""
 _PARASITIC = 1e-9
-"""Growth of a parasitic root that is no rounding."""
+"""Growth of a parasitic root above which it is not rounding."""
 _BESIDE = 1e-6
-"""Part of a limit within which the growth changes its sign, where the root crosses the unit circle."""
+"""Relative distance from a limit within which a root that crosses the unit circle does so."""
 _CROSSED = 1e-8
-"""Growth or decay at the ends of that which makes it a crossing, and no root that stays on the circle."""
+"""Least growth and decay at the ends of that interval for a crossing, as opposed to a root that stays on the circle."""
 
 
 @dataclass(frozen=True)
 class Amplification:
-    """One step for each ``p = w dt``, in twice the precision, with velocities times dt; s numbers make a state."""
+    """One step for each ``p = w dt``, in double-double, with velocities times dt; a state has s entries."""
 
     matrix: Doubled
     """``state^(n+1) = matrix state^n``, the position first, shape (..., s, s)."""
@@ -61,7 +59,7 @@ class Amplification:
     velocity: Doubled
     """The scheme's own velocity, ``v^n dt = velocity . state^n``, shape (..., s)."""
     backward: Doubled | None
-    """Of a scheme that ends with a one-sided velocity: that velocity times dt from the state, shape (..., s)."""
+    """One-sided velocity times dt, shape (..., s), if the scheme ends with it; otherwise None."""
 
 
 def amplification(stepper: Stepper, p: ArrayLike | Doubled) -> Amplification:
@@ -83,7 +81,7 @@ def _units(stepper: Stepper, p: Doubled, *, with_start: bool = True) -> UnitStep
 
 
 def _matrix(columns: Sequence[Sequence[Any]], shape: tuple[int, ...]) -> Doubled:
-    """Return the matrix with these columns, each a list of numbers of a shape."""
+    """Return the matrix with these columns, lists of numbers that broadcast to `shape`."""
     parts = [stacked(column, shape) for column in columns]
     return stacked(parts, parts[0].shape)
 
@@ -93,36 +91,36 @@ class Roots:
     """The roots for each ``p = w dt``; every array has the shape of p."""
 
     log_growth: Floats
-    """Logarithm of the larger one of the principal pair, exact to rounding also where the growth is 1 to rounding."""
+    """Logarithm of the modulus of the larger principal root, accurate to rounding even if it is near 0."""
     angle: Floats
-    """``w~ dt`` from 0 to pi: angle of the principal root, as points on the mesh show it."""
+    """``w~ dt`` from 0 to pi: angle of the principal root, as seen on the mesh."""
     is_complex: Flags
     """Whether the principal roots are complex, so that the solution oscillates with any period."""
     parasitic: Floats
-    """Largest absolute value of the other roots; 0 where there are none."""
+    """Largest modulus of the other roots; 0 if there are none."""
     parasitic_angle: Floats
-    """Angle of that root, from 0 to pi; 0 where there are none."""
+    """Angle of that root, from 0 to pi; 0 if there are none."""
 
 
 def dominant(stepper: Stepper, p: ArrayLike) -> tuple[Floats, Floats]:
-    """Return growth per natural period and angle of the root that a long run is left with.
+    """Return growth per natural period and angle of the root that dominates a long run.
 
-    It is the larger one of the principal pair, or a parasitic root that is larger by more than its rounding.
+    It is the larger principal root, or a parasitic root that is larger by more than its rounding.
     """
     found, steps = roots(stepper, p), np.asarray(p, dtype=float)
     with np.errstate(divide="ignore", over="ignore"):
-        other = on_arrays.log(found.parasitic)
-        # parasitic roots are found to a few digits less than the principal pair
-        is_other = (other - found.log_growth) * (2.0 * np.pi / steps) > _LARGER
-        log_growth = np.where(is_other, other, found.log_growth)
+        parasitic = on_arrays.log(found.parasitic)
+        # parasitic roots have a few digits less than the principal pair
+        is_parasitic = (parasitic - found.log_growth) * (2.0 * np.pi / steps) > _LARGER
+        log_growth = np.where(is_parasitic, parasitic, found.log_growth)
         factor = on_arrays.exp(log_growth * (2.0 * np.pi / steps))
-    return factor, np.where(is_other, found.parasitic_angle, found.angle)
+    return factor, np.where(is_parasitic, found.parasitic_angle, found.angle)
 
 
 def phase_error_per_period(stepper: Stepper, p: ArrayLike) -> Floats:
-    """Return ``(P - P~)/P``: by how much of the natural period a numerical period is too short.
+    """Return ``(P - P~)/P``, the relative error of the numerical period.
 
-    Peak number m comes m times that too early (B, exercise 2); minus infinity where nothing oscillates.
+    Peak m comes m times that too early (B, exercise 2). Minus infinity if nothing oscillates.
     """
     angle = roots(stepper, p).angle
     with np.errstate(divide="ignore"):
@@ -130,17 +128,17 @@ def phase_error_per_period(stepper: Stepper, p: ArrayLike) -> Floats:
 
 
 def roots(stepper: Stepper, p: ArrayLike) -> Roots:
-    """Return what the roots of a scheme say for each ``p = w dt``; the arrays are read-only."""
+    """Return the roots of a scheme for each ``p = w dt``; the arrays are read-only."""
     steps = np.asarray(p, dtype=float)
-    found = _of_few if steps.size <= _FEW else _of_bytes
-    columns = found(stepper, steps.tobytes())
+    function = _cached_columns if steps.size <= _FEW else _columns
+    columns = function(stepper, steps.tobytes())
     return Roots(*(column.reshape(steps.shape) for column in columns))
 
 
-def _of_bytes(stepper: Stepper, p: bytes) -> tuple[NDArray[Any], ...]:
+def _columns(stepper: Stepper, p: bytes) -> tuple[NDArray[Any], ...]:
     """Return the columns of `Roots` for the floats in `p`, each of shape (k,)."""
     with np.errstate(all="ignore"):
-        trace, determinant, other = _quadratic(stepper, np.frombuffer(p))
+        trace, determinant, parasitic = _quadratic(stepper, np.frombuffer(p))
         excess = determinant - trace * trace * 0.25
         is_complex = excess.high > 0
         angle = np.where(
@@ -154,18 +152,19 @@ def _of_bytes(stepper: Stepper, p: bytes) -> tuple[NDArray[Any], ...]:
             0.5 * on_arrays.log1p((determinant - 1.0).rounded),
             on_arrays.log1p((larger - 1.0).rounded),
         )
-    of_other = on_arrays.complex_size(other), on_arrays.atan2(np.abs(other.imag), other.real)
-    columns = (rate, angle, is_complex, *of_other)
+    size = on_arrays.complex_size(parasitic)
+    parasitic_angle = on_arrays.atan2(np.abs(parasitic.imag), parasitic.real)
+    columns = (rate, angle, is_complex, size, parasitic_angle)
     for column in columns:
         column.flags.writeable = False
     return columns
 
 
-_of_few = lru_cache(maxsize=1024)(_of_bytes)
+_cached_columns = lru_cache(maxsize=1024)(_columns)
 
 
 def _quadratic(stepper: Stepper, p: Floats) -> tuple[Doubled, Doubled, Complexes]:
-    """Return T and D of ``x^2 - T x + D`` with the principal roots, and the largest other one, for p of shape (k,)."""
+    """Return T and D of ``x^2 - T x + D`` with the principal roots, and the largest parasitic root; p of shape (k,)."""
     matrix = _step_matrix(stepper, p)
     if matrix.shape[-1] == 2:
         a, b, c, d = (matrix[..., i, j] for i in range(2) for j in range(2))
@@ -192,11 +191,11 @@ def _step_matrix(stepper: Stepper, p: Floats) -> Doubled:
 
 
 def _eigenvalues(matrix: Doubled) -> Complexes:
-    """Return the eigenvalues; NaN where an entry is not finite."""
+    """Return the eigenvalues; NaN if an entry is not finite."""
     values = matrix.rounded
     good = np.asarray(np.isfinite(values).all(axis=(-2, -1)))
-    found = np.linalg.eigvals(np.where(good[..., None, None], values, 0.0))
-    return np.where(good[..., None], found, np.nan).astype(complex)
+    eigenvalues = np.linalg.eigvals(np.where(good[..., None, None], values, 0.0))
+    return np.where(good[..., None], eigenvalues, np.nan).astype(complex)
 
 
 def _exact_pair(p: Floats) -> Complexes:
@@ -206,22 +205,21 @@ def _exact_pair(p: Floats) -> Complexes:
 
 @lru_cache(maxsize=256)
 def _followed(stepper: Stepper) -> Complexes:
-    """Return the principal pair along `GRID`, each the nearest to the one before, shape (n_grid, 2)."""
-    found = _eigenvalues(_step_matrix(stepper, GRID))
+    """Return the principal pair along `GRID`, each the closest to the previous one, shape (n_grid, 2)."""
     followed = [_exact_pair(GRID[:1])]
-    for row in found:
+    for row in _eigenvalues(_step_matrix(stepper, GRID)):
         pair, _ = _split(row[None], followed[-1])
         followed.append(pair if np.isfinite(pair).all() else followed[-1])
     return np.concatenate(followed[1:])
 
 
-def _split(found: Complexes, before: Complexes) -> tuple[Complexes, Complexes]:
-    """Return the two roots that are next to two others, and the rest; shapes (k, 2) and (k, s-2).
+def _split(values: Complexes, before: Complexes) -> tuple[Complexes, Complexes]:
+    """Return the pair of eigenvalues that is closest to the pair `before`, and the others; shapes (k, 2) and (k, s-2).
 
-    A pair is two roots that are conjugate or both real; NaN makes none.
+    A pair is two conjugate or two real eigenvalues; NaN makes none.
     """
-    pairs, rest = _pairs(found.shape[-1])
-    first, second = found[:, pairs[:, 0]], found[:, pairs[:, 1]]
+    pairs, others = _pairs(values.shape[-1])
+    first, second = values[:, pairs[:, 0]], values[:, pairs[:, 1]]
     a, b = before[:, :1], before[:, 1:]
     distance = np.minimum(
         np.abs(first - a) + np.abs(second - b), np.abs(first - b) + np.abs(second - a)
@@ -229,25 +227,24 @@ def _split(found: Complexes, before: Complexes) -> tuple[Complexes, Complexes]:
     is_pair = np.abs((first + second).imag) <= 1e-12 * (np.abs(first) + np.abs(second))
     best = np.argmin(np.where(is_pair, distance, np.inf), axis=-1)
     return (
-        np.take_along_axis(found, pairs[best], axis=-1),
-        np.take_along_axis(found, rest[best], axis=-1),
+        np.take_along_axis(values, pairs[best], axis=-1),
+        np.take_along_axis(values, others[best], axis=-1),
     )
 
 
 @cache
 def _pairs(size: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Return the indices of every pair among `size` roots, and those of the rest."""
+    """Return the indices of every pair among `size` roots, and those of the other roots."""
     pairs = list(combinations(range(size), 2))
-    rest = [[i for i in range(size) if i not in pair] for pair in pairs]
-    return np.array(pairs), np.array(rest)
+    others = [[i for i in range(size) if i not in pair] for pair in pairs]
+    return np.array(pairs), np.array(others)
 
 
 def stability_limit(scheme: Scheme, options: Options) -> float:
-    """Return the largest stable ``w dt``: infinite for none, 0 where every step grows.
+    """Return the largest stable ``w dt``: infinite for no limit, 0 if every step is unstable.
 
-    Below the limit no root is beyond the unit circle. At the limit itself the amplitude may grow linearly, where two
-    roots meet. Of a scheme that is stable again farther on, it is the end of the first interval. An adaptive scheme has
-    none: it chooses its own steps.
+    Below the limit no root is outside the unit circle. At the limit itself the amplitude may grow linearly, if two
+    roots meet. If there are several intervals of stability, it is the end of the first. Adaptive schemes have none.
     """
     if scheme.adaptive:
         return float(np.inf)
@@ -271,7 +268,7 @@ def _limit(stepper: Stepper) -> float:
 
 
 def _first(grows: Callable[[Floats], Flags], low: float, high: float) -> float:
-    """Return the last point before growth begins, between one without and one with growth."""
+    """Return the last point before growth begins, between `low` without and `high` with growth."""
     for _ in range(_ROUNDS):
         points = np.linspace(low, high, _PARTS)
         first = int(np.argmax(grows(points)[1:])) + 1
@@ -280,17 +277,17 @@ def _first(grows: Callable[[Floats], Flags], low: float, high: float) -> float:
 
 
 def _largest(stepper: Stepper, p: Floats) -> Floats:
-    """Return the logarithm of the largest root: it crosses 0 where `_grows` allows for rounding."""
+    """Return the logarithm of the modulus of the largest root, without the tolerance of `_grows`."""
     found = roots(stepper, p)
     with np.errstate(divide="ignore"):
         return np.asarray(np.maximum(found.log_growth, on_arrays.log(found.parasitic)))
 
 
 def _grows(stepper: Stepper, p: Floats) -> Flags:
-    """Say where a root is beyond the unit circle by more than rounding in twice the precision."""
+    """Tell for which p a root is outside the unit circle by more than rounding in double-double."""
     found = roots(stepper, p)
     rounding = 1e-28 * (1.0 + p * p)
-    # where the two roots meet, rounding enters with its square root
+    # near a double root, rounding enters with its square root
     rounding = np.where(found.is_complex, rounding, np.sqrt(rounding))
     is_principal = ~(found.log_growth <= rounding)
     return is_principal | ~(found.parasitic <= 1.0 + _PARASITIC)

@@ -1,11 +1,11 @@
-r"""How far rounding can take a computed trajectory from the exact discrete solution on ``u'' + w^2 u = 0``.
+r"""Bounds of the rounding error of a trajectory: its distance from the exact discrete solution of ``u'' + w^2 u = 0``.
 
-One step rounds each of its operations, coefficients included. The functions of the scheme run on unit vectors with
-numbers that carry a bound of their rounding (running error analysis), which gives a matrix E with
-``|rounding of step n| <= E |state^n|`` in units of the round-off. Carried on by the exact steps behind it, it reaches
-``|rounding at N| <= sum_n |matrix^(N-1-n)| E |state^n|``: the growth of the scheme, the number of steps and the
-round-off of its way of writing all are in it (`three_term` has powers of its matrix that are 1/p large). It is a
-bound for rounding at its worst, N eps where chance gives N^(1/2) eps; compensated sums do better than it says.
+A step rounds each of its operations, coefficients included. Its functions run on unit vectors with numbers that carry a
+bound of their rounding error (running error analysis). This gives a matrix E with
+``|rounding of step n| <= E |state^n|`` in units of the round-off. Propagated by the following exact steps,
+``|rounding at N| <= sum_n |matrix^(N-1-n)| E |state^n|``. The bound includes the growth of the scheme, the number of
+steps and the way in which the scheme is written (the powers of the matrix of `three_term` are of size 1/p). It is a
+worst-case bound, N eps where random rounding gives N^(1/2) eps; compensated sums are better than their bound.
 
 Source: J. H. Wilkinson, Error analysis revisited, IMA Bulletin 22 (1986); N. J. Higham, Accuracy and Stability of
 Numerical Algorithms, section 3.3.
@@ -30,7 +30,7 @@ from vibsim.theory.doubled import Doubled, product
 from vibsim.theory.roots import amplification
 
 SQUARE = 8.0
-"""Roundings in ``w^2`` and ``dt``, which a model works out from parameters of its own."""
+"""Rounding errors in ``w^2`` and ``dt``, which a model computes from its parameters, in units of the round-off."""
 _POINTS = 24
 
 
@@ -45,7 +45,7 @@ class Bounded(Arithmetic):
 
     @staticmethod
     def lift(other: Any) -> Bounded:
-        """Return numbers without a rounding error."""
+        """Convert numbers, without a rounding error."""
         if isinstance(other, Bounded):
             return other
         number = np.asarray(other, dtype=float)
@@ -76,7 +76,7 @@ class Bounded(Arithmetic):
 
 
 def _coefficient(formula: str) -> Bounded:
-    """Return the float of a formula with what it was rounded by; a formula of several roundings may be off by two."""
+    """Return the float of a formula with a bound of its error; several roundings may make two units."""
     value = float(decimal(formula))
     exact = Decimal(value) == decimal(formula)
     return Bounded(np.asarray(value), np.asarray(0.0 if exact else 2.0 * abs(value)))
@@ -87,7 +87,7 @@ def rounding_bound(
 ) -> tuple[Floats, Floats]:
     """Return bounds of ``|computed - discrete|`` for position and velocity over a run of `steps` steps.
 
-    Of shape (case,), or numbers where all were numbers (as of `discrete`); infinite where the solution overflows.
+    Shape (case,), or scalars if all arguments are (as for `discrete`); infinite if the solution overflows.
     """
     members = np.broadcast_arrays(*(np.asarray(x, dtype=float) for x in (w, dt, u_0, v_0)))
     shape = members[0].shape
@@ -99,7 +99,7 @@ def rounding_bound(
 def _bounds(
     stepper: Stepper, w: Floats, dt: Floats, u_0: Floats, v_0: Floats, *, steps: int
 ) -> tuple[Floats, Floats]:
-    """Return the bounds for arrays of shape (case,): the largest of the terms of the sum, as often as it has terms."""
+    """Return the bounds for arrays of shape (case,): the largest term of the sum times the number of terms."""
     p = product(w, dt)
     exact = amplification(stepper, p)
     step, reading, start = _roundings(stepper, p.rounded)
@@ -128,12 +128,12 @@ def _bounds(
 
 
 def _or_infinite(size: Floats) -> Floats:
-    """Return sizes with infinity for what is unknown, nothing times infinity."""
+    """Replace NaN, 0 times infinity, by infinity."""
     return np.where(np.isnan(size), np.inf, size)
 
 
 def _points(steps: int) -> Integers:
-    """Return numbers from 0 to `steps` - 1 at which powers are looked at, close together at first."""
+    """Return integers from 0 to `steps` - 1 at which powers are sampled, close together at first."""
     last = max(steps - 1, 0)
     close = np.geomspace(1, last, _POINTS) if last else [0]
     both = np.concatenate([np.linspace(0, last, _POINTS), close])
@@ -145,7 +145,7 @@ def _sizes(states: Scaled) -> Floats:
 
 
 def _roundings(stepper: Stepper, p: Floats) -> tuple[Floats, Floats, Floats]:
-    """Return bounds of what is rounded in a step, a velocity and a start; the shapes of `Amplification`."""
+    """Return bounds of the rounding errors of a step, a velocity and a start, in the shapes of `Amplification`."""
     zero, square = Bounded.lift(np.zeros_like(p)), Bounded(p * p, SQUARE * p * p)
     units = unit_steps(stepper, Bounded(p, p), zero, _coefficient, square=square)
 

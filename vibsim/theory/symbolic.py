@@ -1,7 +1,7 @@
 r"""The theory of a scheme as formulas in ``p = w dt``: matrix, series, error at a time, discrete solution.
 
-Exact, for every scheme whose step is polynomial or rational on a linear problem; all of them are. SymPy is imported on
-first use, and every result is one of its expressions in the symbols p, n, I, V, w and t.
+Exact for every scheme whose step is polynomial or rational on a linear problem, as all are. SymPy is imported on first
+use; results are its expressions in the symbols p, n, I, V, w and t.
 
 Source: vibration text (B), equations (18)-(20), sections 4.4, 5.6 and 7.2, exercises 7 and 17.
 """
@@ -23,13 +23,13 @@ from vibsim.theory.laurent import HALF, Laurent, coefficients
 from vibsim.theory.phase_amplitude import Principal, principal, principal_mode
 
 POWERS = 9
-"""Power of p from which on errors are not worked out."""
+"""Power of p at which series of errors are truncated."""
 TERMS = 4
-"""Terms of a series, in even powers of p, unless noted."""
+"""Default number of terms of a series, in even powers of p."""
 
 
 def symbol(name: str) -> Any:
-    """Return one of the symbols of results: p, x, I, V, w, t, dt real, n a whole number."""
+    """Return one of the symbols of results: p, x, I, V, w, t, dt real, n a nonnegative integer."""
     from sympy import Symbol
 
     if name == "n":
@@ -48,24 +48,24 @@ def start(stepper: Stepper) -> Any:
 
 
 def growth_series(stepper: Stepper, terms: int = TERMS) -> Any:
-    """Return the growth of the amplitude per step as a polynomial in p, the first terms of its series."""
+    """Return the first terms of the series of the growth of the amplitude per step, as a polynomial in p."""
     return _polynomial(_principal(stepper, terms).determinant ** HALF, terms)
 
 
 def frequency_series(stepper: Stepper, terms: int = TERMS) -> Any:
-    """Return ``w~/w`` likewise: ``1 + p^2/24 + ...`` of the centred scheme, B (19)."""
+    """Return the first terms of ``w~/w``: ``1 + p^2/24 + ...`` for the centred scheme, B (19)."""
     return _polynomial(_principal(stepper, terms).square.shifted(-2) ** HALF, terms)
 
 
 def phase_error_series(stepper: Stepper, terms: int = TERMS) -> Any:
-    """Return ``(P - P~)/P = 1 - w/w~``, the part of a period by which peaks come early in each, likewise."""
+    """Return the first terms of ``(P - P~)/P = 1 - w/w~``, the fraction of a period by which peaks come early."""
     return _polynomial(1.0 - _principal(stepper, terms).square.shifted(-2) ** -HALF, terms)
 
 
 def error_series(stepper: Stepper) -> tuple[Any, Any]:
-    """Return the error ``u(t) - u^n`` at a time t for ``u(0) = 1``, ``u'(0) = 0``: two terms in p, B, section 4.4.
+    """Return two terms in p of the error ``u(t) - u^n`` for ``u(0) = 1``, ``u'(0) = 0`` (B, section 4.4).
 
-    The other formula is the next power of p. Of a scheme with parasitic roots it is the error once they have died out.
+    The second result is the next power of p. With parasitic roots it is the error after these have decayed.
     """
     from sympy import cos, ring, sin
 
@@ -73,14 +73,14 @@ def error_series(stepper: Stepper) -> tuple[Any, Any]:
     formulas, turned = ring("turned", mode.rate.field.domain)
 
     def row(series: Laurent) -> NDArray[Any]:
-        """Return the factors of the powers of p as polynomials in w t."""
-        found = [formulas.ground_new(series.at(k)) for k in range(POWERS)]
-        return np.array(found, dtype=object)
+        """Return the coefficients of the powers of p as polynomials in w t."""
+        constants = [formulas.ground_new(series.at(k)) for k in range(POWERS)]
+        return np.array(constants, dtype=object)
 
     def product(a: NDArray[Any], b: NDArray[Any]) -> NDArray[Any]:
         return np.array([sum(a[: k + 1] * b[k::-1]) for k in range(POWERS)], dtype=object)
 
-    # the motion is the real part of B exp(i w t) exp(apart), where apart vanishes with p
+    # the motion is the real part of B exp(i w t) exp(z), where z vanishes with p
     factors = row(mode.rate) * turned, row(mode.frequency - 1.0) * turned
     power = total = row(mode.position[0]), -row(mode.slope[0] / mode.frequency)
     for k in range(1, POWERS):
@@ -100,7 +100,7 @@ def error_series(stepper: Stepper) -> tuple[Any, Any]:
 
 @dataclass(frozen=True)
 class TwoRoots:
-    """What the solution of a scheme without parasitic roots consists of, in the symbols of this module.
+    """The parts of the solution of a scheme without parasitic roots, in the symbols of this module.
 
     ``u^n = r^n (u^0 cos(n th) + (u^1/r - u^0 cos(th)) sin(n th)/sin(th))``, ``u^0 = I``.
     """
@@ -110,11 +110,11 @@ class TwoRoots:
     cosine: Any
     """cos(th), th = w~ dt."""
     first: tuple[Any, Any]
-    """What ``u^1`` has of I and of ``V dt``, for ``u(0) = I``, ``u'(0) = V``."""
+    """Coefficients of I and ``V dt`` in ``u^1``, for ``u(0) = I``, ``u'(0) = V``."""
 
 
 def two_roots(stepper: Stepper) -> TwoRoots:
-    """Return the parts of the solution; ValueError with parasitic roots, or a start that is no step."""
+    """Return the parts of the solution; ValueError if there are parasitic roots, or the start is not a step."""
     from sympy import sqrt
 
     step, first, _ = matrices(stepper)
@@ -132,7 +132,7 @@ def two_roots(stepper: Stepper) -> TwoRoots:
 
 
 def solution(stepper: Stepper) -> Any:
-    """Return ``u^n`` for ``u(0) = I``, ``u'(0) = V``, as one formula; ValueError where there is no `two_roots`."""
+    """Return the formula of ``u^n`` for ``u(0) = I``, ``u'(0) = V``; ValueError as for `two_roots`."""
     from sympy import acos, cos, sin
 
     parts, n, begin = two_roots(stepper), symbol("n"), symbol("I")
@@ -157,8 +157,8 @@ def matrices(stepper: Stepper) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any]
         substitutes={solved: _solved, solved_together: _solved_together},
     )
     step, first, velocity = (
-        (np.array(found, dtype=object) * fractions.one).T
-        for found in (units.step, units.start, units.velocity)
+        (np.array(columns, dtype=object) * fractions.one).T
+        for columns in (units.step, units.start, units.velocity)
     )
     return step, first, velocity
 
@@ -166,7 +166,7 @@ def matrices(stepper: Stepper) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any]
 def _solved(
     x: Any, u: Any, d_u: Any, v: Any, d_v: Any, t: Any, p: Any, acceleration: Any, slopes: Any
 ) -> Any:
-    """Return what `vibsim.schemes.newton.solved` does, of a linear force."""
+    """Solve the equation of `vibsim.schemes.newton.solved` for a linear force."""
     by_u, by_v = slopes(u, v, t, p)
     return acceleration(u, v, t, p) / (1.0 - (d_u * by_u + d_v * by_v))
 
@@ -174,7 +174,7 @@ def _solved(
 def _solved_together(
     x: Any, y: Any, u: Any, d_u: Any, v: Any, d_v: Any, t: Any, p: Any, acceleration: Any, slopes: Any
 ) -> Any:  # fmt: skip
-    """Return what `vibsim.schemes.newton.solved_together` does, of a linear force."""
+    """Solve the equations of `vibsim.schemes.newton.solved_together` for a linear force."""
     one, two = (acceleration(u[i], v[i], t[i], p) for i in range(2))
     by_u, by_v = slopes(u[0], v[0], t[0], p)
     a, b, c, d = (by_u * i + by_v * j for i, j in zip(d_u, d_v, strict=True))
@@ -183,7 +183,7 @@ def _solved_together(
 
 
 def expression(element: Any) -> Any:
-    """Return an element of a field of fractions, or of a ring, as a formula in p."""
+    """Return an element of a field of fractions, or of a ring, as a SymPy expression in p."""
     return element.as_expr(symbol("p"))
 
 

@@ -1,8 +1,8 @@
 r"""Collocation at the 12 Gauss points of a step, for ``u'' = a(u, u', t)``: the equations of a step, and solutions.
 
 Order 24 (E. Hairer, G. Wanner, S. Noersett, Solving Ordinary Differential Equations I, section II.7); the equations are
-solved by iteration. Within a step the collocation polynomial is the solution. Smooth motions take equal steps, others
-those of `vibsim.simulation.reference.piecewise_collocation`.
+solved by fixed-point iteration. Within a step the solution is the collocation polynomial. Smooth motions take equal
+steps, others those of `vibsim.simulation.reference.piecewise_collocation`.
 """
 
 from __future__ import annotations
@@ -22,14 +22,14 @@ Force = Callable[[Floats, Floats, Floats], Floats]
 STAGES = 12
 ITERATIONS = 60
 SETTLED_CHANGE = 2.0**-51
-"""A change of the accelerations is none that is smaller relative to them and to the velocities over a step."""
+"""Converged if accelerations change by less than this, relative to them plus the velocities over the step."""
 STALLED = 2.0**-30
-"""Largest change that may be taken for round-off once changes no longer fall: forces magnify that of the positions."""
+"""Largest change that counts as round-off once changes stop decreasing: forces magnify the rounding of positions."""
 
 
 @cache
 def nodes() -> tuple[Floats, Floats, Floats]:
-    """Return Gauss's points on [0, 1], their weights, and the barycentric weights of interpolation."""
+    """Return the Gauss points on [0, 1], their weights, and the barycentric weights of interpolation."""
     x, w = np.polynomial.legendre.leggauss(STAGES)
     c = 0.5 * (1.0 + x)
     gaps = c[:, None] - c[None, :] + np.eye(STAGES)
@@ -37,17 +37,17 @@ def nodes() -> tuple[Floats, Floats, Floats]:
 
 
 def _basis(x: Floats) -> Floats:
-    """Return the polynomials that are 1 at one of the points and 0 at the others, shape (..., stage)."""
+    """Return the Lagrange polynomials of the points, shape (..., stage)."""
     c, _, weight = nodes()
     gap = x[..., None] - c
     hit = gap == 0.0
     terms = weight / np.where(hit, 1.0, gap)
-    found = terms / np.sum(terms, axis=-1, keepdims=True)
-    return np.asarray(np.where(np.any(hit, axis=-1, keepdims=True), hit, found))
+    basis = terms / np.sum(terms, axis=-1, keepdims=True)
+    return np.asarray(np.where(np.any(hit, axis=-1, keepdims=True), hit, basis))
 
 
 def integrals(x: Floats) -> tuple[Floats, Floats]:
-    """Return the integrals of these polynomials from 0 to x, and the integrals of those, shape (time, stage)."""
+    """Return the first and second integrals of the Lagrange polynomials from 0 to x, shape (time, stage)."""
     c, weight, _ = nodes()
     at = _basis(x[:, None] * c)
     first = x[:, None] * np.sum(weight[:, None] * at, axis=1)
@@ -57,7 +57,7 @@ def integrals(x: Floats) -> tuple[Floats, Floats]:
 
 @cache
 def _coefficients() -> tuple[Floats, tuple[Floats, Floats], Floats]:
-    """Return those of both integrals at the stages, of both over the step, and of the stages of an equal next step."""
+    """Return the coefficients of both integrals at the stages, of both over the step, and of the next step's stages."""
     c = nodes()[0]
     return np.concatenate(integrals(c)), integrals(np.ones(1)), _basis(1.0 + c)
 
@@ -68,16 +68,16 @@ def summed(coefficients: Floats, a: Floats) -> Floats:
 
 
 def total(terms: Floats, axis: int) -> Floats:
-    """Return the sum along an axis before the last one, from its first term to its last."""
+    """Return the sum along an axis other than the last, from the first term to the last."""
     terms = np.ascontiguousarray(terms)
     if terms.shape[-1] == 1:
-        # numpy adds up one column in another order than several
+        # numpy would sum a single column in a different order
         return np.asarray(np.add.accumulate(terms, axis=axis).take(-1, axis=axis))
     return np.asarray(np.add.reduce(terms, axis=axis))
 
 
 def stages(force: Force, u: Floats, v: Floats, t: Floats, h: Floats, a: Floats) -> Floats:
-    """Return the accelerations at the stages, shape (coordinate, stage, case), from a guess; NaN for no end.
+    """Return the accelerations at the stages, shape (coordinate, stage, case), from a guess; NaN if not converged.
 
     ``t`` are the times of the stages, shape (stage, case).
     """
@@ -87,11 +87,11 @@ def stages(force: Force, u: Floats, v: Floats, t: Floats, h: Floats, a: Floats) 
     for _ in range(ITERATIONS):
         once, twice = np.split(summed(both, a), 2, axis=1)
         y = v[:, None] + h * once
-        found = np.broadcast_to(force(straight + h * h * twice, y, t), a.shape)
-        change = np.max(np.abs(found - a), axis=(0, 1))
-        size = np.max(np.abs(found) + np.abs(y) / h, axis=(0, 1))
-        # a member that has come to rest in its last digits keeps them, whatever the others do
-        a = np.where(going, found, a)
+        new = np.broadcast_to(force(straight + h * h * twice, y, t), a.shape)
+        change = np.max(np.abs(new - a), axis=(0, 1))
+        size = np.max(np.abs(new) + np.abs(y) / h, axis=(0, 1))
+        # a converged member keeps its bits, independent of the others
+        a = np.where(going, new, a)
         stalled = (change <= STALLED * size) & ~(change < 0.5 * before)
         going, before = going & ~(change <= SETTLED_CHANGE * size) & ~stalled, change
         if not (going & np.isfinite(change)).any():
@@ -100,14 +100,14 @@ def stages(force: Force, u: Floats, v: Floats, t: Floats, h: Floats, a: Floats) 
 
 
 def ahead(a: Floats) -> Floats:
-    """Return a guess of the accelerations at the stages of an equal step behind this one."""
+    """Return a guess of the accelerations at the stages of the next step of equal length."""
     return summed(_coefficients()[2], a)
 
 
 def advanced(
     u: Floats, v: Floats, h: Floats, a: Floats, lost: Floats
 ) -> tuple[Floats, Floats, Floats]:
-    """Return positions and velocities at the end of a step, and what the rounding of their sums has lost so far."""
+    """Return positions and velocities at the end of a step, and their compensations (`added`)."""
     first, second = _coefficients()[1]
     u, lost_u = added(u, h * v + h * h * summed(second, a)[:, 0], lost[0])
     v, lost_v = added(v, h * summed(first, a)[:, 0], lost[1])
@@ -115,15 +115,15 @@ def advanced(
 
 
 def added(total: Floats, change: Floats, lost: Floats) -> tuple[Floats, Floats]:
-    """Return a sum, and what its rounding has lost, from what the sums before have lost."""
+    """Return the compensated sum of `total` and `change`, and the new compensation (Kahan); `lost` is the old one."""
     change = change - lost
-    found = total + change
-    return found, (found - total) - change
+    sum_ = total + change
+    return sum_, (sum_ - total) - change
 
 
 @dataclass(frozen=True)
 class Solved:
-    """A solution by equal steps: states at their starts, and accelerations at the stages."""
+    """A solution by equal steps: states at the start of each step, and accelerations at the stages."""
 
     end: Floats
     position: Floats
@@ -139,7 +139,7 @@ class Solved:
 
     @property
     def begin(self) -> Floats:
-        """Times at which they begin."""
+        """Start times of the steps, shape (step, case)."""
         return self.length * np.arange(len(self.position))[:, None]
 
     def at(self, fraction: Floats) -> Floats:
@@ -155,11 +155,11 @@ class Solved:
 
 @dataclass(frozen=True)
 class Pieces:
-    """A solution by steps of different lengths; NaN behind the last one of a member, and for those without an end."""
+    """A solution by steps of different lengths; NaN after a member's last step, and for members without a solution."""
 
     end: Floats
     begin: Floats
-    """Start of every step, shape (step, case)."""
+    """Start times of the steps, shape (step, case)."""
     length: Floats
     position: Floats
     """Shape (step, coordinate, case)."""
@@ -170,14 +170,14 @@ class Pieces:
     def at(self, fraction: Floats) -> Floats:
         """Return all positions and then all velocities at fractions of the end time, shape (state, case, time)."""
         count = self.position.shape[1]
-        found = np.full((2 * count, len(self.end), len(fraction)), np.nan)
+        states = np.full((2 * count, len(self.end), len(fraction)), np.nan)
         for case, end in enumerate(self.end):
             known = int(np.sum(np.isfinite(self.length[:, case])))
-            # some times at a time
+            # in parts, to bound memory
             for first in range(0, len(fraction) if known else 0, 4096):
                 part = slice(first, first + 4096)
-                found[:, case, part] = self._at(case, fraction[part] * end, known)
-        return found
+                states[:, case, part] = self._at(case, fraction[part] * end, known)
+        return states
 
     def _at(self, case: int, t: Floats, known: int) -> Floats:
         begin = self.begin[:known, case]
@@ -191,7 +191,7 @@ class Pieces:
 def _inside(
     u: Floats, v: Floats, h: Floats, x: Floats, inner: Iterable[Floats]
 ) -> tuple[Floats, Floats]:
-    """Return positions and velocities after parts x of steps, from those where they begin and the inner accelerations.
+    """Return positions and velocities after fractions x of steps, from those at the start and the stage accelerations.
 
     All arrays broadcast against each other.
     """
@@ -207,13 +207,13 @@ Solution = TypeVar("Solution", bound=Solved | Pieces)
 
 
 def of_members(solution: Solution, members: Any) -> Solution:
-    """Return the solutions of some members."""
+    """Return the solution of a subset of the members."""
     arrays = {row.name: getattr(solution, row.name)[..., members] for row in fields(solution)}
     return replace(solution, **arrays)
 
 
 def solve(force: Force, start: Floats, end: Floats, steps: int) -> Solved:
-    """Take equal steps to the end time of each member; NaN from where the iteration does not end.
+    """Take equal steps to the end time of each member; NaN from where the iteration does not converge.
 
     Parameters
     ----------

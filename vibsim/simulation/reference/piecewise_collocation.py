@@ -1,13 +1,13 @@
-r"""Motions whose force has corners or jumps, by collocation from one to the next: every piece has a smooth force.
+r"""Motions whose force has corners or jumps, by collocation in pieces: within a piece the force is smooth.
 
-Within a piece the modes of all switches are held (`vibsim.simulation.reference.one_sided_forces`), so that stages
-behind its end see the smooth continuation of its force. A step in which a switch leaves its mode is taken again with
-the length that ends there: Newton's method on the polynomial of the step, until the length no longer changes. There the
-mode changes and a new piece begins. A switch that is at the border of two modes has the mode into which the motion
-goes; where each leads into the other (dry friction that holds) there is no such motion.
+Within a piece the modes of all switches are fixed (`vibsim.simulation.reference.one_sided_forces`), so that stages
+beyond its end use the smooth continuation of its force. A step in which a switch leaves its mode is repeated with the
+length that ends there, found by Newton's method on the polynomial of the step until the length no longer changes. Then
+the mode changes and a new piece begins. A switch at the border of two modes has the mode that the motion enters; if
+each mode leads into the other (dry friction that holds), there is no such motion, and the member slides.
 
-A first walk finds the pieces, in steps of at most a given length. Every other one has twice as many equal steps in
-each piece as the one before it, so that the difference of two walks tells the error of the latter.
+A first walk finds the pieces, in steps of at most a given length. Every further walk has twice as many equal steps in
+each piece as the previous one, so that the difference of two walks measures the error of the latter.
 """
 
 from __future__ import annotations
@@ -31,32 +31,33 @@ from vibsim.simulation.reference.event_detection import Exits, find_exits, overs
 from vibsim.simulation.reference.one_sided_forces import Sides
 
 MOST_ATTEMPTS = 2**13
-"""Steps that are tried, at most, of every member."""
+"""Largest number of attempted steps of every member."""
 SHORTEST = 2.0**-20
-"""Part of the end time below which no step is tried."""
+"""Shortest step, as a fraction of the end time."""
 AT_ONCE = 1e-13
-"""Part of the end time within which a switch is where the step begins."""
+"""Fraction of the end time within which a switch counts as being at the start of the step."""
 LINEAR = 1e-9
-"""A quantity is linear in time that is half-way at half the time, to so much of its change."""
+"""Tolerance for a quantity to be linear in time: its deviation from linear at half the time, relative to its change."""
 TIED = 1e-12
-"""A switch is at a border to so much of its largest value in the step before."""
+"""Distance within which a switch is at a border, relative to its largest value in the previous step."""
 LANDED = 2.0**-50
-"""A step ends at a switch to so much of the time."""
+"""Tolerance for the end of a step at a switch, relative to the time."""
 NEARLY = 1e-11
-"""Part of the end time to which it must, where rounding allows no more."""
+"""Tolerance relative to the end time, if rounding prevents `LANDED`."""
 CLOSE = 0.02
-"""Part of a step within which its end is taken for the root that is sought."""
+"""Fraction of a step within which a root near its end is the one that it aims at."""
 TRIES, MOST_TRIES = 5, 12
+"""Corrections of a step's length before `NEARLY` suffices, and before the member is given up."""
 OPEN, SLIDING, ENDLESS = range(3)
-"""Nothing is against an end; a force holds the member at a jump; there are more corners than can be gone through."""
+"""No known obstacle; a force holds the member at a jump; too many corners."""
 END, SWITCH, EDGE, STEPS = range(4)
-"""Rows of a plan: when a piece ends, the switch that ends it (-1 for the end of the motion), the value of its quantity
-there, and the number of its steps; shape (row, piece, case)."""
+"""Rows of a plan: the time at which a piece ends, the switch that ends it (-1 for the end of the motion), the value of
+its quantity there, and the number of its steps; shape (row, piece, case)."""
 
 
 @dataclass(frozen=True)
 class Walk:
-    """Where the members are, and the steps so far; arrays of shape (case,) that change as they go on."""
+    """The current state of the members, and their steps so far; arrays of shape (case,), updated in place."""
 
     sides: Sides
     end: Floats
@@ -64,48 +65,49 @@ class Walk:
     plan: Floats | None
     t: Floats
     t_lost: Floats
-    """What the rounding of t has lost."""
+    """Compensation of the sum t."""
     u: Floats
     """Shape (coordinate, case)."""
     v: Floats
     lost: Floats
-    """What the rounding of u and v has lost, shape (2, coordinate, case)."""
+    """Compensations of the sums u and v, shape (2, coordinate, case)."""
     modes: Floats
     """Shape (switch, case)."""
     edge: Floats
-    """Value at whose border a switch is, NaN elsewhere, shape (switch, case)."""
+    """Border at which a switch is, NaN if at none, shape (switch, case)."""
     h: Floats
-    """Length of the step that is tried next."""
+    """Length of the next attempted step."""
     last: Flags
-    """Whether it ends the motion."""
+    """Whether that step ends the motion."""
     aim: Integers
-    """The switch at which it is to end; -1 for none."""
+    """The switch at which that step is to end; -1 for none."""
     goal: Floats
     """Value of the quantity of that switch there."""
     guess: Floats
-    """Of the accelerations at its stages, shape (coordinate, stage, case)."""
+    """Guess of the accelerations at its stages, shape (coordinate, stage, case)."""
     fresh: Flags
-    """Whether there is no guess but the acceleration where it begins."""
+    """Whether the guess is to be replaced by the acceleration at the start of the step."""
     tries: Integers
+    """Corrections of the step's length so far."""
     turns: Integers
     """Changes of modes since the last step."""
     taken: Integers
-    """Steps of the piece so far."""
+    """Accepted steps of the piece so far."""
     planned: Integers
-    """Steps of it that are left in the plan, 0 where there is none."""
+    """Remaining steps of the piece in the plan; 0 without a plan."""
     going: Flags
     sliding: Flags
-    """Whether a member ended where a force holds it at a jump."""
+    """Whether a member ended because a force holds it at a jump."""
     count: Integers
-    """Steps in all."""
+    """Number of accepted steps."""
     steps: list[tuple[Any, ...]]
     ends: list[list[tuple[float, int, float, int]]]
-    """Of every member, a row of the plan for each of its pieces so far."""
+    """For every member, a row of the plan for each of its pieces so far."""
 
 
 @dataclass(frozen=True)
 class Step:
-    """A step that was tried, of the members `who`."""
+    """An attempted step of the members `who`."""
 
     who: Integers
     h: Floats
@@ -116,7 +118,7 @@ class Step:
 def walk_pieces(
     sides: Sides, start: Floats, end: Floats, longest: Floats, plan: Floats | None
 ) -> tuple[Pieces, Floats, Integers]:
-    """Go to the end time of each member.
+    """Integrate each member to its end time.
 
     Parameters
     ----------
@@ -125,15 +127,15 @@ def walk_pieces(
     end
         End times, shape (case,).
     longest
-        Longest step where there is no plan, shape (case,).
+        Longest step without a plan, shape (case,).
     plan
-        The pieces of a walk before, of which each gets twice as many steps; of members without steps nothing is known.
+        The pieces of the previous walk, each of which gets twice as many steps; members with 0 steps have no plan.
 
     Returns
     -------
     tuple
-        The solution, NaN for members that do not come to the end; its pieces, without steps for those; and why a
-        member did not come to the end: `SLIDING`, `ENDLESS`, or `OPEN` for no reason known, shape (case,).
+        The solution, NaN for members that do not reach the end; its pieces, with 0 steps for those; and the reason why
+        a member did not reach the end: `SLIDING`, `ENDLESS`, or `OPEN` if unknown, shape (case,).
     """
     walk = _begin(sides, start, end, longest, plan)
     for _ in range(MOST_ATTEMPTS):
@@ -147,7 +149,7 @@ def walk_pieces(
 
 
 def _begin(sides: Sides, start: Floats, end: Floats, longest: Floats, plan: Floats | None) -> Walk:
-    """Return the members at the start, with their first step."""
+    """Return the members at t = 0, with the length of their first step."""
     u, v = np.array(np.split(start, 2))
     cases, switches = len(end), len(sides.switches)
     zero, no = np.zeros(cases, dtype=np.int64), np.zeros(cases, dtype=bool)
@@ -167,17 +169,17 @@ def _begin(sides: Sides, start: Floats, end: Floats, longest: Floats, plan: Floa
 
 
 def _of(numbers: Floats, who: Integers) -> Floats:
-    """Return the numbers of some members, in the order of memory in which they are computed with."""
+    """Return the values of a subset of the members, contiguous in memory."""
     return np.take(numbers, who, axis=-1)
 
 
 def _settle(walk: Walk, who: Integers, size: Floats, fired: Integers) -> None:
-    """Set the modes of all switches where a piece begins; those at a border keep theirs until the step tells.
+    """Set the modes of all switches at the start of a piece; switches at a border keep theirs until the step is tried.
 
     Parameters
     ----------
     size
-        Largest value of each quantity in the step before, shape (switch, case).
+        Largest value of each quantity in the previous step, shape (switch, case).
     fired
         The switch whose mode has just changed, -1 for none.
     """
@@ -189,21 +191,21 @@ def _settle(walk: Walk, who: Integers, size: Floats, fired: Integers) -> None:
         free = np.floor(q) if is_whole else np.where(q > 0.0, 0.0, -1.0)
         tied = np.abs(q - border) <= TIED * size[k]
         keeps = (modes[k] == border) | (modes[k] == border - 1.0)
-        own = fired == k
-        modes[k] = np.where(own | (tied & keeps), modes[k], np.where(tied, border, free))
-        edge[k] = np.where(own, edge[k], np.where(tied, border, np.nan))
+        has_fired = fired == k
+        modes[k] = np.where(has_fired | (tied & keeps), modes[k], np.where(tied, border, free))
+        edge[k] = np.where(has_fired, edge[k], np.where(tied, border, np.nan))
     walk.modes[:, who], walk.edge[:, who] = modes, edge
 
 
 def _planned(walk: Walk, who: Integers) -> Floats:
-    """Return what the plan says of the present pieces, shape (row, case); no steps where it says nothing."""
-    found = np.zeros((4, len(who)))
+    """Return the plan of the current pieces, shape (row, case); 0 steps if they are not in the plan."""
+    plan = np.zeros((4, len(who)))
     if walk.plan is not None:
         piece = np.array([len(walk.ends[case]) for case in who], dtype=np.int64)
         row = np.minimum(piece, walk.plan.shape[1] - 1)
-        found = walk.plan[:, row, who]
-        found[STEPS] = np.where(piece == row, found[STEPS], 0.0)
-    return found
+        plan = walk.plan[:, row, who]
+        plan[STEPS] = np.where(piece == row, plan[STEPS], 0.0)
+    return plan
 
 
 def _begin_piece(walk: Walk, who: Integers) -> None:
@@ -215,8 +217,8 @@ def _begin_piece(walk: Walk, who: Integers) -> None:
 
 
 def _choose_length(walk: Walk, who: Integers) -> None:
-    """Choose the length of the next step: of a planned piece, an equal part of what is left of it."""
-    rest = walk.end[who] - walk.t[who]
+    """Choose the length of the next step: in a planned piece, an equal part of its remaining length."""
+    remaining = walk.end[who] - walk.t[who]
     h = np.where(walk.h[who] > 0.0, 2.0 * walk.h[who], np.inf)
     h = np.minimum(h, walk.longest[who])
     left, plan = walk.planned[who], _planned(walk, who)
@@ -227,14 +229,14 @@ def _choose_length(walk: Walk, who: Integers) -> None:
     walk.aim[who] = np.where(ends, plan[SWITCH], -1)
     walk.goal[who] = np.where(ends, plan[EDGE], 0.0)
     walk.tries[who] = walk.turns[who] = 0
-    last = (h >= rest * (1.0 - 1e-6)) & (walk.aim[who] < 0)
+    last = (h >= remaining * (1.0 - 1e-6)) & (walk.aim[who] < 0)
     walk.last[who] = last
-    walk.h[who] = np.where(last, rest, h)
+    walk.h[who] = np.where(last, remaining, h)
     _meet_known(walk, who[walk.planned[who] == 0])
 
 
 def _meet_known(walk: Walk, who: Integers) -> None:
-    """Let steps end where a switch that is linear in time will leave its mode: that is known before."""
+    """Let steps end where a switch that is linear in time leaves its mode, which is known in advance."""
     sides, modes, t = walk.sides.of(who), _of(walk.modes, who), walk.t[who]
     for k in walk.sides.timed if len(who) else ():
         h = walk.h[who]
@@ -252,7 +254,7 @@ def _meet_known(walk: Walk, who: Integers) -> None:
 
 
 def _try(walk: Walk, who: Integers) -> Step:
-    """Take a step of every member in `who`, and look where switches leave their modes."""
+    """Attempt a step of every member in `who`, and find where switches leave their modes."""
     sides, h, modes = walk.sides.of(who), walk.h[who], _of(walk.modes, who)
     u, v, t = _of(walk.u, who), _of(walk.v, who), walk.t[who]
     force = sides.force(modes)
@@ -264,18 +266,18 @@ def _try(walk: Walk, who: Integers) -> Step:
 
 
 def _go_on(walk: Walk, step: Step) -> None:
-    """Accept the step of each member, or change what is tried next."""
-    who, found = step.who, step.exits
+    """Accept the step of each member, or change the next attempt."""
+    who, exits = step.who, step.exits
     failed = ~np.isfinite(step.a).all(axis=(0, 1))
-    turned = ~failed & found.turned.any(axis=0)
+    turned = ~failed & exits.turned.any(axis=0)
     aim, goal = walk.aim[who], walk.goal[who]
-    over = overshoot(found, aim, goal)
+    over = overshoot(exits, aim, goal)
     closes = ~failed & ~turned & (aim >= 0) & (np.abs(over) <= CLOSE)
-    leaves = ~failed & ~turned & found.leaves(np.where(closes, aim, -1))
+    leaves = ~failed & ~turned & exits.leaves(np.where(closes, aim, -1))
     closes &= ~leaves
     passes = ~(failed | turned | leaves | closes)
     _shorten(walk, who[failed])
-    _turn(walk, who[turned], found.modes[:, turned])
+    _turn(walk, who[turned], exits.modes[:, turned])
     _take_aim(walk, step, leaves)
     done = _close_in(walk, step, closes, over)
     _accept(walk, step, passes | done, done)
@@ -290,7 +292,7 @@ def _shorten(walk: Walk, who: Integers) -> None:
 
 
 def _turn(walk: Walk, who: Integers, modes: Floats) -> None:
-    """Give switches at a border the mode into which the motion goes."""
+    """Give switches at a border the mode that the motion enters."""
     walk.modes[:, who] = modes
     walk.fresh[who] = True
     walk.turns[who] += 1
@@ -299,7 +301,7 @@ def _turn(walk: Walk, who: Integers, modes: Floats) -> None:
 
 
 def _take_aim(walk: Walk, step: Step, leaves: Flags) -> None:
-    """Shorten steps to where the first switch leaves its mode; where that is at once, change the mode."""
+    """Shorten steps to where the first switch leaves its mode; if that is at their start, change the mode."""
     if not leaves.any():
         return
     which = np.flatnonzero(leaves)
@@ -327,7 +329,7 @@ def _cross(walk: Walk, who: Integers, switch: Integers, edge: Floats) -> None:
 
 
 def _close_in(walk: Walk, step: Step, closes: Flags, over: Floats) -> Flags:
-    """Correct steps that are to end at a switch; return which do."""
+    """Correct the length of steps that are to end at a switch; return which end there."""
     who, end = step.who, walk.end[step.who]
     miss = np.abs(over) * step.h
     t = walk.t[who] + step.h
@@ -342,7 +344,7 @@ def _close_in(walk: Walk, step: Step, closes: Flags, over: Floats) -> Flags:
 
 
 def _accept(walk: Walk, step: Step, taken: Flags, ends: Flags) -> None:
-    """Go on by the steps that were taken; `ends` says which of them end at a switch."""
+    """Advance by the steps in `taken`; `ends` says which of them end at a switch."""
     if not taken.any():
         return
     who, h, a = step.who[taken], step.h[taken], _of(step.a, np.flatnonzero(taken))
@@ -363,7 +365,7 @@ def _accept(walk: Walk, step: Step, taken: Flags, ends: Flags) -> None:
     before = walk.h[on]
     walk.planned[on] = np.maximum(walk.planned[on] - 1, 0)
     _choose_length(walk, on)
-    # a guess is for a step of the same length
+    # the guess is only valid for a step of equal length
     walk.fresh[on] |= np.abs(walk.h[on] - before) > 1e-6 * before
 
 
@@ -379,18 +381,18 @@ def _change(walk: Walk, step: Step, which: Integers) -> None:
     if not len(which):
         return
     who = step.who[which]
-    own, edge = walk.aim[who], walk.goal[who]
-    for case, switch, border in zip(who, own, edge, strict=True):
+    switches, edge = walk.aim[who], walk.goal[who]
+    for case, switch, border in zip(who, switches, edge, strict=True):
         walk.ends[case].append((walk.t[case], switch, border, walk.taken[case]))
-    _cross(walk, who, own, edge)
-    _settle(walk, who, step.exits.size[:, which], own)
+    _cross(walk, who, switches, edge)
+    _settle(walk, who, step.exits.size[:, which], switches)
     over = walk.t[who] >= walk.end[who] * (1.0 - AT_ONCE)
     _finish(walk, who[over])
     _begin_piece(walk, who[~over])
 
 
 def _pieces(walk: Walk, arrived: Flags) -> Pieces:
-    """Return the solution, of the members that arrived."""
+    """Return the solution of the members that reached the end."""
     count, cases = walk.u.shape
     most = int(walk.count.max(initial=0))
     begin, length = np.full((2, most, cases), np.nan)
@@ -405,8 +407,8 @@ def _pieces(walk: Walk, arrived: Flags) -> Pieces:
 
 
 def _plan(walk: Walk, arrived: Flags) -> Floats:
-    """Return the pieces, without steps for members that did not arrive."""
-    known = [rows if is_there else [] for rows, is_there in zip(walk.ends, arrived, strict=True)]
+    """Return the pieces, with 0 steps for members that did not reach the end."""
+    known = [rows if is_done else [] for rows, is_done in zip(walk.ends, arrived, strict=True)]
     plan = np.zeros((4, max((len(rows) for rows in known), default=0) or 1, len(known)))
     plan[SWITCH] = -1.0
     for case, rows in enumerate(known):

@@ -1,12 +1,12 @@
-r"""A reference solution to about twelve digits, of models whose exact solution is not known.
+r"""A reference solution to about twelve digits, for models whose exact solution is not known.
 
-Collocation (`vibsim.simulation.reference.collocation`), and the step halved until two solutions agree. Smooth forces
-take equal steps; forces with corners or jumps are smooth from one to the next, and each of these pieces has equal steps
-of its own (`vibsim.simulation.reference.piecewise_collocation`). It shares no arithmetic with the schemes and their
-kernels: formulas are evaluated by numpy. What is left between the last two solutions bounds the error of the last one.
+Collocation (`vibsim.simulation.reference.collocation`) with the step halved until two solutions agree. Smooth forces
+take equal steps; forces with corners or jumps are smooth in between, and each of these pieces has its own equal steps
+(`vibsim.simulation.reference.piecewise_collocation`). The solver shares no arithmetic with the schemes and their
+kernels: formulas are evaluated by numpy. The difference of the last two solutions bounds the error of the last one.
 
-The jobs of an experiment's levels do not compute the same reference again: an entry of the private cache is named by
-the digest of all that its numbers depend on. One that is damaged, or no entry at all, is computed again.
+The jobs of an experiment's levels share references through the private cache. An entry is named by the digest of
+everything that its numbers depend on; a damaged or missing entry is computed again.
 """
 
 from __future__ import annotations
@@ -42,38 +42,38 @@ from vibsim.simulation.reference.piecewise_collocation import ENDLESS, SLIDING, 
 METHOD = "collocation at 12 Gauss points of a step, halved until two solutions agree"
 PIECEWISE = f"{METHOD}; a step ends at every corner of the force"
 FEWEST_STEPS, MOST_STEPS = 8, 2**11
-"""Steps over the whole interval; where there are corners, of a motion without any."""
+"""Range of the number of steps over the whole interval; with corners, of the steps that a smooth motion would have."""
 COMPARED_TIMES = 5 * 64
-"""At so many equal times, and at t = 0, two solutions are compared: four of five lie within a step, where its
-polynomial has a lower order than at the end."""
+"""Number of equally spaced times, beside t = 0, at which two solutions are compared: four of five are inside a step,
+where the order of its polynomial is lower than at the end."""
 ACCURATE = 1e-12
-"""A solution is accepted whose bound is smaller, relative to its largest value."""
+"""Largest bound of the error of an accepted solution, relative to its largest value."""
 BEST_AGREEMENT = 2e-14
-"""No more is to be had from halving the step."""
+"""Relative difference below which halving the step gains nothing."""
 SLOW = 32.0
-"""A smooth motion that is resolved gains far more by halving the step; one that gains less twice is none."""
+"""A smooth, resolved motion gains far more than this factor by halving the step; one that does not is given up."""
 RESOLVED = 1e-3
-"""A relative difference below says that the steps see the motion."""
+"""Relative difference below which steps count as resolving the motion."""
 LOOKS = 8
-"""Equal parts of a step, no longer than the distances of its points, between which a force may not have a pulse."""
+"""Number of equal parts of a step, between whose ends the force must not have a pulse."""
 ROUNDING_BOUND = 16.0 * 2.0**-52
-"""Relative bound of the rounding errors, beside one that grows with the root of the number of steps."""
+"""Relative bound of the rounding errors, apart from a part that grows with the root of the number of steps."""
 
 Arrays = Mapping[str, NDArray[Any]]
 
 
 @dataclass(frozen=True)
 class Chosen:
-    """The solutions that were accepted."""
+    """The accepted solutions."""
 
     parts: tuple[tuple[Integers, Solved | Pieces], ...]
-    """Each with its members."""
+    """Indices of members, and their solution."""
     bounds: Floats
-    """Bounds of the errors, NaN where there is no solution, shape (state, case)."""
+    """Bounds of the errors, NaN without a solution, shape (state, case)."""
 
 
 def method(model: Model) -> str:
-    """Say how the reference of a model is found."""
+    """Return a description of how the reference of a model is computed."""
     return PIECEWISE if sides(model, {}).switches else METHOD
 
 
@@ -82,8 +82,8 @@ def reference(
 ) -> tuple[dict[str, Floats], dict[str, Floats]]:
     """Return the states at fractions of the end time, shape (case, time), and bounds of their errors, shape (case,).
 
-    NaN stands where the accuracy is not reached: of motions that are too sensitive, that are not smooth between the
-    corners of their force, or that a force holds at a jump.
+    NaN if the accuracy is not reached: for motions that are too sensitive, that are not smooth between the corners of
+    their force, or that a force holds at a jump.
     """
     names = [state.name for state in model.states]
     parameters = (group.parameters[row.key] for row in model.parameters)
@@ -98,7 +98,7 @@ def reference(
 
 @lru_cache(maxsize=8)
 def choose(model: Model, numbers: tuple[bytes, ...]) -> Chosen:
-    """Return the solutions that are accepted, computed now or before.
+    """Return the accepted solutions, computed or from the cache.
 
     Parameters
     ----------
@@ -116,19 +116,19 @@ def choose(model: Model, numbers: tuple[bytes, ...]) -> Chosen:
 
 
 def _arrays(chosen: Chosen) -> Arrays:
-    """Return the arrays of solutions by names."""
-    found: dict[str, NDArray[Any]] = {"bounds": chosen.bounds}
+    """Return the arrays of solutions by name."""
+    arrays: dict[str, NDArray[Any]] = {"bounds": chosen.bounds}
     for i, (members, solved) in enumerate(chosen.parts):
-        found[f"members_{i}"] = members
-        found |= {f"{row.name}_{i}": getattr(solved, row.name) for row in fields(solved)}
-    return found
+        arrays[f"members_{i}"] = members
+        arrays |= {f"{row.name}_{i}": getattr(solved, row.name) for row in fields(solved)}
+    return arrays
 
 
 def cached(digest: str, compute: Callable[[], Arrays]) -> Arrays:
-    """Return the arrays of an entry of the cache: those on disk, or what `compute` returns, which is kept."""
+    """Return the arrays of an entry of the cache, or compute and store them."""
 
     def dump(arrays: Arrays) -> bytes | None:
-        # arrays that are not kept need no copy either
+        # no copy of arrays that are too large to be stored
         if sum(array.nbytes for array in arrays.values()) > private_cache.MOST_OF_ENTRY:
             return None
         buffer = io.BytesIO()
@@ -143,7 +143,7 @@ def cached(digest: str, compute: Callable[[], Arrays]) -> Arrays:
 
 
 def digest_of(model: Model, numbers: tuple[bytes, ...]) -> str:
-    """Return the digest of all that a reference depends on, with `numbers` as for `choose`."""
+    """Return the digest of everything that a reference depends on, with `numbers` as for `choose`."""
     names = [row.name for row in model.states], [row.name for row in model.parameters]
     formulas = dict(
         zip(model.velocities, map(partial(tree, model), model.accelerations), strict=True)
@@ -162,17 +162,17 @@ def digest_of(model: Model, numbers: tuple[bytes, ...]) -> str:
 
 @cache
 def _surroundings() -> tuple[bytes, ...]:
-    """Return the code that computes references, the libraries, and what the processor can do."""
-    # numpy chooses its functions by the processor
+    """Return the code that computes references, and the versions of libraries with the features of the processor."""
+    # numpy selects its functions by these features
     features = import_module("numpy._core._multiarray_umath").__cpu_features__
-    able = sorted(name for name, has in features.items() if has)
+    available = sorted(name for name, has in features.items() if has)
     libraries = sorted(versions(("numpy", "scipy")).items())
     code = "".join(of_folder(f"vibsim.{room}") for room in ("formula", "models", "simulation"))
-    return code.encode(), repr((libraries, platform.machine(), able)).encode()
+    return code.encode(), repr((libraries, platform.machine(), available)).encode()
 
 
 def computed(model: Model, numbers: tuple[bytes, ...]) -> Chosen:
-    """Compute the solutions of some members; see `choose`."""
+    """Compute the solutions; see `choose`."""
     states = len(model.states)
     columns = [np.frombuffer(column) for column in numbers]
     start, end, rest = np.array(columns[:states]), columns[states], columns[states + 1 :]
@@ -184,36 +184,38 @@ def computed(model: Model, numbers: tuple[bytes, ...]) -> Chosen:
 
 @dataclass
 class _Refined:
-    """Solutions of some members, each finer than the one before."""
+    """A sequence of solutions of members, each with half the step of the previous one."""
 
     held: Sides
     start: Floats
     end: Floats
     plan: Floats | None = None
+    """Pieces of the previous solution (`walk_pieces`)."""
     slid: Flags | None = None
+    """Members that a force held at a jump in the previous solution, shape (case,)."""
 
     def next(self, steps: int) -> tuple[Solved | Pieces, Flags]:
-        """Return the next solution, and for which members no further one is of use."""
+        """Return the next solution, and which members to give up."""
         none = np.zeros(len(self.end), dtype=bool)
         if not self.held.switches:
             force = self.held.force(np.empty((0, len(self.end))))
             return solve(force, self.start, self.end, steps), none
-        found, self.plan, why = walk_pieces(
+        solution, self.plan, why = walk_pieces(
             self.held, self.start, self.end, self.end / steps, self.plan
         )
         before, self.slid = self.slid, why == SLIDING
-        # what seems to slide in steps that are too long does so once
-        return found, (why == ENDLESS) | (none if before is None else self.slid & before)
+        # steps that are too long may slide once by mistake
+        return solution, (why == ENDLESS) | (none if before is None else self.slid & before)
 
-    def missed(self, found: Solved | Pieces, members: Flags) -> Floats:
-        """Return how long a pulse of the force in time lasts that the steps of some members miss, shape (case,).
+    def missed(self, solution: Solved | Pieces, members: Flags) -> Floats:
+        """Return the duration of a pulse of the force in time that the steps of `members` miss, shape (case,).
 
-        Two solutions may agree without it. 0 where there is none, and for other members.
+        Two solutions may agree without it. 0 if there is none, and for other members.
         """
         model, missed = self.held.model, np.zeros(len(members))
         if not (members.any() and varies_in_time(model)):
             return missed
-        solved = of_members(found, members)
+        solved = of_members(solution, members)
         begin, length = solved.begin.T, solved.length.T
         t = (begin[..., None] + length[..., None] * (np.arange(LOOKS) / LOOKS)).reshape(
             len(begin), -1
@@ -227,7 +229,7 @@ class _Refined:
         return missed
 
     def keep(self, members: Flags) -> None:
-        """Go on with some members."""
+        """Continue with these members only."""
         self.held, self.start = self.held.of(members), self.start[:, members]
         self.end = self.end[members]
         self.plan = None if self.plan is None else self.plan[..., members]
@@ -235,33 +237,33 @@ class _Refined:
 
 
 def _accepted(refined: _Refined) -> Chosen:
-    """Refine until two solutions agree, each member on its own."""
+    """Refine until two solutions agree, separately for each member."""
     bounds = np.full((len(refined.start), len(refined.end)), np.nan)
     times = np.arange(COMPARED_TIMES + 1) / COMPARED_TIMES
     left, accepted = np.arange(len(refined.end)), []
     before, gap, slow = None, np.full(len(left), np.inf), np.zeros(len(left), dtype=np.int64)
     steps = FEWEST_STEPS
     while steps <= MOST_STEPS and len(left):
-        solved, hopeless = refined.next(steps)
-        now, goes_on = solved.at(times), ~hopeless
+        solved, is_given_up = refined.next(steps)
+        now, goes_on = solved.at(times), ~is_given_up
         if before is not None:
             size = np.max(np.abs(now), axis=-1)
             error = np.max(np.abs(now - before), axis=-1)
             relative = np.max(error / np.where(size > 0.0, size, 1.0), axis=0)
             gain = gap / relative
             slow = np.where((gain < SLOW) & (relative < RESOLVED), slow + 1, 0)
-            own_steps = np.sum(np.isfinite(solved.length), axis=0, dtype=float)
-            rounding = ROUNDING_BOUND * (1.0 + 0.25 * own_steps**0.5)
+            n_steps = np.sum(np.isfinite(solved.length), axis=0, dtype=float)
+            rounding = ROUNDING_BOUND * (1.0 + 0.25 * n_steps**0.5)
             settled = relative <= np.maximum(rounding, BEST_AGREEMENT)
-            is_there = settled | ((relative <= ACCURATE) & (gain < SLOW))
-            missed = refined.missed(solved, is_there)
-            is_there &= missed == 0.0
-            # no steps will be short enough
+            is_accepted = settled | ((relative <= ACCURATE) & (gain < SLOW))
+            missed = refined.missed(solved, is_accepted)
+            is_accepted &= missed == 0.0
+            # give up if no steps will be short enough for the pulse
             goes_on &= ~((missed > 0.0) & (missed * MOST_STEPS < refined.end))
-            if is_there.any():
-                accepted.append((left[is_there], of_members(solved, is_there)))
-                bounds[:, left[is_there]] = (error + rounding * size)[:, is_there]
-            goes_on &= ~is_there & (slow < 2)
+            if is_accepted.any():
+                accepted.append((left[is_accepted], of_members(solved, is_accepted)))
+                bounds[:, left[is_accepted]] = (error + rounding * size)[:, is_accepted]
+            goes_on &= ~is_accepted & (slow < 2)
             gap = relative
         refined.keep(goes_on)
         before, left, gap, slow = now[:, goes_on], left[goes_on], gap[goes_on], slow[goes_on]
