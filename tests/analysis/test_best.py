@@ -416,6 +416,13 @@ def test_bounds_of_numbers_by_peaks_know_nothing_of_the_rounding_of_roots() -> N
     assert best(record, "frequency")[1] < 1e-9
 
 
+def test_a_sample_has_no_wider_bound_than_the_series() -> None:
+    """Against 2 asin(k sn(K - 20)), k = sin(1/2)."""
+    short = {"time": {"end": 20.0}, "levels": [6, 7, 8, 9], "schemes": ["rk4"]}
+    value, bound = best(analysed(**(PENDULUM | short))[1], "theta_end")
+    assert abs(value - 0.9958006771243681) <= bound < 1e-7
+
+
 def test_a_number_that_has_not_settled_does_not_pass_by_chance() -> None:
     """With 2 to 8 steps a period the ends differ by their size, and nothing bounds the error of the finest one."""
     given = {"model": {"kind": "spring", "w": 20.0}, "initial": {"u": 1.0}, "time": {"end": 5.0}}

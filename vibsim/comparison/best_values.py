@@ -28,7 +28,7 @@ from vibsim.convergence.ladder_blocks import batches
 from vibsim.convergence.number_extrapolation import Limit, limit, observed_order
 from vibsim.core.array_types import Flags, Floats
 from vibsim.core.record import Variable, flags
-from vibsim.core.vocabulary import MEMBER
+from vibsim.core.vocabulary import LEVELS_OF_AN_ORDER, MEMBER
 from vibsim.experiment.value_names import VALUES
 from vibsim.models import Model
 from vibsim.observe import oscillation, spectrum, steady_state
@@ -78,12 +78,21 @@ class _Ladder:
     size: Floats  # that such a number has: of the solution, or of the number itself
     missed: Floats  # what no level shows: of an extremum between points, of a corner of the force; may be infinite
     safety: Floats  # on the bound
+    of_series: Floats  # of a sample its value and bound in the extrapolated series, (..., 2); NaN of all else
 
     def limit(self) -> Limit:
-        """Return the limit."""
+        """Return the limit; where its ladder bounds a sample, that of the series if this bounds it more closely."""
         found = limit(self.values, self.levels, self.order, self.even, self.floor)
         bound = self.safety * found.bound + self.missed
-        return replace(found, bound=np.where(np.isinf(self.missed), np.inf, bound))
+        value, least = np.moveaxis(self.of_series, -1, 0)
+        is_closer = least < bound
+        bound = np.where(is_closer, least, bound)
+        return Limit(
+            np.where(is_closer, value, found.value),
+            np.where(np.isinf(self.missed), np.inf, bound),
+            np.where(is_closer, max(len(self.levels) - 3, 0), found.first),
+            np.where(is_closer, len(self.levels) - 1, found.last),
+        )
 
 
 def _ladder(name: str, place: value_numbers.Place) -> _Ladder:
@@ -122,7 +131,10 @@ def _ladder(name: str, place: value_numbers.Place) -> _Ladder:
         # an event on the mesh is late by an accident
         missed = np.where(np.isnan(block.left_to_the_mesh), missed, np.inf)
     missed = np.where(np.isfinite(block.missed.time), np.inf, missed)
-    return _Ladder(place.levels, values, order, even, floor, size, missed, safety)
+    of_series = np.full((*size.shape, 2), np.nan)
+    if row.is_sample and len(place.levels) >= LEVELS_OF_AN_ORDER:
+        of_series = value_numbers.sample_of_series(place)
+    return _Ladder(place.levels, values, order, even, floor, size, missed, safety, of_series)
 
 
 def _stacked(rows: Sequence[_Ladder]) -> _Ladder:

@@ -88,6 +88,15 @@ def samples(p: Place) -> list[Floats]:
     return [values[..., index] for values in q.values]
 
 
+def sample_of_series(p: Place) -> Floats:
+    """Return the value at a common time in the extrapolated series, and the bound of this, shape (scheme, case, 2)."""
+    q, grid = p.comparison(), p.block.grid
+    index = _index(p, grid.t, grid.stride)
+    if q is None or index is None:
+        return np.stack([p.missing, p.missing], axis=-1)
+    return np.stack([q.extrapolation[0][..., index], q.largest_bound], axis=-1)
+
+
 def _index(p: Place, t: Floats, every: int) -> int | None:
     """Return the index of the sample that is asked for; None where it was not stored."""
     if p.step is not None:
