@@ -1,4 +1,4 @@
-r"""Formulas on series: norms, differences between levels, ratios, orders, coincidence.
+r"""Formulas for series: norms, differences of levels, ratios, orders, coincidence.
 
 With ``u_l = u - h_l^p e_p + ...`` and ``h_l = 2^-l``, two levels differ by ``d = u_l - u_next = -(1 - 1/R) h_l^p e_p``,
 ``R = 2^(p (next - l))``. So ``-R/(R - 1) d`` estimates the error ``exact - u_l`` (-4/3 for neighbours and p = 2), and
@@ -20,7 +20,7 @@ from vibsim.elementary import on_arrays
 from vibsim.elementary.exact import whole_power
 
 SAFE_SQUARES = 1e140
-"""Numbers between this and its inverse have squares whose sums neither overflow nor vanish."""
+"""Sums of squares of numbers between this and its inverse neither overflow nor underflow."""
 
 
 def laid_out(values: Floats) -> Floats:
@@ -29,10 +29,9 @@ def laid_out(values: Floats) -> Floats:
 
 
 def total(values: Floats) -> Floats:
-    """Return the sum over time, shape (...).
+    """Return the sum over time, shape (...), by adding halves to halves.
 
-    The order of the additions depends on the number of points alone, so that a member has the same bits alone and
-    among others: halves are added to halves.
+    The order of the additions depends only on the number of points, so a member has the same bits alone and in a batch.
     """
     while (n := values.shape[-1]) > 1:
         half = n // 2
@@ -44,19 +43,19 @@ def total(values: Floats) -> Floats:
 
 
 def largest(values: Floats) -> Floats:
-    """Return the largest absolute value over time, shape (...); NaN where there is a NaN."""
+    """Return the largest absolute value over time, shape (...); NaN if any value is NaN."""
     return np.asarray(np.maximum(np.max(values, axis=-1), -np.min(values, axis=-1)))
 
 
 def norm(error: Floats, kind: str, spacing: Floats, end_included: bool = True) -> Floats:
     """Return a norm over time.
 
-    ``l1 = dt sum |e|``, ``l2 = sqrt(dt sum e^2)``, ``linf = max |e|``; ``linf_interior`` leaves the end point out.
+    ``l1 = dt sum |e|``, ``l2 = sqrt(dt sum e^2)``, ``linf = max |e|``; ``linf_interior`` excludes the end point.
 
     Parameters
     ----------
     error
-        Shape (..., case, t); the norm has the shape (..., case), and NaN where the series has a NaN.
+        Shape (..., case, t); the norm has the shape (..., case), and is NaN if the series contains NaN.
     spacing
         Distance between the points, shape (case,) or (1,).
     end_included
@@ -73,15 +72,15 @@ def norm(error: Floats, kind: str, spacing: Floats, end_included: bool = True) -
 
 
 def _root_of_squares(error: Floats, spacing: Floats) -> Floats:
-    """Return ``sqrt(dt sum e^2)``, scaled where squares would overflow or vanish.
+    """Return ``sqrt(dt sum e^2)``, scaled if squares would overflow or underflow.
 
-    The scale is a power of two and changes no bit: so it may be left out where no member needs it.
+    The scale is a power of two and changes no bit, so it is left out if no member needs it.
     """
     size = largest(error)
-    usual = (size == 0) | ~np.isfinite(size)
-    if np.all(usual | ((size < SAFE_SQUARES) & (size > 1 / SAFE_SQUARES))):
+    trivial = (size == 0) | ~np.isfinite(size)
+    if np.all(trivial | ((size < SAFE_SQUARES) & (size > 1 / SAFE_SQUARES))):
         return np.asarray(np.sqrt(spacing * total(error * error)))
-    scale = np.ldexp(1.0, np.frexp(np.where(usual, 1.0, size))[1] - 1)
+    scale = np.ldexp(1.0, np.frexp(np.where(trivial, 1.0, size))[1] - 1)
     scaled = error / scale[..., None]
     return np.asarray(scale * np.sqrt(spacing * total(scaled * scaled)))
 
@@ -92,16 +91,16 @@ def gap_ratio(order: Floats | float, gap: int) -> Floats:
 
 
 def error_factor(order: Floats | float, gap: int) -> Floats:
-    """Return ``-R/(R - 1)``, which turns a difference into the error of its coarser level."""
+    """Return ``-R/(R - 1)``, the ratio of the error of the coarser level to the difference."""
     return np.asarray(
         1.0 / on_arrays.expm1(-np.asarray(order, dtype=np.float64) * gap * on_arrays.LN_2)
     )
 
 
 def target_ratio(order: Floats | float, levels: Sequence[float]) -> Floats:
-    """Return the ratio of the two differences of a triple of levels, for an error of one power.
+    """Return the ratio of the two differences of three levels, for an error of one power.
 
-    ``(2^(p a) - 1)/(1 - 2^(-p b))`` for the gaps a and b: 2^p where both are 1, and a/b at p = 0.
+    ``(2^(p a) - 1)/(1 - 2^(-p b))`` for the gaps a and b: 2^p if both are 1, and a/b at p = 0.
     """
     first, second, third = levels
     p = np.asarray(order, dtype=np.float64) * on_arrays.LN_2
@@ -112,9 +111,9 @@ def target_ratio(order: Floats | float, levels: Sequence[float]) -> Floats:
 
 
 def rescaling(order: Floats | float, levels: Sequence[int]) -> Floats:
-    """Return the factor that lays the last difference of `levels` upon the first, for an error of one power.
+    """Return the ratio of the first to the last difference of `levels`, for an error of one power.
 
-    On successive levels it is ``(2^p)^k`` (A, section 2.5); on others the product of the target ratios.
+    It is ``(2^p)^k`` for successive levels (A, section 2.5), and the product of the target ratios in general.
     """
     factor = np.ones_like(np.asarray(order, dtype=np.float64))
     for i in range(len(levels) - 2):
@@ -123,9 +122,9 @@ def rescaling(order: Floats | float, levels: Sequence[int]) -> Floats:
 
 
 def order_of_ratio(ratio: Floats, levels: Sequence[float]) -> Floats:
-    """Solve `target_ratio` for the order; NaN where that is beyond `STEEPEST`, or the ratio not positive and finite.
+    """Solve `target_ratio` for the order; NaN if it exceeds `STEEPEST`, or if the ratio is not positive and finite.
 
-    The ratio grows with the order, so there is one root; it is found by bisection, for all entries at once.
+    The ratio grows with the order, so bisection finds the only root.
     """
     first, second, third = levels
     ratio = np.asarray(ratio, dtype=np.float64)
@@ -146,7 +145,7 @@ def order_of_ratio(ratio: Floats, levels: Sequence[float]) -> Floats:
 
 
 def local_orders(ratios: Floats, levels: Sequence[float]) -> Floats:
-    """Return the order of every three successive of n levels, shape (..., n-2), from the ratios of the differences."""
+    """Return the order of each three successive of n levels, shape (..., n-2), from the ratios of the differences."""
     triples = [levels[i : i + 3] for i in range(len(levels) - 2)]
     if len({b - a for a, b in pairwise(levels)}) == 1 and triples:
         return order_of_ratio(ratios, triples[0])
@@ -155,22 +154,22 @@ def local_orders(ratios: Floats, levels: Sequence[float]) -> Floats:
 
 
 def orders_of_steps(ratios: Floats, h: Floats) -> Floats:
-    """Return `local_orders` of levels with the step sizes `h`, shape (n,)."""
+    """Return `local_orders` for levels with the step sizes `h`, shape (n,)."""
     return local_orders(ratios, (-on_arrays.log2(h)).tolist())
 
 
 def safe_ratio(top: Floats, bottom: Floats) -> Floats:
-    """Return ``top/bottom``, NaN where the bottom is zero or either is not finite."""
+    """Return ``top/bottom``; NaN if the bottom is zero or either is not finite."""
     usable = np.isfinite(top) & np.isfinite(bottom) & (bottom != 0)
     with np.errstate(over="ignore"):
         return np.asarray(np.where(usable, top, np.nan) / np.where(usable, bottom, 1.0))
 
 
 def local_scale(series: Floats) -> Floats:
-    """Return the size of a series in the surroundings of each point, shape (..., t).
+    """Return the size of a series around each point, shape (..., t).
 
-    The smaller of the largest value so far and the largest value still to come: it follows a growing error as well
-    as a decaying one, and does not vanish at a zero crossing between two humps.
+    This is the smaller of the largest value up to the point and the largest value from it on. It follows growing and
+    decaying errors, and does not vanish at a zero crossing between two humps.
     """
     size = np.nan_to_num(np.abs(series), nan=0.0, posinf=0.0)
     before = np.maximum.accumulate(size, axis=-1)
@@ -181,9 +180,8 @@ def local_scale(series: Floats) -> Floats:
 def masked_ratio(first: Floats, second: Floats, floor: Floats | float = 0.0) -> Floats:
     """Return the ratio of successive differences as a function of time.
 
-    Masked (NaN) at a zero crossing of either difference, that is where one is below `ZERO_CROSSING` times its
-    `local_scale` or has another sign than its neighbour, and where the finer one is below `ROUND_OFF_SAFETY` times its
-    round-off floor, of shape (..., 1).
+    It is NaN at zero crossings of either difference, where it is below `ZERO_CROSSING` times its `local_scale` or
+    changes its sign, and where the finer difference is below `ROUND_OFF_SAFETY` times its `floor`, of shape (..., 1).
     """
     keep = np.abs(second) > ROUND_OFF_SAFETY * np.asarray(floor)
     for series in (first, second):
@@ -195,13 +193,13 @@ def masked_ratio(first: Floats, second: Floats, floor: Floats | float = 0.0) -> 
 
 
 def unit(series: Floats, length: Floats) -> Floats:
-    """Return a series over its length; NaN throughout where that is zero or not finite."""
+    """Return a series divided by its length; NaN if that is zero or not finite."""
     usable = np.isfinite(length) & (length != 0)
     return np.asarray(series / np.where(usable, length, np.nan)[..., None])
 
 
 def inner(first: Floats, second: Floats) -> Floats:
-    """Return the cosine of the angle between two series, shape (...); NaN where one of them vanishes."""
+    """Return the cosine of the angle between two series, shape (...); NaN if one of them vanishes."""
     units = [unit(series, norm(series, "l2", np.ones(1))) for series in (first, second)]
     return total(units[0] * units[1])
 
@@ -214,22 +212,22 @@ def proportionality(first: Floats, second: Floats) -> Floats:
 
 
 def coincidence(first: Floats, second: Floats, ratio: Floats) -> Floats:
-    """Return ``||d - R d'|| / ||d||`` in the L2 norm, shape (...): 0 where the rescaled curves coincide.
+    """Return ``||d - R d'|| / ||d||`` in the L2 norm, shape (...): 0 if the rescaled curves coincide.
 
-    R is the ratio that the order gives (`target_ratio`). It is 0 where both differences vanish, NaN where d alone does.
+    R is the `target_ratio` of the order. The result is 0 if both differences vanish, and NaN if only d does.
     """
     one = np.ones(1)
-    whole = norm(first, "l2", one)
+    size = norm(first, "l2", one)
     with np.errstate(over="ignore", invalid="ignore"):
-        rest = norm(first - np.asarray(ratio)[..., None] * second, "l2", one)
-    return np.where((whole == 0) & (rest == 0), 0.0, safe_ratio(rest, whole))
+        residual = norm(first - np.asarray(ratio)[..., None] * second, "l2", one)
+    return np.where((size == 0) & (residual == 0), 0.0, safe_ratio(residual, size))
 
 
 def cosines(rows: Sequence[Floats], kind: str, end_included: bool = True) -> Floats:
-    """Return the cosines of the angles between series, shape (..., row, row); 0 where one of them vanishes.
+    """Return the cosines of the angles between series, shape (..., row, row); 0 if one of them vanishes.
 
-    Each norm sees its own part of the series: for a largest value the points count where one of the series is large
-    (`PEAKS`), and ``linf_interior`` leaves the end point out.
+    They fit the norm: for ``linf`` points are weighted by how large the series are there (`PEAKS`), and
+    ``linf_interior`` excludes the end point.
     """
     if kind == "linf_interior" and end_included:
         rows = [series[..., :-1] for series in rows]
@@ -239,8 +237,8 @@ def cosines(rows: Sequence[Floats], kind: str, end_included: bool = True) -> Flo
         weight = whole_power(np.maximum.reduce(sizes), PEAKS)
         rows = [np.nan_to_num(unit(series, largest(series))) * weight for series in rows]
     units = [np.nan_to_num(unit(series, norm(series, "l2", one, False))) for series in rows]
-    found = np.empty((*units[0].shape[:-1], len(units), len(units)))
+    result = np.empty((*units[0].shape[:-1], len(units), len(units)))
     for i, first in enumerate(units):
         for j, second in enumerate(units[: i + 1]):
-            found[..., i, j] = found[..., j, i] = total(first * second)
-    return found
+            result[..., i, j] = result[..., j, i] = total(first * second)
+    return result

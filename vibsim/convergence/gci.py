@@ -1,18 +1,19 @@
-r"""The grid convergence index: the field's known error bar, beside the bound of
+r"""The grid convergence index: the established error bar, next to the bound of
 `vibsim.convergence.number_extrapolation`.
 
-Of the finest two levels, ``GCI = F |u_fine - u_coarse|/(r^p - 1)`` with the refinement ratio r (P. J. Roache,
+For the finest two levels, ``GCI = F |u_fine - u_coarse|/(r^p - 1)`` with the refinement ratio r (P. J. Roache,
 Perspective: a method for uniform reporting of grid refinement studies, J. Fluids Eng. 116, 1994). It belongs to the
 finest level, not to an extrapolation. The factor F is 1.25 where the observed order of three levels is within a tenth
 of the promised one; elsewhere it is 3, with the observed order kept between 1/2 and the promised one (W. L. Oberkampf
 and C. J. Roy, Verification and Validation in Scientific Computing, 2010, section 8.7). Two levels show no order: F = 3.
 
-Where levels do not converge monotonically, four and more of them are fitted by ``u + c h^p`` with least squares, and
-the index is what L. Eca and M. Hoekstra (J. Comput. Phys. 262, 2014) make of the fit and its scatter; three levels get
-three times their range, as there. Where they do, with another order than the promised one, it is at least that.
+If levels do not converge monotonically, four or more of them are fitted by ``u + c h^p`` with least squares, and the
+index follows from the fit and its scatter (L. Eca and M. Hoekstra, J. Comput. Phys. 262, 2014); three levels get three
+times their range, as there. If they converge monotonically with another order than the promised one, the index is at
+least that of the fit.
 
-It is absolute, in the unit of the number, so that a number may be negative or pass zero; `relative` divides by the
-number where it is not near zero.
+It is absolute, in the unit of the number, so that a number may be negative or cross zero; `relative` divides by the
+number if it is not near zero.
 """
 
 from __future__ import annotations
@@ -37,36 +38,36 @@ CLASSES = (
     "oscillating_divergence",
     "round_off",
 )
-"""How the finest three levels above round-off follow each other; files hold a position here."""
+"""How the finest three levels above round-off converge; files store an index into this tuple."""
 UNKNOWN, MONOTONE, OSCILLATING, DIVERGING, SWINGING, ROUND_OFF = range(len(CLASSES))
 
 
 def classify(values: Floats, levels: Sequence[int], floor: Floats) -> Codes:
-    """Say how numbers converge, as positions in `CLASSES`; arguments as for `number_extrapolation.limit`.
+    """Return how numbers converge, as indices into `CLASSES`; arguments as for `number_extrapolation.limit`.
 
-    ``R`` is the last difference over the one before, of equally spaced levels: monotone for 0 < R < 1, oscillating for
-    -1 < R < 0, diverging beyond.
+    ``R`` is the ratio of the last difference to the previous one: monotone for 0 < R < 1, oscillating for -1 < R < 0,
+    otherwise diverging.
     """
-    found = np.full(values.shape[:-1], UNKNOWN, dtype=np.int8)
+    classes = np.full(values.shape[:-1], UNKNOWN, dtype=np.int8)
     if len(levels) < LEVELS_OF_AN_ORDER:
-        return found
-    found[np.all(np.isfinite(values[..., -3:]), axis=-1)] = ROUND_OFF
+        return classes
+    classes[np.all(np.isfinite(values[..., -3:]), axis=-1)] = ROUND_OFF
     for i in range(len(levels) - 2):
         (first, second), clean = triple_at(values, floor, i)
-        # of levels that do not follow each other, per level
+        # differences per level, if levels are skipped
         a, b = levels[i + 1] - levels[i], levels[i + 2] - levels[i + 1]
         ratio = safe_ratio(second / b, first / a)
         masks = [ratio >= 1, ratio > 0, ratio <= -1, ratio < 0]
         kind = np.select(masks, [DIVERGING, MONOTONE, SWINGING, OSCILLATING], UNKNOWN)
-        found = np.where(clean, kind, found).astype(np.int8)
-    return found
+        classes = np.where(clean, kind, classes).astype(np.int8)
+    return classes
 
 
 def index(values: Floats, levels: Sequence[int], order: Floats, kinds: Codes) -> Floats:
     """Return the grid convergence index of the finest level, shape (...), in the unit of the numbers.
 
-    It is NaN with one level, and where a number does not exist. `kinds` is what `classify` returned; the rest is as for
-    `number_extrapolation.limit`.
+    It is NaN for one level, and where a number does not exist. `kinds` is the result of `classify`; the other arguments
+    are those of `number_extrapolation.limit`.
     """
     n = len(levels)
     if n == 1:
@@ -77,19 +78,19 @@ def index(values: Floats, levels: Sequence[int], order: Floats, kinds: Codes) ->
         gap = levels[-1] - levels[-2]
         if n == 2:
             return np.asarray(error_left(th.GCI_CAUTIOUS * change, gap_ratio(promised, gap)))
-        last = -np.diff(values[..., -3:], axis=-1)
-        observed = order_of_ratio(safe_ratio(last[..., 0], last[..., 1]), levels[-3:])
+        differences = -np.diff(values[..., -3:], axis=-1)
+        observed = order_of_ratio(safe_ratio(differences[..., 0], differences[..., 1]), levels[-3:])
         regular = of_order(change, gap, observed, promised)
         rough = _fitted(values, levels, promised) if n > 3 else _range(values)
         exact = (kinds == ROUND_OFF) & (change == 0.0)
-        sure = _agrees(observed, promised)
+        agrees = _agrees(observed, promised)
         cautious = np.fmax(regular, rough) if n > 3 else regular
-        regular = np.where(sure, regular, cautious)
+        regular = np.where(agrees, regular, cautious)
         return np.where(exact, 0.0, np.where(observed > 0, regular, rough))
 
 
 def of_order(change: Floats, gap: int, observed: Floats, promised: Floats) -> Floats:
-    """Return ``F |change|/(r^p - 1)`` of two levels, from observed and promised order; NaN for one not known."""
+    """Return ``F |change|/(r^p - 1)`` for two levels, from the observed order (NaN if unknown) and the promised one."""
     agrees = _agrees(observed, promised)
     factor = np.where(agrees, th.GCI_TRUSTED, th.GCI_CAUTIOUS)
     capped = np.clip(np.where(np.isfinite(observed), observed, promised), th.GCI_LEAST_ORDER, None)
@@ -102,7 +103,7 @@ def _agrees(observed: Floats, promised: Floats) -> Flags:
 
 
 def relative(index: Floats, value: Floats, scale: Floats) -> Floats:
-    """Return the index over the size of the number; NaN where that is near zero beside the `scale` of such numbers."""
+    """Return the index relative to the number; NaN if that is near zero, compared with the `scale` of such numbers."""
     size = np.abs(value)
     usable = (size > index) & (size > th.GCI_NEAR_ZERO * scale)
     return np.where(usable, safe_ratio(*np.broadcast_arrays(index, size)), np.nan)
@@ -122,19 +123,21 @@ def _fitted(values: Floats, levels: Sequence[int], promised: Floats) -> Floats:
     least = np.full(mean.shape, np.inf)
     index = np.full(mean.shape, np.nan)
     typical = (np.max(u, axis=-1) - np.min(u, axis=-1)) / (m - 1)
-    for part in np.linspace(0.0, 1.0, th.GCI_EXPONENTS):
-        p = th.GCI_LEAST_ORDER + part * np.maximum(promised - th.GCI_LEAST_ORDER, 0.0)
+    for fraction in np.linspace(0.0, 1.0, th.GCI_EXPONENTS):
+        p = th.GCI_LEAST_ORDER + fraction * np.maximum(promised - th.GCI_LEAST_ORDER, 0.0)
         x = on_arrays.power(h, p[..., None])
-        away = x - np.mean(x, axis=-1)[..., None]
-        slope = np.sum(away * (u - mean[..., None]), axis=-1) / np.sum(away * away, axis=-1)
-        rest = u - mean[..., None] - slope[..., None] * away
+        deviation = x - np.mean(x, axis=-1)[..., None]
+        slope = np.sum(deviation * (u - mean[..., None]), axis=-1) / np.sum(
+            deviation * deviation, axis=-1
+        )
+        residual = u - mean[..., None] - slope[..., None] * deviation
         # three numbers are fitted
-        sigma = np.sqrt(np.sum(rest * rest, axis=-1) / (m - 3))
+        sigma = np.sqrt(np.sum(residual * residual, axis=-1) / (m - 3))
         error = np.abs(slope) * x[..., -1]
-        misfit = np.abs(rest[..., -1])
+        misfit = np.abs(residual[..., -1])
         good = sigma < typical
         rough = th.GCI_CAUTIOUS * sigma / typical * (error + sigma + misfit)
-        now = np.where(good, th.GCI_TRUSTED * error + sigma + misfit, rough)
+        candidate = np.where(good, th.GCI_TRUSTED * error + sigma + misfit, rough)
         better = sigma < least
-        least, index = np.where(better, sigma, least), np.where(better, now, index)
+        least, index = np.where(better, sigma, least), np.where(better, candidate, index)
     return np.where(typical > 0, index, 0.0 * typical)

@@ -1,7 +1,7 @@
-"""Ladders that are worked on together: few are put beside each other, many are judged in blocks in their own units.
+"""Batches of ladders: small sets are stacked, large ones are judged in blocks, each ladder scaled to its own size.
 
-A call of an array operation costs as much as hundreds of numbers, so the few ladders of a small experiment are put
-beside each other. Arrays of many more would not stay in the cache of a core. No number depends on it.
+A call of an array operation costs as much as hundreds of numbers, so the few ladders of a small experiment are stacked.
+Arrays of many more would exceed the cache of a core. No result depends on this.
 """
 
 from __future__ import annotations
@@ -17,19 +17,19 @@ from vibsim.convergence.reasons import code
 from vibsim.core.array_types import Floats, Integers
 from vibsim.core.vocabulary import LEVELS_OF_AN_ORDER
 
-LADDERS = 4096
-"""So many ladders at most are put beside each other; one row of more is worked on by itself."""
-BLOCK = 1024
-"""So many ladders are judged together at most."""
+STACKED_LADDERS = 4096
+"""Largest number of ladders that are stacked; a single set of more is processed alone."""
+BLOCK_LADDERS = 1024
+"""Largest number of ladders that are judged at once."""
 LARGEST_RATIO = 1e60
-"""Of a difference to the largest finer one, and of noise to the largest difference: more says no more."""
+"""Limit of the ratio of a difference to the largest finer one, and of noise to the largest difference."""
 
 Row = TypeVar("Row")
 
 
 def batches(rows: Sequence[Row], ladders: int) -> Iterator[Sequence[Row]]:
-    """Yield rows, of so many ladders each, that are worked on together."""
-    size = max(LADDERS // max(ladders, 1), 1)
+    """Yield groups of rows to be stacked; each row has this number of ladders."""
+    size = max(STACKED_LADDERS // max(ladders, 1), 1)
     for start in range(0, len(rows), size):
         yield rows[start : start + size]
 
@@ -37,44 +37,44 @@ def batches(rows: Sequence[Row], ladders: int) -> Iterator[Sequence[Row]]:
 def in_blocks(
     ladder: Ladder, work: Callable[[Ladder, Floats], dict[str, np.ndarray]]
 ) -> dict[str, np.ndarray]:
-    """Return the reasons and the numbers of ladders.
+    """Return the fields of an `Assessment` of ladders, and `sure`.
 
-    `work` gets finite ladders of three levels and more, over their sizes, and the factors on their differences.
+    `work` is called with scaled, finite ladders of at least three levels and the factors of `_scaled`.
     """
     n, count = len(ladder.h), len(ladder.gram)
     finite = np.all(np.isfinite(ladder.gram), axis=(-2, -1)) & np.all(
         np.isfinite(ladder.floor), axis=-1
     )
     reason = np.full(count, code("non_finite"), dtype=np.int8)
-    found = _nothing(count, n) | {"reason": reason}
+    result = _unknown(count, n) | {"reason": reason}
     if n < LEVELS_OF_AN_ORDER:
         reason[finite] = code("too_few_levels")
     else:
-        every = np.flatnonzero(finite)
-        for start in range(0, len(every), BLOCK):
-            rows = every[start : start + BLOCK]
-            part, size, factors = _scaled(ladder, rows)
-            for name, value in work(part, factors).items():
-                in_units = name in ("error", "error_bound", "best_bound")
-                found[name][rows] = value * size if in_units else value
-    return found
+        finite_rows = np.flatnonzero(finite)
+        for start in range(0, len(finite_rows), BLOCK_LADDERS):
+            rows = finite_rows[start : start + BLOCK_LADDERS]
+            block, size, factors = _scaled(ladder, rows)
+            for name, value in work(block, factors).items():
+                has_unit = name in ("error", "error_bound", "best_bound")
+                result[name][rows] = value * size if has_unit else value
+    return result
 
 
-def _nothing(count: int, levels: int) -> dict[str, np.ndarray]:
-    """Return the numbers of ladders of which nothing is known."""
+def _unknown(count: int, levels: int) -> dict[str, np.ndarray]:
+    """Return the fields of undecided ladders, except for the reason."""
     names = ("order", "low", "high", "error", "error_bound", "best_bound")
-    unknown = {name: np.full(count, np.nan) for name in names}
+    numbers = {name: np.full(count, np.nan) for name in names}
     window = {"first": np.zeros(count, dtype=np.int64), "last": np.full(count, levels - 1)}
     weights = np.full((count, levels), np.nan)
     flags = {"contradicted": np.zeros(count, dtype=bool), "sure": np.ones(count, dtype=bool)}
-    return {**unknown, **window, **flags, "weights": weights}
+    return {**numbers, **window, **flags, "weights": weights}
 
 
 def _scaled(ladder: Ladder, rows: Integers) -> tuple[Ladder, Floats, Floats]:
-    """Return some of the ladders over the norm of their largest row, that norm, and a factor on every difference.
+    """Return some ladders divided by the norm of their largest row, that norm, and a factor for each difference.
 
-    Squares of differences that are too large or small for each other would overflow or vanish: coarse levels that have
-    blown up so far are brought nearer.
+    The factors shrink differences of coarse levels that have blown up, whose squares would overflow or make others
+    underflow.
     """
     gram, count = ladder.gram[rows], len(ladder.h) - 1
     norms = np.sqrt(np.diagonal(gram, axis1=1, axis2=2))
@@ -83,13 +83,13 @@ def _scaled(ladder: Ladder, rows: Integers) -> tuple[Ladder, Floats, Floats]:
         for k in range(count - 2, -1, -1):
             ratio = norms[:, k] / np.max((norms * factors)[:, k + 1 : count], axis=-1)
             factors[:, k] = np.where(ratio > LARGEST_RATIO, LARGEST_RATIO / ratio, 1.0)
-    # beside differences of 0 any size will do
+    # next to differences of 0 any factor will do
     factors = np.where(factors > 0.0, factors, 1.0)
     size = np.max(norms * factors, axis=-1)
     size = np.where(size > 0.0, size, 1.0)
-    over = factors / size[:, None]
-    gram = gram * over[:, :, None] * over[:, None, :]
-    # squares of what is larger would overflow
+    scales = factors / size[:, None]
+    gram = gram * scales[:, :, None] * scales[:, None, :]
+    # squares of larger noise would overflow
     floor = np.minimum(ladder.floor[rows] / size[:, None], LARGEST_RATIO)
-    part = replace(ladder, gram=gram, floor=floor, numbers=ladder.numbers[rows])
-    return part, size, factors[:, :count]
+    block = replace(ladder, gram=gram, floor=floor, numbers=ladder.numbers[rows])
+    return block, size, factors[:, :count]

@@ -1,23 +1,23 @@
 r"""The order of convergence as a function of time, from the differences of three successive levels.
 
-The ratio of two differences at one time means nothing where they change their sign, which those of an oscillation do
-twice in a period. So the order at t is that of their sizes in a window around t, half a period long, which holds a zero
-crossing and what lies between two of them:
+The ratio of two differences at one time is meaningless where they change sign, as those of an oscillation do twice per
+period. So the order at t is that of their norms in a window around t, half a period long, which always contains a zero
+crossing and a hump:
 
     p(t) = log2 R(t),     R(t) = ||d_k|| / ||d_(k+1)||,     ||d||^2 = sum of d^2 over the window
 
-(for successive levels; `differences.order_of_ratio` in general). Its interval is that of ``R (1 - e)`` to
+(for successive levels; `differences.order_of_ratio` in general). Its interval is given by ``R (1 - e)`` and
 ``R/(1 - e)`` with
 
     e = || d_k/||d_k|| - d_(k+1)/||d_(k+1)|| ||  +  noise_k/rms_k  +  noise_(k+1)/rms_(k+1)
 
-How far the two curves are from having one shape in the window, and how much of them may be round-off, for which ten
-times the predicted floor is allowed. Where the order
-changes, or two powers of dt are of one size, the curves differ in shape and the interval is wide; it is unbounded where
-e is 1 or more. It tells how well this ratio is known, not what finer levels would show: for that there are the triples.
+This is how far the two curves are from having one shape in the window, plus how much of them may be round-off (ten
+times the predicted floor). Where the order changes, or two powers of dt have similar size, the curves differ in shape
+and the interval is wide; it is unbounded if e is 1 or more. The interval tells how well this ratio is known, not what
+finer levels would show.
 
-The last point of a run has a formula of its own in some schemes (a one-sided velocity). It stands for itself, and the
-other windows leave it out.
+Some schemes have a different formula at the last point of a run (a one-sided velocity). It is compared alone, and all
+windows exclude it.
 
 Source: pendulum lecture, section 2.5 (ratios of differences); the windows are our own.
 """
@@ -34,7 +34,7 @@ from vibsim.core.array_types import Floats, Integers
 
 
 def window_points(width: Floats, spacing: Floats, points: int) -> Integers:
-    """Return how many of the points of a series a window of a width in time has, an odd number, shape (case,)."""
+    """Return the odd number of points of a window with this width in time, shape (case,)."""
     half = np.rint(0.5 * width / spacing)
     most = max((points - 1) // 2, LEAST_WINDOW // 2)
     return np.asarray(2 * np.clip(half, LEAST_WINDOW // 2, most).astype(np.int64) + 1)
@@ -48,7 +48,7 @@ def local_order(
     counts: Integers,
     end_included: bool = True,
 ) -> tuple[Floats, Floats, Floats]:
-    """Return the order at every time, and the ends of its interval.
+    """Return the order at each time, and the ends of its interval.
 
     Parameters
     ----------
@@ -57,7 +57,7 @@ def local_order(
     floors
         Predicted round-off of the two differences at one point, shape (scheme, case).
     counts
-        Points of the window, odd, shape (case,).
+        Number of points of the window, odd, shape (case,).
     end_included
         Whether the last point is the end of the run.
 
@@ -65,43 +65,43 @@ def local_order(
     -------
     tuple of array
         Order, lower end, upper end, shape (scheme, case, t); an end is infinite where the interval is unbounded. All
-        are NaN where the finer difference is below what may be round-off in the whole window, or one vanishes.
+        are NaN where the finer difference may be round-off throughout the window, or a difference vanishes.
     """
     inner = slice(None, -1) if end_included and first.shape[-1] > LEAST_WINDOW else slice(None)
     scale = _scale(first)
     scaled = first * scale, second * scale
-    sums = _by_count([d[..., inner] for d in scaled], counts)
+    sums = _window_means([d[..., inner] for d in scaled], counts)
     noise = tuple(ROUND_OFF_SAFETY * floor[..., None] * scale for floor in floors)
-    ratio, unsure = _compared(sums, noise)
+    ratio, error = _ratio_and_error(sums, noise)
     if inner.stop is not None:
-        ratio, unsure = _with_end(ratio, unsure, scaled, sums, noise)
-    return _interval(ratio, unsure, levels)
+        ratio, error = _append_end(ratio, error, scaled, sums, noise)
+    return _interval(ratio, error, levels)
 
 
 def _scale(series: Floats) -> Floats:
-    """Return a power of two that brings a series to the size of 1, so that squares do not overflow."""
+    """Return a power of two that scales a series to about 1, so that squares do not overflow."""
     size = largest(np.nan_to_num(series, posinf=0.0, neginf=0.0))[..., None]
     return np.ldexp(1.0, -np.frexp(np.where(size > 0, size, 1.0))[1])
 
 
-def _by_count(pair: list[Floats], counts: Integers) -> Floats:
+def _window_means(pair: list[Floats], counts: Integers) -> Floats:
     """Return means of d_k^2, d_(k+1)^2 and d_k d_(k+1) over the window, shape (3, scheme, case, t)."""
     first, second = pair
-    found = np.empty((3, *first.shape))
+    means = np.empty((3, *first.shape))
     for count in np.unique(counts).tolist():
-        chosen = counts == count
-        a, b = first[:, chosen], second[:, chosen]
-        held = box_sum(np.ones(a.shape[-1]), count)
+        members = counts == count
+        a, b = first[:, members], second[:, members]
+        points = box_sum(np.ones(a.shape[-1]), count)
         with np.errstate(over="ignore", invalid="ignore"):
             for row, product in enumerate((a * a, b * b, a * b)):
-                found[row][:, chosen] = box_sum(product, count) / held
-    return found
+                means[row][:, members] = box_sum(product, count) / points
+    return means
 
 
 def box_sum(values: Floats, count: int) -> Floats:
-    """Return the sum over a window of `count` points around every point, an odd number; 0 is beyond the ends.
+    """Return the sum over a window of `count` points, an odd number, around each point; the padding is 0.
 
-    Sums of 2, 4, 8, ... points are put together, so that no sum is the small difference of two large ones.
+    Sums of 2, 4, 8, ... points are combined, so that no sum is the small difference of two large ones.
     """
     edge = [(0, 0)] * (values.ndim - 1) + [(count // 2, count // 2)]
     power, size, offset = np.pad(values, edge), 1, 0
@@ -118,46 +118,46 @@ def box_sum(values: Floats, count: int) -> Floats:
     return total
 
 
-def _compared(sums: Floats, noise: Sequence[Floats]) -> tuple[Floats, Floats]:
-    """Return the ratio of the sizes, and how unsure it is; NaN where there is nothing to compare."""
+def _ratio_and_error(sums: Floats, noise: Sequence[Floats]) -> tuple[Floats, Floats]:
+    """Return the ratio of the norms and its relative error e; NaN where there is nothing to compare."""
     with np.errstate(divide="ignore", invalid="ignore"):
         first, second = np.sqrt(sums[0]), np.sqrt(sums[1])
         cosine = np.clip(sums[2] / (first * second), -1.0, 1.0)
-        unsure = np.sqrt(2.0 - 2.0 * cosine) + noise[0] / first + noise[1] / second
+        error = np.sqrt(2.0 - 2.0 * cosine) + noise[0] / first + noise[1] / second
         usable = (first > 0) & (second > noise[1])
-    return np.where(usable, safe_ratio(first, second), np.nan), np.where(usable, unsure, np.nan)
+    return np.where(usable, safe_ratio(first, second), np.nan), np.where(usable, error, np.nan)
 
 
-def _with_end(
+def _append_end(
     ratio: Floats,
-    unsure: Floats,
+    error: Floats,
     pair: tuple[Floats, Floats],
     sums: Floats,
     noise: Sequence[Floats],
 ) -> tuple[Floats, Floats]:
-    """Append the last point: alone, or with the window before it where it is near a zero crossing."""
+    """Append the last point: compared alone, or, near a zero crossing, with the values of the last window."""
     ends = [np.abs(series[..., -1:]) for series in pair]
-    alone = np.ones(ends[0].shape, dtype=bool)
+    stands_alone = np.ones(ends[0].shape, dtype=bool)
     for end, square in zip(ends, sums, strict=False):
-        alone &= end > LAST_POINT_ALONE * np.sqrt(square[..., -1:])
+        stands_alone &= end > LAST_POINT_ALONE * np.sqrt(square[..., -1:])
     signs = np.sign(pair[0][..., -1:]) * np.sign(pair[1][..., -1:])
     one_point = np.stack([ends[0] ** 2, ends[1] ** 2, signs * ends[0] * ends[1]])
-    own = _compared(one_point, noise)
-    last = [np.where(alone, x, y[..., -1:]) for x, y in zip(own, (ratio, unsure), strict=True)]
-    joined = [np.concatenate(rows, axis=-1) for rows in ((ratio, last[0]), (unsure, last[1]))]
+    at_end = _ratio_and_error(one_point, noise)
+    last = [
+        np.where(stands_alone, x, y[..., -1:]) for x, y in zip(at_end, (ratio, error), strict=True)
+    ]
+    joined = [np.concatenate(rows, axis=-1) for rows in ((ratio, last[0]), (error, last[1]))]
     return joined[0], joined[1]
 
 
-def _interval(
-    ratio: Floats, unsure: Floats, levels: Sequence[int]
-) -> tuple[Floats, Floats, Floats]:
+def _interval(ratio: Floats, error: Floats, levels: Sequence[int]) -> tuple[Floats, Floats, Floats]:
     order = order_of_ratio(ratio, levels)
-    bounded = unsure < 1.0
-    rest = np.where(bounded, 1.0 - unsure, 1.0)
+    bounded = error < 1.0
+    factor = np.where(bounded, 1.0 - error, 1.0)
     ends = []
-    for end, beyond in ((ratio * rest, -np.inf), (ratio / rest, np.inf)):
-        found = order_of_ratio(end, levels)
-        # an end outside of all orders that are sought is none, too
-        found = np.where(bounded & np.isfinite(found), found, beyond)
-        ends.append(np.where(np.isfinite(order), found, np.nan))
+    for end, unbounded in ((ratio * factor, -np.inf), (ratio / factor, np.inf)):
+        order_at_end = order_of_ratio(end, levels)
+        # an end beyond the largest order is unbounded, too
+        order_at_end = np.where(bounded & np.isfinite(order_at_end), order_at_end, unbounded)
+        ends.append(np.where(np.isfinite(order), order_at_end, np.nan))
     return order, ends[0], ends[1]

@@ -1,18 +1,18 @@
-"""The limit of one number over a ladder: its most accurate value, and a bound of the error of that.
+"""The limit of a single number over a ladder: its most accurate value, and a bound of the error of that value.
 
-The scheme and the error bar are those of `vibsim.convergence.extrapolation`. A single number has no curve whose shape
-would tell an accident from an order, so that nothing is believed but what was seen:
+The triangular scheme and the error bar are those of `vibsim.convergence.extrapolation`. A number has no curve whose
+shape would distinguish an order from an accident, so only what the levels show is accepted:
 
-- one more extrapolation is believed where the last changes of the column before it have the ratio of its power;
-- its error is as much as it has changed from row to row, times a safety; a part of that only where the changes fall as
-  the next power does;
-- a change that is smaller than the one before it promises may be passing through zero, and does not count as smaller;
-- an entry that a finer row contradicts is as wrong as the contradiction says, times the same safety;
-- another power than the promised one is believed where the finest two triples of levels show it;
-- where nothing is believed, the finest level stands as it is, with an error of `SPREAD` times what the last levels
-  differ by (L. Eca and M. Hoekstra, 2014). It is unknown where they do not approach each other, if only raggedly.
+- one more extrapolation is accepted if the last changes of the previous column have the ratio of its power;
+- the error of an entry is its change from the previous row times a safety factor; it is less only if the changes fall
+  like the next power;
+- a change that is smaller than the previous one predicts may be crossing zero, and counts as large as predicted;
+- if a finer row contradicts an entry, the error is the contradiction times the same safety factor;
+- another order than the promised one is accepted if the finest two triples of levels show it;
+- if no extrapolation is accepted, the finest level is the result, and its error is `SPREAD` times the range of the last
+  levels (L. Eca and M. Hoekstra, 2014). It is unknown if the levels do not approach each other, not even raggedly.
 
-Round-off is added with the weights of the combination. The entry with the least bound is taken. The factors are
+Round-off is added with the weights of the combination. The entry with the least bound is the result. The factors are
 calibrated: ``docs/method.md``.
 """
 
@@ -37,45 +37,47 @@ from vibsim.core.array_types import Flags, Floats, Integers
 
 @dataclass(frozen=True)
 class Limit:
-    """The best values of some ladders; arrays of shape (...)."""
+    """The best values of ladders; arrays of shape (...)."""
 
-    value: Floats  # the finest level where no extrapolation is believed
-    bound: Floats  # bound of the error; NaN where nothing is known of it
-    first: Integers  # place of the coarsest level that was used
-    last: Integers  # place of the finest one
+    value: Floats  # the finest level if no extrapolation is accepted
+    bound: Floats  # bound of the error; NaN if it is unknown
+    first: Integers  # index of the coarsest level that was used
+    last: Integers  # index of the finest one
 
 
 def limit(
     values: Floats, levels: Sequence[int], order: Floats, even: Flags, floor: Floats
 ) -> Limit:
-    """Find the limits of numbers.
+    """Return the limits of numbers.
 
-    Levels up to the finest one that has no such number are left out: of a motion that is too coarse there is no period.
+    Only levels finer than the last one without a number are used: a motion that is too coarse has no period.
 
     Parameters
     ----------
     values, floor
         The numbers at n levels, NaN where they do not exist, and their predicted round-off, shape (..., n).
     order, even
-        Promised order p, and whether the next power is p + 2 rather than p + 1, shape (...); where the levels show
-        another order, that is taken.
+        Promised order p, and whether the next power is p + 2 rather than p + 1, shape (...). If the levels show
+        another order, that one is used.
     """
     n, unknown = len(levels), np.full(values.shape[:-1], np.nan)
     finest = np.full(values.shape[:-1], n - 1)
-    found = Limit(values[..., -1].copy(), unknown, finest, finest.copy())
+    result = Limit(values[..., -1].copy(), unknown, finest, finest.copy())
     start = np.max(np.where(np.isfinite(values), 0, np.arange(1, n + 1)), axis=-1)
     for k in np.unique(start[start < n]).tolist():
-        own = start == k
-        of = _limit(values[own][:, k:], levels[k:], order[own], even[own], floor[own][:, k:])
-        found.value[own], found.bound[own] = of.value, of.bound
-        found.first[own], found.last[own] = of.first + k, of.last + k
-    return found
+        rows = start == k
+        limits = _limit(
+            values[rows][:, k:], levels[k:], order[rows], even[rows], floor[rows][:, k:]
+        )
+        result.value[rows], result.bound[rows] = limits.value, limits.bound
+        result.first[rows], result.last[rows] = limits.first + k, limits.last + k
+    return result
 
 
 def _limit(
     values: Floats, levels: Sequence[int], order: Floats, even: Flags, floor: Floats
 ) -> Limit:
-    """Find the limits of numbers that exist at every level."""
+    """Return the limits of numbers that exist at every level."""
     n = len(levels)
     finest = np.full(values.shape[:-1], n - 1)
     with np.errstate(all="ignore"):
@@ -90,16 +92,16 @@ def _limit(
 
 
 def observed_order(values: Floats, levels: Sequence[int], floor: Floats) -> Floats:
-    """Return the order of the finest triple whose differences are above round-off, shape (...); NaN without one."""
-    found = np.full(values.shape[:-1], np.nan)
+    """Return the order of the finest triple of levels whose differences exceed round-off, shape (...), or NaN."""
+    order = np.full(values.shape[:-1], np.nan)
     for i in range(len(levels) - 2):
         triple, clean = triple_at(values, floor, i)
-        found = np.where(clean, order_of_ratio(safe_ratio(*triple), levels[i : i + 3]), found)
-    return found
+        order = np.where(clean, order_of_ratio(safe_ratio(*triple), levels[i : i + 3]), order)
+    return order
 
 
 def triple_at(values: Floats, floor: Floats, i: int) -> tuple[tuple[Floats, Floats], Flags]:
-    """Return the two differences of the triple that begins at place i, and whether they are above round-off."""
+    """Return the two differences of the levels i to i + 2, and whether both exceed round-off."""
     with np.errstate(invalid="ignore"):
         first, second = (values[..., k] - values[..., k + 1] for k in (i, i + 1))
         noise = th.ORDER_ABOVE_ROUND_OFF * (floor[..., i + 1] + floor[..., i + 2])
@@ -109,20 +111,20 @@ def triple_at(values: Floats, floor: Floats, i: int) -> tuple[tuple[Floats, Floa
 def _leading(values: Floats, levels: Sequence[int], promised: Floats, floor: Floats) -> Floats:
     """Return the order to extrapolate with: the promised one, or another one that two successive triples show.
 
-    One triple alone may show any order: where an error changes its sign, or on the way to the promised one.
+    One triple may show any order, where an error changes its sign or the levels are not yet asymptotic.
     """
     p = np.where(np.isfinite(promised), promised, th.ORDINARY_ORDER)
-    observed = observed_order(values, levels, floor)
+    measured = observed_order(values, levels, floor)
     earlier = observed_order(values[..., :-1], levels[:-1], floor[..., :-1])
-    likely = np.clip(np.round(2.0 * observed) / 2, 0.5, th.HIGHEST_ORDER)
-    other = np.abs(observed - p) > th.OTHER_ORDER_DISTANCE
-    for order in (earlier, observed):
-        other &= np.abs(order - likely) <= th.HALF_ORDER_TOLERANCE
-    return np.where(other, likely, p)
+    rounded = np.clip(np.round(2.0 * measured) / 2, 0.5, th.HIGHEST_ORDER)
+    is_other = np.abs(measured - p) > th.OTHER_ORDER_DISTANCE
+    for order in (earlier, measured):
+        is_other &= np.abs(order - rounded) <= th.HALF_ORDER_TOLERANCE
+    return np.where(is_other, rounded, p)
 
 
 def _bound_of_finest(values: Floats, levels: Sequence[int], floor: Floats) -> Floats:
-    """Return a bound of the error of the finest level without any order; NaN where the levels do not approach it."""
+    """Return a bound of the error of the finest level that uses no order; NaN if the differences do not fall."""
     n = values.shape[-1]
     if n == 1:
         return np.full(values.shape[:-1], np.nan)
@@ -137,86 +139,88 @@ def _bound_of_finest(values: Floats, levels: Sequence[int], floor: Floats) -> Fl
     for i in range(max(n - 4, 0), n - 2):
         least = target_ratio(th.SLOWEST_ORDER, levels[i : i + 3])
         falls &= change[..., i] >= least * change[..., i + 1]
-    rounding = np.max(change[..., -2:], axis=-1) <= th.FALL_ABOVE_ROUND_OFF * floor[..., -1]
-    found = np.where(falls | rounding, bound, np.nan)
+    is_round_off = np.max(change[..., -2:], axis=-1) <= th.FALL_ABOVE_ROUND_OFF * floor[..., -1]
+    narrow = np.where(falls | is_round_off, bound, np.nan)
     if n < th.RAGGED_LEVELS:
-        return found
-    # an extremum over grid points falls raggedly, as the grid happens to lie
+        return narrow
+    # an extremum over grid points converges raggedly, depending on where the points lie
     recent = values[..., -th.RAGGED_LEVELS :]
     wide = th.SPREAD * (np.max(recent, axis=-1) - np.min(recent, axis=-1)) + noise
     ragged = np.max(change[..., -2:], axis=-1) < th.RAGGED_DECLINE * np.max(
         change[..., :-2], axis=-1
     )
-    return np.where(ragged, np.fmin(found, wide), found)
+    return np.where(ragged, np.fmin(narrow, wide), narrow)
 
 
 def _extrapolated(
     values: Floats, levels: Sequence[int], p: Floats, q: Integers, floor: Floats, best: Limit
 ) -> Limit:
-    """Extrapolate the numbers of each expansion together."""
+    """Extrapolate the numbers, all with the same expansion at once."""
     expansions = np.stack([p, np.broadcast_to(q, p.shape)], axis=-1)
     for order, step in np.unique(expansions[p > 0], axis=0).tolist():
-        own = np.all(expansions == (order, step), axis=-1)
+        rows = np.all(expansions == (order, step), axis=-1)
         scheme = triangular_scheme(steps_of(levels), order, int(step), th.MOST_COLUMNS + 1)
-        found = _Rows(values[own], scheme, floor[own])
-        rows = found.least(Limit(*(of[own] for of in vars(best).values())))
-        for of, new in zip(vars(best).values(), vars(rows).values(), strict=True):
-            of[own] = new
+        tableau = _Rows(values[rows], scheme, floor[rows])
+        improved = tableau.best_entry(Limit(*(old[rows] for old in vars(best).values())))
+        for old, new in zip(vars(best).values(), vars(improved).values(), strict=True):
+            old[rows] = new
     return best
 
 
 class _Rows:
-    """The triangular scheme of numbers of one expansion: rows over levels, lists over columns, arrays of shape (m,)."""
+    """The triangular scheme of m numbers with one expansion: a list over rows of lists over columns of arrays (m,)."""
 
     def __init__(self, values: Floats, scheme: Scheme, floor: Floats) -> None:
         self.scheme, self.floor = scheme, floor
         self.entries: list[list[Floats]] = []
         self.changes: list[list[Floats]] = []
         for i, entries in enumerate(scheme):
-            before = self.entries[-1] if i else []
-            row, changes = next_row(entries[: th.MOST_COLUMNS], values[..., i], before)
+            previous = self.entries[-1] if i else []
+            row, changes = next_row(entries[: th.MOST_COLUMNS], values[..., i], previous)
             self.entries.append(row)
             self.changes.append(changes)
-        few = len(scheme) == 3
-        self.agrees_alone = th.RATIO_TOLERANCE_OF_THREE if few else th.SINGLE_RATIO_TOLERANCE
-        self.safety_alone = th.SAFETY_OF_THREE if few else th.NUMBER_SAFETY_ALONE
-        self.least_part = th.LEAST_SHARE_OF_THREE if few else th.LEAST_SHARE
+        of_three = len(scheme) == 3
+        self.ratio_tolerance = (
+            th.RATIO_TOLERANCE_OF_THREE if of_three else th.SINGLE_RATIO_TOLERANCE
+        )
+        self.single_safety = th.SAFETY_OF_THREE if of_three else th.NUMBER_SAFETY_ALONE
+        self.least_share = th.LEAST_SHARE_OF_THREE if of_three else th.LEAST_SHARE
 
-    def _misfit_of_ratio(self, j: int, i: int) -> Floats:
-        """Return how far the ratio of the changes of column j at rows i - 1 and i is from that of its power."""
+    def _ratio_error(self, j: int, i: int) -> Floats:
+        """Return the relative error of the ratio of the changes of column j at rows i - 1 and i, against its power."""
         wanted = self.scheme[i][j].change_fall
         return np.abs(self.changes[i - 1][j] / (self.changes[i][j] * wanted) - 1.0)
 
-    def _agrees(self, j: int, i: int) -> Flags:
+    def _has_ratio(self, j: int, i: int) -> Flags:
         """Say where the changes of column j up to row i have the ratio of its power."""
         if i < j + 2:
             return np.zeros(self.floor.shape[:-1], dtype=bool)
-        alone = i == j + 2
-        agrees = self._misfit_of_ratio(j, i) <= (self.agrees_alone if alone else th.RATIO_TOLERANCE)
-        if not alone:
-            agrees &= self._misfit_of_ratio(j, i - 1) <= th.PREVIOUS_RATIO_TOLERANCE
+        single = i == j + 2
+        agrees = self._ratio_error(j, i) <= (self.ratio_tolerance if single else th.RATIO_TOLERANCE)
+        if not single:
+            agrees &= self._ratio_error(j, i - 1) <= th.PREVIOUS_RATIO_TOLERANCE
         return np.asarray(agrees)
 
     def _error(self, j: int, i: int) -> Floats:
-        """Return a bound of the error of the entry at row i and column j, j > 0, without round-off."""
-        change, fall, alone = np.abs(self.changes[i][j]), self.scheme[i][j].fall, i == j + 1
-        if alone:
+        """Return a bound of the error of the entry at row i and column j > 0, without round-off."""
+        change, fall, single = np.abs(self.changes[i][j]), self.scheme[i][j].fall, i == j + 1
+        if single:
             taken = np.abs(self.entries[i][j] - self.entries[i][j - 1])
-            change = np.maximum(change, self.least_part * taken)
+            change = np.maximum(change, self.least_share * taken)
         else:
             change = np.maximum(change, np.abs(self.changes[i - 1][j]) / fall)
-        error = (self.safety_alone if alone else th.NUMBER_SAFETY) * change
-        error = np.where(self._agrees(j, i), error_left(error, fall), error)
+        error = (self.single_safety if single else th.NUMBER_SAFETY) * change
+        error = np.where(self._has_ratio(j, i), error_left(error, fall), error)
         for finer in self.entries[i + 1 :]:
             error = np.fmax(error, th.NUMBER_SAFETY * np.abs(self.entries[i][j] - finer[j]))
         return error
 
-    def least(self, best: Limit) -> Limit:
-        """Return the entry with the least bound, or what there is already."""
+    def best_entry(self, best: Limit) -> Limit:
+        """Return the accepted entry with the least bound, or `best` if that is better."""
         for i in range(2, len(self.entries)):
             believed = np.ones(self.floor.shape[:-1], dtype=bool)
             for j in range(1, min(i - 1, th.MOST_COLUMNS) + 1):
-                believed = believed & self._agrees(j - 1, i)
+                believed = believed & self._has_ratio(j - 1, i)
                 floors = [self.floor[..., k] for k in range(i - j, i + 1)]
                 noise = self.scheme[i][j - 1].round_off(floors)
                 bound = self._error(j, i) + th.ROUND_OFF_SAFETY * noise

@@ -1,4 +1,4 @@
-"""Reasons and statuses of verdicts as arrays and files hold them: by their positions in the lists of the vocabulary."""
+"""Reasons and statuses of verdicts as integer codes: their indices in the lists of the vocabulary."""
 
 from __future__ import annotations
 
@@ -11,22 +11,22 @@ from vibsim.core.vocabulary import REASON_NAMES, REASONS, STATUSES
 
 PASS, FAIL, INCONCLUSIVE = map(STATUSES.index, ("PASS", "FAIL", "INCONCLUSIVE"))
 STATUS_OF = np.array([STATUSES.index(status) for status in REASONS.values()], dtype=np.int8)
-"""The status that each of `REASON_NAMES` belongs to."""
+"""Status of each reason code."""
 code = REASON_NAMES.index
-"""The position of a reason."""
+"""Return the code of a reason."""
 
 
 def is_one_of(codes: Codes, *reasons: str) -> Flags:
-    """Say where a reason is one of some."""
+    """Say which codes are among these reasons."""
     return np.isin(codes, [code(reason) for reason in reasons])
 
 
 def is_open(codes: Codes) -> Flags:
-    """Say where a reason is that of a verdict which decides nothing."""
+    """Say which codes are those of INCONCLUSIVE verdicts."""
     return np.asarray(STATUS_OF[codes] == INCONCLUSIVE)
 
 
 def first_reason(cases: Sequence[tuple[Flags, str | Codes]], otherwise: str) -> Codes:
-    """Return the reason of the first case that applies to each result; a case may have a reason for each of them."""
+    """Return the reason of the first case that applies to each ladder; a case may have one reason for each ladder."""
     codes = [code(reason) if isinstance(reason, str) else reason for _, reason in cases]
     return np.select([where for where, _ in cases], codes, code(otherwise))

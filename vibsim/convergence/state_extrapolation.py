@@ -1,20 +1,20 @@
-r"""Extrapolation of a motion over all levels, at every time by itself: which entry to believe how far.
+r"""Extrapolation of a motion over all levels, at each time independently: the best entry and its error bound.
 
-The scheme and the error bar are those of `vibsim.convergence.extrapolation`, with the powers of the scheme.
+The triangular scheme and the error bar are those of `vibsim.convergence.extrapolation`, with the powers of the scheme.
 
-What is known of the error of an entry, besides round-off:
+The error of an entry is estimated, besides round-off, as follows:
 
-- the change ``T[i][j-1] - T[i-1][j-1]`` and the factor K by which it must fall in its column give the error that
-  ``T[i][j-1]`` still has. What was seen to fall by another factor, more or less, is trusted less: `trust` is the worst
-  agreement, a factor, of all columns of the row so far.
-- extrapolating once more divides that error by about as much as extrapolating the last time did, times what the
-  coarser level costs; never by more than `LARGEST_GAIN`.
-- an entry that a finer row contradicts is as wrong as the contradiction says.
+- the change ``T[i][j-1] - T[i-1][j-1]`` and the factor K by which it must fall in its column give the remaining error
+  of ``T[i][j-1]``. If changes fall by another factor, faster or slower, the entry is trusted less: `trust` is the worst
+  agreement, a factor up to 1, over all columns of the row so far.
+- one more extrapolation reduces that error about as much as the last one did, times the cost of the coarser level, and
+  never below `LARGEST_GAIN` of it.
+- if a finer row contradicts an entry, the error is at least the contradiction.
 
-Position and velocity count together, as the larger of du and dv/w: a time at which the error of one happens to cross
-zero is then no time at which it is thought small. For the same reason a change is as large as it has been so far.
+The error is the larger of du and dv/w, so that it is not small where one of them happens to cross zero. For the same
+reason a change at any time is the largest change so far.
 
-The same text works on floats (one member, one time, without numpy's overhead) and on arrays, with the same bits.
+The same code works on floats (one member, one time, without numpy's overhead) and on arrays, with the same bits.
 """
 
 from __future__ import annotations
@@ -33,19 +33,19 @@ from vibsim.convergence.extrapolation import Entry, error_left, next_row, triang
 from vibsim.elementary.exponential import power
 
 LASTING = 2.0**-52
-"""Relative error of what every level has in common: parameters, the step, the elementary functions."""
+"""Relative error that all levels share: rounding of parameters, of the step, and in elementary functions."""
 
 _TINY = 1e-200
 
 
 @dataclass(frozen=True)
 class Arithmetic:
-    """The few functions that floats and arrays do not share. The larger and the smaller ignore NaN."""
+    """The operations that differ between floats and arrays. `larger` and `smaller` ignore NaN."""
 
     larger: Callable[[Any, Any], Any]
     smaller: Callable[[Any, Any], Any]
     choose: Callable[[Any, Any, Any], Any]
-    so_far: Callable[[Any], Any]  # the largest value up to each time; may change what it is given
+    so_far: Callable[[Any], Any]  # running maximum over time; may overwrite its argument
     holds_anywhere: Callable[[Any], Any]
 
 
@@ -64,13 +64,13 @@ def _choose(condition: bool, a: Any, b: Any) -> Any:
 def _so_far(values: Any) -> Any:
     if values.shape[1] < MANY_MEMBERS:
         return np.fmax.accumulate(values, axis=0)
-    for before, now in pairwise(values):
-        np.fmax(before, now, out=now)
+    for previous, current in pairwise(values):
+        np.fmax(previous, current, out=current)
     return values
 
 
 MANY_MEMBERS = 16
-"""From so many members on numpy's own loop over times is slower than one of ours over rows of members."""
+"""From this number of members on, ``np.fmax.accumulate`` is slower than a Python loop over times."""
 
 FLOATS = Arithmetic(_larger, _smaller, _choose, lambda value: value, bool)
 """For one member at one time."""
@@ -80,28 +80,29 @@ ARRAYS = Arithmetic(np.fmax, np.fmin, np.where, _so_far, np.any)
 
 @dataclass(frozen=True)
 class Circumstances:
-    """What is known of the members besides their levels; floats, or arrays that broadcast against (t, case)."""
+    """Facts about the members besides their levels; floats, or arrays that broadcast against (t, case)."""
 
     rate: Any  # w: dv/w counts like du
-    size: Any  # size of the solution over the whole time
-    limit: Any  # an estimated error beyond it is not believed
+    size: Any  # size of the solution over the whole run
+    limit: Any  # larger estimated errors count as unknown
     phase: Any  # w t
-    # ``1/(w end)^p``, which `Tableau.amplification` is to be multiplied with; 0 where disturbances do not grow
-    response: Any
-    noise: Any  # round-off so far over its prediction relative to 1; at least `size`
-    # part of the response to a lasting disturbance that is the response to one passing: ``max(1, w t)``, or 1 where the
-    # noise was not measured
+    response: (
+        Any  # ``1/(w end)^p``, the factor of `Tableau.amplification`; 0 if disturbances do not grow
+    )
+    noise: Any  # round-off so far, in units of its prediction for a solution of size 1; at least `size`
+    # ratio of the responses to a lasting and to a momentary disturbance: ``max(1, w t)``, or 1 if the noise was not
+    # measured
     spread: Any
 
 
 class Best(NamedTuple):
-    """The best entry at every time of every member; floats, or arrays of shape (t, case)."""
+    """The best entry at each time of each member; floats, or arrays of shape (t, case)."""
 
     position: Any
     velocity: Any
-    error: Any  # bound for the position, and over w the velocity; infinite if not known
-    # which entry: its row times the number of levels, plus its column. Where nothing is known of the error, the finest
-    # level; -1 where that has failed
+    error: Any  # bound of the errors of the position and of velocity/w; infinite if unknown
+    # row of the entry times the number of levels, plus its column: the finest level if the error is unknown, -1 if that
+    # level failed
     entry: Any
 
 
@@ -111,18 +112,20 @@ Pair = tuple[Any, Any]
 
 @dataclass(frozen=True)
 class Tableau:
-    """What the steps of the levels say; one for every scheme with its options."""
+    """The coefficients that depend only on the steps of the levels and on the scheme with its options."""
 
     entries: tuple[tuple[Entry, ...], ...]  # row i holds the entries j = 1, ..., i
-    round_off: tuple[tuple[float, ...], ...]  # of the same entries, relative to the solution
-    # row i: times the change of its level and ``1/(w end)^p`` this is the response of the motion to a lasting relative
-    # disturbance of its equation: the scheme itself disturbs it by ``(w h)^p / (2 (p+1)!)``, for central differences
+    round_off: tuple[
+        tuple[float, ...], ...
+    ]  # round-off of the same entries, relative to the solution
+    # Row i times the change of its level times ``1/(w end)^p`` is the response of the motion to a lasting relative
+    # disturbance of its equation. (Central differences disturb it by ``(w h)^p / (2 (p+1)!)``.)
     amplification: tuple[float, ...]
 
 
 @lru_cache(maxsize=256)
 def tableau(steps: tuple[int, ...], p: int, q: int, round_off: tuple[float, ...]) -> Tableau:
-    """Return the tableau of a ladder; `round_off` is relative, of every level. See `triangular_scheme` for the rest."""
+    """Return the tableau of a ladder; `round_off` is that of each level, relative. See `triangular_scheme`."""
     rows = triangular_scheme(steps, p, q)
     noise = tuple(
         tuple(entry.round_off(round_off[i - j : i + 1]) for j, entry in enumerate(row, start=1))
@@ -140,92 +143,99 @@ class _Row(NamedTuple):
 
     position: list[Any]
     velocity: list[Any]
-    changes: list[Any]  # from the row before, so far
-    bounds: list[Any]  # bounds of the errors of truncation of columns 1, 2, ...
+    changes: list[Any]  # largest changes so far from the previous row
+    bounds: list[Any]  # bounds of the truncation errors of columns 1, 2, ...
 
 
 def best_entry(
-    table: Tableau, levels: Sequence[Pair], known: Circumstances, of: Arithmetic = ARRAYS
+    table: Tableau, levels: Sequence[Pair], facts: Circumstances, ops: Arithmetic = ARRAYS
 ) -> Best:
-    """Extrapolate, and choose the entry with the least bound at every time of every member.
+    """Extrapolate, and return the entry with the least bound at each time of each member.
 
     Parameters
     ----------
     levels
-        Position and velocity of every level, from coarse to fine; NaN where a level has failed.
+        Position and velocity of each level, from coarse to fine; NaN where a level failed.
     """
     row = _Row([levels[0][0]], [levels[0][1]], [], [])
-    found: list[tuple[int, Pair, Any]] = []
+    candidates: list[tuple[int, Pair, Any]] = []
     response: Any = 0.0
     noise = lasting = response
     for i, level in enumerate(levels[1:], start=1):
-        finer = _next_row(table.entries[i], level, row, known, of)
+        finer = _next_row(table.entries[i], level, row, facts, ops)
         for j in range(1, i):
-            # at least as wrong as the finer row says
-            bound = of.larger(row.bounds[j - 1], finer.changes[j])
+            # the error is at least the difference from the finer row
+            bound = ops.larger(row.bounds[j - 1], finer.changes[j])
             floor = noise * table.round_off[i - 1][j - 1] + lasting
-            found.append(
+            candidates.append(
                 ((i - 1) * len(levels) + j, (row.position[j], row.velocity[j]), bound + floor)
             )
-        response = of.larger(table.amplification[i] * known.response * finer.changes[0], response)
-        noise = of.larger(response / known.spread, known.noise) * th.ROUND_OFF_SAFETY
-        lasting = LASTING * (known.size * (1.0 + known.phase) + response)
+        response = ops.larger(table.amplification[i] * facts.response * finer.changes[0], response)
+        noise = ops.larger(response / facts.spread, facts.noise) * th.ROUND_OFF_SAFETY
+        lasting = LASTING * (facts.size * (1.0 + facts.phase) + response)
         row = finer
     last = len(levels) - 1
     for j in range(1, last + 1):
         floor = noise * table.round_off[last][j - 1] + lasting
-        found.append(
+        candidates.append(
             (last * len(levels) + j, (row.position[j], row.velocity[j]), row.bounds[j - 1] + floor)
         )
-    return _least(found, levels[-1], last * len(levels), of)
+    return _least(candidates, levels[-1], last * len(levels), ops)
 
 
-def _least(found: Sequence[tuple[int, Pair, Any]], finest: Pair, code: int, of: Arithmetic) -> Best:
+def _least(
+    candidates: Sequence[tuple[int, Pair, Any]], finest: Pair, finest_entry: int, ops: Arithmetic
+) -> Best:
     """Return the entries with the least bounds; among equals that of the finest row and the last column."""
     position, velocity = finest
     is_finite = (position - position) + (velocity - velocity) == 0.0
-    entry, error = of.choose(is_finite, code, -1), of.choose(is_finite, math.inf, math.inf)
-    for number, (x, y), bound in reversed(found):
+    entry, error = (
+        ops.choose(is_finite, finest_entry, -1),
+        ops.choose(is_finite, math.inf, math.inf),
+    )
+    for entry_number, (x, y), bound in reversed(candidates):
         better = bound < error
-        if of.holds_anywhere(better):
-            # what is not finite fails the comparison
+        if ops.holds_anywhere(better):
+            # false for entries that are not finite
             better = better & ((x - x) + (y - y) == 0.0)
-            position, velocity = of.choose(better, x, position), of.choose(better, y, velocity)
-            error, entry = of.choose(better, bound, error), of.choose(better, number, entry)
+            position, velocity = ops.choose(better, x, position), ops.choose(better, y, velocity)
+            error, entry = ops.choose(better, bound, error), ops.choose(better, entry_number, entry)
     return Best(position, velocity, error, entry)
 
 
 def _next_row(
-    entries: Sequence[Entry], level: Pair, row: _Row, known: Circumstances, of: Arithmetic
+    entries: Sequence[Entry], level: Pair, row: _Row, facts: Circumstances, ops: Arithmetic
 ) -> _Row:
-    """Return the row of a level from the row of the level before, without its round-off."""
+    """Return the row of a level, with bounds that exclude round-off; `row` is the previous one."""
     position, dx = next_row(entries, level[0], row.position)
     velocity, dy = next_row(entries, level[1], row.velocity)
-    changes, bounds, lefts = list[Any](), list[Any](), list[Any]()
+    changes, bounds, all_remaining = list[Any](), list[Any](), list[Any]()
     trust: Any = 1.0
     for j, entry in enumerate(entries):
-        change = of.so_far(of.larger(abs(dx[j]), abs(dy[j]) / known.rate)) + _TINY
+        change = ops.so_far(ops.larger(abs(dx[j]), abs(dy[j]) / facts.rate)) + _TINY
         changes.append(change)
-        left = change
+        remaining = change
         if entry.change_fall:
             fall = row.changes[j] / (change * entry.change_fall) + _TINY
-            trust = of.smaller(of.smaller(fall, 1.0 / fall), trust)
-            is_known = fall == fall
+            trust = ops.smaller(ops.smaller(fall, 1.0 / fall), trust)
+            has_fall = fall == fall
         if j or entry.change_fall:
-            left = error_left(change, of.larger(entry.fall * trust, th.LEAST_FALL))
+            remaining = error_left(change, ops.larger(entry.fall * trust, th.LEAST_FALL))
         if j == 0 and entry.change_fall:
-            left = of.choose(is_known, left, change)
+            remaining = ops.choose(has_fall, remaining, change)
         if j > 1:
-            gain = of.smaller(entry.coarser * lefts[-1] / lefts[-2], 1.0)
-            left = of.larger(lefts[-1] * gain, left)
-        bound = of.choose(th.STATE_SAFETY * left > known.limit, math.inf, th.STATE_SAFETY * left)
+            gain = ops.smaller(entry.coarser * all_remaining[-1] / all_remaining[-2], 1.0)
+            remaining = ops.larger(all_remaining[-1] * gain, remaining)
+        bound = ops.choose(
+            th.STATE_SAFETY * remaining > facts.limit, math.inf, th.STATE_SAFETY * remaining
+        )
         if j:
             safety = (
                 th.GAIN_SAFETY if len(entries) > 2 or entry.change_fall else th.FIRST_GAIN_SAFETY
             )
-            gain = safety * entry.coarser * left / (lefts[-1] * trust)
-            bound = bound * of.larger(of.smaller(gain, 1.0), th.LARGEST_GAIN)
-            bounds[-1] = of.larger(entry.factor * change, bounds[-1])
-        lefts.append(left)
+            gain = safety * entry.coarser * remaining / (all_remaining[-1] * trust)
+            bound = bound * ops.larger(ops.smaller(gain, 1.0), th.LARGEST_GAIN)
+            bounds[-1] = ops.larger(entry.factor * change, bounds[-1])
+        all_remaining.append(remaining)
         bounds.append(bound / (trust * trust + _TINY))
     return _Row(position, velocity, changes, bounds)

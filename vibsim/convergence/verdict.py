@@ -1,37 +1,37 @@
-r"""The verdict: may the observed order of a ladder of levels be believed?
+r"""The verdict: does a ladder of levels show the expected order?
 
-A pure function of the numbers of a ladder, for any number of ladders at once. Leading dimensions ``...`` are ladders
+A pure function of the data of a ladder, for any number of ladders at once. Leading dimensions ``...`` are ladders
 (scheme, case); n is the number of levels.
 
-The error model decides on the order (`vibsim.convergence.assessment`). Facts that no ladder shows come first, or set
-limits to it. The first line that applies decides:
+The error model decides on the order (`vibsim.convergence.assessment`). Facts that levels cannot show precede it or
+limit it. The first row that applies decides:
 
-| what is known | status and reason |
+| condition | status and reason |
 |---|---|
 | the quantity does not exist, or the scheme has no levels | ``not_applicable`` |
-| w dt beyond the stability limit, or growth that refinement does not remove | ``unstable`` |
-| a level that broke down | ``non_finite`` |
+| w dt exceeds the stability limit, or refinement does not remove growth | ``unstable`` |
+| a level broke down | ``non_finite`` |
 | fewer than three levels | ``too_few_levels`` |
-| a pulse of the force that no level sees, and no exact solution that says it does not matter | ``non_smooth`` for a \
-jump, else ``pre_asymptotic`` |
-| nothing moves wherever levels are compared | ``not_applicable``; ``pre_asymptotic`` where the exact solution moves |
-| a velocity that is gone within a step of every level, and no order that is expected | ``pre_asymptotic`` |
-| all differences are round-off, and an ordinary error would show | ``exact``; ``wrong_limit`` away from the exact \
+| no level sees a pulse of the force, and no exact solution shows that it does not matter | ``non_smooth`` for a jump, \
+else ``pre_asymptotic`` |
+| nothing moves where levels are compared | ``not_applicable``; ``pre_asymptotic`` if the exact solution moves |
+| a velocity decays within a step of every level, and the order is not the expected one | ``pre_asymptotic`` |
+| all differences are round-off, but an ordinary error would show | ``exact``; ``wrong_limit`` away from the exact \
 solution |
-| exactness is promised, and a difference is none of round-off | ``order_low`` |
-| the finest differences may be round-off, and the error model believes no order | ``round_off`` |
+| exactness is promised, but a difference exceeds round-off | ``order_low`` |
+| the finest differences may be round-off, and the error model decides no order | ``round_off`` |
 | the error model finds alternating errors | ``oscillating`` |
 | ... another limit than the exact solution | ``wrong_limit`` |
-| ... the expected order, and no promised power may hide behind it | ``asymptotic`` |
-| ... a lower order, which no corner of the force within a step explains | ``order_low`` |
-| such a corner explains an order below the expected one, or one power less beside a point of all levels | \
+| ... the expected order, and it hides no promised power | ``asymptotic`` |
+| ... a lower order that no corner of the force within a step explains | ``order_low`` |
+| such a corner explains an order below the expected one, or one power less next to a point of all levels | \
 ``non_smooth`` |
-| the error model finds a higher order, and no promised power may hide behind it | ``order_high`` |
+| the error model finds a higher order, and it hides no promised power | ``order_high`` |
 | events are left to the mesh, or a corner leaves less than the expected order | ``non_smooth`` |
-| anything else | ``pre_asymptotic`` |
+| otherwise | ``pre_asymptotic`` |
 
-Where levels differ by more than the solution, the error model decides nothing. Where events are left to the mesh, or
-corners to a table, only the power that they leave is regular.
+If levels differ by more than the solution, the error model decides nothing. If events are left to the mesh, or corners
+to a table, only the power that they leave counts.
 """
 
 from __future__ import annotations
@@ -50,12 +50,12 @@ from vibsim.convergence.evidence import (
     Evidence,
     at_rest,
     at_round_off,
-    beside_each_other,
     breakdown,
     errors_stay,
     far_from_exact,
     is_noise,
     pick,
+    stacked,
     truly_exact,
     unresolved,
 )
@@ -68,21 +68,21 @@ from vibsim.elementary import on_arrays
 
 @dataclass(frozen=True)
 class Judgement:
-    """What was decided of every ladder; arrays of shape (...)."""
+    """The verdicts on ladders; arrays of shape (...)."""
 
     status: Codes  # index into `vocabulary.STATUSES`
     reason: Codes  # index into `vocabulary.REASON_NAMES`
-    order: Floats  # the stated order; NaN where none is
-    low: Floats  # lower end of its interval; NaN where nothing is decided
+    order: Floats  # measured order; NaN if there is none
+    low: Floats  # lower end of its interval; NaN for INCONCLUSIVE
     high: Floats  # upper end of its interval
-    first: Integers  # coarsest level that the order rests on; -1 where there is no order
-    last: Integers  # finest level that the order rests on; -1 where there is no order
-    culprit: Integers  # the coarsest level that failed, or is beyond the limit; -1 for none
-    orders: Floats = field(repr=False)  # local order of every triple, shape (..., n-2)
+    first: Integers  # coarsest level that the order rests on; -1 without an order
+    last: Integers  # finest level that the order rests on; -1 without an order
+    culprit: Integers  # coarsest level that failed or exceeds the stability limit; -1 for none
+    orders: Floats = field(repr=False)  # local order of each triple, shape (..., n-2)
 
 
 def judge(e: Evidence) -> Judgement:
-    """Decide on every ladder; see the head of this module."""
+    """Return the verdicts on ladders by the table in the docstring of this module."""
     shape, levels = e.difference.shape[:-1], np.array(e.levels, dtype=np.int64)
     orders = local_orders(safe_ratio(e.difference[..., :-1], e.difference[..., 1:]), e.levels)
     broken, beyond, growing = breakdown(e)
@@ -101,18 +101,17 @@ def judge(e: Evidence) -> Judgement:
         cases.append((np.ones(shape, dtype=bool), "too_few_levels"))
     else:
         judged = e.applicable & ~undefined & ~fails & ~growing
-        believed = _believed(e, judged)
-        read, lower, noise = _cases(e, believed, orders)
-        cases += read
-        # the order of noise is none
+        decision = _decisions(e, judged)
+        decided, lower, noise = _cases(e, decision, orders)
+        cases += decided
+        # noise has no order
         stated = judged & ~noise & ~(np.isinf(e.order) & at_round_off(e))
         order, low, high = (
-            np.where(stated, x, np.nan) for x in (believed.order, lower, believed.high)
+            np.where(stated, x, np.nan) for x in (decision.order, lower, decision.high)
         )
-        first, last = (np.where(stated, levels[x], -1) for x in (believed.first, believed.last))
-    # without a case that applies it is not yet asymptotic
+        first, last = (np.where(stated, levels[x], -1) for x in (decision.first, decision.last))
     reason = first_reason(cases, "pre_asymptotic")
-    # a last estimate is no order of which one could say how surely it is known
+    # an undecided order is a mere estimate, without an interval
     guess = is_open(reason)
     return Judgement(
         status=STATUS_OF[reason],
@@ -127,10 +126,10 @@ def judge(e: Evidence) -> Judgement:
     )
 
 
-def _believed(e: Evidence, judged: Flags) -> Decision:
-    """Return what the error model says of the ladders that it is asked about, and of all others that they are noise."""
+def _decisions(e: Evidence, judged: Flags) -> Decision:
+    """Return the decisions of the error model on the ladders to be judged; all others count as noise."""
     shape, n = judged.shape, len(e.levels)
-    found = Decision(
+    decision = Decision(
         reason=np.full(shape, code("round_off"), dtype=np.int8),
         order=np.full(shape, np.nan),
         low=np.full(shape, np.nan),
@@ -141,37 +140,37 @@ def _believed(e: Evidence, judged: Flags) -> Decision:
     )
     rows = np.concatenate([e.difference, e.error[..., None]], axis=-1)
     keys = np.stack([np.isfinite(e.error), _expected(e), _is_theory(e)], axis=-1)
-    # differences that all vanish have no size
+    # differences that all vanish have no scale
     judged = judged & np.any(e.difference > 0.0, axis=-1)
     for key in np.unique(keys[judged].astype(np.float64), axis=0):
-        chosen = judged & np.all(keys == key, axis=-1)
+        members = judged & np.all(keys == key, axis=-1)
         exact_known, expected, by_theory = key.tolist()
         count = n if exact_known else n - 1
-        sizes = rows[chosen][:, :count]
-        unit = np.max(sizes, axis=-1, keepdims=True)
-        sizes = sizes / unit
+        sizes = rows[members][:, :count]
+        scale = np.max(sizes, axis=-1, keepdims=True)
+        sizes = sizes / scale
         ladder = Ladder(
             h=on_arrays.power(2.0, -np.array(e.levels, dtype=np.float64)),
-            gram=e.cosines[chosen][:, :count, :count] * sizes[:, :, None] * sizes[:, None, :],
-            floor=e.floor[chosen] / unit,
-            numbers=e.numbers[chosen],
+            gram=e.cosines[members][:, :count, :count] * sizes[:, :, None] * sizes[:, None, :],
+            floor=e.floor[members] / scale,
+            numbers=e.numbers[members],
             exact_known=bool(exact_known),
         )
-        # what is exact is recognised by the predicted round-off of the scheme
+        # exactness is decided by `truly_exact`, from the predicted round-off of the scheme
         question = Question(
             expected=expected,
             tolerance=e.tolerance,
             noise_factor=0.0,
             by_theory=bool(by_theory),
         )
-        a = decide(ladder, question)
-        for name, values in vars(found).items():
-            values[chosen] = getattr(a, name)
-    return found
+        answer = decide(ladder, question)
+        for name, values in vars(decision).items():
+            values[members] = getattr(answer, name)
+    return decision
 
 
 def _expected(e: Evidence) -> Floats:
-    """Return the order that is expected; where it is exactness, the order that an ordinary error has."""
+    """Return the expected order; if exactness is expected, the order of an ordinary error."""
     return np.where(np.isinf(e.order), th.ORDINARY_ORDER, e.order)
 
 
@@ -182,68 +181,70 @@ def _is_theory(e: Evidence) -> Flags:
 
 
 def _cases(
-    e: Evidence, b: Decision, orders: Floats
+    e: Evidence, decision: Decision, orders: Floats
 ) -> tuple[list[tuple[Flags, str]], Floats, Flags]:
-    """Return the cases of ladders of three levels and more, first to last.
+    """Return the cases of ladders with at least three levels, in the order of the table.
 
-    With them the lower end of the interval, which reaches to a promised power that may hide, and where all is noise.
+    Also return the lower end of the interval, extended to a promised power that may hide, and where all is noise.
     """
-    says = partial(is_one_of, b.reason)
-    exactly, tol, p = np.isinf(e.order), e.tolerance, _expected(e)
-    noise = says("exact") | (says("round_off", "pre_asymptotic") & is_noise(e))
-    exact = (exactly | noise) & truly_exact(e)
-    # levels that differ by more than the solution have nothing to do with it yet
-    near = pick(e.difference, b.last - 1) <= e.scale
+    has = partial(is_one_of, decision.reason)
+    exact_promised, tol, p = np.isinf(e.order), e.tolerance, _expected(e)
+    noise = has("exact") | (has("round_off", "pre_asymptotic") & is_noise(e))
+    exact = (exact_promised | noise) & truly_exact(e)
+    # levels that differ by more than the solution are not near it yet
+    near = pick(e.difference, decision.last - 1) <= e.scale
     right, low, high, missed = (
-        says(reason) & near for reason in ("asymptotic", "order_low", "order_high", "wrong_limit")
+        has(reason) & near for reason in ("asymptotic", "order_low", "order_high", "wrong_limit")
     )
-    alternating = says("oscillating")
-    # neither the higher order nor a failure of the promised one, until the levels exclude this or show it
-    hides = is_promise_hidden(e, np.where(noise, np.nan, b.order), b.last)
-    lower = np.where(hides, np.minimum(b.low, e.promised), b.low)
-    hidden = hides & (p >= e.promised - tol)
-    # any other power is the accident of where events or corners lie between grid points
-    left, rough = e.left_to_the_mesh, ~np.isnan(e.left_to_the_mesh)
-    regular = ~rough | (np.abs(b.order - left) <= tol)
-    # two levels may then be near each other, and both be away from the exact solution; so may those be that show only
-    # the higher power
-    missed &= ~(rough | ~np.isnan(e.corner) | hides) | errors_stay(e)
-    # a corner leaves all powers up to its own: a ladder that settles lower has another cause
-    below = (b.order < p - tol) | np.any(orders[..., -2:] < (p - tol)[..., None], axis=-1)
-    kinked = ~np.isnan(e.corner) & (p >= e.corner) & (below | alternating | noise)
-    # three levels beside a corner may have any order: the powers that are believed tell
-    deeper = b.high < e.corner - np.maximum(tol, th.HALF_SPACING)
-    # beside a point that all levels share a corner leaves one power less, until steps are shorter than that distance
-    one_less = np.abs(b.order - (e.corner - 1.0)) <= np.maximum(tol, th.HALF_SPACING)
-    for_now = e.near_a_point & one_less & (e.promised >= e.corner)
-    # finer levels show the power of the corner, not p: those that do not yet are no reason to add some
+    alternating = has("oscillating")
+    # the levels show a higher order, but do not exclude the promised power
+    may_hide = is_promise_hidden(e, np.where(noise, np.nan, decision.order), decision.last)
+    lower = np.where(may_hide, np.minimum(decision.low, e.promised), decision.low)
+    hidden = may_hide & (p >= e.promised - tol)
+    # another power results by accident from where events or corners lie between grid points
+    mesh_power, rough = e.left_to_the_mesh, ~np.isnan(e.left_to_the_mesh)
+    regular = ~rough | (np.abs(decision.order - mesh_power) <= tol)
+    # in these cases levels may be near each other and yet away from the exact solution
+    missed &= ~(rough | ~np.isnan(e.corner) | may_hide) | errors_stay(e)
+    # a corner leaves all powers below its own intact: a lower order has another cause
+    below = (decision.order < p - tol) | np.any(orders[..., -2:] < (p - tol)[..., None], axis=-1)
+    corner_explains = ~np.isnan(e.corner) & (p >= e.corner) & (below | alternating | noise)
+    # three levels next to a corner may have any order: use the interval
+    deeper = decision.high < e.corner - np.maximum(tol, th.HALF_SPACING)
+    # next to a point of all levels a corner leaves one power less, until steps are shorter than its distance
+    one_less = np.abs(decision.order - (e.corner - 1.0)) <= np.maximum(tol, th.HALF_SPACING)
+    temporary = e.near_a_point & one_less & (e.promised >= e.corner)
+    # finer levels would show the power of the corner, not p
     limited = e.corner < p - tol
     far = far_from_exact(e)
-    still = at_rest(e) & (exactly | noise)
-    # what no level sees, no difference tells of: an exact solution alone would say that it does not matter
-    blind = e.missed & (missed | ((exact | noise | exactly) & far) | np.isnan(e.error))
-    # an implicit scheme with long steps goes on with a velocity that has gone, and that is no fault of it
+    still = at_rest(e) & (exact_promised | noise)
+    # differences cannot show what no level sees; only an exact solution could show that it does not matter
+    blind = e.missed & (missed | ((exact | noise | exact_promised) & far) | np.isnan(e.error))
+    # an implicit scheme with long steps keeps a velocity that has decayed, which is no fault of the scheme
     coarse = unresolved(e) & (exact | missed | low | high)
     return (
         [
             (blind & e.jumps, "non_smooth"),
             (blind, "pre_asymptotic"),
-            # at rest on every level, and away from a motion: steps as long as that see nothing of it
+            # at rest on every level, but the exact solution moves: the steps are too long to see it
             (still & far, "pre_asymptotic"),
             (still, "not_applicable"),
             (coarse, "pre_asymptotic"),
-            # levels that notice their events at the same points are no closer to the exact solution for that
+            # levels may locate their events at the same wrong points
             (exact & far & rough, "non_smooth"),
             (exact & far, "wrong_limit"),
             (exact, "exact"),
-            (exactly & ~at_round_off(e), "order_low"),
+            (exact_promised & ~at_round_off(e), "order_low"),
             (noise & (e.moved == 0.0) & far, "pre_asymptotic"),
-            (exactly | (noise & (at_round_off(e) | ~(rough | kinked))), "round_off"),
-            (alternating & ~rough & ~kinked, "oscillating"),
+            (
+                exact_promised | (noise & (at_round_off(e) | ~(rough | corner_explains))),
+                "round_off",
+            ),
+            (alternating & ~rough & ~corner_explains, "oscillating"),
             (missed, "wrong_limit"),
-            (right & regular & ~hidden & ~for_now, "asymptotic"),
-            (low & regular & (~kinked | deeper) & ~for_now, "order_low"),
-            (kinked | for_now, "non_smooth"),
+            (right & regular & ~hidden & ~temporary, "asymptotic"),
+            (low & regular & (~corner_explains | deeper) & ~temporary, "order_low"),
+            (corner_explains | temporary, "non_smooth"),
             (high & ~rough & ~hidden, "order_high"),
             (e.missed & e.jumps, "non_smooth"),
             (e.missed, "pre_asymptotic"),
@@ -255,8 +256,8 @@ def _cases(
 
 
 def judge_together(rows: Sequence[Evidence]) -> list[Judgement]:
-    """Decide on several sets of ladders at once, of the same shape, levels and tolerance; see `batches`."""
-    found = vars(judge(beside_each_other(rows)))
-    # what is kept of one does not keep the others
-    parts = [{name: of[i].copy() for name, of in found.items()} for i in range(len(rows))]
+    """Judge several sets of ladders with the same shape, levels and tolerance at once; see `batches`."""
+    fields = vars(judge(stacked(rows)))
+    # copies, so that keeping one set does not keep all in memory
+    parts = [{name: values[i].copy() for name, values in fields.items()} for i in range(len(rows))]
     return [Judgement(**part) for part in parts]

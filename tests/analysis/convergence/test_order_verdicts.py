@@ -11,7 +11,7 @@ from ladders import T, Truth, evidence_of, random_truth, shape_in_time
 
 from vibsim.convergence import verdict
 from vibsim.convergence.evidence import Evidence
-from vibsim.convergence.ladder_blocks import LADDERS, batches
+from vibsim.convergence.ladder_blocks import STACKED_LADDERS, batches
 from vibsim.convergence.verdict import judge, judge_together
 from vibsim.core.vocabulary import NORMS, REASON_NAMES, STATUSES
 
@@ -573,10 +573,12 @@ def test_ladders_judged_together_are_judged_as_alone() -> None:
     assert hidden > 3
 
 
-@pytest.mark.parametrize("ladders", [0, 1, 7, LADDERS - 1, LADDERS, 3 * LADDERS])
+@pytest.mark.parametrize(
+    "ladders", [0, 1, 7, STACKED_LADDERS - 1, STACKED_LADDERS, 3 * STACKED_LADDERS]
+)
 def test_batches_hold_every_row_once_and_few_ladders(ladders: int) -> None:
     rows = tuple(range(31))
     found = [list(part) for part in batches(rows, ladders)]
     assert [row for part in found for row in part] == list(rows)
-    assert all(len(part) == 1 or len(part) * ladders <= LADDERS for part in found)
+    assert all(len(part) == 1 or len(part) * ladders <= STACKED_LADDERS for part in found)
     assert not list(batches((), ladders))

@@ -17,7 +17,7 @@ from vibsim.core.array_types import Floats
 from vibsim.core.signatures import misfit, takes_by_name
 
 GAUSS = 5
-"""Points of the quadrature that makes the average of a function over a cell, in each dimension."""
+"""Points per dimension of the Gauss quadrature that averages a function over a cell."""
 
 
 @dataclass(frozen=True)
@@ -28,17 +28,17 @@ class CommonValues:
     """Shape (n, *points), the coarsest level first."""
     dims: tuple[str, ...]
     coords: Mapping[str, NDArray[Any]]
-    """Of the dimensions that have any, at the common points."""
+    """Coordinates of the common points, for the dimensions that have any."""
     epsilon: Floats
-    """Relative spacing of the precision of every level, shape (n,)."""
+    """Machine epsilon of the precision of each level, shape (n,)."""
     kind: str
     """One of `vibsim.core.vocabulary.RESTRICTIONS`."""
     interpolation_order: int | None
-    """Order of the error of an interpolation; None where no value was interpolated."""
+    """Order of the interpolation error; None if no value was interpolated."""
     notes: tuple[str, ...] = ()
-    """What else may be wrong with the points, for a verdict that does not pass with an expected order above 1."""
+    """Possible faults of the points, for a verdict that does not pass with an expected order above 1."""
     parts: tuple[str, ...] = ()
-    """Which part of the points is compared, where it is not all of them."""
+    """Which part of the points is compared, if not all."""
 
 
 def common_values(
@@ -51,7 +51,7 @@ def common_values(
     levels
         All with the same dimensions, in any order.
     kind
-        How: one of `vibsim.core.vocabulary.RESTRICTIONS`.
+        One of `vibsim.core.vocabulary.RESTRICTIONS`.
     dims
         Names of the dimensions that are refined; None for all. The others must be the same on every level.
     fixed
@@ -60,7 +60,7 @@ def common_values(
     Raises
     ------
     InputError
-        Where the levels have no common points.
+        If the levels have no common points.
     """
     levels = in_common_units(levels)
     first = levels[0]
@@ -80,18 +80,18 @@ def common_values(
     notes, parts, interpolated = [], [], False
     for axis, dim in enumerate(first.dims):
         lengths = [array.shape[axis] for array in arrays]
-        of_levels = [level.coords.get(dim) for level in levels]
-        found = (
-            restriction.common(dim, kind, of_levels, lengths)
+        coordinates = [level.coords.get(dim) for level in levels]
+        shared = (
+            restriction.common(dim, kind, coordinates, lengths)
             if dim in refined and dim not in fixed
-            else restriction.same_points(dim, of_levels, lengths)
+            else restriction.same_points(dim, coordinates, lengths)
         )
-        arrays = [r.of(a, axis) for r, a in zip(found.restrictions, arrays, strict=True)]
-        if found.coordinate is not None:
-            coords[dim] = found.coordinate
-        interpolated |= found.interpolated
-        notes += [found.note] if found.note else []
-        parts += [found.part] if found.part else []
+        arrays = [r.of(a, axis) for r, a in zip(shared.restrictions, arrays, strict=True)]
+        if shared.coordinate is not None:
+            coords[dim] = shared.coordinate
+        interpolated |= shared.interpolated
+        notes += [shared.note] if shared.note else []
+        parts += [shared.part] if shared.part else []
     order = restriction.INTERPOLATION_ORDERS[kind] if interpolated else None
     epsilon = np.array([level.epsilon for level in levels])
     return CommonValues(
@@ -104,7 +104,7 @@ def _listed(dims: Sequence[str]) -> str:
 
 
 def _finite_throughout(values: Floats, dims: Sequence[str], fixed: Sequence[str]) -> Floats:
-    """Return values, NaN throughout where one is not finite: the common points alone may not show it."""
+    """Return values, all NaN if any is not finite, since the common points might not include that one."""
     axes = tuple(axis for axis, dim in enumerate(dims) if dim not in fixed)
     return np.where(np.all(np.isfinite(values), axis=axes, keepdims=True), values, np.nan)
 
@@ -116,34 +116,35 @@ def _transposed(level: GridValues, dims: Sequence[str]) -> Floats:
 def exact_values(exact: Any, common: CommonValues, *, members: bool = False) -> Floats:
     """Return the exact values at the common points, shape (*points).
 
-    `exact` is a number, an array, an xarray object, or a function of the coordinates, which it gets as arrays that can
-    be broadcast: by name where its parameters have the names of the dimensions, else in the order of these. Where
-    averages of cells are compared, the function is averaged over each cell. Of `members` the first dimension is no
-    coordinate of that function.
+    `exact` is a number, an array, an xarray object, or a function of the coordinates. The function gets arrays that can
+    be broadcast: by name if its parameters have the names of the dimensions, otherwise in the order of the dimensions.
+    If cell averages are compared, it is averaged over each cell. With `members` the first dimension is not an argument.
 
     Raises
     ------
     InputError
-        Where it has other points, or values that are no real numbers.
+        If it has other points, or values that are not finite real numbers.
     """
     shape = common.values.shape[1:]
     if callable(exact):
-        found = _of_function(exact, common, common.dims[1:] if members else common.dims)
+        result = _of_function(exact, common, common.dims[1:] if members else common.dims)
     else:
-        given = grid_values(exact, "exact")
-        named = bool(given.coords) or set(given.dims) == set(common.dims)
-        if named and not set(given.dims) <= set(common.dims):
-            raise refused("exact", _listed(given.dims), f"the values have {_listed(common.dims)}")
-        found = given.values
+        labelled = grid_values(exact, "exact")
+        named = bool(labelled.coords) or set(labelled.dims) == set(common.dims)
+        if named and not set(labelled.dims) <= set(common.dims):
+            raise refused(
+                "exact", _listed(labelled.dims), f"the values have {_listed(common.dims)}"
+            )
+        result = labelled.values
         if named:
-            inner = [dim for dim in common.dims if dim in given.dims]
-            found = _at_common_points(_transposed(given, inner), given, inner, common)
-            places = [slice(None) if dim in inner else None for dim in common.dims]
-            found = found[tuple(places)]
+            present = [dim for dim in common.dims if dim in labelled.dims]
+            result = _at_common_points(_transposed(labelled, present), labelled, present, common)
+            index = [slice(None) if dim in present else None for dim in common.dims]
+            result = result[tuple(index)]
     try:
-        values = np.broadcast_to(found, shape)
+        values = np.broadcast_to(result, shape)
     except ValueError:
-        rule = f"has shape {found.shape}, and the common points have {shape}"
+        rule = f"has shape {result.shape}, and the common points have {shape}"
         raise refused("exact", "values", rule) from None
     if not np.isfinite(values).all():
         raise refused("exact", "values", "must be finite")
@@ -151,16 +152,16 @@ def exact_values(exact: Any, common: CommonValues, *, members: bool = False) -> 
 
 
 def _at_common_points(
-    values: Floats, given: GridValues, dims: Sequence[str], common: CommonValues
+    values: Floats, labelled: GridValues, dims: Sequence[str], common: CommonValues
 ) -> Floats:
-    """Take the values at the common points, where these are known."""
+    """Return the values at the common points, for the dimensions with coordinates."""
     for axis, dim in enumerate(dims):
-        if dim in given.coords and dim in common.coords:
-            places = restriction.positions(common.coords[dim], given.coords[dim])
-            if places is None:
+        if dim in labelled.coords and dim in common.coords:
+            index = restriction.positions(common.coords[dim], labelled.coords[dim])
+            if index is None:
                 rule = f"must be given at the {len(common.coords[dim])} common points of the levels"
                 raise refused("exact", f"coordinates {dim}", rule)
-            values = np.take(values, places, axis)
+            values = np.take(values, index, axis)
     return values
 
 
@@ -175,15 +176,15 @@ def _of_function(exact: Callable[..., Any], common: CommonValues, dims: Sequence
         rule = f"must be a function of {_listed(dims)}, takes {misfits[0]}"
         raise refused("exact", "a function", rule)
 
-    def at(grids: Sequence[Floats]) -> Any:
+    def evaluate(grids: Sequence[Floats]) -> Any:
         return exact(**dict(zip(dims, grids, strict=True))) if by_name else exact(*grids)
 
     points = [np.asarray(common.coords[dim], dtype=np.float64) for dim in dims]
     if common.kind != "mean":
         grids = np.meshgrid(*points, indexing="ij", sparse=True)
-        return real(np.asarray(at(grids)), "exact")[0]
+        return real(np.asarray(evaluate(grids)), "exact")[0]
     nodes, weights = np.polynomial.legendre.leggauss(GAUSS)
-    flat = []
+    nodes_of_cells = []
     for x in points:
         if len(x) < 2:
             raise refused(
@@ -193,11 +194,11 @@ def _of_function(exact: Callable[..., Any], common: CommonValues, dims: Sequence
             [[1.5 * x[0] - 0.5 * x[1]], 0.5 * (x[1:] + x[:-1]), [1.5 * x[-1] - 0.5 * x[-2]]]
         )
         middle, half = 0.5 * (edges[1:] + edges[:-1]), 0.5 * np.diff(edges)
-        flat.append((middle[:, None] + half[:, None] * nodes).ravel())
-    grids = np.meshgrid(*flat, indexing="ij", sparse=True)
-    found, _ = real(np.asarray(at(grids)), "exact")
-    found = np.broadcast_to(found, [len(x) for x in flat])
+        nodes_of_cells.append((middle[:, None] + half[:, None] * nodes).ravel())
+    grids = np.meshgrid(*nodes_of_cells, indexing="ij", sparse=True)
+    result, _ = real(np.asarray(evaluate(grids)), "exact")
+    result = np.broadcast_to(result, [len(x) for x in nodes_of_cells])
     for axis, x in enumerate(points):
-        shape = (*found.shape[:axis], len(x), GAUSS, *found.shape[axis + 1 :])
-        found = np.tensordot(found.reshape(shape), 0.5 * weights, axes=([axis + 1], [0]))
-    return found
+        shape = (*result.shape[:axis], len(x), GAUSS, *result.shape[axis + 1 :])
+        result = np.tensordot(result.reshape(shape), 0.5 * weights, axes=([axis + 1], [0]))
+    return result

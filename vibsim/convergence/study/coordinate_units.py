@@ -1,4 +1,4 @@
-"""Coordinates of all levels in the unit of the coarsest one: many programs choose that of times for each file."""
+"""Conversion of coordinates to the units of the coarsest level: many programs choose the unit of times per file."""
 
 from __future__ import annotations
 
@@ -23,51 +23,51 @@ SECONDS: Mapping[str, float] = MappingProxyType(
         for end in ("", "s")
     }
 )
-"""Seconds of a unit of time, by the names that CF conventions and xarray give it."""
+"""Length of units of time [s], by their names in CF conventions and xarray."""
 SINCE = " since "
-"""Between the unit of a date and the date that it is counted from."""
+"""Separates the unit of a date from its reference date."""
 
 
 def in_common_units(levels: Sequence[GridValues]) -> list[GridValues]:
-    """Return levels, the coarsest first, with coordinates in its units: times are converted.
+    """Return the levels, the coarsest first, with all times converted to its units.
 
     Raises
     ------
     InputError
-        Where other coordinates, or the values, have other units than those of the coarsest level.
+        If the values, or coordinates that are not times, differ in their units from the coarsest level.
     """
-    first, found = levels[0], []
+    first, converted = levels[0], []
     for i, level in enumerate(levels):
         if first.units and level.units and level.units != first.units:
             raise _other_units(i, level.name or "values", level.units, first.units)
         coords = dict(level.coords)
         for dim, unit in level.units_of_coords.items():
-            of_first = first.units_of_coords.get(dim, unit)
-            if unit == of_first or not (unit[0] and of_first[0]):
+            common_unit = first.units_of_coords.get(dim, unit)
+            if unit == common_unit or not (unit[0] and common_unit[0]):
                 continue
-            change = _change(unit, of_first)
+            change = _change(unit, common_unit)
             if change is None:
-                raise _other_units(i, dim, unit[0], of_first[0])
+                raise _other_units(i, dim, unit[0], common_unit[0])
             factor, shift = change
             coords[dim] = np.asarray(coords[dim], dtype=np.float64) * factor + shift
-        found.append(replace(level, coords=coords))
-    return found
+        converted.append(replace(level, coords=coords))
+    return converted
 
 
 def _change(unit: tuple[str, str], other: tuple[str, str]) -> tuple[float, float] | None:
-    """Return by which factor and then by how much times change from a unit, with its calendar, to another; or None."""
+    """Return the factor and the shift that convert times from a unit and calendar to another; None if impossible."""
     (length, _, date), (other_length, _, other_date) = (
         text.partition(SINCE) for text, _ in (unit, other)
     )
-    seconds, of_other = (SECONDS.get(text.strip().lower()) for text in (length, other_length))
+    seconds, other_seconds = (SECONDS.get(text.strip().lower()) for text in (length, other_length))
     later = _seconds_between(other_date.strip(), date.strip())
-    if seconds is None or of_other is None or later is None or unit[1] != other[1]:
+    if seconds is None or other_seconds is None or later is None or unit[1] != other[1]:
         return None
-    return seconds / of_other, later / of_other
+    return seconds / other_seconds, later / other_seconds
 
 
 def _seconds_between(first: str, second: str) -> float | None:
-    """Return how many seconds later the second date is; None where one of them is no date."""
+    """Return the second date minus the first [s]; None if one of them is not a date."""
     if first == second:
         return 0.0
     if not (first and second):
@@ -80,8 +80,8 @@ def _seconds_between(first: str, second: str) -> float | None:
         return None
 
 
-def _other_units(level: int, name: str, units: str, of_first: str) -> Exception:
-    rule = f"has the unit {units}, the coarsest level has {of_first}"
+def _other_units(level: int, name: str, units: str, coarsest: str) -> Exception:
+    rule = f"has the unit {units}, the coarsest level has {coarsest}"
     return refused(
         f"level {level} (from the coarsest)", name, rule, "give all levels the same units"
     )

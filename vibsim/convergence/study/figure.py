@@ -1,4 +1,4 @@
-"""The picture of a ladder: errors and differences against the step size, and the rescaled differences of a series."""
+"""The figure of a ladder: errors and differences against the step size, and the rescaled differences of a series."""
 
 from __future__ import annotations
 
@@ -16,19 +16,19 @@ if TYPE_CHECKING:
     from vibsim.convergence.study.verdict import LadderVerdict
 
 WIDTH, HEIGHT = 9.0, 3.8
-"""Of the figure [inch]."""
+"""Size of the figure [inch]."""
 ERROR, DIFFERENCE = "#0072B2", "#D55E00"
 """Colours of Okabe and Ito (2008), for the colour-blind."""
 CURVES = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
 DASHES: tuple[Any, ...] = ("-", (0, (5, 2)), (0, (1.2, 1.6)), (0, (6, 2, 1.2, 2)), (0, (9, 2)))
 FEW_DECADES = 1.5
-"""Of an axis whose ticks are not at powers of ten alone."""
+"""An axis up to this length has minor ticks between powers of ten."""
 LEAST, MOST = 1e-290, 1e290
-"""Of a logarithmic axis."""
+"""Smallest and largest values on a logarithmic axis."""
 
 
 def convergence_figure(verdict: LadderVerdict) -> Figure:
-    """Return the figure of a verdict; of a series it has a second panel."""
+    """Return the figure of a verdict, with a second panel for a series."""
     from matplotlib.figure import Figure
 
     has_curves = shows_curves(verdict)
@@ -41,14 +41,14 @@ def convergence_figure(verdict: LadderVerdict) -> Figure:
 
 
 def shows_curves(verdict: LadderVerdict) -> bool:
-    """Say whether a verdict is of a series, whose differences can be drawn."""
+    """Say whether the verdict is on a series, whose differences can be drawn."""
     return len(verdict.dims) == 1 and len(verdict.values) > 1 and verdict.values.shape[1] > 1
 
 
 def slope(verdict: LadderVerdict) -> float | None:
-    """Return the order that a picture shows for comparison: the expected one, else the observed one."""
-    found = verdict.expected or verdict.at_least or verdict.order
-    return found if found and found > 0.0 else None
+    """Return the order of the reference line: the expected one, or else the observed one."""
+    order = verdict.expected or verdict.at_least or verdict.order
+    return order if order and order > 0.0 else None
 
 
 def _sizes(ax: Axes, verdict: LadderVerdict) -> None:
@@ -56,7 +56,7 @@ def _sizes(ax: Axes, verdict: LadderVerdict) -> None:
     h = np.array([level.h for level in verdict.levels])
     word = "error" if verdict.is_exact_known else "estimated error"
     norm = "" if verdict.is_number else ", root mean square"
-    drawn = []
+    curves = []
     for entries, text, colour, marker in (
         ([level.error for level in verdict.levels], f"{word}{norm}", ERROR, "o"),
         (
@@ -70,17 +70,17 @@ def _sizes(ax: Axes, verdict: LadderVerdict) -> None:
         sizes = np.where((sizes > LEAST) & (sizes < MOST), sizes, np.nan)
         if np.isfinite(sizes).any():
             ax.plot(h, sizes, color=colour, marker=marker, markersize=5, label=text)
-            drawn.append(sizes)
+            curves.append(sizes)
     ax.set_xlabel(verdict.size_name)
     ax.set_title("Error and difference against the step size", fontsize="medium", loc="left")
-    if not drawn:
+    if not curves:
         ax.text(0.5, 0.5, "nothing to draw", transform=ax.transAxes, ha="center", va="center")
         return
     ax.set_xscale("log")
     ax.set_yscale("log")
-    # the slope for comparison may leave the frame
+    # the reference line may leave the frame
     ax.set_ylim(*ax.get_ylim())
-    _reference(ax, verdict, h, drawn[0])
+    _reference(ax, verdict, h, curves[0])
     _plain_ticks(ax, h)
     ax.legend(fontsize="small", loc="best")
 
@@ -112,7 +112,7 @@ def _plain_ticks(ax: Axes, h: Floats) -> None:
 
     ticks = [h[-1]]
     for size in h[::-1]:
-        # labels of neighbours that are too near would lie on each other
+        # skip labels that would overlap
         if np.log10(size / ticks[-1]) > 0.12 * np.log10(h[0] / h[-1]):
             ticks.append(size)
     ax.xaxis.set_major_locator(FixedLocator(ticks))
@@ -129,7 +129,7 @@ def _plain_ticks(ax: Axes, h: Floats) -> None:
 
 
 def _curves(ax: Axes, verdict: LadderVerdict) -> None:
-    """Draw the differences of successive levels, each rescaled to the error that it predicts for the finest level."""
+    """Draw the differences of successive levels, each rescaled to its estimate of the error of the finest level."""
     dim = verdict.dims[0]
     h = np.array([level.h for level in verdict.levels])
     count = verdict.values.shape[1]
@@ -141,9 +141,9 @@ def _curves(ax: Axes, verdict: LadderVerdict) -> None:
             factor = 1.0 / ((h[k] / h[-1]) ** order - (h[k + 1] / h[-1]) ** order)
             curve = factor * (verdict.values[k] - verdict.values[k + 1])
         curve = np.where(np.abs(curve) < MOST, curve, np.nan)
-        look = {"color": CURVES[k % len(CURVES)], "linestyle": DASHES[k % len(DASHES)]}
+        style = {"color": CURVES[k % len(CURVES)], "linestyle": DASHES[k % len(DASHES)]}
         label = f"{verdict.size_name} = {number(float(h[k]), 3)} and {number(float(h[k + 1]), 3)}"
-        ax.plot(x if is_numeric else np.arange(count), curve, linewidth=1.3, label=label, **look)
+        ax.plot(x if is_numeric else np.arange(count), curve, linewidth=1.3, label=label, **style)
     ax.yaxis.set_major_formatter(lambda value, _: number(value, 3))
     ax.set_xlabel(dim if dim in verdict.coords and is_numeric else "point")
     ax.set_title(f"Differences, rescaled with order {order:.3g}", fontsize="medium", loc="left")

@@ -1,4 +1,4 @@
-"""The values of one level with the names of their dimensions and their coordinates, whatever a user gave them as."""
+"""The values of one level with the names and coordinates of their dimensions, from any input that `judge` accepts."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from vibsim.core.array_types import Floats
 
 DOUBLE = float(np.finfo(np.float64).eps)
 NO_UNIT = "1"
-"""The unit of a number without one, by CF conventions."""
+"""CF conventions: the unit of a dimensionless number."""
 
 
 @dataclass(frozen=True)
@@ -25,14 +25,14 @@ class GridValues:
     values: Floats
     dims: tuple[str, ...]
     coords: Mapping[str, NDArray[Any]] = field(default_factory=dict)
-    """Of those dimensions that have coordinates, shape (length,): numbers, or labels."""
+    """Numbers or labels, shape (length,), of each dimension that has coordinates."""
     name: str = ""
     epsilon: float = DOUBLE
-    """Distance of neighbouring numbers near 1 in the precision that the values were computed in."""
+    """Machine epsilon of the precision of the values."""
     units: str = ""
-    """As the user gave them."""
+    """Unit from the attributes."""
     units_of_coords: Mapping[str, tuple[str, str]] = field(default_factory=dict)
-    """Empty of coordinates without one; with the calendar of dates."""
+    """Unit (empty if there is none) and calendar of each coordinate."""
     written: Decimal | None = None
     """A number with the digits that it was written with."""
 
@@ -43,7 +43,7 @@ def grid_values(value: Any, key: str) -> GridValues:
     Raises
     ------
     InputError
-        Where it is none of them, or does not hold real numbers.
+        If it is none of these, or does not hold real numbers.
     """
     if isinstance(value, GridValues):
         return value
@@ -58,8 +58,14 @@ def grid_values(value: Any, key: str) -> GridValues:
         value = value[names[0]]
     if hasattr(value, "dims") and hasattr(value, "coords"):
         dims = tuple(map(str, value.dims))
-        own = {str(n): c for n, c in value.coords.items() if tuple(map(str, c.dims)) == (str(n),)}
-        coords = {name: plain_coordinate(np.asarray(own[name])) for name in dims if name in own}
+        index_coords = {
+            str(n): c for n, c in value.coords.items() if tuple(map(str, c.dims)) == (str(n),)
+        }
+        coords = {
+            name: plain_coordinate(np.asarray(index_coords[name]))
+            for name in dims
+            if name in index_coords
+        }
         numbers, epsilon = real(np.asarray(value), key)
         return GridValues(
             numbers,
@@ -68,7 +74,7 @@ def grid_values(value: Any, key: str) -> GridValues:
             str(value.name or ""),
             epsilon,
             units_in(getattr(value, "attrs", {}))[0],
-            {name: units_in(own[name].attrs) for name in coords},
+            {name: units_in(index_coords[name].attrs) for name in coords},
         )
     try:
         array = value if isinstance(value, np.ma.MaskedArray) else np.asarray(value)
@@ -79,13 +85,13 @@ def grid_values(value: Any, key: str) -> GridValues:
 
 
 def units_in(attributes: Mapping[Any, Any]) -> tuple[str, str]:
-    """Return unit and calendar of a variable with these attributes; empty without a unit."""
+    """Return the unit, empty if there is none, and the calendar from the attributes of a variable."""
     unit = str(attributes.get("units", ""))
     return ("" if unit == NO_UNIT else unit), str(attributes.get("calendar", "standard"))
 
 
 def real(array: NDArray[Any], key: str) -> tuple[Floats, float]:
-    """Return an array as double-precision numbers, and the relative spacing of the precision that it had."""
+    """Return an array in double precision, and the machine epsilon of its original precision."""
     if array.dtype.kind == "c":
         raise refused(
             key, str(array.dtype), "must be real", "judge real and imaginary part separately"
@@ -94,13 +100,13 @@ def real(array: NDArray[Any], key: str) -> tuple[Floats, float]:
         raise refused(key, array.dtype.name, "must hold numbers")
     if array.size == 0:
         raise refused(key, f"shape {array.shape}", "must not be empty")
-    of_floats = array.dtype.kind == "f" and array.dtype.itemsize <= 8
-    epsilon = float(np.finfo(array.dtype).eps) if of_floats else DOUBLE
+    is_float = array.dtype.kind == "f" and array.dtype.itemsize <= 8
+    epsilon = float(np.finfo(array.dtype).eps) if is_float else DOUBLE
     return np.ma.filled(array.astype(np.float64), np.nan), epsilon
 
 
 def plain_coordinate(coordinate: NDArray[Any]) -> NDArray[Any]:
-    """Return a coordinate as numbers: times in nanoseconds, so that they can be compared; labels stay as they are."""
+    """Return a coordinate that can be compared: times become integers in nanoseconds, all else is unchanged."""
     if coordinate.dtype.kind in "mM":
         unit = "timedelta64[ns]" if coordinate.dtype.kind == "m" else "datetime64[ns]"
         return coordinate.astype(unit).astype(np.int64)

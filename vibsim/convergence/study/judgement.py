@@ -69,32 +69,31 @@ def judge(
     Parameters
     ----------
     h
-        Step size of every level, in any order: positive, all different, in any ratio. Where several sizes are refined
-        together, a mapping from names to such lists. The order then counts powers of the first one. The others need
-        not be proportional to it, but must decrease with it.
+        Step size of each level, in any order: positive, all different, in any ratio. If several sizes are refined
+        together, a mapping from names to such lists. The order then refers to the first one. The others need not be
+        proportional to it, but must decrease with it.
     values
-        The result of every level, in the order of `h`: numbers, numpy arrays of any dimension, or xarray objects.
-        Numbers may be `decimal.Decimal`, with the digits as they are written: zeros at the end count.
+        The result of each level, in the order of `h`: numbers, numpy arrays of any dimension, or xarray objects.
+        Numbers may be `decimal.Decimal`, whose zeros at the end count as digits.
     order, at_least
-        The order that is expected, or the lowest one that is. Without both any order passes that may be believed.
+        The expected order, or the lowest expected one. Without either, any order passes that is certain enough.
     exact
         The exact result, if it is known: a number, or a `decimal.Decimal` of the digits as they are written; an array
-        or xarray object at the points that are compared; or a function of the coordinates. If its parameters have the
-        names of the dimensions, they may come in any order; otherwise it gets the coordinates in the order of the
-        dimensions.
+        or xarray object at the compared points; or a function of the coordinates. If its parameters have the names of
+        the dimensions, they may come in any order; otherwise it gets the coordinates in the order of the dimensions.
     noise
-        How noisy each level is (an iteration that stops early, printed digits): the root mean square of the noise.
-        Without it the levels are taken to be exact up to rounding.
+        Root mean square of the noise of each level (from an iteration that stops early, or from printed digits).
+        Without it the levels are assumed to be exact up to rounding.
     restrict
         How levels are brought to common points. ``subset`` takes the points that all levels have: by their coordinates
         (xarray), or by their number, of n, 2n - 1, 3n - 2, ... points from end to end or n, 2n, 3n, ... points of a
         periodic grid. ``mean`` takes averages over the cells of the coarsest level. ``linear`` and ``cubic``
-        interpolate, with an error of order 2 or 4, so that no order from there on is believed.
+        interpolate with an error of order 2 or 4, so orders from there on cannot be shown.
     dims
-        Names of the dimensions that are refined (``"axis 0"``, ``"axis 1"`` of numpy arrays). The others must be the
-        same on every level. Without it all are compared.
+        Names of the refined dimensions (``"axis 0"``, ``"axis 1"`` of numpy arrays), all by default. The others must
+        be the same on each level.
     members
-        Whether the first dimension of each result counts members, each a ladder of its own.
+        Whether the first dimension of each result counts members, each with its own verdict.
 
     Returns
     -------
@@ -104,7 +103,7 @@ def judge(
     Raises
     ------
     InputError
-        For arguments that do not fit together; the message names the argument, its value and the rule.
+        If arguments do not fit together; the message names the argument, its value and the rule.
 
     Examples
     --------
@@ -128,7 +127,7 @@ def judge(
     >>> f"{verdict.error:.1e}", f"{midpoint(80) - (np.e - 1):.1e}"
     ('-1.1e-05', '-1.1e-05')
 
-    A rule of first order is told apart from it:
+    A first-order rule fails:
 
     >>> def left(n):
     ...     return float(np.mean(np.exp(np.arange(n) / n)))
@@ -136,7 +135,7 @@ def judge(
     >>> verdict.status, verdict.reason
     ('FAIL', 'order_low')
 
-    Series and fields are compared at the points that all levels have. Euler's method for u' = -u:
+    Series and fields are compared at their common points. Euler's method for u' = -u:
 
     >>> def euler(n):
     ...     return (1 - 1 / n) ** np.arange(n + 1)
@@ -188,7 +187,7 @@ def verdicts(
     dims: Sequence[str] | None = None,
     members: bool = False,
 ) -> list[LadderVerdict]:
-    """Return the verdict on each member, or on the one ladder; `quantity` is its name in words, the rest as `judge`."""
+    """Return the verdict on each member, or on the only ladder; `quantity` is its name in sentences. See `judge`."""
     if order is not None and at_least is not None:
         raise refused("order", order, "must not be given together with at_least")
     order = None if order is None else finite_number("order", order, above=0.0)
@@ -212,23 +211,23 @@ def verdicts(
         half,
         written if len(written) == len(levels) else None,
     )
-    truth = None if exact is None else exact_values(exact, common, members=members)
+    exact_array = None if exact is None else exact_values(exact, common, members=members)
     shape, n = common.values.shape[1:], len(steps.h)
-    count, inner = (shape[0], shape[1:]) if members else (1, shape)
+    count, points = (shape[0], shape[1:]) if members else (1, shape)
     ladders = np.swapaxes(common.values.reshape(n, count, -1), 0, 1)
-    limits = None if truth is None else truth.reshape(count, -1)
-    shown = common.dims[1:] if members else common.dims
-    # numbers near the ends of double precision: what cannot be said of them is not stated
+    limits = None if exact_array is None else exact_array.reshape(count, -1)
+    point_dims = common.dims[1:] if members else common.dims
+    # numbers near the limits of double precision: results that overflow are not stated
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
-        found = outcomes(request, steps.h, ladders, common.epsilon, limits)
+        results = outcomes(request, steps.h, ladders, common.epsilon, limits)
         return [
-            verdict(request, steps, common, one, (ladder.reshape(n, *inner), shown))
-            for one, ladder in zip(found, ladders, strict=True)
+            verdict(request, steps, common, outcome, (ladder.reshape(n, *points), point_dims))
+            for outcome, ladder in zip(results, ladders, strict=True)
         ]
 
 
 def _levels(values: Any, members: bool) -> list[GridValues]:
-    """Return the values of every level."""
+    """Return the values of each level."""
     if isinstance(values, str | Mapping):
         raise refused(
             "values", type(values).__name__, "must be a list with the result of every level"

@@ -14,15 +14,15 @@ if TYPE_CHECKING:
 COLUMNS = {
     "value": "value, or norm of the values",
     "difference": "this level minus the next finer one",
-    "ratio": "this difference over the next one",
-    "order": "order that belongs to this ratio",
+    "ratio": "this difference divided by the next one",
+    "order": "order that corresponds to this ratio",
     "error": "this level minus the exact or the extrapolated values",
 }
-"""Columns of the table of levels with what they mean."""
+"""Columns of the table of levels and their meaning."""
 
 
 def dataset(verdict: LadderVerdict) -> xarray.Dataset:
-    """Return a verdict as a dataset over the step sizes; missing numbers are NaN, missing facts left out."""
+    """Return a verdict as a dataset over the step sizes; missing numbers are NaN, missing facts are omitted."""
     import xarray
 
     # None becomes NaN

@@ -1,4 +1,4 @@
-"""How numbers are written: in sentences, tables and pictures of a study."""
+"""How numbers are written in sentences, tables and figures of a study."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ from itertools import pairwise
 from vibsim.core.decimals import round_outward
 
 PLAIN_DIGITS = 5
-"""Whole numbers of so many digits are written without a power of ten."""
+"""Integers with up to this number of digits are written without a power of ten."""
 MOST_DIGITS = 12
-"""Of an extrapolated number in a sentence."""
+"""Largest number of digits of an extrapolated number in a sentence."""
 
 
 def number(value: float | None, digits: int) -> str:
-    """Write a number with so many significant digits, ``3.1e-4``."""
+    """Write a number with `digits` significant digits, ``3.1e-4``."""
     if value is None:
         return "-"
     text = f"{value:.{digits}g}"
@@ -29,7 +29,7 @@ def number(value: float | None, digits: int) -> str:
 
 
 def digits_of_values(values: Iterable[float | None]) -> int:
-    """Return how many significant digits show the smallest difference of neighbouring values, 8 at least."""
+    """Return the number of significant digits, at least 8, that shows the smallest difference of successive values."""
     known = [value for value in values if value is not None]
     steps = [abs(a - b) for a, b in pairwise(known) if a != b]
     if not steps:
@@ -45,12 +45,12 @@ def at_most(bound: float) -> str:
 
 
 def percent(share: float | None) -> str:
-    """Write a share in percent; empty where an error is as large as what it belongs to."""
+    """Write a share in percent; empty if it is 1 or more: an error as large as the value."""
     return f"{number(100.0 * share, 2)} %" if share and share < 1.0 else ""
 
 
 def with_bound(value: float, bound: float) -> str:
-    """Write a number as far as its bound allows, with the bound: ``0.97130, within 2.1e-5``."""
+    """Write a number to the digits that its bound allows, with the bound: ``0.97130, within 2.1e-5``."""
     if not 0.0 < bound < math.inf:
         return number(value, 10)
     places = max(1 - math.floor(math.log10(bound)), 0)

@@ -12,7 +12,7 @@ from vibsim.convergence.study.refusal import finite_number, refused
 from vibsim.core.array_types import Floats
 
 PROPORTIONAL = 1e-3
-"""Sizes whose quotient varies by less, relatively, are proportional: a user may have rounded them."""
+"""Largest relative variation of the quotient of proportional sizes, which a user may have rounded."""
 
 
 @dataclass(frozen=True)
@@ -22,9 +22,9 @@ class Refinement:
     h: Floats
     """Strictly decreasing, shape (n,)."""
     positions: tuple[int, ...]
-    """Where each of these levels stands in what the user gave."""
+    """Index of each of these levels in the input."""
     names: tuple[str, ...] = ("h",)
-    """Of the sizes; the first one is `h`."""
+    """Names of the sizes; the first one is that of `h`."""
     is_proportional: bool = True
     """Whether all sizes are proportional to the first."""
 
@@ -35,15 +35,14 @@ def refinement(h: Any, count: int) -> Refinement:
     Parameters
     ----------
     h
-        A size for each level, in any order; or a mapping from names to such lists, of sizes that are refined together.
-        The order of convergence then counts powers of the first one. Sizes need not be proportional (dt may go with
-        dx^2), but all of them must decrease from level to level.
+        A size for each level, in any order; or a mapping from names to such lists, for sizes that are refined together.
+        The order of convergence then refers to the first one. Sizes need not be proportional (dt may follow dx^2), but
+        all of them must decrease from level to level.
 
     Raises
     ------
     InputError
-        For sizes that are not positive, finite and different; and for several of which one does not decrease where
-        another does.
+        If sizes are not positive, finite and different, or if one size does not decrease where the first one does.
     """
     if not isinstance(h, Mapping):
         sizes = _sizes("h", h, count)
@@ -68,7 +67,7 @@ def refinement(h: Any, count: int) -> Refinement:
 
 
 def _sizes(key: str, h: Any, count: int) -> Floats:
-    """Return the sizes of all levels as they were given."""
+    """Return the sizes of all levels in the order of the input."""
     try:
         entries = list(h)
     except TypeError:

@@ -1,4 +1,4 @@
-"""The refusal of an argument, with the value, the rule that it breaks and what would keep it."""
+"""The error for a faulty argument: its value, the rule that it breaks, and a hint."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ def refused(key: str, value: Any, rule: str, hint: str = "") -> InputError:
 
 
 def chosen(key: str, value: Any, choices: Sequence[str]) -> str:
-    """Return one of some words; InputError where it is none of them."""
+    """Return the value if it is one of the choices; otherwise raise InputError."""
     if not isinstance(value, str) or value not in choices:
         raise refused(key, value, f"must be one of {', '.join(choices)}")
     return value
@@ -27,16 +27,16 @@ def chosen(key: str, value: Any, choices: Sequence[str]) -> str:
 def finite_number(
     key: str, value: Any, *, above: float | None = None, least: float | None = None
 ) -> float:
-    """Return a finite number; InputError where it is none, or not within its bounds."""
+    """Return the value as a finite number within the bounds; otherwise raise InputError."""
     bound = f"above {above:g}" if above is not None else f"from {least:g}"
     rule = f"must be a finite number {bound}"
     if isinstance(value, bool | str) or value is None:
         raise refused(key, value, rule)
     try:
-        found = float(value)
+        number = float(value)
     except (TypeError, ValueError):
         raise refused(key, value, rule) from None
-    is_within = (above is None or found > above) and (least is None or found >= least)
-    if not abs(found) < float("inf") or not is_within:
-        raise refused(key, found, rule)
-    return found
+    is_within = (above is None or number > above) and (least is None or number >= least)
+    if not abs(number) < float("inf") or not is_within:
+        raise refused(key, number, rule)
+    return number

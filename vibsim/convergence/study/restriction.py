@@ -5,9 +5,9 @@
 ``mean``
     averages over the cells of the coarsest level, with equal weights.
 ``linear``, ``cubic``
-    interpolation by polynomials through the 2 or 4 nearest points, with an error of order 2 or 4 of its own.
+    interpolation by polynomials through the 2 or 4 nearest points, with an additional error of order 2 or 4.
 
-Each is a weighted sum: of a level of l points, m common points take ``sum_q weights[m, q] values[indices[m, q]]``.
+Each is a weighted sum: common point m has the value ``sum_q weights[m, q] values[indices[m, q]]``.
 """
 
 from __future__ import annotations
@@ -25,17 +25,17 @@ from vibsim.convergence.study.refusal import refused
 from vibsim.core.array_types import Flags, Floats, Integers
 
 EQUAL = 1e-9
-"""Two points whose distance is less than this part of the spacing are one."""
+"""Points closer than this part of the spacing are equal."""
 CENTRED = 1e-3
-"""Cells may be off their centres by this part of their width: coordinates may be rounded."""
+"""Coordinates may be off the centres of cells by this part of the width, since they may be rounded."""
 INTERPOLATION_ORDERS: Mapping[str, int] = MappingProxyType({"linear": 2, "cubic": 4})
-"""Of which order the error of an interpolation is, which is the number of points it takes."""
+"""Order of the error of an interpolation, which is also its number of points."""
 Coordinate = NDArray[Any] | None
-"""Points of a dimension, shape (length,); None where there are none but their count."""
+"""Points of a dimension, shape (length,); None if only their number is known."""
 
 
 FEWEST_POINTS = 3
-"""Common points along a dimension: fewer show only what is prescribed at its ends."""
+"""Fewest common points along a dimension: fewer show only prescribed values at its ends."""
 
 
 @dataclass(frozen=True)
@@ -43,12 +43,12 @@ class Restriction:
     """Weighted sums of the values of a level along a dimension."""
 
     indices: Integers
-    """Shape (m, q), or (m,) where each common point is one of the level."""
+    """Shape (m, q), or (m,) if each common point is a point of the level."""
     weights: Floats | None = None
     """Shape (m, q)."""
 
     def of(self, values: Floats, axis: int) -> Floats:
-        """Return the sums of `values`, whose dimension `axis` then has m points."""
+        """Return the weighted sums of `values` along `axis`, which then has m points."""
         taken = np.take(values, self.indices, axis)
         if self.weights is None:
             return taken
@@ -66,11 +66,11 @@ class Common:
     coordinate: Coordinate
     """The common points."""
     interpolated: bool = False
-    """Whether a value is not one of its level."""
+    """Whether any value is interpolated."""
     note: str = ""
-    """What else may be wrong with these points, for a verdict that does not pass with an expected order above 1."""
+    """Possible fault of these points, for a verdict that does not pass with an expected order above 1."""
     part: str = ""
-    """Which part of the points is compared, where it is not all of them."""
+    """Which part of the points is compared, if not all."""
 
 
 def common(
@@ -85,20 +85,20 @@ def common(
     kind
         One of `vibsim.core.vocabulary.RESTRICTIONS`.
     coordinates
-        Of every level; None where it has none.
+        Coordinate of each level, or None.
     lengths
-        Number of points of every level.
+        Number of points of each level.
 
     Raises
     ------
     InputError
-        Where the levels do not have such points.
+        If the levels have no such points.
     """
     known = [c is not None for c in coordinates]
     if any(known) and not all(known):
         raise refused(dim, "coordinates", f"level {known.index(False)} has none, others do")
     if len(set(lengths)) == 1 and _all_equal(coordinates):
-        return _everything(coordinates[0], len(lengths), lengths[0])
+        return _all_points(coordinates[0], len(lengths), lengths[0])
     if kind == "mean":
         return _means(dim, coordinates, lengths)
     if kind == "subset":
@@ -111,7 +111,7 @@ def common(
 
 
 def same_points(dim: str, coordinates: Sequence[Coordinate], lengths: Sequence[int]) -> Common:
-    """Return all points of a dimension that is not refined; InputError where the levels differ in it."""
+    """Return all points of a dimension that is not refined; InputError if the levels differ in it."""
     if len(set(lengths)) > 1:
         rule = "must have the same points on every level, because it is none of `dims`"
         raise refused(dim, f"lengths {list(lengths)}", rule)
@@ -119,18 +119,18 @@ def same_points(dim: str, coordinates: Sequence[Coordinate], lengths: Sequence[i
         raise refused(
             dim, "coordinates", "must be the same on every level, because it is none of `dims`"
         )
-    return _everything(coordinates[0], len(lengths), lengths[0])
+    return _all_points(coordinates[0], len(lengths), lengths[0])
 
 
 def spacing_tolerance(points: NDArray[Any], epsilon: float) -> float:
-    """Return how far two points may be apart that are one: a part of the spacing, and the rounding of numbers."""
+    """Return the largest distance of equal points: a part of the spacing plus rounding."""
     size = float(np.max(np.abs(points)))
     gaps = np.abs(np.diff(np.sort(points)))
     spacing = float(np.min(gaps)) if gaps.size else size
     return EQUAL * spacing + 8.0 * epsilon * size
 
 
-def _everything(coordinate: Coordinate, levels: int, length: int) -> Common:
+def _all_points(coordinate: Coordinate, levels: int, length: int) -> Common:
     return Common((Restriction(np.arange(length)),) * levels, coordinate)
 
 
@@ -141,18 +141,18 @@ def _all_equal(coordinates: Sequence[Coordinate]) -> bool:
     return all(c is not None and are_equal(first, c) for c in coordinates[1:])
 
 
-def are_equal(first: NDArray[Any], other: NDArray[Any]) -> bool:
-    """Tell whether two coordinates are the same points, but for rounding."""
-    if first.shape != other.shape:
+def are_equal(first: NDArray[Any], second: NDArray[Any]) -> bool:
+    """Tell whether two coordinates have the same points, up to rounding."""
+    if first.shape != second.shape:
         return False
-    if not (_is_numeric(first) and _is_numeric(other)):
-        return bool(np.all(first == other))
-    tolerance = spacing_tolerance(first, max(_epsilon(first), _epsilon(other)))
-    return bool(np.all(np.abs(first - other) <= tolerance))
+    if not (_is_numeric(first) and _is_numeric(second)):
+        return bool(np.all(first == second))
+    tolerance = spacing_tolerance(first, max(_epsilon(first), _epsilon(second)))
+    return bool(np.all(np.abs(first - second) <= tolerance))
 
 
 def positions(targets: NDArray[Any], points: NDArray[Any]) -> Integers | None:
-    """Return where each target stands among some points; None where one is none of them."""
+    """Return the index of each target among the points; None if any target is not among them."""
     if not (_is_numeric(targets) and _is_numeric(points)):
         return np.arange(len(targets)) if are_equal(targets, points) else None
     index, distance = _nearest(targets, points)
@@ -165,12 +165,12 @@ def _is_numeric(points: NDArray[Any]) -> bool:
 
 
 def _epsilon(points: NDArray[Any]) -> float:
-    """Return the relative spacing of the numbers that a coordinate consists of; whole numbers are not rounded."""
+    """Return the machine epsilon of a coordinate; 0 for integers, which are not rounded."""
     return float(np.finfo(points.dtype).eps) if points.dtype.kind == "f" else 0.0
 
 
 def _numeric(dim: str, points: NDArray[Any]) -> NDArray[Any]:
-    """Return points that can be compared: numbers, all different."""
+    """Return the points; InputError if they are not different finite numbers."""
     if not _is_numeric(points):
         raise refused(
             dim, str(points.dtype), "its coordinates are no numbers, and differ between levels"
@@ -183,7 +183,7 @@ def _numeric(dim: str, points: NDArray[Any]) -> NDArray[Any]:
 
 
 def _every_kth(dim: str, lengths: Sequence[int]) -> Common:
-    """Return common points of levels without coordinates, by the number of points: from end to end, or periodic."""
+    """Return the common points of levels without coordinates: of grids from end to end, or of periodic grids."""
     first = lengths[0]
     steps = [n - 1 for n in lengths]
     if any(finer < n for n, finer in pairwise(lengths)):
@@ -213,13 +213,13 @@ def _subset(dim: str, coordinates: Sequence[Coordinate], lengths: Sequence[int])
     points = [_numeric(dim, c) for c in coordinates if c is not None]
     epsilon = max(map(_epsilon, points))
     coarse = points[0]
-    places = [np.arange(lengths[0])]
-    there: Flags = np.ones(lengths[0], dtype=bool)
+    indices = [np.arange(lengths[0])]
+    is_common: Flags = np.ones(lengths[0], dtype=bool)
     for fine in points[1:]:
         index, distance = _nearest(coarse, fine)
-        there &= distance <= spacing_tolerance(fine, epsilon)
-        places.append(index)
-    count = int(there.sum())
+        is_common &= distance <= spacing_tolerance(fine, epsilon)
+        indices.append(index)
+    count = int(is_common.sum())
     if count < min(FEWEST_POINTS, lengths[0]):
         rule = "the levels have no point in common"
         if count:
@@ -229,8 +229,8 @@ def _subset(dim: str, coordinates: Sequence[Coordinate], lengths: Sequence[int])
         raise refused(dim, "coordinates", rule, hint)
     part = ""
     if count < lengths[0]:
-        part = f"The levels have {there.sum()} of the {lengths[0]} points of the coarsest one in common along {dim}."
-    return Common(tuple(Restriction(i[there]) for i in places), coarse[there], part=part)
+        part = f"The levels have {count} of the {lengths[0]} points of the coarsest one in common along {dim}."
+    return Common(tuple(Restriction(i[is_common]) for i in indices), coarse[is_common], part=part)
 
 
 def _nearest(targets: NDArray[Any], points: NDArray[Any]) -> tuple[Integers, Floats]:
@@ -240,8 +240,8 @@ def _nearest(targets: NDArray[Any], points: NDArray[Any]) -> tuple[Integers, Flo
     right = np.clip(np.searchsorted(ordered, targets), 0, len(points) - 1)
     left = np.clip(right - 1, 0, None)
     is_left = np.abs(targets - ordered[left]) < np.abs(targets - ordered[right])
-    found = np.where(is_left, left, right)
-    return order[found], np.abs(targets - ordered[found]).astype(np.float64)
+    nearest = np.where(is_left, left, right)
+    return order[nearest], np.abs(targets - ordered[nearest]).astype(np.float64)
 
 
 def _means(dim: str, coordinates: Sequence[Coordinate], lengths: Sequence[int]) -> Common:
@@ -251,21 +251,21 @@ def _means(dim: str, coordinates: Sequence[Coordinate], lengths: Sequence[int]) 
         raise refused(
             dim, f"lengths {list(lengths)}", rule, "or use restrict: subset, linear or cubic"
         )
-    found = []
+    restrictions = []
     for level, (points, n) in enumerate(zip(coordinates, lengths, strict=True)):
         k = n // first
         indices = np.arange(n).reshape(first, k)
-        found.append(Restriction(indices, np.full(indices.shape, 1.0 / k)))
+        restrictions.append(Restriction(indices, np.full(indices.shape, 1.0 / k)))
         _check_centres(dim, coordinates[0], points, indices, level)
-    return Common(tuple(found), coordinates[0])
+    return Common(tuple(restrictions), coordinates[0])
 
 
 def _check_centres(
     dim: str, coarse: Coordinate, fine: Coordinate, indices: Integers, level: int
 ) -> None:
-    """Refuse coordinates that are no centres of cells of one width, the finer ones within the coarse ones.
+    """Refuse coordinates that are not centres of cells of equal width, the finer cells within the coarse ones.
 
-    Whole numbers count cells. `indices` are those of the finer cells in each coarse one.
+    Integers number the cells. `indices` are those of the finer cells in each coarse one.
     """
     if coarse is None or fine is None or coarse.dtype.kind != "f" or fine.dtype.kind != "f":
         return
@@ -295,16 +295,16 @@ def _interpolations(
     if not inside.any():
         raise refused(dim, "coordinates", "the levels cover no common range")
     targets = coarse[inside]
-    found = [Restriction(np.flatnonzero(inside))]
+    restrictions = [Restriction(np.flatnonzero(inside))]
     interpolated = False
     for fine, tolerance in zip(points[1:], tolerances[1:], strict=True):
         if len(fine) < width:
             raise refused(
                 dim, f"length {len(fine)}", f"{kind} interpolation needs {width} points at least"
             )
-        weights, indices, between = polynomials(targets, fine.astype(np.float64), width, tolerance)
-        interpolated |= between
-        found.append(Restriction(indices, weights))
+        weights, indices, is_used = polynomials(targets, fine.astype(np.float64), width, tolerance)
+        interpolated |= is_used
+        restrictions.append(Restriction(indices, weights))
     part = ""
     if not inside.all():
         part = f"Of the {len(coarse)} points of the coarsest level along {dim}, {inside.sum()} lie within all levels."
@@ -315,15 +315,15 @@ def _interpolations(
             f"The levels have {counts} values{_along(dim)}, which were taken for points from end to end. For averages "
             "of cells use restrict: mean, or give their coordinates."
         )
-    return Common(tuple(found), targets if has_points else None, interpolated, note, part)
+    return Common(tuple(restrictions), targets if has_points else None, interpolated, note, part)
 
 
 def polynomials(
     targets: Floats, points: Floats, width: int, tolerance: float
 ) -> tuple[Floats, Integers, bool]:
-    """Return the weights of Lagrange's polynomials through the nearest `width` points, and whether any is used.
+    """Return weights and indices of the Lagrange polynomials through the nearest `width` points.
 
-    A target that is a point takes the value there.
+    Also return whether any is needed: a target that coincides with a point takes the value there.
     """
     order = np.argsort(points)
     ordered = points[order]
@@ -333,11 +333,11 @@ def polynomials(
     x = ordered[stencil]
     weights = np.ones(x.shape)
     for q in range(width):
-        for other in range(width):
-            if other != q:
-                weights[:, q] *= (targets - x[:, other]) / (x[:, q] - x[:, other])
+        for r in range(width):
+            if r != q:
+                weights[:, q] *= (targets - x[:, r]) / (x[:, q] - x[:, r])
     distance = np.abs(x - targets[:, None])
     nearest = np.argmin(distance, axis=1)
-    hit = np.take_along_axis(distance, nearest[:, None], axis=1)[:, 0] <= tolerance
-    weights[hit] = np.eye(width)[nearest[hit]]
-    return weights, order[stencil], not bool(hit.all())
+    coincides = np.take_along_axis(distance, nearest[:, None], axis=1)[:, 0] <= tolerance
+    weights[coincides] = np.eye(width)[nearest[coincides]]
+    return weights, order[stencil], not bool(coincides.all())

@@ -1,4 +1,4 @@
-"""A verdict on a ladder as text for a terminal: status, sentence, advice, and the table of levels with a picture."""
+"""A verdict on a ladder as text for a terminal: status, sentence, advice, and the table of levels with bars."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ if TYPE_CHECKING:
 
 COLUMNS = 100
 _BAR = 24
-"""Characters of the longest bar of the picture."""
 _LEAST = 4
+"""Characters of the longest and of the shortest bar."""
 
 
 def as_text(verdict: LadderVerdict, columns: int = COLUMNS) -> str:
-    """Return the text, wrapped to a terminal of so many columns."""
+    """Return the text, wrapped to a terminal with this number of columns."""
     return "\n".join(_lines(verdict, max(columns, 40)))
 
 
@@ -57,7 +57,7 @@ def _row(level: Level, digits: int) -> Sequence[str]:
 
 
 def _bars(levels: Sequence[Level]) -> list[str]:
-    """Return a bar for each level, as long as the logarithm of its difference; empty without at least two."""
+    """Return a bar for each level, with length proportional to the log of its difference; empty if fewer than two."""
     sizes = [abs(level.difference) if level.difference else 0.0 for level in levels]
     logs = [math.log10(size) if size > 0.0 else math.nan for size in sizes]
     known = [x for x in logs if not math.isnan(x)]

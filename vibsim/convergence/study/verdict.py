@@ -1,4 +1,4 @@
-"""The verdict on a ladder that any solver computed: facts, the table of levels, and what it can be turned into."""
+"""The verdict on a ladder of any solver: facts, the table of levels, and conversions."""
 
 from __future__ import annotations
 
@@ -26,9 +26,9 @@ KEYS = (
 
 @dataclass(frozen=True)
 class Level:
-    """One row of the table of levels; None where there is no such number.
+    """One row of the table of levels; None where a number does not exist.
 
-    Of numbers all entries are differences with their sign, of series and fields they are norms (root mean square).
+    For numbers all entries are signed; for series and fields they are norms (root mean square).
     """
 
     h: float
@@ -37,18 +37,18 @@ class Level:
     difference: float | None
     """This level minus the next finer one."""
     ratio: float | None
-    """This difference over the next one."""
+    """This difference divided by the next one."""
     order: float | None
-    """The order that this ratio has."""
+    """The order that corresponds to this ratio."""
     error: float | None
-    """This level minus the exact values; where these are not known, minus the extrapolated ones."""
+    """This level minus the exact values; if these are unknown, minus the extrapolated ones."""
 
 
 @dataclass(frozen=True)
 class LadderVerdict:
-    """What a ladder of levels says: facts, words and the table of levels; `print` shows it.
+    """The verdict on a ladder of levels: facts, words and the table of levels; `print` shows it.
 
-    Numbers are None where the levels do not tell them.
+    Numbers are None if the levels do not determine them.
     """
 
     quantity: str
@@ -56,53 +56,53 @@ class LadderVerdict:
     reason: str
     """One of `vibsim.core.vocabulary.REASONS`."""
     order: float | None
-    """The observed order of the finest three levels that may be believed."""
+    """The observed order of the finest three levels that the verdict rests on."""
     order_low: float | None
     order_high: float | None
-    """Its interval of 95 %."""
+    """The ends of its 95 % interval."""
     h_used: tuple[float, ...]
     """Step sizes of the levels that the order rests on, the coarsest first."""
     error: float | None
-    """Of the finest level: computed minus exact of a number, the root mean square of a series or field."""
+    """Error of the finest level: computed minus exact for a number, root mean square for a series or field."""
     error_bound: float | None
-    """What the size of that error does not exceed, in 95 % of such ladders."""
+    """Upper bound of the size of that error, which holds for 95 % of such ladders."""
     relative_error: float | None
-    """The size of the error over that of the finest level."""
+    """Size of the error relative to the size of the finest level."""
     best: float | None
-    """The number extrapolated over the levels; None of a series or field."""
+    """The number extrapolated over the levels; None for a series or field."""
     best_bound: float | None
-    """What the error of `best` does not exceed."""
+    """Upper bound of the error of `best`."""
     gci: float | None
     """The grid convergence index of the finest level, relative, with safety factor 1.25 and the observed order."""
     sentence: str
-    """What was found, in words."""
+    """The result in words."""
     advice: str
-    """What to do about it; empty where nothing is to be done."""
+    """What to do about it; empty if nothing needs to be done."""
     levels: tuple[Level, ...]
     """The table of levels, the coarsest first."""
     expected: float | None = None
     at_least: float | None = None
-    """The order that was asked for."""
+    """The expected order."""
     size_name: str = "h"
     """Name of the step size."""
     is_exact_known: bool = False
-    """Whether the errors of the levels are true ones."""
+    """Whether the errors of the levels are true errors."""
     dims: tuple[str, ...] = ()
     coords: Mapping[str, NDArray[Any]] = field(default_factory=dict, repr=False, compare=False)
     """The common points of the levels."""
     values: Floats = field(default_factory=lambda: np.empty(0), repr=False, compare=False)
-    """What was compared: values of all levels at the common points, the coarsest first, shape ``(n, *points)``."""
+    """Values of all levels at the common points, the coarsest first, shape ``(n, *points)``."""
     best_values: Floats | None = field(default=None, repr=False, compare=False)
     """The values extrapolated over the levels, shape ``(*points)``."""
 
     @property
     def id(self) -> str:
-        """The quantity, under the name that it has in a verdict on an experiment."""
+        """The quantity; verdicts on experiments have the same property."""
         return self.quantity
 
     @property
     def text(self) -> str:
-        """The sentence, under the name that it has in a verdict on an experiment."""
+        """The sentence; verdicts on experiments have the same property."""
         return self.sentence
 
     @property
@@ -111,19 +111,19 @@ class LadderVerdict:
         return bool(self.values[0].size == 1) if len(self.values) else not self.dims
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the facts as JSON has them: the entry of `vibsim judge --json`."""
+        """Return the facts as a JSON object: an entry of `vibsim judge --json`."""
         return {key: jsonable(getattr(self, key)) for key in KEYS}
 
     def to_xarray(self) -> xarray.Dataset:
-        """Return the table of levels, the compared and the extrapolated values; the facts are the attributes."""
+        """Return the table of levels and the compared and extrapolated values, with the facts as attributes."""
         from vibsim.convergence.study.labelled import dataset
 
         return dataset(self)
 
     def plot(self, path: str | Path | None = None) -> Figure:
-        """Draw errors and differences against the step size; save the figure where a `path` is given.
+        """Draw errors and differences against the step size; save the figure if a `path` is given.
 
-        The figure is one of matplotlib, free of pyplot's global state.
+        The result is a matplotlib figure that does not use pyplot.
         """
         from vibsim.convergence.study.figure import convergence_figure
 
