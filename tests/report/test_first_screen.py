@@ -178,7 +178,7 @@ def test_a_caption_names_the_exact_solution_only_where_it_is_drawn(monkeypatch):
         exp = samples.experiment(model={"kind": "pendulum", "drag": drag}, levels=[6])
         record, _, decisive = found(exp)
         with style.applied():
-            picture = drawn.solution(record, "theta", decisive.member, is_left=True)
+            picture = drawn.solution(exp, record, "theta", decisive.member, is_left=True)
             text = samples.svg(picture)
         assert ("exact" in picture.caption) == ("exact" in text) == (drag == 0.0)
 

@@ -105,8 +105,11 @@ def _motion(
     """Draw the motion of the member that decides, and beside it of a typical one."""
     typical = [member for member in series if member.role == "typical"]
     return [
-        *(solution.motion(record, position, member) for member in [lead.member, *typical[:1]]),
-        long_series.long_series(record, position, lead.member),
+        *(
+            solution.motion(experiment, record, position, member)
+            for member in [lead.member, *typical[:1]]
+        ),
+        long_series.long_series(experiment, record, position, lead.member),
         plane.path(experiment, record, series),
     ]
 

@@ -279,8 +279,9 @@ def pictures(experiment: Experiment, record: Record, lead: Lead) -> list[Picture
     if data.is_lean(record) or len(found) == 2:
         return found
     if not found:
-        return [solution.motion(record, choice.position(experiment), lead.member)]
-    moving = drawn.solution(record, choice.position(experiment), lead.member, is_left=left is None)
+        return [solution.motion(experiment, record, choice.position(experiment), lead.member)]
+    of = choice.position(experiment), lead.member
+    moving = drawn.solution(experiment, record, *of, is_left=left is None)
     return [moving, *found] if left is None else [*found, moving]
 
 
