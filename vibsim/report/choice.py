@@ -87,15 +87,16 @@ def first(experiment: Experiment, record: Record) -> str:
     return next(iter(quantities(experiment, record)), position(experiment))
 
 
-def members(record: Record, quantity: str) -> list[Member]:
+def members(record: Record, quantity: str, decisive: Member | None = None) -> list[Member]:
     """Return what the figures over time show of a quantity: of every scheme one member, or two of a sweep.
 
-    These are the worst member, judged by the verdicts on `quantity` and then by the distance of the order from the
-    promised one (of several schemes the worst decides), and a typical one of those that pass, if any does.
+    These are the one that is `decisive`, else the worst, judged by the verdicts on `quantity` and then by the distance
+    of the order from the promised one (of several schemes the worst decides), and a typical one of those that pass, if
+    any does.
     """
     if not data.swept(record) or f"{quantity}_status" not in record:
         # a large sweep has verdicts on what checks ask about alone
-        return data.of_case(record, 0)
+        return data.of_case(record, 0 if decisive is None else decisive.case)
     status = data.flags(record, f"{quantity}_status")
     severity = np.max([(status == word) * rank for word, rank in SEVERITY.items()], axis=(0, 1))
     away = np.abs(deviation(record, quantity))
@@ -103,7 +104,8 @@ def members(record: Record, quantity: str) -> list[Member]:
     # the healthiest: members that most schemes pass, and of the others those that fewest fail
     score = np.sum(status == "PASS", axis=0) * (len(status) + 1) - np.sum(status == "FAIL", axis=0)
     healthy = ranking[score[ranking] == score.max()]
-    roles = {int(healthy[healthy.size // 2]): "typical", int(ranking[-1]): "worst"}
+    last = int(ranking[-1]) if decisive is None else decisive.case
+    roles = {int(healthy[healthy.size // 2]): "typical", last: "worst"}
     shown = reversed(roles.items())
     return [member for case, role in shown for member in data.of_case(record, case, role)]
 

@@ -55,7 +55,14 @@ def context(
         "facts": " · ".join(filter(None, _facts(experiment, record))),
         "numbers": list(numbers(experiment, record, lead))[:MOST_NUMBERS],
         "meaning": " ".join(
-            [findings.paragraph(experiment, record, lead, levels), *_traps(summary, lead)]
+            filter(
+                None,
+                [
+                    findings.paragraph(experiment, record, lead, levels),
+                    findings.asked_of(record, lead),
+                    *_traps(summary, lead),
+                ],
+            )
         ),
         "statements": claims[:MOST_STATEMENTS],
         "more_statements": max(0, len(claims) - MOST_STATEMENTS),
@@ -131,7 +138,7 @@ def _measured(experiment: Experiment, record: Record, lead: Lead) -> Iterator[Nu
     unit, label, form = "", MEASURED.get(kind, ""), "brief"  # a size has two digits
     if check is not None and check.kind == "value":
         unit, form = data.pretty_unit(unit_of(experiment, record, check)), "step"
-        label = words.PAGE.opening(assertions.subject(check))
+        label = words.PAGE.opening(assertions.subject(record, check))
     if kind in ("equal", "accurate"):
         unit = data.norm_unit(record, lead.quantity, "l2" if kind == "accurate" else "linf")
     if check is not None and check.kind == "accurate" and check.is_relative:
@@ -177,7 +184,8 @@ def _order(experiment: Experiment, record: Record, lead: Lead) -> Iterator[Numbe
     if data.swept(record) and every.size > 1:
         ends = [words.number(float(end), "order") for end in (every.min(), every.max())]
         value = ends[0] if ends[0] == ends[1] else " to ".join(ends)
-        known = words.number(every.size, "integer")
+        known, total = (words.number(n, "integer") for n in (every.size, len(record["case"])))
+        known = known if known == total else f"{known} of the {total}"
         yield {"label": label, "value": value, "note": f"of {known} members; {due}"}
     elif lead.is_on_order and lead.result.get("reason") == "exact":
         yield {"label": label, "value": "exact", "note": "the levels differ by round-off only"}

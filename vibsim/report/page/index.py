@@ -88,7 +88,7 @@ class Row:
     @property
     def counts(self) -> str:
         """How many checks passed."""
-        return f"{self.passed} of {len(self.checks)}"
+        return f"{self.passed} of {len(self.checks)}{' passed' * (self.passed < len(self.checks))}"
 
     @property
     def stands(self) -> str:
