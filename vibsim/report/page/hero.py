@@ -215,11 +215,15 @@ def _error(experiment: Experiment, record: Record, lead: Lead) -> Iterator[Numbe
     unit = data.norm_unit(record, quantity, "linf")
     what = findings.short(experiment, quantity)
     size = f"{words.share(relative)} of its size, " if relative else ""
+    note = f"{size}{word}, root mean square"
+    if error == 0.0:
+        equal = "equal to the exact solution" if word == "true" else "the levels agree"
+        note = f"{equal} in every digit"
     steps = words.number(int(record["steps"][-1]), "integer")
     yield {
         "label": f"Error of {what} at {steps} steps{data.of_several(record, member.scheme)}",
         "value": f"{words.number(mean, 'brief')} {unit}".rstrip(),
-        "note": f"{size}{word}, root mean square{_of_member(record, lead)}",
+        "note": f"{note}{_of_member(record, lead)}",
     }
 
 
