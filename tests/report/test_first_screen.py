@@ -18,10 +18,11 @@ from vibsim.experiment import Experiment
 from vibsim.experiment.experiment import canonical
 from vibsim.experiment.schema.checks import MEASURED
 from vibsim.report import choice, data, style, words
+from vibsim.report.figures import gallery
 from vibsim.report.figures import hero as drawn
-from vibsim.report.page import cards, hero
+from vibsim.report.page import cards, hero, page_tables
 from vibsim.report.tables import theory
-from vibsim.report.text import equation, experiment_file, findings, glossary
+from vibsim.report.text import assertions, equation, experiment_file, findings, glossary
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 WRONG_AS_TRAP = [{"kind": "central", "label": "wrong", "start": "first_order"}]
@@ -77,6 +78,33 @@ def test_every_reason_and_every_kind_of_check_has_a_title():
 )  # fmt: skip
 def test_the_title_says_the_finding(changes, title):
     assert first(samples.experiment(**changes))["finding"] == title
+
+
+@pytest.mark.parametrize(
+    ("theta", "where"),
+    [
+        (1.5, "in the member with initial θ = 1.5, of 3 in all"),
+        (1.0, "in both members with initial θ = 1, of 3 in all"),
+    ],
+)
+def test_an_order_of_some_members_alone_says_of_how_many(theta, where):
+    """A title on 2 of 21 members read like one on all of them, and tables showed others than those that decide."""
+    exp = samples.experiment(
+        sweep={"initial.theta": [1.0, 1.0, 1.5]},
+        checks=[{"converges": "theta", "at": {"initial.theta": theta}}],
+    )
+    record, summary, decisive = found(exp)
+    shown = hero.context(exp, record, summary, decisive)
+    assert shown["finding"] == f"The angle θ converges at second order {where}"
+    asked = 2 if theta == 1.0 else 1
+    assert f"The check asks about {asked} of the 3 members" in shown["meaning"]
+    assert (f"of {asked} of the 3 members" in shown["numbers"][0]["note"]) == (asked > 1)
+    assert assertions.about(record, exp.checks[0]) == f"Order of θ (initial θ = {theta:g})"
+    drawn_of = {member.case for member in gallery.choose(exp, record, decisive.member)[0]}
+    assert decisive.member.case in drawn_of
+    _, tables = page_tables.collect(exp, record, summary, decisive, [])
+    (_, table, _), *_ = tables["numbers_shown"]
+    assert table.rows[0][1].startswith(f"initial.theta = {theta:g} rad")
 
 
 def test_the_worst_check_leads_and_a_trap_never_does_where_another_passed():
@@ -178,7 +206,7 @@ def test_a_caption_names_the_exact_solution_only_where_it_is_drawn(monkeypatch):
         exp = samples.experiment(model={"kind": "pendulum", "drag": drag}, levels=[6])
         record, _, decisive = found(exp)
         with style.applied():
-            picture = drawn.solution(record, "theta", decisive.member, is_left=True)
+            picture = drawn.solution(exp, record, "theta", decisive.member, is_left=True)
             text = samples.svg(picture)
         assert ("exact" in picture.caption) == ("exact" in text) == (drag == 0.0)
 

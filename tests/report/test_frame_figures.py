@@ -24,6 +24,7 @@ from vibsim.report.figures import (
     time,
     work,
 )
+from vibsim.report.figures import hero as first_screen
 from vibsim.report.figures.panels import Curve
 from vibsim.report.figures.work import lines
 from vibsim.report.page import hero
@@ -281,10 +282,27 @@ def test_the_grey_line_of_a_motion_is_named_where_it_is_drawn(levels):
     model = {"kind": "elastic_pendulum", "beta": 0.9, "Theta": 40, "gamma": 0.05}
     exp = samples.experiment(model=model, initial={}, levels=levels)
     with style.applied():
-        picture = solution.motion(samples.record(exp), "x", Member(0, 0, "central", ""))
+        picture = solution.motion(exp, samples.record(exp), "x", Member(0, 0, "central", ""))
     lines = picture.figure.axes[0].lines
     assert ("grey" in picture.caption) == any(line.get_color() == style.PALE for line in lines)
     assert ("grey" in picture.caption) == (len(levels) > 1)
+
+
+def test_the_exact_solution_is_smooth_where_levels_have_few_points_in_a_period():
+    """Three points in a period made the grey curve beat, and look as wrong as the run beside it."""
+    time_of = {"end": 40.0, "base_steps": 30}
+    exp = spring(model={"kind": "spring"}, time=time_of, levels=[0, 1], schemes=["central"])
+    record, member = samples.record(exp), Member(0, 0, "central", "")
+    with style.applied():
+        pictures = [
+            solution.motion(exp, record, "u", member),
+            first_screen.solution(exp, record, "u", member, is_left=True),
+        ]
+    for picture in pictures:
+        t, u = picture.figure.axes[0].lines[0].get_data()
+        assert picture.figure.axes[0].lines[0].get_color() == style.PALE
+        np.testing.assert_allclose(u, np.cos(t), atol=1e-12)
+        assert t.size > 150
 
 
 @pytest.mark.parametrize(("end", "is_drawn"), [(15.0, False), (22.0, True)])

@@ -21,13 +21,13 @@ def made(periods=40, schemes=("central",), levels=(0, 1, 2), steps=20, **changes
         | changes
     )  # fmt: skip
     record = samples.record(exp)
-    return record, record.words("scheme")
+    return exp, record, record.words("scheme")
 
 
 def drawn(name="u", **changes):
-    record, schemes = made(**changes)
+    exp, record, schemes = made(**changes)
     with style.applied():
-        picture = long_series(record, name, Member(0, 0, schemes[0]))
+        picture = long_series(exp, record, name, Member(0, 0, schemes[0]))
         return picture, "" if picture is None else drawing.svg(picture.figure, picture.name)
 
 
@@ -114,7 +114,7 @@ def test_a_motion_of_few_samples_has_no_line_between_them(every, is_dotted):
     record = samples.record(exp)
     (member,) = choice.members(record, "theta")
     with style.applied():
-        picture = solution.motion(record, "theta", member)
+        picture = solution.motion(exp, record, "theta", member)
     above, below = picture.figure.axes
     dashes = {line.get_linestyle() for ax in (above, below) for line in ax.get_lines()}
     assert (dashes == {"None"}) is is_dotted

@@ -568,6 +568,8 @@ def test_both_ways_of_a_followed_path_are_in_the_legends():
     )  # fmt: skip
     record = samples.record(exp)
     lead = choice.find_lead(exp, record, {"checks": []})
+    ways = [data.case_name(record, case).partition(" on the ")[2] for case in range(5)]
+    assert ways == ["way up", "way up", "", "way down", "way down"]
     with style.applied():
         drawn = [
             hero.response(exp, record, lead),

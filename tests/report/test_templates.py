@@ -105,8 +105,11 @@ def test_no_page_names_a_norm_by_its_key() -> None:
     experiment = samples.experiment(
         checks=[{"converges": "theta", "order": 2, "norm": norm} for norm in words.NORMS]
     )
-    told = [assertions.about(check) + assertions.measured(check) for check in experiment.checks]
     record = samples.record(experiment)
+    told = [
+        assertions.about(record, check) + assertions.measured(record, check)
+        for check in experiment.checks
+    ]
     told += [
         levels.orders(record, "energy_deviation", choice.members(record, "theta"), norm).caption
         for norm in words.NORMS

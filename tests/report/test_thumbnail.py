@@ -46,6 +46,19 @@ def test_a_line_of_members_is_a_response_curve():
     assert np.all(np.diff(curve[:, 1], 2) < 0.0)
 
 
+def test_both_ways_of_a_path_have_the_colours_of_the_page():
+    """The way up was red on the index and blue on the page."""
+    exp = samples.experiment(
+        model={"kind": "duffing", "delta": 0.1, "gamma": 1.0}, initial={"u": 0.0, "v": 0.0}, levels=[1],
+        time={"periods": 4, "steps_per_period": 16, "frequency": "model.omega"}, schemes=["rk4"], checks=[],
+        sweep={"follow": "model.omega", "model.omega": [*np.linspace(1, 2, 9).tolist(), 1.5]},
+    )  # fmt: skip
+    text = thumbnail.thumbnail(exp, samples.record(exp), Member(0, 0, "rk4"))
+    points = {name: d.count("L") for name, d in re.findall(r'class="(c\d)" d="([^"]*)"', text)}
+    assert points == {"c0": 8, "c1": 1}
+    assert ".c0{stroke:#0072b2}" in text
+
+
 def test_few_members_are_shown_by_their_motions():
     kind, curves = drawn(samples.swept(3))
     assert kind == "curves"

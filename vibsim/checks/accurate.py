@@ -187,6 +187,7 @@ def describe(f: Found, check: AccurateCheck) -> Description:
                 f"{s.subject} is not as accurate as asked ({s.asked}). The error at level {s.level} is {s.error()}, at "
                 f"least {s.least()}.{s.mean()}",
                 s.finer(),
+                f"{s.error()} at level {s.level}, at least {s.least()}",
             )
         case "unstable":
             return Description(

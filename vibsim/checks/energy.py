@@ -142,8 +142,8 @@ def describe(f: Found, check: ConservesCheck) -> Description:
     most = "The energy is 0"
     if math.isfinite(size):
         most = f"The error is at most {number(size, 4)} of the energy"
-    sentence = f"The error of {name} {sentence}. {most}. {expects}"
-    return Description(sentence, _advice(f, drift, check))
+    finding = f"The error of {name} {sentence}. {most}"
+    return Description(f"{finding}. {expects}", _advice(f, drift, check), finding)
 
 
 def _advice(f: Found, drift: str, check: ConservesCheck) -> str:

@@ -87,15 +87,16 @@ def first(experiment: Experiment, record: Record) -> str:
     return next(iter(quantities(experiment, record)), position(experiment))
 
 
-def members(record: Record, quantity: str) -> list[Member]:
+def members(record: Record, quantity: str, decisive: Member | None = None) -> list[Member]:
     """Return the members that figures over time show, with each scheme: the only one, or two of a sweep.
 
-    In a sweep they are the worst member and a typical passing one, if any passes. The worst is judged by the verdicts
-    on `quantity`, then by the distance of the order from the formal one, each taken from the worst scheme.
+    In a sweep they are the `decisive` member, else the worst one, and a typical passing one, if any passes. The worst
+    is judged by the verdicts on `quantity`, then by the distance of the order from the formal one, each taken from the
+    worst scheme.
     """
     if not data.swept(record) or f"{quantity}_status" not in record:
         # a large sweep has verdicts only on the quantities of checks
-        return data.of_case(record, 0)
+        return data.of_case(record, 0 if decisive is None else decisive.case)
     status = data.flags(record, f"{quantity}_status")
     severity = np.max([(status == word) * rank for word, rank in SEVERITY.items()], axis=(0, 1))
     away = np.abs(deviation(record, quantity))
@@ -103,7 +104,8 @@ def members(record: Record, quantity: str) -> list[Member]:
     # the best score: members that most schemes pass, among these the ones that fewest fail
     score = np.sum(status == "PASS", axis=0) * (len(status) + 1) - np.sum(status == "FAIL", axis=0)
     healthy = ranking[score[ranking] == score.max()]
-    roles = {int(healthy[healthy.size // 2]): "typical", int(ranking[-1]): "worst"}
+    last = int(ranking[-1]) if decisive is None else decisive.case
+    roles = {int(healthy[healthy.size // 2]): "typical", last: "worst"}
     shown = reversed(roles.items())
     return [member for case, role in shown for member in data.of_case(record, case, role)]
 

@@ -201,14 +201,29 @@ def swept_label(record: Record, name: str) -> tuple[str, str]:
 
 
 def case_name(record: Record, case: int, only: str | None = None) -> str:
-    """Name a member by its swept values, or by that of the key `only`; empty without a sweep."""
+    """Name a member by its swept values, or by that of the key `only`; empty without a sweep.
+
+    If a path comes back to its values, the name says on which way the member lies.
+    """
     parts = []
     for name in swept(record):
         (key, key_unit), value = swept_label(record, name), pick(record, name, case=case).item()
         text = f"{value:.6g}" if isinstance(value, float) else str(value)
         if only in (None, key):
             parts.append(f"{key} = {text} {key_unit}".strip())
-    return ", ".join(parts)
+    return ", ".join(parts) + (_way(record, case) if only is None else "")
+
+
+def _way(record: Record, case: int) -> str:
+    """Say on which way a member lies if others have its swept values; empty otherwise."""
+    columns = [pick(record, name) for name in swept(record)]
+    same = [column == column[case] for column in columns]
+    path = next((x for x in columns if x.dtype.kind == "f" and np.unique(x[:2]).size > 1), None)
+    if path is None or np.all(same, axis=0).sum() < 2:
+        return ""
+    # the first member goes where the next one goes
+    after = max(case, 1)
+    return f" on the way {'up' if path[after] > path[after - 1] else 'down'}"
 
 
 def all_members(record: Record) -> list[Member]:

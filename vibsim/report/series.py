@@ -10,12 +10,14 @@ from vibsim.core.array_types import Floats
 from vibsim.core.record import Record
 from vibsim.formula import values
 from vibsim.models.base import Formula, Model, tree
+from vibsim.models.events import Impact
 from vibsim.report import data
 from vibsim.report.data import Member, pretty_unit
 from vibsim.report.types import Experiment
 from vibsim.simulation.members import members
 
 ENERGIES = ("energy", "kinetic_energy", "potential_energy")
+SMOOTH = 700  # points of an exact solution: with its gaps so few that none is thinned away
 
 
 def numbers_of(
@@ -71,6 +73,27 @@ def exact(
     if quantity in states:
         return np.asarray(states[quantity])
     return _from_states(experiment, record, quantity, member, states, t)
+
+
+def exact_curve(
+    experiment: Experiment, record: Record, quantity: str, member: Member, end: float = np.inf
+) -> tuple[Floats, Floats]:
+    """Return times and values of the exact solution up to a time, on a finer grid if the common times are few.
+
+    So the curve is smooth even if a level has few points in a period. It has a gap where an impact makes a velocity
+    jump. If only a reference is known, its times are the common ones.
+    """
+    t = data.times(record, member.case)
+    there = t <= end * (1.0 + 1e-12)
+    fine = t[there] if t.size > SMOOTH else np.linspace(t[0], min(end, t[-1]), SMOOTH)
+    best = exact(experiment, record, quantity, member, fine)
+    if best is None or not np.isfinite(best).any():
+        return t[there], data.exact_series(record, quantity, member)[there]
+    model = experiment.model.definition
+    if isinstance(model.events, Impact) and quantity in model.velocities:
+        rises = np.flatnonzero((best[:-1] < 0.0) & (best[1:] >= 0.0))
+        fine, best = np.insert(fine, rises + 1, fine[rises]), np.insert(best, rises + 1, np.nan)
+    return fine, best
 
 
 def _from_states(

@@ -99,10 +99,12 @@ def labelled(text: str, quantity: str | None) -> str:
 
 
 def passed(statuses: Sequence[str], one: str = "check", many: str = "checks") -> str:
-    """Write how many checks passed: `9 of 9 checks`."""
+    """Write how many checks passed: `9 of 9 checks`, `1 of 3 checks passed`."""
     if not statuses:
         return f"no {one}"
-    return f"{statuses.count('PASS')} of {len(statuses)} {one if len(statuses) == 1 else many}"
+    count, total = statuses.count("PASS"), len(statuses)
+    # beside FAIL a bare count would be that of the failures
+    return f"{count} of {total} {one if total == 1 else many}{' passed' * (count < total)}"
 
 
 BADGES = {"PASS": "passed", "INCONCLUSIVE": "undecided", "FAIL": "failed"}

@@ -105,8 +105,11 @@ def _motion(
     """Draw the motion of the member that decides, and beside it of a typical one."""
     typical = [member for member in series if member.role == "typical"]
     return [
-        *(solution.motion(record, position, member) for member in [lead.member, *typical[:1]]),
-        long_series.long_series(record, position, lead.member),
+        *(
+            solution.motion(experiment, record, position, member)
+            for member in [lead.member, *typical[:1]]
+        ),
+        long_series.long_series(experiment, record, position, lead.member),
         plane.path(experiment, record, series),
     ]
 
@@ -195,10 +198,12 @@ def over_members(
     return views, notes
 
 
-def choose(experiment: Experiment, record: Record) -> tuple[list[Member], str]:
-    """Return what gets figures of its own, and a sentence saying what was left out."""
+def choose(
+    experiment: Experiment, record: Record, decisive: Member | None = None
+) -> tuple[list[Member], str]:
+    """Return what gets figures of its own, the `decisive` member first, and a sentence saying what was left out."""
     quantity = choice.first(experiment, record)
-    everyone = choice.with_levels(experiment, choice.members(record, quantity))
+    everyone = choice.with_levels(experiment, choice.members(record, quantity, decisive))
     ranked = everyone
     if f"{quantity}_status" in record:
         status = data.flags(record, f"{quantity}_status")
@@ -212,7 +217,9 @@ def choose(experiment: Experiment, record: Record) -> tuple[list[Member], str]:
             "runs alone has them."
         )
     elif is_swept:
-        parts.append("The worst and a typical member are shown over time, for every scheme.")
+        parts.append(
+            "The member that decides and a typical one are shown over time, for every scheme."
+        )
     count = len(everyone) - room
     if count > 0:
         one, many = ("scheme", "schemes")

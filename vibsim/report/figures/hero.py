@@ -18,7 +18,7 @@ from vibsim.checks.outcome import about_members
 from vibsim.core.array_types import Flags, Floats
 from vibsim.core.record import Record
 from vibsim.core.vocabulary import SECONDS_OF_NORM
-from vibsim.report import choice, data, finest_level, style, sweep_layout, words
+from vibsim.report import choice, data, finest_level, series, style, sweep_layout, words
 from vibsim.report.choice import Lead
 from vibsim.report.data import Member
 from vibsim.report.figures import panels, time
@@ -181,20 +181,22 @@ def against_step(record: Record, lead: Lead) -> Picture | None:
     )
 
 
-def solution(record: Record, quantity: str, member: Member, *, is_left: bool) -> Picture:
+def solution(
+    experiment: Experiment, record: Record, quantity: str, member: Member, *, is_left: bool
+) -> Picture:
     """Draw a quantity at the finest level, and the exact solution."""
     t, values = data.times(record, member.case), data.at(record, f"{quantity}_finest", member)
-    letter, exact = words.symbol(quantity), data.exact_series(record, quantity, member)
+    letter, exact = words.symbol(quantity), series.exact_curve(experiment, record, quantity, member)
     ax = _panel(
         LEFT if is_left else RIGHT, style.label(letter, data.unit(record, f"{quantity}_finest"))
     )
     ax.set_gid(style.TIME)
-    has_exact = bool(np.isfinite(exact).any())
+    has_exact = bool(np.isfinite(exact[1]).any())
     if has_exact:
-        ax.plot(*style.thin(t, exact, 200), color=style.PALE, linewidth=4.5, label="exact")
+        ax.plot(*style.thin(*exact, 200), color=style.PALE, linewidth=4.5, label="exact")
     text = f"{words.number(int(record['steps'][-1]), 'integer')} steps"
     ax.plot(*style.thin(t, values, 200), color=style.COLOURS[0], linewidth=1.4, label=text)
-    panels.fit_values(ax, [values], exact)
+    panels.fit_values(ax, [values], exact[1])
     panels.stop_at_breakdown(ax, t, [values])
     ax.set_xlabel(data.time_label(record))
     ax.legend(loc="best", fontsize=8, handlelength=1.8)

@@ -14,12 +14,12 @@ import numpy as np
 
 from vibsim.core.array_types import Floats
 from vibsim.core.record import Record
-from vibsim.report import data, style, words
+from vibsim.report import data, series, style, words
 from vibsim.report.data import Member
 from vibsim.report.figures import moments, panels
 from vibsim.report.figures.moments import UNBOUNDED
 from vibsim.report.style import Picture
-from vibsim.report.types import Axes
+from vibsim.report.types import Axes, Experiment
 
 MANY_PERIODS = 10.0
 """A run of more periods is long."""
@@ -40,7 +40,9 @@ class Row(NamedTuple):
     group: str | None
 
 
-def long_series(record: Record, quantity: str, member: Member) -> Picture | None:
+def long_series(
+    experiment: Experiment, record: Record, quantity: str, member: Member
+) -> Picture | None:
     """Draw a long series; None where there are few periods, few samples of each, or nothing to compare a run with.
 
     One scheme is drawn on several levels, several schemes each on the coarsest level.
@@ -71,9 +73,13 @@ def long_series(record: Record, quantity: str, member: Member) -> Picture | None
     gid = f"{style.LONG} {PERIODS * period:.6g}"
     axes = panels.stacked([*[TALL] * len(rows), STRIP], gid)
     look: dict[str, Any] = {"color": style.PALE, "linewidth": 3.5, "zorder": 1, "gid": "compared"}
-    is_sparse = t.size * period < SPARSE * span
+    is_sparse, is_curve = t.size * period < SPARSE * span, False
     dots: dict[str, Any] = {"marker": "o", "markersize": 2.5} if is_sparse else {}
-    pale = _smooth(t, compared) if is_sparse else style.thin(t, compared, width)
+    pale = style.thin(t, compared, width)
+    if is_sparse:
+        smooth = series.exact_curve(experiment, record, quantity, member)
+        is_curve = is_known and smooth[0].size > t.size
+        pale = smooth if is_curve else _smooth(t, compared)
     for i, (ax, row) in enumerate(zip(axes, rows, strict=False)):
         _draw(ax, pale, against, look)
         own = {"color": style.COLOURS[i % style.MANY], "linewidth": 1.2, "gid": row.group} | dots
@@ -90,8 +96,8 @@ def long_series(record: Record, quantity: str, member: Member) -> Picture | None
         f"{words.title(quantity)}(t) over {span / period:.0f} periods, {member.case_words or f'a panel for each {of}'}",
         f"A panel for each {of}, with the {'exact solution' if is_known else 'finest level'} in grey. "
         "The strip below has the error of the first panel over the whole time."
-        + " Dots: the times that all levels share; grey is a spline between them."
-        * is_sparse,
+        + " Dots: the times that all levels share." * is_sparse
+        + " Grey is a spline between them." * (is_sparse and not is_curve),
         f"{words.name(quantity)} against time, a panel for each {of}, over {span / period:.0f} periods",
         axes[0].get_figure(root=True),
     )

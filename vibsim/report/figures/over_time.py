@@ -17,7 +17,6 @@ from vibsim.core.array_types import Floats
 from vibsim.core.record import Record
 from vibsim.experiment.schema.figures import LEVEL, MEMBER, FigureOfSource
 from vibsim.formula import parse, values
-from vibsim.models.events import Impact
 from vibsim.report import choice, data, series, style, words
 from vibsim.report.data import Member
 from vibsim.report.figures import panels
@@ -25,7 +24,6 @@ from vibsim.report.style import Picture
 from vibsim.report.types import Axes, Experiment
 
 MOST = 6  # most panels of a figure, and most figures
-SMOOTH = 700  # points of an exact solution: with its gaps so few that none is thinned away
 FEW = 90  # points of a run up to which each has a marker
 LEAVES_FRAME = 8.0
 """What is beyond so many times the exact solution leaves the frame."""
@@ -164,7 +162,7 @@ def _draw(
     first = panel.runs[0][1]
     exact: list[Floats] = []
     if len({member.case for _, member in panel.runs}) == 1:
-        fine, best = _exact(experiment, record, panel.quantity, first, end)
+        fine, best = series.exact_curve(experiment, record, panel.quantity, first, end)
         if np.isfinite(best).any():
             wide: dict[str, Any] = {"color": style.PALE, "linewidth": 4.5, "zorder": 1}
             ax.plot(*style.thin(fine, best), label="exact", **wide)
@@ -184,7 +182,7 @@ def _draw(
             found = np.where(within, found, np.nan)
         ax.plot(*style.thin(t, found), label=style.entry(text), **_look(k, t.size, jumps))
         drawn.append(found)
-    fine = np.linspace(float(t[0]), end, SMOOTH)
+    fine = np.linspace(float(t[0]), end, series.SMOOTH)
     parameters = series.parameters_of(experiment, record, first.case)
     for k, (text, formula) in enumerate(figure.beside.items()):
         curve = values(parse(formula, ("t", *parameters)), {**parameters, "t": fine})
@@ -214,20 +212,3 @@ def _look(k: int, points: int, jumps: bool) -> dict[str, Any]:
         return look | {"marker": "none"}
     # between points an impact may lie, which no line shows
     return look | ({"linestyle": "none"} if jumps else {})
-
-
-def _exact(
-    experiment: Experiment, record: Record, quantity: str, member: Member, end: float
-) -> tuple[Floats, Floats]:
-    """Return the exact solution up to a time, at times of its own; at the common ones where only these are known."""
-    t = data.times(record, member.case)
-    fine = np.linspace(float(t[0]), min(end, float(t[-1])), SMOOTH)
-    best = series.exact(experiment, record, quantity, member, fine)
-    if best is None or not np.isfinite(best).any():
-        there = t <= end * (1.0 + 1e-12)
-        return t[there], data.exact_series(record, quantity, member)[there]
-    model = experiment.model.definition
-    if isinstance(model.events, Impact) and quantity in model.velocities:
-        rises = np.flatnonzero((best[:-1] < 0.0) & (best[1:] >= 0.0))
-        fine, best = np.insert(fine, rises + 1, fine[rises]), np.insert(best, rises + 1, np.nan)
-    return fine, best

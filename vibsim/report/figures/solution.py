@@ -11,11 +11,11 @@ import numpy as np
 
 from vibsim.core.array_types import Floats
 from vibsim.core.record import Record
-from vibsim.report import data, style, words
+from vibsim.report import data, series, style, words
 from vibsim.report.data import Member
 from vibsim.report.figures import moments, panels
 from vibsim.report.style import Picture
-from vibsim.report.types import Axes
+from vibsim.report.types import Axes, Experiment
 
 MOST = 6  # most levels that can be told apart
 Look = dict[str, Any]
@@ -139,7 +139,7 @@ def _draw_errors(
     style.beside(ax)
 
 
-def motion(record: Record, quantity: str, member: Member) -> Picture:
+def motion(experiment: Experiment, record: Record, quantity: str, member: Member) -> Picture:
     """Draw a quantity on all levels, and how far each is from the exact solution, or from the extrapolated one."""
     t, letter = data.times(record, member.case), words.symbol(quantity)
     measure, levels = data.unit(record, f"{quantity}_finest"), data.whole(record, "level")
@@ -148,22 +148,24 @@ def motion(record: Record, quantity: str, member: Member) -> Picture:
     name = f"{quantity}_richardson"
     best = exact if is_known or name not in record else data.at(record, name, member)
     chosen = style.spaced(len(levels), MOST)
-    series = {i: data.state_on_level(record, quantity, member, i) for i in chosen}
+    runs = {i: data.state_on_level(record, quantity, member, i) for i in chosen}
     has_errors = bool(np.isfinite(best).any()) and len(levels) > (0 if is_known else 1)
     axes = panels.stacked([2.3, *[1.7] * has_errors], style.TIME)
     text = "exact" if is_known else "extrapolated"
     is_dotted = moments.is_undersampled(record, t, data.at(record, f"{quantity}_finest", member))
     if has_errors:
         pale: Look = {"color": style.PALE, "linewidth": 5.0, "label": text, "zorder": 1}
-        axes[0].plot(
-            *style.thin(t, best), **pale | (DOTS | {"markersize": 6.0} if is_dotted else {})
-        )
+        if is_dotted:
+            axes[0].plot(*style.thin(t, best), **pale | DOTS | {"markersize": 6.0})
+        else:
+            smooth = series.exact_curve(experiment, record, quantity, member)
+            axes[0].plot(*style.thin(*(smooth if is_known else (t, best))), **pale)
     looks = {i: _look(k, record, i) | (DOTS if is_dotted else {}) for k, i in enumerate(chosen)}
-    _draw_levels(axes[0], t, series, looks, best)
+    _draw_levels(axes[0], t, runs, looks, best)
     title = f"{letter}(t){' at the stored times alone' if is_dotted else ''}"
     axes[0].set(ylabel=style.label(letter, measure), title=title)
     if has_errors:
-        errors = {i: values - best for i, values in series.items()}
+        errors = {i: values - best for i, values in runs.items()}
         exponent = _draw_level_errors(axes[1], t, errors, looks)
         axes[1].set_title(f"Each level minus the {text} solution", fontweight="normal", fontsize=9)
         axes[1].set_ylabel(style.label(f"error of {letter}", measure, exponent))
@@ -188,15 +190,15 @@ def _look(k: int, record: Record, i: int) -> Look:
 
 
 def _draw_levels(
-    ax: Axes, t: Floats, series: dict[int, Floats], looks: dict[int, Look], best: Floats
+    ax: Axes, t: Floats, runs: dict[int, Floats], looks: dict[int, Look], best: Floats
 ) -> None:
-    for k, (i, values) in enumerate(series.items()):
-        dashes = "-" if i == max(series) else style.DASHES[1 + k % (style.MANY - 1)]
+    for k, (i, values) in enumerate(runs.items()):
+        dashes = "-" if i == max(runs) else style.DASHES[1 + k % (style.MANY - 1)]
         look: Look = {"linestyle": dashes} | looks[i]
         ax.plot(*style.thin(t, values), **look)
-    panels.stop_at_breakdown(ax, t, list(series.values()))
-    whole = [values for values in series.values() if np.isfinite(values).all()]
-    whole = whole or list(series.values())
+    panels.stop_at_breakdown(ax, t, list(runs.values()))
+    whole = [values for values in runs.values() if np.isfinite(values).all()]
+    whole = whole or list(runs.values())
     size = data.largest(best)
     near = [values for values in whole if data.largest(values) <= BEYOND * size]
     if near and len(near) < len(whole):

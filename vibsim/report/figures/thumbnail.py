@@ -1,6 +1,6 @@
 """The small picture of an experiment for the index: a map, a response curve, a path in the plane, or the solution.
 
-It is written as SVG of its own, some kilobytes, with colours for light and dark.
+It is written as SVG of its own, some kilobytes, with the colours of the page for light and dark.
 """
 
 from __future__ import annotations
@@ -35,11 +35,11 @@ NUMBERS = ("amplitude", "period", "growth_per_period")
 
 _STYLE = (
     ":root{color-scheme:light dark}path{fill:none;stroke-width:1.8;stroke-linejoin:round;stroke-linecap:round}"
-    ".c0{stroke:#1f3a93}.c1{stroke:#d1495b}.c2{stroke:#d9902f}.map path{stroke:none}"
-    "@media(prefers-color-scheme:dark){.c0{stroke:#9db4ff}.c1{stroke:#ef7f8e}.c2{stroke:#f0b35b}}"
+    ".c0{stroke:#0072b2}.c1{stroke:#d55e00}.c2{stroke:#008a65}.map path{stroke:none}"
+    "@media(prefers-color-scheme:dark){.c0{stroke:#5cb3e8}.c1{stroke:#ff8c42}.c2{stroke:#2fc597}}"
 )
-_ENDS = (38, 44, 120), (209, 73, 91), (246, 211, 133)
-"""Colours of a map for the least, a middle and the largest value."""
+_ENDS = (68, 1, 84), (33, 145, 140), (253, 231, 37)
+"""Colours of a map for the least, a middle and the largest value, as on the page."""
 
 Lines = list[tuple[Floats, Floats]]
 
@@ -104,7 +104,8 @@ def _response(record: Record, along: Along, names: Sequence[str]) -> Lines:
             if data.largest(values) > WIDE * np.median(style.finite(values)):
                 values = np.log10(style.no_zeros(values))
             x = np.log(key.values) if key.is_log else key.values
-            return [(x[members], values[members]) for _, members in along.lines[:CURVES]]
+            # the first is on top, and has the first colour, as on the page
+            return [(x[members], values[members]) for _, members in along.lines[CURVES - 1 :: -1]]
     return []
 
 

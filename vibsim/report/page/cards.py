@@ -90,7 +90,7 @@ def card(experiment: Experiment, record: Record, check: Mapping[str, Any]) -> di
     facts = (decisive[key] for key in ("scheme", "case", "status", "reason", "facts"))
     result = Result(*facts)
     decides = worst(word for word, count in counts.items() if count)
-    text = wording.text(result, counts, check["where"])
+    text = words.swept(wording.text(result, counts, check["where"]))
     if _is_said(asserted, check):
         text = _hardest(record, check)
     wanted = assertions.wanted(experiment, measured, words.fact(decisive, "expected"))
@@ -100,10 +100,10 @@ def card(experiment: Experiment, record: Record, check: Mapping[str, Any]) -> di
         "status": status,
         "measures": kind,
         "badge": words.badge(check),
-        "what": assertions.about(asserted),
-        "source": assertions.source(asserted),
+        "what": assertions.about(record, asserted),
+        "source": assertions.source(record, asserted),
         "wanted": f"not: {wanted}" if is_refutation(asserted) else wanted,
-        "got": _got(check, wording, result),
+        "got": words.swept(_got(check, wording, result)),
         "note": getattr(asserted, "note", None) or "",
         "reason": check["reason"] or "–",
         "meaning": reasons.REFUTED if is_refuted else explained.meaning,

@@ -55,7 +55,14 @@ def context(
         "facts": " · ".join(filter(None, _facts(experiment, record))),
         "numbers": list(numbers(experiment, record, lead))[:MOST_NUMBERS],
         "meaning": " ".join(
-            [findings.paragraph(experiment, record, lead, levels), *_traps(summary, lead)]
+            filter(
+                None,
+                [
+                    findings.paragraph(experiment, record, lead, levels),
+                    findings.asked_of(record, lead),
+                    *_traps(summary, lead),
+                ],
+            )
         ),
         "statements": claims[:MOST_STATEMENTS],
         "more_statements": max(0, len(claims) - MOST_STATEMENTS),
@@ -131,7 +138,7 @@ def _measured(experiment: Experiment, record: Record, lead: Lead) -> Iterator[Nu
     unit, label, form = "", MEASURED.get(kind, ""), "brief"  # a size has two digits
     if check is not None and check.kind == "value":
         unit, form = data.pretty_unit(unit_of(experiment, record, check)), "step"
-        label = words.PAGE.opening(assertions.subject(check))
+        label = words.PAGE.opening(assertions.subject(record, check))
     if kind in ("equal", "accurate"):
         unit = data.norm_unit(record, lead.quantity, "l2" if kind == "accurate" else "linf")
     if check is not None and check.kind == "accurate" and check.is_relative:
@@ -177,7 +184,8 @@ def _order(experiment: Experiment, record: Record, lead: Lead) -> Iterator[Numbe
     if data.swept(record) and every.size > 1:
         ends = [words.number(float(end), "order") for end in (every.min(), every.max())]
         value = ends[0] if ends[0] == ends[1] else " to ".join(ends)
-        known = words.number(every.size, "integer")
+        known, total = (words.number(n, "integer") for n in (every.size, len(record["case"])))
+        known = known if known == total else f"{known} of the {total}"
         yield {"label": label, "value": value, "note": f"of {known} members; {due}"}
     elif lead.is_on_order and lead.result.get("reason") == "exact":
         yield {"label": label, "value": "exact", "note": "the levels differ by round-off only"}
@@ -207,11 +215,15 @@ def _error(experiment: Experiment, record: Record, lead: Lead) -> Iterator[Numbe
     unit = data.norm_unit(record, quantity, "linf")
     what = findings.short(experiment, quantity)
     size = f"{words.share(relative)} of its size, " if relative else ""
+    note = f"{size}{word}, root mean square"
+    if error == 0.0:
+        equal = "equal to the exact solution" if word == "true" else "the levels agree"
+        note = f"{equal} in every digit"
     steps = words.number(int(record["steps"][-1]), "integer")
     yield {
         "label": f"Error of {what} at {steps} steps{data.of_several(record, member.scheme)}",
         "value": f"{words.number(mean, 'brief')} {unit}".rstrip(),
-        "note": f"{size}{word}, root mean square{_of_member(record, lead)}",
+        "note": f"{note}{_of_member(record, lead)}",
     }
 
 
@@ -279,8 +291,9 @@ def pictures(experiment: Experiment, record: Record, lead: Lead) -> list[Picture
     if data.is_lean(record) or len(found) == 2:
         return found
     if not found:
-        return [solution.motion(record, choice.position(experiment), lead.member)]
-    moving = drawn.solution(record, choice.position(experiment), lead.member, is_left=left is None)
+        return [solution.motion(experiment, record, choice.position(experiment), lead.member)]
+    of = choice.position(experiment), lead.member
+    moving = drawn.solution(experiment, record, *of, is_left=left is None)
     return [moving, *found] if left is None else [*found, moving]
 
 

@@ -88,7 +88,7 @@ class Row:
     @property
     def counts(self) -> str:
         """How many checks passed."""
-        return f"{self.passed} of {len(self.checks)}"
+        return f"{self.passed} of {len(self.checks)}{' passed' * (self.passed < len(self.checks))}"
 
     @property
     def stands(self) -> str:
@@ -191,7 +191,7 @@ def headline(checks: Sequence[Mapping[str, Any]]) -> Headline:
             return Headline(
                 "" if order is None else words.number(order, "order"),
                 "" if interval == "–" else interval,
-                "" if relative is None else f"{words.number(relative, 'brief')} of its size",
+                _share(relative),
             )
     passed = [] if ranked and ranked[0]["status"] != "PASS" else wanted or found
     for check, result in passed:
@@ -203,6 +203,13 @@ def headline(checks: Sequence[Mapping[str, Any]]) -> Headline:
         if text:
             return Headline(text=f"{text[: LONGEST - 1]}…" if len(text) > LONGEST else text)
     return Headline()
+
+
+def _share(relative: float | None) -> str:
+    """Write a relative error; empty where it is not known."""
+    if relative is None:
+        return ""
+    return f"{words.number(relative, 'brief')} of its size" if relative else "0, in every digit"
 
 
 def _heading(rows: Sequence[Row]) -> str:

@@ -71,9 +71,7 @@ def write(
     lead = choice.find_lead(experiment, convergence, summary)
     figures = page_figures.draw(experiment, convergence, lead, formats)
     replace_files(directory / "figures", figures.files)
-    texts, tables = page_tables.collect(
-        experiment, convergence, summary, lead.quantity, figures.of_source
-    )
+    texts, tables = page_tables.collect(experiment, convergence, summary, lead, figures.of_source)
     _write_tables(directory / "tables", texts, experiment, convergence)
     played = player.element(experiment, convergence)
     page = environment().get_template("report.html").render(

@@ -44,7 +44,7 @@ def draw(experiment: Experiment, record: Record, lead: Lead, formats: Sequence[s
         "source": [drawn.add(picture) for _, pictures in sources for picture in pictures],
     }
     above = [picture.name for group in groups.values() for picture, _ in group]
-    shown, left_out = gallery.choose(experiment, record)
+    shown, left_out = gallery.choose(experiment, record, lead.member)
     below = gallery.pictures(experiment, record, shown, lead, above)
     groups["motion"] = [drawn.add(picture) for picture in below.motion]
     belief, over_members = drawn.tabs(below.belief), drawn.views(below.members)

@@ -11,6 +11,7 @@ from vibsim.core.record import Record
 from vibsim.core.vocabulary import TYPICAL_NORM
 from vibsim.experiment.schema.figures import FigureOfSource
 from vibsim.report import choice, data, words
+from vibsim.report.choice import Lead
 from vibsim.report.figures import work
 from vibsim.report.style import Picture
 from vibsim.report.tables import (
@@ -38,15 +39,15 @@ def collect(
     experiment: Experiment,
     record: Record,
     summary: Mapping[str, Any],
-    first: str,
+    lead: Lead,
     sources: Iterable[tuple[FigureOfSource, Sequence[Picture]]],
 ) -> tuple[dict[str, dict[str, str]], dict[str, Any]]:
     """Return the texts of all tables, and what the page shows of them by the names that its template uses.
 
-    The quantity `first` comes first; `sources` are the figures of the source with their pictures.
+    The quantity of `lead` comes first; `sources` are the figures of the source with their pictures.
     """
     everyone = members.table(record, choice.position(experiment))
-    listed, others = _of_numbers(experiment, record, everyone, first)
+    listed, others = _of_numbers(experiment, record, everyone, lead)
     printed = published.tables(experiment, record, summary)
     scales = scales_table(experiment, record)
     broken = checks.failures(summary, record)
@@ -67,15 +68,18 @@ def collect(
 
 
 def _of_numbers(
-    experiment: Experiment, record: Record, everyone: Table | None, first: str
+    experiment: Experiment, record: Record, everyone: Table | None, lead: Lead
 ) -> tuple[list[Table], list[Table]]:
     """Return the tables that the page shows, as far as it has room for them, and those that are files only.
 
-    The quantity `first` comes first, if there are tables of it.
+    The quantity of `lead` comes first, if there are tables of it, and its member.
     """
     model = experiment.model.definition
-    found = sorted(choice.quantities(experiment, record), key=lambda quantity: quantity != first)
-    shown = choice.with_levels(experiment, choice.members(record, choice.first(experiment, record)))
+    found = sorted(
+        choice.quantities(experiment, record), key=lambda quantity: quantity != lead.quantity
+    )
+    members_of = choice.members(record, choice.first(experiment, record), lead.member)
+    shown = choice.with_levels(experiment, members_of)
     norms = [name for name in record.words("norm") if name != TYPICAL_NORM]
     orders = [levels.orders(record, quantity, shown) for quantity in found]
     checked = [check.value for check in choice.asked_values(experiment)]

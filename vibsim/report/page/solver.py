@@ -40,10 +40,13 @@ def write(
     experiment = restore(plan.content, plan.source_file, plan.settings)
     cards, tables = [], [check_tables.checks(summary)]
     figures: dict[str, bytes] = {}
+    shown: dict[tuple[str, int], str] = {}
     for check, entry in zip(experiment.checks, summary["checks"], strict=True):
         verdict = analysis.restored(experiment, convergence, check, entry)
         card = _card(experiment, verdict, entry)
-        cards.append(card)
+        # of one ladder the picture and the levels stand once
+        first = shown.setdefault((verdict.quantity, entry["results"][0]["case"]), card["heading"])
+        cards.append(card | {"above": "" if first == card["heading"] else first})
         tables += [table for table in (card["table"], card["members"]) if table]
         figures |= dict(_thumbnail(verdict)) if not figures else {}
         figures |= drawing.files(card["picture"], formats)

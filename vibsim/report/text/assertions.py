@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from vibsim.checks.accurate import rule
 from vibsim.checks.reductions import IN_WORDS
 from vibsim.checks.value import what
 from vibsim.checks.verdict_text import expectation, expected_verdict
+from vibsim.core.record import Record
 from vibsim.core.vocabulary import TYPICAL_NORM
-from vibsim.report import words
-from vibsim.report.types import Check, ConvergesCheck, Experiment, Measurement
+from vibsim.report import data, words
+from vibsim.report.types import Check, Experiment, Measurement
 
 PLACES = ("t", "step", "level", "scheme", "case")  # keys that locate a number
 STABLE = {
@@ -28,25 +31,17 @@ SOLUTIONS = {"exact": "the exact solution", "discrete": "the exact solution of i
 OF_TOLERANCE = "Error of the extrapolated solution, in the unit of each state, at every stored time"
 
 
-def about(check: Check | None) -> str:
+def about(record: Record, check: Check | None) -> str:
     """Return the subject of a check in one line: its claim or what it measures; without a check, the tolerance."""
     if check is None:
         return OF_TOLERANCE
     if check.kind == "claim":
         return f"“{check.claim}”"
     if check.kind == "converges":
-        return f"Order of {words.title(check.converges)}{_norm_and_schemes(check)}"
+        return f"Order of {words.title(check.converges)}{_where(record, check, norm=check.norm)}"
     if check.kind == "accurate":
-        only = f" ({_listed(check.schemes)})" if check.schemes else ""
-        return f"Error of {words.title(check.accurate)} at the finest level{only}"
-    return words.PAGE.opening(subject(check))
-
-
-def _norm_and_schemes(check: ConvergesCheck) -> str:
-    """Write in brackets the norm, unless it is the typical one, and the schemes of a check of an order."""
-    parts = [] if check.norm == TYPICAL_NORM else [words.NORMS[check.norm]]
-    parts += [_listed(check.schemes)] if check.schemes else []
-    return f" ({', '.join(parts)})" if parts else ""
+        return f"Error of {words.title(check.accurate)} at the finest level{_where(record, check)}"
+    return words.PAGE.opening(subject(record, check))
 
 
 def wanted(experiment: Experiment, check: Measurement | None, promised: float | None = None) -> str:
@@ -61,15 +56,15 @@ def wanted(experiment: Experiment, check: Measurement | None, promised: float | 
     return f"order {order} ± {check.tolerance:g}{', promised' * (check.order == 'scheme')}"
 
 
-def source(check: Check | None) -> str:
+def source(record: Record, check: Check | None) -> str:
     """Return the source of a claim and what measures it; empty for other kinds of checks."""
     if check is None or check.kind != "claim":
         return ""
     origin = f"{check.source}. " if check.source else ""
-    return f"{origin}Measured by: {measured(check.that)}."
+    return f"{origin}Measured by: {measured(record, check.that)}."
 
 
-def measured(check: Measurement) -> str:
+def measured(record: Record, check: Measurement) -> str:
     """Say what a check measures and expects."""
     match check.kind:
         case "converges":
@@ -88,7 +83,7 @@ def measured(check: Measurement) -> str:
             statement = (
                 f"{words.title(check.accurate)} is {rule(check, words.PAGE)} at the finest level"
             )
-            return f"{statement}{_where(check)}"
+            return f"{statement}{_where(record, check)}"
         case "value":
             bounds = {"equals": check.equals, "is below": check.below, "is above": check.above}
             conditions = [
@@ -99,44 +94,51 @@ def measured(check: Measurement) -> str:
                 f"{key} {words.PAGE.number(x)}" for key, x in tolerance_keys if x is not None
             ]
             extra = f" ({', '.join(tolerances)})" if tolerances else ""
-            return f"{subject(check)}{conditions[0] if conditions else ' '}{extra}"
+            return f"{subject(record, check)}{conditions[0] if conditions else ' '}{extra}"
         case "stable":
-            return f"{STABLE[check.stable]}{_where(check)}"
+            return f"{STABLE[check.stable]}{_where(record, check)}"
         case "conserves":
             velocity = "the scheme's own velocity" if check.conserves == "energy" else "[D₂ₜu]"
-            return f"the energy by {velocity} {DRIFTS[check.drift]}{_where(check)}"
+            return f"the energy by {velocity} {DRIFTS[check.drift]}{_where(record, check)}"
         case "equal":
             other = SOLUTIONS.get(check.second, check.second)
             within = "round-off" if check.atol is None else words.PAGE.number(check.atol)
             letter = words.title(check.quantity)
-            return f"{letter} by {check.first} equals that of {other} to {within}{_where(check)}"
+            return f"{letter} by {check.first} equals that of {other} to {within}{_where(record, check)}"
 
 
-def subject(check: Measurement) -> str:
+def subject(record: Record, check: Measurement) -> str:
     """Say what a check measures, and where; of a number or a difference without its expected value."""
     if check.kind == "equal":
-        return f"{words.title(check.quantity)} by {check.first}{_where(check)}"
+        return f"{words.title(check.quantity)} by {check.first}{_where(record, check)}"
     if check.kind != "value":
-        return measured(check)
+        return measured(record, check)
     statement, is_sampled = what(check, words.PAGE), check.number.is_sample
     keys = ("level", "scheme", "case") if is_sampled else PLACES
     places = ((key, getattr(check.at, key)) for key in keys)
-    parts = [f"{key} {value}" for key, value in places if value is not None]
-    where = ", ".join([*parts, *swept_values(check)])
+    parts = [_place(record, key, value) for key, value in places if value is not None]
+    where = words.swept(", ".join([*parts, *swept_values(check)]))
     if check.take is not None:
         statement = f"{IN_WORDS[check.take]} {statement} over {check.over}"
     statement = f"{statement}{(f' ({where})' if is_sampled else f' at {where}') if where else ''}"
     return statement.replace("level best", "the limit of the levels")
 
 
-def _where(check: Measurement) -> str:
-    """Write in brackets the schemes, the level and the member of a check."""
+def _where(record: Record, check: Measurement, norm: str = TYPICAL_NORM) -> str:
+    """Write in brackets the norm, unless it is the typical one, and the schemes, level and members of a check."""
     names = getattr(check, "schemes", None)
-    parts = [_listed(names)] if names else []
+    parts = [] if norm == TYPICAL_NORM else [words.NORMS[norm]]
+    parts += [_listed(names)] if names else []
     places = ((key, getattr(check, key, None)) for key in ("level", "case"))
-    parts += [f"{key} {value}" for key, value in places if value is not None]
+    parts += [_place(record, key, value) for key, value in places if value is not None]
     parts += swept_values(check)
-    return f" ({', '.join(parts)})" if parts else ""
+    return f" ({words.swept(', '.join(parts))})" if parts else ""
+
+
+def _place(record: Record, key: str, value: Any) -> str:
+    """Name a place where a number is taken: a member by its swept values."""
+    place = data.case_position(record, value) if key == "case" else None
+    return f"{key} {value}" if place is None else data.case_name(record, place)
 
 
 def swept_values(check: Measurement) -> list[str]:

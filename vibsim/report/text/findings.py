@@ -9,6 +9,7 @@ from typing import Any
 
 from vibsim.checks.order_context import COINCIDE
 from vibsim.checks.order_text import UNSEEN
+from vibsim.checks.outcome import about_members
 from vibsim.convergence import LadderVerdict
 from vibsim.core.record import Record
 from vibsim.report import data, words
@@ -190,7 +191,7 @@ def _phrases(experiment: Experiment, record: Record, lead: Lead) -> dict[str, st
         return filled
     match measured.kind:
         case "value":
-            subject = assertions.subject(measured)
+            subject = assertions.subject(record, measured)
             filled |= {"subject": subject, "Subject": _capitalized(words.PAGE.opening(subject))}
         case "equal":
             second = assertions.SOLUTIONS.get(measured.second, f"that by {measured.second}")
@@ -265,15 +266,18 @@ def _everywhere(record: Record, lead: Lead) -> str:
     kind = lead.measured.kind if lead.measured else ""
     is_named = kind in ("converges", "accurate") and len(named) == 1 < len(schemes)
     by = f" with scheme {named[0]}" if is_named else ""
-    if total < 2:
+    members = len(record["case"])
+    is_of_one = total < 2 and (members < 2 or kind not in ("converges", "accurate"))
+    if is_of_one:
         return by
     if data.swept(record):
-        members = len(record["case"])
-        count = "both" if total == 2 else f"all {words.number(total, 'integer')}"
-        noun = "members" if total <= members else "runs"
+        count = {1: "the", 2: "both"}.get(total, f"all {words.number(total, 'integer')}")
+        noun = "runs" if total > members else "members" if total > 1 else "member"
         values = assertions.swept_values(lead.measured) if lead.measured else []
-        subset = f" with {words.swept(', '.join(values))}" if values else " that are asked about"
-        subset = subset if total < members else ""
+        subset = f"with {words.swept(', '.join(values))}" if values else "asked about"
+        subset = (
+            f" {subset}, of {words.number(members, 'integer')} in all" if total < members else ""
+        )
         return f" in {count} {noun}{subset}{by}"
     if total == len(schemes) == 2:
         return " by both schemes"
@@ -339,6 +343,17 @@ def paragraph(experiment: Experiment, record: Record, lead: Lead, levels: int) -
     word = lead.result.get("reason") if lead.is_on_order else lead.entry["reason"]
     is_promised = keeps_promise(record, lead.measured, lead.entry)
     return reasons.reason(word, kind, value, levels, is_promised).meaning
+
+
+def asked_of(record: Record, lead: Lead) -> str:
+    """Say of how many members a check asks for an order, where others are not judged; else nothing."""
+    asked, every = int(about_members(record, lead.measured).sum()), len(record["case"])
+    if not lead.is_on_order or asked == every:
+        return ""
+    few, all_of, rest = (words.number(n, "integer") for n in (asked, every, every - asked))
+    return (
+        f"The check asks about {few} of the {all_of} members, and does not judge the other {rest}."
+    )
 
 
 def keeps_promise(record: Record, measured: Measurement | None, check: Mapping[str, Any]) -> bool:
