@@ -57,7 +57,7 @@ def tables(experiment: Experiment, record: Record, summary: Mapping[str, Any]) -
         of = f" of {words.symbol(table.quantity)}" if table.quantity else ""
         named = table.source or experiment.source
         caption = (
-            f"{table.title}{f' ({named})' if named else ''}. Ours: {_value_in_words(table.value)}{of}; it agrees if it "
+            f"{table.title}{f' ({named})' if named else ''}. Ours: {words.spelled(table.value)}{of}; it agrees if it "
             "differs by at most half a unit of the last printed digit"
         )
         found.append(Table(f"published_{i}", caption, columns, rows))
@@ -82,11 +82,7 @@ def _beside_header(name: str, table: PublishedTable) -> str:
     if f"{name}{CENTRED}" == table.value:
         return OWN
     own = f" {OWN}" if f"{name}{CENTRED}" in VALUES else ""
-    return f"beside: {_value_in_words(name)}{own}"
-
-
-def _value_in_words(value: str) -> str:
-    return value.replace(CENTRED, " by [D₂ₜu]").replace("_", " ")
+    return f"beside: {words.spelled(name)}{own}"
 
 
 def _row(
