@@ -237,9 +237,9 @@ def test_the_frequency_lies_on_its_formula_and_the_series_touches_it() -> None:
 
 def test_the_first_term_of_a_series_is_written_as_a_fraction() -> None:
     start = np.array([0.5, 1.0]) * accuracy.SMALL
-    assert accuracy._leading(-(start**4) / 120.0)[1] == "1 − (w dt)⁴/120"
-    assert accuracy._leading(5.0 * start**2 / 12.0)[1] == "1 + 5 (w dt)²/12"
-    assert accuracy._leading(np.zeros(2)) is None
+    assert accuracy._leading_term(-(start**4) / 120.0)[1] == "1 − (w dt)⁴/120"
+    assert accuracy._leading_term(5.0 * start**2 / 12.0)[1] == "1 + 5 (w dt)²/12"
+    assert accuracy._leading_term(np.zeros(2)) is None
 
 
 def test_the_second_difference_is_measured_on_its_formula() -> None:

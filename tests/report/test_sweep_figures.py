@@ -108,7 +108,7 @@ def test_members_anywhere_in_a_plane_are_gathered_in_cells():
     values = record["model_g"]
     table = grid.worst(values)
     assert np.nanmax(table) == values.max()
-    column = sweep_layout.place_in(grid.x, grid.borders[0])
+    column = data.bin_of(grid.borders[0], grid.x.values)
     for i in range(table.shape[1]):
         assert np.isnan(table[:, i]).all() or np.nanmax(table[:, i]) == values[column == i].max()
     assert "within it" in grid.note

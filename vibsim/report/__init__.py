@@ -1,7 +1,7 @@
 """From numbers to a page: figures, tables, one self-contained report, and an index over all of them.
 
-Nothing is read here but what the analysis stored: the convergence Record and the summary. Matplotlib and jinja2 are
-imported where they are used, so that importing this package costs next to nothing.
+The only input is what the analysis stored: the convergence Record and the summary. Matplotlib and jinja2 are imported
+where they are used, so that importing this package is fast.
 """
 
 from __future__ import annotations

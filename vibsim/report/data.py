@@ -349,6 +349,11 @@ def state_on_level(record: Record, name: str, member: Member, level: int) -> Flo
     return values
 
 
+def bin_of(borders: Floats, values: Floats) -> NDArray[np.intp]:
+    """Return the interval between ascending borders that holds each value; the outermost for values beyond them."""
+    return np.clip(np.searchsorted(borders, values, side="right") - 1, 0, borders.size - 2)
+
+
 def largest(values: Floats) -> float:
     """Return the largest finite absolute value; 0 if there is none."""
     return float(np.abs(finite(values)).max(initial=0.0))

@@ -17,7 +17,7 @@ from vibsim.report.types import Experiment
 from vibsim.simulation.members import members
 
 ENERGIES = ("energy", "kinetic_energy", "potential_energy")
-SMOOTH = 700  # points of an exact solution: with its gaps so few that none is thinned away
+SMOOTH = 700  # points of an exact solution: few enough, with its gaps, that thinning removes none
 
 
 def numbers_of(

@@ -1,7 +1,7 @@
-"""The look of the figures: colour-blind safe, legible in black-and-white print, the same bytes every time.
+"""The look of the figures: colour-blind safe, legible in black-and-white print, with reproducible bytes.
 
-Colours are those of Okabe and Ito (2008), each with a dash pattern and a marker of its own. Text stays text (a reader
-can search and copy it); it is laid out with a wide font, so that a narrower substitute still fits.
+Colours are those of Okabe and Ito (2008), each with its own dash pattern and marker. Text stays text, which readers can
+search and copy; it is laid out with a wide font, so that a narrower substitute still fits.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ DASHES: tuple[Any, ...] = (
 )  # fmt: skip
 MARKERS = ("o", "s", "^", "D", "v", "P", "X")
 GREY = "#707070"
-PALE = "#b0b0b0"  # of what a solution is compared with
+PALE = "#b0b0b0"  # of the reference that a solution is compared with
 STATUS_MARKERS = {"PASS": "o", "INCONCLUSIVE": "s", "FAIL": "X"}
 STATUS_COLOURS = {"PASS": "#009E73", "INCONCLUSIVE": "#E69F00", "FAIL": "#D55E00"}
 REASON_COLOURS = {
@@ -37,26 +37,26 @@ REASON_COLOURS = {
     "order_low": "#D55E00", "order_high": "#AA2288", "mismatch": "#CC79A7", "wrong_limit": "#5E3C99",
     "unstable": "#7F1D00", "non_finite": "#000000",
 }  # fmt: skip
-"""Greens, yellows and reds by status, dark to light within each: the reason of a verdict on a map."""
+"""Reason of a verdict to its colour on a map: greens, yellows and reds by status."""
 REFERENCE = dict[str, Any](color="black", linestyle=(0, (4, 3)), linewidth=1.0, zorder=1)
-"""Of what is promised or exact."""
+"""Look of promised or exact values."""
 ALLOWED = dict[str, Any](color="#ececec", zorder=0)
-"""Of a band of what a tolerance allows."""
+"""Look of the band that a tolerance allows."""
 BESIDE = dict[str, Any](loc="upper left", bbox_to_anchor=(1.01, 1.03), borderaxespad=0.0)
-"""The place of a legend at the right of its axes."""
+"""Place of a legend at the right of its axes."""
 TIME, STEP, MEMBER = "time", "step", "member"
 """Group ids of axes that a page can read: over time, over the step, and with members (`vibsim.report.figures.svg`)."""
 LONG, OVERVIEW = "long", "overview"
-"""The same of a long series, behind it the width of the window that a page shows at first; and of all of its time."""
-MISSING = "#d4d4d4"  # colour of what has no value
+"""Group ids of a long series, followed by the initial width of its window, and of the strip with its whole time."""
+MISSING = "#d4d4d4"  # colour of missing values
 WIDTH = 9.0  # of a figure [inch]
-THINNED_POINTS = 400  # horizontal resolution to which a long series is thinned
-MANY = len(COLOURS)  # schemes above which a figure has one legend for all of its panels
-LOG_RATIO = 30.0  # largest over least value above which a logarithmic axis shows them better
+THINNED_POINTS = 400  # horizontal resolution of a thinned series
+MANY = len(COLOURS)  # schemes above which all panels of a figure share one legend
+LOG_RATIO = 30.0  # ratio of largest to smallest value above which an axis is logarithmic
 LARGEST, TINIEST = 1e300, 1e-300  # of logarithmic axes: beyond, a margin would overflow
-LEAST, MOST = 1e-290, 1e290  # what lies beyond is drawn at the edge
-TICK_DIGITS = 12  # most significant digits of a tick, so that no two neighbours read alike
-DECADES = (1, 2, 3, 5, 10, 20, 30, 50, 100, 200, 300)  # between ticks of a logarithmic axis
+LEAST, MOST = 1e-290, 1e290  # limits of logarithmic axes
+TICK_DIGITS = 12  # most significant digits of a tick, enough to tell neighbours apart
+DECADES = (1, 2, 3, 5, 10, 20, 30, 50, 100, 200, 300)  # possible spacings of logarithmic ticks
 
 _RC: dict[Any, Any] = {
     "axes.edgecolor": "#404040",
@@ -69,7 +69,7 @@ _RC: dict[Any, Any] = {
     "axes.titlelocation": "left",
     "axes.titlesize": 9.5,
     "axes.titleweight": "bold",
-    # a place of its own spares a search for one, a third of the time that an axis takes
+    # a fixed position saves matplotlib's search for one, a third of the time of an axis
     "axes.titley": 1.0,
     "font.family": ["DejaVu Sans"],
     "font.size": 9.0,
@@ -89,13 +89,13 @@ _RC: dict[Any, Any] = {
 
 @dataclass(frozen=True)
 class Picture:
-    """A figure with the words that belong to it."""
+    """A figure with its texts."""
 
-    name: str  # stem of its files, and unique on its page; plain
+    name: str  # stem of its files, in ASCII, unique on its page
     title: str
     caption: str  # what to look for
-    alt: str  # the same content for a reader who cannot see it
-    figure: Figure | None  # None of a check with nothing to draw; the caption says why
+    alt: str  # the same content for readers who cannot see it
+    figure: Figure | None  # None if a check has nothing to draw; the caption says why
 
 
 _IS_APPLIED = ContextVar("is_applied", default=False)
@@ -103,7 +103,7 @@ _IS_APPLIED = ContextVar("is_applied", default=False)
 
 @contextmanager
 def applied() -> Iterator[None]:
-    """Use the look of this module while figures are built and saved; within itself it has nothing to do."""
+    """Use the look of this module while figures are built and saved; nested uses have no effect."""
     if _IS_APPLIED.get():
         yield
         return
@@ -119,7 +119,7 @@ def applied() -> Iterator[None]:
 
 
 def _import_matplotlib() -> None:
-    """Import what draws, without the help that matplotlib writes for each of its classes: a fifth of its time."""
+    """Import matplotlib's drawing modules without generating docstrings for its classes, a fifth of the time."""
     from matplotlib import artist
 
     module: Any = artist
@@ -135,19 +135,19 @@ def _import_matplotlib() -> None:
 
 
 def _without_help(cls: Any) -> None:
-    """Mark the method `set` of a class of artists as made by matplotlib, which adds its help as well."""
+    """Mark the method `set` of an artist class as generated, as matplotlib does when it adds the docstring."""
     cls.set._autogenerated_signature = True
 
 
 def canvas(height: float, width: float = WIDTH) -> Figure:
-    """Return an empty figure of some `height` and `width` [inch]."""
+    """Return an empty figure of given `height` and `width` [inch]."""
     from vibsim.report.canvas import Canvas
 
     return Canvas(figsize=(width, height))
 
 
 def look(i: int) -> dict[str, Any]:
-    """Return colour, dashes and marker of the i-th of several lines; colours come again with others of these."""
+    """Return colour, dashes and marker of the i-th line; a repeated colour has other dashes and another marker."""
     count, turn = len(COLOURS), i // len(COLOURS)
     return {
         "color": COLOURS[i % count],
@@ -157,15 +157,15 @@ def look(i: int) -> dict[str, Any]:
 
 
 def crowded(record: Record) -> bool:
-    """Say whether a record has more schemes than there are colours: then all panels share one legend."""
+    """Return whether a record has more schemes than colours, so that all panels share one legend."""
     return len(record["scheme"]) > MANY
 
 
 def thin(t: Floats, y: Floats, width: int = THINNED_POINTS) -> tuple[Floats, Floats]:
-    """Thin a series for drawing without losing an extreme.
+    """Thin a series for drawing without losing extremes.
 
-    Of ascending `t` and values `y` of shape (n,), where NaN is a gap, it keeps the first, the last, and the smallest
-    and largest value (or one NaN) of each of `width` groups of neighbours: at most ``2 * width + 2`` points.
+    Of ascending `t` and values `y` of shape (n,), where NaN is a gap, the first, the last, and the smallest and largest
+    value (or one NaN) of each of `width` groups of neighbours remain: at most ``2 * width + 2`` points.
     """
     n = y.size
     if n <= 2 * width + 2:
@@ -182,7 +182,7 @@ def thin(t: Floats, y: Floats, width: int = THINNED_POINTS) -> tuple[Floats, Flo
 
 
 def curve(ax: Axes, t: Floats, y: Floats, **look: Any) -> None:
-    """Draw a series, thinned; a value between two gaps, to which no line leads, as a dot."""
+    """Draw a thinned series; a single value between two gaps, which no line shows, is a dot."""
     x, values = thin(t, y)
     ax.plot(x, values, **look)
     is_gap = np.concatenate([[True], ~np.isfinite(values), [True]])
@@ -193,11 +193,11 @@ def curve(ax: Axes, t: Floats, y: Floats, **look: Any) -> None:
 
 
 def thin_band(t: Floats, low: Floats, high: Floats) -> tuple[Floats, Floats, Floats]:
-    """Thin a band for drawing so that it is nowhere narrower.
+    """Thin a band for drawing without making it narrower anywhere.
 
     Of ascending `t` and borders of shape (n,), where NaN is a gap, each of `THINNED_POINTS` groups of neighbours keeps
-    its first and its last time, with the smallest and the largest value of the group: ``2 * THINNED_POINTS`` points at
-    most. A gap within a group is closed.
+    its first and last time, with the smallest and largest value of the group: at most ``2 * THINNED_POINTS`` points.
+    Gaps within a group are closed.
     """
     n = t.size
     if n <= 2 * THINNED_POINTS:
@@ -209,17 +209,17 @@ def thin_band(t: Floats, low: Floats, high: Floats) -> tuple[Floats, Floats, Flo
 
 
 def spaced(count: int, most: int) -> list[int]:
-    """Choose at most `most` of `count` positions: the first, the last, and even ones between."""
+    """Choose at most `most` of `count` positions: the first, the last, and evenly spaced ones between."""
     return sorted({round(x) for x in np.linspace(0, count - 1, min(most, count))})
 
 
 def finite(*series: Floats) -> Floats:
-    """Return the finite values of some arrays in one, shape (n,)."""
+    """Return the finite values of all arrays together, shape (n,)."""
     return np.concatenate([np.empty(0), *(part[np.isfinite(part)] for part in series)])
 
 
 def positive(values: Floats) -> Floats:
-    """Return values with NaN for what is not finite and positive."""
+    """Return values, with NaN for those that are not positive and finite."""
     return np.where(np.isfinite(values) & (values > 0.0), values, np.nan)
 
 
@@ -229,42 +229,42 @@ def no_zeros(values: Floats) -> Floats:
 
 
 def spans_decades(values: Floats) -> bool:
-    """Say whether values are positive, and the largest of them so large that a logarithmic axis shows them better."""
+    """Return whether values are positive and spread so much that a logarithmic axis shows them better."""
     known = finite(values)
     return bool(known.min() > 0.0 and known.max() > LOG_RATIO * known.min())
 
 
 def of_level(level: int) -> str:
-    """Return the group id of what belongs to one level, or to several of which it is the coarsest."""
+    """Return the group id of curves of a level, or of several levels with this as the coarsest."""
     return f"level-{level}"
 
 
 def entry(text: str) -> str:
-    """Return a legend entry: matplotlib leaves out what begins with an underscore, a user's name may."""
+    """Return a legend entry for any name; matplotlib would leave out one that begins with an underscore."""
     return f"\N{ZERO WIDTH SPACE}{text}" if text.startswith("_") else text
 
 
 def sentences(*parts: str) -> str:
-    """Join the sentences of a caption that are there."""
+    """Join the nonempty sentences of a caption."""
     return " ".join(part for part in parts if part)
 
 
 def label(text: str, unit: str, exponent: int = 0) -> str:
-    """Write an axis label: what is shown, and in brackets its power of ten and unit."""
+    """Write an axis label: a text, and in brackets its power of ten and unit."""
     scaled = [power(exponent)] if exponent else []
     units = [unit] if unit and unit != "1" else []
     return f"{text} [{' '.join(scaled + units)}]" if scaled or units else text
 
 
 def scale(*series: Floats) -> int:
-    """Return the exponent of ten that an axis should carry; 0 where plain numbers read well."""
+    """Return the exponent of ten for the label of an axis; 0 if plain numbers are readable."""
     largest = float(np.abs(finite(*series)).max(initial=0.0))
     exponent = math.floor(math.log10(largest)) if largest else 0
     return 0 if -1 <= exponent <= 3 else exponent
 
 
 def limits(*series: Floats, margin: float = 0.08) -> tuple[float, float]:
-    """Return linear axis limits that hold every finite value, never of zero height."""
+    """Return linear axis limits that hold all finite values, with a positive range."""
     values = finite(*series)
     if not values.size:
         return -1.0, 1.0
@@ -274,17 +274,17 @@ def limits(*series: Floats, margin: float = 0.08) -> tuple[float, float]:
 
 
 def log_limits(*series: Floats, margin: float = 0.08) -> tuple[float, float]:
-    """Return limits of a logarithmic axis that hold every finite positive value."""
+    """Return limits of a logarithmic axis that hold all finite positive values."""
     with np.errstate(divide="ignore", invalid="ignore"):
         low, high = limits(*(np.log10(part[part > 0.0]) for part in series), margin=margin)
-    # what a power of ten would overflow at lies beyond every axis
+    # clipped to the limits of all axes before the powers could overflow
     return 10.0 ** max(low, math.log10(LEAST)), 10.0 ** min(high, math.log10(MOST))
 
 
 def log_axis(ax: Axes, which: str, low: float, high: float, most: int = 7) -> None:
     """Make an axis logarithmic from `low` to `high`, with about `most` labelled ticks in Unicode."""
     low, high = _within(low, high)
-    # the limits first: a margin around values near the end of the floats would overflow
+    # limits first: a margin around values near the largest float would overflow
     ax.set(**{f"{which}lim": (low, high)})
     ax.set(**{f"{which}scale": "log"})
     ax.set(**{f"{which}lim": (low, high)})
@@ -296,8 +296,8 @@ def fit_log_axis(
 ) -> bool:  # fmt: skip
     """Make an axis logarithmic over the positive finite values of some series; return whether there are any.
 
-    `below` is the part of the values of each series that may lie below the axis; values under `least` times the largest
-    leave it; `room` is the factor between the outermost values and its ends; about `most` ticks are labelled.
+    `below` is the fraction of each series that may lie below the axis. Values smaller than `least` times the largest
+    lie below it, too. `room` is the factor between the outermost values and the ends; about `most` ticks are labelled.
     """
     parts = [found for part in series if (found := finite(part[part > 0.0])).size]
     if parts:
@@ -310,7 +310,7 @@ def fit_log_axis(
 def log_ticks(axis: Any, low: float, high: float, most: int = 7) -> None:
     """Put ticks from `low` to `high` on a logarithmic axis (or colour bar).
 
-    They are powers of ten; up to 2 or 3 decades 1, 2 and 5 of each; where these would be fewer than two round numbers.
+    They are powers of ten; over few decades multiples by 1, 2 and 5; if these are fewer than two, round numbers.
     """
     from matplotlib.ticker import FixedLocator, FuncFormatter, MaxNLocator, NullLocator
 
@@ -333,13 +333,13 @@ def log_ticks(axis: Any, low: float, high: float, most: int = 7) -> None:
 
 
 def _within(low: float, high: float) -> tuple[float, float]:
-    """Return the ends of a logarithmic axis as a float can show them."""
+    """Clip the ends of a logarithmic axis to the range that floats can show."""
     low = min(max(low, LEAST), MOST / 10.0)
     return low, min(max(high, 10.0 * low if high <= low else high), MOST)
 
 
 def log_tick(value: float) -> str:
-    """Write a tick of a logarithmic axis as a power of ten, with the digits that it needs."""
+    """Write a tick of a logarithmic axis as a power of ten, with as many digits as it needs."""
     if value <= 0:
         return ""
     mantissa, exponent = f"{value:.{TICK_DIGITS - 1}e}".split("e")
@@ -348,7 +348,7 @@ def log_tick(value: float) -> str:
 
 
 def beside(ax: Axes, **options: Any) -> None:
-    """Put the legend to the right of the axes, where it hides nothing."""
+    """Put the legend to the right of the axes, where it hides no curve."""
     if ax.get_legend_handles_labels()[0]:
         ax.legend(**BESIDE, **options)
     else:

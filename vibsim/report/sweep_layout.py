@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from vibsim.core.array_types import Floats
 from vibsim.core.record import Record
 from vibsim.report import words
-from vibsim.report.data import swept, swept_label
+from vibsim.report.data import bin_of, swept, swept_label
 from vibsim.report.style import LOG_RATIO, label
 from vibsim.report.types import Experiment
 
@@ -152,7 +152,7 @@ def grid_of(keys: list[Key]) -> Grid | None:
     else:
         count = int(np.clip(np.sqrt(x.values.size) / 2.0, *BINS))
         across, up = (bins(key, count) for key in (x, y))
-        column, row = place_in(x, across), place_in(y, up)
+        column, row = bin_of(across, x.values), bin_of(up, y.values)
         note = "A cell shows the worst of the members within it; some cells have none."
     return Grid(x, y, (across, up), row * (across.size - 1) + column, note)
 
@@ -163,12 +163,6 @@ def bins(key: Key, count: int) -> Floats:
         return edges(key.distinct, key.is_log)
     low, high = float(key.distinct[0]), float(key.distinct[-1])
     return np.asarray((np.geomspace if key.is_log else np.linspace)(low, high, count + 1))
-
-
-def place_in(key: Key, borders: Floats) -> NDArray[np.intp]:
-    """Return the bin of every member, shape (case,)."""
-    position = np.searchsorted(borders, key.values, side="right") - 1
-    return np.clip(position, 0, borders.size - 2)
 
 
 def layout_of(experiment: Experiment, record: Record) -> Along | Grid | None:

@@ -1,4 +1,4 @@
-"""Types that only annotations name: their modules take long to import, or no job that draws needs them."""
+"""Types used only in annotations; their modules are slow to import, or unnecessary for drawing jobs."""
 
 from __future__ import annotations
 

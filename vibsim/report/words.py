@@ -98,6 +98,16 @@ def labelled(text: str, quantity: str | None) -> str:
     return "`".join(parts)
 
 
+def capitalized(text: str) -> str:
+    """Capitalize the first letter of a text, and change no other."""
+    return text[:1].upper() + text[1:]
+
+
+def spelled(value: str) -> str:
+    """Write the name of a value, such as ``period_error``, in words."""
+    return value.replace(CENTRED, " by [D₂ₜu]").replace("_", " ")
+
+
 def passed(statuses: Sequence[str], one: str = "check", many: str = "checks") -> str:
     """Write how many checks passed: `9 of 9 checks`, `1 of 3 checks passed`."""
     if not statuses:
@@ -180,11 +190,11 @@ class _Page(Notation):
         return title(name)
 
     def value(self, name: str) -> str:
-        return ERRORS.get(name, name.replace(CENTRED, " by [D₂ₜu]").replace("_", " "))
+        return ERRORS.get(name, spelled(name))
 
     def opening(self, text: str) -> str:
         # symbols keep their case
-        return text[:1].upper() + text[1:] if text.partition(" ")[0] in PROSE else text
+        return capitalized(text) if text.partition(" ")[0] in PROSE else text
 
     def digits(self, text: str) -> str:
         mantissa, has_power, exponent = text.partition("e")

@@ -1,1 +1,1 @@
-"""The figure that shows the result that decided a check."""
+"""The figure of the decisive result of a check."""

@@ -1,4 +1,4 @@
-"""The picture of a drift: the largest energy error so far, its means over three windows, and the drift asked for.
+"""The picture of an energy drift: the running maximum of the error, its means over three windows, the expected drift.
 
 The rules are those of `vibsim.observe.energy_drift`: with the means m3, m2, m1 over [T/8, T/4], [T/4, T/2] and [T/2, T]
 a drift ``a + b t^k`` has ``(m1 - m2)/(m2 - m3) = 2^k``.
@@ -23,40 +23,40 @@ from vibsim.report.evidence.frame import brief, evidence, measured, short
 from vibsim.report.style import Picture
 from vibsim.report.types import Axes, ConservesCheck, Experiment
 
-WINDOWS = ((0.125, 0.25), (0.25, 0.5), (0.5, 1.0))  # in parts of the end, those of m3, m2 and m1
+WINDOWS = ((0.125, 0.25), (0.25, 0.5), (0.5, 1.0))  # of m3, m2 and m1, as fractions of the end
 NAMES = ("m₃", "m₂", "m₁")
-POWERS = {"linear": 1, "quadratic": 2}  # of t, in proportion to which a drift grows
-LEAST = 1e-4  # part of the time before which a logarithmic scale need not show the error
+POWERS = {"linear": 1, "quadratic": 2}  # kind of a drift to the power of t
+LEAST = 1e-4  # fraction of the time before which the error does not set a logarithmic scale
 
 
 @dataclass(frozen=True)
 class EnergyError:
-    """The energy error of one run as the check found it, over the energy at the start where that is not 0."""
+    """The energy error of one run as a check measured it, relative to the initial energy unless that is 0."""
 
-    kind: str  # of `vocabulary.DRIFTS`
-    expected: str  # kind of drift that the check asks for
+    kind: str  # measured kind of drift, of `vocabulary.DRIFTS`
+    expected: str  # kind of drift that the check expects
     t: Floats
-    running: Floats  # the largest error so far, shape (t,)
+    running: Floats  # running maximum, shape (t,)
     means: Floats  # m3, m2, m1
-    round_off: float  # largest error that is taken for round-off
-    power: float  # k, NaN where it cannot be told
-    rate: float  # of the kind of drift, see `vibsim.observe.energy_drift.Drift`
+    round_off: float  # largest error that counts as round-off
+    power: float  # k; NaN if undetermined
+    rate: float  # see `vibsim.observe.energy_drift.Drift`
 
     @property
     def has_border(self) -> bool:
-        """Whether the error has to be compared with round-off."""
+        """Whether the error is compared with round-off."""
         return "none" in (self.kind, self.expected)
 
     @property
     def is_broken(self) -> bool:
-        """Whether the run broke down, so that it has no means."""
+        """Whether the run broke down and has no means."""
         return not np.isfinite(self.means).all()
 
 
 def picture(
     _: Experiment, record: Record, check: ConservesCheck, name: str, member: Member
 ) -> Picture | None:
-    """Draw how the largest energy error so far grows, beside the drift that a check asks for."""
+    """Draw the running maximum of the energy error beside the drift that a check expects."""
     series = f"{check.about}_running_max"
     if series not in record:
         return evidence(f"{member.title}: the largest energy error so far is not stored.")
@@ -64,117 +64,117 @@ def picture(
         measured(record, name, field, member)
         for field in ("level", "drift", "drift_rate", "drift_power")
     )
-    first = abs(float(at(record, "energy_initial", member)))
+    initial = abs(float(at(record, "energy_initial", member)))
     running = at(record, series, member, level=whole(record, "level").index(int(level)))
-    found = EnergyError(
+    error = EnergyError(
         kind=DRIFTS[int(kind)],
         expected=check.drift,
         t=times(record, member.case),
-        # the last velocity may be a one-sided one, which the verdict does not look at
-        running=np.append(running[:-1], np.nan) / (first or 1.0),
-        means=at(record, name_of(name, "window_means"), member) / (first or 1.0),
-        round_off=measured(record, name, "round_off", member) / (first or 1.0),
+        # the verdict ignores the last velocity, which may be one-sided
+        running=np.append(running[:-1], np.nan) / (initial or 1.0),
+        means=at(record, name_of(name, "window_means"), member) / (initial or 1.0),
+        round_off=measured(record, name, "round_off", member) / (initial or 1.0),
         power=power,
         rate=rate,
     )
-    if not frame.usable(found.running).size:
+    if not frame.usable(error.running).size:
         sentence = "the energy error is 0 at every step, so there is nothing to draw."
-        return evidence(f"{member.title}: {sentence}") if np.any(found.running == 0.0) else None
+        return evidence(f"{member.title}: {sentence}") if np.any(error.running == 0.0) else None
     by = " by [D₂ₜu]" if check.conserves.endswith(CENTRED) else ""
-    label = f"largest energy error so far{' / E(0)' if first else ''}{by}"
-    title = style.label(label, "" if first else unit(record, "energy_deviation_max_abs"))
+    label = f"largest energy error so far{' / E(0)' if initial else ''}{by}"
+    title = style.label(label, "" if initial else unit(record, "energy_deviation_max_abs"))
     figure = style.canvas(1.0)
-    _draw(frame.panel(figure, title, time_label(record), frame.WIDE), found)
-    caption = f"{member.title}, level {level:.0f}: {_naming(found)} {_dashed_line(found)}".strip()
+    _draw(frame.panel(figure, title, time_label(record), frame.WIDE), error)
+    caption = f"{member.title}, level {level:.0f}: {_naming(error)} {_dashed_line(error)}".strip()
     return evidence(caption, title, figure)
 
 
-def _draw(ax: Axes, found: EnergyError) -> None:
-    """Draw windows, error, means and the drift asked for."""
-    t, end = found.t, float(found.t[-1])
-    has_bars = found.kind != "none" and not found.is_broken
+def _draw(ax: Axes, error: EnergyError) -> None:
+    """Draw windows, error, means and the expected drift."""
+    t, end = error.t, float(error.t[-1])
+    has_bars = error.kind != "none" and not error.is_broken
     ax.set_xlim(float(t[0]), end)
-    if found.has_border or found.kind == "exponential" or found.is_broken:
-        border = found.round_off if found.has_border else np.nan
-        lowest = 0.1 * np.max(frame.usable(found.running))
+    if error.has_border or error.kind == "exponential" or error.is_broken:
+        border = error.round_off if error.has_border else np.nan
+        lowest = 0.1 * np.max(frame.usable(error.running))
         around = np.array([border, lowest])
-        frame.scale(ax, found.running[t > LEAST * end], found.means, around, is_log=True)
+        frame.scale(ax, error.running[t > LEAST * end], error.means, around, is_log=True)
     else:
-        frame.scale(ax, found.running, found.means, np.zeros(1), margin=0.22)
+        frame.scale(ax, error.running, error.means, np.zeros(1), margin=0.22)
         ax.set_ylim(bottom=0.0)
     if has_bars:
-        for first, last in WINDOWS[::2]:
-            ax.axvspan(first * end, last * end, color=frame.BAND, alpha=0.6, linewidth=0, zorder=0)
-    if found.has_border and found.round_off > 0.0:
-        # the most that is taken for round-off; below is where the error is
-        if found.kind == "none":
-            frame.allowed(ax, 0.0, found.round_off)
-        ax.axhline(found.round_off, **frame.DASHED)
-    ax.plot(*style.thin(t, found.running, 160), color=frame.COLOUR, linewidth=1.2)
+        for start, stop in WINDOWS[::2]:
+            ax.axvspan(start * end, stop * end, color=frame.BAND, alpha=0.6, linewidth=0, zorder=0)
+    if error.has_border and error.round_off > 0.0:
+        # the largest error that counts as round-off, and the band below it
+        if error.kind == "none":
+            frame.allowed(ax, 0.0, error.round_off)
+        ax.axhline(error.round_off, **frame.DASHED)
+    ax.plot(*style.thin(t, error.running, 160), color=frame.COLOUR, linewidth=1.2)
     later = np.linspace(WINDOWS[0][0] * end, end, 60)
-    ax.plot(later, _expected(found, later), **frame.DASHED)
+    ax.plot(later, _expected(error, later), **frame.DASHED)
     if has_bars:
-        for (first, last), mean, text in zip(WINDOWS, found.means, NAMES, strict=True):
-            ax.plot([first * end, last * end], [mean, mean], color=frame.SECOND, linewidth=1.8)
-            place = (first * end, mean)
-            ax.annotate(text, place, (2, 3), textcoords="offset points", fontsize=frame.SIZE)
+        for (start, stop), mean, text in zip(WINDOWS, error.means, NAMES, strict=True):
+            ax.plot([start * end, stop * end], [mean, mean], color=frame.SECOND, linewidth=1.8)
+            point = (start * end, mean)
+            ax.annotate(text, point, (2, 3), textcoords="offset points", fontsize=frame.SIZE)
 
 
-def _expected(found: EnergyError, t: Floats) -> Floats:
-    """Return the drift that is asked for, through m2, and m1 where it grows; NaN where it is no line."""
-    _, second, first = found.means
-    if found.has_border:
+def _expected(error: EnergyError, t: Floats) -> Floats:
+    """Return the expected drift through m2 (and m1, if it grows); NaN if round-off is expected or found."""
+    _, second, first = error.means
+    if error.has_border:
         return np.full(t.shape, np.nan)
-    if found.expected == "bounded":
+    if error.expected == "bounded":
         return np.full(t.shape, second)
-    power = POWERS[found.expected]
+    power = POWERS[error.expected]
     # the mean of t^k over a window
     earlier, later = (
         (b ** (power + 1) - a ** (power + 1)) / ((power + 1) * (b - a)) for a, b in WINDOWS[1:]
     )
-    part = (t / found.t[-1]) ** power
-    return np.asarray(second + (first - second) * (part - earlier) / (later - earlier))
+    growth = (t / error.t[-1]) ** power
+    return np.asarray(second + (first - second) * (growth - earlier) / (later - earlier))
 
 
-def _naming(found: EnergyError) -> str:
-    """Say by which number the drift was named."""
-    most = float(np.nanmax(found.running))
-    third, second, first = means = found.means.tolist()
+def _naming(error: EnergyError) -> str:
+    """Say which number decides the kind of the drift."""
+    largest = float(np.nanmax(error.running))
+    third, second, first = means = error.means.tolist()
     numbers = ", ".join(f"{n} = {short(m)}" for n, m in zip(NAMES, means, strict=True))
     bars = f"the largest energy error so far has the means (bars) {numbers}."
-    if found.kind == "none":
-        border = brief(found.round_off)
-        return f"the largest energy error, {brief(most)}, is within the round-off of this run, {border}."
-    if found.is_broken:
+    if error.kind == "none":
+        border = brief(error.round_off)
+        return f"the largest energy error, {brief(largest)}, is within the round-off of this run, {border}."
+    if error.is_broken:
         return "the largest energy error so far; it ends where the run breaks down."
-    if found.kind == "bounded":
-        part = 100.0 * (first - second) / most
-        how = "no growth" if part <= 100.0 * STILL else "it grows ever more slowly"
-        return f"{bars} m₁ is above m₂ by {brief(part)} % of the largest error: {how}."
-    if found.kind == "exponential":
-        factor = short(float(np.exp(found.rate)))
+    if error.kind == "bounded":
+        part = 100.0 * (first - second) / largest
+        growth = "no growth" if part <= 100.0 * STILL else "it grows ever more slowly"
+        return f"{bars} m₁ is above m₂ by {brief(part)} % of the largest error: {growth}."
+    if error.kind == "exponential":
+        factor = short(float(np.exp(error.rate)))
         return f"{bars} The energy itself changes by the factor {factor} per period: exponential."
-    if math.isnan(found.power):
+    if math.isnan(error.power):
         return (
             f"{bars} The run is too short to name a drift; {LEAST_PERIODS:g} periods and {LEAST_SAMPLES} times "
             "are needed."
         )
-    before = second - third
-    law = f"(m₁ − m₂)/(m₂ − m₃) = {short((first - second) / before) if before else '∞'}"
-    if found.kind in POWERS:
-        return f"{bars} {law}; a drift like {_like(found.kind)} gives {2 ** POWERS[found.kind]}."
+    earlier = second - third
+    law = f"(m₁ − m₂)/(m₂ − m₃) = {short((first - second) / earlier) if earlier else '∞'}"
+    if error.kind in POWERS:
+        return f"{bars} {law}; a drift like {_like(error.kind)} gives {2 ** POWERS[error.kind]}."
     return f"{bars} {law}, which matches no named drift."
 
 
-def _dashed_line(found: EnergyError) -> str:
-    """Say what the dashed line is."""
-    if found.is_broken:
+def _dashed_line(error: EnergyError) -> str:
+    """Explain the dashed line."""
+    if error.is_broken:
         return ""
-    if found.has_border:
+    if error.has_border:
         return "Dashed: the largest error that counts as round-off."
-    if found.expected == "bounded":
+    if error.expected == "bounded":
         return "Dashed: m₂, above which a bounded error does not rise."
-    return f"Dashed: a drift in proportion to {_like(found.expected)} through m₂ and m₁."
+    return f"Dashed: a drift in proportion to {_like(error.expected)} through m₂ and m₁."
 
 
 def _like(drift: str) -> str:

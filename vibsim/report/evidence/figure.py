@@ -1,7 +1,7 @@
-"""The picture that shows a verdict, of the result that decides: the one that the sentence beside it names.
+"""The picture of a verdict: of the decisive result, which the sentence beside it names.
 
-Each kind of check has a module of its own. Where no series are kept over time, pictures of energy, equality and
-stability show the number that decides of all members instead.
+Each kind of check has its own module. If no series over time are stored, pictures of energy, equality and stability
+show the decisive numbers of all members instead.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from vibsim.report.evidence.frame import GrowthScale, evidence, usable
 from vibsim.report.style import Picture
 from vibsim.report.types import Check, ConservesCheck, EqualCheck, Experiment, StableCheck
 
-MANY = 60  # up to so many members each has a dot; of more the range is drawn
+MANY = 60  # members up to which each has a dot; more are a line
 ALONE = (
     "a run of so many samples keeps no time series, so nothing is drawn. The number alone decides."
 )
@@ -31,70 +31,70 @@ BESIDE = {
     "stable": ("predicted_growth", "; orange is the prediction for small oscillations"),
     "equal": ("allowed", "; orange is the allowed distance"),
 }
-"""Kind of a check to the field that is drawn beside the one that decides, and the words on it."""
+"""Kind of a check to the field that is drawn beside the decisive one, and the words for it."""
 
 
 def picture(
     experiment: Experiment, record: Record, asserted: Check | None, check: Mapping[str, Any]
 ) -> Picture | None:
-    """Return the picture of the result that decides a check; None where there is nothing to draw."""
+    """Return the picture of the decisive result of a check; None if there is nothing to draw."""
     results: Sequence[Mapping[str, Any]] = check.get("results") or []
     member = _member(record, results[0]) if results else None
     if asserted is None or member is None:
         return None
-    check_of, name = asserted.measured, asserted.id
-    draw = DRAWN[check_of.kind]
+    measured, name = asserted.measured, asserted.id
+    draw = DRAWN[measured.kind]
     if is_lean(record) and draw in (energy.picture, equal.picture, stable.picture):
         draw = _of_members
     with style.applied():
-        found = draw(experiment, record, check_of, name, member)
-    return found and replace(found, name=f"evidence_{name}")
+        drawn = draw(experiment, record, measured, name, member)
+    return drawn and replace(drawn, name=f"evidence_{name}")
 
 
 def _member(record: Record, result: Mapping[str, Any]) -> Member | None:
     case = case_position(record, result.get("case", -1))
-    every = [] if case is None else of_case(record, case)
-    return next((one for one in every if one.scheme_name == result.get("scheme")), None)
+    candidates = [] if case is None else of_case(record, case)
+    return next((m for m in candidates if m.scheme_name == result.get("scheme")), None)
 
 
 def _of_members(
     _: Experiment, record: Record, check: StableCheck | ConservesCheck | EqualCheck, name: str, member: Member
 ) -> Picture:  # fmt: skip
-    """Draw the number that decides a check against the swept value, or the number of the member."""
+    """Draw the decisive number of all members against the swept value, or against the number of the member."""
     count = len(record["case"])
     if count == 1:
         return evidence(f"{member.title}: {ALONE}")
 
-    def of(field: str) -> Floats:
+    def numbers(field: str) -> Floats:
         return np.asarray(pick(record, name_of(name, field), scheme=member.scheme), np.float64)
 
-    other_field, more = BESIDE.get(check.kind, ("", ""))
-    values = of(DECISIVE[check.kind])
-    beside = of(other_field) if other_field else np.full(count, np.nan)
+    other_field, remark = BESIDE.get(check.kind, ("", ""))
+    values = numbers(DECISIVE[check.kind])
+    beside = numbers(other_field) if other_field else np.full(count, np.nan)
     known = usable(values)
     if not known.size:
         return evidence(f"{member.title}: no member has a number to draw.")
-    # members that differ by rounding are alike on the scale
+    # on this range members that differ by rounding look alike
     around = np.median(known) * 10.0 ** np.array([-0.5, 0.5])
     if check.kind == "stable":
-        up, around = frame.growth_scale(known), frame.ALIKE
+        scale, around = frame.growth_scale(known), frame.ALIKE
     elif check.kind == "conserves":
-        up = GrowthScale("largest energy error / E(0)", is_log=True)
+        scale = GrowthScale("largest energy error / E(0)", is_log=True)
     else:
-        measure = unit(record, f"{check.quantity}_difference_norm")
+        units = unit(record, f"{check.quantity}_difference_norm")
         text = f"largest difference of {words.symbol(check.quantity)}"
-        up = GrowthScale(style.label(text, measure), is_log=True)
+        scale = GrowthScale(style.label(text, units), is_log=True)
     keys = sweep_layout.keys(record)
     key = keys[0] if len(keys) == 1 and not keys[0].words else None
     x = key.values if key else np.arange(count, dtype=np.float64)
     figure = style.canvas(1.0)
-    ax = frame.panel(figure, up.title, key.label if key else "number of the member", frame.WIDE)
+    ax = frame.panel(figure, scale.title, key.label if key else "number of the member", frame.WIDE)
     if key and key.is_log:
         style.log_axis(ax, "x", *style.log_limits(x, margin=0.02))
     else:
         ax.set_xlim(*style.limits(x, margin=0.02))
-    shown, other = values - up.less, beside - up.less
-    frame.scale(ax, shown, other, around - up.less, is_log=up.is_log, margin=0.1)
+    shown, other = values - scale.less, beside - scale.less
+    frame.scale(ax, shown, other, around - scale.less, is_log=scale.is_log, margin=0.1)
     order = np.argsort(x, kind="stable")
     ax.plot(*style.thin(x[order], other[order], 160), color=frame.SECOND, linewidth=0.9)
     if count > MANY:
@@ -104,9 +104,9 @@ def _of_members(
     frame.points(ax, [x[member.case]], shown[[member.case]], [True])
     caption = (
         f"{member.scheme_name}, all {words.number(count, 'integer')} members (no time series are kept). The one "
-        f"that decides, {member.case_words}, is filled{more if usable(beside).size else ''}."
+        f"that decides, {member.case_words}, is filled{remark if usable(beside).size else ''}."
     )
-    return evidence(caption, up.title, figure)
+    return evidence(caption, scale.title, figure)
 
 
 DRAWN: Mapping[str, Callable[..., Picture | None]] = {
@@ -117,4 +117,4 @@ DRAWN: Mapping[str, Callable[..., Picture | None]] = {
     "stable": stable.picture,
     "value": value.picture,
 }
-"""What draws each kind of check: of an experiment, its record, the check with its id, and a member."""
+"""Kind of a check to its drawing, a function of experiment, record, check, id of the check, and member."""

@@ -1,4 +1,4 @@
-"""What the pictures of all kinds of checks have in common: panels of one size, dots that count or not, round ticks."""
+"""Common parts of the pictures of checks: panels of one size, filled and hollow dots, round ticks."""
 
 from __future__ import annotations
 
@@ -20,33 +20,33 @@ COLOUR, SECOND = style.COLOURS[0], style.COLOURS[1]
 LEFT, RIGHT, ABOVE, BELOW, HEIGHT = 0.6, 0.35, 0.2, 0.38, 1.0
 """Room around a panel, and its height [inch]."""
 WIDE = 3.3  # width of a panel over time [inch]
-SIZE = 8.0  # of letters [point]
-MOST_LEVELS = 12  # with more of them every second one is named
-FEWEST_TICKS = 2  # round numbers on a scale: one alone does not tell how large a curve is
+SIZE = 8.0  # of the font [point]
+MOST_LEVELS = 12  # levels up to which all have a label
+FEWEST_TICKS = 2  # on a linear scale: a single number does not show the size of a curve
 DASHED: dict[str, Any] = {"color": INK, "linewidth": 0.8, "linestyle": (0, (4, 3))}
 ALIKE = np.array([1.0 - 1e-11, 1.0 + 1e-11])
-"""Growth factors between these differ by rounding only: a scale need not tell them apart."""
-NEAR_ONE = 0.02  # growth factors that are all so near to 1 are shown less 1
-FACTOR = 3.0  # growth factors beyond this, or one over it, have a logarithmic scale
+"""Range of growth factors that differ from 1 by rounding only; a scale shows at least this range."""
+NEAR_ONE = 0.02  # growth factors that all lie within this distance of 1 are shown minus 1
+FACTOR = 3.0  # growth factors beyond this, or below its inverse, have a logarithmic scale
 
 
 def evidence(caption: str, alt: str = "", figure: Figure | None = None) -> Picture:
-    """Return a drawing and the words below it, or the words that say why there is nothing to draw."""
+    """Return a figure with its caption, or only a caption that says why there is nothing to draw."""
     return Picture("", "", caption, alt, figure)
 
 
 def panel(figure: Figure, title: str, x_name: str, width: float = 2.5) -> Axes:
-    """Return a new panel to the right of those that a figure has, all of one `width` [inch]."""
+    """Add a panel to the right of the panels of a figure, all of one `width` [inch], and return it."""
     figure.add_axes((0.0, 0.0, 1.0, 1.0))
-    room, high = LEFT + width + RIGHT, ABOVE + HEIGHT + BELOW
-    wide = room * len(figure.axes)
-    figure.set_size_inches(wide, high)
+    pitch, height = LEFT + width + RIGHT, ABOVE + HEIGHT + BELOW
+    total = pitch * len(figure.axes)
+    figure.set_size_inches(total, height)
     for i, ax in enumerate(figure.axes):
-        left, bottom = (i * room + LEFT) / wide, BELOW / high
-        ax.set_position((left, bottom, width / wide, HEIGHT / high))
+        left, bottom = (i * pitch + LEFT) / total, BELOW / height
+        ax.set_position((left, bottom, width / total, HEIGHT / height))
     ax.set_title(title, fontsize=SIZE, fontweight="normal")
     ax.set_xlabel(x_name, fontsize=SIZE, color=SOFT)
-    # a place of their own costs less than one that matplotlib finds
+    # a fixed position is faster than one that matplotlib computes
     ax.xaxis.set_label_coords(0.5, -0.24)
     ax.tick_params(labelsize=SIZE, color=SOFT, labelcolor=SOFT)
     ax.grid(visible=False)
@@ -55,7 +55,7 @@ def panel(figure: Figure, title: str, x_name: str, width: float = 2.5) -> Axes:
 
 
 def round_ticks(axis: Any, most: int = 4) -> None:
-    """Put about `most` round numbers on a linear axis; `FEWEST_TICKS` at least."""
+    """Put about `most` round numbers on a linear axis, at least `FEWEST_TICKS`."""
     from matplotlib.ticker import FuncFormatter, MaxNLocator
 
     axis.set_major_locator(MaxNLocator(most, steps=[1, 2, 5, 10], min_n_ticks=FEWEST_TICKS))
@@ -63,7 +63,7 @@ def round_ticks(axis: Any, most: int = 4) -> None:
 
 
 def scale(ax: Axes, *shown: Floats, is_log: bool = False, margin: float = 0.15) -> None:
-    """Give the vertical axis a range that holds what is shown, and ticks; on a logarithmic one what is positive."""
+    """Fit the vertical axis to values, or a logarithmic one to the positive values, and set its ticks."""
     if is_log:
         style.log_axis(ax, "y", *style.log_limits(*shown, margin=margin), most=5)
         return
@@ -71,12 +71,12 @@ def scale(ax: Axes, *shown: Floats, is_log: bool = False, margin: float = 0.15) 
     ax.set_ylim(low, high)
     round_ticks(ax.yaxis)
     if words.number(low, "step") == words.number(high, "step"):
-        # several numbers would read alike
+        # several ticks would have the same label
         ax.set_yticks([0.5 * (low + high)])
 
 
 def allowed(ax: Axes, low: float, high: float) -> None:
-    """Fill what lies between two values, which may be infinite, as far as the frame reaches."""
+    """Fill the band between two values, which may be infinite, within the frame."""
     bottom, top = ax.get_ylim()
     ax.axhspan(max(low, bottom), min(high, top), color=BAND, linewidth=0.0, zorder=0)
 
@@ -88,11 +88,11 @@ def below(ax: Axes, limit: float) -> None:
 
 
 def points(ax: Axes, x: Sequence[float], y: Floats, counts: Sequence[bool]) -> None:
-    """Draw dots, hollow ones that do not count; those beyond the frame are triangles on its edge."""
+    """Draw dots, filled if they count, else hollow; those beyond the frame are triangles on its edge."""
     low, high = ax.get_ylim()
     for is_full, face in ((False, "white"), (True, COLOUR)):
-        of_kind = np.array(counts) == is_full
-        place, value = np.asarray(x, dtype=np.float64)[of_kind], y[of_kind]
+        subset = np.array(counts) == is_full
+        place, value = np.asarray(x, dtype=np.float64)[subset], y[subset]
         inside = (value >= low) & (value <= high)
         look: dict[str, Any] = {"color": COLOUR, "markerfacecolor": face}
         if inside.any():
@@ -102,7 +102,7 @@ def points(ax: Axes, x: Sequence[float], y: Floats, counts: Sequence[bool]) -> N
 
 
 def level_axis(ax: Axes, levels: Sequence[int], most: int = MOST_LEVELS, extra: str = "") -> None:
-    """Name the levels, every second or third one where there are many, and what stands behind the last of them."""
+    """Label the levels, if there are many every second or third, and with `extra` the position after the last."""
     named = {float(level): str(level) for level in levels[:: 1 + len(levels) // (most + 1)]}
     named |= {levels[-1] + 1.0: extra} if extra else {}
     ax.set_xlim(levels[0] - 0.5, levels[-1] + (1.5 if extra else 0.5))
@@ -113,12 +113,12 @@ class GrowthScale(NamedTuple):
     """The vertical scale of growth factors."""
 
     title: str
-    less: float = 0.0  # what is taken from each factor
+    less: float = 0.0  # subtracted from each factor
     is_log: bool = False
 
 
 def growth_scale(factors: Floats) -> GrowthScale:
-    """Return the scale on which positive finite growth factors can be told from each other and from 1."""
+    """Return a scale that separates positive finite growth factors from each other and from 1."""
     if np.all(np.abs(factors - 1.0) <= NEAR_ONE):
         return GrowthScale("growth per period, less 1", less=1.0)
     is_wide = factors.max() > FACTOR or factors.min() < 1.0 / FACTOR
@@ -126,17 +126,17 @@ def growth_scale(factors: Floats) -> GrowthScale:
 
 
 def usable(values: Floats) -> Floats:
-    """Return the values that are positive and finite."""
+    """Return the positive finite values."""
     return style.finite(values[values > 0.0])
 
 
 def measured(record: Record, check: str, name: str, member: Member) -> float:
-    """Return a number that a check measured of a member, such as its ``growth``."""
+    """Return a number that a check measured for a member, such as ``growth``."""
     return float(at(record, name_of(check, name), member))
 
 
 def short(value: float) -> str:
-    """Write a number with up to four significant digits and no zeros behind them."""
+    """Write a number with up to four significant digits, without trailing zeros."""
     return words.number(float(f"{value:.4g}"), "step")
 
 

@@ -1,4 +1,4 @@
-"""The picture of an order: the rescaled differences that coincide or do not, and the order by level."""
+"""The picture of an order: the rescaled differences of levels, and the order by level."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from vibsim.report.types import ConvergesCheck, Experiment, Figure
 def picture(
     _: Experiment, record: Record, check: ConvergesCheck, name: str, member: Member
 ) -> Picture | None:
-    """Draw the rescaled differences over time, where series are kept, and the order by level."""
+    """Draw the rescaled differences over time, if series are stored, and the order by level."""
     quantity = check.converges
     norm = data.norm_index(record, check.norm)
     orders = f"{quantity}_observed_order"
@@ -65,19 +65,19 @@ def _draw_differences(figure: Figure, record: Record, quantity: str, member: Mem
 def _draw_orders(
     figure: Figure, record: Record, check: ConvergesCheck, member: Member, norm: int
 ) -> None:
-    """Draw the order of every triple of levels, the one that is asked for, and the stated one."""
+    """Draw the order of every triple of levels, the expected order, and the stated one."""
     quantity = check.converges
     orders = at(record, f"{quantity}_observed_order", member, norm=norm)
     formal = data.formal_order(record, member, quantity)
     expected = float(formal if check.order == "scheme" else check.order)
     triples, levels = data.whole(record, "triple"), data.whole(record, "level")
     first, last = data.window(record, quantity, member)
-    good = np.array(data.sound_triples(record, quantity, member))
-    near = orders[good & np.isfinite(orders)] if good.any() else orders
+    above = np.array(data.sound_triples(record, quantity, member))
+    sound = orders[above & np.isfinite(orders)] if above.any() else orders
     around = expected + np.array([-0.5, 0.5])
     ax = frame.panel(figure, f"order of {words.symbol(quantity)}", "level")
     frame.level_axis(ax, levels)
-    frame.scale(ax, np.clip(near, -1.0, 9.0), around)
+    frame.scale(ax, np.clip(sound, -1.0, 9.0), around)
     if math.isfinite(expected):
         frame.allowed(ax, expected - check.tolerance, expected + check.tolerance)
         ax.axhline(expected, **frame.DASHED)

@@ -1,7 +1,7 @@
 """The picture of stability: w dt beside the limit of the scheme, the size of the solution, and its growth, by level.
 
-The rules are those of `vibsim.checks.stable`: unstable is w dt beyond the limit, or a solution that has
-grown beyond `BLOWN_UP` times the exact one without the next finer level halving that.
+The rules are those of `vibsim.checks.stable`: a run is unstable if w dt is beyond the limit, or if the solution exceeds
+`BLOWN_UP` times the exact one and the next finer level does not halve that.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from vibsim.report.types import Axes, Experiment, Figure, StableCheck
 
 WIDTH = 1.56  # of a panel [inch]
 MOST_LEVELS = 8
-NEAR_LIMIT = 0.02  # a step so near to the limit, as a part of it, is told with its distance
+NEAR_LIMIT = 0.02  # relative distance from the limit up to which the text states it
 NO_LIMIT = {
     0.0: "The scheme grows at every step, so there is no limit to compare w dt with. ",
     math.inf: "The scheme has no limit on w dt. ",
@@ -35,11 +35,11 @@ SIDES = {1: ("Here",), 2: ("Left", "Right"), 3: ("Left", "Middle", "Right")}
 
 @dataclass(frozen=True)
 class _Run:
-    """A run on its levels, of which one is judged."""
+    """A run on its levels, one of which is judged."""
 
     levels: list[int]
-    index: int  # position of the level that is judged
-    p: Floats  # w dt of every level: of several coordinates that of their fastest oscillation
+    index: int  # position of the judged level
+    p: Floats  # w dt of every level, of the fastest oscillation
     limit: float
     figure: Figure
 
@@ -55,7 +55,7 @@ class _Run:
 def picture(
     experiment: Experiment, record: Record, _: StableCheck, name: str, member: Member
 ) -> Picture | None:
-    """Draw what decides whether a run is stable, on every level."""
+    """Draw the numbers that decide whether a run is stable, by level."""
     level = int(measured(record, name, "level", member))
     levels = whole(record, "level")
     p = at(record, HIGHEST if HIGHEST in record else "omega_dt", member)
@@ -65,8 +65,8 @@ def picture(
         record, "size_over_exact", ("level",), scheme=member.scheme, case=member.case
     )
     letter = words.symbol(position(experiment))
-    found = [_steps(run), _sizes(run, size, letter), _growths(run, record, member, name)]
-    texts = [text for text in found if text]
+    drawn = [_steps(run), _sizes(run, size, letter), _growths(run, record, member, name)]
+    texts = [text for text in drawn if text]
     if not texts:
         return None
     sides = " ".join(f"{s}: {text}" for s, text in zip(SIDES[len(texts)], texts, strict=True))
@@ -76,7 +76,7 @@ def picture(
 
 
 def _steps(run: _Run) -> str:
-    """Draw w dt beside the limit; nothing of a scheme without one, or one that grows at every step."""
+    """Draw w dt beside the limit of the scheme; nothing without a limit, or if the scheme is never stable."""
     p, limit = float(run.p[run.index]), run.limit
     if not 0.0 < limit < math.inf or not usable(run.p).size:
         return ""
@@ -94,23 +94,23 @@ def _steps(run: _Run) -> str:
 
 
 def _sizes(run: _Run, size: Floats, letter: str) -> str:
-    """Draw how large the solution gets, over the exact one; say whether refinement makes it small enough."""
+    """Draw the largest size of the solution over the exact one; say whether refinement reduces it."""
     if not usable(size).size:
         return ""
     ax = run.panel(f"largest |{letter}| / exact")
     frame.scale(ax, size, np.array([1.0, BLOWN_UP]), is_log=True, margin=0.12)
     frame.below(ax, BLOWN_UP)
     run.points(ax, size)
-    one = float(size[run.index])
-    if not math.isfinite(one):
+    ratio = float(size[run.index])
+    if not math.isfinite(ratio):
         return "the run of this level produced a number that is too large."
-    times = short(one)
+    times = short(ratio)
     text = f"the solution is at most {'as large as' if times == '1' else f'{times} times'} the exact one"
     border = f"{BLOWN_UP:g} (dashed)"
-    if one <= BLOWN_UP:
+    if ratio <= BLOWN_UP:
         return f"{text}; beyond {border} it would have blown up."
     if abs(run.p[run.index] / (run.limit or math.inf) - 1.0) <= LIMIT_ROUNDING:
-        # at the limit it is no question whether that goes away
+        # at the limit refinement does not matter
         return f"{text}, beyond {border}: it has blown up."
     coarse = max(0, min(run.index, size.size - 2))
     pair = size[coarse : coarse + 2]
@@ -121,7 +121,7 @@ def _sizes(run: _Run, size: Floats, letter: str) -> str:
 
 
 def _growths(run: _Run, record: Record, member: Member, name: str) -> str:
-    """Draw the growth factor per period, measured and predicted, the latter perhaps of small oscillations only."""
+    """Draw the measured and predicted growth factors per period; a prediction may be for small oscillations only."""
     observed, predicted = (
         np.array(at(record, f"{who}_growth", member)) for who in ("measured", "theory")
     )

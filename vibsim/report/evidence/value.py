@@ -1,6 +1,6 @@
-"""The picture of a number by level: beside its border, or how far it is from the number that it should equal.
+"""The picture of a number by level: beside its bound, or as distance from the number that it should equal.
 
-One that is extrapolated over the levels stands to the right of them, with the bound of its error.
+An extrapolated number is drawn to the right of the levels, with the bound of its error.
 """
 
 from __future__ import annotations
@@ -27,15 +27,15 @@ from vibsim.report.types import AccurateCheck, Axes, Experiment, ValueCheck
 def picture(
     experiment: Experiment, record: Record, check: ValueCheck, name: str, member: Member
 ) -> Picture | None:
-    """Draw a number by level, or how far it is from the one that it should equal; None where no level has one."""
+    """Draw a number by level, or its distance from the one that it should equal; None if no level has it."""
     if check.take not in OF_ONE_MEMBER:
-        # no number of one member is the one that is asked for
+        # the check is not on a number of a single member
         return None
-    found = _values(experiment, record, check, name, member)
-    if found is None or not np.isfinite(found[0]).any():
+    by_level = _values(experiment, record, check, name, member)
+    if by_level is None or not np.isfinite(by_level[0]).any():
         return None
-    row = _row(record, check, name, member, found[0])
-    values, title, number = row.values, style.label(_spoken(check), found[1]), words.number
+    row = _row(record, check, name, member, by_level[0])
+    values, title, number = row.values, style.label(_number_title(check), by_level[1]), words.number
     if not np.isfinite(values[row.counts]).any():
         return None
     bar = values[-1] + np.array([-row.bound, row.bound])
@@ -44,7 +44,7 @@ def picture(
     wanted, allowed = check.equals, check.allowed
     away = np.abs(values - wanted)
     known = frame.usable(away)
-    # what a coarser level has to give is no limit that the others approach
+    # finer levels do not approach the number expected of a coarser one
     is_limit = row.counts[-1] or check.at.level is None
     if not is_limit or not known.size or allowed <= 0.0:
         around = wanted + np.array([-allowed, allowed])
@@ -59,7 +59,7 @@ def picture(
 
 
 def _beside_border(row: ByLevel, check: ValueCheck, title: str, bar: Floats) -> Picture | None:
-    """Draw a number by level beside the one that it must be below or above."""
+    """Draw a number by level beside its upper or lower bound."""
     border = check.above if check.below is None else check.below
     if border is None:
         return None
@@ -69,8 +69,8 @@ def _beside_border(row: ByLevel, check: ValueCheck, title: str, bar: Floats) -> 
     return row.finish(ax, band, border, bar, "where it should lie")
 
 
-def _spoken(check: ValueCheck) -> str:
-    """Return the name of a number as a title has it."""
+def _number_title(check: ValueCheck) -> str:
+    """Return the name of a number for a title."""
     text = what(check, words.PAGE)
     if check.number.is_sample or (check.at.t is None and check.at.step is None):
         return text
@@ -80,7 +80,7 @@ def _spoken(check: ValueCheck) -> str:
 def _values(
     experiment: Experiment, record: Record, check: ValueCheck, name: str, member: Member
 ) -> tuple[Floats, str] | None:
-    """Return a number on every level with its unit; None where the record does not have it."""
+    """Return a number on every level with its unit; None if the record lacks it."""
     if (field := name_of(name, "value_by_level")) in record:
         measure = pretty_unit(unit_of(experiment, record, check))
         return at(record, field, member), measure
@@ -98,16 +98,16 @@ def _values(
 
 @dataclass(frozen=True)
 class ByLevel:
-    """A number on every level, and behind them perhaps the one that is extrapolated."""
+    """A number on every level, and perhaps, after them, the extrapolated number."""
 
     levels: list[int]
     values: Floats
-    counts: list[bool]  # whether it is the one that is asked for
+    counts: list[bool]  # whether a value is the one that the check judges
     scheme: str
-    bound: float = math.nan  # of the error of the extrapolated number; NaN where there is none
+    bound: float = math.nan  # of the error of the extrapolated number; NaN without one
 
     def panel(self, title: str, values: Floats, around: Floats, *, is_log: bool) -> Axes:
-        """Return a new panel with some values by level in a range that holds those `around` them."""
+        """Return a new panel with values by level, whose range also holds the values `around`."""
         ax = frame.panel(style.canvas(1.0), title, "level")
         is_best = values.size > len(self.levels)
         frame.level_axis(ax, self.levels, extra="best" if is_best else "")
@@ -119,7 +119,7 @@ class ByLevel:
     def finish(
         self, ax: Axes, band: tuple[float, float], border: float, ends: Floats, band_text: str
     ) -> Picture:
-        """Fill a band, draw a border and an error bar between two `ends` where they are known."""
+        """Fill a band, draw a border and, between finite `ends`, an error bar; return the picture."""
         frame.allowed(ax, *band)
         ax.axhline(border, **frame.DASHED)
         bar = ""
@@ -133,12 +133,12 @@ class ByLevel:
 
 
 def _row(record: Record, check: ValueCheck, name: str, member: Member, values: Floats) -> ByLevel:
-    """Return the numbers of the levels, and behind them the extrapolated one where that is asked for."""
+    """Return the numbers of the levels, and after them the extrapolated one if the check judges that."""
     levels = whole(record, "level")
     if check.at.level != "best":
-        own = check.number.own_levels(levels) or levels
-        level = own[-1] if check.at.level is None else check.at.level
-        return ByLevel(levels, values, [one == level for one in levels], member.title)
+        valid = check.number.own_levels(levels) or levels
+        judged = valid[-1] if check.at.level is None else check.at.level
+        return ByLevel(levels, values, [level == judged for level in levels], member.title)
     best, bound = (measured(record, name, field, member) for field in ("value", "error_bound"))
     counts = [False] * len(levels) + [True]
     return ByLevel(levels, np.append(values, best), counts, member.title, bound)
@@ -147,20 +147,20 @@ def _row(record: Record, check: ValueCheck, name: str, member: Member, values: F
 def of_error(
     _: Experiment, record: Record, check: AccurateCheck, name: str, member: Member
 ) -> Picture | None:
-    """Draw the errors of the levels; None where that of the finest is not known."""
+    """Draw the errors of the levels; None if that of the finest level is unknown."""
     error, bound, size = (
         measured(record, name, field, member) for field in ("error", "error_bound", "size")
     )
     levels = whole(record, "level")
-    over = size if check.is_relative else 1.0
+    scale = size if check.is_relative else 1.0
     errors = np.full(len(levels), np.nan)
     norms = f"{check.accurate}_error_norm"
     if norms in record:
         errors = np.array(at(record, norms, member, norm=norm_index(record, TYPICAL_NORM)))
     errors[-1] = error
-    if not (np.isfinite(bound) and error > 0.0 and over > 0.0):
+    if not (np.isfinite(bound) and error > 0.0 and scale > 0.0):
         return None
-    shown, most = errors / over, bound / over
+    shown, most = errors / scale, bound / scale
     title = f"error of {words.symbol(check.accurate)}"
     measure = pretty_unit(unit_of_norm(record, check.accurate))
     title = f"relative {title}" if check.is_relative else style.label(title, measure)

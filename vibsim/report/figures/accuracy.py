@@ -1,4 +1,4 @@
-"""How far a mesh changes a wave, over w dt: the frequency of schemes with its series, and the second difference.
+"""Accuracy against w dt: the frequency of schemes with its series, and the second difference of a wave.
 
 Source: vibration text, sections 4.1 and 4.2 (figure 3) and exercise 7; theory from the matrix of a scheme's own step.
 """
@@ -20,21 +20,21 @@ from vibsim.report.style import Picture
 from vibsim.report.types import Axes, Experiment
 
 POINTS = 240  # of a curve
-SMALL = 0.02  # w dt from which the leading term of a series is taken
-EXACT = 1e-3  # part by which a coefficient may differ from a fraction that is written for it
+SMALL = 0.02  # w dt at which the leading term of a series is determined
+EXACT = 1e-3  # largest relative difference between a coefficient and the fraction written for it
 MOST_DENOMINATOR = 400
 
 
 def frequency(experiment: Experiment, record: Record) -> Picture | None:
-    """Draw the frequency of every scheme over the exact one against w dt, with its series up to the first term."""
+    """Draw numerical over exact frequency of every scheme against w dt, with the first term of its series."""
     from vibsim import theory
 
-    p = omega_dt(record)
-    sound = p[np.isfinite(p) & (p > 0.0)]
-    if not sound.size or "measured_phase_error" not in record:
+    w_dt = omega_dt(record)
+    usable = w_dt[np.isfinite(w_dt) & (w_dt > 0.0)]
+    if not usable.size or "measured_phase_error" not in record:
         return None
     limits = pick_or_nan(record, "stability_limit", ("scheme", "case"))
-    grid = np.linspace(1e-3, float(sound.max()), POINTS)
+    grid = np.linspace(1e-3, float(usable.max()), POINTS)
     measured = 1.0 / (1.0 - data.phase_error(record, "measured"))
     (ax,) = panels.stacked([3.0])
     ax.axhline(1.0, **style.REFERENCE)
@@ -45,19 +45,19 @@ def frequency(experiment: Experiment, record: Record) -> Picture | None:
         look = style.look(s)
         stepper = spec.method.stepper(spec.options)
         with np.errstate(all="ignore"):
-            # what a period is too short by
+            # the phase error is the part by which a period is too short
             curve = 1.0 / (1.0 - theory.phase_error_per_period(stepper, grid))
-            few = theory.phase_error_per_period(stepper, np.array([0.5 * SMALL, SMALL]))
-        start = few / (1.0 - few)
+            small = theory.phase_error_per_period(stepper, np.array([0.5 * SMALL, SMALL]))
+        start = small / (1.0 - small)
         limit = float(np.nanmax(limits[s])) if np.isfinite(limits[s]).any() else math.inf
         curve = np.where(grid <= limit, curve, np.nan)
         ax.plot(grid, curve, color=look["color"], label=style.entry(spec.name))
-        if (found := _leading(start)) is not None:
-            order, text, factor = found
+        if (term := _leading_term(start)) is not None:
+            order, text, factor = term
             drawn.append(1.0 + factor * grid**order)
             ax.plot(grid, drawn[-1], color=look["color"], linestyle=(0, (4, 2)), label=text)
         mark = {"color": look["color"], "marker": look["marker"], "linestyle": "none"}
-        ax.plot(p.ravel(), measured[s].ravel(), **mark, markersize=4, label="_measured")
+        ax.plot(w_dt.ravel(), measured[s].ravel(), **mark, markersize=4, label="_measured")
         drawn += [curve, measured[s].ravel()]
     _finish(ax, grid, drawn, "w dt", "numerical over exact frequency")
     return Picture(
@@ -70,32 +70,32 @@ def frequency(experiment: Experiment, record: Record) -> Picture | None:
     )
 
 
-def _finish(ax: Axes, grid: Floats, drawn: list[Floats], across: str, up: str) -> None:
-    """Give axes over a grid of w dt their ranges, labels and legend."""
-    ax.set(xlim=(0.0, 1.03 * float(grid[-1])), ylim=style.limits(*drawn), xlabel=across, ylabel=up)
+def _finish(ax: Axes, grid: Floats, drawn: list[Floats], x: str, y: str) -> None:
+    """Set ranges, labels and legend of axes over a grid of w dt."""
+    ax.set(xlim=(0.0, 1.03 * float(grid[-1])), ylim=style.limits(*drawn), xlabel=x, ylabel=y)
     style.beside(ax)
 
 
-def _leading(start: Floats) -> tuple[int, str, float] | None:
-    """Return the first term c p^k of a series from its values at half of `SMALL` and there: k, its words, and c."""
-    half, whole = (float(value) for value in start)
-    if not (math.isfinite(half) and math.isfinite(whole)) or half == 0.0 or whole / half <= 1.0:
+def _leading_term(start: Floats) -> tuple[int, str, float] | None:
+    """Return the leading term c p^k of a series, from its values at p = `SMALL`/2 and `SMALL`: k, its text, and c."""
+    half, full = (float(value) for value in start)
+    if not (math.isfinite(half) and math.isfinite(full)) or half == 0.0 or full / half <= 1.0:
         return None
-    order = round(math.log2(whole / half))
-    # the next term is smaller by the square of w dt
-    factor = (4.0 * half / (0.5 * SMALL) ** order - whole / SMALL**order) / 3.0
+    order = round(math.log2(full / half))
+    # eliminates the next term, which is smaller by a factor (w dt)^2
+    factor = (4.0 * half / (0.5 * SMALL) ** order - full / SMALL**order) / 3.0
     near = Fraction(factor).limit_denominator(MOST_DENOMINATOR)
-    top, below = f"{words.number(abs(factor), 'brief')} ", ""
+    numerator, denominator = f"{words.number(abs(factor), 'brief')} ", ""
     if near != 0 and abs(float(near) - factor) <= EXACT * abs(factor):
-        top = "" if abs(near.numerator) == 1 else f"{abs(near.numerator)} "
-        below = f"/{near.denominator}" if near.denominator > 1 else ""
+        numerator = "" if abs(near.numerator) == 1 else f"{abs(near.numerator)} "
+        denominator = f"/{near.denominator}" if near.denominator > 1 else ""
     sign = "+" if factor > 0 else "−"
-    return order, f"1 {sign} {top}(w dt){words.superscript(order)}{below}", factor
+    return order, f"1 {sign} {numerator}(w dt){words.superscript(order)}{denominator}", factor
 
 
 def second_difference(record: Record) -> Picture | None:
-    """Draw the fraction of the second derivative that the second difference of a cosine gives, against w dt."""
-    found, p = _measured_fractions(record)
+    """Draw the second difference of a cosine over its second derivative against w dt."""
+    fractions, p = _measured_fractions(record)
     if not p.size:
         return None
     grid = np.linspace(0.0, max(math.pi, float(p.max())), POINTS)
@@ -105,8 +105,8 @@ def second_difference(record: Record) -> Picture | None:
     ax.plot(grid, curve, color=style.COLOURS[0], label="(2/p)² sin²(p/2)")
     dashed: dict[str, Any] = {"color": style.COLOURS[1], "linestyle": (0, (4, 2))}
     ax.plot(grid, series, **dashed, label="1 − p²/12 + p⁴/360")
-    ax.plot(p, found, "o", color=style.COLOURS[0], markersize=4.5, label="measured")
-    _finish(ax, grid, [curve, series, found, np.array([0.0, 1.0])], "p = w dt", "E")
+    ax.plot(p, fractions, "o", color=style.COLOURS[0], markersize=4.5, label="measured")
+    _finish(ax, grid, [curve, series, fractions, np.array([0.0, 1.0])], "p = w dt", "E")
     return Picture(
         "second_difference",
         "Accuracy of the second difference: E against p = w dt",
@@ -119,8 +119,8 @@ def second_difference(record: Record) -> Picture | None:
 
 
 def _measured_fractions(record: Record) -> tuple[Floats, Floats]:
-    """Return E of the exact solution of every member on the mesh of the coarsest level, and w dt there."""
-    found = []
+    """Return E of the exact solution of every member on the coarsest mesh, and w dt there."""
+    pairs = []
     for case in range(len(record["case"])):
         member = Member(0, case, "")
         u, w = data.exact_series(record, "u", member), data.natural_frequency(record, case)
@@ -130,6 +130,6 @@ def _measured_fractions(record: Record) -> tuple[Floats, Floats]:
         dt = float(t[1] - t[0])
         inner = u[1:-1]
         fraction = -float(np.dot(np.diff(u, 2) / dt**2, inner) / (w * w * np.dot(inner, inner)))
-        found.append((fraction, w * dt))
-    fractions, p = np.reshape(np.array(found), (-1, 2)).T
+        pairs.append((fraction, w * dt))
+    fractions, p = np.reshape(np.array(pairs), (-1, 2)).T
     return fractions, p

@@ -1,7 +1,7 @@
-"""The largest energy error so far against time, by the scheme's own velocity and by ``[D_2t u]``.
+"""The running maximum of the energy error against time, with the scheme's own velocity and with ``[D_2t u]``.
 
-Source: vibration text, section 6.2. On two logarithmic axes a bounded error is flat, a linear drift rises with the
-slope 1 and a quadratic one with 2; the error of an unstable scheme turns upwards.
+Source: vibration text, section 6.2. On two logarithmic axes a bounded error is flat, a linear drift has slope 1, a
+quadratic one slope 2; the error of an unstable scheme turns upwards.
 """
 
 from __future__ import annotations
@@ -20,15 +20,15 @@ from vibsim.report.style import Picture
 from vibsim.report.types import Axes
 
 OWN, CENTRED = "energy_deviation_running_max", "energy_deviation_d2t_running_max"
-TOGETHER = 6  # most schemes in one panel
+MOST_SCHEMES = 6  # in one panel
 DASHED = (0, (4, 1.6))
-WIDEST_RANGE = 1e18  # widest range of the error: what lies further below the largest is left out
+WIDEST_RANGE = 1e18  # of the error axis: smaller errors, relative to the largest, are left out
 
 
 def running(record: Record, case: int) -> Picture | None:
     """Draw the running maxima of the energy error on the coarsest level.
 
-    None where the record has none, and where no scheme has another velocity than ``[D_2t u]``.
+    None if the record has none, or if every scheme's velocity is ``[D_2t u]``.
     """
     if not {OWN, CENTRED} <= set(record.variables):
         return None
@@ -36,18 +36,22 @@ def running(record: Record, case: int) -> Picture | None:
     if not np.isfinite(np.asarray(record[CENTRED], dtype=np.float64)).any():
         return None
     first = np.abs(pick_or_nan(record, "energy_initial", MEMBER)[:, case])
-    usable = bool(np.all(first > 0.0))
-    # running maxima of the coarsest level, shape (scheme, t), the first time left out
-    over = first[:, None] if usable else 1.0
-    found = (
+    is_relative = bool(np.all(first > 0.0))
+    # running maxima of the coarsest level, shape (scheme, t), without the first time
+    scale = first[:, None] if is_relative else 1.0
+    maxima = (
         np.asarray(pick(record, name, case=case, level=0), np.float64) for name in (OWN, CENTRED)
     )
-    both = [style.no_zeros(part[:, 1:] / over) for part in found]
-    # of a body at rest nothing else tells a size
-    sizes = [1.0] if usable else [size for part in both for row in part if (size := largest(row))]
+    both = [style.no_zeros(part[:, 1:] / scale) for part in maxima]
+    # without an initial energy only the errors themselves give a size
+    sizes = (
+        [1.0] if is_relative else [size for part in both for row in part if (size := largest(row))]
+    )
     most = frame.UNBOUNDED * min(sizes, default=1.0)
     names = record.words("scheme")
-    groups = [range(i, min(i + TOGETHER, len(names))) for i in range(0, len(names), TOGETHER)]
+    groups = [
+        range(i, min(i + MOST_SCHEMES, len(names))) for i in range(0, len(names), MOST_SCHEMES)
+    ]
     axes = stacked([2.5] * len(groups), style.TIME)
     leaves = False
     for ax, group in zip(axes, groups, strict=True):
@@ -67,7 +71,7 @@ def running(record: Record, case: int) -> Picture | None:
         ax.plot([], [], color=style.GREY, linestyle=DASHED, label="[D₂ₜu]")
         style.beside(ax, fontsize=8, handlelength=2.4)
         text = style.label("max |ΔE| so far", unit(record, "energy_deviation_max_abs"))
-        ax.set_ylabel("max |ΔE| / E(0) so far" if usable else text)
+        ax.set_ylabel("max |ΔE| / E(0) so far" if is_relative else text)
     axes[0].set_title("Energy error by velocity")
     axes[-1].set_xlabel(time_label(record))
     return Picture(
@@ -82,10 +86,7 @@ def running(record: Record, case: int) -> Picture | None:
 
 
 def _drift(record: Record, s: int, case: int) -> str:
-    """Return the kind of drift that the analysis found, for the legend; empty where it found none of these.
-
-    Of a run that did not last to the end there is no other kind.
-    """
+    """Return the kind of drift for the legend; empty if the analysis named none. A run may also have broken down."""
     if record["status"][s, case, 0] != 0:
         return f": {frame.BROKE_DOWN}"
     if "energy_drift_kind" not in record:
@@ -100,10 +101,10 @@ def _draw(ax: Axes, t: Floats, values: Floats, **look: Any) -> None:
 
 
 def _limits(series: list[Floats], most: float) -> tuple[float, float]:
-    """Return limits that hold the series that stay below `most`, and of others where they begin to grow."""
-    usual = [values for values in series if 0.0 < largest(values) <= most]
+    """Return limits around the series that stay below `most` and the part of the others that begins to grow."""
+    bounded = [values for values in series if 0.0 < largest(values) <= most]
     grown = [values for values in series if largest(values) > most]
-    shown = usual or [values[values <= most] for values in grown]
+    shown = bounded or [values[values <= most] for values in grown]
     values = style.finite(*shown)
     if values.size == 0:
         return (most / frame.UNBOUNDED, most) if grown else (0.1, 1.0)

@@ -1,7 +1,7 @@
-"""Local periods and amplitudes against their number, and the phase error of every peak.
+"""Local periods and amplitudes against the number of the peak, and the phase error of every peak.
 
-Source: vibration text, section 3.5 (figure 2) and exercise 2. The local period number m is the time from the m-th
-peak to the next one, the local amplitude half the height from a peak to the trough behind it.
+Source: vibration text, section 3.5 (figure 2) and exercise 2. The m-th local period is the time from the m-th peak to
+the next one, a local amplitude half the height from a peak to the following trough.
 """
 
 from __future__ import annotations
@@ -16,27 +16,27 @@ from vibsim.core.record import Record
 from vibsim.report import choice, data, frame, style
 from vibsim.report.choice import position
 from vibsim.report.data import Member, at, whole
-from vibsim.report.figures.panels import note, stacked
+from vibsim.report.figures.panels import move_label_left, note, stacked
 from vibsim.report.style import Picture
 from vibsim.report.types import Axes, Experiment
 
-FEWEST_PEAKS = 3  # peaks that show how a period changes
-MOST_CURVES = 6  # most curves; more lie on one another
-MOST_MARKERS = 40  # most numbers of one curve that get a marker each
-MARKED = 60  # most local frequencies of one curve that get a marker each
+FEWEST_PEAKS = 3  # that show how a period changes
+MOST_CURVES = 6  # more would lie on one another
+MOST_MARKERS = 40  # numbers of one curve up to which each has a marker
+MARKED = 60  # the same of local frequencies
 MOSTLY = 0.5
-"""Where fewer than this part of the curves stay so small for two peaks or more, the scale is logarithmic."""
+"""If less than this fraction of the curves stays below `CUT_OFF` for two peaks, the scale is logarithmic."""
 CUT_OFF = 10.0
-"""Amplitudes and periods beyond so many times the exact one are cut off, and the panel says so."""
+"""Amplitudes and periods beyond this multiple of the exact one are cut off, and the panel says so."""
 
 Run = tuple[str, Member, int]
-"""A curve: its label, the scheme and member, and the position of its level."""
+"""A curve: label, scheme and member, position of the level."""
 
 
 def local(
     experiment: Experiment, record: Record, shown: list[Member], peaks: int = 2
 ) -> Picture | None:
-    """Draw local periods, amplitudes and the phase error of one member; None where there are fewer peaks."""
+    """Draw local periods, amplitudes and the phase error of one member; None with fewer than `peaks` peaks."""
     runs = runs_of(record, shown, peaks)
     if not runs:
         return None
@@ -44,10 +44,10 @@ def local(
     exact = float(data.exact_periods(record)[case])
     start = first_peak(experiment, record, case, exact)
     looks = looks_of(runs)
-    each = [
+    by_run = [
         _draw(axes, record, run, look, exact, start) for run, look in zip(runs, looks, strict=True)
     ]
-    drawn = list(zip(*each, strict=True))
+    drawn = list(zip(*by_run, strict=True))
     size = exact_amplitude(experiment, record, case)
     for ax, value in zip(axes, (exact, size, 0.0), strict=True):
         if math.isfinite(value):
@@ -59,11 +59,10 @@ def local(
         ("Local amplitude", "local amplitude", measure),
         ("Phase error of the peaks", "peak early by", time),
     )
-    for ax, lines, (title, text, of) in zip(axes, drawn, rows, strict=True):
-        # amplitudes that hardly differ need long numbers
-        ax.yaxis.set_label_coords(-0.115, 0.5)
-        ax.set(ylabel=style.label(text, of), title=title)
-        _tell_alike(ax, lines, [label for label, _, _ in runs])
+    for ax, lines, (title, text, unit) in zip(axes, drawn, rows, strict=True):
+        move_label_left(ax)
+        ax.set(ylabel=style.label(text, unit), title=title)
+        _name_coincident(ax, lines, [label for label, _, _ in runs])
     axes[2].set_xlabel("number of the peak")
     style.beside(axes[0], fontsize=8)
     reference = "its exact time" if math.isfinite(start) else "its time after the first peak"
@@ -79,35 +78,35 @@ def local(
 
 
 def runs_of(record: Record, members: list[Member], peaks: int = 2) -> list[Run]:
-    """Choose the curves of the first member that have so many peaks.
+    """Choose the curves of the first member that have at least `peaks` peaks.
 
-    Of one or two schemes several levels are drawn, of more the coarsest level.
+    One or two schemes are drawn on several levels, more schemes on the coarsest level.
     """
     if "peak_time" not in record:
         return []
     members = [member for member in members if member.case == members[0].case]
     levels = whole(record, "level")
-    each = max(1, min(len(levels), 4, MOST_CURVES // max(1, len(members))))
-    found = []
+    count = max(1, min(len(levels), 4, MOST_CURVES // max(1, len(members))))
+    runs = []
     for member in members[:MOST_CURVES]:
-        for i in range(each):
+        for i in range(count):
             if np.isfinite(at(record, "peak_time", member, level=i)).sum() >= peaks:
-                who = member.scheme_name if len(members) > 1 else ""
-                label = ", ".join(filter(None, [who, f"level {levels[i]}" if each > 1 else ""]))
-                found.append((label or f"level {levels[i]}", member, i))
-    return found
+                scheme = member.scheme_name if len(members) > 1 else ""
+                label = ", ".join(filter(None, [scheme, f"level {levels[i]}" if count > 1 else ""]))
+                runs.append((label or f"level {levels[i]}", member, i))
+    return runs
 
 
 def looks_of(runs: list[Run]) -> list[dict[str, Any]]:
-    """Return the look of each run: of several schemes a colour is a scheme, and dashes and marker are a level."""
+    """Return the look of each run; with several schemes, colour is the scheme, dashes and marker are the level."""
     levels = sorted({level for _, _, level in runs})
     if len({member.scheme for _, member, _ in runs}) == 1:
         return [style.look(k) for k in range(len(runs))]
     looks = []
     for _, member, level in runs:
         k, look = levels.index(level), style.look(member.scheme)
-        of_level = {"linestyle": style.DASHES[k], "marker": style.MARKERS[k]}
-        looks.append(look | of_level if len(levels) > 1 else look)
+        level_look = {"linestyle": style.DASHES[k], "marker": style.MARKERS[k]}
+        looks.append(look | level_look if len(levels) > 1 else look)
     return looks
 
 
@@ -131,19 +130,19 @@ def _draw(
     ]
 
 
-def _tell_alike(ax: Axes, lines: tuple[Any, ...], labels: list[str]) -> None:
-    """Say beside a panel which curves lie on one another there, and draw the first of them wide and pale beneath."""
+def _name_coincident(ax: Axes, lines: tuple[Any, ...], labels: list[str]) -> None:
+    """Name the coincident curves of a panel beside it, and draw the first of them wide and pale beneath."""
     low, high = ax.get_ylim()
     curves = [np.where((y >= low) & (y <= high), y, np.nan) for y in map(_heights_of, lines)]
-    is_first = not str(lines[0].get_label()).startswith("_")
+    has_legend = not str(lines[0].get_label()).startswith("_")
     texts: list[tuple[Any, str]] = []
     for i, first in enumerate(frame.same_as(curves, high - low)):
         if first is not None:
             lines[first].set(linewidth=3.4, alpha=0.5)
             lines[i].set(zorder=3.0 + 0.01 * i)
             texts.append((lines[i], style.entry(f"{labels[i]}:\n  same as {labels[first]}")))
-    if is_first:
-        # the panel with the legend of all
+    if has_legend:
+        # of all panels
         for line, text in texts:
             line.set_label(text)
     elif texts:
@@ -155,7 +154,7 @@ def _heights_of(line: Any) -> Floats:
 
 
 def _peaks(record: Record, member: Member, level: int) -> tuple[Floats, Floats, Floats]:
-    """Return the times of the peaks, interpolated and of grid points, and the amplitudes there."""
+    """Return the interpolated times of the peaks, their grid points in time, and the amplitudes."""
     names = ("peak_time", "peak_time_grid", "peak", "trough_time", "trough")
     time, grid, peak, *troughs = (at(record, name, member, level=level) for name in names)
     keep = np.isfinite(time)
@@ -163,7 +162,7 @@ def _peaks(record: Record, member: Member, level: int) -> tuple[Floats, Floats, 
 
 
 def heights(time: Floats, peak: Floats, trough_time: Floats, trough: Floats) -> Floats:
-    """Return half the height from every peak to the trough behind it, else to the one before; NaN without one."""
+    """Return half the height from every peak to the following, else to the preceding trough; NaN without troughs."""
     known = np.isfinite(trough_time)
     if not known.any():
         return np.full(peak.shape, np.nan)
@@ -172,9 +171,9 @@ def heights(time: Floats, peak: Floats, trough_time: Floats, trough: Floats) -> 
 
 
 def first_peak(experiment: Experiment, record: Record, case: int, period: float) -> float:
-    """Return the time of the first exact peak after the start; NaN where no formula gives it.
+    """Return the time of the first exact peak after the start; NaN if no formula gives it.
 
-    It is known of a linear model, and of any motion that starts at rest: there it is one period, or half of one.
+    It is known for linear models, and for any motion that starts at rest, as one period or half of one.
     """
     u, v = _start(experiment, record, case)
     if not math.isfinite(period) or u == v == 0.0:
@@ -188,7 +187,7 @@ def first_peak(experiment: Experiment, record: Record, case: int, period: float)
 
 
 def _start(experiment: Experiment, record: Record, case: int) -> tuple[float, float]:
-    """Return the first position and velocity of a member."""
+    """Return the initial position and velocity of a member."""
     model, member = experiment.model.definition, Member(0, case, "")
     names = (model.position, model.velocity)
     u, v = (float(at(record, f"{name}_finest", member)[0]) for name in names)
@@ -196,7 +195,7 @@ def _start(experiment: Experiment, record: Record, case: int) -> tuple[float, fl
 
 
 def exact_amplitude(experiment: Experiment, record: Record, case: int) -> float:
-    """Return the exact amplitude where it stays and is known: of a linear model, or of a start at rest."""
+    """Return the exact amplitude, known for conservative models that are linear or start at rest; else NaN."""
     if not experiment.model.definition.conservative:
         return math.nan
     u, v = _start(experiment, record, case)
@@ -209,23 +208,23 @@ def exact_amplitude(experiment: Experiment, record: Record, case: int) -> float:
 def _ranges(
     axes: list[Axes], drawn: list[tuple[Any, ...]], sizes: tuple[float, float, float]
 ) -> bool:
-    """Hold what is drawn; cut off what grows far beyond the exact number, with a mark; say whether anything is."""
+    """Fit the axes to the curves, cut off far beyond the exact number; return whether any is marked as leaving."""
     from matplotlib.ticker import MaxNLocator
 
     leaves = False
     for ax, lines, value in zip(axes, drawn, sizes, strict=True):
         most = CUT_OFF * abs(value)
         values = style.finite(*map(_heights_of, ax.lines))
-        usual = values[~(np.abs(values) > most)]
-        if usual.size in (0, values.size):
+        bounded = values[~(np.abs(values) > most)]
+        if bounded.size in (0, values.size):
             ax.set_ylim(*style.limits(values))
             continue
-        # most of the curves have to be seen at two places at least
+        # most curves must be visible at two peaks or more
         is_readable = [int(np.sum(np.abs(_heights_of(line)) <= most)) > 1 for line in lines]
         if sum(is_readable) < MOSTLY * len(is_readable):
-            _grow(ax, lines, abs(value))
+            _draw_logarithmic(ax, lines, abs(value))
         else:
-            ax.set_ylim(*style.limits(usual))
+            ax.set_ylim(*style.limits(bounded))
             note(ax, f"cut off beyond {CUT_OFF:g} times the exact one")
         for line in lines:
             x = np.asarray(line.get_xdata(), dtype=np.float64)
@@ -234,8 +233,8 @@ def _ranges(
     return leaves
 
 
-def _grow(ax: Axes, lines: tuple[Any, ...], size: float) -> None:
-    """Show on a logarithmic scale how numbers grow, as far as a frame has room."""
+def _draw_logarithmic(ax: Axes, lines: tuple[Any, ...], size: float) -> None:
+    """Show growing numbers on a logarithmic scale, within `frame.UNBOUNDED` of their `size`."""
     for line in lines:
         line.set_ydata(style.no_zeros(_heights_of(line)))
     values = np.concatenate([*map(_heights_of, lines), [size]])
@@ -269,7 +268,7 @@ def frequency(experiment: Experiment, record: Record) -> Picture | None:
         if math.isfinite(value):
             ax.axhline(value, label="exact", **style.REFERENCE)
         ax.set_ylim(*style.limits(*map(_heights_of, ax.lines)))
-        ax.yaxis.set_label_coords(-0.115, 0.5)
+        move_label_left(ax)
         ax.set(ylabel=style.label(text, unit), title=f"Local {text}")
         style.beside(ax)
     axes[1].set_xlabel("number of the peak")

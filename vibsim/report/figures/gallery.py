@@ -1,4 +1,4 @@
-"""Which figures a report shows, the decisive ones first."""
+"""The figures of a report, the decisive ones first."""
 
 from __future__ import annotations
 
@@ -33,16 +33,16 @@ from vibsim.report.sweep_layout import Along, Grid
 from vibsim.report.types import Experiment
 
 FEW_SCHEMES = 3
-"""Schemes up to which each one's figures over time stand before those that lay schemes beside each other."""
+"""Most schemes whose figures over time are shown for the decisive quantity."""
 MOST_SHOWN = 6
-"""Most schemes and members that get figures of their own, of more schemes half as many; the tables have them all."""
+"""Most schemes and members with figures of their own, half as many if there are more schemes; tables have them all."""
 
 Drawn = list[Picture | None]
 
 
 @dataclass(frozen=True)
 class Tab:
-    """Figures that stand together behind one label."""
+    """Figures under one label."""
 
     label: str
     pictures: tuple[Picture, ...]
@@ -56,45 +56,45 @@ class Gallery:
     belief: tuple[Tab, ...] = ()
     members: tuple[View, ...] = ()
     shared: tuple[str, ...] = ()
-    """What all members of a sweep share, in words."""
+    """Sentences on what all members of a sweep share."""
 
 
 def pictures(
     experiment: Experiment, record: Record, shown: list[Member], lead: Lead, first: Sequence[str]
 ) -> Gallery:
-    """Return the figures of a report, those left out that stand above already; `first` names these."""
-    found = choice.quantities(experiment, record)
+    """Return the figures of a report, without those of the first screen; `first` are the names of these."""
+    quantities = choice.quantities(experiment, record)
     case = min((member.case for member in shown), key=lambda case: (case != lead.member.case, case))
     series = [] if data.is_lean(record) else shown
     positions = experiment.model.definition.positions
     position = lead.quantity if lead.quantity in positions else positions[0]
-    own = [member for member in series if member.role != "typical"]
-    own.sort(key=lambda one: (one.scheme, one.case) != (lead.member.scheme, lead.member.case))
+    worst = [member for member in series if member.role != "typical"]
+    worst.sort(key=lambda one: (one.scheme, one.case) != (lead.member.scheme, lead.member.case))
     leading, others = list[Tab](), list[Tab]()
-    for quantity in found:
+    for quantity in quantities:
         is_lead = quantity == lead.quantity
-        members = own[:FEW_SCHEMES] if is_lead else own[:1]
+        members = worst[:FEW_SCHEMES] if is_lead else worst[:1]
         drawn = _of_quantity(experiment, record, quantity, case, members, first)
         (leading if is_lead else others).extend(_tabs(drawn, first))
-    general = _tabs(_of_every_quantity(experiment, record, case, series, own, position), first)
-    working = _tabs([("work", [work.precision(experiment, record, case)])] if series else [], first)
-    if working and np.isnan(data.formal_orders(record, lead.quantity)).any():
-        # where a scheme chooses its own steps, the work compares it with the others
-        belief = [*leading[:1], *working, *leading[1:], *general, *others]
+    general = _tabs(_general(experiment, record, case, series, worst, position), first)
+    efforts = _tabs([("work", [work.precision(experiment, record, case)])] if series else [], first)
+    if efforts and np.isnan(data.formal_orders(record, lead.quantity)).any():
+        # only work compares an adaptive scheme with the others
+        belief = [*leading[:1], *efforts, *leading[1:], *general, *others]
     else:
-        belief = [*leading, *general, *working, *others]
-    moving = _motion(experiment, record, series, lead, position) if series else []
-    views, notes = over_members(experiment, record, found, lead)
-    return Gallery(_new(moving, first), tuple(belief), tuple(views), tuple(notes))
+        belief = [*leading, *general, *efforts, *others]
+    motion = _motion(experiment, record, series, lead, position) if series else []
+    views, notes = over_members(experiment, record, quantities, lead)
+    return Gallery(_new(motion, first), tuple(belief), tuple(views), tuple(notes))
 
 
 def _new(drawn: Drawn, first: Sequence[str]) -> tuple[Picture, ...]:
-    """Return the pictures that do not stand above already."""
-    return tuple(one for one in drawn if one is not None and one.name not in first)
+    """Return the pictures that the first screen does not have."""
+    return tuple(p for p in drawn if p is not None and p.name not in first)
 
 
 def _tabs(labelled: Iterable[tuple[str, Drawn]], first: Sequence[str]) -> list[Tab]:
-    """Return the figures behind each label, as far as they do not stand above already."""
+    """Return the figures under each label that the first screen does not have."""
     tabs = (Tab(label, _new(drawn, first)) for label, drawn in labelled)
     return [tab for tab in tabs if tab.pictures]
 
@@ -102,7 +102,7 @@ def _tabs(labelled: Iterable[tuple[str, Drawn]], first: Sequence[str]) -> list[T
 def _motion(
     experiment: Experiment, record: Record, series: list[Member], lead: Lead, position: str
 ) -> Drawn:
-    """Draw the motion of the member that decides, and beside it of a typical one."""
+    """Draw the motion of the decisive member and of a typical one."""
     typical = [member for member in series if member.role == "typical"]
     return [
         *(
@@ -122,54 +122,54 @@ def _of_quantity(
     members: list[Member],
     first: Sequence[str],
 ) -> list[tuple[str, Drawn]]:
-    """Draw the error of a quantity against the step, and how the levels of each member agree over time.
+    """Draw the error of a quantity against the step, and the agreement of the levels over time for each member.
 
-    The latter takes longest, and stands above already for the member that decides.
+    The latter takes longest; the first screen may have it already for the decisive member.
     """
     has_pairs, letter = bool(data.whole(record, "pair")), words.symbol(quantity)
     is_energy = quantity == "energy_deviation" and "energy_deviation_scaled" in record
     are_compared = has_pairs and (not is_energy or quantity in checked_quantities(experiment))
-    # of a sweep the map has the other members
+    # maps and curves of a sweep show the other members
     shared: Drawn = [order.against_step(experiment, record, quantity, case)] if has_pairs else []
     tabs = list[tuple[str, Drawn]]()
     for member in members:
-        each: Drawn = [time.energy(record, member)] if is_energy else []
+        drawn: Drawn = [time.energy(record, member)] if is_energy else []
         if are_compared and time.name_of_differences(quantity, member) not in first:
-            each.append(time.overlay(record, quantity, member))
-        tabs.append((f"{letter}, {member.scheme_name}", each))
+            drawn.append(time.overlay(record, quantity, member))
+        tabs.append((f"{letter}, {member.scheme_name}", drawn))
     if len(tabs) < 2:
-        return [(letter, [*shared, *(one for _, each in tabs for one in each)])]
+        return [(letter, [*shared, *(picture for _, drawn in tabs for picture in drawn)])]
     return [(f"{letter}, order", shared), *tabs]
 
 
-def _of_every_quantity(
+def _general(
     experiment: Experiment,
     record: Record,
     case: int,
     series: list[Member],
-    own: list[Member],
+    worst: list[Member],
     position: str,
 ) -> Iterator[tuple[str, Drawn]]:
-    """Draw the estimated error, the energy, phase and amplitude, and what theory says of the schemes."""
-    if own and data.whole(record, "pair"):
-        yield "estimated error", [solution.solution(record, position, own[0])]
+    """Draw the figures that belong to no quantity: estimated error, energy, phase and amplitude, and theory."""
+    if worst and data.whole(record, "pair"):
+        yield "estimated error", [solution.solution(record, position, worst[0])]
     equation = experiment.model.definition
     if series:
         if equation.conservative:
             yield "energy", [energy.running(record, case)]
-        beside: Drawn = [extrema.local(experiment, record, series, extrema.FEWEST_PEAKS)]
+        phases: Drawn = [extrema.local(experiment, record, series, extrema.FEWEST_PEAKS)]
         if not data.swept(record) and equation.is_alone:
-            beside.append(plane.phase(experiment, record, series))
-        yield "phase and amplitude", beside
+            phases.append(plane.phase(experiment, record, series))
+        yield "phase and amplitude", phases
     theories: Drawn = [theory.order_and_stability(experiment, record)]
     theories += [theory.growing(experiment, record)] if series else []
     yield "theory", theories
 
 
 def over_members(
-    experiment: Experiment, record: Record, found: list[str], lead: Lead
+    experiment: Experiment, record: Record, quantities: list[str], lead: Lead
 ) -> tuple[list[View], list[str]]:
-    """Return the views over the swept parameters, and what all members share: along a line, on a map, or by key."""
+    """Return the views over the swept parameters (along a line, on a map, or by key), and what all members share."""
     keys = sweep_layout.keys(record)
     if not keys:
         return [], []
@@ -181,17 +181,17 @@ def over_members(
         return lead.member if quantity == lead.quantity else choice.worst(record, quantity)
 
     if isinstance(layout, Along):
-        drawn = sweep.views(experiment, record, layout, found, worst)
+        drawn = sweep.views(experiment, record, layout, quantities, worst)
     elif isinstance(layout, Grid):
         grid = with_separatrix(experiment, layout)
-        drawn = maps.views(experiment, record, grid, found, worst, schemes)
+        drawn = maps.views(experiment, record, grid, quantities, worst, schemes)
     else:
-        drawn = members.views(experiment, record, keys, found, worst, schemes)
+        drawn = members.views(experiment, record, keys, quantities, worst, schemes)
     shown = list(drawn)
-    views = [one for one in shown if isinstance(one, View)]
-    notes = [one for one in shown if isinstance(one, str)]
-    for quantity in found if data.whole(record, "pair") else ():
-        # the verdict that colours them is on the order
+    views = [item for item in shown if isinstance(item, View)]
+    notes = [item for item in shown if isinstance(item, str)]
+    for quantity in quantities if data.whole(record, "pair") else ():
+        # their colours are the verdicts on the order, which need pairs of levels
         picture = members.histograms(experiment, record, quantity)
         if picture is not None:
             views.append(View(f"histograms of {words.symbol(quantity)}", picture, panels=()))
@@ -201,15 +201,15 @@ def over_members(
 def choose(
     experiment: Experiment, record: Record, decisive: Member | None = None
 ) -> tuple[list[Member], str]:
-    """Return what gets figures of its own, the `decisive` member first, and a sentence saying what was left out."""
+    """Return the members with figures of their own, the `decisive` one first, and sentences on what was left out."""
     quantity = choice.first(experiment, record)
-    everyone = choice.with_levels(experiment, choice.members(record, quantity, decisive))
-    ranked = everyone
+    candidates = choice.with_levels(experiment, choice.members(record, quantity, decisive))
+    ranked = candidates
     if f"{quantity}_status" in record:
         status = data.flags(record, f"{quantity}_status")
-        ranked = sorted(everyone, key=lambda one: -SEVERITY[status[one.scheme, one.case]])
+        ranked = sorted(candidates, key=lambda m: -SEVERITY[status[m.scheme, m.case]])
     room = MOST_SHOWN if len(record["scheme"]) <= MOST_SHOWN else MOST_SHOWN // 2
-    shown = [member for member in everyone if member in ranked[:room]]
+    shown = [member for member in candidates if member in ranked[:room]]
     parts, is_swept = [], bool(data.swept(record))
     if data.is_lean(record):
         parts.append(
@@ -220,11 +220,11 @@ def choose(
         parts.append(
             "The member that decides and a typical one are shown over time, for every scheme."
         )
-    count = len(everyone) - room
+    count = len(candidates) - room
     if count > 0:
-        one, many = ("scheme", "schemes")
+        singular, plural = ("scheme", "schemes")
         if is_swept:
-            one, many = "member with its scheme", "members with their schemes"
-        who = f"1 more {one} has" if count == 1 else f"{count} more {many} have"
+            singular, plural = "member with its scheme", "members with their schemes"
+        who = f"1 more {singular} has" if count == 1 else f"{count} more {plural} have"
         parts.append(f"{who} no figures over time; the tables hold their numbers.")
     return shown, " ".join(parts)

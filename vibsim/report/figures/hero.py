@@ -1,6 +1,6 @@
-"""The two pictures at the top of a page: the one that decides, and the error against the step.
+"""The two pictures at the top of a page: the decisive one, and the error against the step.
 
-Of a sweep they are the response over the swept parameters, with the member that decides marked, and the orders of all
+In a sweep they are the response over the swept parameters, with the decisive member marked, and the orders of all
 members. Source: pendulum lecture, section 2.5.
 """
 
@@ -29,21 +29,21 @@ from vibsim.report.text import findings
 from vibsim.report.types import Axes, Experiment
 
 LEFT, RIGHT, HEIGHT = 5.4, 3.9, 2.75
-"""Widths of the left picture and of the right one, and their height [inch]."""
-FEW = 300  # of more members a histogram of the orders says more than dots
-FEWEST_ERRORS = 2  # errors that a picture over the step needs
+"""Widths of the left and the right picture, and their height [inch]."""
+FEW = 300  # members up to which orders are dots; more are a histogram
+FEWEST_ERRORS = 2  # that a picture against the step needs
 MOST_SCHEMES = 6  # schemes that the right picture can tell apart
 SIZES = {
     "l1": "mean error", "l2": "root-mean-square error", "linf": "largest error",
     "linf_interior": "largest error without the last point",
 }  # fmt: skip
-"""What a norm over time, over the same power of the duration as of a second, is as a size of the error."""
-STRIP = 0.12  # of the height of the axes, for a row of a legend
-LONG = 24  # letters of a label above which it is set smaller
+"""Norm to its name after division by the power of the duration that makes it an average."""
+STRIP = 0.12  # height of a legend row over that of the axes
+LONG = 24  # characters of a label from which it is smaller
 
 
 def _panel(width: float, title: str, right: float = 0.14) -> Axes:
-    """Return the axes of a picture, whose label of the vertical axis stands above them."""
+    """Return the axes of a picture, with the label of the vertical axis above them."""
     figure = style.canvas(HEIGHT, width)
     box = (0.72 / width, 0.46 / HEIGHT, (width - 0.72 - right) / width, (HEIGHT - 0.78) / HEIGHT)
     ax = figure.add_axes(box)
@@ -52,12 +52,12 @@ def _panel(width: float, title: str, right: float = 0.14) -> Axes:
 
 
 def _name(ax: Axes, title: str) -> None:
-    """Write what the vertical axis, or the colour, shows above the axes."""
+    """Write the label of the vertical axis, or of the colours, above the axes."""
     ax.set_title(title, fontweight="normal", fontsize=8.5, color=style.GREY)
 
 
 def _legend(ax: Axes, columns: int, size: float) -> None:
-    """Write the legend in a strip of its own above the curves, where it hides none."""
+    """Write the legend in its own strip above the curves."""
     rows = -(-len(ax.get_legend_handles_labels()[0]) // columns)
     low, high = ax.get_ylim()
     if ax.get_yscale() == "log":
@@ -70,7 +70,7 @@ def _legend(ax: Axes, columns: int, size: float) -> None:
 
 
 def differences(record: Record, lead: Lead) -> Picture | None:
-    """Draw the rescaled differences of the levels; None where no series are kept, or no two levels."""
+    """Draw the rescaled differences of the levels; None without stored series or with a single level."""
     if data.is_lean(record) or not data.whole(record, "pair"):
         return None
     quantity, member = lead.quantity, lead.member
@@ -83,7 +83,7 @@ def differences(record: Record, lead: Lead) -> Picture | None:
     letter, measure = words.symbol(quantity), data.unit(record, f"{quantity}_difference")
     ax = _panel(LEFT, style.label(f"rescaled differences of {letter}", measure, scale.exponent))
     ax.set_gid(style.TIME)
-    # a name of several words would leave no room for the curves
+    # a name of several words would take the room of the curves
     labels = [
         curve.label.replace(letter, "level") if "_" in letter else curve.label for curve in shown
     ]
@@ -120,7 +120,7 @@ def _title_of_differences(record: Record, lead: Lead, count: int) -> str:
 
 
 def against_step(record: Record, lead: Lead) -> Picture | None:
-    """Draw the error of every level against the step, of every scheme; None where there is none to draw."""
+    """Draw the errors of all schemes and levels against the step; None if there are too few."""
     quantity, case = lead.quantity, lead.member.case
     letter, measure = words.symbol(quantity), data.norm_unit(record, quantity, "linf")
     names = record.words("scheme")
@@ -208,10 +208,10 @@ def solution(
 
 
 def _errors(record: Record, quantity: str, member: Member, name: str) -> tuple[Floats, Floats]:
-    """Return the estimated and the true error of every level in a norm, shape (level,); NaN for none.
+    """Return the estimated and the true error of every level in a norm, shape (level,); NaN if unknown.
 
-    The difference d of two levels is d r/(r - 1) as error of the coarser one, and d/(r - 1) of the finer, with r the
-    ratio of their errors.
+    With the difference d of two levels and the ratio r of their errors, the error of the coarser one is d r/(r - 1), of
+    the finer one d/(r - 1).
     """
     norm, levels = data.norm_index(record, name), data.whole(record, "level")
     true = data.pick_or_nan(
@@ -229,10 +229,10 @@ def _errors(record: Record, quantity: str, member: Member, name: str) -> tuple[F
 
 
 def _slope(ax: Axes, dt: Floats, error: Floats, order: float, due: str) -> None:
-    """Draw the slope of an order through the finest error that is known."""
+    """Draw the slope of an order through the finest known error."""
     for last in np.flatnonzero(np.isfinite(error))[-1:]:
         line = error[last] * (dt / dt[last]) ** order
-        # no further than the errors, above which the legend stands
+        # below the legend, which is above the errors
         line[line > 2.0 * float(np.nanmax(error))] = np.nan
         if style.finite(line).size > 1:
             look = style.REFERENCE | {"color": style.GREY}
@@ -240,7 +240,7 @@ def _slope(ax: Axes, dt: Floats, error: Floats, order: float, due: str) -> None:
 
 
 def response(experiment: Experiment, record: Record, lead: Lead) -> Picture | None:
-    """Draw a number of every member over the swept parameters, the one that decides marked; None without a sweep."""
+    """Draw a number of every member over the swept parameters, with the decisive one marked; None without a sweep."""
     keys = sweep_layout.keys(record)
     found = _number(experiment, record, lead) if keys else None
     if found is None:
@@ -270,9 +270,9 @@ def response(experiment: Experiment, record: Record, lead: Lead) -> Picture | No
 
 
 def _number(experiment: Experiment, record: Record, lead: Lead) -> tuple[str, str, Floats] | None:
-    """Return the name, the label and the values of the first number that differs between members, shape (case,).
+    """Return name, label and values, shape (case,), of the first number that differs between members.
 
-    First comes what a check asks for, then period and amplitude, then the error of the finest level.
+    Numbers of checks come first, then period and amplitude, then the error of the finest level.
     """
     position, scheme = choice.position(experiment), lead.member.scheme
     checked = [check.value for check in choice.asked_values(experiment)]
@@ -292,7 +292,7 @@ def _number(experiment: Experiment, record: Record, lead: Lead) -> tuple[str, st
 
 
 def _scaled(ax: Axes, values: Floats) -> None:
-    """Make the vertical axis logarithmic where positive values spread over decades."""
+    """Fit the vertical axis, logarithmic if positive values span decades."""
     if style.spans_decades(values):
         style.log_axis(ax, "y", *style.log_limits(values), most=5)
     else:
@@ -300,7 +300,7 @@ def _scaled(ax: Axes, values: Floats) -> None:
 
 
 def _across(ax: Axes, key: sweep_layout.Key) -> None:
-    """Give the horizontal axis the range, the scale and the words of a key."""
+    """Give the horizontal axis the range, scale and words of a key."""
     if key.is_log:
         style.log_axis(ax, "x", *style.log_limits(key.distinct, margin=0.02), most=5)
     else:
@@ -361,7 +361,7 @@ def _dots(lead: Lead, key: sweep_layout.Key, values: Floats, text: str) -> Axes:
 
 
 def _mark(ax: Axes, x: Floats, y: Floats, lead: Lead, *, on_map: bool = False) -> None:
-    """Draw a ring around the member that decides, and say so above the axes, where a legend hides no curve."""
+    """Draw a ring around the decisive member, and explain it above the axes, where it hides no curve."""
     case = lead.member.case
     if ring(ax, float(x[case]), float(y[case]), on_map=on_map):
         _name(ax, f"{ax.get_title(loc='left')} · ring: the member that decides")
@@ -377,27 +377,27 @@ class _Orders:
     promised: Floats
     allowed: float
     is_checked: Flags
-    """Of which members the check asks."""
+    """Members that the check judges."""
 
     @cached_property
     def known(self) -> Flags:
-        """Which members have an order."""
+        """Members with an order."""
         return np.isfinite(self.order)
 
     @cached_property
     def due(self) -> Floats:
-        """The promised orders, each once."""
+        """The distinct promised orders."""
         return np.unique(self.promised[np.isfinite(self.promised)])
 
     @cached_property
     def around(self) -> Floats:
-        """What the picture shows in any case."""
+        """Orders that the picture shows in any case."""
         if not self.due.size:
             return self.order[self.known]
         return np.concatenate([self.due - 2 * self.allowed, self.due + 2 * self.allowed])
 
     def shown(self, orders: Floats) -> Floats:
-        """Return orders, of which those far outside stand at the edge of the picture."""
+        """Clip orders far outside to the edge of the picture."""
         return np.clip(orders, self.around.min() - 1.0, self.around.max() + 1.0)
 
     @cached_property
@@ -407,13 +407,13 @@ class _Orders:
 
     @cached_property
     def inside(self) -> Flags:
-        """Which members are in the band: as in a verdict, the interval counts where there is one."""
+        """Members in the band; as in a verdict, the interval counts if there is one."""
         low, high = np.fmin(self.order, self.low), np.fmax(self.order, self.high)
         within = (low <= self.promised + self.allowed) & (high >= self.promised - self.allowed)
         return np.asarray(self.known & within)
 
     def title(self) -> str:
-        """Say how many members keep their order."""
+        """Say how many members have their order."""
         checked = self.is_checked
         counts = (self.inside[checked].sum(), checked.sum(), np.sum(~checked))
         within, of, others = (words.number(int(count), "integer") for count in counts)
@@ -428,7 +428,7 @@ class _Orders:
 
 
 def orders(experiment: Experiment, record: Record, lead: Lead) -> Picture | None:
-    """Draw the stated orders of all members: dots over the key with most values, or of many a histogram."""
+    """Draw the stated orders of all members: dots over the key with most values, or a histogram of many."""
     keys, quantity, scheme = sweep_layout.keys(record), lead.quantity, lead.member.scheme
     if not keys or not data.whole(record, "triple"):
         return None

@@ -1,7 +1,7 @@
-"""A long series on several levels, or by several schemes, below each other: a window that all panels share moves along.
+"""A long series on several levels, or with several schemes, in panels that share a moving window.
 
-The page shows some periods at once, and a strip below all of the time. A drag or a key moves the window. Without
-scripts all panels show the whole time. Series are thinned so that no extreme is lost.
+The page shows some periods at a time, and the whole time in a strip below. A drag or a key moves the window. Without
+scripts all panels show the whole time. Series are thinned without losing extremes.
 
 Source: vibration text, section 3.3 (panels with linked panning), section 3.1 (a window where there are many periods).
 """
@@ -23,17 +23,17 @@ from vibsim.report.types import Axes, Experiment
 
 MANY_PERIODS = 10.0
 """A run of more periods is long."""
-PERIODS = 4.0  # in the window at first
-MOST_POINTS = 24_000  # of all curves together, about 300 kB
-POINTS_A_PERIOD = 24  # of a curve; of a longer run fewer curves are drawn, and then fewer points
-FEWEST_PANELS, MOST_PANELS = 2, 5  # panels
+PERIODS = 4.0  # initial width of the window
+MOST_POINTS = 24_000  # of all curves, about 300 kB
+POINTS_A_PERIOD = 24  # of a curve; longer runs have fewer curves, and then fewer points
+FEWEST_PANELS, MOST_PANELS = 2, 5
 TALL, STRIP = 0.95, 0.4  # height of a panel and of the strip below [inch]
-SPARSE = 12.0  # samples a period below which they have dots, and what they are compared with is smooth between them
-BEYOND = 1.25  # how much of a panel lies above the largest value that is compared with
+SPARSE = 12.0  # with fewer samples a period they are dots, and the reference is a spline through its samples
+BEYOND = 1.25  # limit of the vertical axis over the largest value of the reference
 
 
 class Row(NamedTuple):
-    """What a panel shows."""
+    """The curve of a panel."""
 
     label: str
     values: Floats
@@ -43,30 +43,32 @@ class Row(NamedTuple):
 def long_series(
     experiment: Experiment, record: Record, quantity: str, member: Member
 ) -> Picture | None:
-    """Draw a long series; None where there are few periods, few samples of each, or nothing to compare a run with.
+    """Draw a long series; None with few periods, few samples a period, or nothing to compare with.
 
-    One scheme is drawn on several levels, several schemes each on the coarsest level.
+    One scheme is drawn on several levels, several schemes on the coarsest level.
     """
     t, finest = data.times(record, member.case), data.whole(record, "level")[-1]
-    compared = data.exact_series(record, quantity, member)
-    is_known = bool(np.isfinite(compared).all())
+    reference = data.exact_series(record, quantity, member)
+    is_known = bool(np.isfinite(reference).all())
     if not is_known:
-        compared = data.at(record, f"{quantity}_finest", member)
-    size = data.largest(compared)
-    if not np.isfinite(compared).all() or size == 0.0:
+        reference = data.at(record, f"{quantity}_finest", member)
+    size = data.largest(reference)
+    if not np.isfinite(reference).all() or size == 0.0:
         return None
     span = float(t[-1] - t[0])
-    period = moments.period(t, compared)
-    curves = MOST_POINTS / (POINTS_A_PERIOD * span / period)
-    rows = _rows(record, quantity, member, int(np.clip(curves / 2, FEWEST_PANELS, MOST_PANELS)))
+    period = moments.period(t, reference)
+    most_curves = MOST_POINTS / (POINTS_A_PERIOD * span / period)
+    rows = _rows(
+        record, quantity, member, int(np.clip(most_curves / 2, FEWEST_PANELS, MOST_PANELS))
+    )
     is_short = span <= MANY_PERIODS * period
     if (
         is_short
         or (len(rows) == 1 and not is_known)
-        or moments.is_undersampled(record, t, compared)
+        or moments.is_undersampled(record, t, reference)
     ):
         return None
-    # a group of neighbours keeps two points
+    # thinning keeps two points of each group of neighbours
     width = max(style.THINNED_POINTS, MOST_POINTS // (4 * len(rows)))
     letter, measure = words.symbol(quantity), data.unit(record, f"{quantity}_finest")
     against = "exact" if is_known else f"level {finest}"
@@ -75,30 +77,30 @@ def long_series(
     look: dict[str, Any] = {"color": style.PALE, "linewidth": 3.5, "zorder": 1, "gid": "compared"}
     is_sparse, is_curve = t.size * period < SPARSE * span, False
     dots: dict[str, Any] = {"marker": "o", "markersize": 2.5} if is_sparse else {}
-    pale = style.thin(t, compared, width)
+    pale_points = style.thin(t, reference, width)
     if is_sparse:
         smooth = series.exact_curve(experiment, record, quantity, member)
         is_curve = is_known and smooth[0].size > t.size
-        pale = smooth if is_curve else _smooth(t, compared)
+        pale_points = smooth if is_curve else _smooth(t, reference)
     for i, (ax, row) in enumerate(zip(axes, rows, strict=False)):
-        _draw(ax, pale, against, look)
-        own = {"color": style.COLOURS[i % style.MANY], "linewidth": 1.2, "gid": row.group} | dots
-        _draw(ax, style.thin(t, row.values, width), style.entry(row.label), own)
+        _draw(ax, pale_points, against, look)
+        line = {"color": style.COLOURS[i % style.MANY], "linewidth": 1.2, "gid": row.group} | dots
+        _draw(ax, style.thin(t, row.values, width), style.entry(row.label), line)
         ax.set(xlim=(t[0], t[-1]), ylim=(-BEYOND * size, BEYOND * size))
         ax.set_ylabel(style.label(letter, measure))
         style.beside(ax)
     axes[len(rows) - 1].tick_params(labelbottom=True)
-    _draw_strip(axes[-1], t, rows[0], compared, size)
+    _draw_strip(axes[-1], t, rows[0], reference, size)
     axes[-1].set_xlabel(data.time_label(record))
-    of = "level" if rows[0].group else "scheme"
+    each = f"panel for each {'level' if rows[0].group else 'scheme'}"
     return Picture(
         f"long_{quantity}_{member.stem}",
-        f"{words.title(quantity)}(t) over {span / period:.0f} periods, {member.case_words or f'a panel for each {of}'}",
-        f"A panel for each {of}, with the {'exact solution' if is_known else 'finest level'} in grey. "
+        f"{words.title(quantity)}(t) over {span / period:.0f} periods, {member.case_words or f'a {each}'}",
+        f"A {each}, with the {'exact solution' if is_known else 'finest level'} in grey. "
         "The strip below has the error of the first panel over the whole time."
         + " Dots: the times that all levels share." * is_sparse
         + " Grey is a spline between them." * (is_sparse and not is_curve),
-        f"{words.name(quantity)} against time, a panel for each {of}, over {span / period:.0f} periods",
+        f"{words.name(quantity)} against time, a {each}, over {span / period:.0f} periods",
         axes[0].get_figure(root=True),
     )
 
@@ -106,11 +108,11 @@ def long_series(
 def _rows(record: Record, quantity: str, member: Member, most: int) -> list[Row]:
     levels, schemes = data.whole(record, "level"), record.words("scheme")
     if len(schemes) > 1:
-        chosen = data.of_case(record, member.case)
-        chosen.sort(key=lambda one: one.scheme != member.scheme)
+        members = data.of_case(record, member.case)
+        members.sort(key=lambda one: one.scheme != member.scheme)
         return [
             Row(f"{one.scheme_name}, level {levels[0]}", data.state_on_level(record, quantity, one, 0), None)
-            for one in chosen[:most]
+            for one in members[:most]
         ]  # fmt: skip
     rows = []
     for i in style.spaced(len(levels), most):
@@ -121,7 +123,7 @@ def _rows(record: Record, quantity: str, member: Member, most: int) -> list[Row]
 
 
 def _smooth(t: Floats, x: Floats) -> tuple[Floats, Floats]:
-    """Return a curve through few samples of an oscillation, a spline."""
+    """Return a spline through few samples of an oscillation."""
     from scipy.interpolate import CubicSpline
 
     times = np.linspace(t[0], t[-1], 4 * (t.size - 1) + 1)
@@ -129,7 +131,7 @@ def _smooth(t: Floats, x: Floats) -> tuple[Floats, Floats]:
 
 
 def _draw(ax: Axes, points: tuple[Floats, Floats], label: str, look: dict[str, Any]) -> None:
-    """Draw a curve of which a page shows a small part, so that every point counts."""
+    """Draw a curve with all its points, since a page shows a small part of it enlarged."""
     import matplotlib
 
     with matplotlib.rc_context({"path.simplify": False}):
@@ -137,12 +139,12 @@ def _draw(ax: Axes, points: tuple[Floats, Floats], label: str, look: dict[str, A
         line.get_path()
 
 
-def _draw_strip(ax: Axes, t: Floats, row: Row, compared: Floats, size: float) -> None:
+def _draw_strip(ax: Axes, t: Floats, row: Row, reference: Floats, size: float) -> None:
     ax.set_gid(style.OVERVIEW)
-    error, most = row.values - compared, UNBOUNDED * size
+    error, most = row.values - reference, UNBOUNDED * size
     text = f"error, {row.label}"
     ax.plot(*style.thin(t, error), color=style.COLOURS[0], linewidth=0.8, label=text)
-    # one that grows without bound leaves the strip
+    # an error that grows without bound leaves the strip
     ax.set(xlim=(t[0], t[-1]), ylim=style.limits(np.clip(error, -most, most)))
     ax.set_yticks([])
     style.beside(ax)

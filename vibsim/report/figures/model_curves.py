@@ -1,4 +1,4 @@
-"""What an experiment is before it runs: the meshes of its levels, and the force of its spring.
+"""The setup of an experiment: the meshes of its levels, and the force of its spring.
 
 Source: pendulum lecture, sections 2.1 and 2.5 (one mesh, and three with their common points); vibration text,
 exercise 19 a (springs that yield).
@@ -25,7 +25,7 @@ POINTS = 200  # of a curve
 
 
 def grids(record: Record) -> Picture | None:
-    """Draw the first points of the meshes of the coarsest levels, with those that all of them have."""
+    """Draw the first points of the coarsest meshes, and their common points."""
     levels, dt = data.whole(record, "level")[:MESHES], data.steps_of(record, 0)
     figure = style.canvas(0.75 + 0.36 * len(levels))
     height = figure.get_figheight()
@@ -63,22 +63,22 @@ def grids(record: Record) -> Picture | None:
 
 
 def spring(experiment: Experiment, record: Record) -> Picture | None:
-    """Draw the force of the spring against the displacement, for every member with a spring of its own."""
+    """Draw the force of every distinct spring of the members against the displacement."""
     model = experiment.model.definition
     if model.coordinates != 1:
         return None
     position, velocity = model.position, model.velocity
     finest = f"{position}_finest"
-    reach = data.largest(np.asarray(record[finest])) if finest in record else 0.0
-    if reach == 0.0:
+    largest = data.largest(np.asarray(record[finest])) if finest in record else 0.0
+    if largest == 0.0:
         return None
-    u = np.linspace(-reach, reach, POINTS)
+    u = np.linspace(-largest, largest, POINTS)
     curves: dict[bytes, tuple[str, Floats]] = {}
     for case in range(len(record["case"])):
         numbers = series.parameters_of(experiment, record, case)
-        at = {**numbers, velocity: 0.0, "t": 0.0}
+        state = {**numbers, velocity: 0.0, "t": 0.0}
         formula = tree(model, model.acceleration)
-        pull = values(formula, {**at, position: 0.0}) - values(formula, {**at, position: u})
+        pull = values(formula, {**state, position: 0.0}) - values(formula, {**state, position: u})
         force = np.broadcast_to(pull * numbers.get("m", 1.0), u.shape)
         text = words.swept(data.case_name(record, case)) or "spring"
         curves.setdefault(force.tobytes(), (text, force))
@@ -87,7 +87,7 @@ def spring(experiment: Experiment, record: Record) -> Picture | None:
         look = style.look(k)
         ax.plot(u, force, color=look["color"], linestyle=look["linestyle"], label=style.entry(text))
     letter = words.symbol(position)
-    ax.set_xlim(-reach, reach)
+    ax.set_xlim(-largest, largest)
     ax.set_xlabel(style.label(letter, data.unit(record, finest)))
     ax.set_ylabel(f"s({letter})")
     style.beside(ax)

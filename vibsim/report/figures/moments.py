@@ -1,4 +1,4 @@
-"""A motion at other times than those of its samples, and the numbers that its drawing needs."""
+"""A motion between its samples, and the numbers that its drawing needs."""
 
 from __future__ import annotations
 
@@ -14,12 +14,10 @@ from vibsim.report import data
 from vibsim.report.figures.scenes import Motion
 
 SECONDS_A_PERIOD = 2.0  # at speed 1
-WINDOW_PERIODS = 6.0  # a series over time is shown whole up to 1.5 times as many
-VISIBLE = 0.03  # difference of two motions that is seen, over the size of the motion
-FEWEST_SAMPLES = (
-    6.0  # a period: straight lines between fewer cut off more than a tenth of its extremes
-)
-UNBOUNDED = 3.0  # a motion larger than this, over the size of the finest one, is not drawn
+WINDOW_PERIODS = 6.0  # width of a moving window; up to 1.5 times as many periods are shown at once
+VISIBLE = 0.03  # smallest visible difference of two motions, relative to the size of the motion
+FEWEST_SAMPLES = 6.0  # a period; straight lines between fewer cut off over a tenth of its extremes
+UNBOUNDED = 3.0  # motions larger than this multiple of the finest one are not drawn
 
 
 def motion(
@@ -30,7 +28,7 @@ def motion(
     parameters: Mapping[str, Any],
     reach: Mapping[str, float],
 ) -> Motion:
-    """Return a motion at times `t`, from the series of its states at the times of its `samples`."""
+    """Return a motion at times `t`, interpolated between the series of its states at the times `samples`."""
     states = {name: at_times(t, samples, x) for name, x in series.items()}
     if model.kind == "bouncing_ball":
         states["h"] = _flight(t, samples, series, states["h"], float(parameters["g"]))
@@ -38,12 +36,12 @@ def motion(
 
 
 def window(span: float, period: float) -> float:
-    """Return how much of a time is shown at once: all of it, or some periods of a long run."""
+    """Return the width of the window over time: the whole `span`, or some periods of a long run."""
     return span if span <= 1.5 * WINDOW_PERIODS * period else WINDOW_PERIODS * period
 
 
 def period(t: Floats, u: Floats) -> float:
-    """Return about how long the motion takes to come back, counted by its turns; the whole time without any."""
+    """Estimate the period of a motion from its number of turning points; the whole time without any."""
     step = np.diff(u)
     step = step[np.abs(step) > 1e-9 * data.largest(u)]
     turns = int(np.sum(np.signbit(step[1:]) != np.signbit(step[:-1])))
@@ -51,15 +49,15 @@ def period(t: Floats, u: Floats) -> float:
 
 
 def is_undersampled(record: Record, t: Floats, u: Floats) -> bool:
-    """Say whether lines between samples would hide what the steps between them show of a motion."""
+    """Return whether lines between the stored samples would hide motion that the steps between them resolve."""
     has_more = int(np.min(record["steps"])) > t.size - 1
     return has_more and t.size * period(t, u) < FEWEST_SAMPLES * float(t[-1] - t[0])
 
 
 def at_times(times: Floats, t: Floats, x: Floats) -> Floats:
-    """Return a series at other times, by the cubic of each interval whose slopes are those of its neighbours."""
+    """Interpolate a series at other times: a smooth blend of the tangents at the two neighbouring samples."""
     slope = np.gradient(x, t)
-    i = np.clip(np.searchsorted(t, times, side="right") - 1, 0, t.size - 2)
+    i = data.bin_of(t, times)
     h = t[i + 1] - t[i]
     s = (times - t[i]) / h
     a, b = x[i] + h * s * slope[i], x[i + 1] - h * (1.0 - s) * slope[i + 1]
@@ -68,16 +66,16 @@ def at_times(times: Floats, t: Floats, x: Floats) -> Floats:
 
 
 def _flight(times: Floats, t: Floats, series: Mapping[str, Floats], h: Floats, g: float) -> Floats:
-    """Return the height of a ball, with its impacts: between samples it falls until it meets the rise to the next.
+    """Return the height of a ball with its impacts: it falls from one sample until it meets the rise to the next.
 
-    `h` is the height at `times` as if nothing happened between the samples at `t`.
+    `h` is the height at `times` interpolated without impacts between the samples at `t`.
     """
-    i = np.clip(np.searchsorted(t, times, side="right") - 1, 0, t.size - 2)
+    i = data.bin_of(t, times)
     height, v = series["h"], series["v"]
     falls, rises = (
         height[j] + v[j] * x - 0.5 * g * x * x for j, x in ((i, times - t[i]), (i + 1, times - t[i + 1]))
     )  # fmt: skip
-    # behind its last impact it lies
+    # after its last impact it lies still
     rises = np.where((height[i + 1] <= 0.0) & (v[i + 1] == 0.0), 0.0, rises)
-    meets = (v[i] < 0.0) & (v[i + 1] >= 0.0)
-    return np.maximum(np.where(meets, np.maximum(falls, rises), h), 0.0)
+    has_impact = (v[i] < 0.0) & (v[i + 1] >= 0.0)
+    return np.maximum(np.where(has_impact, np.maximum(falls, rises), h), 0.0)

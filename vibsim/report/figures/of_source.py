@@ -1,4 +1,4 @@
-"""The figures of the source that an experiment file names, each drawn under its number there."""
+"""The figures of a source text that an experiment file names, drawn under their numbers there."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from vibsim.core.record import Record
 from vibsim.experiment.schema.figures import FigureOfSource
-from vibsim.report import choice, data
+from vibsim.report import choice, data, words
 from vibsim.report.choice import Lead
 from vibsim.report.figures import (
     accuracy,
@@ -43,26 +43,26 @@ DRAWN: Mapping[str, Draw] = {
     "spectrum": lambda e, r, lead: spectra.spectrum(e, r, lead.member),
     "poincare": lambda e, r, _: spectra.poincare(e, r, data.all_members(r)),
 }
-"""What draws each kind, but those over time, which have options, and the player."""
+"""Kind of a figure to its drawing; figures over time, which have options, and the player are special."""
 OF_RECORD = ("local_frequency", "frequency", "second_difference", "grids")
-"""Kinds that need no series over time, which a large sweep does not keep."""
+"""Kinds that need no series over time, which a large sweep does not store."""
 
 
 def pictures(
     experiment: Experiment, record: Record, lead: Lead
 ) -> list[tuple[FigureOfSource, list[Picture]]]:
-    """Return the pictures of every figure that is asked for; none where what it shows is not kept of the run."""
-    found, names = [], set[str]()
+    """Return the pictures of every figure of the file; none if the data that it shows are not stored."""
+    drawn, names = [], set[str]()
     for i, figure in enumerate(experiment.figures, 1):
         named = []
         for picture in _drawn(experiment, record, lead, figure, f"source_{i}"):
-            # one that is asked for twice is on the page twice
+            # a figure that is named twice is on the page twice
             name = picture.name if picture.name not in names else f"source_{i}_{picture.name}"
             names.add(name)
-            title = f"{opening(figure.source)}: {picture.title}"
+            title = f"{words.capitalized(figure.source)}: {picture.title}"
             named.append(replace(picture, name=name, title=title))
-        found.append((figure, named))
-    return found
+        drawn.append((figure, named))
+    return drawn
 
 
 def _drawn(
@@ -77,21 +77,17 @@ def _drawn(
 
 
 def undrawn(
-    found: Iterable[tuple[FigureOfSource, Sequence[Picture]]], *, has_player: bool
+    drawn: Iterable[tuple[FigureOfSource, Sequence[Picture]]], *, has_player: bool
 ) -> list[str]:
-    """Return the sources of what is asked for and not shown."""
+    """Return the sources of the figures of the file that are not shown."""
     return [
-        opening(figure.source)
-        for figure, drawn in found
-        if not (has_player if figure.shows == PLAYER else drawn)
+        words.capitalized(figure.source)
+        for figure, pictures in drawn
+        if not (has_player if figure.shows == PLAYER else pictures)
     ]
 
 
-def opening(source: str) -> str:
-    """Return a source as the beginning of a title."""
-    return source[:1].upper() + source[1:]
-
-
 def of_player(experiment: Experiment) -> str:
-    """Return the sources of the sketches that the player shows in motion; empty without any."""
-    return "; ".join(opening(row.source) for row in experiment.figures if row.shows == PLAYER)
+    """Return the sources of the sketches that the player animates; empty without any."""
+    sources = (row.source for row in experiment.figures if row.shows == PLAYER)
+    return "; ".join(map(words.capitalized, sources))

@@ -1,4 +1,4 @@
-"""The size of the error against the step, and the order that three successive levels give.
+"""The error against the step, and the local order from three successive levels.
 
 Source: pendulum lecture, section 2.5.
 """
@@ -20,18 +20,18 @@ from vibsim.report.style import Picture
 from vibsim.report.types import Axes, Experiment
 
 SLOPES: tuple[Any, ...] = ((0, (4, 3)), (0, (1.2, 1.6)), (0, (7, 2, 1.2, 2)), (0, (10, 2)))
-"""Dashes of several promised slopes."""
-OUTLIER = 1e4  # errors beyond so many times the upper quartile leave the frame
+"""Dashes of the slopes, if there are several."""
+OUTLIER = 1e4  # errors beyond this multiple of the upper quartile leave the frame
 KINDS: dict[str, tuple[str, dict[str, Any]]] = {
     "difference": ("level difference", {"marker": "o", "linestyle": "none", "markersize": 5}),
     "true": ("true error", {"marker": "o", "linestyle": "none", "markersize": 7, "markerfacecolor": "none"}),
     "floor": ("predicted round-off", {"linestyle": ":", "linewidth": 1.0}),
 }  # fmt: skip
-"""What filled, hollow and dotted mean, once for all schemes."""
+"""Legend entries for filled, hollow and dotted, shared by all schemes."""
 
 
 def against_step(experiment: Experiment, record: Record, quantity: str, case: int) -> Picture:
-    """Draw the norms of differences and errors against the step, and the local order against the level."""
+    """Draw the norms of differences and errors against the step, and the local order by level."""
     schemes, many = record.words("scheme"), style.crowded(record)
     panel = max(2.2, 0.17 * len(schemes)) if many else 2.2
     second = (6.1, 2.7) if many else (5.0, 3.8)
@@ -40,49 +40,49 @@ def against_step(experiment: Experiment, record: Record, quantity: str, case: in
     members = data.of_case(record, case)
     kinds = _draw_norms(left, experiment, record, quantity, members)
     draw = _draw_each if many else _draw_by_level
-    there = _has_order(right, record, quantity, case)
-    is_settled = draw(right, experiment, record, quantity, members) if there else None
+    has_order = _has_order(right, record, quantity, case)
+    is_stated = draw(right, experiment, record, quantity, members) if has_order else None
     legend_above(figure, left)
     name = ", ".join(filter(None, [words.symbol(quantity), members[0].case_words]))
     return Picture(
         name=f"order_{quantity}_{case}",
         title=f"How fast does the error shrink? {name}",
-        caption=_caption(kinds, is_settled, many, data.basis_of_order(record, quantity)),
+        caption=_caption(kinds, is_stated, many, data.basis_of_order(record, quantity)),
         alt=f"Norm of the level differences of {words.name(quantity)} against the step, and local order against level",
         figure=figure,
     )
 
 
-def _caption(kinds: set[str], is_settled: bool | None, many: bool, due: str) -> str:
-    """Explain what is drawn, and nothing else."""
+def _caption(kinds: set[str], is_stated: bool | None, many: bool, basis: str) -> str:
+    """Explain the parts that are drawn; `is_stated` is None without a local order, `basis` ``promised`` or the like."""
     if not kinds:
         return "Nothing is drawn: there is no error to measure here."
-    shown = "size of the level differences (filled)" if "difference" in kinds else ""
+    difference = "size of the level differences (filled)" if "difference" in kinds else ""
     true = "size of the true error (hollow)" if "true" in kinds else ""
     orders = {
         True: f"Right: the stated order of every scheme with its interval (hollow: of the finest three levels, where "
-        f"none is stated); the stroke is the {due} one.",
+        f"none is stated); the stroke is the {basis} one.",
         False: "Right: the order from three levels, at the coarsest of them; it should settle inside a grey band. "
         "Beyond the frame: too coarse, within round-off, or growing without bound.",
     }
     return style.sentences(
-        f"Left: {' and '.join(filter(None, [shown, true]))} against dt.",
-        f"Parallel to a dashed line means that {due} order." if "slope" in kinds else "",
+        f"Left: {' and '.join(filter(None, [difference, true]))} against dt.",
+        f"Parallel to a dashed line means that {basis} order." if "slope" in kinds else "",
         "Points on the dotted line are round-off." if "floor" in kinds else "",
-        "" if is_settled is None else orders[many],
-        "The bar is the stated order with its interval." if is_settled and not many else "",
+        "" if is_stated is None else orders[many],
+        "The bar is the stated order with its interval." if is_stated and not many else "",
     )
 
 
 def _draw_norms(
     ax: Axes, experiment: Experiment, record: Record, quantity: str, members: list[Member]
 ) -> set[str]:
-    """Draw the norms; return what is seen: ``difference``, ``true``, ``slope``, ``floor``."""
+    """Draw the norms; return the visible parts, of ``difference``, ``true``, ``slope``, ``floor``."""
     dt, norm = data.steps_of(record, members[0].case), data.norm_index(record)
     kinds: dict[str, list[Floats]] = {"difference": [], "true": [], "floor": []}
     for member in members:
         if np.isnan(data.formal_order(record, member, quantity)):
-            # a scheme that chooses its own steps has no error against dt
+            # an adaptive scheme has no error against dt
             continue
         look = style.look(member.scheme)
         difference, true = (
@@ -99,51 +99,51 @@ def _draw_norms(
         ax.plot(dt, floor, color=look["color"], **dotted, gid=name, label=f"_{text}, {name}")
         for kind, values in zip(kinds, (difference, true, floor), strict=True):
             kinds[kind].append(values)
-    # two schemes apart, differences and errors stand by turns
+    # differences and errors of the schemes in turn
     measured = [
-        part for pair in zip(kinds["difference"], kinds["true"], strict=True) for part in pair
+        norms for pair in zip(kinds["difference"], kinds["true"], strict=True) for norms in pair
     ]
-    if not any(np.isfinite(part).any() for part in measured):
+    if not any(np.isfinite(norms).any() for norms in measured):
         for line in list(ax.lines):
             line.remove()
         ax.set(xticks=[], yticks=[])
         style.remark(ax, "every difference and error is zero,\nor not finite: nothing to draw")
         return set()
     orders = list(dict.fromkeys(order for order, _ in promises(experiment, record, quantity)))
-    due = data.basis_of_order(record, quantity)
-    found = {name for name in ("difference", "true") if style.finite(*kinds[name]).size}
+    basis = data.basis_of_order(record, quantity)
+    visible = {name for name in ("difference", "true") if style.finite(*kinds[name]).size}
     for k, order in enumerate(orders):
         dashes = SLOPES[k % len(SLOPES)] if len(orders) > 1 else None
-        if _reference(ax, dt, measured, order, due, dashes):
-            found.add("slope")
+        if _reference(ax, dt, measured, order, basis, dashes):
+            visible.add("slope")
     if _step_limits(ax, dt, measured, kinds["floor"]):
-        found.add("floor")
+        visible.add("floor")
     for kind, (text, mark) in KINDS.items():
-        if kind in found:
+        if kind in visible:
             ax.plot([], [], color=style.GREY, **mark, label=text)
     ax.set_xlabel(style.label("dt", data.time_unit(record, "dt")))
     measure = data.norm_unit(record, quantity)
     ax.set_ylabel(style.label(f"{words.USUAL_NORM}, {words.symbol(quantity)}", measure))
     _level_axis(ax, dt, data.whole(record, "level"))
-    return found
+    return visible
 
 
 def _positive(parts: list[Floats]) -> Floats:
-    found = style.finite(*(part[part > 0] for part in parts))
-    return found if found.size else np.array([1.0])
+    values = style.finite(*(part[part > 0] for part in parts))
+    return values if values.size else np.array([1.0])
 
 
 def _highest(values: Floats) -> float:
-    """Return the largest value that a range holds: an unstable level would hide all others."""
+    """Return the largest value within the frame; an unstable level would hide all others."""
     return min(float(values.max()), OUTLIER * float(np.quantile(values, 0.75)), style.LARGEST)
 
 
 def _reference(
-    ax: Axes, dt: Floats, errors: list[Floats], order: float, due: str, dashes: Any
+    ax: Axes, dt: Floats, errors: list[Floats], order: float, basis: str, dashes: Any
 ) -> bool:
-    """Draw the promised slope a little above the largest value at the coarsest step, and say whether there is room.
+    """Draw the slope of an order a little above the largest value at the coarsest step; return whether it fits.
 
-    Of several each has dashes of its own, and its number at its end.
+    Each of several slopes has its own dashes, and its number at its end.
     """
     coarsest = np.array([part[0] for part in errors if np.isfinite(part[0])] or [1.0])
     start = 2.5 * _highest(coarsest)
@@ -152,7 +152,7 @@ def _reference(
     if reach.sum() < 2 or start <= 0.0:
         return False
     look = style.REFERENCE | ({"linestyle": dashes} if dashes else {})
-    ax.plot(dt[reach], line[reach], **look, label=f"slope {order:g} ({due})")
+    ax.plot(dt[reach], line[reach], **look, label=f"slope {order:g} ({basis})")
     if dashes:
         plain = {"facecolor": "white", "edgecolor": "none", "pad": 0.5, "alpha": 0.8}
         ax.annotate(
@@ -163,29 +163,29 @@ def _reference(
 
 
 def _step_limits(ax: Axes, dt: Floats, errors: list[Floats], floors: list[Floats]) -> bool:
-    """Set the ranges; show the floor, and say so, only where the data come within three decades of it."""
+    """Set the ranges; return whether they include the floor, as they do if the data come within three decades of it."""
     values = _positive(errors)
     low, high = float(values.min()), _highest(values)
     floor = float(_positive(floors).max())
-    near = floor > 1e-3 * low
-    bottom = min(low, floor) if near else low
-    top = max(8 * high, min(2 * floor, 1e3 * high)) if near else 8 * high
+    has_floor = floor > 1e-3 * low
+    bottom = min(low, floor) if has_floor else low
+    top = max(8 * high, min(2 * floor, 1e3 * high)) if has_floor else 8 * high
     style.log_axis(ax, "y", bottom / 3, top)
     style.log_axis(ax, "x", float(dt[-1]) / 1.5, float(dt[0]) * 1.5)
-    return near
+    return has_floor
 
 
 def _level_axis(ax: Axes, dt: Floats, levels: list[int]) -> None:
-    """Write the levels along the top."""
+    """Write the levels along the top of a panel."""
     above: dict[str, Any] = {"va": "bottom", "fontsize": 8.5}
-    every = max(1, len(levels) // 8)
-    for x, level in zip(dt[::every].tolist(), levels[::every], strict=True):
+    stride = max(1, len(levels) // 8)
+    for x, level in zip(dt[::stride].tolist(), levels[::stride], strict=True):
         ax.text(x, 1.03, str(level), transform=ax.get_xaxis_transform(), ha="center", **above)
     ax.text(-0.02, 1.03, "level", transform=ax.transAxes, ha="right", **above)
 
 
 def _has_order(ax: Axes, record: Record, quantity: str, case: int) -> bool:
-    """Say whether three levels give an order; the panel says why where they do not."""
+    """Return whether three levels give an order; if not, the panel says why."""
     name = f"{quantity}_observed_order"
     if name in record and np.isfinite(data.pick(record, name, case=case)).any():
         return True
@@ -210,22 +210,22 @@ def _draw_by_level(
     sound: list[Floats] = []
     stated = False
     are_sound = [data.sound_triples(record, quantity, member) for member in members]
-    for member, good in zip(members, are_sound, strict=True):
-        if any(map(any, are_sound)) and not any(good):
-            # beside orders, those of noise would be taken for some
+    for member, above in zip(members, are_sound, strict=True):
+        if any(map(any, are_sound)) and not any(above):
+            # orders of noise could be mistaken for orders
             continue
         look = style.look(member.scheme)
         local = data.at(record, f"{quantity}_observed_order", member, norm=norm)
-        sound.append(local[good] if any(good) else local)
+        sound.append(local[above] if any(above) else local)
         ax.plot(triples, local, **look, markersize=5, linewidth=1.1)
         stated |= draw_stated(ax, record, quantity, member, norm, look["color"])
     ax.set_ylim(*_order_limits(style.finite(*sound), [order for order, _ in promised]))
     if len(members) == 1 and len(triples) <= 8:
-        above: Any = {"xytext": (0, 7), "textcoords": "offset points", "ha": "center"}
+        offset: Any = {"xytext": (0, 7), "textcoords": "offset points", "ha": "center"}
         for level, order in zip(triples, local.tolist(), strict=True):
             if np.isfinite(order):
                 text = words.number(order, "order")
-                ax.annotate(text, (level, order), **above, fontsize=8, annotation_clip=True)
+                ax.annotate(text, (level, order), **offset, fontsize=8, annotation_clip=True)
     levels = data.whole(record, "level")
     ax.set_xlim(levels[0] - 0.5, levels[-1] + 0.5)
     ax.xaxis.set_major_locator(MaxNLocator(nbins=10, integer=True))
@@ -237,14 +237,14 @@ def _draw_by_level(
 def _draw_each(
     ax: Axes, experiment: Experiment, record: Record, quantity: str, members: list[Member]
 ) -> bool:
-    """Draw the stated order of every scheme in a row of its own; return whether an order is stated."""
-    norm, orders, settled = data.norm_index(record), list[float](), False
+    """Draw the stated order of every scheme in its own row; return whether any is stated."""
+    norm, orders, stated = data.norm_index(record), list[float](), False
     members = [m for m in members if not np.isnan(data.formal_order(record, m, quantity))]
     for row, member in enumerate(members):
         look, promised = style.look(member.scheme), data.formal_order(record, member, quantity)
         order, low, high = data.stated_order(record, quantity, member, norm)
         is_stated = bool(np.isfinite(order))
-        settled |= is_stated
+        stated |= is_stated
         last = data.at(record, f"{quantity}_observed_order", member, norm=norm)[-1]
         value, face = (order, look["color"]) if is_stated else (float(last), "white")
         ax.plot([low, high], [row, row], color=look["color"], linewidth=3.0, alpha=0.35)
@@ -257,13 +257,13 @@ def _draw_each(
     ax.set_yticks(range(len(members)), names, fontsize=7.5)
     ax.set_ylim(len(members) - 0.4, -0.6)
     ax.set_xlabel(f"order of {words.symbol(quantity)} ({words.USUAL_NORM})")
-    return settled
+    return stated
 
 
 def draw_stated(
     ax: Axes, record: Record, quantity: str, member: Member, norm: int, colour: str
 ) -> bool:
-    """Draw the stated order as a bar over the levels of its window, with its interval; say whether there is one."""
+    """Draw the stated order as a bar over the levels of its window, with its interval; return whether there is one."""
     order, low, high = data.stated_order(record, quantity, member, norm)
     first, last = data.window(record, quantity, member)
     if not np.isfinite([order, low, high]).all() or last <= first:
@@ -276,9 +276,8 @@ def draw_stated(
 
 
 def _order_limits(values: Floats, promised: list[float]) -> tuple[float, float]:
-    """Hold the promised orders and those that count, no further than 5 below the least and 2 above the largest."""
+    """Return limits around the promised orders and `values`, at most 5 below the smallest and 2 above the largest."""
     if not promised:
-        # of schemes that promise none
         return style.limits(values)
     low = min([promised[0] - 0.3, *values.tolist()])
     high = max([promised[-1] + 0.3, *values.tolist()])

@@ -1,7 +1,7 @@
 """Quantities over time as a source shows them: several schemes, levels or members beside the exact solution.
 
-The exact solution is drawn at times of its own, so that it stays a smooth curve where a scheme has few points in a
-period. Where impacts make a velocity jump, its curve has a gap.
+The exact solution is drawn at its own times, so that it is smooth even if a scheme has few points a period. Where
+impacts make the velocity jump, its curve has a gap.
 
 Source: vibration text, figures 1, 4, 5, 7, 9 and 11, section 3.3, exercises 18 b, 20, 21 b and 22 a.
 """
@@ -26,44 +26,44 @@ from vibsim.report.types import Axes, Experiment
 MOST = 6  # most panels of a figure, and most figures
 FEW = 90  # points of a run up to which each has a marker
 LEAVES_FRAME = 8.0
-"""What is beyond so many times the exact solution leaves the frame."""
+"""Values beyond this multiple of the exact solution leave the frame."""
 SEEN = 0.2
-"""Only runs that stay within the frame for so much of the time leave it at all."""
+"""Runs that stay within `LEAVES_FRAME` for a smaller fraction of the time are drawn whole instead."""
 SUBTLE: dict[str, Any] = {"linestyle": (0, (5, 2)), "linewidth": 1.2, "zorder": 1.5}
 """The look of further curves."""
 
 
 @dataclass(frozen=True)
 class _Panel:
-    """What one panel shows."""
+    """The content of a panel."""
 
     title: str
     quantity: str
     runs: tuple[tuple[str, Member], ...]
-    """The words of the legend, and whose curve it is."""
+    """Legend entry and member of each curve."""
     level: int
 
 
 def pictures(
     experiment: Experiment, record: Record, figure: FigureOfSource, name: str
 ) -> list[Picture]:
-    """Return the figures that are asked for, one or one for each value of what `asked.each` names."""
+    """Return one figure, or one for each value of the key `figure.each`."""
     everyone = choice.with_levels(experiment, data.all_members(record))
-    groups = _divided(record, everyone, figure.each)
-    found = []
+    groups = _grouped(record, everyone, figure.each)
+    drawn = []
     for k, i in enumerate(style.spaced(len(groups), MOST)):
         text, members = groups[i]
         stem = f"{name}_{k}" if len(groups) > 1 else name
-        found.append(_picture(experiment, record, figure, (stem, text, members)))
-    return [picture for picture in found if picture is not None]
+        drawn.append(_picture(experiment, record, figure, stem, text, members))
+    return [picture for picture in drawn if picture is not None]
 
 
-def _divided(
-    record: Record, everyone: list[Member], by: str | None
+def _grouped(
+    record: Record, members: list[Member], by: str | None
 ) -> list[tuple[str, list[Member]]]:
-    """Divide members by what they have in common: nothing, the whole member, or a swept key; with the words for it."""
+    """Group members by the value of a swept key, by member, or (None) all together; with the words for each group."""
     groups: dict[str, list[Member]] = {}
-    for member in everyone:
+    for member in members:
         key = None if by == MEMBER else by
         text = "" if by is None else words.swept(data.case_name(record, member.case, key))
         groups.setdefault(text, []).append(member)
@@ -74,9 +74,10 @@ def _picture(
     experiment: Experiment,
     record: Record,
     figure: FigureOfSource,
-    of: tuple[str, str, list[Member]],
+    name: str,
+    text: str,
+    members: list[Member],
 ) -> Picture | None:
-    name, text, members = of
     shown = _panels(experiment, record, figure, members)
     tall = 2.2 if len(shown) < 4 else 1.6
     axes = panels.stacked([tall] * len(shown), style.TIME)
@@ -105,10 +106,10 @@ def _picture(
 
 
 def _is_thinned(record: Record, figure: FigureOfSource, members: list[Member]) -> bool:
-    """Say whether figures, panels or runs are left out."""
+    """Return whether figures, panels or runs are left out."""
     is_by_level = figure.panels == LEVEL
-    figures = _divided(record, data.all_members(record), figure.each)
-    groups = _divided(record, members, None if is_by_level else figure.panels)
+    figures = _grouped(record, data.all_members(record), figure.each)
+    groups = _grouped(record, members, None if is_by_level else figure.panels)
     levels = data.whole(record, "level") if is_by_level else []
     runs = max(len(group) for _, group in groups)
     return max(len(figures), len(groups), len(levels)) > MOST or runs > style.MANY
@@ -128,7 +129,7 @@ def _panels(
             for i in style.spaced(len(levels), MOST)
         ]
     if figure.panels is not None:
-        groups = _divided(record, members, figure.panels)
+        groups = _grouped(record, members, figure.panels)
         return [
             _Panel(groups[i][0], quantities[0], _named(record, groups[i][1], figure), finest)
             for i in style.spaced(len(groups), MOST)
@@ -140,48 +141,48 @@ def _panels(
 def _named(
     record: Record, members: list[Member], figure: FigureOfSource
 ) -> tuple[tuple[str, Member], ...]:
-    """Name runs by what they do not have in common."""
+    """Name runs by the scheme and the swept keys in which they differ."""
     several = len({member.scheme for member in members}) > 1
     divided = {figure.each, figure.panels}
     keys = [data.swept_label(record, name)[0] for name in data.swept(record)]
-    own = [] if MEMBER in divided else [key for key in keys if key not in divided]
-    found = []
+    varying = [] if MEMBER in divided else [key for key in keys if key not in divided]
+    named = []
     for i in style.spaced(len(members), style.MANY):
         member = members[i]
         parts = [member.scheme_name] if several else []
-        parts += [words.swept(data.case_name(record, member.case, key)) for key in own]
-        found.append((", ".join(parts) or member.scheme_name, member))
-    return tuple(found)
+        parts += [words.swept(data.case_name(record, member.case, key)) for key in varying]
+        named.append((", ".join(parts) or member.scheme_name, member))
+    return tuple(named)
 
 
 def _draw(
     ax: Axes, experiment: Experiment, record: Record, figure: FigureOfSource, panel: _Panel, end: float
 ) -> bool:  # fmt: skip
-    """Draw a panel up to the time `end`; return whether its quantity is known."""
+    """Draw a panel up to the time `end`; return whether its quantity is stored or computable."""
     model = experiment.model.definition
     first = panel.runs[0][1]
     exact: list[Floats] = []
     if len({member.case for _, member in panel.runs}) == 1:
-        fine, best = series.exact_curve(experiment, record, panel.quantity, first, end)
-        if np.isfinite(best).any():
+        fine, reference = series.exact_curve(experiment, record, panel.quantity, first, end)
+        if np.isfinite(reference).any():
             wide: dict[str, Any] = {"color": style.PALE, "linewidth": 4.5, "zorder": 1}
-            ax.plot(*style.thin(fine, best), label="exact", **wide)
-            exact.append(best)
+            ax.plot(*style.thin(fine, reference), label="exact", **wide)
+            exact.append(reference)
     size = max(map(data.largest, exact), default=0.0)
     drawn, jumps = [], model.events is not None and model.events.jumps
     for k, (text, member) in enumerate(panel.runs):
         t = data.times(record, member.case)
-        found = series.on_level(experiment, record, panel.quantity, member, panel.level)
-        if found is None:
+        y = series.on_level(experiment, record, panel.quantity, member, panel.level)
+        if y is None:
             return False
-        there = t <= end * (1.0 + 1e-12)
-        t, found = t[there], found[there]
-        within = np.abs(found) <= LEAVES_FRAME * size
-        # an exact solution of zero is no measure
+        shown = t <= end * (1.0 + 1e-12)
+        t, y = t[shown], y[shown]
+        within = np.abs(y) <= LEAVES_FRAME * size
+        # never true for an exact solution of zero
         if within.mean() >= SEEN:
-            found = np.where(within, found, np.nan)
-        ax.plot(*style.thin(t, found), label=style.entry(text), **_look(k, t.size, jumps))
-        drawn.append(found)
+            y = np.where(within, y, np.nan)
+        ax.plot(*style.thin(t, y), label=style.entry(text), **_look(k, t.size, jumps))
+        drawn.append(y)
     fine = np.linspace(float(t[0]), end, series.SMOOTH)
     parameters = series.parameters_of(experiment, record, first.case)
     for k, (text, formula) in enumerate(figure.beside.items()):
@@ -199,8 +200,7 @@ def _draw(
             lambda value, _: f"{value / 10.0**exponent:g}".replace("-", "−")
         )
     ax.set_ylabel(style.label(words.symbol(panel.quantity), unit, exponent))
-    # values that hardly differ need long numbers
-    ax.yaxis.set_label_coords(-0.115, 0.5)
+    panels.move_label_left(ax)
     ax.set_title(panel.title)
     style.beside(ax)
     return True
@@ -210,5 +210,5 @@ def _look(k: int, points: int, jumps: bool) -> dict[str, Any]:
     look: dict[str, Any] = style.look(k) | {"linewidth": 1.2, "markersize": 3.0}
     if points > FEW:
         return look | {"marker": "none"}
-    # between points an impact may lie, which no line shows
+    # a line would hide impacts between points
     return look | ({"linestyle": "none"} if jumps else {})

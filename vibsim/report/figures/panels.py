@@ -1,4 +1,4 @@
-"""Panels of a figure, and curves over time that may coincide."""
+"""Panels of figures, and curves over time that may coincide."""
 
 from __future__ import annotations
 
@@ -13,9 +13,11 @@ from vibsim.report import data, frame, style
 from vibsim.report.types import Axes, Figure
 
 LOG_RATIO = 1e6
-"""Curves whose largest value is so many times a usual one are drawn on a logarithmic scale."""
-LOG_SPREAD = 8.0  # spreads that differ by more than this are drawn on a logarithmic scale
-LONG_LABEL = 36  # letters of a label above which its unit stands in a line of its own
+"""Curves whose largest value exceeds this multiple of the median are drawn on a logarithmic scale."""
+LOG_SPREAD = (
+    8.0  # ratio of the largest to the smallest spread above which their scale is logarithmic
+)
+LONG_LABEL = 36  # characters; longer labels have the unit on a second line
 LEGEND_COLUMNS = 7  # most columns of a legend above panels
 
 
@@ -25,38 +27,43 @@ class Curve:
 
     label: str
     values: Floats
-    sound: bool = True  # whether it stands above round-off
+    sound: bool = True  # whether it is above round-off
     lost: str = ""
-    """Why it does not, in words; round-off where nothing is said."""
+    """Why it is not sound, in words; empty means round-off."""
     group: str | None = None
-    """Group id of what is switched off together with it in a page."""
+    """Group id of the elements of a page that are switched off together."""
 
     @property
     def is_whole(self) -> bool:
-        """Whether the runs behind it lasted to the end; at the first and last time a centred formula has no value."""
+        """Whether its runs lasted to the end; a centred formula has no value at the first and last time."""
         inner = self.values[1:-1] if self.values.size > 2 else self.values
         return self.lost != frame.BROKE_DOWN and bool(np.isfinite(inner).all())
 
     @property
     def is_readable(self) -> bool:
-        """Whether its runs lasted to the end, and it stands above round-off."""
+        """Whether its runs lasted to the end and it is above round-off."""
         return self.sound and self.is_whole
 
     @property
     def fate(self) -> str:
-        """What the legend says of a curve that is not sound or not whole; else empty."""
+        """Remark in the legend on a curve that is not sound or not whole; else empty."""
         if not self.is_whole:
             return frame.BROKE_DOWN
         return "" if self.sound else self.lost or frame.ROUND_OFF
 
 
 def note(ax: Axes, text: str, height: float = 0.9) -> None:
-    """Say within a panel, at its right, how it shows what it shows."""
+    """Write a remark on the scale of a panel at its right."""
     ax.text(0.99, height, text, transform=ax.transAxes, ha="right", fontsize=8.5)
 
 
+def move_label_left(ax: Axes) -> None:
+    """Make room for the long tick labels of values that hardly differ."""
+    ax.yaxis.set_label_coords(-0.115, 0.5)
+
+
 def stacked(heights: list[float], over: str | None = None) -> list[Axes]:
-    """Return axes below each other with one common axis of abscissae; room for a legend at the right.
+    """Return axes of some heights [inch] below each other with a shared x axis and room for a legend at the right.
 
     `over` is the group id of axes whose curves a page can read.
     """
@@ -80,7 +87,7 @@ def rows_of(
 ) -> tuple[Figure, list[Axes]]:
     """Return a figure and its `count` panels, row by row.
 
-    `columns` are left and width of each, `tall` is the height of a panel with the room `above` and `below` it [inch].
+    `columns` are left edge and width of each, `tall` is the height of a panel, with room `above` and `below` it [inch].
     """
     height = -(-count // len(columns)) * (above + tall + below)
     figure = style.canvas(height)
@@ -94,9 +101,9 @@ def rows_of(
 
 
 def legend_above(figure: Figure, ax: Axes) -> None:
-    """Write the legend of a panel above all of them, in as many columns as there is room for."""
+    """Write the legend of a panel above all panels, in as many columns as fit."""
     handles, texts = ax.get_legend_handles_labels()
-    # below the upper edge there is room for one row; more stand above it
+    # one row fits below the upper edge; more rows extend above it
     place: dict[str, Any] = {"bbox_to_anchor": (0.07, 1.0 - 0.24 / figure.get_figheight())}
     for count in range(min(len(texts), LEGEND_COLUMNS), 0, -1):
         legend = figure.legend(
@@ -108,9 +115,9 @@ def legend_above(figure: Figure, ax: Axes) -> None:
 
 
 def draw_curves(ax: Axes, t: Floats, curves: list[Curve], text: str, measure: str) -> None:
-    """Draw curves that may coincide: from wide and solid below to narrow and dashed above, markers in turn.
+    """Draw curves that may coincide: from wide and solid below to narrow and dashed above, with staggered markers.
 
-    The range is that of the sound curves that last to the end: a run that blew up would hide all others.
+    The axis is fitted to the sound curves that last to the end, since a run that blew up would hide all others.
     """
     sound = [curve for curve in curves if curve.sound] or curves
     shown = [curve.values for curve in sound if curve.is_whole] or [curve.values for curve in sound]
@@ -125,15 +132,15 @@ def draw_curves(ax: Axes, t: Floats, curves: list[Curve], text: str, measure: st
     stop_at_breakdown(ax, t, [curve.values for curve in curves])
     scale.apply(ax)
     words = style.label(f"|{text}|" if scale.is_log else text, measure, scale.exponent)
-    # a long label would run into the panel below
+    # a long label would extend into the panel below
     ax.set_ylabel(words.replace(f"{text} [", f"{text}\n[") if len(words) > LONG_LABEL else words)
     style.beside(ax)
 
 
 def stop_at_breakdown(ax: Axes, t: Floats, series: list[Floats]) -> None:
-    """Let the time end with the last finite value of all series, and say so where that is not the end."""
-    found = np.flatnonzero(np.any([np.isfinite(values) for values in series], axis=0))
-    last = max(int(found[-1]), 1) if found.size else t.size - 1
+    """End the time axis at the last finite value of all series, with a note if that is not the end of the run."""
+    finite = np.flatnonzero(np.any([np.isfinite(values) for values in series], axis=0))
+    last = max(int(finite[-1]), 1) if finite.size else t.size - 1
     # a centred formula has no value at the last time
     last = t.size - 1 if last >= t.size - 2 else last
     ax.set_xlim(float(t[0]), float(t[last]))
@@ -142,7 +149,7 @@ def stop_at_breakdown(ax: Axes, t: Floats, series: list[Floats]) -> None:
 
 
 def fit_values(ax: Axes, shown: list[Floats], *others: Floats) -> None:
-    """Let an axis hold drawn values; where they grow without bound, draw their sizes on a logarithmic scale."""
+    """Fit an axis to values; if they grow without bound, change its lines to sizes on a logarithmic scale."""
     if explosive(shown):
         for line in ax.lines:
             line.set_ydata(style.no_zeros(np.asarray(line.get_ydata(), dtype=np.float64)))
@@ -153,7 +160,7 @@ def fit_values(ax: Axes, shown: list[Floats], *others: Floats) -> None:
 
 
 class Scale(NamedTuple):
-    """The vertical scale of series: linear with a power of ten, or logarithmic for what grows without bound."""
+    """The vertical scale of series: linear with a power of ten, or logarithmic for growth without bound."""
 
     series: list[Floats]
     is_log: bool
@@ -161,16 +168,16 @@ class Scale(NamedTuple):
 
     @classmethod
     def of(cls, series: list[Floats]) -> Scale:
-        """Return the scale on which some series can be read."""
+        """Return a scale on which the series are readable."""
         is_log = explosive(series)
         return cls(series, is_log, 0 if is_log else style.scale(*series))
 
     def scaled(self, values: Floats) -> Floats:
-        """Return what stands for values on the axis."""
+        """Return values as the axis shows them."""
         return style.no_zeros(values) if self.is_log else values / 10.0**self.exponent
 
     def apply(self, ax: Axes, most: int = 7) -> None:
-        """Give an axis this scale, with about `most` labelled ticks of a logarithmic one."""
+        """Give an axis this scale; a logarithmic one has about `most` labelled ticks."""
         if self.is_log:
             style.log_axis(ax, "y", *decades(self.series), most=most)
         else:
@@ -178,14 +185,14 @@ class Scale(NamedTuple):
 
 
 def explosive(series: list[Floats]) -> bool:
-    """Say whether values grow beyond all bounds, so that on a linear scale only the last of them would be seen."""
+    """Return whether values grow without bound, so that a linear scale would show only the last of them."""
     sizes = _sizes(series)
-    usual = min((np.median(s) for s in sizes), default=np.inf)
-    return bool(max((s.max() for s in sizes), default=0.0) > LOG_RATIO * usual)
+    typical = min((np.median(s) for s in sizes), default=np.inf)
+    return bool(max((s.max() for s in sizes), default=0.0) > LOG_RATIO * typical)
 
 
 def decades(series: list[Floats]) -> tuple[float, float]:
-    """Return limits of a logarithmic axis over values that grow, from what they begin with."""
+    """Return limits of a logarithmic axis over growing values, from their initial size."""
     sizes = _sizes(series)
     high = min(max(float(s.max()) for s in sizes), style.LARGEST)
     low = min(float(s[:2].max()) for s in sizes)
@@ -193,12 +200,12 @@ def decades(series: list[Floats]) -> tuple[float, float]:
 
 
 def _sizes(series: list[Floats]) -> list[Floats]:
-    found = [np.abs(style.finite(values[values != 0.0])) for values in series]
-    return [size for size in found if size.size]
+    sizes = [np.abs(style.finite(values[values != 0.0])) for values in series]
+    return [size for size in sizes if size.size]
 
 
 def _look(i: int, count: int, points: int) -> dict[str, Any]:
-    """Return a line's look such that later lines leave earlier ones visible beneath them."""
+    """Return the look of the i-th line, which leaves earlier ones visible beneath it."""
     part = i / max(1, count - 1)
     every = max(1, points // 9)
     return {
@@ -216,17 +223,17 @@ def _look(i: int, count: int, points: int) -> dict[str, Any]:
 
 
 def comparable(curves: list[Curve]) -> bool:
-    """Say whether at least two curves are readable, so that a spread has a meaning."""
+    """Return whether at least two curves are readable, so that a spread has a meaning."""
     return sum(curve.is_readable for curve in curves) > 1
 
 
 def draw_spread(ax: Axes, t: Floats, curves: list[Curve], measure: str) -> None:
-    """Draw how far every comparable curve is from the finest of them; logarithmic where they differ much."""
+    """Draw the distance of every readable curve from the finest one; logarithmic if the distances differ much."""
     sound = [i for i, curve in enumerate(curves) if curve.is_readable]
     reference = curves[sound[-1]]
     gaps = {i: curves[i].values - reference.values for i in sound[:-1]}
     shown = list(gaps.values())
-    # an end point of its own kind does not count
+    # the quantile ignores end points, which have their own formulas
     typical = [float(np.nanquantile(np.abs(gap), 0.9)) for gap in shown]
     sizes = [size for size in typical if size > 0]
     is_log = bool(sizes) and max(sizes) > LOG_SPREAD * min(sizes)

@@ -1,4 +1,4 @@
-"""Motions in a plane with equal scales: velocity against position, and the path of a body with two coordinates.
+"""Motions in a plane with equal scales: the phase plane, and the path of a body with two coordinates.
 
 Source: vibration text, sections 5.5 and 7 (figures 6, 8 and 10) for the phase plane, where velocities are divided by
 the natural frequency w so that the orbit of a linear oscillation is a circle; exercise 22 for the path.
@@ -23,21 +23,21 @@ from vibsim.report.types import Axes, Experiment
 PANELS_A_ROW = 3  # panels in a row of the phase plane, and most panels of the path
 MOST_PANELS = 6  # most panels of the phase plane, and most schemes in them
 CUT_ORBIT, CUT_PATH = 2.5, 1.3
-"""What leaves the exact orbit or path by more than this factor is cut off."""
-PERIODS = 3.0  # of a longer motion the first period and the last so many are drawn
-FEWEST_SAMPLES = 8  # fewer samples than this in a period do not draw an orbit
-FLATTEST = 0.15  # least height of the frame of a path over its width, or the other way round
+"""Frames hold at most this multiple of the size of the exact orbit, or of the first path."""
+PERIODS = 3.0  # of a longer motion the first period and this many last ones are drawn
+FEWEST_SAMPLES = 8  # fewest samples a period that draw an orbit
+FLATTEST = 0.15  # smallest ratio of the sides of a path's frame
 TALLEST = 4.5  # largest height of a panel [inch]
-TICK = 0.8  # room for a number below a panel [inch]
-SEEN = 0.01  # of the size of a path, what is seen of a difference
+TICK = 0.8  # width of a tick label below a panel [inch]
+SEEN = 0.01  # smallest visible difference of two paths, relative to their size
 
 Points = tuple[Floats, Floats]
 
 
 def phase(experiment: Experiment, record: Record, shown: list[Member]) -> Picture | None:
-    """Draw the phase plane of the schemes shown, one panel per level; None where it would show nothing.
+    """Draw the phase plane of the schemes in `shown`, one panel per level.
 
-    A few schemes only, and series with samples enough in a period.
+    None for many schemes, without a natural frequency, for few samples a period, and for a body at rest.
     """
     model = experiment.model.definition
     if not shown or len({member.scheme for member in shown}) > MOST_PANELS:
@@ -57,7 +57,7 @@ def phase(experiment: Experiment, record: Record, shown: list[Member]) -> Pictur
     parts = [(np.ones(t.size, dtype=bool), 1.2)]
     if is_long:
         parts = [(t <= t[0] + period, 0.9), (t >= t[-1] - PERIODS * period, 1.4)]
-    # an orbit that closes is drawn once, any other as far as the levels are
+    # a closed orbit is drawn once, any other for the times of the levels
     closes = math.isfinite(exact)
     orbit = t <= 1.02 * period if closes else np.any([keep for keep, _ in parts], axis=0)
     size = _draw_orbit(axes, record, model, case, w, orbit)
@@ -76,7 +76,7 @@ def phase(experiment: Experiment, record: Record, shown: list[Member]) -> Pictur
         ax.set_title(f"level {levels[i]}, w dt = {words.number(w * float(dt[i]), 'step')}")
     edge = 1.12 * (min(largest, CUT_ORBIT * size) if size > 0.0 else largest)
     if edge == 0.0:
-        # a body at rest has no orbit
+        # at rest
         return None
     letter, measure = words.symbol(model.position), unit(record, f"{model.position}_finest")
     for n, ax in enumerate(axes):
@@ -101,7 +101,7 @@ def phase(experiment: Experiment, record: Record, shown: list[Member]) -> Pictur
 def _draw_orbit(
     axes: list[Axes], record: Record, model: Model, case: int, w: float, drawn: Flags
 ) -> float:
-    """Draw the exact orbit, and return its size; 0 where it is not known."""
+    """Draw the exact orbit and return its size; 0 if it is unknown."""
     names = f"{model.position}_exact", f"{model.velocity}_exact"
     if any(name not in record for name in names):
         return 0.0
@@ -117,16 +117,16 @@ def _draw_orbit(
 
 
 def _draw_end(ax: Axes, points: Points, k: int, width: float, name: str) -> None:
-    """Mark the last point of the k-th scheme, with its entry in the legend."""
+    """Mark the last point of the k-th scheme, with its legend entry."""
     last = np.flatnonzero(np.isfinite(points[0]))[-1:]
     look: dict[str, Any] = style.look(k) | {"linestyle": "-", "linewidth": width, "markersize": 5}
     ax.plot(points[0][last], points[1][last], **look, label=style.entry(name))
 
 
 def path(experiment: Experiment, record: Record, shown: list[Member]) -> Picture | None:
-    """Draw the paths of the schemes shown: a panel for each level, or for each member of a sweep at its finest level.
+    """Draw the paths of the schemes in `shown`: one panel per level, or per member of a sweep at the finest level.
 
-    None of a model with one coordinate, or with more than two: no plane holds their motion.
+    None unless the model has two coordinates.
     """
     from matplotlib.ticker import MaxNLocator
 
@@ -137,7 +137,7 @@ def path(experiment: Experiment, record: Record, shown: list[Member]) -> Picture
     if data.swept(record):
         cases = sorted({member.case for member in shown})[:PANELS_A_ROW]
         groups = [[member for member in shown if member.case == case] for case in cases]
-        panels = [(found[0].case_words, found, len(levels) - 1) for found in groups]
+        panels = [(group[0].case_words, group, len(levels) - 1) for group in groups]
     else:
         panels = [(f"level {levels[i]}", shown, i) for i in style.spaced(len(levels), PANELS_A_ROW)]
     curves = [[_points(record, names, m, level) for m in members] for _, members, level in panels]
@@ -150,8 +150,8 @@ def path(experiment: Experiment, record: Record, shown: list[Member]) -> Picture
         panels, curves = [panels[i] for i in distinct], [curves[i] for i in distinct]
     references = [_points(record, names, members[0], None) for _, members, _ in panels]
     is_known = [bool(np.isfinite(reference).all()) for reference in references]
-    each = zip(references, is_known, curves, strict=True)
-    frame = _frame([points for exact, has, panel in each for points in (*[exact] * has, *panel)])
+    rows = zip(references, is_known, curves, strict=True)
+    frame = _frame([points for exact, has, panel in rows for points in (*[exact] * has, *panel)])
     if frame is None:
         return None
     (left, right), (low, high) = frame
@@ -185,7 +185,7 @@ def path(experiment: Experiment, record: Record, shown: list[Member]) -> Picture
 
 
 def _points(record: Record, names: tuple[str, ...], member: Member, level: int | None) -> Points:
-    """Return the path of a member on a level, or the exact one, which is NaN where it is not known."""
+    """Return the path of a member on a level, or the exact one (None), which is NaN if unknown."""
     if level is None:
         x, y = (data.exact_series(record, name, member) for name in names)
     else:
@@ -194,13 +194,13 @@ def _points(record: Record, names: tuple[str, ...], member: Member, level: int |
 
 
 def _differ(panel: list[Points], finest: list[Points]) -> bool:
-    """Say whether one of the paths of a level looks different from that of the finest level."""
+    """Return whether a path of a level looks different from that of the finest level."""
     distances = [data.largest(np.subtract(a, b)) for a, b in zip(panel, finest, strict=True)]
     return max(distances) > SEEN * max(data.largest(np.asarray(points)) for points in finest)
 
 
 def _frame(paths: list[Points]) -> tuple[tuple[float, float], tuple[float, float]] | None:
-    """Return the limits of both axes: around the first path, with room for the others as far as they stay near it."""
+    """Return the limits of both axes around the first path, with room for others that stay near it."""
     first = [style.finite(values) for values in paths[0]]
     if not all(values.size for values in first):
         return None
@@ -209,6 +209,6 @@ def _frame(paths: list[Points]) -> tuple[tuple[float, float], tuple[float, float
     limits = []
     for axis in (0, 1):
         reach = max(data.largest(points[axis] - middle[axis]) for points in paths)
-        room = max(min(reach, CUT_PATH * half[axis]), FLATTEST * max(half))
-        limits.append((middle[axis] - 1.08 * room, middle[axis] + 1.08 * room))
+        half_width = max(min(reach, CUT_PATH * half[axis]), FLATTEST * max(half))
+        limits.append((middle[axis] - 1.08 * half_width, middle[axis] + 1.08 * half_width))
     return (limits[0], limits[1]) if max(half) > 0.0 else None

@@ -1,8 +1,7 @@
-"""Drawings of systems that move: which lines, springs, bodies and forces, and where they are at every time.
+"""Drawings of moving systems: lines, springs, bodies and forces, with their positions at every time.
 
-A drawing is a list of parts whose numbers are series over time, in the pixels of a frame of `WIDTH` times `HEIGHT`.
-Pages and movies draw a part in the same way at every time (`path_of`, `strokes` and `place_of_label`, and the same in
-``player.js``).
+A drawing is a list of parts whose numbers are series over time, in pixels of a frame of `WIDTH` times `HEIGHT`. Pages
+and movies draw parts alike (`path_of`, `strokes` and `place_of_label`, and the same functions in ``player.js``).
 
 Source: vibration text, section 10.6 (pendulum with its forces, the drag five times larger), 10.7, 10.8 (vehicle), 10.9,
 10.3; sketches of figures 12 to 17.
@@ -24,32 +23,32 @@ from vibsim.models import Model, tree
 from vibsim.models.base import Formula, looked_up
 
 WIDTH, HEIGHT = 320.0, 220.0
-WEIGHT = 0.45  # length of an arrow as long as the weight, over that of the wire
-MAGNIFIED = 5.0  # how much larger than other forces the drag is drawn
+WEIGHT = 0.45  # length of the arrow of the weight over that of the wire
+MAGNIFIED = 5.0  # scale of the drag over that of other forces
 MAGNIFIED_DRAG = f"{MAGNIFIED:g} D"
 DRAG = "drag", f"drag D, drawn {MAGNIFIED:g} times as large"
 LONGEST = 1.3  # longest arrow over the length of the wire
-REACH = 92.0  # pixels of the largest displacement of a body on a spring
-FORCE = 60.0  # pixels of the largest driving force
-CYLINDER = 26.0  # length of that of a dashpot [pixel]
+REACH = 92.0  # largest displacement of a body on a spring [pixel]
+FORCE = 60.0  # length of the largest driving force [pixel]
+CYLINDER = 26.0  # length of the cylinder of a dashpot [pixel]
 COILS = 9  # turns of a spring
 ARC = 0.3  # radius of the arc of an angle over the length of the wire
 ARC_POINTS = 24
-LABELLED = 10.0  # least length of an arrow, and least angle [degree], that has its label
-BESIDE = 14.0  # pixels from the tip of an arrow, or from an arc, to the middle of its label
-AROUND = 1.2  # seen part of a road over the reach of the body, in its height
+LABELLED = 10.0  # shortest arrow [pixel] and smallest angle [degree] with a label
+BESIDE = 14.0  # from the tip of an arrow, or from an arc, to the middle of its label [pixel]
+AROUND = 1.2  # shortest length of road in half the frame [m]
 
 
 @dataclass(frozen=True)
 class Motion:
-    """What is known of a motion: series over time of shape (t,), and numbers."""
+    """A motion: series over time of shape (t,), and parameters."""
 
     model: Model
     t: Floats
     states: Mapping[str, Floats]
     parameters: Mapping[str, Any]
     reach: Mapping[str, float]
-    """Largest size of each state, in all motions that are drawn side by side."""
+    """Largest size of each state over all motions that are drawn side by side."""
 
     def number(self, name: str) -> float:
         """Return a parameter."""
@@ -61,19 +60,19 @@ class Motion:
         return self.value(formula)
 
     def value(self, formula: Formula, **instead: float) -> Floats:
-        """Return the series of a formula of the model, shape (t,), with other values for some of its names."""
+        """Return the series of a formula of the model, shape (t,), with the names `instead` replaced by values."""
         numbers = self.numbers | instead
         expression = parse(formula, tuple(numbers)) if isinstance(formula, str) else formula
         return np.broadcast_to(values(expression, numbers), self.t.shape)
 
     @cached_property
     def numbers(self) -> dict[str, Any]:
-        """What a formula of the model may name."""
-        found = {"t": self.t, **self.states, **self.parameters}
-        return found | looked_up(self.model, found)
+        """The values of all names that a formula of the model may use."""
+        known = {"t": self.t, **self.states, **self.parameters}
+        return known | looked_up(self.model, known)
 
     def has(self, name: str) -> bool:
-        """Say whether the model has an output of this name."""
+        """Return whether the model has an output of this name."""
         return any(row.name == name for row in self.model.outputs)
 
 
@@ -82,29 +81,30 @@ class Part:
     """A part of a drawing."""
 
     shape: str
-    """``line`` and ``spring`` between two points, ``circle`` with its radius, ``box`` with its sizes, ``arrow`` along a
-    vector, ``arc`` around a point with its radius and an angle from below [degree], ``track``: a fixed outline that
-    moves to the left."""
+    """``line`` and ``spring`` (two points), ``circle`` (centre, radius), ``box`` (centre, sizes), ``arrow`` (start,
+    vector), ``arc`` (centre, radius, angle from straight down [degree]), ``track`` (shift of a fixed outline to the
+    left)."""
     look: str
-    """Class of the style."""
+    """Class of the style sheet."""
     at: tuple[Floats | float, ...]
+    """The numbers of the shape, as series of shape (t,) or as constants."""
     outline: str = ""
-    """Of a track."""
+    """Path data of a track."""
     label: str = ""
-    """Of an arrow or an arc, drawn beside it."""
+    """Text beside an arrow or an arc."""
 
 
 @dataclass(frozen=True)
 class Scene:
-    """A drawing, and what its colours stand for."""
+    """A drawing and its legend."""
 
     parts: tuple[Part, ...]
     legend: tuple[tuple[str, str], ...] = ()
-    """Look and words of the parts that need a name."""
+    """Look and words of the parts in the legend."""
 
 
 def scene_of(model: Model) -> Callable[[Motion], Scene] | None:
-    """Return what draws the motions of a model; None where its system cannot be drawn."""
+    """Return the function that draws motions of a model; None if its system cannot be drawn."""
     if model.kind in SCENES:
         return SCENES[model.kind]
     is_displacement = model.is_alone and model.states[0].unit in {"m", "1"}
@@ -123,7 +123,7 @@ def pendulum(motion: Motion) -> Scene:
         Part("arc", "angle", (x0, y0, ARC * length, np.degrees(theta)), label="θ"),
         Part("line", "wire", (x0, y0, x, y)),
         Part("circle", "pivot", (x0, y0, 3.0)),
-        # beneath the arrows, so that a small force is seen
+        # beneath the arrows, so that small forces stay visible
         Part("circle", "body", (x, y, 9.0)),
     ]
     legend = []
@@ -145,14 +145,14 @@ def pendulum(motion: Motion) -> Scene:
 
 
 def _shortened(force: Floats) -> Floats:
-    """Return a force over the weight, no longer than the frame has room for."""
+    """Limit a force, as a multiple of the weight, to the longest arrow that fits."""
     return np.clip(force, -LONGEST / WEIGHT, LONGEST / WEIGHT)
 
 
 def elastic_pendulum(motion: Motion) -> Scene:
     """Draw a body on an elastic wire, with its forces."""
     across, up = motion.states["x"], motion.states["y"]
-    # pivot at (0, 1), and all that is reached
+    # the scale fits the pivot at (0, 1) and the whole motion
     widest = max(motion.reach["x"], 0.3)
     lowest, highest = 1.0 + max(motion.reach["y"], 0.1), max(motion.reach["y"] - 1.0, 0.0)
     scale = min(0.44 * WIDTH / widest, 0.9 * HEIGHT / (lowest + highest + WEIGHT))
@@ -183,14 +183,14 @@ def elastic_pendulum(motion: Motion) -> Scene:
 
 
 def vehicle(motion: Motion) -> Scene:
-    """Draw a wheel on its road, and the body on its spring above; the vehicle stays and the road moves."""
+    """Draw a wheel on its road and the body on its spring above it; the road moves under the vehicle."""
     place, road = motion.number("speed") * motion.t, _road(motion)
     body = motion.states["u"] + road
     tallest = max(float(np.max(np.abs(road))), motion.reach["u"], 1e-9)
     # the same scale across, unless the road would rush by
     up = 34.0 / tallest
     across = min(up, 0.5 * WIDTH / max(AROUND, 0.02 * float(place[-1])))
-    # it is level before the start and behind the end
+    # the road is level before the start and after the end
     ends = across * place[0] - WIDTH, across * place[-1] + WIDTH
     points = np.concatenate([ends[:1], across * place, ends[1:]])
     heights = np.pad(178.0 - up * road, 1, mode="edge")
@@ -223,7 +223,7 @@ def bouncing_ball(motion: Motion) -> Scene:
 
 
 def spring_mass(motion: Motion) -> Scene:
-    """Draw a body that moves to and fro, held by a spring, with its dashpot and the force on it where it has any."""
+    """Draw a body on a spring that moves to and fro, with its dashpot and its driving force, if it has any."""
     half, model = 18.0, motion.model
     parts = _on_spring(motion, "wheel", half)
     *_, middle = (part for part in parts if part.look == "body")
@@ -234,7 +234,7 @@ def spring_mass(motion: Motion) -> Scene:
         parts += _dashpot(22.0, x - half, y + 9.0)
     legend = []
     if model.driving is not None:
-        # its power is the force times the velocity, beside which that of damping has a higher power of it
+        # the driving power is the force times the velocity plus higher powers of it from damping
         force = motion.value(
             derivative(tree(model, model.driving), model.velocity), **{model.velocity: 0.0}
         )
@@ -245,7 +245,7 @@ def spring_mass(motion: Motion) -> Scene:
 
 
 def _dashpot(x0: float, x1: Floats | float, y: Floats | float) -> list[Part]:
-    """Return a cylinder held at `x0`, and the piston of what stands at `x1`, both along with its motion."""
+    """Return a cylinder held at `x0` and its piston, held by the body at `x1`."""
     gap = x1 - x0
     cylinder, piston = x0 + 0.5 * gap, x0 + 0.55 * gap
     half = 0.5 * CYLINDER
@@ -263,7 +263,7 @@ def sliding_box(motion: Motion) -> Scene:
 
 
 def _on_spring(motion: Motion, wheels: str, half: float) -> list[Part]:
-    """Return wall, floor, spring and box, which stands on wheels where it does not slide."""
+    """Return wall, floor, spring and box, on wheels of the look `wheels`; empty for a box that slides."""
     u = motion.states[motion.model.position]
     floor, middle = 150.0, 180.0
     x = middle + REACH * u / max(motion.reach[motion.model.position], 1e-300)
@@ -281,11 +281,11 @@ def _on_spring(motion: Motion, wheels: str, half: float) -> list[Part]:
 
 
 def washing_machine(motion: Motion) -> Scene:
-    """Draw a machine on a spring, with the unbalance that turns in it."""
+    """Draw a machine on springs with its rotating unbalance."""
     up = 34.0 * motion.states["u"] / max(motion.reach["u"], 1e-300)
     y = 95.0 - up
     angle = motion.number("speed") * motion.t
-    # the force e W^2 cos(W t) points upwards at first
+    # the force e W^2 cos(W t) initially points upwards
     parts = (
         Part("line", "ground", (70.0, 205.0, 250.0, 205.0)),
         Part("spring", "wire", (130.0, 205.0, 130.0, y + 46.0)),
@@ -307,11 +307,11 @@ SCENES: Mapping[str, Callable[[Motion], Scene] | None] = {
     "sliding_box": sliding_box,
     "washing_machine": washing_machine,
 }
-"""What draws the motions of a kind of model; another one with a displacement is a body on a spring."""
+"""Kind of a model to its drawing; any other model with a displacement is a body on a spring."""
 
 
 def _outline(x: Floats, y: Floats) -> str:
-    """Return a line through points as the data of a path."""
+    """Return a line through points as SVG path data."""
     points = zip(np.round(x).astype(int).tolist(), np.round(y, 1).tolist(), strict=True)
     heights_at: dict[int, float] = {}
     for across, height in points:
@@ -325,7 +325,7 @@ def values_of(part: Part, k: int) -> list[float]:
 
 
 def strokes(shape: str, values: Sequence[float]) -> list[list[tuple[float, float]]]:
-    """Return the lines that a shape of these numbers consists of, as points; none of what is too small to be seen."""
+    """Return the polylines of a shape with these numbers; none if it is too small to be visible."""
     match shape, values:
         case "line", [x0, y0, x1, y1]:
             return [[(x0, y0), (x1, y1)]]
@@ -357,7 +357,7 @@ def strokes(shape: str, values: Sequence[float]) -> list[list[tuple[float, float
 
 
 def path_of(part: Part, k: int) -> str:
-    """Return the data of the path of a part at the k-th time, as ``player.js`` does."""
+    """Return the SVG path data of a part at the k-th time, as ``player.js`` does."""
     values = values_of(part, k)
     match part.shape, values:
         case "circle", [x, y, r]:
@@ -369,7 +369,7 @@ def path_of(part: Part, k: int) -> str:
 
 
 def place_of_label(shape: str, values: Sequence[float]) -> tuple[float, float] | None:
-    """Return the middle of the label of an arrow or an arc; None where it is too small for one."""
+    """Return the centre of the label of an arrow or an arc; None if it is too small for one."""
     if shape == "arrow":
         x, y, dx, dy = values
         length = math.hypot(dx, dy)

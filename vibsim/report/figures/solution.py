@@ -1,4 +1,4 @@
-"""The motion on every level with the error of each, and the solution with its error bar, estimated beside true error.
+"""The motion on every level with its errors, and the solution with its error bar and estimated and true errors.
 
 Source: pendulum lecture, section 2.5 (the estimate from two levels), and Richardson's extrapolation.
 """
@@ -20,18 +20,18 @@ from vibsim.report.types import Axes, Experiment
 MOST = 6  # most levels that can be told apart
 Look = dict[str, Any]
 BEYOND = 3.0
-"""A level that grows beyond so many times the solution it is compared with leaves the frame."""
+"""Levels beyond this multiple of the reference solution leave the frame."""
 CUT = 3.0
-"""A solution that grows beyond so many times the exact one is cut off there, and the panel says so."""
+"""Solutions beyond this multiple of the exact one are cut off, and the panel says so."""
 TINY = 1e-18
-"""Smallest relative size that a logarithmic panel shows: anything below is an accident of rounding."""
+"""Smallest relative size on a logarithmic panel; smaller values are accidents of rounding."""
 BAND = "#56B4E9"
 DOTS: Look = {"linestyle": "none", "marker": ".", "markersize": 3.0}
-"""In place of a line, where samples are too few for one."""
+"""Replaces a line if the samples are too few for one."""
 
 
 def solution(record: Record, quantity: str, member: Member) -> Picture:
-    """Draw the solution, and below it, on a logarithmic scale, its estimated and its true error."""
+    """Draw the solution and, below it on a logarithmic scale, its estimated and its true error."""
     t, letter = data.times(record, member.case), words.symbol(quantity)
     measure = data.unit(record, f"{quantity}_finest")
     exact = data.exact_series(record, quantity, member)
@@ -58,7 +58,7 @@ def solution(record: Record, quantity: str, member: Member) -> Picture:
 
 
 def _draw_band(ax: Axes, t: Floats, centre: Floats, bound: Floats, measure: str) -> str:
-    """Draw the error bar of the extrapolated solution as a band, and say how thick it is."""
+    """Draw the error bar of the extrapolated solution as a band; return a remark on its width."""
     if not np.isfinite(bound).all():
         return ""
     thickest = float(np.max(bound))
@@ -89,41 +89,41 @@ def _draw_solution(
     panels.stop_at_breakdown(ax, t, [finest])
     drawn = [y for y, _, _ in rows]
     # a run that blew up would hide the others
-    ranged = [y for y in drawn if np.isfinite(y).all()] or drawn
+    finite = [y for y in drawn if np.isfinite(y).all()] or drawn
     size = data.largest(exact) if np.isfinite(exact).all() else 0.0
     if 0.0 < size < max(map(data.largest, drawn)) / CUT:
         ax.set_ylim(-CUT * size, CUT * size)
         panels.note(ax, f"cut off at {CUT:g} times the exact solution", 0.11)
     else:
-        panels.fit_values(ax, ranged)
+        panels.fit_values(ax, finite)
     style.beside(ax)
 
 
 def _draw_errors(
     ax: Axes, t: Floats, record: Record, quantity: str, member: Member, bound: Floats, true: Floats
 ) -> None:
-    """Draw the estimates of the coarsest and the finest pair of levels, and the bound of the extrapolated solution."""
+    """Draw the estimates from the coarsest and finest pairs of levels, and the bound of the extrapolated solution."""
     pairs = data.whole(record, "pair")
     drawn: list[Floats] = []
 
-    def add(line: Floats, dots: Floats, of: str, true_of: str, **look: Any) -> None:
+    def add(line: Floats, dots: Floats, label: str, true_label: str, **look: Any) -> None:
         """Draw an estimate as a line and a true error as dots, few enough to leave the line visible."""
         line, dots = style.no_zeros(line), style.no_zeros(dots)
         drawn.append(line)
-        ax.plot(*style.thin(t, line), label=of, **look)
+        ax.plot(*style.thin(t, line), label=label, **look)
         if np.isfinite(dots).any():
             drawn.append(dots)
-            every = slice(None, None, max(1, t.size // 60))
+            subset = slice(None, None, max(1, t.size // 60))
             mark: Look = {"linestyle": "none", "marker": "o", "markersize": 3.2}
             mark |= {"markerfacecolor": "white", "markeredgewidth": 0.9}
-            ax.plot(t[every], dots[every], label=true_of, **look | mark)
+            ax.plot(t[subset], dots[subset], label=true_label, **look | mark)
 
     estimates = [
         data.at(record, f"{quantity}_error_estimate", member, pair=i) for i in range(len(pairs))
     ]
-    # a run that blew up has no error worth a scale of its own, unless all did
-    whole = [i for i, estimate in enumerate(estimates) if np.isfinite(estimate).all()]
-    chosen = whole or list(range(len(pairs)))
+    # errors of runs that blew up are drawn only if all did
+    finite = [i for i, estimate in enumerate(estimates) if np.isfinite(estimate).all()]
+    chosen = finite or list(range(len(pairs)))
     for k, i in enumerate(dict.fromkeys([chosen[0], chosen[-1]]) if chosen else []):
         error = data.at(record, f"{quantity}_error", member, pair=i)
         text = f"level {pairs[i]}"
@@ -131,16 +131,16 @@ def _draw_errors(
         look["gid"] = style.of_level(pairs[i])
         add(estimates[i], error, f"estimate, {text}", f"true, {text}", **look)
     if np.isfinite(bound).all():
-        of, true_of = "bound, extrapolated", "true, extrapolated"
-        add(bound, true, of, true_of, color=style.COLOURS[2])
-    # dips at zero crossings may leave the range below
+        label, true_label = "bound, extrapolated", "true, extrapolated"
+        add(bound, true, label, true_label, color=style.COLOURS[2])
+    # dips at zero crossings may lie below the axis
     if not style.fit_log_axis(ax, "y", *drawn, below=0.03, least=TINY):
         style.remark(ax, "no error to draw: it is zero, or not known")
     style.beside(ax)
 
 
 def motion(experiment: Experiment, record: Record, quantity: str, member: Member) -> Picture:
-    """Draw a quantity on all levels, and how far each is from the exact solution, or from the extrapolated one."""
+    """Draw a quantity on all levels, and their errors against the exact solution, or else the extrapolated one."""
     t, letter = data.times(record, member.case), words.symbol(quantity)
     measure, levels = data.unit(record, f"{quantity}_finest"), data.whole(record, "level")
     exact = data.exact_series(record, quantity, member)
@@ -197,22 +197,22 @@ def _draw_levels(
         look: Look = {"linestyle": dashes} | looks[i]
         ax.plot(*style.thin(t, values), **look)
     panels.stop_at_breakdown(ax, t, list(runs.values()))
-    whole = [values for values in runs.values() if np.isfinite(values).all()]
-    whole = whole or list(runs.values())
+    finite = [values for values in runs.values() if np.isfinite(values).all()]
+    finite = finite or list(runs.values())
     size = data.largest(best)
-    near = [values for values in whole if data.largest(values) <= BEYOND * size]
-    if near and len(near) < len(whole):
+    near = [values for values in finite if data.largest(values) <= BEYOND * size]
+    if near and len(near) < len(finite):
         ax.set_ylim(*style.limits(best, *near, np.array([-size, size])))
         panels.note(ax, "coarse levels leave the frame", 0.03)
     else:
-        panels.fit_values(ax, whole, best)
+        panels.fit_values(ax, finite, best)
     style.beside(ax)
 
 
 def _draw_level_errors(
     ax: Axes, t: Floats, errors: dict[int, Floats], looks: dict[int, Look]
 ) -> int:
-    """Draw errors, on a logarithmic scale where they grow without bound; return the exponent of the axis."""
+    """Draw errors, on a logarithmic scale if they grow without bound; return the exponent of ten of the axis."""
     shown = [e for e in errors.values() if np.isfinite(e).all()] or list(errors.values())
     scale = panels.Scale.of(shown)
     for i, values in errors.items():

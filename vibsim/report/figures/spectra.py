@@ -1,4 +1,4 @@
-"""The spectrum of the motion with the frequencies that theory knows, and its Poincare section.
+"""The spectrum of the motion with the frequencies of theory, and its Poincare section.
 
 Source: `vibsim.observe.spectrum` for the lines; H. Poincare, Les methodes nouvelles de la mecanique celeste (1892), and
 P. Holmes, A nonlinear oscillator with a strange attractor, Phil. Trans. R. Soc. A 292 (1979) 419-448, for the section.
@@ -19,16 +19,16 @@ from vibsim.report.figures import panels
 from vibsim.report.style import Picture
 from vibsim.report.types import Experiment
 
-DECADES = 1e-8  # what is lower than this part of the highest line is not drawn
-MOST_LEVELS = 3  # most levels of the spectrum, the finest ones
+LOWEST = 1e-8  # lower end of the axis over the highest line
+MOST_LEVELS = 3  # finest levels in the spectrum
 MOST_PANELS = 6  # most sections
 PANELS_A_ROW = 3
 
 
 def spectrum(experiment: Experiment, record: Record, member: Member) -> Picture | None:
-    """Draw the amplitudes of the lines at the finest levels, with the exact frequency and those that theory predicts.
+    """Draw the amplitudes of the spectral lines at the finest levels, with the exact and the predicted frequencies.
 
-    None where there are too few samples for a line.
+    None if there are too few samples for a line.
     """
     name = choice.position(experiment)
     t, levels = data.times(record, member.case), whole(record, "level")
@@ -39,13 +39,13 @@ def spectrum(experiment: Experiment, record: Record, member: Member) -> Picture 
     highest, last = 0.0, 0.0
     chosen = range(max(len(levels) - MOST_LEVELS, 0), len(levels))
     for k, level in enumerate(chosen):
-        found = observed.lines(state_on_level(record, name, member, level))
-        w_of, values = w[: found.size], found[: w.size]
+        amplitudes = observed.lines(state_on_level(record, name, member, level))
+        frequencies, values = w[: amplitudes.size], amplitudes[: w.size]
         colour, text = style.look(k)["color"], f"level {levels[level]}"
-        ax.plot(w_of, values, color=colour, linewidth=1.0, label=text)
-        top = data.largest(found)
+        ax.plot(frequencies, values, color=colour, linewidth=1.0, label=text)
+        top = data.largest(amplitudes)
         highest = max(highest, top)
-        last = max(last, float(w_of[values > 1e-3 * top].max(initial=0.0)))
+        last = max(last, float(frequencies[values > 1e-3 * top].max(initial=0.0)))
         predicted = _predicted(experiment, record, member, level)
         if math.isfinite(predicted):
             look: Any = {"color": colour, "linestyle": ":", "linewidth": 1.2}
@@ -56,7 +56,7 @@ def spectrum(experiment: Experiment, record: Record, member: Member) -> Picture 
     exact = data.natural_frequency(record, member.case)
     if model.linear and math.isfinite(exact):
         ax.axvline(exact, label="natural", **style.REFERENCE)
-    style.log_axis(ax, "y", DECADES * highest, 3.0 * highest)
+    style.log_axis(ax, "y", LOWEST * highest, 3.0 * highest)
     ax.set_xlim(0.0, min(float(w[-1]), 4.0 * np.fmax(last, exact)))
     ax.set_xlabel(style.label("angular frequency", data.radians_unit(record)))
     measure = data.unit(record, f"{name}_finest")
@@ -76,7 +76,7 @@ def spectrum(experiment: Experiment, record: Record, member: Member) -> Picture 
 
 
 def _predicted(experiment: Experiment, record: Record, member: Member, level: int) -> float:
-    """Return the angular frequency of a scheme's own steps by theory; NaN where there is none."""
+    """Return the angular frequency of a scheme's discrete solution by theory; NaN if theory gives none."""
     from vibsim import theory
 
     model, spec = experiment.model.definition, experiment.schemes[member.scheme]
@@ -89,7 +89,7 @@ def _predicted(experiment: Experiment, record: Record, member: Member, level: in
 
 
 def poincare(experiment: Experiment, record: Record, shown: list[Member]) -> Picture | None:
-    """Draw position and velocity after every period of the force in the second half of the run, of each member."""
+    """Draw position and velocity of each member after every period of the force, in the second half of the run."""
     model, periods = experiment.model.definition, experiment.time.periods
     first = [member for member in shown if member.scheme == shown[0].scheme][:MOST_PANELS]
     if periods is None or not first:

@@ -1,18 +1,18 @@
-"""A figure of matplotlib as SVG, written in one pass: ticks and letters without a layout of their own.
+"""A matplotlib figure as SVG, written in one pass without a layout for ticks and letters.
 
-The SVG writer of matplotlib makes five artists for each tick and lays every text out twice, which took half the time
-of a report. This one draws all other artists by the interface that matplotlib has for new formats. It differs in
-three more points: ids come from the name of the figure, colours are attributes that the style sheet of a page can
-replace, and what a script needs to find values again stands beside the curves:
+The SVG writer of matplotlib creates five artists for each tick and lays out every text twice, which took half the time
+of a report. This one writes ticks itself and draws all other artists through matplotlib's renderer interface. Its ids
+come from the name of the figure, its colours are attributes that the style sheet of a page can replace, and its groups
+carry the data from which a script reads values:
 
 ``<g data-axis="time" data-box="left top width height" data-x="low high" data-y="low high" data-log="xy">``
-    a panel whose axes have a group id (``ax.set_gid("time")``); its limits are in units of its labels. Of a panel with
-    members the page holds their places (`vibsim.report.page.explorer`)
+    a panel whose axes have a group id (``ax.set_gid("time")``), with limits in the units of its labels; the page itself
+    holds the positions of members (`vibsim.report.page.explorer`)
 ``<g data-axis="long" data-window="width" ...>``, ``<g data-axis="overview" ...>``
-    panels of a long series (``ax.set_gid("long width")``), of which a page shows a part, and all of its time
+    a panel of a long series (``ax.set_gid("long width")``), of which a page shows a window, and the strip of all time
 ``<g data-curve="label" data-key="key">``
-    a curve, or what else has a place on the axes; the key is its group id, else its label. A label that begins with an
-    underscore, which leaves it out of the legend, counts too
+    a curve or another artist on the axes; the key is its group id, else its label, even if this begins with an
+    underscore, which leaves it out of the legend
 ``<g data-entry="key">``
     the handle or the text of a legend entry
 """
@@ -42,17 +42,17 @@ from matplotlib.transforms import Affine2D
 
 FAMILY = "'DejaVu Sans', Verdana, Arial, Helvetica, sans-serif"
 POINT = 72.0  # dots per inch: lengths of an SVG drawing are points
-RASTER = 160.0  # dots per inch of what is drawn as an image
-MARGIN = 3.6  # between words and the border of a figure [point]
-BOLD = 1.11  # width of bold letters, as a factor of that of plain ones
-ASCENT, DESCENT = 0.928, 0.236  # of the letters, as factors of their size
+RASTER = 160.0  # dots per inch of embedded images
+MARGIN = 3.6  # between text and the border of a figure [point]
+BOLD = 1.11  # width of bold letters over that of plain ones
+ASCENT, DESCENT = 0.928, 0.236  # of the font, over its size
 RC: Any = matplotlib.rcParams
 COMMANDS = [b"M", b"L", b"Q", b"C", b"z"]
 ANCHORS = {"center": (' text-anchor="middle"', 0.5), "right": (' text-anchor="end"', 1.0)}
 
 
 def document(figure: Figure, name: str) -> str:
-    """Return the SVG document of a figure; the ids in it begin with `name`."""
+    """Return the SVG document of a figure; its ids begin with `name`."""
     figure.set_dpi(POINT)
     if (engine := figure.get_layout_engine()) is not None:
         engine.execute(figure)
@@ -68,7 +68,7 @@ def _in_order(artists: list[Any]) -> list[Any]:
 
 @cache
 def _letter(letter: str) -> float:
-    """Return the width of a letter as a part of its size."""
+    """Return the width of a letter over the size of the font."""
     font = get_font(fontManager.findfont("DejaVu Sans"))
     font.set_size(100.0, POINT)
     glyph = font.load_char(ord(letter), flags=LoadFlags.NO_HINTING)
@@ -76,7 +76,7 @@ def _letter(letter: str) -> float:
 
 
 def _number(value: float) -> str:
-    """Write a number with at most two decimals: hundredths of a point are more than anyone sees."""
+    """Write a number with at most two decimals; less than a hundredth of a point is invisible."""
     text = f"{value:.2f}".rstrip("0").rstrip(".")
     return "0" if text == "-0" else text
 
@@ -86,12 +86,12 @@ def _numbers(*values: float) -> str:
 
 
 def _place(x: float, y: float, width: float, height: float) -> str:
-    """Write place and size of an element as attributes."""
+    """Write position and size of an element as attributes."""
     return f'x="{_number(x)}" y="{_number(y)}" width="{_number(width)}" height="{_number(height)}"'
 
 
 class Writer(RendererBase):  # type: ignore[misc, unused-ignore]
-    """What matplotlib draws on: elements of SVG, and how far the words among them reach."""
+    """Matplotlib renderer that collects SVG elements and the extent of the text among them."""
 
     def __init__(self, width: float, height: float, name: str, *, has_paper: bool) -> None:
         super().__init__()
@@ -107,7 +107,7 @@ class Writer(RendererBase):  # type: ignore[misc, unused-ignore]
         self._decimals = 2
 
     def document(self) -> str:
-        """Return all that was drawn, with a frame that holds every word."""
+        """Return everything drawn, in a frame that holds all text."""
         left, top = self._low
         width, height = self._high - self._low
         place = _place(left, top, width, height)
@@ -144,7 +144,7 @@ class Writer(RendererBase):  # type: ignore[misc, unused-ignore]
             x, y = (" ".join(f"{v:.9g}" for v in lim) for lim in (ax.get_xlim(), ax.get_ylim()))
             kind, _, window = tag.partition(" ")
             more = f' data-window="{window}"' if window else ""
-            # of what is shown much larger, hundredths of a point are seen
+            # pages enlarge a panel with a window
             self._decimals = 3 if window else 2
             self._body.append(
                 f'<g data-axis="{kind}"{more} data-box="{place}" data-x="{x}" data-y="{y}" data-log="{log}">'
@@ -167,27 +167,27 @@ class Writer(RendererBase):  # type: ignore[misc, unused-ignore]
         self._decimals = 2
 
     def _curve(self, artist: Any) -> None:
-        """Draw what belongs to a curve of a panel that a script can read."""
+        """Draw an artist of a panel that a script can read, in a group with its label and key."""
         label = str(artist.get_label())
         has_label = bool(label) and not label.startswith("_child")
-        # what begins with an underscore is left out of legends
+        # matplotlib leaves labels with an underscore out of legends
         label = label.removeprefix("_")
         key = artist.get_gid() or (label if has_label else "")
         before = len(self._body)
         self.add(artist)
-        # what is empty, or wholly outside, leaves nothing to be read
+        # an empty or invisible artist draws nothing
         if len(self._body) > before:
             name = f' data-curve="{escape(label)}"' if has_label else ""
             self._body.insert(before, f'<g{name} data-key="{escape(key)}">')
             self._body.append("</g>")
 
     def _axis(self, ax: Any, axis: Any, i: int) -> None:
-        """Draw grid, ticks, their numbers and the label of an axis: of x with `i` 0, of y with 1."""
-        known, which = axis.get_tick_params("major"), "xy"[i]
-        size = float(known.get("labelsize", RC[f"{which}tick.labelsize"]))
+        """Draw grid, ticks, tick labels and label of an axis: x for `i` = 0, y for `i` = 1."""
+        params, which = axis.get_tick_params("major"), "xy"[i]
+        size = float(params.get("labelsize", RC[f"{which}tick.labelsize"]))
         plain = RC[f"{which}tick.color"]
-        colour, words = (to_hex(known.get(key, plain)) for key in ("color", "labelcolor"))
-        near, far = (("bottom", "top"), ("left", "right"))[i]
+        colour, ink = (to_hex(params.get(key, plain)) for key in ("color", "labelcolor"))
+        near, opposite = (("bottom", "top"), ("left", "right"))[i]
         length, pad = RC[f"{which}tick.major.size"], RC[f"{which}tick.major.pad"]
         box, height = ax.bbox, self._size[1]
         low, high = (box.x0, box.x1) if i == 0 else (box.y0, box.y1)
@@ -196,63 +196,63 @@ class Writer(RendererBase):  # type: ignore[misc, unused-ignore]
         at = self._places(ax, places, i)
         visible = [k for k in range(places.size) if low - 0.01 <= at[k] <= high + 0.01]
         self._body.append(f'<g data-ticks="{which}">' if ax.get_gid() else "<g>")
-        # where a tick begins and ends across the axis, downwards
+        # start and length of a tick on each side, across the axis
         edges = {
             near: (height - box.y0, length) if i == 0 else (box.x0, -length),
-            far: (height - box.y1, -length) if i == 0 else (box.x1, length),
+            opposite: (height - box.y1, -length) if i == 0 else (box.x1, length),
         }
-        if known.get("gridOn", RC["axes.grid"]):
+        if params.get("gridOn", RC["axes.grid"]):
             look = f'stroke="{to_hex(RC["grid.color"])}" stroke-width="{RC["grid.linewidth"]}"'
             start = edges[near][0]
             ends = (start, box.height * -1.0) if i == 0 else (start, box.width)
             self._strokes([at[k] for k in visible], ends, i, look)
         look = f'stroke="{colour}" stroke-width="0.8"'
-        for side in (near, far):
-            if known.get(side, side == near):
+        for side in (near, opposite):
+            if params.get(side, side == near):
                 self._strokes([at[k] for k in visible], edges[side], i, look)
             if side == near and not isinstance(axis.get_minor_locator(), NullLocator):
-                found = self._places(ax, np.asarray(axis.get_minorticklocs(), float), i)
+                minor = self._places(ax, np.asarray(axis.get_minorticklocs(), float), i)
                 start, long = edges[near]
-                self._strokes([x for x in found if low <= x <= high], (start, 0.57 * long), i, look)
+                self._strokes([x for x in minor if low <= x <= high], (start, 0.57 * long), i, look)
         widest = 0.0
-        for side in (near, far):
-            if not known.get(f"label{side}", side == near):
+        for side in (near, opposite):
+            if not params.get(f"label{side}", side == near):
                 continue
             start, long = edges[side]
-            off = start + long + np.sign(long) * pad
+            edge = start + long + np.sign(long) * pad
             for k in visible:
                 widest = max(widest, self.width(texts[k], size))
                 if i == 0:
-                    down = off + ASCENT * size if side == near else off - DESCENT * size
-                    self._write(at[k], down, texts[k], size, "center", words)
+                    down = edge + ASCENT * size if side == near else edge - DESCENT * size
+                    self._write(at[k], down, texts[k], size, "center", ink)
                 else:
                     aligned = "right" if side == near else "left"
-                    self._write(off, height - at[k] + 0.36 * size, texts[k], size, aligned, words)
+                    self._write(edge, height - at[k] + 0.36 * size, texts[k], size, aligned, ink)
         self._body.append("</g>")
-        self._label(ax, axis, i, (widest, size) if known.get(f"label{near}", True) else (0.0, 0.0))
+        self._label(ax, axis, i, (widest, size) if params.get(f"label{near}", True) else (0.0, 0.0))
         if offset := axis.get_major_formatter().get_offset():
             place = (box.x1, height - box.y0 + 2.2 * size), (box.x0, height - box.y1 - 3)
-            self._write(*place[i], offset, size, ("right", "left")[i], words)
+            self._write(*place[i], offset, size, ("right", "left")[i], ink)
 
     def _places(self, ax: Any, values: Any, i: int) -> Any:
-        """Return where values of an axis stand, in points from the left or from below."""
+        """Return the positions of values of an axis, in points from the left or from below."""
         both = np.zeros((values.size, 2))
         both[:, i] = values
         transform = ax.get_xaxis_transform() if i == 0 else ax.get_yaxis_transform()
         return transform.transform(both)[:, i]
 
     def _strokes(self, at: list[float], ends: tuple[float, float], i: int, look: str) -> None:
-        """Draw parallel lines across an axis, each from where it starts and of the same length."""
-        start, long = (_number(x) for x in ends)
+        """Draw parallel lines across an axis; `ends` are their common start and length."""
+        start, length = (_number(x) for x in ends)
         if i == 0:
-            path = "".join(f"M{_number(x)} {start}v{long}" for x in at)
+            path = "".join(f"M{_number(x)} {start}v{length}" for x in at)
         else:
-            path = "".join(f"M{start} {_number(self._size[1] - y)}h{long}" for y in at)
+            path = "".join(f"M{start} {_number(self._size[1] - y)}h{length}" for y in at)
         if path:
             self._body.append(f'<path d="{path}" {look}/>')
 
     def _label(self, ax: Any, axis: Any, i: int, numbers: tuple[float, float]) -> None:
-        """Draw the label of an axis beyond the numbers of its ticks, or at its own place if they leave it free."""
+        """Draw the label of an axis beyond its tick labels, or at its fixed position if they leave that free."""
         if not axis.label.get_text():
             return
         which, near = (("x", "bottom"), ("y", "left"))[i]
@@ -271,7 +271,7 @@ class Writer(RendererBase):  # type: ignore[misc, unused-ignore]
         axis.label.draw(self)
 
     def _legend(self, legend: Any) -> None:
-        """Draw a legend, with the key of its curve at every entry."""
+        """Draw a legend; each entry carries the key of its curve."""
         parent = legend.parent
         every = parent.axes if isinstance(parent, Figure) else [parent]
         lines = [line for ax in every if ax.get_gid() for line in ax.get_lines()]
@@ -289,16 +289,16 @@ class Writer(RendererBase):  # type: ignore[misc, unused-ignore]
                 text.set_gid(tag)
         legend.draw(self)
 
-    # what artists call
+    # the interface that artists call
 
     def open_group(self, s: str, gid: str | None = None) -> None:
-        """Begin a group where the artist was tagged."""
+        """Begin a group if the artist is tagged."""
         if gid in self._tags:
             self._body.append(f"<g{self._tags[gid]}>")
             self._open.append(s)
 
     def close_group(self, s: str) -> None:
-        """End the group of an artist that was tagged."""
+        """End the group of a tagged artist."""
         if self._open and self._open[-1] == s:
             self._open.pop()
             self._body.append("</g>")
@@ -308,13 +308,13 @@ class Writer(RendererBase):  # type: ignore[misc, unused-ignore]
         return self._size
 
     def width(self, text: str, size: float) -> float:
-        """Return about how wide a text is [point]."""
+        """Estimate the width of a text [point]."""
         return size * sum(map(_letter, text))
 
     def get_text_width_height_descent(
         self, s: str, prop: Any, ismath: Any
     ) -> tuple[float, float, float]:
-        """Return about how large a line of text is [point]."""
+        """Estimate width, height and descent of a line of text [point]."""
         size = prop.get_size_in_points()
         wide = self.width(s, size) * (BOLD if prop.get_weight() == "bold" else 1.0)
         return wide, size * (ASCENT + DESCENT), size * DESCENT
@@ -326,7 +326,7 @@ class Writer(RendererBase):  # type: ignore[misc, unused-ignore]
     def draw_text(
         self, gc: Any, x: float, y: float, s: str, prop: Any, angle: float, ismath: Any = False, mtext: Any = None
     ) -> None:  # fmt: skip
-        """Write a line of text whose base line begins at `x`, `y`."""
+        """Write a line of text whose baseline begins at `x`, `y`."""
         size = prop.get_size_in_points()
         wide, _, _ = self.get_text_width_height_descent(s, prop, ismath)
         aligned = mtext.get_horizontalalignment() if mtext is not None and not angle else "left"
@@ -346,7 +346,7 @@ class Writer(RendererBase):  # type: ignore[misc, unused-ignore]
         self, x: float, y: float, text: str, size: float, aligned: str, colour: str,
         angle: float = 0.0, wide: float | None = None, more: str = "",
     ) -> None:  # fmt: skip
-        """Write a line of text where its alignment says, and note how far it reaches."""
+        """Write a line of text, aligned at `x`, `y`, and extend the frame to hold it."""
         if not text.strip():
             return
         wide = self.width(text, size) if wide is None else wide
@@ -379,7 +379,7 @@ class Writer(RendererBase):  # type: ignore[misc, unused-ignore]
         """Draw a marker at every point of a path."""
         places = (trans + self._flip).transform(path.vertices)
         width, height = self._size
-        # what is far outside is clipped anyway, and its numbers may be too large for a browser
+        # distant markers are clipped anyway, and their numbers may be too large for a browser
         near = np.all((places > -9.0) & (places < (width + 9.0, height + 9.0)), axis=1)
         if not near.any():
             return
@@ -391,7 +391,7 @@ class Writer(RendererBase):  # type: ignore[misc, unused-ignore]
         self._body.append(f"<g{self._look(gc, rgbFace)}>{uses}</g>")
 
     def draw_image(self, gc: Any, x: float, y: float, im: Any, transform: Any = None) -> None:
-        """Draw an image of shape (rows, columns, 4); bytes."""
+        """Draw an image: bytes of shape (rows, columns, 4)."""
         from PIL import Image
 
         stream = io.BytesIO()
@@ -402,7 +402,7 @@ class Writer(RendererBase):  # type: ignore[misc, unused-ignore]
         self._body.append(f'<image {place} xlink:href="data:image/png;base64,{content}"/>')
 
     def _image(self, artist: Any) -> None:
-        """Draw an artist of very many elements as an image."""
+        """Draw an artist with very many elements as an image."""
         from matplotlib.backends.backend_agg import RendererAgg
 
         figure = artist.get_figure(root=True)
@@ -411,17 +411,17 @@ class Writer(RendererBase):  # type: ignore[misc, unused-ignore]
         artist.draw(agg)
         figure.set_dpi(POINT)
         pixels = np.asarray(agg.buffer_rgba())
-        there = np.nonzero(pixels[..., 3])
-        if not there[0].size:
+        opaque = np.nonzero(pixels[..., 3])
+        if not opaque[0].size:
             return
-        (top, bottom), (left, right) = ((int(p.min()), int(p.max()) + 1) for p in there)
+        (top, bottom), (left, right) = ((int(p.min()), int(p.max()) + 1) for p in opaque)
         x, y = left * POINT / RASTER, (pixels.shape[0] - bottom) * POINT / RASTER
         self.draw_image(None, x, y, np.ascontiguousarray(pixels[top:bottom, left:right]))
 
     # elements
 
     def _data(self, path: Any, transform: Any, is_line: bool) -> str:
-        """Return the data of a path."""
+        """Return the SVG path data of a path."""
         simplify = bool(path.should_simplify and is_line)
         clip = (0.0, -self._size[1], *self._size) if is_line else None  # a legend may stand above
         raw = cast(Any, _path).convert_to_string(
@@ -431,31 +431,31 @@ class Writer(RendererBase):  # type: ignore[misc, unused-ignore]
         return text.replace("L ", "L").replace("M ", "M")
 
     def _look(self, gc: Any, face: Any) -> str:
-        """Return what colours and lines an element has, as attributes."""
+        """Return the fill, stroke and clipping of an element as attributes."""
         rgba, forced = gc.get_rgb(), gc.get_forced_alpha()
-        found = []
+        attributes = []
         if face is None or (len(face) == 4 and face[3] == 0.0):
-            found.append('fill="none"')
+            attributes.append('fill="none"')
         else:
-            found.append(f'fill="{to_hex(face[:3])}"')
+            attributes.append(f'fill="{to_hex(face[:3])}"')
             if len(face) == 4 and face[3] != 1.0 and not forced:
-                found.append(f'fill-opacity="{_number(face[3])}"')
+                attributes.append(f'fill-opacity="{_number(face[3])}"')
         if forced and gc.get_alpha() != 1.0:
-            found.append(f'opacity="{_number(gc.get_alpha())}"')
+            attributes.append(f'opacity="{_number(gc.get_alpha())}"')
         if (wide := gc.get_linewidth()) and rgba[3] > 0.0:
-            found += [f'stroke="{to_hex(rgba[:3])}"', f'stroke-width="{_number(wide)}"']
+            attributes += [f'stroke="{to_hex(rgba[:3])}"', f'stroke-width="{_number(wide)}"']
             if rgba[3] != 1.0 and not forced:
-                found.append(f'stroke-opacity="{_number(rgba[3])}"')
+                attributes.append(f'stroke-opacity="{_number(rgba[3])}"')
             offset, dashes = gc.get_dashes()
             if dashes is not None:
-                found.append(f'stroke-dasharray="{_numbers(*dashes)}"')
-                found += [f'stroke-dashoffset="{_number(offset)}"'] if offset else []
+                attributes.append(f'stroke-dasharray="{_numbers(*dashes)}"')
+                attributes += [f'stroke-dashoffset="{_number(offset)}"'] if offset else []
         box = gc.get_clip_rectangle()
         if box is not None:
             place = _place(box.x0, self._size[1] - box.y1, box.width, box.height)
             key = self._shared(f'<clipPath id="#"><rect {place}/></clipPath>')
-            found.append(f'clip-path="url(#{key})"')
-        return " " + " ".join(found)
+            attributes.append(f'clip-path="url(#{key})"')
+        return " " + " ".join(attributes)
 
     def _hatch(self, gc: Any) -> str:
         data = self._data(gc.get_hatch_path(), Affine2D().scale(POINT), False)
@@ -464,5 +464,5 @@ class Writer(RendererBase):  # type: ignore[misc, unused-ignore]
         return self._shared(f'<pattern id="#" {box}>{line}</pattern>')
 
     def _shared(self, element: str) -> str:
-        """Return the id of an element that others refer to."""
+        """Define an element that others refer to, once, and return its id."""
         return self._defs.setdefault(element, f"{self._name}-{len(self._defs)}")

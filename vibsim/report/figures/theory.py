@@ -1,4 +1,4 @@
-"""What theory predicts of schemes beside what was measured: growth and phase error against w dt, and runs that grow.
+"""Theory beside measurement: growth and phase error of schemes against w dt, and unstable runs.
 
 Source: vibration text, sections 4.1 to 4.6, and exercise 2; theory from the matrix of a scheme's own step; section 4.5
 (figure 4): beyond the limit of stability the amplitude grows by a constant factor in each step.
@@ -23,24 +23,26 @@ from vibsim.report.tables.theory import predicted
 from vibsim.report.types import Axes, Experiment
 
 CURVE_POINTS = 240  # points of a curve
-SMALLEST = 1e-13  # growth and phase error below this are round-off of what they are taken from
+SMALLEST = (
+    1e-13  # smaller growth and phase errors are round-off of the numbers they are computed from
+)
 KINDS = ("growth", "phase error")
-SAME_CURVE = 1e-9  # curves that differ by less than this part of themselves are the same
+SAME_CURVE = 1e-9  # relative difference below which curves are the same
 FEW_DOTS = 40  # dots of one scheme up to which they are large
-MOST_RUNS = 6  # most unstable runs that are drawn: the slowest and the fastest among them
-NOTABLE = 1e-3  # a run is drawn where it grows over the whole time by more than this part
-FULLY_DRAWN = 4.0  # on a linear scale the solution is drawn up to so many times the exact one
-LARGEST_DRAWN = 1e250  # sizes beyond are not drawn
+MOST_RUNS = 6  # most unstable runs that are drawn, from the slowest to the fastest
+NOTABLE = 1e-3  # least growth per period, less one, of an unstable run that is drawn
+FULLY_DRAWN = 4.0  # limit of the linear scale over the size of the exact solution
+LARGEST_DRAWN = 1e250  # larger sizes are not drawn
 SEEN = 0.2
-"""Only runs that stay within the frame for so much of the time are drawn beside the exact solution."""
+"""Further runs join the linear panel only if they stay within it for this fraction of the time."""
 LEAVES_FRAME = 100.0
-"""What is beyond so many times the exact solution is not drawn on that scale, so that curves leave the frame."""
+"""Curves on the linear scale end at this multiple of the exact solution, outside the frame."""
 
 
 def order_and_stability(experiment: Experiment, record: Record) -> Picture | None:
-    """Draw ``|growth per period − 1|`` and the phase error per period against w dt; None where theory has nothing.
+    """Draw ``|growth per period − 1|`` and the phase error per period against w dt.
 
-    There must be two different values of w dt at least: of a sweep, or of several levels.
+    None if theory predicts nothing, or for fewer than two values of w dt in levels and members.
     """
     p = omega_dt(record)
     if not predicted(record) or np.unique(p[np.isfinite(p) & (p > 0.0)]).size < 2:
@@ -55,7 +57,7 @@ def order_and_stability(experiment: Experiment, record: Record) -> Picture | Non
     curves = [_theory(experiment, s, grid) for s in range(len(record["scheme"]))]
     limits = pick_or_nan(record, "stability_limit", MEMBER)[:, 0]
     for k, (ax, (from_theory, measured)) in enumerate(zip(axes, (growth, phase), strict=True)):
-        # what has no theory, such as an adaptive scheme, has no place over w dt
+        # schemes without theory, such as adaptive ones, have no w dt
         found = np.where(np.isnan(from_theory), np.nan, measured)
         for s, name in enumerate(record.words("scheme")):
             if np.isnan(from_theory[s]).all():
@@ -99,31 +101,31 @@ def order_and_stability(experiment: Experiment, record: Record) -> Picture | Non
 def _alike(
     names: list[str], curves: list[tuple[Floats, Floats] | None]
 ) -> list[tuple[str, str, str]]:
-    """Return which curves lie on an earlier one: what they are of, the scheme, and the earlier scheme."""
-    found = []
+    """Return the curves that coincide with an earlier one: kind, scheme, and earlier scheme."""
+    same = []
     drawn = [(name, curve) for name, curve in zip(names, curves, strict=True) if curve is not None]
     for k, kind in enumerate(KINDS):
         sizes = [np.log(_visible(curve[k])) for _, curve in drawn]
         firsts = frame.same_as(sizes, SAME_CURVE / frame.LOOKS_ALIKE)
         for (name, _), first in zip(drawn, firsts, strict=True):
             if first is not None:
-                found.append((kind, name, drawn[first][0]))
-    return found
+                same.append((kind, name, drawn[first][0]))
+    return same
 
 
 def _visible(values: Floats) -> Floats:
-    """Return sizes; NaN for those that are round-off."""
+    """Return absolute values; NaN for round-off."""
     return np.where(np.abs(values) < SMALLEST, np.nan, np.abs(values))
 
 
 def _sentence(alike: list[tuple[str, str, str]]) -> str:
-    """Say for the caption which curves are the same; empty where none are."""
+    """Say for the caption which curves coincide; empty if none do."""
     phrases = []
     for kind in KINDS:
         groups: dict[str, list[str]] = {}
-        for found, name, other in alike:
-            if found == kind:
-                groups.setdefault(other, []).append(name)
+        for alike_kind, name, first in alike:
+            if alike_kind == kind:
+                groups.setdefault(first, []).append(name)
         phrases += [
             f"{kind} of {', '.join(names)} as of {first}" for first, names in groups.items()
         ]
@@ -131,9 +133,9 @@ def _sentence(alike: list[tuple[str, str, str]]) -> str:
 
 
 def _theory(experiment: Experiment, s: int, grid: Floats) -> tuple[Floats, Floats] | None:
-    """Return growth per period less one and phase error over the period on a grid of w dt.
+    """Return growth per period minus one, and phase error over the period, on a grid of w dt.
 
-    None for an adaptive scheme, and where an option of the scheme is swept: then there is no one curve.
+    None for an adaptive scheme or one with a swept option, which has no single curve.
     """
     from vibsim import theory
 
@@ -158,16 +160,15 @@ def _dots(ax: Axes, p: Floats, y: Floats, look: dict[str, Any], text: str) -> No
         ax.plot(p[keep], size[keep], **mark, markerfacecolor=face, zorder=3)
 
 
-def _finish(ax: Axes, from_theory: Floats, found: Floats, limits: Floats, grid: Floats) -> None:
-    """Choose both logarithmic ranges, and mark the limits of stability at the upper edge.
+def _finish(ax: Axes, from_theory: Floats, measured: Floats, limits: Floats, grid: Floats) -> None:
+    """Set both logarithmic ranges, and mark the limits of stability at the upper edge.
 
-    The range is that of theory, as far as it predicts anything but zero, and of what lies above: far below there is
-    round-off only.
+    The vertical range holds the nonzero predictions and everything above them; far below is only round-off.
     """
     predicted_size = from_theory[np.isfinite(from_theory) & (np.abs(from_theory) >= SMALLEST)]
     lowest = float(np.min(np.abs(predicted_size), initial=np.inf))
     least = lowest / 10.0 if math.isfinite(lowest) else SMALLEST
-    values = np.concatenate([from_theory.ravel(), found.ravel()])
+    values = np.concatenate([from_theory.ravel(), measured.ravel()])
     size = np.abs(values[np.isfinite(values) & (np.abs(values) >= least)])
     if size.size == 0:
         style.remark(ax, "theory and measurement agree: there is none")
@@ -182,10 +183,7 @@ def _finish(ax: Axes, from_theory: Floats, found: Floats, limits: Floats, grid: 
 
 
 def growing(experiment: Experiment, record: Record) -> Picture | None:
-    """Draw the solutions that theory predicts to grow without bound, and their predicted growth; None without such.
-
-    These are runs with w dt beyond the limit of stability of their scheme, or at it.
-    """
+    """Draw the runs with w dt at or beyond the limit of stability, and their predicted growth; None without any."""
     runs = _unstable(record)
     if not runs:
         return None
@@ -203,11 +201,11 @@ def growing(experiment: Experiment, record: Record) -> Picture | None:
             within = np.abs(values) <= LEAVES_FRAME * most if most > 0.0 else np.isfinite(values)
             inner = style.thin(t, np.where(within, values, np.nan))
             upper.plot(*inner, color=colour, linewidth=1.2)
-        # the margin of an axis would overflow beyond
+        # larger sizes would overflow the margin of the axis
         size = style.no_zeros(values)
         size = np.where(size < LARGEST_DRAWN, size, np.nan)
         sizes.append(size)
-        text = _of_run(record, member, level)
+        text = _run_label(record, member, level)
         lower.plot(*style.thin(t, size), color=colour, linewidth=0.9, label=text)
         growth = data.at(record, "theory_growth", member, level=level).item()
         w = data.natural_frequency(record, member.case)
@@ -220,10 +218,10 @@ def growing(experiment: Experiment, record: Record) -> Picture | None:
             upper.plot(*style.thin(t, exact), color="black", linestyle=(0, (1, 2)), zorder=5)
     if reference > 0.0:
         upper.set_ylim(-FULLY_DRAWN * reference, FULLY_DRAWN * reference)
-    found = style.finite(*sizes)
-    found = found if found.size else np.array([1.0])
-    least = 0.2 * (reference or float(np.median(found)))
-    style.log_axis(lower, "y", least, 3.0 * float(found.max()))
+    finite = style.finite(*sizes)
+    finite = finite if finite.size else np.array([1.0])
+    least = 0.2 * (reference or float(np.median(finite)))
+    style.log_axis(lower, "y", least, 3.0 * float(finite.max()))
     upper.set_ylabel(style.label(letter, measure))
     lower.set_ylabel(style.label(f"|{letter}|", measure))
     beside = "The slowest beside the exact solution (dotted)"
@@ -247,18 +245,18 @@ def _unstable(record: Record) -> list[tuple[Member, int]]:
     """Choose the unstable runs, from the slowest growth to the fastest."""
     growth = pick_or_nan(record, "theory_growth", OF_LEVEL)
     limit, product = pick_or_nan(record, "stability_limit", MEMBER), omega_dt(record)
-    found: list[tuple[float, Member, int]] = []
+    runs: list[tuple[float, Member, int]] = []
     for member in data.all_members(record):
         most = float(limit[member.scheme, member.case])
         for i, factor in enumerate(growth[member.scheme, member.case].tolist()):
             is_beyond = 0.0 < most <= product[member.case, i] * (1.0 + 1e-9)
             if is_beyond and factor > 1.0 + NOTABLE:
-                found.append((factor, member, i))
-    found.sort(key=lambda run: run[0])
-    return [found[i][1:] for i in style.spaced(len(found), MOST_RUNS)]
+                runs.append((factor, member, i))
+    runs.sort(key=lambda run: run[0])
+    return [runs[i][1:] for i in style.spaced(len(runs), MOST_RUNS)]
 
 
-def _of_run(record: Record, member: Member, level: int) -> str:
+def _run_label(record: Record, member: Member, level: int) -> str:
     from_theory, measured = (
         words.number(data.at(record, f"{who}_growth", member, level=level).item())
         for who in ("theory", "measured")

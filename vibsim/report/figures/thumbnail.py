@@ -1,6 +1,6 @@
-"""The small picture of an experiment for the index: a map, a response curve, a path in the plane, or the solution.
+"""The thumbnail of an experiment for the index: a map, a response curve, a path in the plane, or the solution.
 
-It is written as SVG of its own, some kilobytes, with the colours of the page for light and dark.
+It is a small hand-written SVG with the colours of the page for light and dark.
 """
 
 from __future__ import annotations
@@ -25,13 +25,13 @@ EDGE = 5.0  # free space around curves
 CURVES = 3  # most curves in one picture
 CELLS = 48, 24  # most cells of a map across and up
 SHADES = 7  # colours of a map
-FLAT = 1e-2  # a number that varies by less than this part of its size makes no curve and no map
-FEWEST_VALUES = 8  # swept values that make a response curve; of fewer the solutions are drawn
-WIDE = 1e3  # a number whose largest value exceeds its median by this factor is drawn on a logarithmic scale
+FLAT = 1e-2  # smallest relative variation of a number that is drawn as curve or map
+FEWEST_VALUES = 8  # swept values of a response curve; with fewer, solutions are drawn
+WIDE = 1e3  # ratio of largest value to median above which the scale is logarithmic
 BEYOND = 1.5
-"""What leaves the smallest of several solutions by more than this factor is cut off."""
+"""Solutions beyond this multiple of the smallest of them are cut off."""
 NUMBERS = ("amplitude", "period", "growth_per_period")
-"""What is drawn over swept parameters: the first that varies. Of a motion that keeps its energy the period is first."""
+"""Candidates for a response curve or map: the first that varies; for conservative motions the period comes first."""
 
 _STYLE = (
     ":root{color-scheme:light dark}path{fill:none;stroke-width:1.8;stroke-linejoin:round;stroke-linecap:round}"
@@ -39,13 +39,13 @@ _STYLE = (
     "@media(prefers-color-scheme:dark){.c0{stroke:#5cb3e8}.c1{stroke:#ff8c42}.c2{stroke:#2fc597}}"
 )
 _ENDS = (68, 1, 84), (33, 145, 140), (253, 231, 37)
-"""Colours of a map for the least, a middle and the largest value, as on the page."""
+"""Colours of a map for the smallest, a middle and the largest value, as on the page."""
 
 Lines = list[tuple[Floats, Floats]]
 
 
 def thumbnail(experiment: Experiment, record: Record, member: Member) -> str:
-    """Return the small picture as an SVG document; `member` is the one whose motion is drawn where no sweep is."""
+    """Return the thumbnail as an SVG document; without a response to a sweep it shows the motion of `member`."""
     layout = sweep_layout.layout_of(experiment, record)
     model = experiment.model.definition
     names = sorted(NUMBERS, key="period".__ne__) if model.conservative else NUMBERS
@@ -66,13 +66,13 @@ def thumbnail(experiment: Experiment, record: Record, member: Member) -> str:
 
 
 def _reach(values: Floats) -> float:
-    """Return the distance of the largest from the smallest finite value; 0 where there is none."""
-    there = style.finite(values)
-    return float(np.ptp(there)) if there.size else 0.0
+    """Return the range of the finite values; 0 without any."""
+    finite = style.finite(values)
+    return float(np.ptp(finite)) if finite.size else 0.0
 
 
 def _solutions(record: Record, position: str, member: Member, layout: Along | Grid | None) -> Lines:
-    """Return the finest level of some members along a line, else of each scheme; of one also the coarsest level."""
+    """Return the finest level of some members along a line, else of each scheme; a single one also on the coarsest."""
     t = data.times(record, member.case)
     of = data.of_case(record, member.case)[:CURVES]
     if isinstance(layout, Along):
@@ -94,7 +94,7 @@ def _solutions(record: Record, position: str, member: Member, layout: Along | Gr
 
 
 def _response(record: Record, along: Along, names: Sequence[str]) -> Lines:
-    """Return a number over the swept key, a curve for each of the other values; nothing where none varies."""
+    """Return a number over the swept key, one curve for each line of members; empty if no number varies."""
     key = along.key
     if key.distinct.size < FEWEST_VALUES:
         return []
@@ -110,7 +110,7 @@ def _response(record: Record, along: Along, names: Sequence[str]) -> Lines:
 
 
 def _map(record: Record, grid: Grid, names: Sequence[str], position: str) -> list[str]:
-    """Return the cells of a map in colours; nothing where no number varies over it."""
+    """Return the coloured cells of a map; empty if no number varies."""
     found = [np.abs(data.pick_or_nan(record, name, MEMBER, level=-1)[0]) for name in names]
     found.append(np.log10(style.no_zeros(finest_level.error(record, position).best[0])))
     values = next((values for values in found if is_telling(values)), None)
@@ -127,7 +127,7 @@ def _map(record: Record, grid: Grid, names: Sequence[str], position: str) -> lis
 
 
 def _cells(shade: NDArray[Any]) -> Iterator[str]:
-    """Yield a path of all cells of each shade; the first row is at the bottom."""
+    """Yield one path with all cells of each shade; the first row is at the bottom."""
     rows, columns = shade.shape
     width, height = WIDTH / columns, HEIGHT / rows
     for k in range(SHADES):
@@ -146,7 +146,7 @@ def _cells(shade: NDArray[Any]) -> Iterator[str]:
 
 
 def is_telling(values: Floats) -> bool:
-    """Say whether values vary enough to be drawn."""
+    """Return whether enough values are finite and vary enough to be drawn."""
     is_known = 2 * style.finite(values).size > values.size
     return bool(is_known and _reach(values) > FLAT * data.largest(values))
 
@@ -175,7 +175,7 @@ def document(lines: Lines, *, is_equal: bool = False) -> str:
 
 
 def outline(x: Floats, y: Floats) -> str:
-    """Return points as the data of a path, in tenths of a pixel; it is interrupted where one is not finite."""
+    """Return points as SVG path data, in tenths of a pixel, interrupted at points that are not finite."""
     parts, before, pen = [], "", "M"
     for across, up in zip(x.tolist(), y.tolist(), strict=True):
         if not (math.isfinite(across) and math.isfinite(up)):

@@ -1,4 +1,4 @@
-"""Figures over time: do the rescaled differences coincide, what is the ratio between them, and which order has it?
+"""Figures over time: the rescaled differences of levels, their ratios, and the local order.
 
 Source: pendulum lecture, sections 2.5 and 2.6; `vibsim.convergence.local_order` for the order in windows.
 """
@@ -19,16 +19,16 @@ from vibsim.report.figures import panels
 from vibsim.report.style import Picture
 from vibsim.report.types import Axes
 
-MOST_CURVES = 6  # most curves in one panel; more cannot be told apart
-ORDERS = 3  # triples whose order is drawn over time: the finest ones above round-off
+MOST_CURVES = 6  # in one panel; more cannot be told apart
+ORDERS = 3  # most triples whose order is drawn over time: the finest ones above round-off
 UNSURE = 1.0
-"""An interval of an order that is wider, or unbounded, leaves a place marked as uncertain."""
-ROOM, BEYOND = 0.35, 3.0  # least and most distance from the promised order to the frame
+"""An order whose interval is wider, or unbounded, is drawn as uncertain."""
+ROOM, BEYOND = 0.35, 3.0  # least and most distance from the formal order to the edge of the frame
 SPREAD = "the spread: how far each curve is from the finest one above round-off."
 
 
 def name_of_differences(quantity: str, member: Member) -> str:
-    """Return the name of the picture that `overlay` draws."""
+    """Return the name of the picture of `overlay`."""
     return f"differences_{quantity}_{member.stem}"
 
 
@@ -80,7 +80,7 @@ def energy(record: Record, member: Member) -> Picture:
     order = data.rescaling_order(record, member, name)
     measure, t = data.unit(record, f"{name}_scaled"), data.times(record, member.case)
     above = data.sound_pairs(record, name, member) if len(levels) > 1 else [True]
-    # the error of the finest level is seen in the difference from the one before it
+    # the finest level is as sound as its difference from the next coarser one
     above = [*above, above[-1]][: len(levels)]
     curves = []
     for i in _few(above):
@@ -129,7 +129,7 @@ def differences(record: Record, quantity: str, member: Member) -> list[panels.Cu
 
 
 def _lost(record: Record, quantity: str, member: Member, levels: list[int]) -> str:
-    """Say why values of these positions of levels would mean nothing (see `frame.why_lost`)."""
+    """Say why values that come from `levels` (positions) would mean nothing (see `frame.why_lost`)."""
     values = np.zeros(1)
     if f"{quantity}_scaled" in record and len(levels) == 1:
         values = data.at(record, f"{quantity}_scaled", member, level=levels[0])
@@ -139,7 +139,7 @@ def _lost(record: Record, quantity: str, member: Member, levels: list[int]) -> s
 
 
 def _multiplied(order: float, levels: list[int]) -> str:
-    """Say what the differences are multiplied by."""
+    """Say by which factors the differences are rescaled."""
     targets = {float(target_ratio(order, levels[i : i + 3])) for i in range(len(levels) - 2)}
     if len(targets) > 1:
         return "each multiplied by the number before it"
@@ -147,15 +147,15 @@ def _multiplied(order: float, levels: list[int]) -> str:
 
 
 def _few(sound: list[bool]) -> list[int]:
-    """Choose curves: the coarsest, the two finest sound ones, some between, and the first that is lost behind them.
+    """Choose curves: the coarsest, the two finest sound ones, some between, and the next finer one, lost in round-off.
 
-    Where none is sound, round-off is what there is to see, and all count.
+    If none is sound, the figure shows round-off, and all are candidates.
     """
     shown = [i for i, good in enumerate(sound) if good] or list(range(len(sound)))
     lost = [i for i, good in enumerate(sound) if not good and i > max(shown, default=-1)][:1]
-    room = MOST_CURVES - len(lost)
-    if len(shown) > room:
-        between = np.linspace(0, len(shown) - 2, room - 1).round().astype(int)
+    most_shown = MOST_CURVES - len(lost)
+    if len(shown) > most_shown:
+        between = np.linspace(0, len(shown) - 2, most_shown - 1).round().astype(int)
         shown = [*(shown[i] for i in between), shown[-1]]
     return [*shown, *lost]
 
@@ -179,15 +179,15 @@ def _draw_ratios(
     if not drawn:
         style.remark(ax, _why_no_ratio(good, lost))
     targets = sorted({float(target_ratio(order, levels[i : i + 3])) for i in _few(good)})
-    # a line would strike the remark through
+    # a line would cross out the remark
     for k, target in enumerate(targets if drawn else []):
         text = "" if k else data.basis_of_order(record, quantity)
         ax.axhline(target, **style.REFERENCE, label=text)
-    # the target and the middle nine tenths of the ratios, but no wild outlier
-    every = style.finite(*drawn)
-    every = every if every.size else np.array(targets)
-    low = min(float(np.quantile(every, 0.05)), 0.97 * targets[0])
-    high = max(float(np.quantile(every, 0.95)), 1.03 * targets[-1])
+    # the frame holds the targets and the middle 90 % of the ratios, without wild outliers
+    ratios = style.finite(*drawn)
+    ratios = ratios if ratios.size else np.array(targets)
+    low = min(float(np.quantile(ratios, 0.05)), 0.97 * targets[0])
+    high = max(float(np.quantile(ratios, 0.95)), 1.03 * targets[-1])
     room = 0.15 * (high - low)
     ax.set_ylim(max(low - room, -targets[-1]), min(high + room, 3 * targets[-1]))
     ax.set_ylabel("ratio")
@@ -209,22 +209,22 @@ def _why_no_ratio(good: list[bool], lost: list[str]) -> str:
 
 
 def has_order(record: Record, quantity: str, member: Member) -> bool:
-    """Tell whether there is an order over time to be drawn."""
+    """Return whether the record has an order over time."""
     name = f"{quantity}_local_order"
     return name in record and bool(np.isfinite(data.at(record, name, member)).any())
 
 
 def finest_sound(sound: list[bool]) -> list[int]:
-    """Choose triples: the finest ones that stand above round-off; where none does, the coarsest."""
+    """Choose triples: the finest ones above round-off, else the coarsest."""
     return [i for i, good in enumerate(sound) if good][-ORDERS:] or [0]
 
 
 def _draw_orders(
     ax: Axes, t: Floats, record: Record, quantity: str, member: Member, good: list[bool]
 ) -> None:
-    """Draw the order over time of the finest triples, their intervals, and the promised order.
+    """Draw the order over time of the finest triples with their intervals, and the formal order.
 
-    A triple has the colour of its ratio. The last point stands apart; where an order is uncertain it is a grey dot.
+    A triple has the colour of its ratio. The last point is drawn separately; uncertain orders are grey dots.
     """
     levels, promised = data.whole(record, "level"), data.formal_order(record, member, quantity)
     colours = _few(good)
@@ -251,12 +251,12 @@ def _draw_orders(
         ax.plot(t[-1:], order[-1:], clip_on=False, zorder=5, **point)
         unsure = np.isfinite(order) & ~sure
         if unsure.any():
-            every = max(1, int(np.count_nonzero(unsure)) // 60)
-            x, y = t[unsure][::every], order[unsure][::every]
+            stride = max(1, int(np.count_nonzero(unsure)) // 60)
+            x, y = t[unsure][::stride], order[unsure][::stride]
             ax.plot(x, y, ".", color="#a0a0a0", markersize=2.6, zorder=1.5, gid=group)
         drawn += [order[sure] if sure.any() else order, order[-1:]]
-    found = style.finite(*drawn)
-    ends = np.array([found.min(), found.max()] if found.size else [])
+    orders = style.finite(*drawn)
+    ends = np.array([orders.min(), orders.max()] if orders.size else [])
     if math.isfinite(promised):
         ax.axhline(promised, **style.REFERENCE, label=data.basis_of_order(record, quantity))
         low_end = max(float(min([promised - ROOM, *(ends - 0.1)])), promised - BEYOND)

@@ -1,4 +1,4 @@
-"""Work and precision: the error against steps, evaluations of the force and estimated time, as figure and as table.
+"""Work and precision: the error against steps, force evaluations and estimated time, as figure and as table.
 
 Source: E. Hairer, S. P. Norsett and G. Wanner, Solving Ordinary Differential Equations I, section II.10 (diagrams of
 error against work); vibration text, exercise 4.
@@ -34,21 +34,21 @@ from vibsim.report.types import Axes, Experiment
 
 def precision(experiment: Experiment, record: Record, case: int) -> Picture | None:
     """Draw the error against steps, evaluations and time; None for fewer than two lines with several points."""
-    found = lines(experiment, record, case)
-    if sum(line.error.size > 1 for line in found) < 2:
+    drawn = lines(experiment, record, case)
+    if sum(line.error.size > 1 for line in drawn) < 2:
         return None
     figure, axes = rows_of(3, [(0.675 + 2.835 * i, 2.565) for i in range(3)], 3.1, 0.4, 0.55)
     for ax in axes[1:]:
         ax.sharey(axes[0])
     floor = float(pick_or_nan(record, "work_reference_error", ("case",))[case])
     for k, ax in enumerate(axes):
-        for i, line in enumerate(found):
+        for i, line in enumerate(drawn):
             look = style.look(i) | {"markersize": 4.5, "linewidth": 1.0}
             look |= {"markerfacecolor": "white"} if line.is_adaptive else {}
             ax.plot(line.work[k], style.no_zeros(line.error), label=style.entry(line.name), **look)
         if floor > 0.0:
             ax.axhline(floor, color=style.GREY, linestyle=":", label="error of the reference")
-    _ranges(axes, found)
+    _ranges(axes, drawn)
     letter = words.symbol(position(experiment))
     axes[0].set_ylabel(style.label(f"largest error of {letter}", unit(record, "work_error")))
     for ax, text in zip(axes, ("steps", "force evaluations", "estimated time [s]"), strict=True):
@@ -64,7 +64,7 @@ def precision(experiment: Experiment, record: Record, case: int) -> Picture | No
             "Lower left is better: a small error for little work. The slope of a line is minus the order, until "
             "round-off.",
             "Hollow: adaptive methods over their tolerances."
-            * any(line.is_adaptive for line in found),
+            * any(line.is_adaptive for line in drawn),
             "Below the dotted line the reference is no better than the solution." * (floor > 0.0),
             "Of an implicit scheme the evaluations of one iteration per step are counted. The time is that of the cost "
             "model: one compiled member alone, and SciPy's own pace for adaptive methods.",
@@ -74,14 +74,14 @@ def precision(experiment: Experiment, record: Record, case: int) -> Picture | No
     )
 
 
-def _ranges(axes: list[Axes], found: list[Line]) -> None:
-    errors = style.finite(*(line.error[line.error > 0.0] for line in found))
+def _ranges(axes: list[Axes], lines: list[Line]) -> None:
+    errors = style.finite(*(line.error[line.error > 0.0] for line in lines))
     if errors.size:
-        # an unstable level has an error without bound, which would hide all others
+        # the unbounded error of an unstable level would hide all others
         high = min(float(errors.max()), 1e3 * float(np.quantile(errors, 0.75)))
         style.log_axis(axes[0], "y", float(errors.min()) / 3.0, 3.0 * high)
     for k, ax in enumerate(axes):
-        style.fit_log_axis(ax, "x", *(line.work[k] for line in found), room=1.5, most=5)
+        style.fit_log_axis(ax, "x", *(line.work[k] for line in lines), room=1.5, most=5)
 
 
 @dataclass(frozen=True)
@@ -90,26 +90,26 @@ class Line:
 
     name: str
     labels: tuple[str, ...]  # level or tolerance of every point
-    work: tuple[Floats, Floats, Floats]  # steps, evaluations of the force, estimated seconds
+    work: tuple[Floats, Floats, Floats]  # steps, force evaluations, estimated time [s]
     error: Floats
     is_adaptive: bool = False
 
 
 def lines(experiment: Experiment, record: Record, case: int) -> list[Line]:
-    """Return what is drawn of a member; empty where the analysis has no data of the kind."""
+    """Return the lines of a member; empty if the analysis stored no work."""
     if "work_error" not in record:
         return []
-    found, families = [], dict[str, list[int]]()
+    drawn, families = [], dict[str, list[int]]()
     for s, spec in enumerate(experiment.schemes):
         if spec.adaptive:
             families.setdefault(spec.kind, []).append(s)
         else:
-            found.append(_of_levels(experiment, record, s, case))
-    found += [_of_tolerances(experiment, record, kind, s, case) for kind, s in families.items()]
-    return [line for line in found if line.error.size]
+            drawn.append(_over_levels(experiment, record, s, case))
+    drawn += [_over_tolerances(experiment, record, kind, s, case) for kind, s in families.items()]
+    return [line for line in drawn if line.error.size]
 
 
-def _of_levels(experiment: Experiment, record: Record, s: int, case: int) -> Line:
+def _over_levels(experiment: Experiment, record: Record, s: int, case: int) -> Line:
     member = Member(s, case, experiment.schemes[s].name)
     steps, forces, error = _numbers(record, member)
     keep = np.isfinite(error) & np.isfinite(steps)
@@ -118,15 +118,15 @@ def _of_levels(experiment: Experiment, record: Record, s: int, case: int) -> Lin
     return Line(member.scheme_name, labels, (steps, forces, forces * ONE_SECONDS), error)
 
 
-def _of_tolerances(
-    experiment: Experiment, record: Record, kind: str, members: list[int], case: int
+def _over_tolerances(
+    experiment: Experiment, record: Record, kind: str, schemes: list[int], case: int
 ) -> Line:
     """Return the points of the schemes of one adaptive kind, from the loosest tolerance to the tightest."""
     from vibsim.schemes.adaptive import seconds
 
     periods = natural_frequency(record, case) * float(ends_of(record)[case]) / math.tau
     rows = []
-    for s in members:
+    for s in schemes:
         tolerance = float(experiment.schemes[s].options["tolerance"])
         steps, forces, error = (part[-1] for part in _numbers(record, Member(s, case, "")))
         rows.append((-tolerance, steps, forces, seconds(kind, tolerance, periods), error))
@@ -142,7 +142,7 @@ def _numbers(record: Record, member: Member) -> tuple[Floats, Floats, Floats]:
 
 
 def table(experiment: Experiment, record: Record) -> Table | None:
-    """Return error and work of every scheme and level, or tolerance, of the first member; None without such data."""
+    """Return error and work of the first member for every scheme and level, or tolerance; None without such data."""
     found = lines(experiment, record, 0)
     if len(found) < 2:
         return None

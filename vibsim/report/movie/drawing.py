@@ -1,4 +1,4 @@
-"""The frames of a movie: pixels, the same every time."""
+"""The frames of a movie as reproducible pixels."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ from vibsim.report.movie.film import Film
 from vibsim.report.types import Axes
 
 Pixels = NDArray[np.uint8]
-"""Of a frame: shape (height, width, 3)."""
+"""A frame, shape (height, width, 3)."""
 WIDTH, HEIGHT, STAGE, NAMES = 8.0, 2.4, 3.0, 0.8
-"""Width, height of the series over time, and of the drawn systems or of the names above it [inch]."""
+"""Width of a frame; heights of the series over time, and of the drawn systems or the names above it [inch]."""
 INK, DIM, BLUE, RED, GREEN, GOLD = "#16181d", "#69707d", "#1f3a93", "#d1495b", "#0b6e4f", "#a86a12"
 GRID, PALE = "#e6e6e6", "#c4c8ce"
 COLOURS = (INK, DIM, BLUE, RED, GREEN, GOLD, GRID, PALE, "#000000", "#404040")
-"""All that frames show, before they are mixed with the paper."""
+"""All colours of frames, before antialiasing mixes them with the background."""
 CURVES: tuple[dict[str, Any], ...] = (
     {"color": BLUE, "linewidth": 1.6, "zorder": 4},
     {"color": RED, "linewidth": 1.6, "linestyle": (0, (5, 3)), "zorder": 5},
@@ -40,11 +40,11 @@ LOOKS: dict[str, dict[str, Any]] = {
     "pull": {"edgecolor": RED, "linewidth": 2.2},
     "drag": {"edgecolor": GOLD, "linewidth": 2.2},
 }
-"""What differs from `LINE`, by the look of a part; as ``player.css`` has it in the light."""
+"""Look of a part to its differences from `LINE`, as in ``player.css`` for the light scheme."""
 
 
 def frames(film: Film, dots_per_inch: float) -> Iterator[Pixels]:
-    """Yield the frames of a film; each is as large as the others, with an even number of rows and columns."""
+    """Yield the frames of a film, all of one size with an even number of rows and columns."""
     with style.applied():
         from matplotlib.backends.backend_agg import FigureCanvasAgg
         from matplotlib.figure import Figure
@@ -67,13 +67,13 @@ def frames(film: Film, dots_per_inch: float) -> Iterator[Pixels]:
 
 
 def _trace(figure: Any, film: Film, share: float) -> Callable[[int], None]:
-    """Draw the series in the lower `share` of the figure; return what moves the window to the time of a frame."""
+    """Draw the series in the lower `share` of the figure; return a function that moves the window to a frame."""
     ax = figure.add_axes((0.09, 0.2 * share, 0.88, 0.62 * share))
     known = next((run for run in film.runs if run.exact is not None), None)
     if known is not None and known.exact is not None:
         ax.plot(known.t, known.exact, color=PALE, linewidth=5.0, label="exact", zorder=1)
     for run, look in zip(film.runs, CURVES, strict=False):
-        # the titles stand below the drawings, where there are two
+        # with two drawings, the titles are below them
         label = "_" if len(film.scenes) > 1 else style.entry(run.title)
         ax.plot(run.t, run.series, label=label, **look)
     shown = [
@@ -114,7 +114,7 @@ def _digits(span: float) -> int:
 
 
 def _stage(figure: Any, film: Film, i: int, scene: Scene, below: float) -> Callable[[int], None]:
-    """Draw the i-th system above the series; return what moves its parts to where they are in a frame."""
+    """Draw the i-th system above the series; return a function that moves its parts to a frame."""
     from matplotlib.patches import PathPatch
     from matplotlib.path import Path
 
@@ -171,7 +171,7 @@ def _path(lines: list[Floats]) -> Any:
 
 
 def _legend(figure: Any, scene: Scene) -> None:
-    """Name what the colours of a drawing stand for, above the drawings."""
+    """Write the legend of a drawing's colours above the drawings."""
     from matplotlib.lines import Line2D
 
     handles = [

@@ -1,8 +1,8 @@
-"""Frames as a movie file: MP4, WebM or GIF, the same bytes every time.
+"""Frames as a movie file: MP4, WebM or GIF, with reproducible bytes.
 
-MP4 and WebM are written by FFmpeg's libraries (package ``av``, which brings them), GIF by Pillow. Every video is
-encoded by one thread, because what several write depends on their number, and x264 without its machine code for
-single processors, because what that writes was once seen to change from run to run. No file holds a date.
+MP4 and WebM are written by FFmpeg's libraries (bundled with the package ``av``), GIF by Pillow. Videos are encoded by
+one thread, because the output depends on the number of threads, and x264 runs without its processor-specific code,
+whose output once changed from run to run. No file holds a date.
 
 Source: vibration text, section 3.2 (formats of movies, and codecs).
 """
@@ -22,9 +22,9 @@ VIDEOS: dict[str, tuple[str, dict[str, str]]] = {
     "mp4": ("libx264", {"crf": "20", "preset": "fast", "threads": "1", "x264-params": "asm=0"}),
     "webm": ("libvpx-vp9", {"crf": "32", "b": "0", "cpu-used": "5", "threads": "1"}),
 }
-"""Codec and its options by the ending of a file."""
+"""Extension of a file to its codec and options."""
 FORMATS = (*VIDEOS, "gif")
-SHADES = 16  # of each colour of a GIF, between it and the paper
+SHADES = 16  # of each colour of a GIF, between it and the background
 
 
 def png(frame: Pixels) -> bytes:
@@ -37,7 +37,7 @@ def png(frame: Pixels) -> bytes:
 
 
 def check(form: str) -> None:
-    """Raise VibsimError where what writes movies of a format cannot be used."""
+    """Raise VibsimError if the package that writes a format cannot be used."""
     if form in VIDEOS:
         try:
             import_module("av")
@@ -47,7 +47,7 @@ def check(form: str) -> None:
 
 
 def movie(frames: Iterable[Pixels], fps: float, form: str) -> bytes:
-    """Return a movie of some frames, so many a second."""
+    """Return a movie of frames at `fps` frames a second."""
     return _gif(iter(frames), fps) if form == "gif" else _video(frames, fps, form)
 
 
@@ -56,7 +56,7 @@ def _video(frames: Iterable[Pixels], fps: float, form: str) -> bytes:
 
     codec, options = VIDEOS[form]
     file = io.BytesIO()
-    # without `bitexact` a WebM file has a random number, and both have the version of the writer
+    # without `bitexact` a WebM file holds a random number, and both formats the version of the writer
     with av.open(file, "w", format=form, options={"fflags": "+bitexact"}) as container:
         stream: Any = container.add_stream(
             codec, rate=Fraction(fps).limit_denominator(1001), options=options
@@ -91,10 +91,10 @@ def _gif(frames: Iterator[Pixels], fps: float) -> bytes:
 
 
 def _shades() -> list[int]:
-    """Return every colour of a frame mixed with the paper: one palette for all frames, so that none flickers."""
-    found = [255, 255, 255]
+    """Return all colours of frames mixed with the background: one palette for all frames prevents flicker."""
+    palette = [255, 255, 255]
     for colour in COLOURS:
         for i in range(1, SHADES + 1):
             parts = (int(colour[k : k + 2], 16) for k in (1, 3, 5))
-            found += [255 + round((part - 255) * i / SHADES) for part in parts]
-    return found
+            palette += [255 + round((part - 255) * i / SHADES) for part in parts]
+    return palette

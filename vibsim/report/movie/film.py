@@ -1,4 +1,4 @@
-"""What a movie shows: one or two runs, their drawn systems, the times of the frames, and the moving window.
+"""The content of a movie: one or two runs, their drawn systems, the times of the frames, and the moving window.
 
 Source: vibration text, sections 3.1 (a window that moves along a long run, frames that are skipped) and 8.7, note
 hpl 2 (two runs side by side), 10.6 (the pendulum with its forces).
@@ -22,56 +22,56 @@ from vibsim.report.series import parameters_of
 from vibsim.report.types import Experiment
 
 MOST_FRAMES = 1500
-"""Of a longer run fewer frames a period are shown, and then its beginning only, unless the user names a number."""
+"""Longer runs have fewer frames a period, and then show only their beginning, unless the user sets the number."""
 FEWEST_FRAMES_A_PERIOD = 12
 LEAST_SECONDS = 8.0
 
 
 @dataclass(frozen=True)
 class Run:
-    """One member by one scheme at one level."""
+    """One member with one scheme on one level."""
 
     title: str
     t: Floats
     """Times of the samples, shape (sample,)."""
     series: Floats
-    """The quantity over time at the samples; not finite where the run broke down."""
+    """The quantity at the samples; not finite after a breakdown."""
     states: Mapping[str, Floats]
     """Every state of the model at the samples."""
     exact: Floats | None
-    """The exact solution of the quantity at the samples, where one is known."""
+    """The exact solution of the quantity at the samples, if known."""
     parameters: Mapping[str, Any]
 
 
 @dataclass(frozen=True)
 class Film:
-    """What is drawn in every frame."""
+    """The content of all frames."""
 
     runs: tuple[Run, ...]
     scenes: tuple[Scene, ...]
-    """A drawing of each run at the times of the frames; empty where the system cannot be drawn."""
+    """A drawing of each run at the times of the frames; empty if the system cannot be drawn."""
     t: Floats
     """Time of every frame, shape (frame,)."""
     start: float
-    """First time that is shown."""
+    """First time shown."""
     stop: float
-    """Last time that is shown."""
+    """Last time shown."""
     window: float
     """Width of the window over the series: the whole time shown, or some periods of a long run."""
     label: str
-    """Of the series, with its unit."""
+    """Label of the series, with its unit."""
     time_unit: str
     end: float
-    """Last time that was asked for, of which the beginning may be all that is shown."""
+    """Last time requested; the movie may show only the beginning."""
 
     @property
     def is_cut(self) -> bool:
-        """Say whether only the beginning is shown."""
+        """Whether only the beginning is shown."""
         return self.stop < self.end
 
 
 def run(experiment: Experiment, record: Record, scheme: str, quantity: str) -> Run:
-    """Return a run from the level of a member, which has one member and the series over time."""
+    """Return a run from a level record that holds one member with its series over time."""
     model, place = experiment.model.definition, record.words("scheme").index(scheme)
     t = data.times(record, 0)
     names = [state.name for state in model.states]
@@ -90,7 +90,7 @@ def run(experiment: Experiment, record: Record, scheme: str, quantity: str) -> R
 
 
 def differs_visibly(other: Run, first: Run) -> float:
-    """Return how far a run is from the first one, over its size; 0 where nobody sees it, or it leaves the frame."""
+    """Return the relative distance of a run from the first one; 0 if it is invisible, or the run leaves the frame."""
     if not (np.isfinite(first.series).all() and np.isfinite(other.series).all()):
         return 0.0
     size = data.largest(first.series)
@@ -112,16 +112,16 @@ def film(
     periods: float | None = None,
     most: int = MOST_FRAMES,
 ) -> Film:
-    """Return what the movie of one or two runs shows.
+    """Return the content of the movie of one or two runs.
 
     Parameters
     ----------
     record
-        The level of the first run, for units.
+        The level record of the first run, for units.
     fps
-        Frames a second: a period takes `moments.SECONDS_A_PERIOD` where there is room.
+        Frames a second; a period takes `moments.SECONDS_A_PERIOD` unless that needs more than `most` frames.
     frames
-        Number of frames, spread evenly over the whole time; otherwise as many as movement needs, `most` at most.
+        Number of frames, spread evenly over the whole time; default: as many as the motion needs, at most `most`.
     start, end
         First and last time shown; default: those of the shortest run.
     periods
@@ -150,7 +150,7 @@ def film(
 
 
 def _as_needed(start: float, end: float, period: float, fps: float, most: int) -> tuple[int, float]:
-    """Return how many frames the motion needs, and the last time that they reach."""
+    """Return the number of frames that the motion needs, and the last time that they show."""
     periods = (end - start) / period
     wanted = max(LEAST_SECONDS * fps, moments.SECONDS_A_PERIOD * fps * periods)
     frames = math.ceil(min(most, wanted))

@@ -1,4 +1,4 @@
-"""The checks of a page: a line for each, its evidence, and what to change where it did not pass."""
+"""The checks of a page: a line for each, its evidence, and a proposed change if it did not pass."""
 
 from __future__ import annotations
 
@@ -23,15 +23,15 @@ from vibsim.report.text import assertions, experiment_file, findings, reasons
 from vibsim.report.types import Check, Experiment
 
 SAID_BY_THE_LINE = ("value", "equal", "converges")
-"""Kinds of checks of which the line says all where they pass."""
-ALIKE = 6  # checks on a number, or on equal solutions, from which on their lines are a table
-WIDE = 1.0  # an interval that reaches further below its order is worth a sentence
+"""Kinds of checks whose line says everything if they pass."""
+ALIKE = 6  # value checks, or checks of equality, from which their lines become a table
+WIDE = 1.0  # an interval that extends further below its order gets a sentence
 
 
 def cards(
     experiment: Experiment, record: Record, summary: Mapping[str, Any]
 ) -> list[dict[str, Any]]:
-    """Return what the page says of every check; of printed numbers of those that did not come out as expected."""
+    """Return the cards of all checks; of checks of printed numbers only those that did not pass."""
     in_tables = published.ids(experiment)
     return [
         card(experiment, record, check)
@@ -43,10 +43,7 @@ def cards(
 def gathered(
     made: list[dict[str, Any]], decides: str | None
 ) -> tuple[list[dict[str, Any]], list[dict[str, Any]]]:
-    """Return the cards that stand alone, and the many alike, of which the line says all, as tables of lines.
-
-    The check that decides stands alone.
-    """
+    """Split cards into single ones, among them the decisive one, and many alike that become rows of a table."""
     groups = []
     for kind in SAID_BY_THE_LINE[:2]:
         plain = [
@@ -70,7 +67,7 @@ def gathered(
 
 
 def card(experiment: Experiment, record: Record, check: Mapping[str, Any]) -> dict[str, Any]:
-    """Return what the page says of one check; an experiment with a tolerance has one that nothing asserts."""
+    """Return the card of a check; the check of a tolerance has no assertion in the experiment."""
     asserted = next((spec for spec in experiment.checks if spec.id == check["id"]), None)
     measured = asserted.measured if asserted else None
     kind = measured.kind if measured else check["kind"]
@@ -82,7 +79,7 @@ def card(experiment: Experiment, record: Record, check: Mapping[str, Any]) -> di
         levels=len(data.whole(record, "level")),
         is_promised=findings.keeps_promise(record, measured, check),
     )
-    # of a claim that is refuted as expected, what the reason does not say is the point
+    # the reason alone does not say that a claim is refuted as expected
     is_refuted = is_refutation(asserted) and check["reason"] == "match"
     unit = data.pretty_unit(unit_of(experiment, record, value)) if value else ""
     wording = Wording(experiment, record, asserted, words.PAGE)
@@ -110,7 +107,7 @@ def card(experiment: Experiment, record: Record, check: Mapping[str, Any]) -> di
         "needs": explained.needs,
         "results": results,
         "more": more,
-        # but for those that the check's own text has
+        # except for the one in the text of the check
         "where": [f"{place['text']}." for word, place in check["where"].items() if word != decides],
         "alone": _alone(check),
         "picture": figure.picture(experiment, record, asserted, check),
@@ -121,14 +118,14 @@ def card(experiment: Experiment, record: Record, check: Mapping[str, Any]) -> di
 
 
 def _is_said(asserted: Check | None, check: Mapping[str, Any]) -> bool:
-    """Say whether the line of a check tells all of what was measured: it is as asked for, without a doubt."""
+    """Return whether the line of a check says everything: it passed beyond doubt."""
     if check["status"] != "PASS" or asserted is None:
         return False
     result = check["results"][0]
     order, low, wanted = (words.fact(result, name) for name in ("order", "order_low", "expected"))
     allowed = getattr(asserted.measured, "tolerance", math.inf)
     is_doubtful = order is not None and low is not None and order - low > WIDE
-    # that the interval reaches what is wanted, where the order itself does not, is worth a sentence
+    # the order itself misses the expected one, but its interval reaches it
     is_doubtful |= None not in (order, wanted) and abs(order - wanted) > allowed
     if asserted.measured.kind == "value":
         number, bound = (words.fact(result, name) for name in ("value", "error_bound"))
@@ -140,7 +137,7 @@ def _is_said(asserted: Check | None, check: Mapping[str, Any]) -> bool:
 
 
 def _hardest(record: Record, check: Mapping[str, Any]) -> str:
-    """Name the result that decides, of several."""
+    """Name the decisive one of several results; empty for a single result."""
     total, result = sum(check["counts"].values()), check["results"][0]
     if total < 2:
         return ""
@@ -150,7 +147,7 @@ def _hardest(record: Record, check: Mapping[str, Any]) -> str:
 
 
 def _got(check: Mapping[str, Any], wording: Wording, result: Result) -> str:
-    """Say in a few words what was measured where it decides."""
+    """Say in a few words what the decisive result measured."""
     decisive = check["results"][0]
     if words.fact(decisive, "order") is not None and result.status != "INCONCLUSIVE":
         order, bounds = words.fact(decisive, "order"), words.interval_of(decisive)
@@ -161,10 +158,10 @@ def _got(check: Mapping[str, Any], wording: Wording, result: Result) -> str:
 
 
 def _results(record: Record, check: Mapping[str, Any], unit: str) -> tuple[Any, str]:
-    """Return the table of the results, and a sentence that says how many it leaves out; of one result neither."""
+    """Return the table of results and a sentence on those left out; neither for one result or a passed check."""
     table, counts = check_tables.results(record, check, unit), check["counts"]
     total = sum(counts.values())
-    # where all passed, the table of checks has the hardest
+    # the table of checks has the hardest result of a passed check
     if table is None or total < 2 or check["status"] == "PASS":
         return None, ""
     counted = ", ".join(f"{n} {word}" for word, n in counts.items() if n)
@@ -173,11 +170,11 @@ def _results(record: Record, check: Mapping[str, Any], unit: str) -> tuple[Any, 
 
 
 def _alone(check: Mapping[str, Any]) -> str:
-    """Return the commands that run the listed members alone, a line for each."""
+    """Return the commands that run the listed members alone, one line each."""
     lines: dict[str, str] = {}
     for result in check["results"]:
         if result.get("command"):
-            # of the schemes of a member the worst comes first
+            # the worst scheme of a member comes first
             found = f"{result['status']} {result['reason']}"
             lines.setdefault(called(result["command"]), found)
     width = max(map(len, lines), default=0)
@@ -185,7 +182,7 @@ def _alone(check: Mapping[str, Any]) -> str:
 
 
 def provenance_rows(provenance: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
-    """Yield the versions of all software in one line, then what else is known of where the results came from."""
+    """Yield the versions of all software in one line, then the rest of the provenance."""
     found = {**provenance.get("versions", {}), **versions(DRAWING)}
     named = {"python": "Python"}
     yield "Versions", ", ".join(f"{named.get(name, name)} {found[name]}" for name in found)

@@ -1,6 +1,6 @@
-"""The members of a sweep as data of a page: where each stands in the views, its numbers, its verdict, its command.
+"""The members of a sweep as data of a page: positions in the views, numbers, verdicts, commands.
 
-A page stays small, so of very many members some can be pointed at: those of an even grid, and the worst ones.
+To limit the size of a page, only some of very many members respond to the pointer: an even subset, and the worst ones.
 """
 
 from __future__ import annotations
@@ -23,13 +23,13 @@ from vibsim.report.sweep_layout import Key
 from vibsim.report.types import Experiment
 
 POINTS = 2000
-"""Most points of a view that can be pointed at; a page holds some of very many members."""
+"""Most points of a view that respond to the pointer."""
 
 
 def worst(
     experiment: Experiment, record: Record, views: Sequence[View]
 ) -> list[tuple[str, str, str]]:
-    """Return the members that are marked: the letters of the quantities, its name, and the command for it."""
+    """Return the marked members: the letters of the quantities, the name of the member, and its command."""
     found: dict[int, dict[str, None]] = {}
     for view in views:
         if view.worst is not None:
@@ -43,16 +43,16 @@ def worst(
 
 
 def _around(experiment: Experiment) -> tuple[str, str]:
-    """Return what stands before and behind the number of a member in its command."""
+    """Return the parts of the command of a member before and after its number."""
     if experiment.chain > 1:
-        # none of those that start from others runs alone
+        # members that start from others cannot run alone
         return called(f"vibsim show {quote(experiment.word)} --case "), ""
     start, _, end = quote(f"{experiment.word}@0").rpartition("0")
     return called(f"vibsim run {start}"), end + set_options(experiment.settings)
 
 
 def content(experiment: Experiment, record: Record, views: Sequence[View]) -> dict[str, Any] | None:
-    """Return what the script of a page reads; None without a view in which members have a place."""
+    """Return the data for the script of a page; None without a view that shows members."""
     shown = [view for view in views if view.panels]
     if not shown:
         return None
@@ -76,9 +76,9 @@ def content(experiment: Experiment, record: Record, views: Sequence[View]) -> di
 
 
 def listed(keys: Sequence[Key], count: int, most: int, marked: Iterable[int]) -> NDArray[np.intp]:
-    """Return the positions of at most about `most` members, and of those that are marked, in ascending order.
+    """Return the positions of about `most` members at most, and of the marked ones, in ascending order.
 
-    Of a grid they are a coarser grid: even ones of the values of each key.
+    On a grid they form a coarser grid of evenly chosen values of each key.
     """
     if count <= most:
         return np.arange(count)
@@ -107,7 +107,7 @@ def _view(view: View, cases: NDArray[np.intp]) -> dict[str, Any]:
 
 
 def _verdicts(record: Record, quantity: str, cases: NDArray[np.intp]) -> dict[str, Any] | None:
-    """Return the verdicts on a quantity as numbers of texts, by scheme and member."""
+    """Return the texts of the verdicts on a quantity, and their indices by scheme and member."""
     if f"{quantity}_status" not in record:
         return None
     status, reason = (
@@ -119,7 +119,7 @@ def _verdicts(record: Record, quantity: str, cases: NDArray[np.intp]) -> dict[st
 
 
 def _numbers(values: Any, digits: int) -> list[float | int | None]:
-    """Return numbers of some significant digits; None for those that do not exist."""
+    """Round numbers to significant digits; None for those that are not finite."""
     rounded = (float(f"{value:.{digits}g}") for value in values.tolist())
     return [
         None if not math.isfinite(x) else int(x) if x.is_integer() and abs(x) < 1e6 else x

@@ -1,4 +1,4 @@
-"""The first screen of a page: the finding, three numbers, two pictures, and what to do where it did not pass."""
+"""The first screen of a page: the finding, three numbers, two pictures, and the next step if a check did not pass."""
 
 from __future__ import annotations
 
@@ -30,12 +30,12 @@ from vibsim.report.types import Experiment
 
 MOST_NUMBERS = 3  # large numbers on the first screen
 MOST_SCHEMES = 3  # schemes that are named
-MOST_STATEMENTS = 3  # statements that are read beside the finding
+MOST_STATEMENTS = 3  # claims that are shown beside the finding
 MEASURED = {
     "stable": "Growth per period", "conserves": "Largest energy error over E(0)", "equal": "Largest difference",
     "accurate": "Error of the finest level", "tolerance": "Error bound of the best solution",
 }  # fmt: skip
-"""Kind of a check to the name of the number that decides it."""
+"""Kind of a check to the name of its decisive number."""
 
 Number = dict[str, str]
 """``label``, ``value`` with its unit, and ``note`` of a large number."""
@@ -72,7 +72,7 @@ def context(
 def _statements(
     experiment: Experiment, summary: Mapping[str, Any], lead: Lead
 ) -> list[dict[str, str]]:
-    """Return the statements that the title does not tell, and what came of each."""
+    """Return the claims, other than that of the title, with their outcomes."""
     claims = {check.id: check.claim for check in experiment.checks if check.kind == "claim"}
     return [
         {"status": entry["status"], "badge": words.badge(entry), "claim": claims[entry["id"]]}
@@ -82,7 +82,7 @@ def _statements(
 
 
 def _traps(summary: Mapping[str, Any], lead: Lead) -> Iterator[str]:
-    """Say which order the traps found, where the page is about something else."""
+    """Yield a sentence on the order that each trap found, unless the page is on this trap."""
     for check in summary["checks"]:
         order = words.fact(check["results"][0], "order") if check["results"] else None
         if words.badge(check) == words.TRAP and check is not lead.entry and order is not None:
@@ -91,7 +91,7 @@ def _traps(summary: Mapping[str, Any], lead: Lead) -> Iterator[str]:
 
 
 def _facts(experiment: Experiment, record: Record) -> Iterator[str]:
-    """Yield what was run: the title, the schemes, the members, the steps and the source."""
+    """Yield title, schemes, members, steps and source of the run."""
     yield experiment.title
     names = [spec.name for spec in experiment.schemes]
     yield ", ".join(names) if len(names) <= MOST_SCHEMES else f"{len(names)} schemes"
@@ -106,7 +106,7 @@ def _facts(experiment: Experiment, record: Record) -> Iterator[str]:
 
 
 def numbers(experiment: Experiment, record: Record, lead: Lead) -> Iterator[Number]:
-    """Yield the large numbers, the most telling first: what decides, order, error, best value, member."""
+    """Yield the large numbers, the most informative first: decisive number, order, error, member, best value, steps."""
     if lead.entry is not None and not lead.is_on_order:
         yield from _measured(experiment, record, lead)
     if data.whole(record, "triple") or lead.is_on_order:
@@ -130,7 +130,7 @@ def numbers(experiment: Experiment, record: Record, lead: Lead) -> Iterator[Numb
 
 
 def _measured(experiment: Experiment, record: Record, lead: Lead) -> Iterator[Number]:
-    """Yield the number that decides a check on something else than an order."""
+    """Yield the decisive number of a check that is not on an order."""
     number, check = decisive_number(lead.facts), lead.measured
     if number is None or not math.isfinite(number):
         return
@@ -156,9 +156,9 @@ def _measured(experiment: Experiment, record: Record, lead: Lead) -> Iterator[Nu
 
 
 def _order(experiment: Experiment, record: Record, lead: Lead) -> Iterator[Number]:
-    """Yield the observed order with its interval, of a sweep the range over its members, and the promised one.
+    """Yield the observed order with its interval, or in a sweep its range over the members, and the promised order.
 
-    The members are those that the check is about.
+    The members are those that the check judges.
     """
     quantity, member = lead.quantity, lead.member
     if f"{quantity}_order" not in record:
@@ -176,7 +176,7 @@ def _order(experiment: Experiment, record: Record, lead: Lead) -> Iterator[Numbe
     orders = finest_level.orders(record, quantity, lead.norm)[0][member.scheme]
     shown = about_members(record, lead.measured if lead.is_on_order else None)
     if f"{quantity}_status" in record:
-        # what is undecided has an estimate at most
+        # undecided members have at most an estimate
         shown &= data.flags(record, f"{quantity}_status")[member.scheme] != "INCONCLUSIVE"
     every = style.finite(orders[shown])
     if lead.is_on_order and lead.result.get("status") == "INCONCLUSIVE":
@@ -190,7 +190,7 @@ def _order(experiment: Experiment, record: Record, lead: Lead) -> Iterator[Numbe
     elif lead.is_on_order and lead.result.get("reason") == "exact":
         yield {"label": label, "value": "exact", "note": "the levels differ by round-off only"}
     elif order is None or not math.isfinite(order):
-        # beside another number it says nothing that there is none
+        # a missing order is shown only if no other number decides
         if lead.is_on_order or lead.entry is None:
             yield {"label": label, "value": "not known", "note": due}
     else:
@@ -199,7 +199,7 @@ def _order(experiment: Experiment, record: Record, lead: Lead) -> Iterator[Numbe
 
 
 def _error(experiment: Experiment, record: Record, lead: Lead) -> Iterator[Number]:
-    """Yield the root-mean-square error of the finest level, in its unit and over the size of the solution."""
+    """Yield the root-mean-square error of the finest level, in its unit and relative to the size of the solution."""
     quantity, member = lead.quantity, lead.member
     error, relative = lead.facts.get("error"), lead.facts.get("relative_error")
     true = float(finest_level.true_error(record, quantity)[member.scheme, member.case])
@@ -228,7 +228,7 @@ def _error(experiment: Experiment, record: Record, lead: Lead) -> Iterator[Numbe
 
 
 def _best(experiment: Experiment, record: Record, lead: Lead) -> Iterator[Number]:
-    """Yield the best value of the first number that is asked for, or of the end or the period."""
+    """Yield the best value of the first number of a check, or of the position at the end, period or amplitude."""
     position, model = choice.position(experiment), experiment.model.definition
     checked = choice.asked_values(experiment)
     wanted = [
@@ -242,7 +242,7 @@ def _best(experiment: Experiment, record: Record, lead: Lead) -> Iterator[Number
             continue
         value = float(data.at(record, field, lead.member))
         bound = float(data.at(record, f"{field}_error", lead.member))
-        # a bound as large as the value says that nothing is known
+        # a bound as large as the value means that the value is unknown
         if not (math.isfinite(value) and bound < abs(value)):
             continue
         row = rows[name]
@@ -259,7 +259,7 @@ def _best(experiment: Experiment, record: Record, lead: Lead) -> Iterator[Number
 
 
 def _levels_of_best(record: Record, name: str, lead: Lead) -> str:
-    """Say which levels a best value is of."""
+    """Say from which levels a best value comes."""
     if "scalar" not in record:
         return "extrapolated over the levels"
     first, last = used_levels(record, record.words("scalar").index(name), lead.member)
@@ -269,7 +269,7 @@ def _levels_of_best(record: Record, name: str, lead: Lead) -> str:
 
 
 def _of_member(record: Record, lead: Lead) -> str:
-    """Name the member that a number is of, where there are several."""
+    """Name the member of a number; empty without a sweep."""
     return f", of {lead.member.case_words}" if data.swept(record) else ""
 
 
@@ -298,7 +298,7 @@ def pictures(experiment: Experiment, record: Record, lead: Lead) -> list[Picture
 
 
 def _evidence(experiment: Experiment, record: Record, lead: Lead) -> Picture | None:
-    """Return the picture that shows why the check came out as it did."""
+    """Return the picture that shows why the decisive check came out as it did."""
     if lead.entry is None:
         return None
     found = figure.picture(experiment, record, lead.asserted, lead.entry)

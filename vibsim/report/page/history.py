@@ -1,8 +1,8 @@
-"""What no two runs share: when the results of an experiment were made, how long it took, and what changed.
+"""The data that differ between runs: when the results of an experiment were made, how long it took, and what changed.
 
-No clock time is in any result, so this stands in a file of its own. The index reads it where scripts run, and says
-nothing of it where it is missing. The file is JSON behind the name of a variable, since a page that was opened from a
-disk may load a script, but no data. What it holds is data: an entry of another form counts as not there.
+Results hold no clock times, so these have their own file. The index reads it if scripts run and it exists. The file
+is JSON after the name of a variable, since a page opened from a disk may load scripts, but no data. Its content is
+treated as data: entries of another form are ignored.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from vibsim import store
 from vibsim.core import regular_files
 
 FILE = ".vibsim/history.js"
-"""Within the results folder."""
+"""Path within the results folder."""
 _BEFORE, _BEHIND = "vibsimHistory = ", ";\n"
 
 
@@ -41,13 +41,13 @@ def update(results: Path, found: Mapping[str, tuple[str, str]]) -> None:
     }:
         return
     text = json.dumps(entries, ensure_ascii=True, sort_keys=True, separators=(",", ":"))
-    # it is only told, so that a folder that cannot be written loses nothing
+    # the file is optional, so a folder that cannot be written is no error
     with suppress(OSError):
         store.write_text(results / FILE, f"{_BEFORE}{text}{_BEHIND}")
 
 
 def load(results: Path) -> dict[str, dict[str, Any]]:
-    """Return the entries of the file by the keys of experiments; empty where it cannot be read."""
+    """Return the entries of the file by the keys of experiments; empty if it cannot be read."""
     try:
         with regular_files.reading(results / FILE) as stream:
             text = stream.read().decode()
@@ -62,14 +62,14 @@ def load(results: Path) -> dict[str, dict[str, Any]]:
 def _entry(
     folder: Path, status: str, number: str, before: Mapping[str, Any] | None
 ) -> dict[str, Any]:
-    """Return the entry of an experiment: when it was made [ms], its time of work [s], and what it was before."""
+    """Return the entry of an experiment: when it was made [ms], its run time [s], and its earlier status and number."""
     made = 0
     with suppress(OSError):
         made = int((folder / "summary.json").stat().st_mtime * 1000)
     entry = {"made": made, "seconds": _seconds(folder), "status": status, "number": number}
     if before is None:
         return entry | {"new": True}
-    # what has no number now, or had none, tells no change of it
+    # a missing number is not a change
     was = {
         key: before[key]
         for key in ("status", "number")

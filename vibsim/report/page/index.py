@@ -21,7 +21,7 @@ from vibsim.report.tables import source_figures
 from vibsim.report.tables.table import Column, Table, to_csv
 
 UNREADABLE = ("DAMAGED", "MISSING")
-"""Words for an experiment whose verdict cannot be read: it counts as failed."""
+"""Statuses of an experiment whose verdict cannot be read; they count as failed."""
 FILTERS = (
     ("PASS", "passed"),
     ("INCONCLUSIVE", "undecided"),
@@ -30,27 +30,27 @@ FILTERS = (
     (words.TRAP, "with a trap caught"),
     (words.REFUTED, "with a statement refuted"),
 )
-"""What cards can be filtered by, with its words."""
+"""Filters of the cards, with their words."""
 HEADERS = (
     "collection", "experiment", "title", "source", *citation.PLACES, "experiment status",
     "check", "kind", "text", "quantity", "expected", "status", "reason", "scheme", "case", "order",
     "order_low", "order_high", "levels", "value", "error", "error_bound", "relative_error", "advice", "failures",
 )  # fmt: skip
-LONGEST = 90  # characters of a finding that stands in place of numbers
+LONGEST = 90  # most characters of a finding in place of numbers
 
 
 @dataclass(frozen=True)
 class Headline:
-    """What was measured of an experiment, in two numbers or in words."""
+    """The result of an experiment in two numbers or in words."""
 
     order: str = ""
     interval: str = ""
     error: str = ""
     text: str = ""
-    """What was found, where no check has an order or an error."""
+    """The finding, if no check has an order or an error."""
 
     def __str__(self) -> str:
-        """Return the number that a later run is compared with."""
+        """Return the number with which a later run is compared."""
         return f"order {self.order}" if self.order else self.error or self.text
 
 
@@ -62,17 +62,17 @@ class Row:
     name: str
     title: str
     status: str
-    why: str  # text and reason of the worst check, or what is wrong with the file; empty where all passed
+    why: str  # reason and text of the worst check, or the fault of the file; empty if all passed
     passed: int = 0
     link: str = ""
     picture: str = ""
     source: Mapping[str, str | None] | None = None
-    """Where it comes from, by `citation.FIELDS`."""
+    """Its source, by `citation.FIELDS`."""
     checks: Sequence[Mapping[str, Any]] = ()
     broken: int = 0  # number of runs that broke down
     headline: Headline = field(default_factory=Headline)
     marks: Sequence[tuple[str, int]] = ()
-    """Which of `words.MARKS` its checks have, with the number of checks."""
+    """The `words.MARKS` of its checks, each with the number of checks."""
 
     @property
     def key(self) -> str:
@@ -81,7 +81,7 @@ class Row:
 
     @property
     def tags(self) -> list[str]:
-        """The filters that it comes under."""
+        """The filters that it matches."""
         status = "UNREADABLE" if self.status in UNREADABLE else self.status
         return [status, *(mark for mark, _ in self.marks)]
 
@@ -92,12 +92,12 @@ class Row:
 
     @property
     def stands(self) -> str:
-        """Where it comes from, in a line."""
+        """Its source in one line."""
         return citation.line(self.source) if self.source else ""
 
     @property
     def search(self) -> str:
-        """What a search looks through, in small letters."""
+        """The text that a search looks through, in lower case."""
         found = (result.get("scheme") for check in self.checks for result in check["results"])
         checked = (check["quantity"] for check in self.checks)
         known = dict.fromkeys(str(word) for word in (*found, *checked) if word)
@@ -107,9 +107,9 @@ class Row:
 def write_index(results: Path) -> None:
     """Write ``index.html`` and ``summary.csv`` over all experiments below a results folder.
 
-    It holds ``<collection>/<experiment>/summary.json``. A damaged summary, and an experiment with results but without a
-    summary, have a card of their own: what is not known to be right is not passed over. What no two runs share, dates
-    and what changed, is in a file beside it (`history`).
+    The folder holds ``<collection>/<experiment>/summary.json``. A damaged summary, and results without a summary, get a
+    card as well, so that nothing unverified is overlooked. Data that differ between runs are in a separate file
+    (`history`).
     """
     patterns = ("*/*/summary.json", "*/*/convergence.nc", "*/*/level_*")
     folders = {path.parent for pattern in patterns for path in results.glob(pattern)}
@@ -163,21 +163,21 @@ def _row(results: Path, folder: Path) -> Row:
 
 
 def _why(checks: Sequence[Mapping[str, Any]]) -> str:
-    """Return the worst check and its reason; empty where all passed."""
+    """Return the reason and the text of the worst check; empty if all passed."""
     if not checks:
         return "no checks"
     first = max(checks, key=lambda check: SEVERITY[check["status"]])
     if first["status"] == "PASS":
         return ""
-    # what is conserved goes by its name on its page, too
+    # a page names the conserved quantity in words
     quantity = None if first["kind"] == "conserves" else first["quantity"]
     return f"{first['reason']}: {words.labelled(first['text'], quantity)}"
 
 
 def headline(checks: Sequence[Mapping[str, Any]]) -> Headline:
-    """Return the numbers of the first of the worst checks that has any, else what the first check found.
+    """Return the numbers of the worst check that has any, else the finding of the first check that passed.
 
-    The order of a trap counts for nothing. What went wrong is told elsewhere.
+    Traps have no headline order; failures are described elsewhere.
     """
     ranked = sorted(checks, key=lambda check: -SEVERITY[check["status"]])
     found = [(check, _decides(check)) for check in ranked]
@@ -185,7 +185,7 @@ def headline(checks: Sequence[Mapping[str, Any]]) -> Headline:
     for _, result in wanted:
         order, relative = (words.fact(result, name) for name in ("order", "relative_error"))
         if result.get("status") == "INCONCLUSIVE":
-            order = None  # an estimate at most
+            order = None  # at most an estimate
         if order is not None or relative is not None:
             interval = words.interval(words.interval_of(result))
             return Headline(
@@ -240,6 +240,6 @@ def _lines(row: Row) -> Iterator[tuple[Any, ...]]:
 
 
 def _source(row: Row, check: Mapping[str, Any]) -> tuple[str | None, ...]:
-    """Return where a check stands, by `citation.FIELDS`: its own source, else that of its experiment."""
+    """Return the source of a check, by `citation.FIELDS`: its own, else that of its experiment."""
     found = check.get("source") or row.source or {}
     return tuple(found.get(name) for name in citation.FIELDS)

@@ -1,4 +1,4 @@
-"""The report of one experiment: one page that opens anywhere, with its figures and tables as files beside it."""
+"""The report of one experiment: a self-contained page, with its figures and tables as files beside it."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def write(
     plan
         The plan of the experiment; its ``experiment`` is read.
     convergence
-        What the analysis found, as stored in ``convergence.nc``.
+        The results of the analysis, as stored in ``convergence.nc``.
     summary
         The verdicts, as stored in ``summary.json``.
     directory
@@ -57,7 +57,7 @@ def write(
     formats
         Of ``svg``, ``png``, ``pdf``; SVG is always written, the others are written beside it.
     provenance
-        What the results came from: digests, versions, the part of the experiment that the job used.
+        The origin of the results: digests, versions, the part of the experiment that the job used.
 
     Raises
     ------
@@ -97,7 +97,7 @@ def write(
 def _write_tables(
     directory: Path, texts: Mapping[str, Mapping[str, str]], experiment: Experiment, record: Record
 ) -> None:
-    """Write the files of tables; that of the members of a sweep has all of them, however many."""
+    """Write the files of tables; the file of members always holds all members of a sweep."""
     files, streamed = page_tables.files_of(texts), list[str]()
     if data.swept(record):
         streamed = ["members.csv"]
@@ -114,7 +114,7 @@ def _checks(
     *,
     has_picture: bool,
 ) -> dict[str, Any]:
-    """Return the section of checks; that of the check that decides may have its picture on the first screen."""
+    """Return the section of checks; with `has_picture`, the first screen has the picture of the decisive check."""
     made = cards.cards(experiment, record, summary)
     decides = lead.entry["id"] if lead.entry else None
     if has_picture:
@@ -129,7 +129,7 @@ def _checks(
 
 
 def _reading_of_checks(made: Iterable[Mapping[str, Any]]) -> list[tuple[str, str]]:
-    """Return how to read the picture of each kind of check that passed, once."""
+    """Return one caption for the pictures of each kind of check that passed."""
     found: dict[str, str] = {}
     for check in made:
         if check["picture"] and check["status"] == "PASS":
@@ -138,7 +138,7 @@ def _reading_of_checks(made: Iterable[Mapping[str, Any]]) -> list[tuple[str, str
 
 
 def _setup(experiment: Experiment, record: Record) -> dict[str, Any]:
-    """Return the section of what was computed, and how to do it again."""
+    """Return the section on the setup of the run and how to reproduce it."""
     return {
         "equation": equation.mathml(experiment.model.definition.equation),
         "setup": list(setting.setup(experiment, record)),
@@ -150,7 +150,7 @@ def _setup(experiment: Experiment, record: Record) -> dict[str, Any]:
 
 
 def _python(experiment: Experiment) -> str:
-    """Return the lines of Python that do the same as the command."""
+    """Return Python code equivalent to the command."""
     word, is_ours = experiment.word, experiment.collection != ADHOC
     file, at, case = word.rpartition("@")
     if not at or word.endswith(ENDINGS):
@@ -164,7 +164,7 @@ def _python(experiment: Experiment) -> str:
 
 
 def replace_files(directory: Path, files: Mapping[str, bytes], others: Sequence[str] = ()) -> None:
-    """Write files, and remove those of an earlier report that are neither among them nor among the `others`."""
+    """Write files, and remove all others of an earlier report except the `others`."""
     for name, content in files.items():
         store.write_bytes(directory / name, content)
     for path in directory.iterdir() if directory.is_dir() else ():

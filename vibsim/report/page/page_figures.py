@@ -1,4 +1,4 @@
-"""The figures of a page: each is a file, and in the page itself as far as it has room."""
+"""The figures of a page: each is a file, and part of the page itself as long as there is room."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ from vibsim.report.page.templates import markup
 from vibsim.report.style import Picture
 from vibsim.report.types import Experiment
 
-BYTES = 1_000_000  # of all figures behind tabs; figures beyond are files only
-FIGURES = 6  # most figures behind the tabs of a section
+BYTES = 1_000_000  # most bytes of all figures under tabs; further figures are files only
+FIGURES = 6  # most figures under the tabs of a section
 
 Shown = tuple[Picture, str]
 """A picture with its markup."""
@@ -29,14 +29,14 @@ class PageFigures:
 
     files: dict[str, bytes]
     above: list[str]
-    """Names of those that stand above the motion."""
+    """Names of the figures above the section on the motion."""
     of_source: list[tuple[FigureOfSource, list[Picture]]]
     content: dict[str, Any]
-    """What the page shows of them, by the names that its template uses."""
+    """The content of the page, by the names that its template uses."""
 
 
 def draw(experiment: Experiment, record: Record, lead: Lead, formats: Sequence[str]) -> PageFigures:
-    """Draw the figures of a page from its first screen down; what stands above is not drawn again below."""
+    """Draw the figures of a page from its first screen down, none of them twice."""
     drawn = _Drawn(formats)
     sources = of_source.pictures(experiment, record, lead)
     groups = {
@@ -82,7 +82,7 @@ class _Drawn:
         return picture, markup(drawing.inline(text, picture.alt))
 
     def tabs(self, tabs: Sequence[gallery.Tab]) -> list[tuple[str, list[Shown]]]:
-        """Return the labels of tabs with their pictures, as long as the page has room; the others are files only."""
+        """Return the tabs with their pictures as long as the page has room; further ones are files only."""
         found, most = [], FIGURES
         for tab in tabs:
             added = [self.add(picture) for picture in tab.pictures]
@@ -95,7 +95,7 @@ class _Drawn:
         return found
 
     def views(self, views: Sequence[View]) -> list[tuple[View, str]]:
-        """Return the views of members with their markup, as long as the page has room; the others are files only."""
+        """Return the views of members with their markup as long as the page has room; further ones are files only."""
         found = []
         for view in views:
             picture, text = self.add(view.picture)
@@ -108,9 +108,9 @@ class _Drawn:
 
 
 def _captions(drawn: Iterable[Shown]) -> list[tuple[str, str]]:
-    """Return how to read each kind of picture, once: what stands before the first colon of its title, and a caption.
+    """Return each kind of picture once, named by its title up to the first colon, with its caption.
 
-    A caption that several kinds share stands once, too.
+    A caption that several kinds share appears only once.
     """
     found: dict[str, Picture] = {}
     for picture, _ in drawn:
@@ -120,7 +120,7 @@ def _captions(drawn: Iterable[Shown]) -> list[tuple[str, str]]:
 
 
 def _readings(pictures: Iterable[Picture]) -> list[tuple[str, str]]:
-    """Return how to read pictures, each caption once, by the title of the first that has it."""
+    """Return each caption once, with the title of the first picture that has it."""
     found: dict[str, str] = {}
     for picture in pictures:
         if picture.caption:

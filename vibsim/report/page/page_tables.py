@@ -1,4 +1,4 @@
-"""The tables of a page: each is a file, and its first rows stand in the page as far as it has room."""
+"""The tables of a page: each is a file, and the page shows the first rows as long as there is room."""
 
 from __future__ import annotations
 
@@ -29,10 +29,10 @@ from vibsim.report.tables.scales import table as scales_table
 from vibsim.report.tables.table import Table, to_csv
 from vibsim.report.types import Experiment
 
-MOST_ROWS = 8  # of a table that the page itself holds; the CSV file holds all
-ROOM = 220  # cells of all tables of numbers together; a table beyond is a file only
-COPIED = 40_000  # letters of a table that a page holds whole, to be copied; a longer one is a file
-LONG_HEADING = 90  # letters of a caption of which a heading has the first words only
+MOST_ROWS = 8  # of a table in the page; the CSV file holds all
+ROOM = 220  # most cells of all tables of numbers in the page; further tables are files only
+COPIED = 40_000  # most characters of a table that a page holds whole, for copying
+LONG_HEADING = 90  # most characters of a heading; longer captions are shortened
 
 
 def collect(
@@ -42,7 +42,7 @@ def collect(
     lead: Lead,
     sources: Iterable[tuple[FigureOfSource, Sequence[Picture]]],
 ) -> tuple[dict[str, dict[str, str]], dict[str, Any]]:
-    """Return the texts of all tables, and what the page shows of them by the names that its template uses.
+    """Return the texts of all tables, and the content of the page by the names that its template uses.
 
     The quantity of `lead` comes first; `sources` are the figures of the source with their pictures.
     """
@@ -70,9 +70,9 @@ def collect(
 def _of_numbers(
     experiment: Experiment, record: Record, everyone: Table | None, lead: Lead
 ) -> tuple[list[Table], list[Table]]:
-    """Return the tables that the page shows, as far as it has room for them, and those that are files only.
+    """Return the tables of numbers that the page has room for, and those that are files only.
 
-    The quantity of `lead` comes first, if there are tables of it, and its member.
+    The tables of the quantity and of the member of `lead` come first.
     """
     model = experiment.model.definition
     found = sorted(
@@ -86,7 +86,7 @@ def _of_numbers(
     wanted = [
         *orders[:1], best.table(model, record, shown, checked), theory.schemes(experiment, record), *orders[1:],
         degrees.table(experiment), levels.scalars(record, shown), levels.events(record), *theory.predictions(record),
-        # what damping or a force changes says nothing of a scheme
+        # energy changed by damping or a force is not an error of the scheme
         *((levels.velocities(record), levels.maxima(record, shown)) if model.conservative else ()),
         None if data.is_lean(record) else work.table(experiment, record),
     ]  # fmt: skip
@@ -103,10 +103,10 @@ def _of_numbers(
 
 
 def cut(table: Table) -> tuple[str, Table, str]:
-    """Return the heading of a table, its first rows in whole blocks, and a sentence on the rows of its file alone."""
+    """Return the heading of a table, its first rows in whole blocks, and a sentence on the remaining rows."""
     shown = table.rows[:MOST_ROWS]
     if len(shown) < len(table.rows) and (heads := table.heads):
-        # a block is shown whole, but the first
+        # drop a block that does not fit, unless it is the first
         last = table.rows[len(shown)][:heads]
         shown = tuple(row for row in shown if row[:heads] != last) or shown
     more = len(table.rows) - len(shown)
@@ -115,7 +115,7 @@ def cut(table: Table) -> tuple[str, Table, str]:
 
 
 def _heading(caption: str) -> str:
-    """Return what stands above a table."""
+    """Return the heading of a table: its caption, or the beginning of a long one."""
     found = (re.split(end, caption, maxsplit=1)[0] for end in ("$", r"; |\. ", r": | \("))
     return next((text for text in found if len(text) <= LONG_HEADING), caption)
 
@@ -126,7 +126,7 @@ def texts_of(tables: Iterable[Table]) -> dict[str, dict[str, str]]:
 
 
 def files_of(written: Mapping[str, Mapping[str, str]]) -> dict[str, bytes]:
-    """Return the files of tables by their names, from the `texts_of` them."""
+    """Return the files of tables by name, from their `texts_of`."""
     found = {}
     for name, texts in written.items():
         found[f"{name}.csv"] = texts["CSV"].encode()
@@ -135,5 +135,5 @@ def files_of(written: Mapping[str, Mapping[str, str]]) -> dict[str, bytes]:
 
 
 def _copied(texts: Mapping[str, str]) -> Mapping[str, str]:
-    """Return what buttons copy of a table, its texts; nothing of a very long one."""
+    """Return the texts of a table for its copy buttons; empty for a very long one."""
     return texts if max(map(len, texts.values())) <= COPIED else {}

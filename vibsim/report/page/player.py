@@ -1,8 +1,8 @@
-"""The player of a report: a drawing of the system that moves as the finest level found, above the position over time.
+"""The player of a report: the system in motion at the finest level, above the position over time.
 
-What moves is in the page as numbers, thinned and rounded to tenths of a pixel. Without scripts a picture with several
-positions stands in its place. A second motion is drawn beside the first where the two differ visibly: of all schemes,
-that coarsest level which is furthest from the finest level of the first scheme.
+The page holds the motion as numbers, thinned and rounded to tenths of a pixel. Without scripts it shows a picture with
+several positions. If another motion differs visibly, it is drawn beside the first: of all schemes, the coarsest level
+that is farthest from the finest level of the first scheme.
 
 Source: vibration text, sections 3.1 (a window that moves along a long run) and 3.2 (players), note hpl 2 (two motions
 side by side), 10.6 (pendulum with its forces).
@@ -29,31 +29,31 @@ from vibsim.report.page.templates import environment, markup, source
 from vibsim.report.series import parameters_of
 from vibsim.report.types import Experiment
 
-FRAMES_A_PERIOD = 48  # where there is room
-FEWEST_FRAMES_A_PERIOD = 20  # of a longer run the beginning is shown
-NUMBERS_A_FRAME = 8  # of one motion, about
+FRAMES_A_PERIOD = 48  # if there is room
+FEWEST_FRAMES_A_PERIOD = 20  # only the beginning of a longer run is shown
+NUMBERS_A_FRAME = 8  # of one motion, approximately
 MOST_NUMBERS = 30_000  # of all series together, which keeps the data below 200 kB
 LEAST_FRAMES = 240
-POSITIONS = 6  # in the picture that stands still
+POSITIONS = 6  # in the still picture
 TRACE = 640.0, 150.0  # width and height of the position over time [pixel]
 EDGE = 8.0
 
 
 @dataclass(frozen=True)
 class Lane:
-    """A motion that is shown."""
+    """A motion in the player."""
 
     title: str
     motion: Motion
     scene: Scene
     period: float
-    """About how long the motion takes to come back."""
+    """Approximate period of the motion."""
     end: float
-    """The last time of the run, of which the beginning may be all that is shown."""
+    """The last time of the run; the player may show only the beginning."""
 
 
 def element(experiment: Experiment, record: Record) -> str:
-    """Return the player as HTML, with its script and its style; empty where the system cannot be drawn."""
+    """Return the player as HTML, with its script and its style; empty if the system cannot be drawn."""
     shown = lanes(experiment, record)
     if not shown:
         return ""
@@ -62,7 +62,7 @@ def element(experiment: Experiment, record: Record) -> str:
 
 
 def lanes(experiment: Experiment, record: Record) -> list[Lane]:
-    """Return the one or two motions that are shown; none where the system cannot be drawn or does not move."""
+    """Return the one or two motions of the player; empty if the system cannot be drawn or does not move."""
     model = experiment.model.definition
     draw = scenes.scene_of(model)
     if draw is None or data.is_lean(record) or f"{model.position}_finest" not in record:
@@ -88,7 +88,7 @@ def lanes(experiment: Experiment, record: Record) -> list[Lane]:
 
 
 def _member(experiment: Experiment, record: Record) -> Member:
-    """Return what is shown: the first scheme, and of a sweep a typical member."""
+    """Return the first scheme and, in a sweep, a typical member."""
     found = choice.quantities(experiment, record)
     if not found:
         return data.of_case(record, 0)[0]
@@ -99,7 +99,7 @@ def _member(experiment: Experiment, record: Record) -> Member:
 def _chosen(
     experiment: Experiment, record: Record, member: Member
 ) -> list[tuple[Member, int, dict[str, Floats]]]:
-    """Return the one or two motions that are shown: member, position of the level, series of the states."""
+    """Return one or two motions: member, position of the level, series of the states."""
     model = experiment.model.definition
     names = [state.name for state in model.states if f"{state.name}_finest" in record]
     finest = len(data.whole(record, "level")) - 1
@@ -129,7 +129,7 @@ def _chosen(
 
 
 def _title(record: Record, member: Member, level: int) -> str:
-    """Name a motion by its level, and by its scheme and member where there are several."""
+    """Name a motion by its level and, if there are several, by scheme and member."""
     step = words.number(float(data.steps_of(record, member.case)[level]), "brief")
     text = f"level {data.whole(record, 'level')[level]}, dt = {step} {data.time_unit(record)}"
     scheme = member.scheme_name if len(record["scheme"]) > 1 else ""
@@ -137,7 +137,7 @@ def _title(record: Record, member: Member, level: int) -> str:
 
 
 def _times(t: Floats, period: float, count: int) -> Floats:
-    """Return the times that are shown of samples `t`, for so many motions, shape (frame,)."""
+    """Return the times of the frames, shape (frame,), for samples at `t` and `count` motions."""
     most = MOST_NUMBERS // (NUMBERS_A_FRAME * count)
     end = min(float(t[-1] - t[0]), period * most / FEWEST_FRAMES_A_PERIOD)
     wanted = max(LEAST_FRAMES, math.ceil(FRAMES_A_PERIOD * end / period))
@@ -145,7 +145,7 @@ def _times(t: Floats, period: float, count: int) -> Floats:
 
 
 def _context(record: Record, shown: list[Lane]) -> dict[str, Any]:
-    """Return what the template shows."""
+    """Return the content of the template."""
     t, period, position = shown[0].motion.t, shown[0].period, shown[0].motion.model.position
     whole = float(t[-1] - t[0])
     window = moments.window(whole, period)
@@ -168,7 +168,7 @@ def _context(record: Record, shown: list[Lane]) -> dict[str, Any]:
     last = shown[0].end
     unit = data.unit(record, f"{position}_finest")
     return {
-        # no text in it can end the script element
+        # escaped, so that no text can end the script element
         "data": markup(json.dumps(content, separators=(",", ":")).replace("<", "\\u003c")),
         "stages": [(lane.title, markup(_still(lane))) for lane in shown],
         "legend": shown[0].scene.legend,
@@ -189,7 +189,7 @@ def _context(record: Record, shown: list[Lane]) -> dict[str, Any]:
 
 
 def _curve(t: Floats, trace: Floats, window: float) -> str:
-    """Return the part of the position over time that lies in the first window, as the data of a path."""
+    """Return the position over time within the first window as SVG path data."""
     there = t <= t[0] + window * (1.0 + 1e-12)
     x = (t[there] - t[0]) / window * TRACE[0]
     points = zip(x.tolist(), trace[there].tolist(), strict=True)
@@ -197,7 +197,7 @@ def _curve(t: Floats, trace: Floats, window: float) -> str:
 
 
 def _packed(part: Part) -> dict[str, Any]:
-    """Return a part for the script: a number that does not change once, others for every time in tenths."""
+    """Return a part for the script: constants as one number, others as a series in tenths of a pixel."""
     columns = [
         float(np.ravel(column)[0])
         if np.ptp(np.asarray(column)) < 0.05
@@ -208,13 +208,13 @@ def _packed(part: Part) -> dict[str, Any]:
 
 
 def _rounded(values: Floats) -> list[int]:
-    """Return pixels in tenths."""
+    """Return pixels in units of a tenth."""
     found: list[int] = np.round(10.0 * np.clip(values, -1e6, 1e6)).astype(int).tolist()
     return found
 
 
 def _still(lane: Lane) -> str:
-    """Return the parts at the start, and behind them fainter bodies at other times of the first period."""
+    """Return the parts at the start, over fainter bodies at other times of the first period."""
     scene, t = lane.scene, lane.motion.t
     last = FRAMES_A_PERIOD // 2 if t.size > FRAMES_A_PERIOD else t.size - 1
     places = np.linspace(0, last, POSITIONS).astype(int).tolist()[1:]
@@ -226,7 +226,7 @@ def _still(lane: Lane) -> str:
 
 
 def _shape(part: Part, k: int) -> str:
-    """Return a part at the k-th time as an element."""
+    """Return a part at the k-th time as an SVG element."""
     look = escape(part.look)
     if part.shape == "track":
         offset = float(np.ravel(part.at[0])[k])
@@ -235,7 +235,7 @@ def _shape(part: Part, k: int) -> str:
 
 
 def _label(part: Part) -> str:
-    """Return the label of a part at the first time as an element."""
+    """Return the label of a part at the first time as an SVG element."""
     place = scenes.place_of_label(part.shape, scenes.values_of(part, 0))
     at = ' display="none"' if place is None else f' x="{place[0]:.1f}" y="{place[1]:.1f}"'
     return f'<text class="{escape(part.look)}"{at}>{escape(part.label)}</text>'

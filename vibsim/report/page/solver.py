@@ -1,4 +1,4 @@
-"""The page of an experiment with a solver of the user: a card for each check, the members of a sweep, the set-up."""
+"""The page of an experiment with the user's own solver: a card for each check, the members of a sweep, the setup."""
 
 from __future__ import annotations
 
@@ -72,7 +72,7 @@ def write(
 def _card(
     experiment: SolverExperiment, verdict: LadderVerdict, entry: Mapping[str, Any]
 ) -> dict[str, Any]:
-    """Return what the page shows of a check."""
+    """Return the card of a check."""
     files = [] if experiment.sweep else [f"level_{level:02d}.nc" for level in experiment.levels]
     card = study.card(entry["id"], verdict, entry["expected"], files)
     caption = card["table"].caption
@@ -87,7 +87,7 @@ def _card(
 
 
 def _members(entry: Mapping[str, Any]) -> Table:
-    """Return the table of the members that the summary lists, the worst first."""
+    """Return the table of the members in the summary, the worst first."""
     results = entry["results"]
     names = list(results[0]["values"])
     forms = {"order": "order", "error": "small", "error_bound": "small", "best": "full"}
@@ -112,7 +112,7 @@ def _members(entry: Mapping[str, Any]) -> Table:
 
 
 def _thumbnail(verdict: LadderVerdict) -> Iterator[tuple[str, bytes]]:
-    """Yield the small figure of the index, errors or differences over the levels; nothing without two of them."""
+    """Yield the thumbnail for the index: errors or differences over the levels, if there are at least two."""
     found = np.array([abs(level.error or level.difference or 0.0) for level in verdict.levels])
     places = np.flatnonzero(found)
     if places.size > 1:
@@ -121,7 +121,7 @@ def _thumbnail(verdict: LadderVerdict) -> Iterator[tuple[str, bytes]]:
 
 
 def _setup(experiment: SolverExperiment) -> Iterator[tuple[str, str]]:
-    """Yield what makes the levels."""
+    """Yield the setup of the solver as pairs of term and text."""
     kinds = {"command": "Command", "python": "Function", "files": "Files"}
     yield kinds[experiment.solver.kind], experiment.solver.text
     yield from not_in_file(experiment.settings)

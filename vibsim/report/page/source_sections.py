@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from vibsim.report.page.templates import source
 
 FILE = "sections.json"
-"""Among the templates; ``workflow/catalogue.py`` writes it."""
+"""A file among the templates, written by ``workflow/catalogue.py``."""
 
 
 @dataclass(frozen=True)
@@ -18,11 +18,11 @@ class Section:
 
     heading: str
     search: str
-    """What a search looks through, in small letters."""
+    """The text that a search looks through, in lower case."""
     see: list[str]
-    """Commands, and pages of the documentation."""
+    """Commands and pages of the documentation."""
     experiments: list[tuple[str, str]]
-    """Name without its collection, and the link of its page; that is empty where the experiment has not run."""
+    """Name without the collection, and link to the page, which is empty if the experiment has not run."""
 
 
 def listed(links: Mapping[str, str]) -> list[tuple[str, list[Section]]]:

@@ -1,4 +1,4 @@
-"""The statements of the source texts over all experiments: what was measured of each, by text and section."""
+"""The statements of the source texts over all experiments, with their outcomes, by text and section."""
 
 from __future__ import annotations
 
@@ -11,35 +11,35 @@ from vibsim.report import words
 from vibsim.report.tables.source_figures import order
 
 CORRECTION = "correction of the "
-"""Begins the source of a claim that says what is true where a text is wrong."""
+"""Prefix of the source of a claim that corrects a wrong text."""
 CONFIRMED, CORRECTED, OPEN = "CONFIRMED", "CORRECTED", "OPEN"
 
 
 @dataclass(frozen=True)
 class Statement:
-    """A statement of a text, and what a run found of it."""
+    """A statement of a text and its outcome in a run."""
 
     place: str
-    """Equation, figure and exercise, where it has a section; else empty."""
+    """Equation, figure and exercise, if it has a section; else empty."""
     text: str
-    """The statement, and what was measured."""
+    """The statement and the measurement."""
     note: str
-    """What is true, where the statement is not."""
+    """The truth, if the statement is wrong."""
     badge: str
     experiment: str
     link: str
-    """The page of the experiment; empty where it has none."""
+    """The page of the experiment; empty if it has none."""
 
 
 def listed(
     experiments: Iterable[tuple[str, str, Iterable[Mapping[str, Any]]]],
 ) -> list[tuple[str, list[Statement]]]:
-    """Return the statements under the section, or the exercise, where they stand, in their order.
+    """Return the statements by section or exercise, in the order of the texts.
 
     Parameters
     ----------
     experiments
-        Name, link of the page, and the checks of the summary, of every experiment.
+        Name, link to the page, and checks of the summary of every experiment.
     """
     found: dict[tuple[str, str, str], list[Statement]] = {}
     for name, link, checks in experiments:
@@ -69,7 +69,7 @@ def _statement(
 
 
 def _places(source: Mapping[str, str | None]) -> Iterator[tuple[str, str, str]]:
-    """Yield the text, the kind and the number of every section that is named, else of every equation and so on."""
+    """Yield text, kind and number of every section that the source names, else of every equation and so on."""
     kind = next(kind for kind in citation.PLACES if source[kind])
     text = str(source["text"]).removeprefix(CORRECTION)
     for number in citation.numbers(str(source[kind])):

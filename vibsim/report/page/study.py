@@ -1,4 +1,4 @@
-"""The page on ladders that any solver computed: one file that opens anywhere, and the verdicts as JSON beside it."""
+"""The page on ladders of any solver: a self-contained file, and the verdicts as JSON beside it."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def write(
     sources
         Names of the files that each was read from.
     directory
-        Folder to write to; it is made.
+        Folder to write to, which is created.
     content
         The verdicts as the command prints them.
     """
@@ -74,7 +74,7 @@ def write(
 
 
 def finding(verdicts: Sequence[LadderVerdict]) -> str:
-    """Return the finding on the quantity that decides: the first of the worst."""
+    """Return the finding on the decisive quantity: the first of the worst."""
     status = worst(verdict.status for verdict in verdicts)
     return findings.of_ladder(next(verdict for verdict in verdicts if verdict.status == status))
 
@@ -103,14 +103,14 @@ def numbers(verdict: LadderVerdict) -> list[dict[str, str]]:
 
 
 def _best(verdict: LadderVerdict) -> str:
-    """Write the best value with the digits that its bound leaves."""
+    """Write the best value with the digits that its bound supports."""
     if verdict.best is None or verdict.best_bound is None:
         return words.number(verdict.best, "value")
     return rounded(verdict.best, verdict.best_bound).text
 
 
 def _expectation(verdict: LadderVerdict) -> str:
-    """Say what order was asked for."""
+    """Say which order is expected."""
     if verdict.expected is not None:
         return f"order {verdict.expected:g}"
     if verdict.at_least is not None:
@@ -119,7 +119,7 @@ def _expectation(verdict: LadderVerdict) -> str:
 
 
 def card(name: str, verdict: LadderVerdict, expected: str, files: Sequence[str]) -> dict[str, Any]:
-    """Return what the page shows of a quantity: `asked` is what was expected, and `name` unique on the page."""
+    """Return the card of a quantity; `name` is unique on the page."""
     rows = [
         ("Expected", expected),
         ("Order", words.with_interval(verdict.order, (verdict.order_low, verdict.order_high))),

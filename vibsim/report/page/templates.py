@@ -1,7 +1,7 @@
-"""The templates of pages: what they may use, where they are kept compiled, and what a page that they make may run.
+"""The templates of pages: their filters, their compiled code in the cache, and the scripts that a page may run.
 
-Templates are kept as Python code in the private cache: to compile those of one page takes longer than to fill them in.
-A page runs its own scripts, named by their digests in its Content-Security-Policy, and nothing else.
+Templates are cached as Python code in the private cache, since compiling those of a page takes longer than rendering.
+A page runs only its own scripts, which its Content-Security-Policy names by their digests.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ TEMPLATES = Path(__file__).parents[1] / "templates"
 @cache
 def environment() -> Environment:
     """Return the jinja2 environment of the templates, with escaping always on."""
-    # without `optimized`, the code depends on the text of a template alone, and on nothing that a filter returns
+    # without `optimized`, the code depends only on the text of a template, not on results of filters
     made = Environment(
         loader=FileSystemLoader(TEMPLATES), autoescape=True, undefined=StrictUndefined, trim_blocks=True,
         lstrip_blocks=True, optimized=False, bytecode_cache=TemplateCache(),
@@ -53,7 +53,7 @@ _LOWERED = re.compile(r"(?<!\w)([A-Za-z])_(?:\(([^()]*)\)|([A-Za-z0-9]{1,2}))(?!
 
 
 def _code(text: str) -> str:
-    """Escape a text, set what stands between backticks as code, and elsewhere exponents and indices as such."""
+    """Escape a text; text between backticks becomes code, elsewhere exponents and indices are set as such."""
     parts = text.split("`")
     if len(parts) % 2 == 0:
         return escape(text)
@@ -64,7 +64,7 @@ def _code(text: str) -> str:
 
 
 def _shifted(text: str) -> str:
-    """Escape a text and set its exponents and indices."""
+    """Escape a text and set its exponents and indices as superscripts and subscripts."""
     raised = _RAISED.sub(lambda found: f"<sup>{found[1] or found[2]}</sup>", escape(text))
     return Markup(
         _LOWERED.sub(lambda found: f"{found[1]}<sub>{found[2] or found[3]}</sub>", raised)
@@ -72,14 +72,14 @@ def _shifted(text: str) -> str:
 
 
 def source(name: str) -> str:
-    """Return a file of the templates as it is, for a script or a style."""
+    """Return a file of the templates unchanged, for a script or a style."""
     loader = environment().loader
     assert loader is not None
     return markup(loader.get_source(environment(), name)[0])
 
 
 def markup(text: str) -> str:
-    """Mark a drawing of our own as markup; its texts were escaped when it was drawn."""
+    """Mark one of our drawings as safe markup; its texts are already escaped."""
     return Markup(text)
 
 
@@ -95,7 +95,7 @@ _ANY = "script-src 'unsafe-inline'"
 
 
 def sealed(page: str) -> str:
-    """Return a page whose policy allows just the scripts that it has; `page` allows any.
+    """Return a page whose policy allows only its own scripts, whereas that of `page` allows any.
 
     Source: Content Security Policy Level 3, section 2.3.1 (hash-source).
     """
@@ -104,7 +104,7 @@ def sealed(page: str) -> str:
 
 
 def digest_of(script: str) -> str:
-    """Return the digest of a script as a policy writes it."""
+    """Return the digest of a script in the notation of a policy."""
     return f"sha256-{base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()}"
 
 
@@ -112,22 +112,22 @@ _KIND = "templates"
 
 
 class TemplateCache(BytecodeCache):
-    """Keeps compiled templates; what is missing or damaged is compiled again, and no cache is no fault."""
+    """Caches compiled templates; missing or damaged ones are compiled again, also without any cache."""
 
     def load_bytecode(self, bucket: Bucket) -> None:
-        """Fill a bucket with the code of its template, if it is kept."""
+        """Fill a bucket with the code of its template, if it is cached."""
         folder = private_cache.opened(_KIND)
         content = folder and folder.read(_name(bucket))
         if content:
             bucket.bytecode_from_string(content)
 
     def dump_bytecode(self, bucket: Bucket) -> None:
-        """Keep the code in a bucket."""
+        """Cache the code in a bucket."""
         if folder := private_cache.opened(_KIND):
             folder.write(_name(bucket), bucket.bytecode_to_string())
 
 
 def _name(bucket: Bucket) -> str:
-    """Name an entry by all that the code depends on: Python, jinja2, the place of the template and its text."""
+    """Name an entry by everything that the code depends on: Python, jinja2, path and text of the template."""
     parts = (sys.version, jinja2.__version__, bucket.key, bucket.checksum)
     return hashlib.sha256("\0".join(parts).encode()).hexdigest()

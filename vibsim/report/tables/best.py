@@ -1,7 +1,7 @@
-"""The table of the most accurate values that the ladder holds, each with two error bars.
+"""The table of the most accurate values of the ladder, each with two error bars.
 
-One belongs to the extrapolated value (a calibrated bound, `vibsim.convergence.number_extrapolation`), the other to the
-value of the finest level (the grid convergence index, `vibsim.convergence.gci`).
+One is a calibrated bound for the extrapolated value (`vibsim.convergence.number_extrapolation`), the other the grid
+convergence index of the value of the finest level (`vibsim.convergence.gci`).
 """
 
 from __future__ import annotations
@@ -25,21 +25,21 @@ CLASSES = {
     "oscillating_divergence": "swinging apart",
     "round_off": "round-off",
 }
-"""How the levels follow each other, in words."""
+"""Kind of convergence over the levels to its words."""
 MOST_DIGITS = 16  # significant digits of a double
 OF_A_PERIODIC_MOTION = "period", "frequency", "growth_per_period"
-"""Numbers that mean something of a free motion in one coordinate; of any other one where a check asks for them."""
+"""Numbers that are meaningful for a free motion in one coordinate; for others only if a check names them."""
 NEVER_NEGATIVE = *OF_A_PERIODIC_MOTION, "amplitude", "relative_energy_error"
 PER_NUMBER = ("finest level", "GCI", "GCI relative", "order", "levels", "convergence")
-"""Columns that are kept with series only."""
+"""Columns whose data are stored only with series."""
 
 
 def table(
     model: Model, record: Record, shown: Sequence[Member], checked: Collection[str] = ()
 ) -> Table | None:
-    """Return the limit of every number of the members; None where there is none, or one level only.
+    """Return the best value of every number of the members; None without numbers, or for a single level.
 
-    `asked` are the names of the numbers that checks ask for.
+    `checked` are the names of the numbers of checks.
     """
     if len(whole(record, "level")) < 2 or "period_richardson" not in record:
         return None
@@ -66,7 +66,7 @@ def table(
 
 
 def numbers(model: Model, is_lean: bool, checked: Collection[str]) -> list[tuple[int, Scalar]]:
-    """Return the numbers that mean something of a motion, each with its position in the record."""
+    """Return the numbers that are meaningful for a motion, each with its position in the record."""
     is_periodic = model.is_alone and is_autonomous(model)
     return [
         (k, row)
@@ -105,27 +105,27 @@ def _rows(
 def _finest(record: Record, index: float, k: int, member: Member) -> tuple[Cell, Cell, Cell]:
     """Return the value of the finest level and its grid convergence index, absolute and relative."""
     value, relative = (
-        float(at(record, f"scalar_{of}", member, scalar=k)) for of in ("finest", "gci")
+        float(at(record, f"scalar_{field}", member, scalar=k)) for field in ("finest", "gci")
     )
     return rounded(value, index), error_size(index), error_size(relative)
 
 
 def error_size(size: float) -> Written | None:
-    """Write the size of an error with two digits; nothing where there is none."""
+    """Write the size of an error with two digits; None if it is not finite."""
     if not math.isfinite(size):
         return None
     return Written(size, words.number(size, "brief"))
 
 
 def best(name: str, value: float, bound: float) -> Written:
-    """Write a best value; of one that is never negative and may be 0 what it lies below."""
+    """Write a best value; one that is never negative and may be 0 as an upper bound."""
     if name in NEVER_NEGATIVE and abs(value) <= bound:
         return Written(value, f"below {words.ceiling(value + bound)}")
     return rounded(value, bound)
 
 
 def rounded(value: float, error: float) -> Written:
-    """Write a number with one digit beyond the first that its error touches."""
+    """Write a number up to the second significant digit of its error."""
     if not (math.isfinite(error) and error > 0.0):
         return Written(value, words.printed(f"{value:.12g}"))
     size = math.floor(math.log10(abs(value))) if value else 0
@@ -136,13 +136,13 @@ def rounded(value: float, error: float) -> Written:
 
 
 def used_levels(record: Record, k: int, member: Member) -> tuple[int, int]:
-    """Return the coarsest and the finest level that the best value of the k-th number is of."""
+    """Return the coarsest and the finest level that the best value of the k-th number uses."""
     first, last = (int(at(record, f"scalar_{end}", member, scalar=k)) for end in ("first", "last"))
     return first, last
 
 
 def _approach(record: Record, k: int, member: Member) -> tuple[Cell, Cell, Cell]:
-    """Return the observed order, the levels that were used, and how the levels follow each other."""
+    """Return the observed order, the levels used, and the kind of convergence."""
     first, last = used_levels(record, k, member)
     used = words.levels((first, last)) if first < last else f"{last} as it is"
     order = float(at(record, "scalar_order", member, scalar=k))
@@ -151,12 +151,12 @@ def _approach(record: Record, k: int, member: Member) -> tuple[Cell, Cell, Cell]
 
 
 def _exact(record: Record, name: str, member: Member) -> float:
-    """Return the exact value of a number, NaN where it is not known."""
+    """Return the exact value of a number; NaN if it is unknown."""
     if name == "period":
         return float(exact_periods(record)[member.case])
     quantity, _, which = name.rpartition("_")
-    # a coarse grid need not end at the end
-    is_there = which == "end" and record.attrs.get("end_included")
-    if not is_there or f"{quantity}_exact" not in record:
+    # the common times need not include the end
+    has_end = which == "end" and record.attrs.get("end_included")
+    if not has_end or f"{quantity}_exact" not in record:
         return math.nan
     return float(exact_series(record, quantity, member)[-1])

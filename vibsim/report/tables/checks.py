@@ -1,4 +1,4 @@
-"""Tables of what a summary holds: checks, their results, all experiments, and runs that broke down."""
+"""Tables from a summary: checks, their results, and runs that broke down."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from vibsim.core.record import Record
 from vibsim.report import data, words
 from vibsim.report.tables.table import Cell, Column, Table, Written
 
-ROUND_OFF = 1e-12  # numbers no larger than this have two digits: more would be noise
+ROUND_OFF = 1e-12  # numbers up to this have two digits: more would be noise
 
 
 def checks(summary: Mapping[str, Any]) -> Table:
@@ -32,7 +32,7 @@ def checks(summary: Mapping[str, Any]) -> Table:
 
 
 def results(record: Record, check: Mapping[str, Any], unit: str) -> Table | None:
-    """Return the table of what was measured of one check, with the unit of its numbers."""
+    """Return the table of the results of one check; `unit` is that of its numbers."""
     listed: Sequence[Mapping[str, Any]] = check.get("results") or []
     if not listed:
         return None
@@ -46,7 +46,7 @@ def results(record: Record, check: Mapping[str, Any], unit: str) -> Table | None
     columns += (
         [Column("order", form="order"), Column("interval"), Column("levels")] if has_order else []
     )
-    # how far apart two solutions are has no digits worth reading, a number that a check names may have
+    # differences and errors need few digits, a number of a value check may need many
     form = "small" if check.get("kind") in ("equal", "accurate") else "value"
     columns += [Column("value", unit, form)] if has_value else []
 
@@ -70,22 +70,22 @@ def results(record: Record, check: Mapping[str, Any], unit: str) -> Table | None
 
 
 def member(record: Record, case: int) -> str:
-    """Name a member by its global index; empty where the record does not have it."""
+    """Name a member by its global index; empty if the record lacks it."""
     place = data.case_position(record, case)
     return "" if place is None else data.case_name(record, place)
 
 
 def failures(summary: Mapping[str, Any], record: Record) -> Table | None:
-    """Return the runs that broke down; None where there is none."""
-    found: Iterable[Mapping[str, Any]] = summary.get("failures") or []
-    if not found:
+    """Return the runs that broke down; None if there are none."""
+    listed: Iterable[Mapping[str, Any]] = summary.get("failures") or []
+    if not listed:
         return None
     columns = (
         Column("scheme"), Column("level", form="integer"), Column("case", form="integer"), Column("member"),
         Column("t", data.time_unit(record), "step"), Column("step", form="integer"), Column("error"),
     )  # fmt: skip
     keys = ("scheme", "level", "case", "member", "t", "step", "error")
-    named = [{**row, "member": member(record, row["case"])} for row in found]
+    named = [{**row, "member": member(record, row["case"])} for row in listed]
     rows = tuple(tuple(row[key] for key in keys) for row in named)
     caption = "Runs that broke down: the first moment at which the solution was not finite"
     return Table("failures", caption, columns, rows)

@@ -1,4 +1,4 @@
-"""Table of the polynomials that every scheme reproduces exactly, and of what it is off by on the next degree.
+"""Table of the polynomial degree up to which every scheme is exact, and its residual on the next degree.
 
 Source: vibration text, sections 2.2 and 8.5, problem 1 and exercise 9.
 """
@@ -15,8 +15,8 @@ from vibsim.report.types import Experiment
 from vibsim.theory import Miss, Residual
 from vibsim.theory.degrees import HIGHEST_DEGREE, applies
 
-LONGEST = 40  # characters of a coefficient that a table shows
-DIGITS = 6  # digits of whole numbers in a coefficient above which it is written with decimals
+LONGEST = 40  # most characters of a coefficient in the table
+DIGITS = 6  # coefficients with longer integers are written as decimals
 EXACT = "exact"
 CAUSES = {
     "": "the first step alone",
@@ -24,14 +24,14 @@ CAUSES = {
     "force": "the force, taken at a point that is off the solution",
     "damping": "its treatment of damping",
 }
-"""Where the blame lies, by `vibsim.theory.Miss.cause`."""
+"""`vibsim.theory.Miss.cause` to its words."""
 
 
 def table(experiment: Experiment) -> Table | None:
-    """Return one row per scheme, on the model of the experiment with a force for each polynomial.
+    """Return one row per scheme, for the model of the experiment with a manufactured force for each polynomial.
 
-    None where the experiment is not about polynomials: none is its solution, and no check asks for `exact_degree`.
-    Schemes with swept options and those that choose their own steps have no row.
+    None unless the exact solution is a polynomial or a check is on `exact_degree`. Adaptive schemes and schemes with
+    swept options have no row.
     """
     model = experiment.model.definition
     if not _is_about_polynomials(experiment) or not applies(model):
@@ -49,10 +49,10 @@ def table(experiment: Experiment) -> Table | None:
         if degree == HIGHEST_DEGREE:
             rows.append((spec.name, degree, None, EXACT, EXACT, "–"))
         else:
-            found = theory.miss(stepper, model, degree + 1)
-            off = residual_text(found.start), residual_text(found.step)
-            rows.append((spec.name, degree, found.degree, *off, _blame(found)))
-    # each polynomial has a force of its own
+            miss = theory.miss(stepper, model, degree + 1)
+            residuals = residual_text(miss.start), residual_text(miss.step)
+            rows.append((spec.name, degree, miss.degree, *residuals, _cause(miss)))
+    # the left side; each polynomial has its own force
     equation = model.equation.partition(" = ")[0]
     caption = (
         "Polynomials c₀ + c₁ t + c₂ t² + … that schemes reproduce exactly, as solutions of "
@@ -62,13 +62,13 @@ def table(experiment: Experiment) -> Table | None:
     return Table("exact_degrees", caption, columns, tuple(rows)) if rows else None
 
 
-def _blame(found: Miss) -> str:
-    """Say where it is wrong; a first step may be wrong beside the others, in its own way."""
-    cause = CAUSES[found.cause]
-    is_apart = found.start is not None and (
-        found.step is None or found.start.power < found.step.power
+def _cause(miss: Miss) -> str:
+    """Say what causes a residual; the first step may be less accurate than the others for its own reason."""
+    cause = CAUSES[miss.cause]
+    is_start_worse = miss.start is not None and (
+        miss.step is None or miss.start.power < miss.step.power
     )
-    return f"the first step, and {cause}" if is_apart and found.cause else cause
+    return f"the first step, and {cause}" if is_start_worse and miss.cause else cause
 
 
 def residual_text(residual: Residual | None) -> str:
@@ -83,7 +83,7 @@ def residual_text(residual: Residual | None) -> str:
 
 
 def coefficient(residual: Residual) -> str:
-    """Write a coefficient as text, in decimals where its numbers are long or have roots."""
+    """Write a coefficient as text, with decimals if it has long numbers or roots."""
     from sympy import N
 
     text = str(residual.coefficient)
@@ -93,7 +93,7 @@ def coefficient(residual: Residual) -> str:
 
 
 def _is_about_polynomials(experiment: Experiment) -> bool:
-    """Tell whether the exact solution that the file states is one, or a check asks for `exact_degree`."""
+    """Return whether the stated exact solution is a polynomial, or a check is on `exact_degree`."""
     if any(getattr(c.measured, "value", None) == "exact_degree" for c in experiment.checks):
         return True
     text, model = experiment.model.formulas.get("exact"), experiment.model.definition
@@ -102,7 +102,7 @@ def _is_about_polynomials(experiment: Experiment) -> bool:
 
 
 def is_polynomial(node: Expression) -> bool:
-    """Tell whether a formula is a polynomial in ``t``."""
+    """Return whether a formula is a polynomial in ``t``."""
     match node:
         case Negate(operand):
             return is_polynomial(operand)

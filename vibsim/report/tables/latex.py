@@ -1,7 +1,7 @@
-r"""Tables as LaTeX for the package ``booktabs``: in plain ASCII, so that pdflatex knows every character.
+r"""Tables as LaTeX for the package ``booktabs``, in ASCII, so that pdflatex can print every character.
 
-What a text contains is printed and never run. Greek letters, signs of mathematics and raised or lowered characters
-become mathematics, accents the accents of LaTeX. What none of them can print stands as its number, such as ``U+4E2D``.
+All text is escaped, never run. Greek letters, mathematical signs, superscripts and subscripts become mathematics,
+accented letters LaTeX accents. Any other character becomes its code, such as ``U+4E2D``.
 Source: The Unicode Standard, chapter 4 (names, categories and decompositions of characters).
 """
 
@@ -48,7 +48,7 @@ _SMALL = {
 _GREEK = {name: rf"\{name.lower()}" for name in _SMALL} | {
     "EPSILON": r"\varepsilon", "LAMDA": r"\lambda", "FINAL SIGMA": r"\varsigma", "OMICRON": "o",
 }  # fmt: skip
-"""Small letters by their names in Unicode."""
+"""Unicode name of a small letter to its command."""
 _CAPITALS = {
     name: rf"\{name.capitalize()}"
     for name in ("GAMMA", "DELTA", "THETA", "XI", "PI", "SIGMA", "UPSILON", "PHI", "PSI", "OMEGA")
@@ -56,7 +56,7 @@ _CAPITALS = {
     "ALPHA": "A", "BETA": "B", "EPSILON": "E", "ZETA": "Z", "ETA": "H", "IOTA": "I", "KAPPA": "K", "MU": "M",
     "NU": "N", "OMICRON": "O", "RHO": "P", "TAU": "T", "CHI": "X", "LAMDA": r"\Lambda",
 }  # fmt: skip
-"""Capital letters: those without a command look like Latin ones."""
+"""Unicode name of a capital letter to its command, or to the Latin letter that looks the same."""
 _ACCENTS = {
     "\u0300": "`", "\u0301": "'", "\u0302": "^", "\u0303": "~", "\u0304": "=", "\u0306": "u", "\u0307": ".",
     "\u0308": '"', "\u030a": "r", "\u030b": "H", "\u030c": "v", "\u0323": "d", "\u0327": "c", "\u0331": "b",
@@ -64,9 +64,9 @@ _ACCENTS = {
 _SHIFTS = {"<super>": "^", "<sub>": "_"}
 _ROOT = re.compile("√([A-Za-z0-9]+)")
 _HARMLESS = re.compile("[A-Za-z0-9 .,:;+()/=-]*")
-"""What needs no other way of writing."""
+"""Text that needs no escaping."""
 _OPTION = ("[", "*")
-r"""With what a row may not begin: behind ``\\`` it would be an option of that command."""
+r"""Beginnings of a row that ``\\`` before it would take as its option."""
 
 
 def to_latex(table: Table) -> str:
@@ -84,18 +84,18 @@ def _row(cells: list[str]) -> str:
 
 
 def escape(text: str) -> str:
-    """Return text that LaTeX prints as it stands, in ASCII."""
+    """Escape text in ASCII so that LaTeX prints it as it stands."""
     if _HARMLESS.fullmatch(text):
         return text
-    written, last = [], 0
+    pieces, end = [], 0
     for root in _ROOT.finditer(text):
-        written += [_plain(text[last : root.start()]), rf"$\sqrt{{\mathrm{{{root[1]}}}}}$"]
-        last = root.end()
-    return "".join([*written, _plain(text[last:])])
+        pieces += [_plain(text[end : root.start()]), rf"$\sqrt{{\mathrm{{{root[1]}}}}}$"]
+        end = root.end()
+    return "".join([*pieces, _plain(text[end:])])
 
 
 def _plain(text: str) -> str:
-    """Write characters one by one, but raised and lowered ones that follow each other together."""
+    """Escape characters one by one, and runs of superscripts or subscripts together."""
     parts = []
     for shift, group in groupby(text, _shift):
         if shift:
@@ -106,13 +106,13 @@ def _plain(text: str) -> str:
 
 
 def _shift(character: str) -> str:
-    """Say whether a character is raised or lowered and can be shifted in LaTeX; empty for one on the line."""
+    """Return the shift of a superscript or subscript that LaTeX can print; empty for other characters."""
     kind = unicodedata.decomposition(character).partition(" ")[0]
     return kind if kind in _SHIFTS and _on_line(character) else ""
 
 
 def _on_line(character: str) -> str:
-    """Return a raised or lowered character on the line; within mathematics a minus is a hyphen."""
+    """Return the base character of a superscript or subscript, in ASCII; in mathematics a minus is a hyphen."""
     plain = unicodedata.normalize("NFKD", character).replace("−", "-")
     return plain if plain.isascii() else ""
 
@@ -129,7 +129,7 @@ def _character(character: str) -> str:
     letter = {"SMALL": _GREEK, "CAPITAL": _CAPITALS}[greek[1]].get(greek[2]) if greek else None
     if letter:
         return f"${letter}$"
-    # what is not seen: controls, joiners, a combining mark by itself
+    # invisible: controls, joiners, combining marks without a letter
     if unicodedata.category(character) in {"Cc", "Cf", "Cs", "Mn", "Me"}:
         return ""
     decomposed = unicodedata.normalize("NFD", character)
@@ -137,7 +137,7 @@ def _character(character: str) -> str:
     if marks and base.isascii() and base.isalpha():
         accent = next((_ACCENTS[mark] for mark in marks if mark in _ACCENTS), "")
         return f"\\{accent}{{{base}}}" if accent else base
-    alike = unicodedata.normalize("NFKD", character)
-    if alike != character:
-        return "".join(map(_character, alike))
+    compatible = unicodedata.normalize("NFKD", character)
+    if compatible != character:
+        return "".join(map(_character, compatible))
     return " " if unicodedata.category(character) == "Zs" else f"U+{ord(character):04X}"

@@ -1,8 +1,7 @@
 """Tables with a row for every scheme, member and level: orders, periods, energy errors, events.
 
 Source of the two energy errors: vibration text, sections 6.2 and 7.1. The text uses ``[D_2t u]^n = (u^(n+1) -
-u^(n-1))/(2 dt)``, n = 1 .. N-1, whatever the scheme; for many schemes that shows the error of that difference and not
-the scheme's.
+u^(n-1))/(2 dt)``, n = 1 .. N-1, for every scheme, which often shows the error of this difference, not of the scheme.
 """
 
 from __future__ import annotations
@@ -21,9 +20,9 @@ from vibsim.report.tables.table import Cell, Column, Table, Written
 
 OWN, CENTRED = "energy_deviation_max_abs", "energy_deviation_d2t_max_abs"
 ROUND_OFF = 1e-13
-"""A relative error that is no larger is rounding, and nothing is worth comparing with it."""
+"""Relative errors up to this are rounding, and no quotient of them is shown."""
 Fill = Callable[[Member, int], Cell]
-"""Returns the cell of a member and the position of a level."""
+"""Returns the cell for a member and the position of a level."""
 
 
 def by_level(
@@ -36,28 +35,27 @@ def by_level(
     titled: bool = False,
     there: Flags | None = None,
 ) -> Table:
-    """Return a table with a row for every member and level, or for those that are `there`, shape (scheme, case, level).
+    """Return a table with a row for every member and level, or for the `there` ones, shape (scheme, case, level).
 
-    `filled` are the columns after scheme, member and level, each with what fills it (None is left out); scheme and
-    member share a column where the table is `titled`.
+    `filled` are the columns after scheme, member and level, each with its fill function (None is left out). In a
+    `titled` table scheme and member share a column.
     """
     names = ["scheme", "member"] if data.swept(record) and not titled else ["scheme"]
     shown = [column for column in filled if column is not None]
     columns = (*map(Column, names), Column("level", form="integer"), *(c for c, _ in shown))
     rows = []
     for member in members:
-        # keys as the experiment file has them
-        own = [text for text in (member.scheme_name, member.case_name) if text]
-        own = [", ".join(own)] if titled else own
+        # with the dotted keys of the experiment file
+        heads = [text for text in (member.scheme_name, member.case_name) if text]
+        heads = [", ".join(heads)] if titled else heads
         for i, level in enumerate(whole(record, "level")):
             if there is None or there[member.scheme, member.case, i]:
-                rows.append((*own, level, *(fill(member, i) for _, fill in shown)))
-    heads = len(names) if data.swept(record) else 0
-    return Table(name, caption, columns, tuple(rows), heads)
+                rows.append((*heads, level, *(fill(member, i) for _, fill in shown)))
+    return Table(name, caption, columns, tuple(rows), len(names) if data.swept(record) else 0)
 
 
 def _cells(values: Floats, kind: type[int] | type[float] = float) -> Fill:
-    """Return what fills a column with numbers of shape (scheme, case, level)."""
+    """Return a function that fills a column with numbers of shape (scheme, case, level)."""
     return lambda member, i: kind(values[member.scheme, member.case, i])
 
 
@@ -77,17 +75,17 @@ def orders(
     floors = {member: data.floor_norm(record, quantity, member, norm) for member in shown}
     notes = {member: _notes(record, quantity, member, n) for member in shown}
 
-    def of(name: str) -> Fill:
-        found = pick_or_nan(record, f"{quantity}_{name}", (*MEMBER, "level"), norm=n)
-        return lambda m, i: float(found[m.scheme, m.case, i]) if i < found.shape[2] else math.nan
+    def cells(name: str) -> Fill:
+        values = pick_or_nan(record, f"{quantity}_{name}", (*MEMBER, "level"), norm=n)
+        return lambda m, i: float(values[m.scheme, m.case, i]) if i < values.shape[2] else math.nan
 
     filled = (
         (Column("steps", form="integer"), lambda member, i: int(record["steps"][i])),
         _step_column(record),
-        (Column("difference", measure, "norm"), of("difference_norm")) if pairs else None,
-        (Column("ratio", form="order"), of("ratio_norm")) if triples else None,
-        (Column("order", form="order"), of("observed_order")) if triples else None,
-        (Column("true error", measure, "norm"), of("error_norm")),
+        (Column("difference", measure, "norm"), cells("difference_norm")) if pairs else None,
+        (Column("ratio", form="order"), cells("ratio_norm")) if triples else None,
+        (Column("order", form="order"), cells("observed_order")) if triples else None,
+        (Column("true error", measure, "norm"), cells("error_norm")),
         (Column("floor", measure, "norm"), lambda member, i: float(floors[member][i])),
         (Column("counts"), lambda member, i: notes[member][i]) if triples else None,
     )
@@ -97,30 +95,30 @@ def orders(
 
 
 def _notes(record: Record, quantity: str, member: Member, norm: int) -> list[str]:
-    """Say of every row whether the stated order rests on the three levels that start there."""
+    """Return for every level whether the stated order uses the three levels from there on, or why not."""
     levels, (first, last) = whole(record, "level"), data.window(record, quantity, member)
     stated, *_ = data.stated_order(record, quantity, member, norm)
     orders = pick_or_nan(record, f"{quantity}_observed_order", (*MEMBER, "level"), norm=norm)
-    own = orders[member.scheme, member.case]
+    local = orders[member.scheme, member.case]
     above = data.sound_pairs(record, quantity, member) if len(levels) > 1 else []
     notes = []
     for i, level in enumerate(levels):
-        places, has_three = list(range(i, min(i + 3, len(levels)))), i + 2 < len(levels)
+        positions, has_three = list(range(i, min(i + 3, len(levels)))), i + 2 < len(levels)
         if has_three and first <= level and levels[i + 2] <= last:
             notes.append("yes")
         elif 0 <= level < first:
-            is_like = has_three and abs(own[i] - stated) <= ORDER_TOLERANCE
+            is_like = has_three and abs(local[i] - stated) <= ORDER_TOLERANCE
             notes.append("not needed" if is_like else "too coarse")
-        elif all(above[k] for k in places[:-1]):
+        elif all(above[k] for k in positions[:-1]):
             notes.append("no" if has_three else "–")
         else:
-            lost = frame.why_lost(record, quantity, member, places, np.zeros(1))
+            lost = frame.why_lost(record, quantity, member, positions, np.zeros(1))
             notes.append(lost.removeprefix("lost in "))
     return notes
 
 
 def maxima(record: Record, shown: Sequence[Member]) -> Table | None:
-    """Return max|ΔE| over every step with and without the last point, and their ratios from level to level."""
+    """Return max|ΔE| over all steps, with and without the last point, and the ratios of successive levels."""
     if OWN not in record:
         return None
     measure, several = unit(record, OWN), len(whole(record, "level")) > 1
@@ -129,7 +127,7 @@ def maxima(record: Record, shown: Sequence[Member]) -> Table | None:
         (OWN, "max |ΔE|", "ratio"),
         (f"{OWN}_interior", "max |ΔE| without the last point", "ratio, without"),
     ):
-        # lean records leave the second out
+        # lean records lack the second
         if name in record:
             values, is_sound = pick_or_nan(record, name, OF_LEVEL), record["status"] == 0
             filled.append((Column(text, measure, "norm"), _cells(values)))
@@ -141,11 +139,11 @@ def maxima(record: Record, shown: Sequence[Member]) -> Table | None:
 
 def _ratios(values: Floats, is_sound: Flags) -> Floats:
     """Return the ratio of each level's value to that of the next one, shape (scheme, case, level); NaN without one."""
-    found = np.full(values.shape, np.nan)
-    here, next_one = values[..., :-1], values[..., 1:]
-    there = is_sound[..., :-1] & is_sound[..., 1:] & (next_one != 0.0)
-    np.divide(here, next_one, out=found[..., :-1], where=there)
-    return found
+    ratios = np.full(values.shape, np.nan)
+    coarser, finer = values[..., :-1], values[..., 1:]
+    is_defined = is_sound[..., :-1] & is_sound[..., 1:] & (finer != 0.0)
+    np.divide(coarser, finer, out=ratios[..., :-1], where=is_defined)
+    return ratios
 
 
 def scalars(record: Record, shown: Sequence[Member]) -> Table | None:
@@ -159,7 +157,7 @@ def scalars(record: Record, shown: Sequence[Member]) -> Table | None:
         (Column("period", time, "full"), _cells(period)),
         (Column("exact period", time, "full"), lambda member, i: float(exact[member.case])),
         (Column("relative error", form="norm"), _cells(period / usable - 1.0)),
-        # the peak of a run that grows without bound may have either sign
+        # in a run that grows without bound the sign is arbitrary
         (Column("amplitude", angle, "full"), _cells(np.abs(record["amplitude"]))),
     )
     caption = "Period (interpolated) and amplitude"
@@ -167,14 +165,14 @@ def scalars(record: Record, shown: Sequence[Member]) -> Table | None:
 
 
 def velocities(record: Record) -> Table | None:
-    """Return the largest relative energy error with both velocities; None where no scheme has one of its own."""
+    """Return the largest relative energy error with both velocities; None if no scheme has its own velocity."""
     if CENTRED not in record or not np.isfinite(pick_or_nan(record, CENTRED, OF_LEVEL)).any():
         return None
     first = style.positive(np.abs(pick_or_nan(record, "energy_initial", MEMBER)))[..., None]
     own, centred, interior = (
         pick_or_nan(record, name, OF_LEVEL) / first for name in (OWN, CENTRED, f"{OWN}_interior")
     )
-    # the velocity of a scheme without another one is the centred difference, but at the last step
+    # a scheme without its own velocity uses the centred difference, except at the last step
     is_same = np.asarray(np.isnan(centred).all(axis=-1))
     second = np.where(is_same[..., None], interior, centred)
     is_named = "energy_drift_kind" in record
@@ -209,7 +207,7 @@ def velocities(record: Record) -> Table | None:
 
 
 def _plain(quotient: float) -> Cell:
-    """Return a quotient that is written without powers of ten, with three digits at least."""
+    """Write a quotient without a power of ten, with at least three digits."""
     if not math.isfinite(quotient) or quotient <= 0.0:
         return quotient
     rounded = float(f"{quotient:.2e}")
@@ -218,7 +216,7 @@ def _plain(quotient: float) -> Cell:
 
 
 def events(record: Record) -> Table | None:
-    """Return number and times of impacts, turns of friction and rest; None where there are none."""
+    """Return number and times of impacts, turns under friction and rest; None if there are none."""
     count, first, last, rest = (
         pick_or_nan(record, name, OF_LEVEL)
         for name in ("event_count", "first_event_time", "last_event_time", "rest_time")
@@ -232,7 +230,7 @@ def events(record: Record) -> Table | None:
     seconds, has_rest = time_unit(record, "first_event_time"), np.isfinite(rest).any()
 
     def change(member: Member, i: int) -> Cell:
-        """Return by how much the last event is later than on the next finer level; None where it is another event."""
+        """Return the time of the last event minus that on the next finer level; None if it is a different event."""
         counts, times = (part[member.scheme, member.case, i : i + 2] for part in (count, last))
         is_same = counts.size == 2 and counts[0] == counts[1] and np.isfinite(times[0] - times[1])
         return float(times[0] - times[1]) if is_same else None

@@ -1,4 +1,4 @@
-"""Numbers that a source printed beside ours: the source's own digits, ours in the same manner, and their difference."""
+"""Printed numbers of a source beside ours: its digits, ours in the same notation, and their difference."""
 
 from __future__ import annotations
 
@@ -20,34 +20,34 @@ from vibsim.report.types import Experiment, PublishedRow, PublishedTable
 
 AGREES = "agrees?"
 OWN = "by own velocity"
-PLACES = ("t", "step", "event", "case")  # where a number may be taken, beside swept values
+PLACES = ("t", "step", "event", "case")  # keys that locate a number, besides swept values
 
 
 def ids(experiment: Experiment) -> frozenset[str]:
-    """Name the checks that printed numbers made: a page has tables of these in place of cards."""
+    """Return the ids of the checks of printed numbers, for which a page has tables in place of cards."""
     from vibsim.experiment.schema.published import row_id
 
-    every = enumerate(experiment.published, 1)
-    return frozenset(row_id(i, j) for i, table in every for j in range(1, len(table.rows) + 1))
+    numbered = enumerate(experiment.published, 1)
+    return frozenset(row_id(i, j) for i, table in numbered for j in range(1, len(table.rows) + 1))
 
 
-def sentence(found: list[Table]) -> str:
-    """Say how many printed numbers ours agree with; empty where there is none."""
+def sentence(compared: list[Table]) -> str:
+    """Say how many printed numbers agree with ours; empty if there are none."""
     marks = []
-    for table in found:
-        place = [column.header for column in table.columns].index(AGREES)
-        marks += [str(row[place]) for row in table.rows]
+    for table in compared:
+        i = [column.header for column in table.columns].index(AGREES)
+        marks += [str(row[i]) for row in table.rows]
     agreed = sum(mark.startswith("yes") for mark in marks)
     text = f"{agreed} of {len(marks)} printed numbers agree with ours to the last printed digit."
     return text if marks else ""
 
 
 def tables(experiment: Experiment, record: Record, summary: Mapping[str, Any]) -> list[Table]:
-    """Return one table for every table of printed numbers."""
+    """Return one table for each table of printed numbers."""
     from vibsim.experiment.schema.published import row_id
 
     checks = {check["id"]: check for check in summary["checks"]}
-    found = []
+    compared = []
     for i, table in enumerate(experiment.published, 1):
         columns = _columns(record, table)
         rows = tuple(
@@ -55,13 +55,13 @@ def tables(experiment: Experiment, record: Record, summary: Mapping[str, Any]) -
             for j, row in enumerate(table.rows, 1)
         )
         of = f" of {words.symbol(table.quantity)}" if table.quantity else ""
-        named = table.source or experiment.source
+        origin = table.source or experiment.source
         caption = (
-            f"{table.title}{f' ({named})' if named else ''}. Ours: {_value_in_words(table.value)}{of}; it agrees if it "
+            f"{table.title}{f' ({origin})' if origin else ''}. Ours: {words.spelled(table.value)}{of}; it agrees if it "
             "differs by at most half a unit of the last printed digit"
         )
-        found.append(Table(f"published_{i}", caption, columns, rows))
-    return found
+        compared.append(Table(f"published_{i}", caption, columns, rows))
+    return compared
 
 
 def _columns(record: Record, table: PublishedTable) -> tuple[Column, ...]:
@@ -78,15 +78,11 @@ def _columns(record: Record, table: PublishedTable) -> tuple[Column, ...]:
 
 
 def _beside_header(name: str, table: PublishedTable) -> str:
-    """Return the header of a further value: what it has by the scheme's own velocity, it says so."""
+    """Return the header of an additional value, which names the scheme's own velocity if there are two."""
     if f"{name}{CENTRED}" == table.value:
         return OWN
-    own = f" {OWN}" if f"{name}{CENTRED}" in VALUES else ""
-    return f"beside: {_value_in_words(name)}{own}"
-
-
-def _value_in_words(value: str) -> str:
-    return value.replace(CENTRED, " by [D₂ₜu]").replace("_", " ")
+    velocity = f" {OWN}" if f"{name}{CENTRED}" in VALUES else ""
+    return f"beside: {words.spelled(name)}{velocity}"
 
 
 def _row(
@@ -98,7 +94,7 @@ def _row(
     checks: Mapping[str, Any],
 ) -> Iterator[Cell]:
     headers = [column.header for column in columns]
-    # without a member it is the first
+    # by default the first member
     case = 0 if row.at.case is None else data.case_position(record, row.at.case) or 0
     if row.at.swept:
         case = int(np.argmax(members_with(columns_of(record), row.at.swept, len(record["case"]))))
@@ -118,15 +114,15 @@ def _row(
     yield ours - row.meaning.number
     yield _agrees(checks.get(name, {}).get("status"), row)
     if table.beside:
-        place = record.words("check").index(name)
-        found = data.pick(record, "published_beside", check=place, case=case)
-        yield from (float(value) for value in found[: len(table.beside)])
+        check = record.words("check").index(name)
+        values = data.pick(record, "published_beside", check=check, case=case)
+        yield from (float(value) for value in values[: len(table.beside)])
     if "why" in headers:
         yield row.note or ""
 
 
 def _agrees(status: str | None, row: PublishedRow) -> str:
-    """Say whether the measured number agrees with the printed one, and whether that was expected."""
+    """Say whether our number agrees with the printed one, and whether that was expected."""
     if status not in {"PASS", "FAIL"}:
         return "not known"
     expected = "" if status == "PASS" else " (not as expected)"

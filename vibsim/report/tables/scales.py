@@ -16,7 +16,7 @@ from vibsim.report.types import Experiment
 
 
 def table(experiment: Experiment, record: Record) -> Table | None:
-    """Return scales and dimensionless numbers of every member, as a range; None where the model states none."""
+    """Return the ranges of scales and dimensionless numbers over the members; None if the model defines none."""
     model, scaling = experiment.model.definition, experiment.scaling
     if model.scales is None:
         return None
@@ -49,7 +49,7 @@ def table(experiment: Experiment, record: Record) -> Table | None:
 
 
 def _members(section: str, values: Mapping[str, float], record: Record) -> dict[str, Any]:
-    """Return the values of every member: swept ones as arrays."""
+    """Return values by key, swept ones as arrays of shape (case,)."""
     names = {str(record.coords[name].attrs["sweep_key"]): name for name in data.swept(record)}
     return {
         key: record[names[f"{section}.{key}"]] if f"{section}.{key}" in names else value

@@ -1,4 +1,4 @@
-"""The figures of the source texts: which of them stands where on a page, as a table that the index reads again."""
+"""The figures of the source texts and their places on a page, as a table that the index reads."""
 
 from __future__ import annotations
 
@@ -19,23 +19,23 @@ if TYPE_CHECKING:
     from vibsim.report.style import Picture
 
 PLAYER = "player"
-"""What is shown by the player of the page and not drawn."""
+"""Kind of figure that the player of the page shows."""
 HEADERS = ("figure", "shows", "place")
 """The place is the id of an element of the page."""
 
 
-def table(found: Iterable[tuple[FigureOfSource, Sequence[Picture]]]) -> Table | None:
-    """Return which figure of the source stands where on the page; None where none is asked for."""
+def table(drawn: Iterable[tuple[FigureOfSource, Sequence[Picture]]]) -> Table | None:
+    """Return the places of the figures of the source on the page; None if the file names none."""
     rows = []
-    for figure, drawn in found:
-        places = [picture.name for picture in drawn] or [PLAYER] * (figure.shows == PLAYER)
+    for figure, pictures in drawn:
+        places = [picture.name for picture in pictures] or [PLAYER] * (figure.shows == PLAYER)
         rows += [(figure.source, figure.shows.replace("_", " "), place) for place in places]
     columns = tuple(map(Column, HEADERS))
     return Table("figures", "Figures of the source", columns, tuple(rows)) if rows else None
 
 
 FILE = "tables/figures.csv"
-"""Within the results of an experiment."""
+"""Path within the results of an experiment."""
 PAGE = "report.html"
 _NUMBER = re.compile(r"(\d+)")
 
@@ -45,15 +45,15 @@ class Place:
     """A figure on the page of an experiment."""
 
     name: str
-    """Of the experiment."""
+    """Name of the experiment."""
     shows: str
     link: str
 
 
 def listed(results: Path, folders: Iterable[Path]) -> list[tuple[str, list[Place]]]:
-    """Return the figures of the texts in their order, with the places where experiments show them.
+    """Return the figures of the texts in order, with their places on the pages of experiments.
 
-    A table that cannot be read, or has other columns, counts as not there: the verdicts do not depend on it.
+    A table that cannot be read, or has other columns, counts as missing, since no verdict depends on it.
     """
     found: dict[str, list[Place]] = {}
     for folder in folders:
@@ -67,14 +67,14 @@ def listed(results: Path, folders: Iterable[Path]) -> list[tuple[str, list[Place
         for row in rows:
             figure, shows, place = (row.get(name) or "" for name in HEADERS)
             places = found.setdefault(figure, [])
-            # of several pictures the first one has the link
+            # the link leads to the first of several pictures
             if place and (folder.name, shows) not in {(p.name, p.shows) for p in places}:
                 places.append(Place(folder.name, shows, f"{page}#{quote(place)}"))
     return sorted(((f, p) for f, p in found.items() if f and p), key=lambda row: order(row[0]))
 
 
 def order(figure: str) -> list[tuple[int, str]]:
-    """Order figures by their numbers: figure 2 stands before figure 10."""
+    """Return a sort key that orders figures by number: figure 2 before figure 10."""
     return [
         (int(part), "") if part.isdigit() else (0, part) for part in _NUMBER.split(figure.lower())
     ]

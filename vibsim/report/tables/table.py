@@ -1,4 +1,4 @@
-"""Tables: one object, written for reading and for computing (CSV with every digit); LaTeX is in `latex.py`."""
+"""Tables as text for reading and as CSV with all digits for computing; LaTeX is in `latex.py`."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from vibsim.report import words
 
 Cell = str | int | float | None
 _FORMULA = ("=", "+", "-", "@", "\t", "\n", "\uff1d", "\uff0b", "\uff0d", "\uff20")
-"""With what a formula of a spreadsheet begins; the last four are such signs in full width."""
+"""First characters of a spreadsheet formula; the last four are their full-width forms."""
 
 
 class Written(float):
-    """A number with the text that a reader sees in place of it; files for computing hold the number."""
+    """A number with the text that is shown instead; files for computing hold the number."""
 
     text: str
 
@@ -34,8 +34,7 @@ class Column:
     header: str
     unit: str = ""
     form: str = "text"
-    """``text``, ``printed`` (text of a printed number, `words.printed`), or a form of
-    `vibsim.report.words.number`."""
+    """``text``, ``printed`` (see `words.printed`), or a form of `vibsim.report.words.number`."""
 
     @property
     def title(self) -> str:
@@ -52,14 +51,14 @@ class Table:
     columns: tuple[Column, ...]
     rows: tuple[tuple[Cell, ...], ...]
     heads: int = 0
-    """So many columns at the left are long and repeat: a page shows them once, above each block of rows."""
+    """Number of long repeating columns at the left, which a page shows once, above each block of rows."""
 
     def __post_init__(self) -> None:
         if any(len(row) != len(self.columns) for row in self.rows):
             raise ValueError(f"table {self.name}: a row does not have {len(self.columns)} cells")
 
     def without_empty(self, headers: Collection[str] | None = None) -> Table:
-        """Return the table without those columns of some headers, or of all but the heads, that hold nothing."""
+        """Return the table without the empty ones among the columns `headers`, or among all but the heads."""
         chosen = [
             i
             for i, column in enumerate(self.columns)
@@ -70,13 +69,13 @@ class Table:
         return replace(self, columns=tuple(self.columns[i] for i in chosen), rows=rows)
 
     def text_rows(self) -> Iterator[list[str]]:
-        """Yield every row as it is read."""
+        """Yield every row as text."""
         forms = [self._form(i) for i in range(len(self.columns))]
         for row in self.rows:
             yield [_text(cell, form) for cell, form in zip(row, forms, strict=True)]
 
     def _form(self, i: int) -> str:
-        """Return the form of a column: norms have a power of ten where one of them needs it, so that they compare."""
+        """Return the form of a column: if one norm needs a power of ten, all have one, so that they compare."""
         form = self.columns[i].form
         sizes = [abs(row[i]) for row in self.rows if isinstance(row[i], float)]  # type: ignore[arg-type]
         nonzero = [size for size in sizes if 0 < size < math.inf]
@@ -85,7 +84,7 @@ class Table:
 
 
 def is_nothing(cell: Cell) -> bool:
-    """Say whether a cell holds nothing."""
+    """Return whether a cell is empty."""
     return cell is None or (isinstance(cell, float) and math.isnan(cell))
 
 
@@ -100,14 +99,14 @@ def _text(cell: Cell, form: str) -> str:
 
 
 def to_csv(table: Table) -> str:
-    """Return a table as CSV: units in the header, floats with every digit, empty where nothing applies."""
+    """Return a table as CSV: units in the header, floats with all digits, empty cells for missing values."""
     lines = [csv_line([column.title for column in table.columns])]
     lines += [csv_line([_exact(cell) for cell in row]) for row in table.rows]
     return "".join(lines)
 
 
 def csv_line(cells: Sequence[str]) -> str:
-    """Return a line of CSV; a text that a spreadsheet would run as a formula gets an apostrophe before it.
+    """Return a line of CSV; text that a spreadsheet would run as a formula is prefixed with an apostrophe.
 
     Source: OWASP, CSV injection.
     """
@@ -117,7 +116,7 @@ def csv_line(cells: Sequence[str]) -> str:
 
 
 def _harmless(text: str) -> str:
-    # a lone carriage return would be the end of a line, and has no quotes around it
+    # the writer does not quote a lone carriage return, which would end the line
     cell = text.replace("\r\n", "\n").replace("\r", "\n")
     if not cell.startswith(_FORMULA):
         return cell

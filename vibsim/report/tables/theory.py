@@ -1,4 +1,4 @@
-"""Tables of what theory predicts of every scheme beside what was measured.
+"""Tables of theory beside measurement for every scheme.
 
 Source: vibration text, sections 4.1 to 4.6 (frequency and growth on ``u'' + w^2 u = 0``), 5.6, 6.2.
 """
@@ -21,19 +21,19 @@ from vibsim.report.tables.levels import Fill, by_level
 from vibsim.report.tables.table import Cell, Column, Table, Written
 from vibsim.report.types import Experiment
 
-LIMITS = {0.0: "never", math.inf: "any"}  # words for limits of stability that are no number
-EDGE = 1e-9  # relative distance within which a step counts as lying on the limit of stability
+LIMITS = {0.0: "never", math.inf: "any"}  # words for special limits of stability
+EDGE = 1e-9  # relative distance within which a step is at the limit of stability
 ROUNDINGS = 32.0
-"""Predicted and measured numbers agree to round-off within so many of them for each step of a period."""
+"""Rounding errors per step of a period within which a prediction and a measurement agree."""
 
 
 def predicted(record: Record) -> bool:
-    """Say whether theory predicts anything here: it does for linear models."""
+    """Return whether the record has predictions of theory, as for linear models."""
     return bool(np.isfinite(pick_or_nan(record, "theory_growth", OF_LEVEL)).any())
 
 
 def schemes(experiment: Experiment, record: Record) -> Table | None:
-    """Return one row per scheme: what it states, and the orders found; None for one scheme alone."""
+    """Return one row per scheme with its stated properties and measured orders; None for a single scheme."""
     names = record.words("scheme")
     if len(names) < 2:
         return None
@@ -66,12 +66,12 @@ def _scheme(
 ) -> Iterator[Cell]:
     spec = experiment.schemes[s]
     scheme = spec.method
-    words_of = ["adaptive" if scheme.adaptive else "explicit" if scheme.explicit else "implicit"]
-    words_of += ["s"] if scheme.symplectic else []
+    kinds = ["adaptive" if scheme.adaptive else "explicit" if scheme.explicit else "implicit"]
+    kinds += ["s"] if scheme.symplectic else []
     named = spec.name if spec.name.startswith(spec.kind) else f"{spec.name} ({spec.kind})"
-    yield from (named, scheme.family, ", ".join(words_of))
+    yield from (named, scheme.family, ", ".join(kinds))
     yield None if scheme.adaptive else scheme.force_evaluations
-    limit = _alike(pick_or_nan(record, "stability_limit", MEMBER)[s])
+    limit = _common(pick_or_nan(record, "stability_limit", MEMBER)[s])
     if isinstance(limit, float):
         limit = Written(limit, LIMITS.get(limit, words.number(limit, "step")))
     yield limit
@@ -81,28 +81,28 @@ def _scheme(
         with np.errstate(invalid="ignore"):
             away = np.abs(value - formal)
         case = int(np.argmax(np.where(np.isfinite(away), away, -1.0)))
-        yield _alike(formal)
+        yield _common(formal)
         if whole(record, "triple"):
             order, *ends = (float(part[case]) for part in (value, low, high))
             yield Written(order, words.with_interval(order, ends))
 
 
-def _alike(values: Floats) -> Cell:
-    """Return the one number that all members have, or a word where they differ; None where there is none."""
-    found = np.unique(values[~np.isnan(values)])
-    if found.size > 1:
+def _common(values: Floats) -> Cell:
+    """Return the number that all members share, or ``varies``; None if no member has one."""
+    distinct = np.unique(values[~np.isnan(values)])
+    if distinct.size > 1:
         return "varies"
-    return float(found[0]) if found.size else None
+    return float(distinct[0]) if distinct.size else None
 
 
 def predictions(record: Record) -> list[Table]:
-    """Return what is predicted and measured of every scheme, member and level: growth; frequency and phase error."""
+    """Return the predicted and measured growth, and frequency and phase error, of every scheme, member and level."""
     if not predicted(record):
         return []
     time = data.time_unit(record)
     rate = data.unit(record, "theory_frequency") or f"rad/{time}"
     by_peaks = record.variable("measured_growth").attrs.get("method") == PEAKS
-    how = (
+    method = (
         "The measured numbers come from peaks interpolated by a parabola, which adds an error on coarse levels"
         if by_peaks
         else "The measured numbers are those of the recurrence that the computed steps satisfy"
@@ -112,8 +112,8 @@ def predictions(record: Record) -> list[Table]:
     alone = {"growth": ("growth per period − 1", "")}
     both = {"frequency": ("frequency", rate), "phase_error": ("phase error", time)}
     return [
-        _predictions(record, "growth", f"{growth}. {how}", alone),
-        _predictions(record, "phase", f"{phase}. {how}", both),
+        _predictions(record, "growth", f"{growth}. {method}", alone),
+        _predictions(record, "phase", f"{phase}. {method}", both),
     ]
 
 
@@ -149,13 +149,13 @@ def _predictions(
     table = by_level(
         record, f"theory_{name}", caption, data.all_members(record), filled, there=there
     )
-    found = table.without_empty(["difference"])
+    short = table.without_empty(["difference"])
     agree = ". Where no difference is shown, the two agree to round-off"
-    return found if found.columns == table.columns else replace(found, caption=caption + agree)
+    return short if short.columns == table.columns else replace(short, caption=caption + agree)
 
 
 def _beyond(values: Floats, noise: Floats) -> Fill:
-    """Return what fills a column with numbers, and leaves out those that are no larger than the noise."""
+    """Return a function that fills a column with numbers, except those within the noise."""
 
     def cell(member: Member, i: int) -> Cell:
         value = float(values[member.scheme, member.case, i])
@@ -165,7 +165,7 @@ def _beyond(values: Floats, noise: Floats) -> Fill:
 
 
 def _written(values: Floats, noise: Floats) -> Fill:
-    """Return what fills a column with numbers, two digits of those that are no larger than the noise."""
+    """Return a function that fills a column with numbers, with two digits for those within the noise."""
 
     def cell(member: Member, i: int) -> Cell:
         place = member.scheme, member.case, i
@@ -177,7 +177,7 @@ def _written(values: Floats, noise: Floats) -> Fill:
 
 
 def is_stable(p: float, limit: float) -> str:
-    """Say in a word whether ``w dt = p`` is within the limit of stability."""
+    """Say in a word whether ``w dt = p`` is below the limit of stability."""
     if math.isnan(limit) or math.isnan(p):
         return "–"
     if limit == 0.0:

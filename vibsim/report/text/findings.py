@@ -131,7 +131,7 @@ def _claim_title(lead: Lead) -> str:
         return ""
     claim = check.claim
     if _FORMULA.match(claim) is None:
-        claim = claim[:1].upper() + claim[1:]
+        claim = words.capitalized(claim)
     claim = claim if len(claim) <= LONG_CLAIM else f"{claim[: LONG_CLAIM - 1]}…"
     status = lead.entry["status"]
     is_false = not check.holds and status != "INCONCLUSIVE"
@@ -297,7 +297,7 @@ def _at(*orders: float | None) -> str:
 
 def _capitalized(text: str) -> str:
     """Capitalize the article at the beginning of a sentence; symbols keep their case."""
-    return text[:1].upper() + text[1:] if text.startswith("the ") else text
+    return words.capitalized(text) if text.startswith("the ") else text
 
 
 def of_ladder(verdict: LadderVerdict) -> str:

@@ -21,14 +21,14 @@ from vibsim.report.types import Axes, Experiment, Figure
 
 LEFT, WIDE, TALL, ABOVE, BELOW = 0.8, 5.4, 3.4, 0.32, 0.5
 """Left margin, width and height of a map, room above and below it [inch]."""
-BAR = 0.14  # width of the scale at its right, and half of the gap before it [inch]
+BAR = 0.14  # width of the colour bar, and half of the gap before it [inch]
 BORDERED = 400  # most cells that are drawn one by one, with borders; more are one image
-MOST_DECADES = 12.0  # most decades that a logarithmic scale spans, from the largest value down
+MOST_DECADES = 12.0  # of a logarithmic scale, from the largest value down
 LOG_SPREAD = 20.0
-"""Positive values that spread by more than this factor, but for a hundredth, have a logarithmic scale."""
-LOG_SPREAD_OF_PERIODS = 5.0  # the same of periods: those of rotation are much shorter
-ORDER_RANGE = 0.5  # distance from the promised order at which the colours end
-DOT_SPACING = 0.025  # distance between the dots of a separatrix, as part of the panel
+"""Ratio of the largest value to the 1 % quantile above which a scale is logarithmic."""
+LOG_SPREAD_OF_PERIODS = 5.0  # the same for periods: those of rotation are much shorter
+ORDER_RANGE = 0.5  # distance from the formal order at the ends of the colours
+DOT_SPACING = 0.025  # smallest distance of the dots of a separatrix, as a fraction of the panel
 
 
 @dataclass(frozen=True)
@@ -38,47 +38,47 @@ class Map:
     stem: str
     name: str
     quantity: str
-    values: Floats  # shape (case,); NaN where there is nothing
+    values: Floats  # shape (case,); NaN if a member has no such number
     label: str = ""
-    """What the colours mean, with the unit."""
+    """Meaning of the colours, with the unit."""
     unit: str = ""
     caption: str = ""
     badness: Floats | None = None
-    """Of several members in a cell the one with most of it is shown; without it the largest value."""
+    """A cell with several members shows the one of largest badness; without it the largest value."""
     kind: str = "size"
     """``size`` (dark to light), ``distance`` (around 0, pale within `tolerance`), ``factor`` (around 1), ``code``."""
     tolerance: float = 0.0
     spread: float = LOG_SPREAD
     codes: tuple[tuple[str, str], ...] = ()  # of kind ``code``: text and colour of every number
-    texts: tuple[str, ...] = ()  # what the numbers stand for, where the verdict does not tell it
+    texts: tuple[str, ...] = ()  # meaning of the numbers, unless the verdict tells it
     number: Floats | None = None
-    """The number itself, where the map shows its distance from another one."""
+    """The number itself, if the map shows its distance from another one."""
     shared: str | None = None
-    """What is said where all members have the same; None for the value."""
+    """The sentence if all members share the value, else empty; None to derive it from the values."""
 
 
 def views(
-    experiment: Experiment, record: Record, grid: Grid, found: list[str], worst: Worst, schemes: range
+    experiment: Experiment, record: Record, grid: Grid, quantities: list[str], worst: Worst, schemes: range
 ) -> Iterator[View | str]:  # fmt: skip
-    """Yield a map of each quantity of each scheme; of what is the same for all members a sentence."""
+    """Yield a map of each number of each scheme, or a sentence if all members share it."""
     for scheme in schemes:
         several = data.of_several(record, scheme)
-        for each in _maps(experiment, record, found, scheme):
-            text = each.shared
+        for shown in _maps(experiment, record, quantities, scheme):
+            text = shown.shared
             if text is None:
-                text = view.shared(each.name, each.values, each.unit)
+                text = view.shared(shown.name, shown.values, shown.unit)
             if text:
                 yield f"{text}{several}"
-            elif np.isfinite(each.values).any():
-                yield _view(record, grid, each, scheme, worst(each.quantity).case)
+            elif np.isfinite(shown.values).any():
+                yield _view(record, grid, shown, scheme, worst(shown.quantity).case)
 
 
-def _maps(experiment: Experiment, record: Record, found: list[str], scheme: int) -> Iterator[Map]:
-    """Yield the maps of a scheme: of the motion, without friction or force the period first, and of each quantity."""
+def _maps(experiment: Experiment, record: Record, names: list[str], scheme: int) -> Iterator[Map]:
+    """Yield the maps of a scheme: of the motion (a conservative one by its period first) and of each quantity."""
     both = [_period, _amplitude]
-    for of_motion in both if experiment.model.definition.conservative else both[::-1]:
-        yield from of_motion(position(experiment), record, scheme)
-    for quantity in found:
+    for draw_motion in both if experiment.model.definition.conservative else both[::-1]:
+        yield from draw_motion(position(experiment), record, scheme)
+    for quantity in names:
         yield from _order(experiment, record, quantity, scheme)
         yield from _errors(record, quantity, scheme)
     for name, check in view.value_checks(experiment):
@@ -89,37 +89,46 @@ def _maps(experiment: Experiment, record: Record, found: list[str], scheme: int)
         )  # fmt: skip
 
 
-def _period(of: str, record: Record, scheme: int) -> Iterator[Map]:
-    time, known = finest_level.measured(record, "period", of), data.exact_periods(record)
-    value, exact = time.value[scheme], np.where(np.isfinite(known), known, np.nan)
+def _period(quantity: str, record: Record, scheme: int) -> Iterator[Map]:
+    time, periods = (
+        finest_level.measured(record, "period", quantity),
+        data.exact_periods(record),
+    )
+    value, exact = time.value[scheme], np.where(np.isfinite(periods), periods, np.nan)
     if not np.isfinite(value).any():
         return
-    label, at = style.label("period", time.unit), f"Of level {data.whole(record, 'level')[-1]}."
+    label, caption = style.label("period", time.unit), _finest_level(record)
     with np.errstate(invalid="ignore", divide="ignore"):
         bar = time.error[scheme] / value
     error = finest_level.period_error(record, -1)[scheme]
-    yield Map("period", "period", of, value, label, time.unit, at, spread=LOG_SPREAD_OF_PERIODS)
-    yield Map("period_error", "error of the period", of, error, "|period / exact − 1|", caption=at)
-    guessed = "From the two finest levels alone. Where it agrees with the error, it can be trusted."
-    text = "estimated error / period"
-    yield Map("period_bar", "error bar of the period", of, bar, text, caption=guessed)
-    label, spread = f"exact {label}", LOG_SPREAD_OF_PERIODS
-    yield Map("period_exact", "exact period", of, exact, label, time.unit, spread=spread)
+    spread = LOG_SPREAD_OF_PERIODS
+    yield Map("period", "period", quantity, value, label, time.unit, caption, spread=spread)
+    name, text = "error of the period", "|period / exact − 1|"
+    yield Map("period_error", name, quantity, error, text, caption=caption)
+    trust = "From the two finest levels alone. Where it agrees with the error, it can be trusted."
+    name, text = "error bar of the period", "estimated error / period"
+    yield Map("period_bar", name, quantity, bar, text, caption=trust)
+    label = f"exact {label}"
+    yield Map("period_exact", "exact period", quantity, exact, label, time.unit, spread=spread)
 
 
-def _amplitude(of: str, record: Record, scheme: int) -> Iterator[Map]:
-    size = finest_level.measured(record, "amplitude", of)
+def _finest_level(record: Record) -> str:
+    return f"Of level {data.whole(record, 'level')[-1]}."
+
+
+def _amplitude(quantity: str, record: Record, scheme: int) -> Iterator[Map]:
+    size = finest_level.measured(record, "amplitude", quantity)
     value, bar = size.value[scheme], size.error[scheme]
     if not np.isfinite(value).any():
         return
-    label, at = style.label("amplitude", size.unit), f"Of level {data.whole(record, 'level')[-1]}."
-    yield Map("amplitude", "amplitude", of, value, label, size.unit, at)
+    label, caption = style.label("amplitude", size.unit), _finest_level(record)
+    yield Map("amplitude", "amplitude", quantity, value, label, size.unit, caption)
     text = style.label("estimated error", size.unit)
-    yield Map("amplitude_bar", "error bar of the amplitude", of, bar, text, size.unit)
+    yield Map("amplitude_bar", "error bar of the amplitude", quantity, bar, text, size.unit)
 
 
 def _order(experiment: Experiment, record: Record, quantity: str, scheme: int) -> Iterator[Map]:
-    """Yield the verdict on a quantity, its order, the interval of that, and the levels it rests on."""
+    """Yield the verdict on a quantity, its order, the width of the interval, and the levels that it rests on."""
     letter = words.symbol(quantity)
     if f"{quantity}_reason" in record:
         yield _reasons(record, quantity, scheme)
@@ -141,49 +150,49 @@ def _order(experiment: Experiment, record: Record, quantity: str, scheme: int) -
 
 
 def _errors(record: Record, quantity: str, scheme: int) -> Iterator[Map]:
-    """Yield the error of the finest level, and how far its estimate can be trusted."""
-    found, letter = finest_level.error(record, quantity), words.symbol(quantity)
-    unit, level = data.norm_unit(record, quantity), data.whole(record, "level")[-1]
-    text = style.label(f"{found.kind} error of {letter} ({words.USUAL_NORM})", unit)
-    best, estimate = style.positive(found.best[scheme]), found.estimate[scheme]
+    """Yield the error of the finest level and the quality of its estimate."""
+    error, letter = finest_level.error(record, quantity), words.symbol(quantity)
+    unit = data.norm_unit(record, quantity)
+    text = style.label(f"{error.kind} error of {letter} ({words.USUAL_NORM})", unit)
+    best, estimate = style.positive(error.best[scheme]), error.estimate[scheme]
     yield Map(
-        f"{quantity}_error", f"error of {letter}", quantity, best, text, unit, f"Of level {level}."
+        f"{quantity}_error", f"error of {letter}", quantity, best, text, unit, _finest_level(record)
     )
     if not np.isfinite(estimate).any():
         return
     with np.errstate(invalid="ignore", divide="ignore"):
-        if found.kind == "true":
-            ratio = style.positive(estimate / found.true[scheme])
+        if error.kind == "true":
+            ratio = style.positive(estimate / error.true[scheme])
             yield Map(
                 f"{quantity}_trust", f"estimated over true error of {letter}", quantity, ratio,
                 "estimated / true error", badness=np.abs(np.log(ratio)), kind="factor",
                 caption="Where it is pale, two levels alone tell the error.",
             )  # fmt: skip
             return
-        width = style.positive((found.high - found.low)[scheme] / estimate)
+        width = style.positive((error.high - error.low)[scheme] / estimate)
     name = f"error bar of the error of {letter}"
     yield Map(f"{quantity}_error_bar", name, quantity, width, "relative width")
 
 
 def _coded(
-    stem: str, name: str, quantity: str, values: Floats, codes: list[tuple[int, str, str]], **more: Any
+    stem: str, name: str, quantity: str, values: Floats, codes: list[tuple[int, str, str]], **fields: Any
 ) -> Map:  # fmt: skip
-    """Return a map of whole numbers, each with its text, to which its count is added, and colour; the last is worst."""
-    place, texts = np.full(values.shape, np.nan), []
+    """Return a map of codes. Each has a text, to which its count is added, and a colour; the last code is the worst."""
+    positions, texts = np.full(values.shape, np.nan), []
     for i, (code, text, colour) in enumerate(codes):
-        place[values == code] = i
+        positions[values == code] = i
         count = words.number(int(np.sum(values == code)), "integer")
         texts.append((f"{text} ({count})", colour))
-    return Map(stem, name, quantity, place, kind="code", codes=tuple(texts), **more)
+    return Map(stem, name, quantity, positions, kind="code", codes=tuple(texts), **fields)
 
 
 def _reasons(record: Record, quantity: str, scheme: int) -> Map:
-    """Return the map of the reasons of the verdicts; of several members in a cell the worst."""
+    """Return the map of the reasons of the verdicts; a cell shows its worst member."""
     reason = data.pick(record, f"{quantity}_reason", scheme=scheme)
     meanings = record.meanings(f"{quantity}_reason")
     found, counts = (part.tolist() for part in np.unique(reason, return_counts=True))
     named = [(code, meanings[code], count) for code, count in zip(found, counts, strict=True)]
-    # the milder first, of equal ones the rarer last
+    # by severity, then the rarer last
     named.sort(key=lambda row: (SEVERITY[REASONS[row[1]]], -row[2]))
     codes = [
         (code, f"{REASONS[word]}: {word}", style.REASON_COLOURS[word]) for code, word, _ in named
@@ -212,78 +221,78 @@ def _window(record: Record, quantity: str, scheme: int) -> Map:
     return _coded(f"{quantity}_levels", name, quantity, first, codes, shared=shared, texts=texts)
 
 
-def _view(record: Record, grid: Grid, each: Map, scheme: int, worst: int) -> View:
-    """Draw a map, and explain what is grey, dotted or gathered in blocks; nothing that is not there."""
-    table = grid.worst(each.values, each.badness)
-    figure = draw(grid, each, table)
+def _view(record: Record, grid: Grid, shown: Map, scheme: int, worst: int) -> View:
+    """Draw a map; the caption explains grey cells, dots and blocks, if there are any."""
+    table = grid.worst(shown.values, shown.badness)
+    figure = draw(grid, shown, table)
     ax, several = figure.axes[0], data.of_several(record, scheme)
     is_ringed = view.ring(ax, float(grid.x.values[worst]), float(grid.y.values[worst]), on_map=True)
-    title = f"{each.name[:1].upper()}{each.name[1:]}{several}"
+    title = f"{words.capitalized(shown.name)}{several}"
     text = style.sentences(
-        each.caption,
+        shown.caption,
         "Grey hatched cells have no such number." * (not np.isfinite(table).all()),
         "The dotted line is the separatrix, where the exact period is infinite."
         * bool(grid.separatrix[0].size),
         grid.note,
     )
-    own, is_number = each.values if each.number is None else each.number, each.kind != "code"
-    values = view.by_scheme(record, scheme, own) if is_number or each.texts else None
+    number, is_number = shown.values if shown.number is None else shown.number, shown.kind != "code"
+    values = view.by_scheme(record, scheme, number) if is_number or shown.texts else None
     return View(
-        each.name, Picture(f"map_{each.stem}_{scheme}", title, text, f"{title} over two swept parameters", figure),
-        each.quantity, values, None, each.unit, each.texts, (scheme,), several.removeprefix(", "), ((0, 1),),
+        shown.name, Picture(f"map_{shown.stem}_{scheme}", title, text, f"{title} over two swept parameters", figure),
+        shown.quantity, values, None, shown.unit, shown.texts, (scheme,), several.removeprefix(", "), ((0, 1),),
         worst if is_ringed else None,
     )  # fmt: skip
 
 
-def draw(grid: Grid, each: Map, table: Floats) -> Figure:
+def draw(grid: Grid, shown: Map, table: Floats) -> Figure:
     """Return a figure with one map and its scale or legend at the right."""
-    high = ABOVE + TALL + BELOW
-    figure = style.canvas(high)
-    at = (LEFT / style.WIDTH, BELOW / high, WIDE / style.WIDTH, TALL / high)
-    ax = figure.add_axes(at, gid=style.MEMBER)
-    image = _cells(ax, grid, each, table)
-    _frame(ax, grid, each.label or each.name)
+    height = ABOVE + TALL + BELOW
+    figure = style.canvas(height)
+    box = (LEFT / style.WIDTH, BELOW / height, WIDE / style.WIDTH, TALL / height)
+    ax = figure.add_axes(box, gid=style.MEMBER)
+    image = _cells(ax, grid, shown, table)
+    _frame(ax, grid, shown.label or shown.name)
     _mark(ax, grid.separatrix)
-    if each.kind == "code":
-        _legend(ax, each)
+    if shown.kind == "code":
+        _legend(ax, shown)
     elif image is not None:
         left = (LEFT + WIDE + 2 * BAR) / style.WIDTH
-        bar = figure.add_axes((left, at[1], BAR / style.WIDTH, at[3]))
-        _scale(bar, image, each, table)
+        bar = figure.add_axes((left, box[1], BAR / style.WIDTH, box[3]))
+        _scale(bar, image, shown, table)
     return figure
 
 
-def _cells(ax: Axes, grid: Grid, each: Map, table: Floats) -> Any:
+def _cells(ax: Axes, grid: Grid, shown: Map, table: Floats) -> Any:
     many = table.size > BORDERED
     ax.patch.set(facecolor=style.MISSING, hatch="////", edgecolor="#b4b4b4", linewidth=0.0)
     if not np.isfinite(table).any():
         style.remark(ax, "no value anywhere")
         return None
-    cmap, norm = _colours(each, table)
+    cmap, norm = _colours(shown, table)
     border: Any = {"edgecolors": "none" if many else "#8c8c8c", "linewidth": 0.0 if many else 0.4}
-    shown = np.ma.masked_invalid(table)
-    return ax.pcolormesh(*grid.borders, shown, cmap=cmap, norm=norm, **border, rasterized=many)
+    masked = np.ma.masked_invalid(table)
+    return ax.pcolormesh(*grid.borders, masked, cmap=cmap, norm=norm, **border, rasterized=many)
 
 
-def _colours(each: Map, table: Floats) -> tuple[Any, Any]:
-    """Return the colour map of a map and how values become its numbers."""
+def _colours(shown: Map, table: Floats) -> tuple[Any, Any]:
+    """Return the colour map of a map and its normalisation."""
     from matplotlib import colormaps
     from matplotlib.colors import BoundaryNorm, ListedColormap, LogNorm, Normalize
 
-    if each.kind == "code":
-        borders = np.arange(len(each.codes) + 1) - 0.5
-        colours = [colour for _, colour in each.codes]
-        return ListedColormap(colours), BoundaryNorm(borders, len(each.codes))
-    if each.kind == "distance":
-        return pale_within(each.tolerance), Normalize(-ORDER_RANGE, ORDER_RANGE)
-    if each.kind == "factor":
+    if shown.kind == "code":
+        borders = np.arange(len(shown.codes) + 1) - 0.5
+        colours = [colour for _, colour in shown.codes]
+        return ListedColormap(colours), BoundaryNorm(borders, len(shown.codes))
+    if shown.kind == "distance":
+        return pale_within(shown.tolerance), Normalize(-ORDER_RANGE, ORDER_RANGE)
+    if shown.kind == "factor":
         return colormaps["PuOr"], LogNorm(0.5, 2.0)
-    low, high, logarithmic = limits(style.finite(table), each.spread)
+    low, high, logarithmic = limits(style.finite(table), shown.spread)
     return colormaps["viridis"], (LogNorm if logarithmic else Normalize)(low, high)
 
 
 def pale_within(tolerance: float) -> Any:
-    """Return colours around zero from -ORDER_RANGE to ORDER_RANGE that jump where the tolerance ends."""
+    """Return colours from -ORDER_RANGE to ORDER_RANGE that are pale within the tolerance and jump at its ends."""
     from matplotlib import colormaps
     from matplotlib.colors import ListedColormap
 
@@ -296,12 +305,12 @@ def pale_within(tolerance: float) -> Any:
 
 
 def limits(values: Floats, spread: float = LOG_SPREAD) -> tuple[float, float, bool]:
-    """Return the range of a scale, and whether it is logarithmic: then a hundredth of the values may lie below it."""
+    """Return the range of a scale, and whether it is logarithmic; then 1 % of the values may lie below it."""
     low, high = float(values.min()), float(values.max())
     if low >= 0.0 and high > 0.0:
-        usual = max(float(np.quantile(values[values > 0.0], 0.01)), high * 10.0**-MOST_DECADES)
-        if high >= spread * usual:
-            return usual, high, True
+        bottom = max(float(np.quantile(values[values > 0.0], 0.01)), high * 10.0**-MOST_DECADES)
+        if high >= spread * bottom:
+            return bottom, high, True
     room = 0.0 if high > low else 0.01 * abs(high) or 1.0
     return low - room, high + room, False
 
@@ -313,12 +322,12 @@ def _frame(ax: Axes, grid: Grid, title: str) -> None:
         if key.words:
             getattr(ax, f"{which}axis").set_ticks(key.distinct, key.words)
         getattr(ax, f"set_{which}label")(key.label)
-    ax.set_title(f"{title[:1].upper()}{title[1:]}")
+    ax.set_title(words.capitalized(title))
     ax.grid(visible=False)
 
 
 def _mark(ax: Axes, ridge: tuple[Floats, Floats]) -> None:
-    """Draw the separatrix as dots that stand out from light and dark, no two of them closer than `DOT_SPACING`."""
+    """Draw the separatrix as dots that are visible on light and dark, `DOT_SPACING` apart."""
     if not ridge[0].size:
         return
     ends = ax.get_xlim(), ax.get_ylim()
@@ -333,16 +342,16 @@ def _mark(ax: Axes, ridge: tuple[Floats, Floats]) -> None:
     ax.set(xlim=ends[0], ylim=ends[1])
 
 
-def _legend(ax: Axes, each: Map) -> None:
+def _legend(ax: Axes, shown: Map) -> None:
     from matplotlib.patches import Patch
 
     edge: Any = {"edgecolor": "#404040", "linewidth": 0.4}
-    handles = [Patch(facecolor=colour, label=text, **edge) for text, colour in each.codes]
-    # the worst above
+    handles = [Patch(facecolor=colour, label=text, **edge) for text, colour in shown.codes]
+    # the worst on top
     ax.legend(handles=handles[::-1], **style.BESIDE, handlelength=1.2)
 
 
-def _scale(ax: Axes, image: Any, each: Map, table: Floats) -> None:
+def _scale(ax: Axes, image: Any, shown: Map, table: Floats) -> None:
     """Draw the colour bar beside a map."""
     from matplotlib.ticker import MaxNLocator
 
@@ -353,10 +362,10 @@ def _scale(ax: Axes, image: Any, each: Map, table: Floats) -> None:
     bar = ax.figure.colorbar(image, cax=ax, extend=beyond)
     bar.outline.set_linewidth(0.5)
     bar.ax.grid(visible=False)
-    if each.kind == "distance":
-        bar.set_ticks([-ORDER_RANGE, -each.tolerance, 0.0, each.tolerance, ORDER_RANGE])
+    if shown.kind == "distance":
+        bar.set_ticks([-ORDER_RANGE, -shown.tolerance, 0.0, shown.tolerance, ORDER_RANGE])
         bar.ax.set_yticklabels([f"{x:+g}".replace("-", "−") if x else "0" for x in bar.get_ticks()])
-    elif each.kind == "factor":
+    elif shown.kind == "factor":
         bar.set_ticks([0.5, 0.7, 1.0, 1.4, 2.0], labels=["0.5", "0.7", "1", "1.4", "2"])
         bar.ax.minorticks_off()
     elif type(image.norm).__name__ == "LogNorm":

@@ -1,6 +1,6 @@
-"""How numbers and verdicts are spread over the members of a sweep: histograms, and each number against each key.
+"""The distribution of numbers and verdicts over the members of a sweep: histograms, and each number against each key.
 
-Few members are points; many are counted in cells, so that a page stays small however many there are.
+Few members are points; many are counted in cells, which limits the size of the page.
 """
 
 from __future__ import annotations
@@ -15,29 +15,29 @@ from numpy.typing import NDArray
 from vibsim.core.array_types import Flags, Floats
 from vibsim.core.record import Record
 from vibsim.core.vocabulary import SEVERITY
-from vibsim.report import finest_level, style, words
+from vibsim.report import data, finest_level, style, words
 from vibsim.report.choice import position, tolerance
-from vibsim.report.data import basis_of_order, flags, norm_unit, of_several, promised_text, whole
+from vibsim.report.data import bin_of, flags, norm_unit, of_several, promised_text, whole
 from vibsim.report.figures.panels import rows_of
 from vibsim.report.figures.sweeps.view import View, Worst, by_scheme, key_axis, ring, shared
 from vibsim.report.style import Picture
-from vibsim.report.sweep_layout import Key, bins, place_in
+from vibsim.report.sweep_layout import Key, bins
 from vibsim.report.types import Axes, Experiment
 from vibsim.report.words import power
 
 Masks = dict[str, Flags]
-"""Which members come to each verdict, shape (case,)."""
-FEWEST_MEMBERS, BARS = 60, 50  # of fewer members a histogram says nothing; bars of one
-MOST_ROWS = 6  # most schemes that have a row of histograms
-MOST_PANELS = 6  # most keys that have a panel; the members' table has all
+"""Status to the members that have it, shape (case,)."""
+FEWEST_MEMBERS, BARS = 60, 50  # fewest members and number of bars of a histogram
+MOST_ROWS = 6  # most schemes with a row of histograms
+MOST_PANELS = 6  # most keys with a panel; the table of members has all
 MOST_POINTS = 4000  # most members that are drawn as points
-ORDER_FRAME = 1.5  # distance from the promised order at which the frame ends
+ORDER_FRAME = 1.5  # distance from the formal order at the edges of the frame
 SHARES = 24  # most bars of shares along a key
-MESH = 160, 60  # cells that members are counted in, along and up
+MESH = 160, 60  # cells in which members are counted, across and up
 
 
 def histograms(experiment: Experiment, record: Record, quantity: str) -> Picture | None:
-    """Draw the spread of order, error and period error, one row per scheme; None for few members."""
+    """Draw the distributions of order, error and period error, one row per scheme; None for few members."""
     if len(record["case"]) < FEWEST_MEMBERS:
         return None
     schemes, letter = record.words("scheme")[:MOST_ROWS], words.symbol(quantity)
@@ -80,7 +80,7 @@ def histograms(experiment: Experiment, record: Record, quantity: str) -> Picture
 
 
 def _legend(ax: Axes, texts: dict[str, str], **place: Any) -> None:
-    """Say which colour is which verdict, with the text for each."""
+    """Draw the legend of the colours of verdicts, with a text for each."""
     from matplotlib.patches import Patch
 
     handles = [Patch(color=style.STATUS_COLOURS[word], label=text) for word, text in texts.items()]
@@ -90,7 +90,7 @@ def _legend(ax: Axes, texts: dict[str, str], **place: Any) -> None:
 def _histogram(
     ax: Axes, values: Floats, status: NDArray[Any], band: tuple[float, float] | None
 ) -> int:
-    """Draw a histogram stacked by verdict, logarithmic without a band; return how many members have no such number."""
+    """Draw a histogram stacked by verdict, logarithmic without a band; return the number of members without a value."""
     usable = np.isfinite(values) & (values > 0.0 if band is None else True)
     ax.tick_params(labelsize=7.5)
     if not usable.any():
@@ -115,11 +115,11 @@ def _histogram(
 
 
 def views(
-    experiment: Experiment, record: Record, keys: list[Key], found: list[str], worst: Worst, schemes: range
+    experiment: Experiment, record: Record, keys: list[Key], quantities: list[str], worst: Worst, schemes: range
 ) -> Iterator[View | str]:  # fmt: skip
     """Yield order, error and verdict of each quantity of each scheme against every swept key."""
     for scheme in schemes:
-        for quantity in found:
+        for quantity in quantities:
             if f"{quantity}_status" in record:
                 draw = _Projection(record, keys, quantity, scheme, worst(quantity).case)
                 yield from draw.order(
@@ -131,7 +131,7 @@ def views(
 
 @dataclass(frozen=True)
 class _Projection:
-    """What the views of a quantity of one scheme against every swept key have in common."""
+    """Views of a quantity of one scheme against every swept key."""
 
     record: Record
     keys: list[Key]
@@ -141,12 +141,12 @@ class _Projection:
 
     @property
     def masks(self) -> Masks:
-        """Which members come to each verdict."""
+        """The members with each status."""
         status = flags(self.record, f"{self.quantity}_status")[self.scheme]
         return {word: status == word for word in SEVERITY}
 
     def order(self, allowed: float) -> Iterator[View | str]:
-        """Yield the stated order, less the one that is due."""
+        """Yield the stated order minus the formal one."""
         record, quantity = self.record, self.quantity
         name = f"order of {words.symbol(quantity)}"
         order = finest_level.orders(record, quantity)[0]
@@ -161,11 +161,11 @@ class _Projection:
             ax.axhspan(-allowed, allowed, **style.ALLOWED)
             _draw_members(ax, key, away, self.masks, (-ORDER_FRAME, ORDER_FRAME))
         label = f"{name} − {promised_text(record, quantity, self.scheme)}"
-        beyond = "Orders beyond the frame are drawn at its edge, members without an order at the lower edge."
-        is_beyond = not np.all(np.abs(away) < ORDER_FRAME)
-        band = f"Grey: the tolerance around the {basis_of_order(record, quantity)} order."
+        edge_note = "Orders beyond the frame are drawn at its edge, members without an order at the lower edge."
+        leaves = not np.all(np.abs(away) < ORDER_FRAME)
+        band = f"Grey: the tolerance around the {data.basis_of_order(record, quantity)} order."
         places = np.clip(np.nan_to_num(away, nan=-ORDER_FRAME), -ORDER_FRAME, ORDER_FRAME)
-        explanation = style.sentences(band, beyond * is_beyond)
+        explanation = style.sentences(band, edge_note * leaves)
         yield self._view("order", name, label, axes, explanation, order, places)
 
     def error(self) -> Iterator[View | str]:
@@ -181,7 +181,7 @@ class _Projection:
         axes = self._axes()
         for ax, key in zip(axes, self.keys, strict=False):
             _draw_members(ax, key, size, self.masks, None)
-            # an axis of logarithms
+            # the axis shows logarithms
             ax.yaxis.set_major_locator(MaxNLocator(5, integer=True))
             ax.yaxis.set_major_formatter(FuncFormatter(lambda y, _: power(round(y))))
         explanation = f"Of level {whole(self.record, 'level')[-1]}."
@@ -189,7 +189,7 @@ class _Projection:
         yield self._view("error", name, label, axes, explanation, error.best, size, unit)
 
     def shares(self) -> View:
-        """Return what share of the members near a value of a key comes to which verdict."""
+        """Return the shares of the verdicts among the members near each value of a key."""
         axes = self._axes()
         for ax, key in zip(axes, self.keys, strict=False):
             _draw_shares(ax, key, self.masks)
@@ -231,7 +231,7 @@ class _Projection:
             * (len(record["case"]) > MOST_POINTS and place is not None),
             f"{more} more keys are not shown; the table of members has them." * (more > 0),
         )
-        title, figure = f"{name[:1].upper()}{name[1:]}{several}", axes[0].get_figure(root=True)
+        title, figure = f"{words.capitalized(name)}{several}", axes[0].get_figure(root=True)
         stem = f"projections_{self.quantity}_{kind}_{self.scheme}"
         places = None if place is None else by_scheme(record, self.scheme, place)
         return View(
@@ -244,33 +244,32 @@ class _Projection:
 def _draw_members(
     ax: Axes, key: Key, values: Floats, masks: Masks, ends: tuple[float, float] | None
 ) -> None:
-    """Draw a number of every member by verdict; what is beyond `ends`, or no number, at the edge."""
+    """Draw a number of every member by verdict; values beyond `ends`, and NaN, are drawn at the edge."""
     low, high = ends or style.limits(values)
     inside = np.clip(np.where(np.isnan(values), low, values), low, high)
-    room, some = 0.06 * (high - low), values.size > 500
-    for word, chosen in masks.items():
+    room, many = 0.06 * (high - low), values.size > 500
+    for word, members in masks.items():
         colour = style.STATUS_COLOURS[word]
         if values.size <= MOST_POINTS:
             dot: Any = {"linestyle": "none", "marker": style.STATUS_MARKERS[word], "color": colour}
-            dot |= {"markersize": 2.6 if some else 4.0, "markeredgewidth": 0.0, "rasterized": some}
-            ax.plot(key.values[chosen], inside[chosen], **dot)
-        elif chosen.any():
+            dot |= {"markersize": 2.6 if many else 4.0, "markeredgewidth": 0.0, "rasterized": many}
+            ax.plot(key.values[members], inside[members], **dot)
+        elif members.any():
             up = np.linspace(low - room, high + room, MESH[1] + 1)
-            _draw_counts(ax, replace(key, values=key.values[chosen]), inside[chosen], colour, up)
+            _draw_counts(ax, replace(key, values=key.values[members]), inside[members], colour, up)
     ax.set_ylim(low - room, high + room)
     ax.grid(visible=False, axis="both" if values.size > MOST_POINTS else "x")
 
 
 def _draw_counts(ax: Axes, key: Key, values: Floats, colour: str, up: Floats) -> None:
-    """Count members in cells; the more, the darker."""
+    """Draw the number of members in each cell: the more, the darker."""
     from matplotlib.colors import LinearSegmentedColormap, LogNorm, to_rgb
 
     across = bins(key, MESH[0])
-    column = place_in(key, across)
-    row = np.clip(np.searchsorted(up, values, side="right") - 1, 0, MESH[1] - 1)
+    column, row = bin_of(across, key.values), bin_of(up, values)
     width = across.size - 1
     count = np.bincount(row * width + column, minlength=MESH[1] * width).astype(np.float64)
-    pale, dark = (tuple(0.5 * part + 0.5 * grey for part in to_rgb(colour)) for grey in (1.0, 0.0))
+    pale, dark = (tuple(0.5 * tone + 0.5 * grey for tone in to_rgb(colour)) for grey in (1.0, 0.0))
     shades = LinearSegmentedColormap.from_list("", [pale, to_rgb(colour), dark])
     table = np.ma.masked_equal(count.reshape(MESH[1], width), 0.0)
     norm = LogNorm(1.0, max(float(count.max()), 2.0))
@@ -278,9 +277,9 @@ def _draw_counts(ax: Axes, key: Key, values: Floats, colour: str, up: Floats) ->
 
 
 def _draw_shares(ax: Axes, key: Key, masks: Masks) -> None:
-    """Draw stacked bars along a key: the shares of the verdicts among the members there."""
+    """Draw stacked bars along a key: the shares of the verdicts."""
     borders = bins(key, SHARES)
-    place, count = place_in(key, borders), borders.size - 1
+    place, count = bin_of(borders, key.values), borders.size - 1
     total, base = np.bincount(place, minlength=count), np.zeros(count)
     for word, chosen in masks.items():
         with np.errstate(invalid="ignore"):

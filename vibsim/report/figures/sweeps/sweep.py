@@ -15,7 +15,7 @@ from vibsim.core.record import Record
 from vibsim.core.vocabulary import SEVERITY
 from vibsim.report import data, finest_level, frame, style, sweep_layout, words
 from vibsim.report.choice import position, promises
-from vibsim.report.figures.panels import explosive, stacked
+from vibsim.report.figures.panels import explosive, move_label_left, stacked
 from vibsim.report.figures.sweeps import separatrix, view
 from vibsim.report.figures.sweeps.view import View, Worst
 from vibsim.report.finest_level import Measured
@@ -23,23 +23,23 @@ from vibsim.report.style import Picture
 from vibsim.report.sweep_layout import Along, Key
 from vibsim.report.types import Axes, Experiment, ValueCheck
 
-TALL, ENTRY = 3.0, 0.18  # least height of a panel, height of an entry of a legend [inch]
-RISE = 0.17  # by which a worse verdict stands higher
-MOST_MARKERS = 60  # most members that get a marker each; above, a line says it better
-DEEP = 1e-16  # errors below this part of the largest leave the frame
+TALL, ENTRY = 3.0, 0.18  # least height of a panel, height of a legend entry [inch]
+RISE = 0.17  # vertical offset of a verdict from the next better one
+MOST_MARKERS = 60  # most members with a marker each; more are a line
+DEEP = 1e-16  # errors below this fraction of the largest leave the frame
 LOG_RATIO = 10.0
-"""Where some amplitudes leave the frame, others that many times a usual one are drawn on a logarithmic scale."""
+"""If amplitudes leave the frame, a ratio of largest to median above this makes the scale of the others logarithmic."""
 
 
 def views(
-    experiment: Experiment, record: Record, along: Along, found: list[str], worst: Worst
+    experiment: Experiment, record: Record, along: Along, quantities: list[str], worst: Worst
 ) -> Iterator[View | str]:
-    """Yield a view of each quantity along one key; of what is the same for all members a sentence."""
+    """Yield a view of each number along one key, or a sentence if all members share it."""
     draw = _Drawing(experiment, record, along, worst)
     both = [draw.period, draw.amplitude]
     for draw_one in both if experiment.model.definition.conservative else both[::-1]:
         yield from draw_one()
-    for quantity in found:
+    for quantity in quantities:
         if data.whole(record, "triple"):
             yield from draw.order(quantity)
         yield from draw.error(quantity)
@@ -50,7 +50,7 @@ def views(
 
 @dataclass(frozen=True)
 class _Drawing:
-    """What the views along one key have in common."""
+    """Views along one key."""
 
     experiment: Experiment
     record: Record
@@ -59,7 +59,7 @@ class _Drawing:
 
     @cached_property
     def on_separatrix(self) -> list[float]:
-        """Return where the separatrix crosses the line of the members, if there is one line."""
+        """Where the separatrix crosses the line of the members, if there is only one line."""
         is_alone = len(self.along.lines) == 1 and not self.along.follows
         return separatrix.on_line(self.experiment, self.along.key).tolist() if is_alone else []
 
@@ -67,13 +67,13 @@ class _Drawing:
         self, stem: str, name: str, quantity: str, values: Floats, caption: str, draw: Callable[[Axes], str],
         unit: str = "", form: str = "step",
     ) -> Iterator[View | str]:  # fmt: skip
-        """Yield a view of values, or the value that all members share; nothing where there is none.
+        """Yield a view of values, or the value that all members share; nothing without finite values.
 
-        `draw` draws them, and returns a sentence where they leave the frame.
+        `draw` draws them and returns a sentence if they leave the frame, else an empty text.
         """
-        # an order is read with three decimals
-        explanation = np.round(values, 3) if form == "order" else values
-        if text := view.shared(name, explanation, unit, form):
+        # orders are compared to three decimals
+        compared = np.round(values, 3) if form == "order" else values
+        if text := view.shared(name, compared, unit, form):
             yield text
         elif np.isfinite(values).any():
             tall = max(TALL, ENTRY * len(self.record["scheme"]) * len(self.along.lines))
@@ -92,9 +92,9 @@ class _Drawing:
         is_ringed = view.ring(
             ax, float(key.values[worst.case]), float(places[worst.scheme, worst.case])
         )
-        title = f"{name[:1].upper()}{name[1:]}"
+        title = words.capitalized(name)
         alt = f"{title} of every member against {key.name}"
-        keys = [one.key for one in sweep_layout.keys(self.record)]
+        keys = [swept.key for swept in sweep_layout.keys(self.record)]
         return View(
             name, Picture(stem, title, style.sentences(caption, marked), alt, ax.get_figure(root=True)), quantity,
             values, places if values is None else None, unit, schemes=tuple(range(len(places))),
@@ -103,15 +103,16 @@ class _Drawing:
 
     def period(self) -> Iterator[View | str]:
         """Yield the period with its error bar, and its relative error on several levels."""
-        record, along, of = self.record, self.along, position(self.experiment)
-        found, exact = finest_level.measured(record, "period", of), data.exact_periods(record)
-        if not np.isfinite(found.value).any():
+        record, along, quantity = self.record, self.along, position(self.experiment)
+        period = finest_level.measured(record, "period", quantity)
+        exact = data.exact_periods(record)
+        if not np.isfinite(period.value).any():
             return
         is_known, several = bool(np.isfinite(exact).any()), bool(data.whole(record, "pair"))
         bars = ", with its error bar from the two finest levels" * several
         yield from self._view(
-            "period", "period", of, found.value, f"On the finest level{bars}{'; and the exact one' * is_known}.",
-            lambda ax: _draw_numbers(ax, record, along, found, exact if is_known else None), found.unit,
+            "period", "period", quantity, period.value, f"On the finest level{bars}{'; and the exact one' * is_known}.",
+            lambda ax: _draw_numbers(ax, record, along, period, exact if is_known else None), period.unit,
         )  # fmt: skip
         spacing = (
             "From level to level it should fall by the same factor, so lines of successive levels are evenly spaced. "
@@ -119,38 +120,38 @@ class _Drawing:
             "the exact period."
         )
         yield from self._view(
-            "period_error", "error of the period", of, finest_level.period_error(record, -1), spacing * several,
-            lambda ax: _draw_period_errors(ax, record, along, found), form="norm",
+            "period_error", "error of the period", quantity, finest_level.period_error(record, -1), spacing * several,
+            lambda ax: _draw_period_errors(ax, record, along, period), form="norm",
         )  # fmt: skip
 
     def amplitude(self) -> Iterator[View | str]:
         """Yield the amplitude with its error bar, and the error bar alone."""
-        record, along, of = self.record, self.along, position(self.experiment)
-        found = finest_level.measured(record, "amplitude", of)
-        if not np.isfinite(found.value).any():
+        record, along, quantity = self.record, self.along, position(self.experiment)
+        amplitude = finest_level.measured(record, "amplitude", quantity)
+        if not np.isfinite(amplitude.value).any():
             return
-        size = frame.sizes(record, of)
-        bounded = frame.is_bounded(found.value, size)
+        size = frame.sizes(record, quantity)
+        bounded = frame.is_bounded(amplitude.value, size)
         if not bounded.any():
-            bounded = np.isfinite(found.value)
-        # what is beyond the frame has no bar across it
-        barred = bounded & frame.is_bounded(found.error, size)
-        value, error = np.where(bounded, found.value, np.nan), np.where(barred, found.error, np.nan)
-        within = replace(found, value=value, error=error)
+            bounded = np.isfinite(amplitude.value)
+        # values beyond the frame have no error bar across it
+        barred = bounded & frame.is_bounded(amplitude.error, size)
+        value = np.where(bounded, amplitude.value, np.nan)
+        within = replace(amplitude, value=value, error=np.where(barred, amplitude.error, np.nan))
         explanation = (
             "Half the height between the last peak and the last trough, on the finest level."
         )
         turns = bool(self.experiment.model.definition.turn)
         explanation += " Members that go over the top have none." * turns
         yield from self._view(
-            "amplitude", "amplitude", of, found.value, explanation,
-            lambda ax: _draw_amplitudes(ax, record, along, found, within, size), found.unit,
+            "amplitude", "amplitude", quantity, amplitude.value, explanation,
+            lambda ax: _draw_amplitudes(ax, record, along, amplitude, within, size), amplitude.unit,
         )  # fmt: skip
         if data.whole(record, "pair"):
             yield from self._view(
-                "amplitude_error", "error bar of the amplitude", of, found.error,
+                "amplitude_error", "error bar of the amplitude", quantity, amplitude.error,
                 "Estimated from the two finest levels.",
-                lambda ax: _draw_error_bars(ax, record, along, found, within.error), found.unit, "norm",
+                lambda ax: _draw_error_bars(ax, record, along, amplitude, within.error), amplitude.unit, "norm",
             )  # fmt: skip
 
     def order(self, quantity: str) -> Iterator[View | str]:
@@ -224,22 +225,22 @@ class _Curve:
     x: Floats
     members: NDArray[np.intp]
     text: str
-    """Words of the scheme, where there are several, and of the line; empty for a curve that is alone."""
+    """Legend entry: the scheme, if there are several, and the line; empty for a single curve."""
 
     def of(self, values: Floats) -> Floats:
-        """Return its part of values of the shape (scheme, case)."""
+        """Return the values of its members, of values of the shape (scheme, case)."""
         return np.asarray(values[self.scheme, self.members])
 
 
 def _curves(record: Record, along: Along, *, by_line: bool = False) -> list[_Curve]:
-    """Return the curves of every scheme and line; `by_line` those of a line together."""
+    """Return the curves of every scheme and line, ordered by scheme, or `by_line`."""
     names, count = record.words("scheme"), len(along.lines)
-    found = []
+    curves = []
     for s, name in enumerate(names):
-        who = name if len(names) > 1 else ""
+        scheme = name if len(names) > 1 else ""
         for k, (line, at) in enumerate(along.lines):
-            found.append(_Curve(s, s * count + k, along.key.values[at], at, _text(who, line)))
-    return sorted(found, key=lambda curve: curve.number % count) if by_line else found
+            curves.append(_Curve(s, s * count + k, along.key.values[at], at, _text(scheme, line)))
+    return sorted(curves, key=lambda curve: curve.number % count) if by_line else curves
 
 
 def _draw_orders(
@@ -267,14 +268,14 @@ def _draw_orders(
 
 
 def _draw_errors(ax: Axes, record: Record, along: Along, quantity: str) -> str:
-    """Draw the error of the finest level; return the sentence on what leaves the frame."""
-    found, size = finest_level.error(record, quantity), frame.sizes(record, quantity)
-    both = np.stack([found.true, found.estimate])
+    """Draw the error of the finest level; return the sentence on values that leave the frame."""
+    error, size = finest_level.error(record, quantity), frame.sizes(record, quantity)
+    both = np.stack([error.true, error.estimate])
     bounded = np.where(frame.is_bounded(both, size), both, np.nan)
     true, estimate, low, high = map(
-        style.no_zeros, (found.true, found.estimate, found.low, found.high)
+        style.no_zeros, (error.true, error.estimate, error.low, error.high)
     )
-    # what is beyond the frame has no bar across it
+    # values beyond the frame have no error bar across it
     low, high = (np.where(np.isfinite(bounded[1]), end, np.nan) for end in (low, high))
     for curve in _curves(record, along):
         x, look = curve.x, style.look(curve.number)
@@ -290,23 +291,23 @@ def _draw_errors(ax: Axes, record: Record, along: Along, quantity: str) -> str:
     ax.set_ylabel(style.label(text, data.norm_unit(record, quantity)))
     if not style.crowded(record):
         _beside(ax, along)
-    # where nothing is bounded all of it makes the range
+    # without bounded values all of them set the range
     fitted = any(
         style.fit_log_axis(ax, "y", np.ravel(values), below=0.005, least=DEEP)
         for values in (bounded, both)
     )
-    return _leaving(ax, along, found.best) if fitted else ""
+    return _leaving(ax, along, error.best) if fitted else ""
 
 
 def _draw_verdicts(ax: Axes, along: Along, status: NDArray[Any], schemes: list[str]) -> None:
-    """Draw one row per scheme; every verdict has a colour, a marker and a height of its own."""
+    """Draw one row per scheme; every verdict has its own colour, marker and height."""
     order = np.argsort(along.key.values, kind="stable")
     x, many = along.key.values[order], len(schemes) > style.MANY
     for i, word in enumerate(SEVERITY):
         places = []
         for s in range(len(schemes)):
-            found = x[status[s][order] == word]
-            places.append(style.thin(found, np.full(found.size, s + RISE * i)))
+            members = x[status[s][order] == word]
+            places.append(style.thin(members, np.full(members.size, s + RISE * i)))
         ax.plot(
             *np.hstack(places), linestyle="none", marker=style.STATUS_MARKERS[word],
             markersize=3.5 if many else 5, color=style.STATUS_COLOURS[word], markeredgecolor="black",
@@ -318,84 +319,83 @@ def _draw_verdicts(ax: Axes, along: Along, status: NDArray[Any], schemes: list[s
     if not many:
         style.beside(ax, handlelength=1.2)
         return
-    # there is room for many names at the right only, and for the legend then above
+    # many names fit only at the right, and the legend then above
     ax.tick_params(axis="y", left=False, labelleft=False, labelright=True)
     place: Any = {"loc": "lower left", "bbox_to_anchor": (0.0, 1.0), "borderaxespad": 0.1}
     ax.legend(ncols=3, fontsize=8, handlelength=1.2, **place)
 
 
 def _draw_numbers(
-    ax: Axes, record: Record, along: Along, found: Measured, exact: Floats | None, title: str = ""
+    ax: Axes, record: Record, along: Along, number: Measured, exact: Floats | None, title: str = ""
 ) -> str:
-    """Draw a number of the finest level with its error bars, and the exact number where it is known."""
+    """Draw a number of the finest level with its error bars, and the exact number if it is known."""
     count, level = len(record["scheme"]), data.whole(record, "level")[-1]
     for curve in _curves(record, along, by_line=True):
         if exact is not None and curve.scheme == 0:
             values = np.where(np.isfinite(exact), exact, np.nan)[curve.members]
             text = "" if curve.number else "exact"
             _line(ax, curve.x, values, color="black", linewidth=1.0, label=text, zorder=1)
-        value, error = curve.of(found.value), curve.of(found.error)
+        value, error = curve.of(number.value), curve.of(number.error)
         look = _mark(curve.scheme, curve.number, count)
         _interval(ax, curve.x, value - error, value + error, look["color"])
-        # beside the exact line dots are seen better
+        # dots are easier to tell from the line of the exact number
         has_dots = exact is not None and curve.x.size <= MOST_MARKERS
         dashes = "none" if has_dots else style.look(curve.number)["linestyle"]
         text = curve.text or f"level {level}"
         _line(ax, curve.x, value, linestyle=dashes, linewidth=1.0, label=text, **look)
-    ax.set_ylim(*_room(found, exact))
-    ax.set_ylabel(style.label(found.name, found.unit))
-    ax.set_title(title or f"{found.name.capitalize()}, level {level}")
+    ax.set_ylim(*_room(number, exact))
+    ax.set_ylabel(style.label(number.name, number.unit))
+    ax.set_title(title or f"{number.name.capitalize()}, level {level}")
     _beside(ax, along, fontsize=7.5 if style.crowded(record) else 8)
     return ""
 
 
 def _draw_amplitudes(
-    ax: Axes, record: Record, along: Along, found: Measured, within: Measured, size: Floats
+    ax: Axes, record: Record, along: Along, amplitude: Measured, within: Measured, size: Floats
 ) -> str:
-    """Draw amplitudes in a frame that holds those `within` it, of a motion of some size."""
-    # amplitudes that hardly differ need long numbers
-    ax.yaxis.set_label_coords(-0.115, 0.5)
-    _draw_numbers(ax, record, along, replace(found, error=within.error), None)
-    value, usual = within.value, style.finite(within.value)
-    is_wide = usual.size > 0 and float(usual.max()) > LOG_RATIO * float(np.median(usual))
-    if explosive([value.ravel()]) or (is_wide and explosive([found.value.ravel()])):
-        # a motion that a scheme damps away would fill the frame with its decades
+    """Draw amplitudes in a frame that holds those in `within`; `size` is the size of the motion, shape (case,)."""
+    move_label_left(ax)
+    _draw_numbers(ax, record, along, replace(amplitude, error=within.error), None)
+    value, finite = within.value, style.finite(within.value)
+    is_wide = finite.size > 0 and float(finite.max()) > LOG_RATIO * float(np.median(finite))
+    if explosive([value.ravel()]) or (is_wide and explosive([amplitude.value.ravel()])):
+        # decades of a motion that a scheme damps away would fill the frame
         least = np.nanmin(np.append(size, np.nanmax(value))) / frame.UNBOUNDED
         style.fit_log_axis(ax, "y", np.maximum(value, least), room=2.0)
     else:
         ax.set_ylim(*_room(within, None))
-    return _leaving(ax, along, found.value)
+    return _leaving(ax, along, amplitude.value)
 
 
-def _room(found: Measured, exact: Floats | None) -> tuple[float, float]:
-    """Return limits that hold all values and, as far as they do not exceed the values' own spread, the error bars."""
-    values = style.finite(found.value)
+def _room(number: Measured, exact: Floats | None) -> tuple[float, float]:
+    """Return limits that hold all values and their error bars, these up to the spread of the values."""
+    values = style.finite(number.value)
     most = float(np.ptp(values)) or 0.02 * float(np.max(np.abs(values)))
-    error = np.clip(np.nan_to_num(found.error), 0.0, most)
-    shown = [found.value - error, found.value + error]
+    error = np.clip(np.nan_to_num(number.error), 0.0, most)
+    shown = [number.value - error, number.value + error]
     return style.limits(*(shown if exact is None else [*shown, exact]))
 
 
-def _draw_period_errors(ax: Axes, record: Record, along: Along, found: Measured) -> str:
-    """Draw the relative error of the period on several levels, and what the two finest predict."""
+def _draw_period_errors(ax: Axes, record: Record, along: Along, period: Measured) -> str:
+    """Draw the relative error of the period on several levels, and its estimate from the two finest."""
     levels, schemes = data.whole(record, "level"), len(record["scheme"])
     several = len(along.lines) > 1 or style.crowded(record)
     count = 1 if several else 6 if schemes == 1 else 3
     spaced = np.linspace(len(levels) - 1, 0, min(len(levels), count)).round().astype(int)
     error = {i: finest_level.period_error(record, i) for i in np.unique(spaced)[::-1].tolist()}
     with np.errstate(invalid="ignore", divide="ignore"):
-        predicted = style.no_zeros(found.error / found.value)
+        predicted = style.no_zeros(period.error / period.value)
     for curve in _curves(record, along, by_line=True):
         text = "" if curve.number else f"estimated, level {levels[-1]}"
         grey: dict[str, Any] = {"color": "#9a9a9a", "linewidth": 4.0, "alpha": 0.6, "zorder": 1}
         _line(ax, curve.x, curve.of(predicted), label=text, **grey)
         line, s = divmod(curve.number, len(along.lines))[::-1]
-        for m, (i, of_level) in enumerate(error.items()):
+        for m, (i, level_error) in enumerate(error.items()):
             colour = line + s if several else m
             text = ", ".join(filter(None, [curve.text, f"level {levels[i]}"]))
             look = _mark(s, colour, schemes) | {"linewidth": 1.2}
             look |= {"linestyle": style.look(colour)["linestyle"]}
-            _line(ax, curve.x, curve.of(style.no_zeros(of_level)), label=text, **look)
+            _line(ax, curve.x, curve.of(style.no_zeros(level_error)), label=text, **look)
     style.fit_log_axis(ax, "y", *error.values(), room=2.0)
     ax.set(ylabel="|period / exact − 1|", title="Relative error of the period")
     if not style.crowded(record):
@@ -403,25 +403,25 @@ def _draw_period_errors(ax: Axes, record: Record, along: Along, found: Measured)
     return ""
 
 
-def _draw_error_bars(ax: Axes, record: Record, along: Along, found: Measured, held: Floats) -> str:
+def _draw_error_bars(ax: Axes, record: Record, along: Along, number: Measured, held: Floats) -> str:
     """Draw the estimated error of a number of the finest level, in a frame that holds the errors `held`."""
     for curve in _curves(record, along):
         look = style.look(curve.number) | {"markersize": 4}
         text = curve.text or style.entry(record.words("scheme")[curve.scheme])
-        _line(ax, curve.x, style.no_zeros(curve.of(found.error)), **look, label=text)
-    # of a motion that is damped away the error falls for ever
-    shown = held if np.isfinite(held).any() else found.error
+        _line(ax, curve.x, style.no_zeros(curve.of(number.error)), **look, label=text)
+    # as a motion is damped away, its error falls without limit
+    shown = held if np.isfinite(held).any() else number.error
     style.fit_log_axis(ax, "y", shown, least=DEEP, room=2.0)
-    ax.set_ylabel(style.label("estimated error", found.unit))
+    ax.set_ylabel(style.label("estimated error", number.unit))
     if len(along.lines) > 1 and not style.crowded(record):
         _beside(ax, along, fontsize=8)
-    return _leaving(ax, along, found.error)
+    return _leaving(ax, along, number.error)
 
 
 def _leaving(ax: Axes, along: Along, values: Floats) -> str:
-    """Mark at the upper edge what grows out of the frame, of values of the shape (scheme, case); return the sentence.
+    """Mark at the upper edge the values, shape (scheme, case), that leave the frame; return the sentence on them.
 
-    Of few members each is marked, of many the first of every stretch.
+    Of few members each is marked, of many the first of every run of successive ones.
     """
     high, leaves = ax.get_ylim()[1], False
     for s in range(values.shape[0]):
@@ -434,14 +434,14 @@ def _leaving(ax: Axes, along: Along, values: Floats) -> str:
 
 
 def _line(ax: Axes, x: Floats, y: Floats, **look: Any) -> None:
-    """Draw a quantity over members in the order of `x`, thinned; markers only while they are few."""
+    """Draw a number of members in the order of `x`, thinned; with markers if they are few."""
     if x.size > MOST_MARKERS:
         look["marker"] = "," if look.get("linestyle") == "none" else ""
     ax.plot(*style.thin(x, y), **look)
 
 
 def _interval(ax: Axes, x: Floats, low: Floats, high: Floats, colour: str) -> None:
-    """Draw error bars: one for each of few members, else a band between two lines."""
+    """Draw error bars: one for each of few members, two border lines for many."""
     if x.size <= MOST_MARKERS:
         ax.vlines(x, low, high, color=colour, linewidth=2.4, alpha=0.4)
         return
@@ -450,13 +450,13 @@ def _interval(ax: Axes, x: Floats, low: Floats, high: Floats, colour: str) -> No
 
 
 def _text(*parts: str) -> str:
-    """Join the words of a legend entry; of a line that differs in one key its value is enough."""
+    """Join the words of a legend entry; a line that differs in one key has only its value."""
     short = (part if ", " in part else part.rpartition(" = ")[2] for part in parts if part)
     return style.entry(", ".join(short))
 
 
 def _beside(ax: Axes, along: Along, **options: Any) -> None:
-    """Put the legend beside the axes, below the key in which lines differ."""
+    """Put the legend beside the axes, with the key in which lines differ as its title."""
     name = along.lines[0][0]
     if " = " in name and ", " not in name:
         key = name.rpartition(" = ")[0]
@@ -465,7 +465,7 @@ def _beside(ax: Axes, along: Along, **options: Any) -> None:
 
 
 def _mark(scheme: int, colour: int, count: int) -> dict[str, Any]:
-    """Return a marker of a scheme; of several the first is large and hollow, so that all stay visible."""
+    """Return the marker of a scheme; the first of several is large and hollow, so that all stay visible."""
     look = {"marker": style.look(scheme)["marker"], "color": style.look(colour)["color"]}
     if count > 1 and scheme == 0:
         return look | {"markerfacecolor": "none", "markersize": 8}

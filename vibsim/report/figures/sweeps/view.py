@@ -1,4 +1,4 @@
-"""One quantity of all members of a sweep: its figure, and what a page needs to find members in it again."""
+"""One number of all members of a sweep: its figure, and the data by which a page finds members in it."""
 
 from __future__ import annotations
 
@@ -19,89 +19,89 @@ from vibsim.report.sweep_layout import Key
 from vibsim.report.types import Axes, Experiment, ValueCheck
 
 SHOWN_ALREADY = ("period", "period_error", "exact_period", "amplitude")
-"""Values of checks that have views of their own."""
+"""Values of checks whose views exist anyway."""
 Worst = Callable[[str], Member]
-"""Returns the worst member, judged by a quantity."""
+"""Returns the worst member, judged by its verdict on a quantity."""
 
 
 @dataclass(frozen=True)
 class View:
-    """A quantity of all members, as a map, as curves, or against each swept key."""
+    """A number of all members: a map, curves, or panels for each swept key."""
 
     name: str
-    """What a reader chooses it by."""
+    """Name by which a reader chooses it."""
     picture: Picture
-    """Its panels have the group id `vibsim.report.style.MEMBER`; without one no member can be pointed at."""
+    """Panels with the group id `vibsim.report.style.MEMBER` respond to the pointer."""
     quantity: str = ""
-    """Whose verdicts its members have."""
-    values: Floats | None = None  # shape (scheme, case); None of a verdict, which is told anyway
+    """The quantity of the verdicts that are shown with a member."""
+    values: Floats | None = None  # shape (scheme, case); None for a verdict, which is shown anyway
     places: Floats | None = None
-    """Where members stand in a panel over a key, of the same shape, where the values do not say it."""
+    """Vertical positions of the members, of the same shape, if they differ from the values."""
     unit: str = ""
     texts: tuple[str, ...] = ()
-    """What the values stand for, where they number texts."""
+    """Meaning of the values, if they are numbers of texts."""
     schemes: tuple[int, ...] = ()  # those drawn
     of: str = ""
-    """The scheme that is drawn, where each has a view of its own."""
+    """The scheme, if each has its own view."""
     panels: tuple[tuple[int, int | None], ...] = ((0, None),)
-    """Of every panel the positions of the keys along x and y; None stands for the value."""
+    """Positions of the keys along x and y of every panel; None stands for the value."""
     worst: int | None = None
-    """The position of the member that is marked."""
+    """Position of the marked member."""
 
 
 def value_checks(experiment: Experiment) -> list[tuple[str, ValueCheck]]:
-    """Return the checks, with their ids, on a number of every member that has no view of its own."""
-    found = [(check.id, check.measured) for check in experiment.checks]
+    """Return the value checks, with their ids, on all members and without a view elsewhere."""
+    measured = [(check.id, check.measured) for check in experiment.checks]
     return [
         (name, check)
-        for name, check in found
+        for name, check in measured
         if check.kind == "value" and check.at.case is None and check.value not in SHOWN_ALREADY
     ]
 
 
 def of_check(record: Record, name: str, check: ValueCheck) -> Floats:
-    """Return the number that a check asks for, shape (scheme, case); NaN of schemes that it is not about."""
+    """Return the numbers of a check, shape (scheme, case); NaN for schemes that it does not judge."""
     schemes = np.array([check.at.scheme in (None, scheme) for scheme in record.words("scheme")])
     return np.where(schemes[:, None], field_values(record, name, "value"), np.nan)
 
 
 def by_scheme(record: Record, scheme: int, values: Floats) -> Floats:
-    """Return numbers of the members of one scheme as those of every scheme, shape (scheme, case); NaN of the others."""
-    found = np.full((len(record["scheme"]), values.size), np.nan)
-    found[scheme] = values
-    return found
+    """Return numbers of one scheme in an array of shape (scheme, case); NaN for the others."""
+    table = np.full((len(record["scheme"]), values.size), np.nan)
+    table[scheme] = values
+    return table
 
 
 def check_words(check: ValueCheck) -> str:
-    """Name the number that a check asks for."""
+    """Return the name of the number of a check."""
     of = f" of {words.symbol(check.quantity)}" if check.quantity else ""
     return f"{check.value}{of}".replace("_", " ")
 
 
 def shared_verdict(record: Record, quantity: str, scheme: int | None = None) -> str:
-    """Say which verdict all members have, of all schemes or of one; empty where they differ."""
+    """Say which verdict all members share, of all schemes or of one; empty if they differ."""
     reason = flags(record, f"{quantity}_reason")[slice(None) if scheme is None else scheme]
-    found = np.unique(reason.astype(str))
-    if found.size != 1:
+    reasons = np.unique(reason.astype(str))
+    if reasons.size != 1:
         return ""
-    return f"verdict on {words.symbol(quantity)} {REASONS[found[0]]} ({found[0]})"
+    return f"verdict on {words.symbol(quantity)} {REASONS[reasons[0]]} ({reasons[0]})"
 
 
 def shared(name: str, values: Floats, unit: str = "", form: str = "step") -> str:
-    """Say which value all members share that have one, ``period 6.283 s``; empty where they differ or none has one."""
-    known = style.finite(values)
-    if not known.size or finest_level.varies(values):
+    """Say which finite value all members share, such as ``period 6.283 s``; empty if there is none."""
+    finite = style.finite(values)
+    if not finite.size or finest_level.varies(values):
         return ""
-    number = words.number(float(known[0]), form)
-    some = known.size < values.size
-    who = f" ({words.number(known.size, 'integer')} have one)" if some else ""
-    return f"{name} {number} {unit}".rstrip() + who
+    number = words.number(float(finite[0]), form)
+    is_partial = finite.size < values.size
+    count = f" ({words.number(finite.size, 'integer')} have one)" if is_partial else ""
+    return f"{name} {number} {unit}".rstrip() + count
 
 
 def key_axis(ax: Axes, key: Key, part: float) -> None:
-    """Give the horizontal axis the scale and the words of a key, of a logarithmic one with room at both ends.
+    """Give the horizontal axis the scale and the words of a key.
 
-    The room is the `part` of the decades that the key spans.
+    A logarithmic axis is extended at both ends by the fraction `part` of the decades that the key spans.
     """
     if key.is_log:
         room = (key.distinct[-1] / key.distinct[0]) ** part
@@ -111,7 +111,7 @@ def key_axis(ax: Axes, key: Key, part: float) -> None:
 
 
 def ring(ax: Axes, x: float, y: float, *, on_map: bool = False) -> bool:
-    """Draw a ring around the worst member, whole at an edge, too; say whether it has a place on the axes."""
+    """Draw a ring around the worst member, not clipped at the edges; return whether it lies within the axes."""
     limits = ax.get_xlim(), ax.get_ylim()
     if not all(low <= at <= high for at, (low, high) in zip((x, y), limits, strict=True)):
         return False
