@@ -132,6 +132,10 @@ def _rounding(one: Outcome) -> tuple[str, ...]:
         )
     if not one.rounded > ROUNDING_SAID * one.error_bound or one.exact_known:
         return ()
+    if one.comes_in_steps:
+        return (
+            "Levels with the same value show that values come in steps, which the bounds include.",
+        )
     return ("The bounds include the rounding of the values to their last digit.",)
 
 

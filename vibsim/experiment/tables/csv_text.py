@@ -21,6 +21,8 @@ from vibsim.core.array_types import Floats, Integers
 
 MOST_LINES = 2**21
 """Lines of a text, the empty ones and the comments too."""
+ROWS_WRITTEN = 1000
+"""Rows whose cells are kept as they are written, at most."""
 MOST_CHARACTERS = 2**16
 """Of a line."""
 SEPARATORS = {";": "semicolons", "\t": "tabs", ",": "commas"}
@@ -117,8 +119,8 @@ def read(
     most
         Number of rows that are read at most.
     written
-        Takes the cells of these columns, row by row, with decimal points: zeros at the end are digits of what was
-        printed.
+        Takes the cells of these columns in the first `ROWS_WRITTEN` rows, with decimal points: zeros at the end are
+        digits of what was printed.
     """
     source = _Rows(content)
     rows = iter(source)
@@ -136,7 +138,7 @@ def read(
             raise CsvError(f"must not have more than {most} points")
         for i, name, column in chosen:
             column.append(marks.number(row[i], name, source.line, is_first=not lines))
-        if written is not None:
+        if written is not None and len(written) < ROWS_WRITTEN:
             written.append([row[i].strip().replace(",", ".") for i, *_ in chosen])
         lines.append(source.line)
     marks.finish()
