@@ -181,6 +181,11 @@ def test_equal_levels_that_may_be_exact_are_not_taken_for_printed_numbers(value:
             1.1,
         ),  # rounded to whole numbers
         ([8.0379364312, 8.2336581816, 8.2336581816, 8.2336581816], 8.2352, 0.6),  # of grid points
+        (
+            [0.9978456732198741] * 2 + [0.9999999884786189] * 4,
+            1.0,
+            0.005,
+        ),  # the same place on four grids
     ],
 )
 def test_values_that_come_in_steps_are_no_better_than_a_step(
@@ -191,6 +196,7 @@ def test_values_that_come_in_steps_are_no_better_than_a_step(
     assert verdict.best is not None
     assert verdict.best_bound is not None
     assert abs(verdict.best - exact) <= verdict.best_bound <= within
+    assert ("come in steps" in verdict.sentence) == (1 < len(set(levels)) < len(levels))
     assert judge(h, levels, exact=exact).reason != "wrong_limit"
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from decimal import Decimal
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +24,8 @@ LEVEL = "level"
 """Name of the coordinate with the position of a level, the coarsest 0."""
 EPSILON = "epsilon"
 """Attribute with the distance of neighbouring numbers near 1 in the precision that values were computed in."""
+WRITTEN = "written"
+"""Attribute of a number with the digits that it was written with in a table."""
 
 
 def read(path: Path, quantities: Quantities, *, is_shown: bool = True) -> dict[str, GridValues]:
@@ -66,21 +69,23 @@ def _from_table(path: Path, quantities: Quantities, is_shown: bool) -> dict[str,
     """Return the quantities in the columns of a table: a row for each point, or a single one."""
     columns = [name for row in quantities.values() for name in row.coordinates or ()]
     names = list(dict.fromkeys([*columns, *quantities]))
-    table, _ = level_tables.columns(path, names, MOST_LINES, is_shown=is_shown)
+    table, first = level_tables.columns(path, names, MOST_LINES, is_shown=is_shown)
     if not len(table[names[0]]):
         raise VibsimError(f"{path}: has no row below the names of its columns")
     return {
-        name: _checked(name, _on_grid(name, table, row.coordinates or ()), row)
+        name: _checked(name, _on_grid(name, table, first, row.coordinates or ()), row)
         for name, row in quantities.items()
     }
 
 
-def _on_grid(name: str, table: Mapping[str, Floats], dims: Sequence[str]) -> GridValues:
+def _on_grid(
+    name: str, table: Mapping[str, Floats], first: Mapping[str, Decimal], dims: Sequence[str]
+) -> GridValues:
     """Return a column as values on the grid of its coordinates; without them a number, or a series over the rows."""
     column = table[name]
     if not dims:
         if len(column) == 1:
-            return GridValues(column[0], (), {}, name)
+            return GridValues(column[0], (), {}, name, written=first[name])
         return GridValues(column, ("row",), {}, name)
     points = [np.unique(table[dim], return_inverse=True) for dim in dims]
     shape = tuple(len(axis) for axis, _ in points)
@@ -148,7 +153,8 @@ def record(
                 coords[dim] = Variable((dim,), np.asarray(points), text)
     variables = {}
     for name, one in values.items():
-        text = attributes(name, one.units or NO_UNIT, **{EPSILON: one.epsilon})
+        digits = {} if one.written is None else {WRITTEN: str(one.written)}
+        text = attributes(name, one.units or NO_UNIT, **{EPSILON: one.epsilon}, **digits)
         variables[name] = Variable(one.dims, one.values, text)
     return Record(coords, variables)
 
@@ -164,6 +170,7 @@ def stored(found: Record, name: str) -> GridValues:
     epsilon = variable.attrs[EPSILON]
     assert isinstance(epsilon, float)
     coords = {dim: found[dim] for dim in variable.dims if dim in found.coords}
+    digits = variable.attrs.get(WRITTEN)
     return GridValues(
         np.asarray(variable.values),
         variable.dims,
@@ -172,4 +179,5 @@ def stored(found: Record, name: str) -> GridValues:
         epsilon,
         units_in(variable.attrs)[0],
         {dim: units_in(found.coords[dim].attrs) for dim in coords},
+        None if digits is None else Decimal(str(digits)),
     )

@@ -14,7 +14,7 @@ from vibsim.core.errors import Fault, InputError, nearest
 from vibsim.experiment.tables import csv_text
 from vibsim.experiment.yaml.file_content import MOST_BYTES, read_bytes
 
-MOST_LEVELS = 1000
+MOST_LEVELS = csv_text.ROWS_WRITTEN
 
 
 @dataclass(frozen=True)
@@ -75,8 +75,10 @@ def _as_written(cell: str) -> Decimal:
 
 def columns(
     path: Path, names: Sequence[str], most: int, *, is_shown: bool
-) -> tuple[dict[str, Floats], Integers]:
-    """Return the columns `names` of a table of `most` rows at most, and the line of every row; InputError as `read`.
+) -> tuple[dict[str, Floats], dict[str, Decimal]]:
+    """Return the columns `names` of a table of `most` rows at most, and their first numbers as they are written.
+
+    InputError as `read`.
 
     Where the file may be anything (`is_shown` is false), no message shows what is in it but numbers.
     """
@@ -89,8 +91,10 @@ def columns(
                 raise InputError([Fault(str(path), 0, "", name, f"the table has {what}", hint)])
         return names
 
-    found, lines = _read(path, choose, most, is_shown=is_shown)
-    return dict(zip(names, found, strict=True)), lines
+    cells: list[list[str]] = []
+    found, _ = _read(path, choose, most, cells, is_shown=is_shown)
+    first = map(_as_written, cells[0]) if cells else ()
+    return dict(zip(names, found, strict=True)), dict(zip(names, first, strict=False))
 
 
 def _read(

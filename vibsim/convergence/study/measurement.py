@@ -133,14 +133,17 @@ def rounding_of_sizes(h: Floats) -> Floats:
 
 
 def step_of_values(values: Floats) -> float:
-    """Return the least difference of the finest levels where two are the same to the last bit and others differ.
+    """Return the least difference of levels where two of the finest are the same to the last bit and others differ.
 
     Then values come in steps, such as a largest value over grid points, and are off by as much. Shape (n, points); 0
-    where no two of the finest `IN_STEPS` are the same, or all.
+    where no two of the finest `IN_STEPS` are the same, or all levels. Coarser ones count only if all of these are.
     """
-    sizes = np.max(np.abs(np.diff(values[-IN_STEPS:], axis=0)), axis=1)
-    differ = sizes > 0.0
-    return 0.0 if np.all(differ) or not np.any(differ) else float(np.min(sizes[differ]))
+    sizes = np.max(np.abs(np.diff(values, axis=0)), axis=1)
+    finest = sizes[1 - IN_STEPS :]
+    if np.all(finest > 0.0) or not np.any(sizes):
+        return 0.0
+    among = finest if np.any(finest) else sizes
+    return float(np.min(among[among > 0.0]))
 
 
 def is_single(values: Floats) -> bool:

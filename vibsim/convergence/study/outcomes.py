@@ -103,6 +103,8 @@ class Outcome:
     """Whether the levels were judged without the exact values, which have too few digits to tell their error."""
     rounded: float = 0.0
     """How far the extrapolated values are off because those of the levels have few digits; part of the bounds."""
+    comes_in_steps: bool = False
+    """Whether they are so far off because the values come in steps."""
 
 
 def outcomes(
@@ -346,8 +348,10 @@ def _decide(
         # added up one by one, so that a member has the same digits alone and among others
         one.best = sum((w * row for w, row in zip(weights, part, strict=True)), 0.0 * part[0])
         added_up = ADDED_UP * SINGLE * measured.norms[k, -1] * measured.are_single[k]
-        units = np.maximum(request.halves(part, places), max(step_of_values(part), float(added_up)))
-        one.rounded = float(np.sum(units * np.abs(weights)))
+        units = np.maximum(request.halves(part, places), float(added_up))
+        step = step_of_values(part)
+        one.comes_in_steps = step > float(np.max(units))
+        one.rounded = float(np.sum(np.maximum(units, step) * np.abs(weights)))
     if one.reason == "wrong_limit":
         # the floor is that of storing numbers, half a unit
         most = 0.0 if request.noise else 2.0 * MOST_ADDED_UP * measured.ladder.floor[k, -1]

@@ -110,7 +110,7 @@ SENTENCES: Mapping[str, tuple[str, str]] = MappingProxyType(
             "add a finer level{such_as}.",
         ),
         "round_off": (
-            "The differences of {quantity} have reached {floor}, so they do not show its order{estimate}.",
+            "The differences of {quantity} look like {floor}, so they do not show its order{estimate}.",
             NOT_FINER,
         ),
         "oscillating": (

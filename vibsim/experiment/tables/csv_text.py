@@ -20,6 +20,8 @@ from vibsim.core.array_types import Floats, Integers
 
 MOST_LINES = 2**21
 """Largest number of lines, including empty lines and comments."""
+ROWS_WRITTEN = 1000
+"""Largest number of rows whose cells are kept as text."""
 MOST_CHARACTERS = 2**16
 """Largest number of characters of a line."""
 SEPARATORS = {";": "semicolons", "\t": "tabs", ",": "commas"}
@@ -116,8 +118,8 @@ def read(
     most
         Largest number of rows.
     written
-        If given, the cells of these columns are appended to it, row by row, with decimal points. They keep zeros at
-        the end, which are digits of what was printed.
+        If given, the cells of these columns in the first `ROWS_WRITTEN` rows are appended to it, with decimal points.
+        They keep zeros at the end, which are digits of what was printed.
     """
     source = _Rows(content)
     rows = iter(source)
@@ -135,7 +137,7 @@ def read(
             raise CsvError(f"must not have more than {most} points")
         for i, name, column in chosen:
             column.append(marks.number(row[i], name, source.line, is_first=not lines))
-        if written is not None:
+        if written is not None and len(written) < ROWS_WRITTEN:
             written.append([row[i].strip().replace(",", ".") for i, *_ in chosen])
         lines.append(source.line)
     marks.finish()
