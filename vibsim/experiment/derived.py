@@ -45,8 +45,8 @@ def alone(experiment: AnyExperiment, case: int) -> AnyExperiment:
         name, rule = str(experiment.file or experiment.name), "starts where the member before ends"
         hint = f"run the sweep, or @{case - case % experiment.chain}, which starts as the file says"
         raise InputError([Fault(name, 0, "sweep.follow", str(case), rule, hint)])
-    own = columns(experiment, case, case + 1)
-    swept = {key: column[0].item() for key, column in own.items()}
+    member_values = columns(experiment, case, case + 1)
+    swept = {key: column[0].item() for key, column in member_values.items()}
     parameters = _filled(swept, "model", experiment.model.parameters)
     # terms that are 0 only for this member stay in the equation, so all bits stay the same
     model = experiment.model.model_copy(update={"parameters": parameters})
@@ -57,14 +57,14 @@ def alone(experiment: AnyExperiment, case: int) -> AnyExperiment:
     end = swept.get("time.end", float(experiment.natural_end(parameters)))
     # times that are fractions of the end of a member become times
     unit = end if experiment.end_varies else 1.0
-    published = _tables_of_member(experiment, case, unit, own)
+    published = _tables_of_member(experiment, case, unit, member_values)
     matching = [
         check
         for check in experiment.written
         if check.measured.member in (None, case)
         # a reduction over members does not apply to a single one
         and getattr(check.measured, "take", None) is None
-        and members_with(own, check.measured.swept, 1).all()
+        and members_with(member_values, check.measured.swept, 1).all()
     ]
     checks: list[Check] = [_check_of_member(check, unit) for check in matching]
     checks += claims(published)
@@ -102,15 +102,15 @@ def _scheme(swept: dict[str, Any], scheme: SchemeSpec) -> SchemeSpec:
 
 
 def _tables_of_member(
-    experiment: ExperimentSpec, case: int, unit: float, own: Mapping[str, Column]
+    experiment: ExperimentSpec, case: int, unit: float, member_values: Mapping[str, Column]
 ) -> tuple[PublishedTable, ...]:
-    """Return the printed tables with only the rows that apply to a member with `own` swept values."""
+    """Return the printed tables with only the rows that apply to member `case`."""
     tables = []
     for table in experiment.published:
         matching = (
             row
             for row in table.rows
-            if row.at.case in (None, case) and members_with(own, row.at.swept, 1).all()
+            if row.at.case in (None, case) and members_with(member_values, row.at.swept, 1).all()
         )
         rows = tuple(row.model_copy(update={"at": _at_of_member(row.at, unit)}) for row in matching)
         if rows:

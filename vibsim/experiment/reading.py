@@ -266,10 +266,10 @@ def _keys(section: Any) -> Iterator[str]:
 def _levels(document: Any, report: Report) -> tuple[int, ...]:
     """Return the levels; empty if the section is missing or faulty, or replaced by a tolerance."""
     data = report.source.data
-    given = [key for key in ("levels", "tolerance") if data.get(key) is not None]
-    if not given:
+    present = [key for key in ("levels", "tolerance") if data.get(key) is not None]
+    if not present:
         report.add(("levels",), MISSING, "e.g. {from: 6, to: 9}, or tolerance in its place")
-    elif len(given) > 1:
+    elif len(present) > 1:
         report.add(("tolerance",), "must not be given together with levels", at_key=True)
     return rising_levels(document.levels, report)
 

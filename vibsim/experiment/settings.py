@@ -77,28 +77,28 @@ def _path(top: Node, key: str) -> Path_:
     """Return the path of a dotted key in the content of a file, whose keys may themselves contain dots."""
     path: Path_ = ()
     node: Node | None = top
-    rest = key
-    while rest:
-        if index := _INDEX.match(rest):
+    tail = key
+    while tail:
+        if index := _INDEX.match(tail):
             place = int(index[1])
             _check_index(node, path, place)
-            path, rest = (*path, place), rest[index.end() :]
+            path, tail = (*path, place), tail[index.end() :]
         else:
-            name = _name(node, path, rest)
+            name = _name(node, path, tail)
             if not name:
                 raise _SettingError(FORM)
             _check_name(node, path)
-            path, rest = (*path, name), rest.removeprefix(name).removeprefix(".")
+            path, tail = (*path, name), tail.removeprefix(name).removeprefix(".")
         node = (node.children or {}).get(path[-1]) if node else None
     return path
 
 
-def _name(node: Node | None, path: Path_, rest: str) -> str:
-    """Return the next key of `rest`: the longest existing one, else up to the next dot (a swept key: up to the end)."""
+def _name(node: Node | None, path: Path_, tail: str) -> str:
+    """Return the next key of `tail`: the longest existing one, else up to the next dot (a swept key: to the end)."""
     keys = filter(None, (node.keys if node else None) or ())
-    known = [key for key in keys if rest == key or rest.startswith((f"{key}.", f"{key}["))]
+    known = [key for key in keys if tail == key or tail.startswith((f"{key}.", f"{key}["))]
     end = r"[^\[]*" if path[-1:] in _DOTTED_SECTIONS else r"[^.\[]*"
-    match = re.match(end, rest)
+    match = re.match(end, tail)
     return max(known, key=len) if known else match[0] if match else ""
 
 

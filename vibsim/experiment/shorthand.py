@@ -206,20 +206,20 @@ def solved(equation: str, others: Sequence[str]) -> tuple[str, str]:
         if other not in (name, velocity, _SECOND, *others):
             hint = likely(other, others) or "give its value in `parameters`"
             raise ExpressionError(equation, 0, f"unknown name '{other}'", hint)
-    factor, rest = ZERO, ZERO
+    factor, rhs = ZERO, ZERO
     for term in (*_terms(left), *_terms(Negate(right))):
         slope = derivative(term, _SECOND)
         if _SECOND in slope.names:
             raise ExpressionError(equation, 0, f"must be linear in {name}''")
-        without = tidied(put(term, _SECOND, ZERO))
+        remainder = tidied(put(term, _SECOND, ZERO))
         factor = factor + slope
-        rest = rest + without.operand if isinstance(without, Negate) else rest - without
+        rhs = rhs + remainder.operand if isinstance(remainder, Negate) else rhs - remainder
     factor = tidied(factor)
     if is_zero(factor):
         raise ExpressionError(equation, 0, f"has no {name}'' but in what vanishes")
     if isinstance(factor, Negate):
-        factor, rest = factor.operand, Negate(rest)
-    return name, to_formula(tidied(rest / factor))
+        factor, rhs = factor.operand, Negate(rhs)
+    return name, to_formula(tidied(rhs / factor))
 
 
 def _terms(node: Expression, *, is_minus: bool = False) -> Iterator[Expression]:

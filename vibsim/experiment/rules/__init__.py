@@ -1,1 +1,1 @@
-"""What an experiment must be besides well-formed, section by section."""
+"""Rules that a well-formed experiment must satisfy, by section."""

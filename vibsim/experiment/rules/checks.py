@@ -185,8 +185,8 @@ def _check_converges(check: ConvergesCheck, scope: Scope) -> None:
 def _check_accurate(check: AccurateCheck, scope: Scope) -> None:
     check_expect(check.expect, (*scope.path, "expect"), scope.report)
     _check_convergent(check.accurate, "accurate", check.schemes, scope)
-    given = given_one(check, ("relative", "absolute"), scope.path, scope.report)
-    if given == "relative" and is_error_part(check.accurate):
+    key = given_one(check, ("relative", "absolute"), scope.path, scope.report)
+    if key == "relative" and is_error_part(check.accurate):
         rule = f"is a part of the solution, and {check.accurate} is an error itself"
         scope.at("relative").refuse(rule, "give `absolute:`", at_key=True)
 
@@ -234,10 +234,10 @@ def given_one(section: Any, keys: Sequence[str], path: Path_, report: Report) ->
 
 
 def _check_value_check(check: ValueCheck, scope: Scope) -> None:
-    given = given_one(check, ("equals", "below", "above"), scope.path, scope.report)
-    if given is not None:
+    key = given_one(check, ("equals", "below", "above"), scope.path, scope.report)
+    if key is not None:
         for name in ("rtol", "atol"):
-            if getattr(check, name) is not None and given != "equals":
+            if getattr(check, name) is not None and key != "equals":
                 scope.at(name).refuse("is used with equals only", at_key=True)
     place = scope.at("at")
     _check_reduction(check, scope)

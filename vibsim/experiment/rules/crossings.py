@@ -92,9 +92,9 @@ def _jumps(node: Expression) -> str:
 
 def _never_happens(event: Any, path: tuple[str, str, int], report: Report) -> bool:
     """Tell whether an event is switched off for both crossing directions, and report that."""
-    given = [name for name in ("falling", "rising") if getattr(event, name) is not None]
-    if not given or event.falling or event.rising:
+    directions = [name for name in ("falling", "rising") if getattr(event, name) is not None]
+    if not directions or event.falling or event.rising:
         return False
     rule = "must be true for falling or for rising: the event would never happen"
-    report.add((*path, given[0]), rule, "leave both out for both ways", False, at_key=True)
+    report.add((*path, directions[0]), rule, "leave both out for both ways", False, at_key=True)
     return True

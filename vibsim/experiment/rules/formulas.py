@@ -247,15 +247,15 @@ def _shortlist(names: Sequence[str]) -> str:
 
 def _check_companions(row: FormulaField, section: Any, report: Report) -> None:
     """Report a field given together with one that it replaces, or without one that it needs."""
-    given = section.model_fields_set
-    if row.instead_of and not {row.name, row.instead_of} & given:
-        alone = ": `potential` alone makes no forces" if "potential" in given else ""
+    keys = section.model_fields_set
+    if row.instead_of and not {row.name, row.instead_of} & keys:
+        alone = ": `potential` alone makes no forces" if "potential" in keys else ""
         hint = f"write {row.instead_of} or {row.name}{alone}"
         report.add(("model", row.instead_of), MISSING, hint)
-    elif row.instead_of and {row.name, row.instead_of} <= given:
+    elif row.instead_of and {row.name, row.instead_of} <= keys:
         rule = f"must not be given together with {row.instead_of}"
         report.add(("model", row.name), rule, at_key=True)
-    elif row.beside and row.name in given and row.beside not in given:
+    elif row.beside and row.name in keys and row.beside not in keys:
         rule = f"has a meaning beside {row.beside} only"
         report.add(("model", row.name), rule, at_key=True)
 

@@ -129,8 +129,8 @@ class MemberNumbers:
         return {key: swept.get(f"model.{key}", x) for key, x in self.parameters.items()}
 
     def _by_name(self, swept: Mapping[str, Any]) -> dict[str, Any]:
-        given = self._parameters(swept)
-        return {row.name: given[row.key] for row in self.model.parameters}
+        parameters = self._parameters(swept)
+        return {row.name: parameters[row.key] for row in self.model.parameters}
 
 
 def _chunks(count: int) -> Iterator[tuple[int, int]]:

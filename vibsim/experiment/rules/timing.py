@@ -30,19 +30,19 @@ def time_spec(
     """Return the end and the steps at level 0; None if they cannot be determined."""
     if section is None:
         return None
-    given = {name for name in TimeSection.model_fields if getattr(section, name) is not None}
+    keys = {name for name in TimeSection.model_fields if getattr(section, name) is not None}
     by_periods = ("periods", "steps_per_period")
-    if section.frequency is not None and not set(by_periods) <= given:
+    if section.frequency is not None and not set(by_periods) <= keys:
         rule = "says whose periods are counted, and belongs to periods and steps_per_period"
         report.add(("time", "frequency"), rule, at_key=True)
         return None
     if section.steps_per_point is not None:
         rule = "must not be given together with steps_per_point"
-        _refuse(given - {"steps_per_point"}, rule, report)
+        _refuse(keys - {"steps_per_point"}, rule, report)
         return _by_table(section.steps_per_point, model, parameters, report)
     if section.end is not None:
-        _refuse(given & set(by_periods), "must not be given together with end", report)
-        if {"base_steps", "base_dt"} <= given:
+        _refuse(keys & set(by_periods), "must not be given together with end", report)
+        if {"base_steps", "base_dt"} <= keys:
             _refuse({"base_dt"}, "must not be given together with base_steps", report)
             return None
         steps: int | None = section.base_steps or 1
@@ -53,12 +53,12 @@ def time_spec(
                 hint = f"end/base_dt is {ratio:.15g}"
                 report.add(("time", "base_dt"), "end must be a whole number of base_dt", hint)
         return None if steps is None else TimeSpec(end=section.end, base_steps=steps)
-    if not given & set(by_periods):
+    if not keys & set(by_periods):
         report.add(("time", "end"), MISSING, "or periods and steps_per_period")
         return None
-    _refuse(given & {"base_steps", "base_dt"}, "must not be given together with periods", report)
+    _refuse(keys & {"base_steps", "base_dt"}, "must not be given together with periods", report)
     for name in by_periods:
-        if name not in given:
+        if name not in keys:
             report.add(("time", name), MISSING, "periods and steps_per_period")
     if section.periods is None or section.steps_per_period is None:
         return None

@@ -125,27 +125,27 @@ class MeasuringCheck(Section):
     def about(self) -> str | None:
         """The quantity whose time series the check needs; None if it needs none."""
         key = self.kind if self.kind in OF_A_QUANTITY else "quantity"
-        found: str | None = getattr(self, key, None)
-        return found
+        quantity: str | None = getattr(self, key, None)
+        return quantity
 
     @property
     def member(self) -> int | None:
         """Index of the member of the sweep that the check applies to; None for all."""
         has_case = "case" in type(self).model_fields
-        found: int | None = getattr(self if has_case else getattr(self, "at", None), "case", None)
-        return found
+        case: int | None = getattr(self if has_case else getattr(self, "at", None), "case", None)
+        return case
 
     @property
     def swept(self) -> Mapping[str, float | str]:
         """Swept values by dotted key that select the members the check applies to; empty for all."""
-        found: Members | None = getattr(self, "at", None)
-        return found.swept if found is not None else {}
+        members: Members | None = getattr(self, "at", None)
+        return members.swept if members is not None else {}
 
     @property
     def expected_verdict(self) -> Expect | None:
         """The verdict that passes; None for kinds of checks without the key `expect`."""
-        found: Expect | None = getattr(self, "expect", None)
-        return found
+        expect: Expect | None = getattr(self, "expect", None)
+        return expect
 
     @property
     def expects_pass(self) -> bool:
