@@ -16,7 +16,7 @@ from thinned import thinned
 
 from vibsim import Experiment, analyse
 from vibsim.analysis import analyse_records, blockwise, keep_for_verdicts, summarise, verdicts
-from vibsim.comparison.value_numbers import KNOWN
+from vibsim.comparison.value_numbers import NUMBERS
 from vibsim.core.errors import VibsimError
 from vibsim.core.record import Record, Variable
 from vibsim.experiment.storage import stored_series
@@ -163,7 +163,7 @@ def test_every_value_can_be_asked_for_where_storage_is_bounded(
     assert names == set(stored_series(experiment))
     lean = values_of(experiment, analyse_records(experiment, records))
     asked = {check.value for check in experiment.checks if check.kind == "value"}
-    rows = {name: VALUES[name] for name in KNOWN}
+    rows = {name: VALUES[name] for name in NUMBERS}
     assert asked == {n for n, row in rows.items() if not needs_another_model(row)}
     assert np.isfinite(full).any(axis=(1, 2)).mean() > 0.9
     assert np.array_equal(lean, full, equal_nan=True)

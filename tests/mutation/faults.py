@@ -383,8 +383,8 @@ FAULTS = (
         "fine minus coarse",
         "analysis",
         "comparison/quantity_comparison.py",
-        "found = [coarse - fine for coarse, fine",
-        "found = [fine - coarse for coarse, fine",
+        "results = [coarse - fine for coarse, fine",
+        "results = [fine - coarse for coarse, fine",
     ),
     Fault(
         "level minus exact",

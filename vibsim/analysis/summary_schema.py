@@ -13,7 +13,7 @@ from vibsim.checks import reductions
 from vibsim.checks.experiment_tolerance import BOUND
 from vibsim.checks.fields import Field, result_fields
 from vibsim.checks.kinds import KINDS
-from vibsim.checks.order import BESIDE
+from vibsim.checks.order import OTHER_FACTS
 from vibsim.checks.solver_facts import LEVELS, SOLVER_FACTS
 from vibsim.core.json_schema import (
     COUNT,
@@ -53,7 +53,7 @@ def schema() -> dict[str, Any]:
     for kind, row in KINDS.items():
         of_kind = {name: _fact(field) for name, field in result_fields(row.fields).items()}
         if kind == "converges":
-            of_kind |= {name: _fact(field) for name, field in BESIDE.items()}
+            of_kind |= {name: _fact(field) for name, field in OTHER_FACTS.items()}
         facts.append(object_of(of_kind, title=f"facts of a check `{kind}`"))
         if kind == "value":
             of_all = of_kind | {name: _fact(field) for name, field in reductions.FACTS.items()}

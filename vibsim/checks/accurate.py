@@ -1,8 +1,8 @@
-"""The check ``accurate``: whether the error of the finest level is as small as asked.
+"""The check ``accurate``: whether the error of the finest level is within the accuracy that the check requires.
 
-The error is that of the L2 norm over time. Where the exact solution is known it is the true one. Elsewhere it is
-estimated by extrapolation, and decides only where the order of the quantity is known: a bound that rests on levels
-whose errors fall by no known power bounds nothing.
+The error is measured in the L2 norm over time. It is the true error if the exact solution is known. Otherwise it is
+estimated by extrapolation, and decides only if the order of the quantity is known: a bound that rests on levels without
+a known order is unreliable.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from vibsim.checks.sentences import (
     NOT_FINITE,
     WRONG_LIMIT_ADVICE,
     Description,
-    Found,
+    MemberFacts,
     add_levels,
     cost_in_words,
 )
@@ -39,7 +39,7 @@ from vibsim.experiment.schema.checks import AccurateCheck
 from vibsim.observe.member_block import MemberBlock
 
 BASES = ("none", "exact", "extrapolated")
-"""What an error is measured against; files hold a position here."""
+"""References of an error; files store an index into this tuple."""
 NONE, EXACT, EXTRAPOLATED = range(len(BASES))
 _TEXTS = (
     "L2 norm over time of the error of the finest level, in the unit of the quantity times the square root of s",
@@ -61,100 +61,100 @@ FIELDS = {
     ),
 }
 ORDER_KNOWN = "asymptotic", "exact", "order_low", "order_high"
-"""Reasons of verdicts on an order that say by which power errors fall."""
-MOST = 12
-"""More levels than that are no prediction."""
+"""Reasons of verdicts that state an order."""
+MOST_MORE_LEVELS = 12
+"""Largest number of additional levels that is predicted."""
 
 
 def measure(block: MemberBlock, compared: Compared, check: AccurateCheck) -> Measured:
     """Return what a check measures."""
     quantity = compared[check.accurate]
-    found, judged = error_of_finest(quantity), judgement(quantity, TYPICAL_NORM)
-    # a scheme that chooses its own steps has no order, and may have a true error all the same
-    has_none = (judged.reason == code("not_applicable")) & ~(
-        block.adaptive[:, None] & found.is_true
+    finest, judged = error_of_finest(quantity), judgement(quantity, TYPICAL_NORM)
+    # an adaptive scheme has no order, but may have a true error
+    without_error = (judged.reason == code("not_applicable")) & ~(
+        block.adaptive[:, None] & finest.is_true
     )
-    basis = np.select([has_none, found.is_true], [NONE, EXACT], EXTRAPOLATED)
+    basis = np.select([without_error, finest.is_true], [NONE, EXACT], EXTRAPOLATED)
     return {
-        **facts_of_error(found),
-        "size": found.size,
+        **facts_of_error(finest),
+        "size": finest.size,
         "accuracy": check.accuracy,
         "basis": basis,
         "order_reason": judged.reason,
         "level": block.grid.levels[-1],
-        "level_needed": _level_needed(block.grid.levels[-1], found, judged, check),
+        "level_needed": _level_needed(block.grid.levels[-1], finest, judged, check),
     }
 
 
-def facts_of_error(found: FinestError) -> dict[str, Any]:
+def facts_of_error(finest: FinestError) -> dict[str, Any]:
     """Return the values of `ERROR`."""
     with np.errstate(all="ignore"):
-        relative = np.where(found.size > 0.0, found.error / found.size, np.nan)
-    return {"error": found.error, "error_bound": found.bound, "relative_error": relative}
+        relative = np.where(finest.size > 0.0, finest.error / finest.size, np.nan)
+    return {"error": finest.error, "error_bound": finest.bound, "relative_error": relative}
 
 
 def known_error(q: Comparison) -> dict[str, Any]:
-    """Return the values of `ERROR` where the error of a quantity can be believed, NaN elsewhere."""
-    found, reason = error_of_finest(q), judgement(q, TYPICAL_NORM).reason
-    decides = found.is_true & ~is_one_of(reason, "unstable", "non_finite", "not_applicable")
-    decides |= is_one_of(reason, *ORDER_KNOWN)
-    facts = facts_of_error(found)
-    return {name: np.where(decides, values, np.nan) for name, values in facts.items()}
+    """Return the values of `ERROR` where the error of a quantity is reliable, NaN elsewhere."""
+    finest, reason = error_of_finest(q), judgement(q, TYPICAL_NORM).reason
+    is_reliable = finest.is_true & ~is_one_of(reason, "unstable", "non_finite", "not_applicable")
+    is_reliable |= is_one_of(reason, *ORDER_KNOWN)
+    facts = facts_of_error(finest)
+    return {name: np.where(is_reliable, values, np.nan) for name, values in facts.items()}
 
 
-def error_in_words(f: Found, quantity: str, norm: str) -> str:
-    """Say how large the error of the finest level is, as a root mean square over time; empty where it is not known.
+def error_in_words(f: MemberFacts, quantity: str, norm: str) -> str:
+    """State the root-mean-square error over time of the finest level; empty if it is unknown.
 
-    It is that of all points, also where a check is about a norm without the last one.
+    It includes the last point, even if the norm of the check excludes it.
     """
-    error, most, relative = (f.fact(name) for name in ERROR)
-    if not math.isfinite(most):
+    error, bound, relative = (f.fact(name) for name in ERROR)
+    if not math.isfinite(bound):
         return ""
-    number, (mean, largest) = f.notation.number, (_mean_square(f, x) for x in (error, most))
+    number, (rms, largest) = f.notation.number, (_mean_square(f, x) for x in (error, bound))
     unit = unit_of_quantity(f.record, quantity)
     where = ", its last point included," if norm == "linf_interior" else ""
-    sentence = f" The root-mean-square error of the finest level{where} is {number(mean, 2)} {unit}"
+    sentence = f" The root-mean-square error of the finest level{where} is {number(rms, 2)} {unit}"
     sentence = sentence.rstrip()
     if math.isfinite(relative):
         sentence += f" ({number(relative, 2)} of its size)"
-    # of a true error the bound has the same digits
-    if number(largest, 2) != number(mean, 2):
+    # the bound of a true error has the same digits
+    if number(largest, 2) != number(rms, 2):
         sentence += f", at most {number(largest, 2)}"
     return f"{sentence}."
 
 
-def _mean_square(f: Found, error: float) -> float:
-    """Return the root of the mean square over time of an error whose L2 norm over time is given."""
+def _mean_square(f: MemberFacts, error: float) -> float:
+    """Return the root mean square over time of an error, from its L2 norm."""
     duration = f.record.step(-1, f.case) * f.experiment.steps(int(f.record["level"][-1]))
     return error / math.sqrt(duration)
 
 
-def _level_needed(last: int, found: FinestError, judged: Judgement, check: AccurateCheck) -> Codes:
-    """Return the finer level whose bound is probably as asked, shape (scheme, case); -1 where none is known."""
+def _level_needed(last: int, finest: FinestError, judged: Judgement, check: AccurateCheck) -> Codes:
+    """Return the level whose bound probably reaches the accuracy, shape (scheme, case); -1 if unknown."""
     with np.errstate(all="ignore"):
-        allowed = check.accuracy * (found.size if check.is_relative else 1.0)
-        steps = np.ceil(on_arrays.log2(found.bound / allowed) / judged.order)
-        # neither round-off nor another limit vanishes with the step
-        known = (judged.order > 0.0) & (steps >= 1.0) & (steps <= MOST)
-        known &= (found.round_off < allowed) & (judged.reason != code("wrong_limit"))
+        allowed = check.accuracy * (finest.size if check.is_relative else 1.0)
+        steps = np.ceil(on_arrays.log2(finest.bound / allowed) / judged.order)
+        # round-off and a wrong limit do not vanish with the step
+        known = (judged.order > 0.0) & (steps >= 1.0) & (steps <= MOST_MORE_LEVELS)
+        known &= (finest.round_off < allowed) & (judged.reason != code("wrong_limit"))
     return np.where(known, last + np.where(known, steps, 0.0), -1.0).astype(np.int16)
 
 
-def judge(experiment: Experiment, record: Record, check: AccurateCheck, found: Measured) -> Judged:
-    """Compare the error of the finest level with what is asked."""
-    error, bound, order_reason = found["error"], found["error_bound"], found["order_reason"]
-    is_true, size = found["basis"] == EXACT, found["size"]
-    allowed = found["accuracy"] * (size if check.is_relative else np.ones_like(size))
-    # as far below the error as the bound is above it
+def judge(experiment: Experiment, record: Record, check: AccurateCheck, facts: Measured) -> Judged:
+    """Compare the error of the finest level with the required accuracy."""
+    error, bound, order_reason = (facts["error"], facts["error_bound"], facts["order_reason"])
+    is_true, size = facts["basis"] == EXACT, facts["size"]
+    allowed = facts["accuracy"] * (size if check.is_relative else np.ones_like(size))
+    # lower bound, as far below the error as the upper bound is above it
     least = np.maximum(2.0 * error - bound, 0.0)
-    decides = is_true | is_one_of(order_reason, *ORDER_KNOWN)
-    # a coarse level may be unstable beside a finest one that follows the solution
+    is_reliable = is_true | is_one_of(order_reason, *ORDER_KNOWN)
+    # a coarse level may be unstable although the finest one follows the solution
     is_unstable = is_one_of(order_reason, "unstable") & ~(is_true & (error < size))
     cases = [
         (is_unstable | is_one_of(order_reason, "non_finite"), order_reason),
-        ((found["basis"] == NONE) | ~(allowed > 0.0), "not_applicable"),
-        (decides & (bound < allowed), "match"),
-        (decides & (least > allowed), "mismatch"),
+        ((facts["basis"] == NONE) | ~(allowed > 0.0), "not_applicable"),
+        (is_reliable & (bound < allowed), "match"),
+        (is_reliable & (least > allowed), "mismatch"),
         (is_true, "round_off"),
         (is_open(order_reason), order_reason),
     ]
@@ -165,13 +165,13 @@ def judge(experiment: Experiment, record: Record, check: AccurateCheck, found: M
 
 
 def rule(check: AccurateCheck, notation: Notation = PLAIN) -> str:
-    """Say what an error should be."""
+    """Say which accuracy is required."""
     accuracy = notation.number(check.accuracy)
     return f"accurate to {accuracy} of its size" if check.is_relative else f"accurate to {accuracy}"
 
 
-def describe(f: Found, check: AccurateCheck) -> Description:
-    """Say how large the error is, and what to change where that is not as asked."""
+def describe(f: MemberFacts, check: AccurateCheck) -> Description:
+    """State the error, and what to change if it is not small enough."""
     s = _Phrases(f, check)
     what = s.what
     match f.reason:
@@ -223,9 +223,9 @@ def describe(f: Found, check: AccurateCheck) -> Description:
 
 
 class _Phrases:
-    """Parts of sentences on an error."""
+    """Phrases of sentences on an error."""
 
-    def __init__(self, f: Found, check: AccurateCheck) -> None:
+    def __init__(self, f: MemberFacts, check: AccurateCheck) -> None:
         self.f, self.check = f, check
         self.what = f.notation.quantity(check.accurate)
         self.subject = f.notation.opening(self.what)
@@ -234,14 +234,14 @@ class _Phrases:
         self.cost = partial(cost_in_words, f.experiment)
 
     def _counted(self, error: float) -> str:
-        """Write an error as the check counts it."""
+        """Write an error, relative or absolute as in the check."""
         if self.check.is_relative:
             size = self.f.fact("size")
             error = error / size if size > 0.0 else math.nan
         return beside(self.f.notation, error, self.check.accuracy)
 
     def mean(self) -> str:
-        """Say how large an error is in the unit of its quantity, where it is asked for as a norm over time."""
+        """State the root-mean-square error in the unit of the quantity, for a check of an absolute norm."""
         if self.check.is_relative:
             return ""
         mean = self.f.notation.number(_mean_square(self.f, self.f.fact("error")), 2)
@@ -250,7 +250,7 @@ class _Phrases:
         return f"{sentence.rstrip()}."
 
     def error(self) -> str:
-        """Say how large the error is."""
+        """Write the error."""
         phrase = self._counted(self.f.fact("error"))
         return f"{phrase} of its size" if self.check.is_relative else phrase
 
@@ -261,7 +261,7 @@ class _Phrases:
         return self._counted(max(2.0 * self.f.fact("error") - self.f.fact("error_bound"), 0.0))
 
     def open(self) -> str:
-        """Say that what is asked lies between the bounds of the error."""
+        """Say that the required accuracy lies between the bounds of the error."""
         return (
             f"{self.subject} may or may not be as accurate as asked ({self.asked}). The error at level {self.level} is "
             f"{self.error()}, between {self.least()} and {self.most()}.{self.mean()}"
@@ -271,7 +271,7 @@ class _Phrases:
         return f" ({self.error()})" if math.isfinite(self.f.fact("error")) else ""
 
     def finer(self) -> str:
-        """Name the level that is probably as accurate as asked, where one is known."""
+        """Name the level that probably reaches the accuracy, if it is known."""
         change, needed = f"hange `{self.check.key}:`", self.f.fact("level_needed")
         if self.f.word("order_reason") == "wrong_limit":
             return WRONG_LIMIT_ADVICE.format(scheme=self.f.scheme_name)
@@ -281,7 +281,7 @@ class _Phrases:
         return f"A{add}, which probably reaches it by the measured order, or c{change}."
 
     def more_levels(self) -> str:
-        """Say what shows an order."""
+        """Say how to find the order."""
         ask = f"The check `{{converges: {self.check.accurate}}}` says what its order needs"
         if self.f.reason in ("pre_asymptotic", "too_few_levels", "oscillating"):
             return f"A{add_levels(self.level, FINER, self.cost)}. {ask}."

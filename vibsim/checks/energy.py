@@ -10,7 +10,7 @@ import numpy as np
 from vibsim.apriori.formal_orders import columns_of, formal_orders
 from vibsim.checks.fields import LEVEL, MOTION, Field, Measured
 from vibsim.checks.outcome import Judged
-from vibsim.checks.sentences import MOVE, NOT_FINITE, NOTHING_MOVES, Description, Found
+from vibsim.checks.sentences import MOVE, NOT_FINITE, NOTHING_MOVES, Description, MemberFacts
 from vibsim.comparison.quantity_comparison import Compared
 from vibsim.convergence.reasons import first_reason
 from vibsim.convergence.thresholds import ABOVE_ROUND_OFF
@@ -61,21 +61,21 @@ _RATES = {
 def measure(block: MemberBlock, compared: Compared, check: ConservesCheck) -> Measured:
     """Return what a check measures."""
     level = block.grid.levels[-1] if check.level is None else check.level
-    found = drift_at(block, level, check.about or "")
+    drift = drift_at(block, level, check.about or "")
     return {
-        "drift": found.kind,
-        "drift_rate": found.rate,
-        "drift_power": found.power,
-        "energy_error": found.largest,
+        "drift": drift.kind,
+        "drift_rate": drift.rate,
+        "drift_power": drift.power,
+        "energy_error": drift.largest,
         "motion": lies_still(block, level),
         "level": level,
-        "window_means": found.means,
-        "round_off": found.round_off,
+        "window_means": drift.means,
+        "round_off": drift.round_off,
     }
 
 
 def lies_still(block: MemberBlock, level: int) -> Flags:
-    """Say where no position moves by more than round-off at any step of a level, shape (scheme, case)."""
+    """Say where no position moves by more than round-off at a level, shape (scheme, case)."""
     record, still = block.records[level], np.ones(block.shape, dtype=bool)
     floor = ABOVE_ROUND_OFF * block.relative_floor[..., block.grid.levels.index(level)]
     for name in block.model.positions:
@@ -87,32 +87,32 @@ def lies_still(block: MemberBlock, level: int) -> Flags:
     return still
 
 
-def judge(experiment: Experiment, record: Record, check: ConservesCheck, found: Measured) -> Judged:
-    """Compare how the energy error grows with what a check expects."""
-    kind, largest, still = found["drift"], found["energy_error"], found["motion"] != 0
-    broken = record["status"][..., record.place("level", int(found["level"]))] != 0
+def judge(experiment: Experiment, record: Record, check: ConservesCheck, facts: Measured) -> Judged:
+    """Compare the growth of the energy error with the expectation of a check."""
+    kind, largest, still = facts["drift"], facts["energy_error"], facts["motion"] != 0
+    broken = record["status"][..., record.place("level", int(facts["level"]))] != 0
     is_none, unclear = (kind == DRIFTS.index(name) for name in ("none", "unclear"))
-    wanted = kind == DRIFTS.index(check.drift)
+    is_expected = kind == DRIFTS.index(check.drift)
     if check.drift == "bounded":
-        # what is conserved is bounded too
-        wanted |= is_none
-    # an error that theory has, lost in round-off, may grow in any way; one that it has not does not grow
+        # a conserved energy is bounded, too
+        is_expected |= is_none
+    # an error hidden by round-off may grow in any way, unless theory says that there is none
     has_error = np.isfinite(formal_orders(experiment, check.about or "", columns_of(record)))
     cases = [
         (broken, "non_finite"),
         (np.isnan(largest) & unclear, "not_applicable"),
         (still & is_none, "not_applicable"),
-        # an error above round-off is not none, however short the run
+        # an error above round-off contradicts `none` in any run
         (unclear & (check.drift != "none"), "pre_asymptotic"),
-        (wanted, "match"),
+        (is_expected, "match"),
         (is_none & has_error, "round_off"),
     ]
     reason = first_reason(cases, "mismatch")
     return Judged(reason, largest)
 
 
-def describe(f: Found, check: ConservesCheck) -> Description:
-    """Say how the error of the energy grows with time, and what to change where a check expects otherwise."""
+def describe(f: MemberFacts, check: ConservesCheck) -> Description:
+    """Say how the energy error grows with time, and what to change if the check expects otherwise."""
     size, rate, drift = f.fact("energy_error"), f.fact("drift_rate"), f.word("drift")
     number, name = f.notation.number, f.notation.value(check.conserves)
     expects = f"The check expects `drift: {check.drift}`."
@@ -146,7 +146,7 @@ def describe(f: Found, check: ConservesCheck) -> Description:
     return Description(f"{finding}. {expects}", _advice(f, drift, check), finding)
 
 
-def _advice(f: Found, drift: str, check: ConservesCheck) -> str:
+def _advice(f: MemberFacts, drift: str, check: ConservesCheck) -> str:
     if f.reason == "pre_asymptotic":
         longer = "Lengthen the run (`time: end`), or store more of it (`samples: all`)."
         until = ""

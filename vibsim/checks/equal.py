@@ -1,4 +1,4 @@
-"""The check ``equal``: how far two solutions are from each other."""
+"""The check ``equal``: the distance of two solutions."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 from vibsim.checks.energy import lies_still
 from vibsim.checks.fields import LEVEL, MOTION, Field, Measured
 from vibsim.checks.outcome import Judged
-from vibsim.checks.sentences import MOVE, NOT_FINITE, NOTHING_MOVES, Description, Found
+from vibsim.checks.sentences import MOVE, NOT_FINITE, NOTHING_MOVES, Description, MemberFacts
 from vibsim.comparison.quantity_comparison import Compared
 from vibsim.comparison.solution_distance import solution_distance
 from vibsim.convergence.reasons import first_reason
@@ -32,26 +32,26 @@ FIELDS = {
         unit_of="quantity",
     ),
 }
-"""Of other schemes than the first one that a check names, distances are NaN."""
+"""Distances are NaN except for the first scheme of the check."""
 PLACES = 241
-"""Most places in time of a distance: as many as a figure has pixels."""
+"""Largest number of places in time of a distance, about the pixels of a figure."""
 
 
 def measure(block: MemberBlock, compared: Compared, check: EqualCheck) -> Measured:
     """Return what a check measures."""
     level = block.grid.levels[-1] if check.level is None else check.level
-    found = solution_distance(block, compared, check)
+    distances = solution_distance(block, compared, check)
     distance, allowed = (np.full(block.shape, np.nan) for _ in range(2))
-    still, names = lies_still(block, level), [row.name for row in block.experiment.schemes]
-    second = names.index(check.second) if check.second in names else found.scheme
-    distance[found.scheme], allowed[found.scheme] = found.largest, found.allowed
+    at_rest, names = lies_still(block, level), [row.name for row in block.experiment.schemes]
+    second = names.index(check.second) if check.second in names else distances.scheme
+    distance[distances.scheme], allowed[distances.scheme] = distances.largest, distances.allowed
     places = min(PLACES, max(len(record["t"]) for record in block.records.values()))
     return {
         "distance": distance,
         "allowed": allowed,
-        "motion": np.broadcast_to(still[found.scheme] & still[second], block.shape),
+        "motion": np.broadcast_to(at_rest[distances.scheme] & at_rest[second], block.shape),
         "level": level,
-        "distance_over_time": by_place(found.over_time, places),
+        "distance_over_time": by_place(distances.over_time, places),
     }
 
 
@@ -61,51 +61,51 @@ def by_place(values: Floats, count: int) -> Floats:
     Parameters
     ----------
     values
-        Shape (case, t), evenly spaced; NaN is passed over.
+        Shape (case, t), evenly spaced; NaN is ignored.
     count
         Number of places.
 
     Returns
     -------
     array
-        Shape (case, place); NaN where no time is nearest to a place.
+        Shape (case, place); NaN for a place that is nearest to no time.
     """
     last = values.shape[-1] - 1
     nearest = np.round(np.arange(last + 1) * ((count - 1) / max(last, 1))).astype(int)
-    taken, first = np.unique(nearest, return_index=True)
-    found = np.full((*values.shape[:-1], count), np.nan)
-    found[..., taken] = np.fmax.reduceat(values, first, axis=-1)
-    return found
+    occupied, first = np.unique(nearest, return_index=True)
+    result = np.full((*values.shape[:-1], count), np.nan)
+    result[..., occupied] = np.fmax.reduceat(values, first, axis=-1)
+    return result
 
 
-def judge(experiment: Experiment, record: Record, check: EqualCheck, found: Measured) -> Judged:
-    """Compare the largest distance between two solutions with what it may be."""
-    distance, allowed, still = found["distance"], found["allowed"], found["motion"] != 0
-    place = record.place("level", int(found["level"]))
+def judge(experiment: Experiment, record: Record, check: EqualCheck, facts: Measured) -> Judged:
+    """Compare the largest distance of two solutions with the allowed one."""
+    distance, allowed, at_rest = facts["distance"], facts["allowed"], facts["motion"] != 0
+    place = record.place("level", int(facts["level"]))
     names = record.words("scheme")
     involved = [names.index(name) for name in check.equal if name in names]
     broken = np.any(record["status"][involved, :, place] != 0, axis=0)
     cases = [
         (np.broadcast_to(broken, distance.shape), "non_finite"),
         (np.isnan(distance) | np.isnan(allowed), "not_applicable"),
-        ((distance <= allowed) & still, "not_applicable"),
+        ((distance <= allowed) & at_rest, "not_applicable"),
         (distance <= allowed, "match"),
     ]
     reason = first_reason(cases, "mismatch")
-    # as a part of what is allowed, which differs from member to member
+    # relative to the allowed distance, which differs between members
     with np.errstate(divide="ignore", invalid="ignore"):
         away = np.where(distance > 0, distance / allowed, distance)
     return Judged(reason, away)
 
 
 def other_solution(check: EqualCheck) -> str:
-    """Name what a scheme must equal."""
+    """Name the solution that a scheme must equal."""
     known = {"exact": "the exact solution", "discrete": "the exact solution of its own steps"}
     return known.get(check.second, f"scheme {check.second}")
 
 
-def describe(f: Found, check: EqualCheck) -> Description:
-    """Say how far two solutions are from each other, and what to change where that is too far."""
+def describe(f: MemberFacts, check: EqualCheck) -> Description:
+    """Say how far apart two solutions are, and what to change if that is too far."""
     what, other = f.notation.opening(f.notation.quantity(check.quantity)), other_solution(check)
     distance, allowed, number = f.fact("distance"), f.fact("allowed"), f.notation.number
     both = f"{what} of scheme {check.first} and {other}"

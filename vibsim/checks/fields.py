@@ -1,6 +1,6 @@
-"""What a check measures, as variables of its own: ``check_<id>_<field>`` of ``convergence.nc``.
+"""The measured fields of checks, stored as the variables ``check_<id>_<field>`` of ``convergence.nc``.
 
-Each kind of check says which fields it has, with their type, their unit and their meaning.
+Each kind of check defines its fields with their types, units and meanings.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from vibsim.core.record import Record, Variable, attributes, flags
 from vibsim.core.vocabulary import MEMBER, REASON_NAMES, STATUSES
 
 GROUP = "checks"
-"""Group of ``convergence.nc`` that holds what the checks measured."""
+"""Group of ``convergence.nc`` that holds the fields."""
 
 
 @dataclass(frozen=True)
@@ -26,14 +26,14 @@ class Field:
     meaning: str
     type: type[np.generic] = np.float64
     words: tuple[str, ...] = ()
-    """Of a position in a list of words, the list."""
+    """The list of words that the number is an index into, if any."""
     none: int | None = None
-    """The number that stands for none."""
+    """The number that represents None."""
     dims: tuple[str, ...] = MEMBER
     of_figure: bool = False
-    """Whether only its figure needs it: it is left out where no series are stored."""
+    """Whether only the figure needs it; it is omitted if no series are stored."""
     unit_of: str = ""
-    """Whether it has the unit of the ``number`` or of the ``quantity`` of its check; empty where it has none."""
+    """Whether it has the unit of the ``number`` or of the ``quantity`` of its check; empty for no unit."""
 
 
 STATUS = Field("status", np.int8, STATUSES)
@@ -50,27 +50,27 @@ def name_of(check: str, field: str) -> str:
 def variables(
     check: str,
     fields: Mapping[str, Field],
-    found: Mapping[str, Any],
+    values: Mapping[str, Any],
     units: Mapping[str, str],
     lean: bool,
 ) -> dict[str, Variable]:
-    """Return what a check measured as variables: the values `found` of its fields.
+    """Return the values of the fields of a check as variables.
 
     Parameters
     ----------
     units
-        Of the number and the quantity of the check (`Field.unit_of`).
+        Units of the number and the quantity of the check (`Field.unit_of`).
     lean
-        Whether no series are stored. Then what only the figure of the check needs is left out.
+        Whether no series are stored; then fields that only a figure needs are omitted.
     """
     table = {}
     for name, field in fields.items():
         if not (lean and field.of_figure):
-            more = flags(field.words) if field.words else {}
+            attributes_of_words = flags(field.words) if field.words else {}
             unit = units.get(field.unit_of) or "1"
-            attrs = attributes(f"check {check}: {field.meaning}", unit, **more)
-            values = np.asarray(found[name], dtype=field.type)
-            table[name_of(check, name)] = Variable(field.dims, values, attrs, GROUP)
+            attrs = attributes(f"check {check}: {field.meaning}", unit, **attributes_of_words)
+            array = np.asarray(values[name], dtype=field.type)
+            table[name_of(check, name)] = Variable(field.dims, array, attrs, GROUP)
     return table
 
 
@@ -82,11 +82,11 @@ def field_values(record: Record, check: str, field: str) -> NDArray[Any]:
 Measured = Mapping[str, Any]
 """Values of the fields of a check, by their names."""
 Facts = Mapping[str, tuple[Field, NDArray[Any]]]
-"""Name of a fact to what it is, and its values: of every scheme and member, or one for all."""
+"""Field and values of each fact by its name; the values are one for each scheme and member, or one for all."""
 
 
 def result_fields(fields: Mapping[str, Field]) -> dict[str, Field]:
-    """Return the fields that a result states: not what its figure alone needs, nor what every result has."""
+    """Return the fields that a result states: not those of figures, and not status and reason."""
     return {
         name: field
         for name, field in fields.items()
@@ -95,7 +95,7 @@ def result_fields(fields: Mapping[str, Field]) -> dict[str, Field]:
 
 
 def facts_of(table: Facts, scheme: int, case: int) -> dict[str, Any]:
-    """Return the facts of one scheme and member as plain data; None where there is none, or it is not finite."""
+    """Return the facts of one scheme and member as plain data; None if missing or not finite."""
     return {
         name: _plain(field, values[scheme, case] if field.dims[:2] == MEMBER else values)
         for name, (field, values) in table.items()
@@ -104,8 +104,8 @@ def facts_of(table: Facts, scheme: int, case: int) -> dict[str, Any]:
 
 def _plain(field: Field, value: NDArray[Any]) -> Any:
     if np.ndim(value):
-        several = [_plain(field, one) for one in value]
-        return None if None in several else several
+        entries = [_plain(field, entry) for entry in value]
+        return None if None in entries else entries
     if field.words:
         return field.words[int(value)]
     if np.issubdtype(field.type, np.integer):

@@ -1,4 +1,4 @@
-"""What is done with every kind of check: what it measures, how that is judged, and how it is put into words."""
+"""The kinds of checks: how each one measures, judges, and describes its results."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ class Kind(NamedTuple):
     """A kind of check that measures something."""
 
     fields: Mapping[str, Field]
-    """What is stored of it."""
+    """The stored variables."""
     measure: Callable[..., Measured]
     """Takes a block of members, the compared quantities and the check; returns the values of the fields."""
     judge: Callable[..., Judged]
     """Takes the experiment, the convergence Record, the check and the values of its fields."""
     describe: Callable[..., Description]
-    """Takes a `Found` and the check."""
+    """Takes `MemberFacts` and the check."""
 
 
 KINDS: Mapping[str, Kind] = {
@@ -41,41 +41,41 @@ KINDS: Mapping[str, Kind] = {
 
 
 def check_variables(block: MemberBlock, compared: Compared) -> dict[str, Variable]:
-    """Return what every check of an experiment measured, and what its figure needs beside that."""
+    """Return the measured fields of all checks of an experiment, including those that only figures need."""
     table: dict[str, Variable] = {}
     for check in block.experiment.checks:
         kind = KINDS[check.measured.kind]
-        found = kind.measure(block, compared, check.measured)
+        values = kind.measure(block, compared, check.measured)
         units = _units(block, compared, check.measured)
-        table |= variables(check.id, kind.fields, found, units, block.lean)
+        table |= variables(check.id, kind.fields, values, units, block.lean)
     return table
 
 
 def _units(block: MemberBlock, compared: Compared, check: Measurement) -> dict[str, str]:
-    """Return the units of the quantity and of the number that a check is about."""
+    """Return the unit of the quantity or of the number of a check."""
     known = {name: "" if q.units == "1" else q.units for name, q in compared.items()}
     if check.kind == "value":
         position = block.model.position
-        # UDUNITS has no roots: as elsewhere an L2 norm has the unit of its quantity
+        # UDUNITS has no roots, so an L2 norm is stored with the unit of its quantity
         unit = value.unit_of_number(check, known, position, "s").removesuffix(" sqrt(s)")
         return {"number": unit}
     return {"quantity": known.get(getattr(check, "quantity", ""), "")}
 
 
 def judge(experiment: Experiment, record: Record, check: Measurement, id_: str) -> Outcome:
-    """Compare what a check measured with what it expects."""
+    """Compare the measured fields of a check with its expectation."""
     kind = KINDS[check.kind]
-    found = {
+    measured = {
         name: field_values(record, id_, name)
         for name, field in kind.fields.items()
         if not field.of_figure
     }
-    facts = {name: (field, found[name]) for name, field in result_fields(kind.fields).items()}
-    judged = kind.judge(experiment, record, check, found)
+    facts = {name: (field, measured[name]) for name, field in result_fields(kind.fields).items()}
+    judged = kind.judge(experiment, record, check, measured)
     return outcome_of(experiment, record, check, judged, facts)
 
 
 def definition(experiment: Experiment) -> str:
-    """Return what the checks measure, as text: a verdict belongs to the checks that were measured."""
+    """Return the definition of all checks as text, to detect verdicts that belong to other checks."""
     rows = [check.measured.model_dump(mode="json") for check in experiment.checks]
     return json.dumps(rows, sort_keys=True)

@@ -1,15 +1,15 @@
-"""How sentences write names and numbers; quick commands use it, so that it imports nothing but Python."""
+"""How sentences write names and numbers; used by quick commands, so it imports only the standard library."""
 
 from __future__ import annotations
 
 NEAR_ONE, ROUND_OFF = 1e-2, 1e-13
-"""A factor that is nearer to 1 is written as 1 and the rest; nearer still, the rest is rounding."""
+"""A factor within the first distance of 1 is written as 1 plus the rest; below the second one the rest is rounding."""
 
 
 class Notation:
-    """The notation of terminals and files: names as an experiment file has them, numbers as Python writes them.
+    """The notation of terminals and files: names as in experiment files, numbers as in Python.
 
-    A page has another one (`vibsim.report.words.PAGE`).
+    Pages have another notation (`vibsim.report.words.PAGE`).
     """
 
     def quantity(self, name: str) -> str:
@@ -17,7 +17,7 @@ class Notation:
         return name
 
     def value(self, name: str) -> str:
-        """Write the name of a number that a check can ask for."""
+        """Write the name of a number of a ``value`` check."""
         return name
 
     def opening(self, text: str) -> str:
@@ -25,11 +25,11 @@ class Notation:
         return text
 
     def digits(self, text: str) -> str:
-        """Write a number that is given in digits."""
+        """Write the digits of a number."""
         return text
 
     def number(self, value: float, digits: int = 6) -> str:
-        """Write a number with up to so many significant digits."""
+        """Write a number with up to `digits` significant digits."""
         return self.digits(f"{value:.{digits}g}")
 
     def factor(self, value: float) -> str:
@@ -46,7 +46,7 @@ PLAIN = Notation()
 
 
 def beside(notation: Notation, value: float, limit: float) -> str:
-    """Write a number with two digits, or with as many as show on which side of a limit it is."""
+    """Write a number with two digits, or with as many as show on which side of the limit it lies."""
     for digits in range(2, 16):
         rounded = float(f"{value:.{digits}g}")
         if (rounded > limit, rounded < limit) == (value > limit, value < limit):

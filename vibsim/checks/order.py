@@ -1,14 +1,14 @@
-r"""The check ``converges``: what it measures of the order of convergence, and whether that is as expected.
+r"""The check ``converges``: measures the order of convergence and compares it with the expected one.
 
-What would settle a verdict that is open: how many finer levels, or which levels and which arithmetic.
+It also estimates what would settle an open verdict: how many finer levels, or which levels and which arithmetic.
 
-**Too coarse.** With ``d_k = a h^p + b h^q`` the local orders approach the order p of the scheme, or the expected one
-where they are nearer to that, like ``p_k - p = C r^k``, ``r = 2^-(q-p)`` per level. So the last order and the factor r,
-as it was seen or as the powers of the scheme give it, say at which level the order is within the tolerance; one more
-confirms it. An order far above p is that of levels which have nothing to do with the solution, and tells nothing.
+**Too coarse.** With ``d_k = a h^p + b h^q`` the local orders approach the order p of the scheme (or the expected one,
+if that is nearer) like ``p_k - p = C r^k`` with ``r = 2^-(q-p)`` per level. So the last order and the factor r, as
+observed or as the powers of the scheme give it, predict the level at which the order is within the tolerance; one more
+level confirms it. An order far above p belongs to levels that are unrelated to the solution, and predicts nothing.
 
-**Round-off.** Differences fall like h^p from the finest clean one on, the predicted round-off of an arithmetic grows
-with the number of steps. An order can be read from three levels as long as the finer of their two differences is
+**Round-off.** From the finest clean difference on, differences fall like h^p, while the predicted round-off of an
+arithmetic grows with the number of steps. Three levels show an order as long as the finer of their two differences is
 `ORDER_ABOVE_ROUND_OFF` times the round-off of its levels.
 """
 
@@ -19,7 +19,7 @@ from collections.abc import Callable
 import numpy as np
 
 from vibsim.apriori.formal_orders import even_powers, orders_in, relative_floors
-from vibsim.checks.accurate import ERROR, MOST, known_error
+from vibsim.checks.accurate import ERROR, MOST_MORE_LEVELS, known_error
 from vibsim.checks.fields import REASON, STATUS, Field, Measured
 from vibsim.checks.outcome import Judged, as_expected
 from vibsim.comparison.order_evidence import (
@@ -78,26 +78,26 @@ FIELDS = {
     "parting_rate": Field("rate at which they part"),
     **ERROR,
 }
-BESIDE = {
+OTHER_FACTS = {
     "expected": Field("order that is expected; none where the quantity is to be exact"),
     "best": Field("the number extrapolated over the levels; none of a series"),
     "best_bound": Field("bound of its error"),
 }
-"""Facts that are not measured by the check."""
+"""Facts of a result that are not measured."""
 
 UNKNOWN = -1
-SLOWEST = 0.9
-"""Orders that approach by a larger factor do not tell where they go."""
-FINEST = 40
-"""No finer level is looked at."""
+SLOWEST_APPROACH = 0.9
+"""Orders that approach their limit by a larger factor per level predict nothing."""
+FINEST_LEVEL = 40
+"""Finest level considered."""
 
 
 def measure(block: MemberBlock, compared: Compared, check: ConvergesCheck) -> Measured:
-    """Return what a check measures, with what would settle a verdict that is open, or explain it."""
+    """Return what a check measures, and what would settle or explain the verdict."""
     quantity, norm = compared[check.converges], check.norm
     judged, order = judge_check(quantity, check), order_of(quantity, check.order)
     is_state = check.converges in (state.name for state in block.model.states)
-    parts = parting(quantity, is_state & (judged.reason == code("pre_asymptotic")))
+    agreement = parting(quantity, is_state & (judged.reason == code("pre_asymptotic")))
     return {
         "status": judged.status,
         "reason": judged.reason,
@@ -106,31 +106,31 @@ def measure(block: MemberBlock, compared: Compared, check: ConvergesCheck) -> Me
         "order_high": judged.high,
         "levels": np.stack([judged.first, judged.last], axis=-1),
         "failed_level": judged.culprit,
-        "levels_needed": _more_levels(quantity, judged, order, check.tolerance),
+        "levels_needed": _levels_needed(quantity, judged, order, check.tolerance),
         "readable_level": _finest_readable(quantity, judged, norm, order),
         "readable_level_compensated": _finest_readable(
             quantity, judged, norm, order, "compensated"
         ),
         "cause": causes(quantity, compared, judged, norm, order, check.tolerance),
-        "parting_time": parts[..., 0],
-        "parting_rate": parts[..., 1],
+        "parting_time": agreement[..., 0],
+        "parting_rate": agreement[..., 1],
         **known_error(quantity),
     }
 
 
-def judge(experiment: Experiment, record: Record, check: ConvergesCheck, found: Measured) -> Judged:
-    """Compare the verdict on a quantity, of every scheme and member, with the expected one."""
-    reason, order = found["reason"], expected_order(experiment, record, check)
-    none = np.full((1, 1), np.nan)
-    beside: dict[str, Floats] = {"expected": order, "best": none, "best_bound": none}
+def judge(experiment: Experiment, record: Record, check: ConvergesCheck, facts: Measured) -> Judged:
+    """Compare the verdict on a quantity with the expected verdict, for each scheme and member."""
+    reason, order = facts["reason"], expected_order(experiment, record, check)
+    unknown = np.full((1, 1), np.nan)
+    others: dict[str, Floats] = {"expected": order, "best": unknown, "best_bound": unknown}
     return Judged(
         reason,
-        # what is exact has no order that could be hard to reach
-        away=np.where(reason == code("exact"), 0.0, np.abs(found["order"] - order)),
+        # an exact quantity has no distance from an order
+        away=np.where(reason == code("exact"), 0.0, np.abs(facts["order"] - order)),
         compared=as_expected(check.expect, reason),
         facts={
-            name: (BESIDE[name], np.broadcast_to(values, reason.shape))
-            for name, values in beside.items()
+            name: (OTHER_FACTS[name], np.broadcast_to(values, reason.shape))
+            for name, values in others.items()
         },
     )
 
@@ -162,88 +162,88 @@ def is_of_parts(name: str) -> bool:
     return name.endswith((*numbers, f"{PHASE}_at_start"))
 
 
-def _more_levels(q: Comparison, judged: Judgement, order: Floats, tolerance: float) -> Codes:
+def _levels_needed(q: Comparison, judged: Judgement, order: Floats, tolerance: float) -> Codes:
     """Return how many finer levels a ladder that is too coarse probably needs, shape (scheme, case).
 
-    At least 1; `UNKNOWN` where nothing is known, or the verdict is another one.
+    It is at least 1, or `UNKNOWN`, also for all verdicts other than ``pre_asymptotic``.
     """
     shape, orders = judged.reason.shape, judged.orders
     needed = np.full(shape, UNKNOWN, dtype=np.int8)
-    early = judged.reason == code("pre_asymptotic")
-    if not np.any(early) or not orders.shape[-1]:
+    is_coarse = judged.reason == code("pre_asymptotic")
+    if not np.any(is_coarse) or not orders.shape[-1]:
         return needed
-    last, has = orders[..., -1], np.broadcast_to(q.order, shape)
+    last, own = orders[..., -1], np.broadcast_to(q.order, shape)
     with np.errstate(all="ignore"):
-        aim = np.where(np.abs(last - has) < np.abs(last - order), has, order)
-        away = np.abs(orders - aim[..., None])
+        target = np.where(np.abs(last - own) < np.abs(last - order), own, order)
+        distance = np.abs(orders - target[..., None])
         promised = np.where(even_powers(q.block.experiment, q.name, q.block.columns), 0.25, 0.5)
-        observed = away[..., -1] / away[..., -2] if orders.shape[-1] > 1 else promised
-        # what was seen once may be an accident; no power falls faster than the next one
+        observed = distance[..., -1] / distance[..., -2] if orders.shape[-1] > 1 else promised
+        # a single observation may be accidental; orders approach no faster than by the next power
         factor = np.maximum(observed, promised)
-        steps = np.ceil(on_arrays.log(tolerance / away[..., -1]) / on_arrays.log(factor)) + 1
-        # an error that falls faster than the powers do is none of them
-        known = early & np.isfinite(steps) & (last <= aim + SUPERCONVERGENCE)
-        # how small the promised power still is, behind a higher one, is not in the orders
-        known &= ~((last > q.order + HALF_SPACING) & (q.special > q.order + HALF_SPACING))
-    known &= (factor <= SLOWEST) & (steps <= MOST)
-    needed[known] = np.maximum(steps[known], 1).astype(np.int8)
+        steps = np.ceil(on_arrays.log(tolerance / distance[..., -1]) / on_arrays.log(factor)) + 1
+        # an error that falls faster than all powers follows none of them
+        is_known = is_coarse & np.isfinite(steps) & (last <= target + SUPERCONVERGENCE)
+        # orders do not show how small a promised power is that a higher one hides
+        is_known &= ~((last > q.order + HALF_SPACING) & (q.special > q.order + HALF_SPACING))
+    is_known &= (factor <= SLOWEST_APPROACH) & (steps <= MOST_MORE_LEVELS)
+    needed[is_known] = np.maximum(steps[is_known], 1).astype(np.int8)
     return needed
 
 
 def _finest_readable(
     q: Comparison, judged: Judgement, norm: str, order: Floats, arithmetic: str | None = None
 ) -> Codes:
-    """Return the finest level at which an order can still be read, in the arithmetic of the schemes or another one.
+    """Return the finest level that shows an order, in the arithmetic of the schemes or another one, (scheme, case).
 
-    `UNKNOWN` where the verdict is not ``round_off``, or no three levels show an order; shape (scheme, case).
+    It is `UNKNOWN` if the verdict is not ``round_off``, or no three levels show an order.
     """
-    found = np.full(judged.reason.shape, UNKNOWN, dtype=np.int8)
+    result = np.full(judged.reason.shape, UNKNOWN, dtype=np.int8)
     with np.errstate(invalid="ignore"):
         p = np.where(judged.order >= LOWEST_ORDER, judged.order, order)
-    lost = (judged.reason == code("round_off")) & np.isfinite(p)
-    if not np.any(lost):
-        return found
-    size, at = _clean_difference(q, norm, p)
+    is_round_off = (judged.reason == code("round_off")) & np.isfinite(p)
+    if not np.any(is_round_off):
+        return result
+    size, level_of_difference = _clean_difference(q, norm, p)
     noise = _noise(q, norm, arithmetic)
     with np.errstate(all="ignore"):
-        for level in range(FINEST - 1):
-            left = size * on_arrays.power(2.0, p * (at - level - 1))
+        for level in range(FINEST_LEVEL - 1):
+            remaining = size * on_arrays.power(2.0, p * (level_of_difference - level - 1))
             floor = noise(level + 1) + noise(level + 2)
-            clean = (size > 0.0) & (left >= ORDER_ABOVE_ROUND_OFF * floor)
-            found[lost & clean] = level + 2
-    return found
+            clean = (size > 0.0) & (remaining >= ORDER_ABOVE_ROUND_OFF * floor)
+            result[is_round_off & clean] = level + 2
+    return result
 
 
 def _clean_difference(q: Comparison, norm: str, p: Floats) -> tuple[Floats, Floats]:
-    """Return the finest difference above round-off, as that of neighbouring levels, and its coarser level.
+    """Return the finest difference above round-off, converted to successive levels, and its coarser level.
 
-    Where none is above it, the coarsest difference is taken, which is noise: what can be read is then too much.
+    If none is above round-off, the coarsest difference is used, which is noise; the result is then too optimistic.
     """
     levels = np.array(q.block.grid.levels)
     e = evidence(q, norm, q.order, ORDINARY_ORDER)
     clean = e.difference >= ORDER_ABOVE_ROUND_OFF * (e.floor[..., :-1] + e.floor[..., 1:])
-    place = np.max(np.where(clean, np.arange(len(levels) - 1), 0), axis=-1)
-    size = pick(e.difference, place)
-    gap = np.diff(levels)[place]
-    whole = np.where(
+    index = np.max(np.where(clean, np.arange(len(levels) - 1), 0), axis=-1)
+    size = pick(e.difference, index)
+    gap = np.diff(levels)[index]
+    per_level = np.where(
         gap > 1,
         on_arrays.expm1(-p * on_arrays.LN_2) / on_arrays.expm1(-p * gap * on_arrays.LN_2),
         1.0,
     )
-    return size * whole, levels.astype(np.float64)[place]
+    return size * per_level, levels.astype(np.float64)[index]
 
 
 def _noise(q: Comparison, norm: str, arithmetic: str | None) -> Callable[[int], Floats]:
-    """Return what gives the predicted round-off of a level in a norm, shape (scheme, case)."""
+    """Return a function that predicts the round-off of a level in a norm, shape (scheme, case)."""
     block, floor = q.block, evidence(q, norm, q.order, ORDINARY_ORDER).floor[..., -1]
     if block.stored_floor[-1] > 0.0:
-        # what storing leaves is the same at every level, in any arithmetic
+        # the rounding of stored values is the same at all levels, in any arithmetic
         return lambda level: floor
     base = floor / block.relative_floor[..., -1]
 
-    def at(level: int) -> Floats:
+    def round_off(level: int) -> Floats:
         steps = (block.experiment.steps(level),)
         floors = relative_floors(block.experiment, steps, block.columns, arithmetic)
         return np.asarray(base * floors[..., 0])
 
-    return at
+    return round_off

@@ -1,4 +1,4 @@
-"""What is known of the member that decided a convergence verdict, for the sentence and the advice on it."""
+"""The facts about the member that decided a convergence verdict, for its sentence and advice."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ from vibsim.apriori.formal_orders import (
 from vibsim.apriori.table_corners import is_on_a_point
 from vibsim.checks.accurate import error_in_words
 from vibsim.checks.phase_amplitude_text import parts_in_words
-from vibsim.checks.sentences import Found, cost_in_words, growth_in_words
-from vibsim.checks.stable import ALIKE, first_within
+from vibsim.checks.sentences import MemberFacts, cost_in_words, growth_in_words
+from vibsim.checks.stable import SAME_TIME, first_within
 from vibsim.comparison.comparison_variables import has_exact
 from vibsim.core.record import Record
 from vibsim.core.vocabulary import is_error_part, whole_of
@@ -31,65 +31,65 @@ from vibsim.observe.member_block import fastest
 from vibsim.schemes.base import LOW_STARTS, Scheme
 
 COINCIDE = 0.1
-"""Rescaled differences that are further apart, over the finer one, do not coincide."""
+"""Largest relative distance of rescaled differences that coincide."""
 
 
 class Corner(NamedTuple):
-    """The first corner of the force that steps feel."""
+    """The first corner of the force that affects steps."""
 
     words: str
-    """What happens there."""
+    """Its description."""
     time: float
     power: float
     """The highest power of dt that it leaves regular."""
     on_a_point: bool = False
-    """Whether it is a jump at a grid point, not within a step."""
+    """Whether it is a jump at a grid point instead of within a step."""
 
 
 class OrderContext:
-    """What a sentence on a convergence verdict needs to know; numbers are NaN, levels -1 where they are not known."""
+    """The facts for sentences on a convergence verdict; unknown numbers are NaN, unknown levels -1."""
 
-    def __init__(self, f: Found, check: ConvergesCheck) -> None:
+    def __init__(self, f: MemberFacts, check: ConvergesCheck) -> None:
         experiment, record, scheme, case = f.experiment, f.record, f.scheme, f.case
         quantity = check.converges
-        self._found, self._columns = f, columns_of(record)
+        self._facts, self._columns = f, columns_of(record)
         self.quantity, self.norm, self.tolerance = quantity, check.norm, check.tolerance
         self.is_position = quantity in f.model.positions
         self.notation, self.reason = f.notation, f.reason
         self.cause = f.word("cause")
-        """Why the order is another one, one of `vibsim.comparison.order_evidence.CAUSES`."""
+        """Why the order differs from the expected one: one of `vibsim.comparison.order_evidence.CAUSES`."""
         order = float(f.fact("order"))
         self.order = order if math.isfinite(order) else math.nan
         self.low, self.high = float(f.fact("order_low")), float(f.fact("order_high"))
         self.first, self.last = f.fact("levels")
         self.levels = tuple(int(level) for level in record["level"])
         self.orders = _orders(record, check, scheme, case)
-        """Of successive levels in the norm of the check, the coarsest first."""
+        """Local orders in the norm of the check, the coarsest levels first."""
         self.more: int = f.fact("levels_needed")
-        """Finer levels that are probably needed."""
+        """Number of finer levels that are probably needed."""
         self.readable: int = f.fact("readable_level")
-        """Finest level at which an order can be read, ..."""
+        """Finest level at which an order can be read."""
         self.compensated: int = f.fact("readable_level_compensated")
-        """... and the same in compensated arithmetic."""
+        """The same in compensated arithmetic."""
         self.has_exact = has_exact(record, quantity, scheme, case)
         self.cost = partial(cost_in_words, experiment)
         self.error = error_in_words(f, quantity, check.norm)
-        """How large the error of the finest level is; empty where it is not known."""
+        """A sentence on the error of the finest level; empty if it is unknown."""
 
         self.scheme, self.kind = f.scheme_name, experiment.schemes[scheme].kind
         self.options = options_of(experiment, self._columns, scheme, case)
         self.promised = f.of_member(orders_in(experiment, record, quantity))
-        """The order that the scheme promises, ..."""
+        """The order that the scheme promises."""
         self.special = f.of_member(special_orders(experiment, quantity, self._columns))
-        """... and has at most, in a special case of motion, model or options."""
+        """Its highest order in a special case of motion, model or options."""
         self.expected = self.promised if check.order == "scheme" else float(check.order)
-        """The order that was expected; infinite where the quantity was to be exact."""
+        """The expected order; infinite for exactness."""
         self.parts = parts_in_words(f, quantity, self.expected)
         self.has_promise = not is_error_part(quantity) or is_promised(experiment, quantity)
-        """Whether that is a promise for the quantity; of a part of an error it may be the one for its position."""
+        """Whether `promised` is for the quantity itself; for a part of an error it may be for its position."""
 
         self.culprit: int = f.fact("failed_level")
-        """Level that failed or is beyond the stability limit."""
+        """Level that failed or exceeds the stability limit."""
         self.failures = _failures(record, scheme, case)
 
         self.table_corner = self._stored("table_corner_time", case)
@@ -98,7 +98,7 @@ class OrderContext:
         self.pulse = self._stored("pulse_time", case), self._stored("pulse_width", case)
         """Time and length of a pulse of the force that no level sees."""
         self.decay = self._stored("decay_rate", scheme, case)
-        """The largest rate at which damping takes a velocity away."""
+        """The largest decay rate of a velocity by damping."""
         self.shortest = record.step(-1, case)
         self.parts_at = float(f.fact("parting_time"))
         self.parting_rate = float(f.fact("parting_rate"))
@@ -106,63 +106,63 @@ class OrderContext:
         self.end = self.shortest * experiment.steps(self.levels[-1])
 
     def _stored(self, name: str, *place: int) -> float:
-        record = self._found.record
+        record = self._facts.record
         return float(record[name][place]) if name in record else math.nan
 
     @cached_property
     def rescaled_distance(self) -> float:
-        """How far the finest two rescaled differences of the levels that decide are apart, over the finer one."""
+        """Relative distance of the finest two rescaled differences of the levels that decide."""
         for i, finest in enumerate(self.levels[2:]):
             if finest == self.last:
-                place = self._found.scheme, self._found.case, i
+                place = self._facts.scheme, self._facts.case, i
                 return self._stored(f"{self.quantity}_coincidence", *place)
         return math.nan
 
     @cached_property
     def centred(self) -> float:
-        """The order that the scheme would promise with `start: centred`; NaN where it has no other start."""
+        """The order that the scheme would promise with `start: centred`; NaN if its start is not of lower order."""
         if self.options.get("start") not in LOW_STARTS:
             return math.nan
         options = {**self.options, "start": "centred"}
-        model = self._found.model
+        model = self._facts.model
         return float(self._method.formal_order(whole_of(self.quantity), model, options))
 
     @property
     def _method(self) -> Scheme:
-        return self._found.experiment.schemes[self._found.scheme].method
+        return self._facts.experiment.schemes[self._facts.scheme].method
 
     @cached_property
     def omega_dt(self) -> float:
-        """The step of the culprit times the fastest frequency; NaN where no level failed."""
+        """The step of the culprit times the fastest frequency; NaN if no level failed."""
         if self.culprit < 0:
             return math.nan
-        place = self._found.case, self.levels.index(self.culprit)
-        return float(fastest(self._found.record)[place])
+        place = self._facts.case, self.levels.index(self.culprit)
+        return float(fastest(self._facts.record)[place])
 
     @cached_property
     def limit(self) -> float:
-        """The largest stable w dt of the scheme, infinite for none; sought only where a level failed."""
+        """The largest stable w dt of the scheme, infinite for none; NaN if no level failed."""
         if self.culprit < 0:
             return math.nan
-        return self._found.of_member(stability_limits(self._found.experiment, self._columns))
+        return self._facts.of_member(stability_limits(self._facts.experiment, self._columns))
 
     @cached_property
     def growth_in_words(self) -> str:
-        """How the solution grows at the culprit."""
+        """A sentence on the growth of the solution at the culprit."""
         if math.isnan(self.omega_dt) or self._method.adaptive:
             return ""
         predicted = float(theory.dominant(self._method.stepper(self.options), self.omega_dt)[0])
-        place = self._found.scheme, self._found.case, self.levels.index(self.culprit)
-        return growth_in_words(self._found, predicted, self._stored("measured_growth", *place))
+        place = self._facts.scheme, self._facts.case, self.levels.index(self.culprit)
+        return growth_in_words(self._facts, predicted, self._stored("measured_growth", *place))
 
     @property
     def what(self) -> str:
-        """The quantity as a sentence has it."""
+        """The quantity inside a sentence."""
         return self.notation.quantity(self.quantity)
 
     @property
     def subject(self) -> str:
-        """The quantity as it begins a sentence."""
+        """The quantity at the beginning of a sentence."""
         return self.notation.opening(self.what)
 
     @property
@@ -172,12 +172,12 @@ class OrderContext:
 
     @property
     def start_fault(self) -> str:
-        """What is wrong with the formula of the first step; empty where nothing is."""
+        """The fault of the formula of the first step; empty if there is none."""
         return LOW_STARTS.get(str(self.options.get("start")), "")
 
     @property
     def ends_low(self) -> bool:
-        """Whether the formula for the last velocity explains the order, or may."""
+        """Whether the formula for the last velocity explains, or may explain, the order."""
         formula = self.options.get("end_velocity")
         if self.norm == "linf_interior" or self.is_position:
             return False
@@ -197,8 +197,8 @@ class OrderContext:
 
     @property
     def shows_promise(self) -> bool:
-        """Whether the order that was found may be the one that the scheme promises, and not what was expected."""
-        # what has no interval may be any order
+        """Whether the observed order may be the promised one, which differs from the expected one."""
+        # without an interval any order is possible
         excluded = (
             self.promised < self.low - self.tolerance or self.promised > self.high + self.tolerance
         )
@@ -206,15 +206,15 @@ class OrderContext:
 
     @property
     def singular(self) -> float:
-        """Time at which the two finest levels failed alike, so that finer ones will, too; NaN where they did not."""
+        """Time at which both finest levels failed, so that finer ones will, too; NaN if the times differ."""
         if len(self.failures) < 2:
             return math.nan
         before, last = self.failures[-2:]
-        return last if abs(before - last) <= ALIKE * before else math.nan
+        return last if abs(before - last) <= SAME_TIME * before else math.nan
 
     @property
     def is_beyond_limit(self) -> bool:
-        """Whether w dt is beyond the stability limit at the culprit."""
+        """Whether w dt exceeds the stability limit at the culprit."""
         return math.isfinite(self.omega_dt) and self.omega_dt > self.limit
 
     @property
@@ -226,7 +226,7 @@ class OrderContext:
 
 
 def _orders(record: Record, check: ConvergesCheck, scheme: int, case: int) -> tuple[float, ...]:
-    """Return the orders of successive levels; none where the record does not have them, or the norm."""
+    """Return the local orders; empty if the record does not have them, or the norm."""
     name, norms = f"{check.converges}_observed_order", record.words("norm")
     if name not in record or check.norm not in norms:
         return ()
@@ -234,10 +234,7 @@ def _orders(record: Record, check: ConvergesCheck, scheme: int, case: int) -> tu
 
 
 def _failures(record: Record, scheme: int, case: int) -> tuple[float, ...]:
-    """Return when each level met a number that is not finite, in its first step at 0; NaN where it did not.
-
-    Data of other programs need not say it.
-    """
+    """Return the failure time of each level, 0 for its first step and NaN for none; empty if it is not stored."""
     if "failure_time" not in record:
         return ()
     times = np.asarray(record["failure_time"], dtype=float)[scheme, case]
@@ -247,7 +244,7 @@ def _failures(record: Record, scheme: int, case: int) -> tuple[float, ...]:
     return tuple(np.where(broken, times, np.nan).tolist())
 
 
-def _corner(f: Found) -> Corner | None:
+def _corner(f: MemberFacts) -> Corner | None:
     record, place = f.record, (f.scheme, f.case)
     if "corner_switch" not in record or record["corner_switch"][place] < 0:
         return None

@@ -1,7 +1,7 @@
-"""What was measured of a convergence, and what to change in the YAML: a sentence and an advice for every diagnosis.
+"""Convergence verdicts in words: a sentence, and advice on what to change in the YAML, for each diagnosis.
 
-A diagnosis is the reason of a verdict, made finer by the cause where one is known. Templates are filled from the
-attributes and phrases of an `_Phrases`.
+A diagnosis is the reason of a verdict, refined by its cause if that is known. Templates are filled with the attributes
+and phrases of `_Phrases`.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from vibsim.checks.phase_amplitude_text import NO_PART, PART_ADVICE
 from vibsim.checks.sentences import (
     WRONG_LIMIT_ADVICE,
     Description,
-    Found,
+    MemberFacts,
     Template,
     add_levels,
 )
@@ -28,15 +28,15 @@ from vibsim.experiment.schema.fields import MAX_LEVEL
 from vibsim.schemes.base import is_on_the_mesh
 
 HIGHEST = 12.0
-"""An estimate above is the order of no scheme."""
+"""No scheme has an order above this."""
 FAR_DOWN = 1.0
-"""An interval that reaches further below its order holds a lower power of the expansion as well."""
+"""An interval that extends further below its order contains a lower power of the expansion."""
 LAST_ORDERS = 4
-"""So many of the last orders are looked at and reported."""
+"""Number of the last orders that are reported."""
 NEAR_DUE = 0.3
-"""Orders this near to the one that is due need no word on where they go."""
+"""The trend of orders this near to their goal is not reported."""
 BACKWARD_DAMPING = "central_backward_damping"
-"""The scheme whose order is lost by its treatment of damping alone."""
+"""The scheme that loses an order only by its treatment of damping."""
 
 Words = Mapping[str, tuple[str, str]]
 """Diagnosis to the templates of sentence and advice."""
@@ -280,8 +280,8 @@ DIAGNOSES: Words = {
 }
 
 
-def describe(f: Found, check: ConvergesCheck) -> Description:
-    """Say what was measured of a convergence, and what to change where it is not what the check asks for."""
+def describe(f: MemberFacts, check: ConvergesCheck) -> Description:
+    """Describe the convergence, and what to change if it is not as expected."""
     return in_words(_Phrases(f, check))
 
 
@@ -295,7 +295,7 @@ def in_words(s: _Phrases) -> Description:
 
 
 def _diagnosis(s: OrderContext) -> str:
-    """Return the first diagnosis that applies: by the options of the scheme or the force, then by the cause."""
+    """Return the first diagnosis that applies: from the options of the scheme or the force, then from the cause."""
     by_cause, corner = f"{s.reason}, {s.cause}", s.corner
     has_promise, less = s.shows_promise, s.promises_less
     finer = {
@@ -343,7 +343,7 @@ class _Phrases(OrderContext):
     """The context with phrases that depend on numbers."""
 
     def measured(self) -> str:
-        """Return the stated order with its interval and levels; empty where there is none."""
+        """Return the measured order with its interval and levels; empty if there is none."""
         if math.isnan(self.order):
             return ""
         known = math.isfinite(self.low) and math.isfinite(self.high)
@@ -363,23 +363,23 @@ class _Phrases(OrderContext):
         return f"{sentence} {hidden}".rstrip()
 
     def whose(self) -> str:
-        """Say whose the order is: the scheme's, or that of the check alone, where theory has none or another one."""
+        """Say whether the order is promised by the scheme or expected by the check alone."""
         differs = self.promises_less or self.promises_more
         return "promised" if self.has_promise and not differs else "expected"
 
     def coincidence(self) -> str:
-        """Say whether the levels agree, or why the measured order is not yet the one that dominates."""
+        """Say whether the rescaled differences coincide, or why the measured order is not yet the dominating one."""
         if moved := higher_part(self.order, self.expected, self.tolerance):
             return f" {moved}"
         if self.rescaled_distance <= COINCIDE:
             return " The rescaled differences coincide."
-        # the last point, which this norm leaves out, is part of the differences
+        # the differences include the last point, which `linf_interior` excludes
         if self.rescaled_distance > COINCIDE and self.norm != "linf_interior":
             return " The rescaled differences do not coincide yet."
         return ""
 
     def doubt(self) -> str:
-        """Say of an order that passes why its interval reaches far down; empty where it does not."""
+        """Say why the interval of an order that passes extends far down; empty if it does not."""
         if not self.order - self.low > FAR_DOWN:
             return ""
         return (
@@ -391,7 +391,7 @@ class _Phrases(OrderContext):
         return "" if self.has_exact else UNSEEN
 
     def first_good(self) -> int:
-        """Return the coarsest level that is stable, or from which on none met a number that is not finite."""
+        """Return the coarsest stable level, or the first one from which on no level failed."""
         if self.reason == "unstable":
             return self.first_stable
         times = zip(self.levels, self.failures, strict=False)
@@ -402,7 +402,7 @@ class _Phrases(OrderContext):
         return self.cost([self.first_good()])
 
     def place(self) -> str:
-        """Say where a calculation broke down, as far as it is known."""
+        """Say where the calculation broke down, as far as that is known."""
         if self.culprit < 0:
             return ""
         where, number = f" at level {self.culprit}", self.notation.number
@@ -418,7 +418,7 @@ class _Phrases(OrderContext):
         return f". The only estimate before that is {self.measured()}" if self.order > 0.0 else ""
 
     def coarser(self) -> str:
-        """Say which levels show an order, from the second letter on."""
+        """Say which levels show an order; the text starts with the second letter."""
         is_fine = self.readable >= max(self.levels[-1], 2)
         if self.readable >= 2 and not is_fine:
             first = max(self.readable - 3, 0)
@@ -433,7 +433,7 @@ class _Phrases(OrderContext):
         )
 
     def other_arithmetic(self) -> str:
-        """Say in which arithmetic and on which levels an order can be read, as far as they are predicted."""
+        """Say in which arithmetic and on which levels an order can be read, as far as that is predicted."""
         coarser = self.coarser()
         if not self.order > 0.0:
             coarser += ". If the coarser ones are round-off, too, the scheme is exact here, and another `model:` "
@@ -445,7 +445,7 @@ class _Phrases(OrderContext):
         return f"Set `arithmetic: compensated` for scheme {self.scheme}{reach}, or u{coarser}"
 
     def add(self, count: int = 2) -> str:
-        """Ask for so many finer levels, with what they cost."""
+        """Ask for `count` finer levels, with their cost."""
         return f"A{add_levels(self.levels[-1], count, self.cost)}"
 
     def add_missing(self) -> str:
@@ -466,7 +466,7 @@ class _Phrases(OrderContext):
         return math.log(10.0) / self.parting_rate
 
     def or_finer(self) -> str:
-        """Say what finer levels do for a motion that magnifies errors."""
+        """Say what finer levels do for a motion that amplifies errors."""
         order = self.expected if math.isfinite(self.expected) else self.promised
         count = levels_to_the_end(self.parts_at, self.parting_rate, self.end, order) + 1
         if self.levels[-1] + count > MAX_LEVEL:
@@ -489,7 +489,7 @@ class _Phrases(OrderContext):
         return known.get(power, "a derivative of the force jumps")
 
     def beside_corner(self) -> str:
-        """Say what was measured beside the order that a corner leaves, and what a scheme promises without it."""
+        """Add the last estimate, and the order that the scheme promises without the corner if that is too low."""
         found = f"; the last estimate is {self.measured()}" if self.order > 0.0 else ""
         if self.promises_less:
             order = self.notation.number(self.promised)
@@ -497,7 +497,7 @@ class _Phrases(OrderContext):
         return found
 
     def end_before_corner(self) -> str:
-        """Ask to stop before a corner, or for a scheme of an order that it leaves regular, where this is none."""
+        """Ask to end before the corner, or for a scheme of an order that the corner leaves regular."""
         assert self.corner is not None
         number, power = self.notation.number, self.corner.power
         most, order = max(power - 1.0, 1.0), self.promised if self.promises_less else self.expected
@@ -516,10 +516,10 @@ class _Phrases(OrderContext):
         return f". The last estimate is {self.measured()}{self._trend()}"
 
     def _trend(self) -> str:
-        """Say where orders go; empty where it is not known, or they are near the one that levels should approach."""
+        """Describe the trend of the orders; empty if it is unknown or they are near their goal."""
         known, due = [order for order in self.orders if math.isfinite(order)], self.expected
         if known and math.isfinite(self.promised):
-            # levels approach the order that the scheme has, where the last order is nearer to that
+            # the goal is the promised order if the last order is nearer to that
             due = min(self.expected, self.promised, key=lambda order: abs(known[-1] - order))
         if not known or not math.isfinite(due) or abs(known[-1] - due) <= NEAR_DUE:
             return ""
@@ -539,7 +539,7 @@ class _Phrases(OrderContext):
         return f"{start} {'fall' if is_above else 'rise'} towards {goal} ({listed}){why}"
 
     def hidden(self) -> str:
-        """Say which power may take over on finer levels, as near a special case; empty where none is known to."""
+        """Say which promised power may dominate on finer levels, as near a special case; empty if there is none."""
         if not self.promised + HALF_SPACING < min(self.order, self.special):
             return ""
         return (

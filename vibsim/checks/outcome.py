@@ -1,4 +1,4 @@
-"""What a check measured of every scheme and member, which of them decides, and each of them as a result."""
+"""The outcome of a check: the results of all schemes and members, and which one decides."""
 
 from __future__ import annotations
 
@@ -25,27 +25,27 @@ from vibsim.experiment.sweep_columns import members_with
 
 @dataclass(frozen=True)
 class Outcome:
-    """Measured and compared; arrays have the shape (scheme, case) of the whole experiment."""
+    """The measured and compared results; arrays have the shape (scheme, case) of the whole experiment."""
 
     schemes: list[str]
-    """Names of the schemes that the check is about."""
+    """Names of the schemes that the check covers."""
     scheme_index: list[int]
-    """Their positions."""
+    """Indices of these schemes."""
     cases: NDArray[Any]
-    """Global index of every member, shape (case,)."""
+    """Global index of each member, shape (case,)."""
     case_index: Integers
-    """Positions of the members that the check is about, the same for every scheme; or those that decide, shape
-    (scheme, 1), where a result is of all members together."""
+    """Indices of the members that the check covers; or, if one result covers all members, of the member that decides,
+    shape (scheme, 1)."""
     status: NDArray[Any]
-    """Measured, index into `STATUSES`."""
+    """Measured status, index into `STATUSES`."""
     reason: NDArray[Any]
-    """Measured, index into `vocabulary.REASON_NAMES`."""
+    """Measured reason, index into `vocabulary.REASON_NAMES`."""
     compared: NDArray[Any]
-    """Status after comparison with what was expected."""
+    """Status after comparison with the expectation."""
     away: Floats
-    """How far each number is from the expected one; larger is worse."""
+    """Distance of each number from the expected one; larger is worse."""
     facts: Facts
-    """What was measured of every scheme and member."""
+    """Measured facts of each scheme and member."""
 
     @property
     def total(self) -> int:
@@ -54,7 +54,7 @@ class Outcome:
 
     @property
     def is_of_all(self) -> bool:
-        """Whether a result is of all members together."""
+        """Whether one result covers all members."""
         return self.case_index.ndim > 1
 
     @property
@@ -64,34 +64,34 @@ class Outcome:
 
     @cached_property
     def chosen(self) -> NDArray[Any]:
-        """Compared status of the results that count, shape (scheme, case) of the check."""
+        """Compared status of the covered results, shape (scheme, case) of the check."""
         return self.compared[self._at]
 
     @cached_property
     def _keys(self) -> tuple[Integers, Floats]:
-        """Severity and distance of every result that counts, flat."""
+        """Severity and distance of the covered results, flat."""
         away = self.away[self._at]
         severity = np.array([SEVERITY[name] for name in STATUSES])[self.chosen]
         return severity.ravel(), np.where(np.isnan(away), np.inf, away).ravel()
 
     @cached_property
     def ranking(self) -> Integers:
-        """Numbers of all results, worst first; equals in their order."""
+        """Indices of all results, worst first; ties in their original order."""
         severity, away = self._keys
         return np.lexsort((-away, -severity))
 
     def worst(self, most: int) -> Integers:
-        """Return the beginning of `ranking`, without sorting all of it."""
+        """Return the first `most` entries of `ranking`, without sorting all results."""
         severity, away = self._keys
-        found: list[Integers] = []
+        parts: list[Integers] = []
         for value in sorted(set(SEVERITY.values()), reverse=True):
-            left = most - sum(map(len, found))
-            rows = np.flatnonzero(severity == value) if left > 0 else np.empty(0, dtype=np.int64)
-            if len(rows) > left:
-                least = np.partition(away[rows], len(rows) - left)[len(rows) - left]
-                rows = rows[away[rows] >= least]
-            found.append(rows[np.argsort(-away[rows], kind="stable")][: max(left, 0)])
-        return np.concatenate(found)
+            missing = most - sum(map(len, parts))
+            rows = np.flatnonzero(severity == value) if missing > 0 else np.empty(0, dtype=np.int64)
+            if len(rows) > missing:
+                threshold = np.partition(away[rows], len(rows) - missing)[len(rows) - missing]
+                rows = rows[away[rows] >= threshold]
+            parts.append(rows[np.argsort(-away[rows], kind="stable")][: max(missing, 0)])
+        return np.concatenate(parts)
 
     def counts(self) -> dict[str, int]:
         """Return the number of results by compared status."""
@@ -99,25 +99,25 @@ class Outcome:
 
 
 class Judged(NamedTuple):
-    """What is decided of every scheme and member, as `Outcome` has it."""
+    """The decision of a kind of check; the fields are those of `Outcome`."""
 
     reason: NDArray[Any]
     away: Floats
     compared: NDArray[Any] | None = None
-    """A check that expects a PASS need not give it."""
+    """None for a check that expects a PASS."""
     facts: Facts = MappingProxyType({})
-    """Facts beside the fields that were measured."""
+    """Facts besides the measured fields."""
     members: Integers | None = None
-    """Of a number of all members, the position of the one that decides, shape (scheme, 1)."""
+    """If one number covers all members, the index of the member that decides, shape (scheme, 1)."""
 
 
 def outcome_of(
     experiment: Experiment, record: Record, check: Measurement | None, judged: Judged, facts: Facts
 ) -> Outcome:
-    """Return the outcome of a check, of the schemes and members that it is about; None stands for the tolerance."""
+    """Return the outcome of a check for the schemes and members that it covers; None is the tolerance."""
     names, cases = record.words("scheme"), np.asarray(record["case"])
     if check is None:
-        # what chooses its own steps is no part of the ladder
+        # adaptive schemes have no levels
         schemes = list(experiment.ladder)
     elif check.kind == "equal":
         schemes = [names.index(check.first)]
@@ -140,30 +140,30 @@ def outcome_of(
 
 
 def about_members(record: Record, check: Measurement | None) -> Flags:
-    """Say which members a check is about, shape (case,); None stands for the tolerance, which is about all."""
+    """Say which members a check covers, shape (case,); None is the tolerance, which covers all."""
     cases = np.asarray(record["case"])
     if check is None:
         return np.ones(len(cases), dtype=np.bool_)
-    found = members_with(columns_of(record), check.swept, len(cases))
-    return found if check.member is None else found & (cases == check.member)
+    is_swept = members_with(columns_of(record), check.swept, len(cases))
+    return is_swept if check.member is None else is_swept & (cases == check.member)
 
 
 @dataclass(frozen=True)
 class Result:
-    """What was measured of one scheme and one member."""
+    """The result of one scheme and one member."""
 
     scheme: str
     case: int
     """Global index of the member."""
     status: str
-    """The measured one, whatever was expected."""
+    """Measured status, whatever was expected."""
     reason: str
     facts: Mapping[str, Any] = field(hash=False)
-    """What was measured, by name, as plain data; None where there is none."""
+    """Measured facts by name, as plain data; None for a missing one."""
 
     @property
     def value(self) -> float | None:
-        """The number that decides; None where an order does, or where it is not finite."""
+        """The number that decides; None if an order decides or it is not finite."""
         return decisive_number(self.facts)
 
     @property
@@ -180,12 +180,12 @@ class Result:
     @property
     def levels(self) -> tuple[int, int] | None:
         """First and last level that the order rests on."""
-        found = None if self.order is None else self.facts.get("levels")
-        return found and (found[0], found[1])
+        levels = None if self.order is None else self.facts.get("levels")
+        return levels and (levels[0], levels[1])
 
 
 class Results(Sequence[Result]):
-    """Every result of a check, the worst first; made when they are looked at, for there may be millions."""
+    """All results of a check, the worst first; created on access, since there may be millions."""
 
     def __init__(self, outcome: Outcome) -> None:
         self._outcome = outcome
@@ -213,14 +213,14 @@ class Results(Sequence[Result]):
         return hash(tuple(self))
 
     def __reduce__(self) -> tuple[type[Results], tuple[Outcome]]:
-        """Copy and pickle what was measured, without the ranking."""
+        """Copy and pickle the outcome without its cached ranking."""
         return Results, (replace(self._outcome),)
 
     def __repr__(self) -> str:
         return f"<{len(self)} results>"
 
     def worst(self, most: int | None) -> Iterator[Result]:
-        """Yield the worst results, all of them where `most` is None, without sorting more."""
+        """Yield the `most` worst results, or all of them if it is None, without sorting more."""
         outcome = self._outcome
         yield from map(self._one, outcome.ranking if most is None else outcome.worst(most))
 
@@ -239,7 +239,7 @@ class Results(Sequence[Result]):
 
 
 def as_expected(expect: Expect, reason: Codes) -> Codes:
-    """Return the statuses of results with these reasons, compared with the expected verdict."""
+    """Return the statuses of results with these reasons after comparison with the expected verdict."""
     right = STATUS_OF[reason] == STATUSES.index(expect.status)
     if expect.reason is not None:
         right &= reason == code(expect.reason)
@@ -247,14 +247,14 @@ def as_expected(expect: Expect, reason: Codes) -> Codes:
 
 
 def compared_reason(check: MeasuringCheck | None, status: str, measured: str, reason: str) -> str:
-    """Return the measured reason where a PASS was expected, else whether the outcome is the expected one.
+    """Return the measured reason if a PASS was expected, otherwise ``match`` or ``mismatch``.
 
     Parameters
     ----------
     check
         None for the tolerance of the experiment.
     status, measured
-        Status compared with what was expected, and the measured one.
+        Status after comparison with the expectation, and measured status.
     """
     expects_pass = check is None or check.expects_pass
     if status == "PASS" and not expects_pass:
@@ -265,7 +265,7 @@ def compared_reason(check: MeasuringCheck | None, status: str, measured: str, re
 
 
 def truth(claim: ClaimCheck, status: str, reason: str) -> bool | None:
-    """Return whether a statement is true by status and reason of what measures it; None where it is not decided."""
-    # a number that broke down shows neither a statement nor its opposite
+    """Return whether a statement is true, from the status and reason of its measurement; None if undecided."""
+    # a number that broke down decides nothing
     is_unmeasured = claim.that.kind != "converges" and reason == "non_finite"
     return None if status == "INCONCLUSIVE" or is_unmeasured else status == "PASS"

@@ -1,24 +1,24 @@
-"""What the parts of a position's error say of a verdict on the position: which has less than the expected order."""
+"""Which part of the error of a position, phase or amplitude, has less than the expected order, in words."""
 
 from __future__ import annotations
 
 import math
 
-from vibsim.checks.sentences import Found
+from vibsim.checks.sentences import MemberFacts
 from vibsim.convergence.reasons import INCONCLUSIVE
 from vibsim.core.vocabulary import AMPLITUDE, PHASE, TYPICAL_NORM
 
 APART = 0.5
-"""Orders that differ by less are the same."""
+"""Orders that differ by less are equal."""
 NEAR = 0.125
-"""How near to a whole or half order a stated one must be to be reported."""
+"""Largest distance of a reported order from a multiple of 1/2."""
 FROM_THE_START = 0.5
-"""A shift is there from the start where that of the first step is at least this part of the largest."""
+"""A shift exists from the start if that of the first step is at least this part of the largest one."""
 NO_PART = (
     "could not be measured: each level must oscillate with at least 6 common times in a period, and be like the true "
     "motion but for a shift in time and a factor"
 )
-"""Why a part of an error is not there, behind its name; common times are those of the coarsest level."""
+"""Why a part of an error is missing, as the end of a sentence; common times are those of the coarsest level."""
 PART_ADVICE = (
     "Start `levels:` finer, and use a `time: end` of a period or more. If the motion does not oscillate, check the "
     "position itself."
@@ -26,15 +26,15 @@ PART_ADVICE = (
 NAMES = {1.0: "first", 2.0: "second", 3.0: "third", 4.0: "fourth", 5.0: "fifth", 6.0: "sixth"}
 
 
-def parts_in_words(f: Found, quantity: str, expected: float) -> str:
-    """Say of which order phase and amplitude are where one is below the expected order and the other is another one.
+def parts_in_words(f: MemberFacts, quantity: str, expected: float) -> str:
+    """State the orders of phase and amplitude if they differ and the lower one is below the expected order.
 
-    Empty where that is not so or not known, and for a quantity that is no state.
+    Empty otherwise, and for a quantity that is not a state.
     """
     model, record, place = f.model, f.record, (f.scheme, f.case)
     known = dict(zip((*model.positions, *model.velocities), model.positions * 2, strict=True))
     position = known.get(quantity, "")
-    # a large run keeps only the part that a check asks for
+    # a large run stores only the parts that checks use
     if any(f"{position}{end}_order" not in record for end in (PHASE, AMPLITUDE)):
         return ""
     norm = record.words("norm").index(TYPICAL_NORM)
@@ -52,18 +52,18 @@ def parts_in_words(f: Found, quantity: str, expected: float) -> str:
 
 
 def sentence(phase: float, amplitude: float, share: float, expected: float, whose: str = "") -> str:
-    """Tell two orders apart, and where the lower one comes from.
+    """State the orders of both parts, and the cause of the lower one.
 
     Parameters
     ----------
     phase, amplitude
-        Orders; NaN where none is stated.
+        Orders; NaN if unknown.
     share
-        Part of the phase error that is there from the start.
+        Part of the phase error that exists from the start.
     expected
-        The order that the verdict expects: a part of this order or a higher one is as it should be.
+        The expected order; parts of this order or a higher one are correct.
     whose
-        Of which position they are, in words; empty where the verdict is on that position.
+        The position in words; empty if the verdict is on that position.
     """
     if not math.isfinite(phase + amplitude) or abs(phase - amplitude) < APART:
         return ""

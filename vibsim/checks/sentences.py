@@ -1,4 +1,4 @@
-"""What every sentence on a result is made from: its facts and common phrases."""
+"""The facts and common phrases of all sentences on results."""
 
 from __future__ import annotations
 
@@ -21,31 +21,31 @@ from vibsim.experiment.schema.checks import Measurement
 from vibsim.models.base import Model
 
 LONG = 120.0
-"""Seconds above which times are written in minutes, and sixty times that in hours."""
+"""Times above this [s] are written in minutes, and above sixty times this in hours."""
 
 NOT_FINITE = (
     "{} has no meaning here, because the calculation produced a number that is not finite.",
     "Start `levels:` at a finer level. If finer levels do not avoid it, shorten `time: end`.",
 )
-"""Sentence and advice where the calculation met a number that is not finite."""
+"""Sentence and advice if the calculation produced a number that is not finite."""
 NOTHING_MOVES = "Nothing moves here, so {} keeps its initial value with any scheme"
 MOVE = "Choose `initial:` values or a force that cause motion."
-"""Advice where nothing moves."""
+"""Advice if nothing moves."""
 WRONG_LIMIT_ADVICE = (
     "Check `model:` and `initial:` against the intended equation, and the code of scheme {scheme} if it is your own. "
     "Finer levels will not help."
 )
-"""Advice where levels approach another limit than the exact solution."""
+"""Advice if levels approach another limit than the exact solution."""
 
 
 class Template(string.Formatter):
-    """Fills templates with attributes of an object: ``{name}``, or ``{name:4}`` with so many digits of a number."""
+    """Fills templates with attributes of an object: ``{name}``, or ``{name:4}`` for a number with 4 digits."""
 
     def __init__(self, source: object, notation: Notation) -> None:
         self.source, self.notation = source, notation
 
     def get_value(self, key: int | str, args: object, kwargs: object) -> Any:
-        """Return an attribute; what is a method is called."""
+        """Return an attribute, or the result of a method."""
         value = getattr(self.source, str(key))
         return value() if callable(value) else value
 
@@ -60,41 +60,41 @@ class Description(NamedTuple):
     """A result in words."""
 
     sentence: str
-    """What was measured."""
+    """The measured result."""
     advice: str
-    """What to change in the experiment file; empty where nothing is to be changed."""
+    """What to change in the experiment file; empty if nothing needs to be changed."""
     brief: str = ""
-    """The sentence in a few words; empty where it has no shorter form."""
+    """A short form of the sentence; empty if there is none."""
 
 
 @dataclass(frozen=True)
-class Found:
-    """What a check measured of one scheme and one member."""
+class MemberFacts:
+    """The facts that a check measured for one scheme and one member."""
 
     experiment: Experiment
     record: Record
     """Convergence Record."""
     check: Measurement | None
-    """What was measured; None for the tolerance of the experiment."""
+    """The measuring check; None for the tolerance of the experiment."""
     id: str
     scheme: int
     case: int
-    """Their positions in the Record."""
+    """Indices of scheme and member in the Record."""
     reason: str
-    """The measured one."""
+    """Measured reason."""
     notation: Notation = PLAIN
 
     def fact(self, name: str) -> Any:
-        """Return a field of the check: that of the scheme and the member, or the one for all."""
+        """Return the value of a field for this scheme and member, or the common value of all."""
         values = np.asarray(field_values(self.record, self.id, name))
         return (values[self.scheme, self.case] if values.ndim else values).tolist()
 
     def word(self, name: str) -> str:
-        """Return a field that is a position in a list of words as its word."""
+        """Return the word of a field that holds an index into a list of words."""
         return self.record.meanings(name_of(self.id, name))[self.fact(name)]
 
     def of_member(self, orders: Floats) -> float:
-        """Return the number of the member, from those of shape (scheme, 1 or case)."""
+        """Return the entry of the member from an array of shape (scheme, 1 or case)."""
         return float(orders[self.scheme, self.case if orders.shape[1] > 1 else 0])
 
     @property
@@ -109,17 +109,17 @@ class Found:
 
     @cached_property
     def failed_at(self) -> float:
-        """Time at which the level of the check met a number that is not finite; NaN where it did not."""
+        """Time at which the level of the check produced a number that is not finite; NaN if it did not."""
         place = self.scheme, self.case, self.record.place("level", self.fact("level"))
         failed = self.record["status"][place]
         return float(self.record["failure_time"][place]) if failed else math.nan
 
 
-def growth_in_words(f: Found, predicted: float, measured: float) -> str:
-    """Return a sentence on the growth that theory predicts and the measured one; empty where neither is known.
+def growth_in_words(f: MemberFacts, predicted: float, measured: float) -> str:
+    """Return a sentence on the predicted and the measured growth; empty if neither is known.
 
-    The theory is of free linear oscillations without damping: of a model with damping or a force in time, and of a
-    nonlinear one, that is said. Of several coordinates it is that of their fastest oscillation.
+    The theory covers free linear oscillations without damping, and of several coordinates the fastest oscillation. The
+    sentence says so for other models.
     """
     theory = "predicted" if f.model.linear else "predicted for small oscillations"
     if len(f.model.positions) > 1:
@@ -137,7 +137,7 @@ def growth_in_words(f: Found, predicted: float, measured: float) -> str:
 
 
 def cost_in_words(experiment: Experiment, levels: Sequence[int]) -> str:
-    """Return what levels cost together, as a plan estimates it; the memory is that of the largest job."""
+    """Return the estimated total cost of levels in words; the memory is that of the largest job."""
     costs = [level_cost(experiment, level) for level in levels]
     members = experiment.members
     steps = sum(cost.schemes * cost.steps * members for cost in costs)
@@ -149,7 +149,7 @@ def cost_in_words(experiment: Experiment, levels: Sequence[int]) -> str:
 
 
 def add_levels(finest: int, count: int, cost: Callable[[Sequence[int]], str]) -> str:
-    """Ask for so many levels finer than one, with what they cost in words; from the second letter on."""
+    """Ask for `count` more levels, with their cost in words; the text starts with the second letter."""
     last = finest + count
     finer = list(range(finest + 1, last + 1))
     names = {1: f"level {last}", 2: f"levels {finer[0]} and {last}"}

@@ -1,4 +1,4 @@
-"""What a result of a check on the levels of a solver of the user states, by the kind of the check."""
+"""The facts of a result on the levels of a user's solver, by the kind of check."""
 
 from __future__ import annotations
 
@@ -31,11 +31,11 @@ SOLVER_FACTS: Mapping[str, Mapping[str, str]] = MappingProxyType(
         },
     }
 )
-"""Numbers with what they mean; None where the levels do not tell them."""
+"""Numbers and their meanings; None if the levels do not determine them."""
 LEVELS = MappingProxyType(
     {
         "levels": "first and last level that the order rests on",
         "h_used": "step sizes of the levels that the order rests on",
     }
 )
-"""Lists of numbers beside those of `converges`."""
+"""Additional lists of numbers of `converges`."""

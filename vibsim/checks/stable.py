@@ -1,15 +1,15 @@
-"""The check ``stable``: whether schemes grow where the exact solution does not, and by as much as theory predicts.
+"""The check ``stable``: whether schemes grow where the exact solution does not, and as fast as theory predicts.
 
-Unstable is an overflow, w dt beyond the stability limit of the scheme, or growth beyond the exact solution's that
-refinement within the ladder does not remove (``docs/verdicts.md``, Stable, conserves, equal). The growth of Forward
-Euler vanishes with dt and is none. An overflow at a time that finer levels do not move is that of the motion, an escape
-or a formula that has no value there, and no instability.
-At the limit itself a scheme may be stable or grow in proportion to t: there the measurement alone decides.
+A scheme is unstable if it overflows, if w dt exceeds its stability limit, or if it grows more than the exact solution
+and refinement within the ladder does not remove the growth (``docs/verdicts.md``, Stable, conserves, equal). The growth
+of Forward Euler vanishes with dt and does not count. An overflow whose time does not change on finer levels is a
+property of the motion (an escape, or a formula without a value), not an instability. At the limit itself a scheme may
+be stable or grow in proportion to t: there only the measurement decides.
 
-Beyond the limit of a linear model the growth must be the predicted one. The amplitude may follow it late: at a limit
-two roots meet, and ``1 + 2 N`` comes before the power takes over. So the logarithms of both over the whole run may
-differ by `NEAR` of themselves and ln(4 + 2 N). A larger difference means that scheme or theory is not what it claims to
-be.
+Beyond the limit of a linear model the growth must be the predicted one. The amplitude may follow with a delay: at a
+limit two roots coincide, and a factor ``1 + 2 N`` precedes the power. So the logarithms of both growths over the whole
+run may differ by the part `GROWTH_TOLERANCE` plus ln(4 + 2 N). A larger difference means that the scheme is not the one
+that the theory describes.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from vibsim.apriori.formal_orders import columns_of, stability_limits
 from vibsim.checks.fields import LEVEL, STATUS, Field, Measured
 from vibsim.checks.notation import ROUND_OFF
 from vibsim.checks.outcome import Judged
-from vibsim.checks.sentences import Description, Found, growth_in_words
+from vibsim.checks.sentences import Description, MemberFacts, growth_in_words
 from vibsim.comparison.quantity_comparison import Compared
 from vibsim.convergence.reasons import FAIL, PASS, STATUS_OF, code, first_reason
 from vibsim.convergence.thresholds import BLOWN_UP, LIMIT_ROUNDING
@@ -50,48 +50,48 @@ FIELDS = {
     "level": LEVEL,
 }
 
-ALIKE = 0.15
-"""Two levels fail at one time that fail within this part of it: the finer one sees it at most a step earlier."""
+SAME_TIME = 0.15
+"""Failure times within this relative distance are equal: the finer level fails at most a step earlier."""
 FAR = 1000.0
-"""A solution of linear equations that is so many times larger than theory lets it become is unstable: theory knows a
-single oscillation, without damping, and the square of its growth is allowed."""
+"""Linear equations are unstable if their solution exceeds the theoretical growth by this factor. Theory knows a single
+oscillation without damping; the square of its growth is allowed."""
 GROWS = 1.01
-"""Growth factor per period from which a motion is said to grow."""
-NEAR = 0.1
-"""How far the logarithm of a growth may be from the predicted one, as a part of it."""
+"""Least growth factor per period of a motion that grows."""
+GROWTH_TOLERANCE = 0.1
+"""Largest relative deviation of the logarithm of a growth from the predicted one."""
 
 
 def measure(block: MemberBlock, compared: Compared, check: StableCheck) -> Measured:
     """Return what a check measures."""
     level = block.grid.levels[-1] if check.level is None else check.level
     index = block.grid.levels.index(level)
-    p = np.broadcast_to(block.fastest[:, index], block.shape)
+    w_dt = np.broadcast_to(block.fastest[:, index], block.shape)
     limit, growth, broken = block.stability_limit, block.growth, block.failed[..., index]
-    beyond = p > limit * (1.0 + LIMIT_ROUNDING)
-    at_limit = _is_at_limit(p, limit)
-    grown = (growth[..., index] > BLOWN_UP) & (at_limit | ~_removed(growth, index))
-    escaped = broken & ~beyond & _breaks_down_alike(block)
-    found = oscillation.growth_of_motion(block, level)
-    expected = predicted_oscillation.dominant_growth(block, level)
-    contradicted = ~broken & predicted_oscillation.is_simple(block) & beyond
-    contradicted &= _differs(block, index, found, expected)
-    far = _is_beyond_theory(block, index, expected)
-    unstable = (broken & ~escaped) | beyond | grown | far
+    exceeds_limit = w_dt > limit * (1.0 + LIMIT_ROUNDING)
+    at_limit = _is_at_limit(w_dt, limit)
+    grown = (growth[..., index] > BLOWN_UP) & (at_limit | ~_is_removed(growth, index))
+    escaped = broken & ~exceeds_limit & _fail_at_same_time(block)
+    measured = oscillation.growth_of_motion(block, level)
+    predicted = predicted_oscillation.dominant_growth(block, level)
+    contradicted = ~broken & predicted_oscillation.is_simple(block) & exceeds_limit
+    contradicted &= _differs(block, index, measured, predicted)
+    exceeds_theory = _is_beyond_theory(block, index, predicted)
+    unstable = (broken & ~escaped) | exceeds_limit | grown | exceeds_theory
     cases = [(contradicted, "mismatch"), (unstable, "unstable"), (escaped, "non_finite")]
     reason = first_reason(cases, "match")
     return {
         "status": STATUS_OF[reason],
         "reason": reason,
-        "growth": found,
-        "predicted_growth": expected,
-        "omega_dt": p,
+        "growth": measured,
+        "predicted_growth": predicted,
+        "omega_dt": w_dt,
         "excess": growth[..., index],
         "level": level,
     }
 
 
-def _removed(growth: Floats, index: int) -> Flags:
-    """Say where the next finer level, or the step from the next coarser one, at least halves the growth."""
+def _is_removed(growth: Floats, index: int) -> Flags:
+    """Say where refinement to the next finer level, or at the finest level from the previous one, halves the growth."""
     if growth.shape[-1] == 1:
         return np.zeros(growth.shape[:-1], dtype=bool)
     coarse = min(index, growth.shape[-1] - 2)
@@ -99,7 +99,7 @@ def _removed(growth: Floats, index: int) -> Flags:
 
 
 def _is_beyond_theory(block: MemberBlock, index: int, growth_per_period: Floats) -> Flags:
-    """Say where a solution of linear equations is far larger than the growth per period allows, shape (s, c)."""
+    """Say where linear equations grow far more than the growth per period allows, shape (scheme, case)."""
     if not (block.model.linear or block.model.superposed):
         return np.zeros(block.shape, dtype=bool)
     periods = block.fastest[:, index] * block.grid.steps[index] / (2.0 * np.pi)
@@ -108,37 +108,38 @@ def _is_beyond_theory(block: MemberBlock, index: int, growth_per_period: Floats)
         return np.asarray(on_arrays.log(block.growth[..., index] / FAR) > allowed)
 
 
-def _breaks_down_alike(block: MemberBlock) -> Flags:
-    """Say where the two finest levels broke down at the same time, which a finer one does not move, shape (s, c)."""
+def _fail_at_same_time(block: MemberBlock) -> Flags:
+    """Say where the two finest levels broke down at the same time, as finer ones would, shape (scheme, case)."""
     finest = [block.records[level] for level in block.grid.levels[-2:]]
     if len(finest) == 1 or any("failure_time" not in record for record in finest):
         return np.zeros(block.shape, dtype=bool)
-    before, last = (np.asarray(record["failure_time"], dtype=float) for record in finest)
-    alike = np.abs(before - last) <= ALIKE * before
-    return np.asarray(np.all(block.failed[..., -2:], axis=-1) & alike)
+    previous, last = (np.asarray(record["failure_time"], dtype=float) for record in finest)
+    is_same = np.abs(previous - last) <= SAME_TIME * previous
+    return np.asarray(np.all(block.failed[..., -2:], axis=-1) & is_same)
 
 
 def _differs(block: MemberBlock, index: int, measured: Floats, expected: Floats) -> Flags:
     periods = predicted_oscillation.natural_frequency(block) * block.group.end / (2.0 * np.pi)
     with np.errstate(divide="ignore", invalid="ignore"):
         distance = np.abs(on_arrays.log(measured) - on_arrays.log(expected)) * periods
-        whole = on_arrays.log(expected) * periods
-    late = on_arrays.log(4.0 + 2.0 * block.grid.steps[index])
-    return np.asarray(distance > NEAR * np.abs(whole) + late)
+        predicted_log = on_arrays.log(expected) * periods
+    delay = on_arrays.log(4.0 + 2.0 * block.grid.steps[index])
+    return np.asarray(distance > GROWTH_TOLERANCE * np.abs(predicted_log) + delay)
 
 
-def judge(experiment: Experiment, record: Record, check: StableCheck, found: Measured) -> Judged:
-    """Compare whether schemes are stable with what a check expects."""
+def judge(experiment: Experiment, record: Record, check: StableCheck, facts: Measured) -> Judged:
+    """Compare the stability of schemes with the expectation of a check."""
     with np.errstate(divide="ignore", invalid="ignore"):
-        size = np.abs(on_arrays.log(found["growth"]))
-    as_expected = found["reason"] == code("match" if check.stable else "unstable")
+        size = np.abs(on_arrays.log(facts["growth"]))
+    as_expected = facts["reason"] == code("match" if check.stable else "unstable")
     away = np.where(np.isnan(size), np.inf, size)
-    return Judged(found["reason"], away, np.where(as_expected, PASS, FAIL))
+    return Judged(facts["reason"], away, np.where(as_expected, PASS, FAIL))
 
 
-def describe(f: Found, check: StableCheck) -> Description:
+def describe(f: MemberFacts, check: StableCheck) -> Description:
     """Say whether a scheme is stable at the level of a check, and why."""
-    level, p, failed, number = f.fact("level"), f.fact("omega_dt"), f.failed_at, f.notation.number
+    level, w_dt, failed = f.fact("level"), f.fact("omega_dt"), f.failed_at
+    number = f.notation.number
     time = "" if math.isnan(failed) else number(failed, 4)
     if f.reason == "non_finite":
         return Description(
@@ -151,9 +152,9 @@ def describe(f: Found, check: StableCheck) -> Description:
     factors = f.fact("predicted_growth"), f.fact("growth")
     sentence = (
         f"Scheme {f.scheme_name} is {'stable' if f.reason == 'match' else 'unstable'} at level {level}"
-        f"{f', where w dt = {number(p, 4)}' if math.isfinite(p) else ''}."
+        f"{f', where w dt = {number(w_dt, 4)}' if math.isfinite(w_dt) else ''}."
     )
-    if f.reason == "unstable" and not time and f.model.linear and _is_at_limit(p, _limit(f)):
+    if f.reason == "unstable" and not time and f.model.linear and _is_at_limit(w_dt, _limit(f)):
         sentence += " This is its limit, at which the amplitude grows in proportion to the time."
     else:
         sentence += growth_in_words(f, *factors)
@@ -170,23 +171,23 @@ def describe(f: Found, check: StableCheck) -> Description:
         sentence += f" It produced a number that is not finite or too large at t = {time}."
     if f.reason == "mismatch":
         sentence += " Prediction and measurement disagree, so this is not the scheme that the theory describes."
-    return Description(sentence, _advice(f, level, p, time))
+    return Description(sentence, _advice(f, level, w_dt, time))
 
 
-def _is_at_limit(p: Floats, limit: Floats) -> Flags:
-    """Say where a step is the longest for which a scheme may be stable."""
+def _is_at_limit(w_dt: Floats, limit: Floats) -> Flags:
+    """Say where w dt is at the stability limit."""
     low, high = limit * (1.0 - LIMIT_ROUNDING), limit * (1.0 + LIMIT_ROUNDING)
-    return np.asarray((p >= low) & (p <= high))
+    return np.asarray((w_dt >= low) & (w_dt <= high))
 
 
-def _limit(f: Found) -> Floats:
-    """Return the limit of w dt of a scheme; 0 where none is known."""
+def _limit(f: MemberFacts) -> Floats:
+    """Return the limit of w dt of a scheme; 0 if unknown."""
     known = "stability_limit" in f.record
     return np.asarray(f.record["stability_limit"][f.scheme, f.case] if known else 0.0)
 
 
-def _vanishing(f: Found, factors: tuple[float, float]) -> str:
-    """Say by how much a scheme grows that grows at every step; empty where it does not, or nothing is known."""
+def _vanishing(f: MemberFacts, factors: tuple[float, float]) -> str:
+    """Say by how much a scheme grows that is unstable at any step; empty if the growth is 0 or unknown."""
     known = [value for value in factors if not math.isnan(value)]
     if not known or min(known) - 1.0 <= ROUND_OFF:
         return ""
@@ -197,11 +198,11 @@ def _vanishing(f: Found, factors: tuple[float, float]) -> str:
 
 
 def first_within(limit: float, level: int, omega_dt: float) -> int:
-    """Return the coarsest level whose w dt is within a stability limit, from a level that is beyond it."""
+    """Return the coarsest level within a stability limit, from a level beyond it and its w dt."""
     return level + math.ceil(log2(omega_dt / limit) - LIMIT_ROUNDING)
 
 
-def _advice(f: Found, level: int, p: float, time: str) -> str:
+def _advice(f: MemberFacts, level: int, w_dt: float, time: str) -> str:
     if f.reason == "match":
         return "Set `stable: true`, or take coarser `levels:` if the scheme has a limit (w dt beyond it)."
     if f.reason == "mismatch":
@@ -210,9 +211,9 @@ def _advice(f: Found, level: int, p: float, time: str) -> str:
             "theory predicts."
         )
     limit = f.of_member(stability_limits(f.experiment, columns_of(f.record)))
-    if math.isfinite(limit) and math.isfinite(p) and p > limit:
+    if math.isfinite(limit) and math.isfinite(w_dt) and w_dt > limit:
         return (
-            f"Take finer `levels:`, from {first_within(limit, level, p)} on (w dt within the limit "
+            f"Take finer `levels:`, from {first_within(limit, level, w_dt)} on (w dt within the limit "
             f"{f.notation.number(limit)}), or correct `stable:`."
         )
     if time:

@@ -1,4 +1,4 @@
-"""Where in a sweep the results of a status lie: a range, a box, and a distribution for every swept key."""
+"""Where in a sweep the results of a status lie: a range, a box, and a distribution for each swept key."""
 
 from __future__ import annotations
 
@@ -21,25 +21,25 @@ from vibsim.core.vocabulary import STATUSES
 Column = NDArray[Any]
 
 IN_BOX = 0.95
-"""Part of the results that the box holds, at least."""
+"""Least part of the results inside the box."""
 BINS = 8
-"""A key's values are reported in so many bins with the same number of members, or fewer."""
+"""Largest number of bins for the values of a key; bins have the same number of members."""
 TELLING = 0.5
-"""Ranges that hold no more than this part of all members say where something is."""
+"""A range is informative if it holds at most this part of all members."""
 MOST_KEYS = 2
-"""A sentence names so many keys."""
+"""Largest number of keys that a sentence names."""
 
 
 def sweep_regions(record: Record, outcome: Outcome) -> dict[str, Any]:
-    """Tell where in a sweep, whose values the convergence Record has, the results lie that did not pass.
+    """Return where in a sweep the results lie that did not pass.
 
     Returns
     -------
     dict
-        For every status but PASS that occurs: ``count``; ``schemes``, the number by scheme; ``keys``, for every swept
-        key of numbers ``range`` (least and largest value that occurs), ``box`` (the shortest interval, so that all of
-        them together hold `IN_BOX` of the results) and ``bins`` (``from``, ``to``, and the ``share`` of the results in
-        it that have the status), and for one of words ``shares``; and ``text``, a sentence. Empty without a sweep.
+        For each status but PASS that occurs: ``count``; ``schemes``, the count by scheme; ``keys``; and ``text``, a
+        sentence. Each numeric key has a ``range`` (least and largest value), a ``box`` (the shortest interval such that
+        all boxes together hold `IN_BOX` of the results) and ``bins`` (``from``, ``to``, and the ``share`` of results
+        with that status); a key of words has ``shares``. Empty without a sweep.
     """
     if outcome.is_of_all or outcome.total == 1:
         return {}
@@ -47,27 +47,27 @@ def sweep_regions(record: Record, outcome: Outcome) -> dict[str, Any]:
     if not columns:
         return {}
     bins = {key: _bins(values) for key, values in columns.items()}
-    found: dict[str, Any] = {}
+    regions: dict[str, Any] = {}
     for code, status in enumerate(STATUSES):
         mask = outcome.chosen == code
         if code == PASS or not mask.any():
             continue
         hits, count = mask.sum(axis=0), int(mask.sum())
         keys = {
-            key: _along(values, bins[key], hits, len(outcome.schemes), len(columns))
+            key: _along_key(values, bins[key], hits, len(outcome.schemes), len(columns))
             for key, values in columns.items()
         }
-        found[status] = {
+        regions[status] = {
             "text": _sentence(status, count, outcome.total, columns, keys, hits),
             "count": count,
             "schemes": dict(zip(outcome.schemes, mask.sum(axis=1).tolist(), strict=True)),
             "keys": keys,
         }
-    return found
+    return regions
 
 
 def _bins(values: Column) -> Integers:
-    """Return the number of the bin of every value; equal values share a bin, and a bin is an interval."""
+    """Return the bin index of each value; bins are intervals, and equal values share a bin."""
     ordered = np.sort(values)
     distinct = ordered[np.r_[True, ordered[1:] != ordered[:-1]]]
     if len(distinct) > BINS and values.dtype.kind == "f":
@@ -76,25 +76,25 @@ def _bins(values: Column) -> Integers:
     return np.searchsorted(distinct, values, side="right") - 1
 
 
-def _along(
+def _along_key(
     values: Column, bins: Integers, hits: Integers, schemes: int, keys: int
 ) -> dict[str, Any]:
-    """Describe along one key where `hits`, the number of results of every member, are."""
+    """Describe the distribution along one key of `hits`, the number of results of each member."""
     members = np.bincount(bins)
     shares = (np.bincount(bins, weights=hits) / (members * schemes)).tolist()
-    inside = [values[bins == place] for place in range(len(members))]
+    per_bin = [values[bins == place] for place in range(len(members))]
     if values.dtype.kind != "f":
-        return {"shares": {str(one[0]): share for one, share in zip(inside, shares, strict=True)}}
-    found = np.sort(np.repeat(values, hits))
-    # the shortest interval that holds its share; what each key may leave out adds up
-    held = math.ceil((1.0 - (1.0 - IN_BOX) / keys) * len(found))
-    first = int(np.argmin(found[held - 1 :] - found[: len(found) - held + 1]))
+        return {"shares": {str(x[0]): share for x, share in zip(per_bin, shares, strict=True)}}
+    ordered = np.sort(np.repeat(values, hits))
+    # the shortest interval that holds enough results; the parts outside of it add up over the keys
+    count = math.ceil((1.0 - (1.0 - IN_BOX) / keys) * len(ordered))
+    first = int(np.argmin(ordered[count - 1 :] - ordered[: len(ordered) - count + 1]))
     return {
-        "range": [float(found[0]), float(found[-1])],
-        "box": [float(found[first]), float(found[first + held - 1])],
+        "range": [float(ordered[0]), float(ordered[-1])],
+        "box": [float(ordered[first]), float(ordered[first + count - 1])],
         "bins": [
-            {"from": float(one.min()), "to": float(one.max()), "share": share}
-            for one, share in zip(inside, shares, strict=True)
+            {"from": float(x.min()), "to": float(x.max()), "share": share}
+            for x, share in zip(per_bin, shares, strict=True)
         ],
     }
 
@@ -107,35 +107,37 @@ def _sentence(
     keys: Mapping[str, Any],
     hits: Integers,
 ) -> str:
-    """Say how many results have a status, and where they are, if they are anywhere in particular."""
+    """Say how many results have a status, and where they are if they are not spread over the sweep."""
     if count == total:
         return f"{status} in all {total} results"
     start = f"{status} in {count} of {total} results"
     all_with = "all with" if count > 1 else "with"
     for name, words in (("range", all_with), ("box", f"at least {IN_BOX:.0%} of them with")):
-        places = sorted(_place(key, columns[key], keys[key], name, hits) for key in columns)[
+        places = sorted(_share_inside(key, columns[key], keys[key], name, hits) for key in columns)[
             :MOST_KEYS
         ]
-        telling = [text for part, text, alone in places if part <= TELLING or (alone and part < 1)]
-        if not telling and math.prod(part for part, _, _ in places) <= TELLING:
-            telling = [text for part, text, _ in places if part < 1]
+        telling = [
+            text for share, text, alone in places if share <= TELLING or (alone and share < 1)
+        ]
+        if not telling and math.prod(share for share, _, _ in places) <= TELLING:
+            telling = [text for share, text, _ in places if share < 1]
         if telling:
             return f"{start}, {words} {' and '.join(telling)}"
     return start if count == 1 else f"{start}, spread over the sweep"
 
 
-def _place(
-    key: str, values: Column, found: Mapping[str, Any], name: str, hits: Integers
+def _share_inside(
+    key: str, values: Column, region: Mapping[str, Any], name: str, hits: Integers
 ) -> tuple[float, str, bool]:
-    """Return the part of all members that a range or box holds along one key, that in words, and if it holds all alone.
+    """Return the share of all members in a range or box of one key, its text, and whether it is exact.
 
-    All alone means that it separates the members with results from those without, and so tells, however large.
+    It is exact if it separates the members with results from all others; then it is informative at any size.
     """
-    if name in found:
-        low, high = found[name]
+    if name in region:
+        low, high = region[name]
         inside, text = (values >= low) & (values <= high), _interval(key, values, low, high)
     else:
-        words = [word for word, share in found["shares"].items() if share > 0]
+        words = [word for word, share in region["shares"].items() if share > 0]
         inside, text = np.isin(values, words), f"{key} {' or '.join(words)}"
     return float(np.mean(inside)), text, bool(np.array_equal(inside, hits > 0))
 
@@ -143,7 +145,7 @@ def _place(
 def _interval(key: str, values: Column, low: float, high: float) -> str:
     if low == high:
         return f"{key} equal to {PLAIN.number(low)}"
-    # rounded outward, so that what is said is true
+    # rounded outward, so that the statement is true
     least, most = _rounded(low, up=False), _rounded(high, up=True)
     if high >= np.max(values):
         return f"{key} of {least} or more"
@@ -153,8 +155,8 @@ def _interval(key: str, values: Column, low: float, high: float) -> str:
 
 
 def _rounded(value: float, *, up: bool) -> str:
-    """Write a number with up to 6 significant digits, rounded one way where it has more.
+    """Write a number with up to 6 significant digits, rounded up or down.
 
-    What it has are its 15 decimal digits: those of 1.9 are no 1.8999999999999999.
+    It is first rounded to 15 decimal digits: 1.9 is not 1.8999999999999999.
     """
     return PLAIN.number(round_outward(float(f"{value:.15g}"), 6, up=up))

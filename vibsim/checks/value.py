@@ -1,7 +1,7 @@
-"""The check ``value``: a number against its bound.
+"""The check ``value``: compares a number with a bound or an expected value.
 
-A number that misses what is asked may come there on finer levels, or have settled elsewhere: the count of bounces that
-are located is the same on each of them. By how much the finest levels still change it tells the two apart.
+A number that misses the target may reach it on finer levels, or may have settled elsewhere, as a count of located
+bounces that is the same on all levels. How much the finest levels still change it distinguishes the two.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from vibsim.checks.fields import Field, Measured, name_of
 from vibsim.checks.notation import PLAIN, ROUND_OFF, Notation
 from vibsim.checks.outcome import Judged
 from vibsim.checks.phase_amplitude_text import NO_PART, PART_ADVICE
-from vibsim.checks.sentences import NOT_FINITE, Description, Found, add_levels, cost_in_words
+from vibsim.checks.sentences import NOT_FINITE, Description, MemberFacts, add_levels, cost_in_words
 from vibsim.comparison import best_values, value_numbers
 from vibsim.comparison.quantity_comparison import Compared
 from vibsim.convergence.reasons import first_reason
@@ -56,22 +56,22 @@ FIELDS = {
     ),
 }
 DIRECTION_ASKED = {1.0: "rising", -1.0: "falling", 0.0: "neither rising nor falling throughout"}
-"""What is asked of a direction, by the number that stands for it."""
+"""Expected directions in words, by their numbers."""
 UNKNOWN, SETTLED, MOVING = -1, 0, 1
-"""What finer levels do to a number that misses what is asked: not known, too little, perhaps enough."""
+"""Whether finer levels may bring a number to its target: unknown, they change it too little, perhaps."""
 STILL_TO_CHANGE = 3.0
-"""All finer levels together change a number by no more than so many times its last change (an order of 1/2 by 2.4)."""
+"""All finer levels together change a number by at most this multiple of its last change (2.4 for an order of 1/2)."""
 FINER, MOST_FINER = 2, 12
-"""So many finer levels are advised where nothing tells how many are needed, and so many at most."""
+"""Number of finer levels that advice suggests if the needed number is unknown, and at most."""
 UNPROVED = (
     " The levels agree with it, but do not prove it: the error bound is wider than what is asked."
 )
 FEWEST_DIGITS, MOST_DIGITS = 4, 10
-"""Significant digits of a number that was measured."""
+"""Significant digits of a measured number."""
 
 
 def compare(check: ValueCheck, number: Floats) -> tuple[Flags, Floats]:
-    """Return where numbers are as they should be, and how far beyond the border they are; of any shape."""
+    """Return which numbers, of any shape, meet the check, and by how much they miss it (negative if they meet it)."""
     if check.below is not None:
         return number < check.below, number - check.below
     if check.above is not None:
@@ -84,26 +84,26 @@ def compare(check: ValueCheck, number: Floats) -> tuple[Flags, Floats]:
 
 
 def measure(block: MemberBlock, compared: Compared, check: ValueCheck) -> Measured:
-    """Return the number, the bound of its error, and what finer levels do to it."""
+    """Return the number, the bound of its error, and whether finer levels may change the outcome."""
     at, name, levels, row = check.at, check.value, block.grid.levels, check.number
     place = value_numbers.Place(
         block, compared, check.quantity or "", at.level, at.t, at.step, at.event
     )
-    found = best_values.value(name, place)
-    value, bound, missed = (np.broadcast_to(one, block.shape) for one in found)
+    best = best_values.value(name, place)
+    value, bound, missed = (np.broadcast_to(x, block.shape) for x in best)
     fulfilled, _ = compare(check, value)
     numbers = np.full((*block.shape, len(levels)), np.nan)
     is_open = np.isnan(bound) & row.has_limit(at.level)
     if "level" in row.at and not (block.lean and np.all(fulfilled & ~is_open) and not check.take):
         numbers = _by_level(name, place)
     if check.take is not None and row.has_limit(at.level):
-        # every member has a part in the number of all
+        # a reduced number needs a bound for each member
         bound = np.where(np.isnan(bound), STILL_TO_CHANGE * _last_change(numbers) + missed, bound)
-    own = row.own_levels(levels) or tuple(levels)
-    level = place.level if place.level in own else own[-1]
-    left = np.where(is_open, missed, 0.0)
+    own_levels = row.own_levels(levels) or tuple(levels)
+    level = place.level if place.level in own_levels else own_levels[-1]
+    unseen = np.where(is_open, missed, 0.0)
     needed, first = _prospects(
-        check, numbers[..., : len(own)], own, int(level), fulfilled, is_open, left
+        check, numbers[..., : len(own_levels)], own_levels, int(level), fulfilled, is_open, unseen
     )
     needed = np.where(fulfilled & ~is_open, UNKNOWN, needed)
     return {
@@ -116,9 +116,9 @@ def measure(block: MemberBlock, compared: Compared, check: ValueCheck) -> Measur
 
 
 def _by_level(name: str, place: value_numbers.Place) -> Floats:
-    """Return a number at every level, shape (scheme, case, level); NaN where a level has no such number.
+    """Return a number at each level, shape (scheme, case, level); NaN where it does not exist.
 
-    A step of a level is the same time on every other one; of the extrapolated solution it is that of a common time.
+    A step of one level is taken at the same time on all others; for the extrapolated solution it is a common time.
     """
     if place.level == "best" and VALUES[name].is_sample:
         return np.stack(value_numbers.samples(place), axis=-1)
@@ -133,7 +133,7 @@ def _by_level(name: str, place: value_numbers.Place) -> Floats:
 def _last_change(numbers: Floats) -> Floats:
     """Return by how much the finest levels still change a number, shape (scheme, case); NaN for one level.
 
-    Half of the change before counts as well: one change may be small by chance.
+    It is at least half of the previous change, since one change may be small by chance.
     """
     if numbers.shape[-1] < 2:
         return np.full(numbers.shape[:-1], np.nan)
@@ -150,54 +150,52 @@ def _prospects(
     level: int,
     fulfilled: Flags,
     is_open: Flags,
-    left: Floats,
+    unseen: Floats,
 ) -> tuple[Any, Any]:
-    """Return what finer levels than `level` do to a number, and the first at which it is as asked, -1 for none.
+    """Return whether levels finer than `level` may change the outcome, and the first one that meets the check, or -1.
 
-    The first is `SETTLED`, `MOVING` or `UNKNOWN`; of a number that is `fulfilled`, `MOVING` where finer levels may move
-    it out again, else `UNKNOWN`. `numbers` are of every level, shape (scheme, case, level). Where `is_open` and the
-    changes do not shrink, each of `MOST_FINER` finer levels may change a number by as much again; it may be off by
-    what is `left` besides, which no level shows.
+    The former is `SETTLED`, `MOVING` or `UNKNOWN`; for a `fulfilled` check it is `MOVING` if finer levels may miss it
+    again, otherwise `UNKNOWN`. `numbers` has the shape (scheme, case, level). If the bound `is_open` and the changes do
+    not shrink, each of `MOST_FINER` finer levels may change a number by as much again. The error `unseen`, which no
+    level shows, is added.
     """
-    holds, away = compare(check, numbers)
-    helps = holds & (np.array(levels) > level)
-    first = np.where(np.any(helps, axis=-1), np.array(levels)[np.argmax(helps, axis=-1)], -1)
+    holds, distance = compare(check, numbers)
+    finer = holds & (np.array(levels) > level)
+    first = np.where(np.any(finer, axis=-1), np.array(levels)[np.argmax(finer, axis=-1)], -1)
     code = np.full(fulfilled.shape, UNKNOWN)
     if len(levels) > 1:
         with np.errstate(all="ignore"):
             last = _last_change(numbers)
             change = np.abs(np.diff(numbers[..., -3:], axis=-1))
             shrinks = change[..., -1] <= STILL_TO_CHANGE / (1.0 + STILL_TO_CHANGE) * change[..., 0]
-            reach = np.where(is_open & ~shrinks, MOST_FINER, STILL_TO_CHANGE) * last + left
-            code[away[..., -1] <= reach] = MOVING
-            code[(away[..., -1] > reach) | (reach == 0.0)] = SETTLED
-            code[fulfilled] = np.where(reach > -away[..., -1], MOVING, UNKNOWN)[fulfilled]
+            reach = np.where(is_open & ~shrinks, MOST_FINER, STILL_TO_CHANGE) * last + unseen
+            code[distance[..., -1] <= reach] = MOVING
+            code[(distance[..., -1] > reach) | (reach == 0.0)] = SETTLED
+            code[fulfilled] = np.where(reach > -distance[..., -1], MOVING, UNKNOWN)[fulfilled]
     return code, np.where(fulfilled, -1, first)
 
 
-def judge(experiment: Experiment, record: Record, check: ValueCheck, found: Measured) -> Judged:
-    """Compare a measured number with what the check asks of it.
+def judge(experiment: Experiment, record: Record, check: ValueCheck, facts: Measured) -> Judged:
+    """Compare a measured number with the check.
 
-    A limit of several levels that misses what is asked by less than its bound may be right: nothing is decided then.
-    Nor is whether an angle is below or above another one where its bound goes through pi.
-    Nor is it where the time of an event meets what is asked, but may be further away, or where any number does whose
-    bound is unknown and that finer levels may still move out, or of which no level can bound the error.
+    Nothing is decided if a limit misses the check by less than its bound, or if the bound of an angle extends through
+    pi. Nor is it if a limit meets the check, but only by chance: the time of an event that may be further away, a
+    number with an unknown bound that finer levels may still move, or one whose error no level can bound.
     """
-    name, number, bound = check.value, found["value"], found["error_bound"]
+    name, number, bound = check.value, facts["value"], facts["error_bound"]
     row, is_limit = check.number, check.number.has_limit(check.at.level)
     holds, away = compare(check, number)
-    # a limit rests on the levels behind the finest one that broke down
+    # a limit rests on the levels finer than the last one that broke down
     survives = np.isfinite(number) & (
         row.survives_failure | is_limit & (record["status"][..., -1] == 0)
     )
-    # of a stability limit infinity is a value; on the separatrix there is no period, and nothing went wrong
+    # a stability limit may be infinite; an infinite exact period means that there is none, as on the separatrix
     does_not_exist = np.isnan(number) | (np.isinf(number) & (name == "exact_period"))
     infinite = np.isinf(number) & (name != "stability_limit") & ~does_not_exist
     may_be_right = ~(np.minimum(away, _to_the_cut(check, number)) > bound) & is_limit
-    # a time that the levels leave open agrees by chance, perhaps of another event; a limit of a range is met only where
-    # all numbers within the bound are
+    # an uncertain time agrees by chance, perhaps that of another event; an inequality must hold within the whole bound
     is_strict = row.needs_events or check.equals is None
-    is_unknown = np.isnan(bound) & (row.needs_events | (found["levels_needed"] == MOVING))
+    is_unknown = np.isnan(bound) & (row.needs_events | (facts["levels_needed"] == MOVING))
     is_wide = np.isinf(bound) | ((bound > _room(check, number)) & is_strict)
     holds &= ~((is_unknown | is_wide) & is_limit)
     cases = [
@@ -217,7 +215,7 @@ def judge(experiment: Experiment, record: Record, check: ValueCheck, found: Meas
 
 
 def _lacks_levels(experiment: Experiment, check: ValueCheck) -> bool:
-    """Say whether a number rests on more levels than the experiment has."""
+    """Say whether a number needs more levels than the experiment has."""
     return check.number.finer_levels >= len(experiment.levels)
 
 
@@ -231,13 +229,13 @@ def _failed(record: Record, check: ValueCheck) -> Flags:
 
 
 UNITS = "units_of_quantities"
-"""Attribute of a Record that holds verdicts and no quantities: their units by name, as JSON."""
+"""Attribute with the units of quantities by name, as JSON, of a Record that holds verdicts but no quantities."""
 
 
 def unit_of(experiment: Experiment, record: Record, check: ValueCheck) -> str:
-    """Return the unit of the number of a check, such as ``rad s-1``; empty where it has none.
+    """Return the unit of the number of a check, such as ``rad s-1``; empty if it has none.
 
-    A scaled run, and a model without units, have none: the convergence Record says so.
+    A scaled run and a model without units have none, as the convergence Record shows.
     """
     time = "s" if has_time_unit(record) else ""
     position = experiment.model.definition.position
@@ -245,49 +243,49 @@ def unit_of(experiment: Experiment, record: Record, check: ValueCheck) -> str:
 
 
 def unit_of_number(check: ValueCheck, known: Mapping[str, str], position: str, time: str) -> str:
-    """Return the unit of the number of a check, from those of quantities and that of time; empty where it has none."""
+    """Return the unit of the number of a check from the units of quantities and time; empty if it has none."""
     measure = check.number.measure
     if check.take not in OF_THE_SAME_KIND:
-        # a swept value has its own unit, a direction none
+        # swept values have other units, and directions have none
         return ""
     of_time = {"time": "s", "frequency": "rad s-1", "l1": "s", "l2": "sqrt(s)"}
     unit = of_time.get(measure, "") if time else ""
     if measure not in ("quantity", "l1", "l2", "position"):
         return unit
-    of = position if measure == "position" else check.quantity
-    return f"{known.get(of or '', '')} {unit}".strip()
+    owner = position if measure == "position" else check.quantity
+    return f"{known.get(owner or '', '')} {unit}".strip()
 
 
 def unit_of_quantity(record: Record, quantity: str) -> str:
-    """Return the unit of a quantity; empty where it has none."""
+    """Return the unit of a quantity; empty if it has none."""
     return _known_units(record).get(quantity, "")
 
 
 def unit_of_norm(record: Record, quantity: str) -> str:
-    """Return the unit of the L2 norm over time of a quantity; empty where it has none."""
+    """Return the unit of the L2 norm over time of a quantity; empty if it has none."""
     return f"{_known_units(record).get(quantity, '')} {'sqrt(s)' if has_time_unit(record) else ''}".strip()
 
 
 def _known_units(record: Record) -> dict[str, str]:
-    kept = record.attrs.get(UNITS)
-    found: dict[str, str] = units_in(record) if kept is None else json.loads(str(kept))
-    return found
+    stored = record.attrs.get(UNITS)
+    units: dict[str, str] = units_in(record) if stored is None else json.loads(str(stored))
+    return units
 
 
 def units_in(record: Record) -> dict[str, str]:
-    """Return the units of all quantities of a convergence Record, for one that keeps `UNITS` in place of them."""
-    found: dict[str, str] = {}
-    # of every quantity that a check may ask for one of these is stored at least
-    for end in ("_end", "_difference_norm", "_finest"):
+    """Return the units of all quantities of a convergence Record, to be stored as `UNITS`."""
+    units: dict[str, str] = {}
+    # at least one of these is stored for each quantity that a check may use
+    for suffix in ("_end", "_difference_norm", "_finest"):
         for name, variable in record.variables.items():
-            if name.endswith(end):
+            if name.endswith(suffix):
                 unit = str(variable.attrs.get("units", ""))
-                found.setdefault(name.removesuffix(end), "" if unit == "1" else unit)
-    return found
+                units.setdefault(name.removesuffix(suffix), "" if unit == "1" else unit)
+    return units
 
 
 def what(check: ValueCheck, notation: Notation = PLAIN) -> str:
-    """Say which number is meant."""
+    """Name the number of a check."""
     quantity = notation.quantity(check.quantity) if check.quantity else ""
     if check.number.is_sample:
         if check.at.t is not None:
@@ -298,34 +296,34 @@ def what(check: ValueCheck, notation: Notation = PLAIN) -> str:
     if check.at.event is not None:
         return f"{value} of event {check.at.event}"
     if check.quantity and is_error_part(check.quantity):
-        # "largest error" of what is an error: "largest phase error of u"
-        named, is_word = re.subn(r"\berror\b", quantity, value, count=1)
+        # avoid "error of phase error": "largest phase error of u"
+        text, is_word = re.subn(r"\berror\b", quantity, value, count=1)
         if is_word:
-            return named
+            return text
     return f"{value} of {quantity}" if quantity else value
 
 
 def border(check: ValueCheck) -> tuple[str, float]:
-    """Return the key that holds the number that the check asks for, and the number."""
-    wanted = {key: getattr(check, key) for key in ("equals", "below", "above")}
-    return next((key, number) for key, number in wanted.items() if number is not None)
+    """Return the key of the target of a check (`equals`, `below` or `above`), and the target."""
+    borders = {key: getattr(check, key) for key in ("equals", "below", "above")}
+    return next((key, number) for key, number in borders.items() if number is not None)
 
 
 def rule(check: ValueCheck, notation: Notation = PLAIN) -> str:
-    """Say what a number should be."""
+    """Say what the number should be."""
     key, wanted = border(check)
     if check.take == "monotone":
         return DIRECTION_ASKED[wanted]
     if key != "equals":
         return f"{key} {notation.number(wanted)}"
-    # counted numbers are equal, or apart by more
+    # counts differ by at least 1
     is_counted = check.number.measure == "count" and check.allowed < 0.5
     within = "" if is_counted else f" within {notation.number(check.allowed)}"
     return f"equal to {notation.number(wanted, 15)}{within}"
 
 
-def describe(f: Found, check: ValueCheck) -> Description:
-    """Say what a number is, whether it is what a check asks for, and what to change."""
+def describe(f: MemberFacts, check: ValueCheck) -> Description:
+    """State a number, whether it meets the check, and what to change."""
     subject = f.notation.opening(what(check, f.notation))
     brief, expected = _measured(f, check), rule(check, f.notation)
     match f.reason:
@@ -365,46 +363,46 @@ def describe(f: Found, check: ValueCheck) -> Description:
                 f"A{finer_levels(f)} to shrink the error bound, or ask for the number of one level "
                 "(`at: {level: ...}`)."
             )
-    found = f.fact("value")
-    brief = _measured(f, check, _digits(found, _room(check, found)))
+    number = f.fact("value")
+    brief = _measured(f, check, _digits(number, _room(check, number)))
     return Description(sentence, advice, brief)
 
 
 def is_proved(check: ValueCheck, value: float, bound: float) -> bool:
-    """Say of a number that is as asked whether no other one within its bound would be otherwise."""
+    """Say whether all numbers within the bound meet the check, for a number that meets it."""
     return not (check.number.has_limit(check.at.level) and bool(bound > _room(check, value)))
 
 
 def _room(check: ValueCheck, value: Any) -> Any:
-    """Return how far numbers may be from what is asked, or are from a limit."""
+    """Return the allowed deviation from an expected value, or the distance from a bound."""
     key, wanted = border(check)
-    away = np.abs(value - wanted)
-    return check.allowed if key == "equals" else np.minimum(away, _to_the_cut(check, value))
+    distance = np.abs(value - wanted)
+    return check.allowed if key == "equals" else np.minimum(distance, _to_the_cut(check, value))
 
 
 def _to_the_cut(check: ValueCheck, value: Any) -> Any:
-    """Return how far angles are from -pi and pi, beyond which they begin anew; infinite where that decides nothing."""
+    """Return the distance of angles from -pi and pi, where they wrap around; infinite if that does not matter."""
     key, wanted = border(check)
     is_cut = check.number.is_angle and key != "equals" and abs(wanted) < np.pi
     return np.pi - np.abs(value) if is_cut else math.inf
 
 
 def _digits(number: float, room: float) -> int:
-    """Return how many digits of a number tell it from others that are so far away, and one more."""
+    """Return one more than the number of digits that distinguish a number from others at the distance `room`."""
     if not (math.isfinite(number) and number != 0.0 and room > 0.0):
         return MOST_DIGITS
-    # a whole number is not rounded
+    # the integer part is not rounded
     whole, finer = (math.log10(abs(number) / unit) for unit in (1.0, room))
     return min(max(FEWEST_DIGITS, 1 + math.floor(whole), 2 + math.ceil(finer)), MOST_DIGITS)
 
 
-def _measured(f: Found, check: ValueCheck, digits: int = MOST_DIGITS) -> str:
-    """Write a number with its unit, and with the bound of its error where it has one."""
-    found, bound = f.fact("value"), f.fact("error_bound")
-    # of round-off two digits say all
-    digits = 2 if f.reason == "match" and abs(found) <= ROUND_OFF else digits
-    phrase = f"{f.notation.number(found, digits)} {unit_of(f.experiment, f.record, check)}".rstrip()
-    if check.value == "stability_limit" and found == 0.0:
+def _measured(f: MemberFacts, check: ValueCheck, digits: int = MOST_DIGITS) -> str:
+    """Write a number with its unit, and with the bound of its error if it has one."""
+    value, bound = f.fact("value"), f.fact("error_bound")
+    # two digits are enough for round-off
+    digits = 2 if f.reason == "match" and abs(value) <= ROUND_OFF else digits
+    phrase = f"{f.notation.number(value, digits)} {unit_of(f.experiment, f.record, check)}".rstrip()
+    if check.value == "stability_limit" and value == 0.0:
         phrase += " (it grows at every step)"
     if not check.number.has_limit(check.at.level):
         return phrase
@@ -414,22 +412,24 @@ def _measured(f: Found, check: ValueCheck, digits: int = MOST_DIGITS) -> str:
         phrase += f", with an error of at most {f.notation.number(bound, 2)}"
     broken = np.flatnonzero(f.record["status"][f.scheme, f.case])
     if len(broken) and not check.number.survives_failure:
-        phrase += f", from the levels behind {f.experiment.levels[broken[-1]]}, which broke down"
+        phrase += (
+            f", from the levels finer than {f.experiment.levels[broken[-1]]}, which broke down"
+        )
     return phrase
 
 
-def _through_the_cut(f: Found, check: ValueCheck) -> str:
-    """Say of an angle that those within its bound go on at the other end of all angles; empty elsewhere."""
-    found, bound = f.fact("value"), f.fact("error_bound")
-    if not (math.isfinite(bound) and bound > _to_the_cut(check, found)):
+def _through_the_cut(f: MemberFacts, check: ValueCheck) -> str:
+    """Say that the bound of an angle extends through pi; empty otherwise."""
+    number, bound = f.fact("value"), f.fact("error_bound")
+    if not (math.isfinite(bound) and bound > _to_the_cut(check, number)):
         return ""
-    ends = (f.notation.number(end, FEWEST_DIGITS) for end in (found - bound, found + bound))
-    cut = "pi" if found > 0.0 else "-pi"
+    ends = (f.notation.number(end, FEWEST_DIGITS) for end in (number - bound, number + bound))
+    cut = "pi" if number > 0.0 else "-pi"
     return f", an angle between {' and '.join(ends)}, which goes through {cut}"
 
 
-def _why_unknown(f: Found, check: ValueCheck) -> str:
-    """Say why nothing bounds the error of a number, where one cause is sure."""
+def _why_unknown(f: MemberFacts, check: ValueCheck) -> str:
+    """Say why the error of a number has no bound, if a cause is certain."""
     if _is_on_the_mesh(f, check):
         return ", because events are left to the mesh"
     if np.isfinite(pulse := _pulse_time(f)):
@@ -444,20 +444,20 @@ def _why_unknown(f: Found, check: ValueCheck) -> str:
     return ", because there is one level only" if len(f.experiment.levels) == 1 else ""
 
 
-def _by_level_of(f: Found) -> list[float]:
-    """Return a number at every level; none where that was not stored."""
+def _by_level_of(f: MemberFacts) -> list[float]:
+    """Return a number at each level; empty if it was not stored."""
     is_stored = name_of(f.id, "value_by_level") in f.record
     return f.fact("value_by_level") if is_stored else []
 
 
-def _is_on_the_mesh(f: Found, check: ValueCheck) -> bool:
-    """Say whether a number is of events that are left to the mesh."""
+def _is_on_the_mesh(f: MemberFacts, check: ValueCheck) -> bool:
+    """Say whether a number depends on events that are left to the mesh."""
     options = options_of(f.experiment, columns_of(f.record), f.scheme, f.case)
     return check.number.needs_events and is_on_the_mesh(options)
 
 
-def advice_on_bound(f: Found, check: ValueCheck) -> str:
-    """Say what to change where no finer level can bound the error of a number; empty elsewhere."""
+def advice_on_bound(f: MemberFacts, check: ValueCheck) -> str:
+    """Say what to change if no finer level can bound the error of a number; empty otherwise."""
     if _is_on_the_mesh(f, check):
         return f"Set `events: located` for scheme {f.scheme_name}."
     if np.isfinite(_pulse_time(f)):
@@ -466,7 +466,7 @@ def advice_on_bound(f: Found, check: ValueCheck) -> str:
         return f"Give {LEAST_PERIODS} or more `periods:`."
     numbers = np.array(_by_level_of(f))
     bound = f.fact("error_bound")
-    # without a bound, what is asked is so far away that the levels do not decide
+    # without a bound, use the distance from the target
     away = bound if np.isfinite(bound) else _room(check, f.fact("value"))
     if check.number.rests_on_run and STILL_TO_CHANGE * _last_change(numbers) < away:
         key = "periods" if f.experiment.time.periods is not None else "end"
@@ -474,44 +474,44 @@ def advice_on_bound(f: Found, check: ValueCheck) -> str:
     return ""
 
 
-def _pulse_time(f: Found) -> float:
-    """Return when the force has a pulse that no level sees; NaN where there is none."""
+def _pulse_time(f: MemberFacts) -> float:
+    """Return the time of a pulse of the force that no level sees; NaN if there is none."""
     return float(f.record["pulse_time"][f.case]) if "pulse_time" in f.record else math.nan
 
 
-def _has_few_periods(f: Found, check: ValueCheck) -> bool:
-    """Say whether a run is too short to tell a steady motion from what is left of its start."""
+def _has_few_periods(f: MemberFacts, check: ValueCheck) -> bool:
+    """Say whether a run is too short to distinguish a steady motion from the transient."""
     periods, row = f.experiment.time.periods, check.number
     is_steady = row.needs_force and row.rests_on_run
     return is_steady and periods is not None and periods < LEAST_PERIODS
 
 
-def finer_levels(f: Found, count: int = FINER) -> str:
-    """Ask for so many finer levels, with what they cost; from the second letter on."""
+def finer_levels(f: MemberFacts, count: int = FINER) -> str:
+    """Ask for `count` finer levels, with their cost; the text starts with the second letter."""
     return add_levels(f.experiment.levels[-1], count, partial(cost_in_words, f.experiment))
 
 
-def _levels_to_add(f: Found, check: ValueCheck) -> int:
-    """Return how many finer levels make a number as asked if its changes fall on as the last two did."""
+def _levels_to_add(f: MemberFacts, check: ValueCheck) -> int:
+    """Return how many finer levels a number needs to meet the check if its changes continue to fall as the last two."""
     numbers = _by_level_of(f)
     if len(numbers) < LEVELS_OF_AN_ORDER:
         return FINER
-    before, last = np.diff(numbers[-3:])
-    fall = last / before if before else 0.0
+    previous, last = np.diff(numbers[-3:])
+    fall = last / previous if previous else 0.0
     if not 0.0 < fall < 1.0:
         return FINER
     steps = np.arange(1, MOST_FINER + 1)
     left = last * on_arrays.power(fall, steps + 1) / (1.0 - fall)
     limit = numbers[-1] + last * fall / (1.0 - fall)
-    # a number that is to equal another one must change by less than it may be off
+    # for an expected value, the remaining change must be within the tolerance
     enough = (
         compare(check, limit - left)[0] if check.equals is None else np.abs(left) <= check.allowed
     )
     return int(steps[np.argmax(enough)]) if np.any(enough) else FINER
 
 
-def _on_mismatch(f: Found, check: ValueCheck) -> str:
-    """Say what to change where a number is another one; finer levels only where they change it enough."""
+def _on_mismatch(f: MemberFacts, check: ValueCheck) -> str:
+    """Say what to change if a number misses the check; finer levels only if they may change it enough."""
     is_printed = f.id.startswith("published_")
     change = f"hange `{'printed' if is_printed else border(check)[0]}:`"
     if check.number.is_count_of_work or not check.number.depends_on_level:
@@ -532,18 +532,18 @@ def _on_mismatch(f: Found, check: ValueCheck) -> str:
     return f"A{finer_levels(f, count)}{ask}, or c{change}."
 
 
-def _is_unsteady(f: Found, check: ValueCheck) -> bool:
-    """Tell whether a number itself says that the motion is not steady."""
+def _is_unsteady(f: MemberFacts, check: ValueCheck) -> bool:
+    """Tell whether the number itself shows that the motion is not steady."""
     if check.value == "section_period":
         return bool(f.fact("value") == 0)
     return check.value == "steady_change"
 
 
 def _at(check: ValueCheck, level: int) -> str:
-    """Write where a number is taken, at a finer level: a step there is the same time."""
-    found: dict[str, Any] = {"level": level}
+    """Write `at:` of a check for a finer level, where the step is converted to the same time."""
+    place: dict[str, Any] = {"level": level}
     if check.at.step is not None and isinstance(check.at.level, int):
-        found["step"] = check.at.step * 2 ** (level - check.at.level)
-    found |= {key: getattr(check.at, key) for key in ("t", "event", "scheme", "case")}
-    pairs = (f"{key}: {value}" for key, value in found.items() if value is not None)
+        place["step"] = check.at.step * 2 ** (level - check.at.level)
+    place |= {key: getattr(check.at, key) for key in ("t", "event", "scheme", "case")}
+    pairs = (f"{key}: {value}" for key, value in place.items() if value is not None)
     return f"{{{', '.join(pairs)}}}"

@@ -1,7 +1,7 @@
-"""The verdict on a check in words: what decides it, of how many results that is so, and what to change.
+"""The verdict on a check in words: the result that decides it, the counts, and what to change.
 
-Everything is made from facts: those of the summary, or of a verdict, and the variables of ``convergence.nc``. The
-sentence on a result is chosen by its reason, in the module of its kind of check.
+The text is made from facts: those of the summary or of a verdict, and the variables of ``convergence.nc``. The module
+of each kind of check chooses the sentence on a result by its reason.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from vibsim.checks import accurate, equal, experiment_tolerance, value
 from vibsim.checks.kinds import KINDS
 from vibsim.checks.notation import PLAIN, Notation
 from vibsim.checks.outcome import Result, compared_reason, truth
-from vibsim.checks.sentences import Description, Found
+from vibsim.checks.sentences import Description, MemberFacts
 from vibsim.core.record import Record
 from vibsim.core.vocabulary import BY_TOLERANCE, worst
 from vibsim.experiment import Experiment
@@ -25,7 +25,7 @@ CORRECT = "Correct `expect:`, or find out why the outcome differs."
 
 
 def expectation(experiment: Experiment, check: Check | None, notation: Notation = PLAIN) -> str:
-    """Say what a check expects; None stands for the tolerance of the experiment."""
+    """Say what a check expects; None is the tolerance of the experiment."""
     if check is None:
         return experiment_tolerance.rule(experiment, notation)
     match check.kind:
@@ -68,7 +68,7 @@ class Wording:
 
     def _describe(self, result: Result) -> Description:
         record, check = self.record, self._measured
-        found = Found(
+        found = MemberFacts(
             self.experiment,
             record,
             check,
@@ -85,25 +85,25 @@ class Wording:
         )
 
     def sentence(self, result: Result) -> str:
-        """Say what was measured of one result."""
+        """Return the sentence on one result."""
         return self._describe(result).sentence
 
     def brief(self, result: Result) -> str:
-        """Say in a few words what was measured of one result."""
+        """Return a short text on one result."""
         description = self._describe(result)
         return description.brief or description.sentence.removesuffix(".")
 
     def text(self, result: Result, counts: Mapping[str, int], where: Mapping[str, Any]) -> str:
-        """Say what was measured where it decides, and of how many results that is so.
+        """Return the text on all results: the counts, and the sentence on the result that decides.
 
         Parameters
         ----------
         result
-            The one that decides: the worst.
+            The worst result, which decides.
         counts
-            Number of results by status, compared with what was expected.
+            Number of results by status, after comparison with the expectation.
         where
-            Where in a sweep those of a status lie (`vibsim.checks.sweep_regions`).
+            Where in a sweep the results of each status lie (`vibsim.checks.sweep_regions`).
         """
         check, status, total = self._measured, _status(counts), sum(counts.values())
         sentence = self.sentence(result)
@@ -137,7 +137,7 @@ class Wording:
         return f"The statement {decided}. {sentence}"
 
     def _swept_values(self) -> str:
-        """Name the swept values of the members that the check is about; empty where it is about every one."""
+        """Name the swept values that the check is restricted to; empty if it covers all members."""
         return self._listed({} if self._measured is None else self._measured.swept)
 
     def _listed(self, swept: Mapping[str, Any]) -> str:
@@ -147,7 +147,7 @@ class Wording:
         )
 
     def _place(self, result: Result, brackets: bool = False) -> str:
-        """Name the scheme, and of a sweep the member with its swept values, these perhaps in brackets."""
+        """Name the scheme and, in a sweep, the member with its swept values."""
         head, place = f"scheme {result.scheme}", self.record.place("case", result.case)
         listed = self._listed({key: x[place] for key, x in columns_of(self.record).items()})
         if not listed:
@@ -155,7 +155,7 @@ class Wording:
         return f"{head}, case {result.case}{f' ({listed})' if brackets else f', {listed}'}"
 
     def advice(self, status: str, result: Result, counts: Mapping[str, int]) -> str:
-        """Say what to change in the YAML; empty for a check whose status is PASS."""
+        """Say what to change in the YAML; empty for PASS."""
         if status == "PASS":
             return ""
         if _status(counts) != "PASS":

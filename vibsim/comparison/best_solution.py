@@ -1,4 +1,4 @@
-"""``best.nc``: the best solution that a ladder holds, extrapolated over all its levels, with a bound of its error."""
+"""``best.nc``: the best solution of a ladder, extrapolated over all its levels, with a bound of its error."""
 
 from __future__ import annotations
 
@@ -28,11 +28,11 @@ from vibsim.simulation.members import Members, members
 from vibsim.simulation.scaled import in_scales
 
 REACHED = ("no", "yes")
-"""Meaning of the variable ``reached``."""
+"""Meanings of the values of the variable ``reached``."""
 
 
 def best_record(experiment: Experiment, records: Mapping[int, Record]) -> Record:
-    """Extrapolate the solution of every scheme with equal steps, and every member, over all levels.
+    """Extrapolate the solution of each scheme with equal steps and each member over all levels.
 
     Parameters
     ----------
@@ -42,15 +42,15 @@ def best_record(experiment: Experiment, records: Mapping[int, Record]) -> Record
     Returns
     -------
     Record
-        What ``best.nc`` holds: dims scheme, case, t; every state, and ``<state>_error``, the bound of its error;
-        ``level_first`` and ``level_last``, between which the levels lie that were used; where the experiment has a
-        tolerance, ``reached(scheme, case)``: whether no bound exceeds it. The numbers of a member do not depend on the
-        others in the Records.
+        The contents of ``best.nc``: dims scheme, case, t; each state, and ``<state>_error``, the bound of its error;
+        ``level_first`` and ``level_last``, the range of the used levels; if the experiment has a tolerance,
+        ``reached(scheme, case)``: whether no bound exceeds it. The numbers of a member do not depend on the others in
+        the Records.
 
     Raises
     ------
     VibsimError
-        Where the Records do not belong together, or have no times in common.
+        If the Records do not belong together, or have no common times.
     """
     grid = common_grid(records)
     check_belonging(experiment, records)
@@ -63,21 +63,21 @@ def best_record(experiment: Experiment, records: Mapping[int, Record]) -> Record
 def extrapolated(
     experiment: Experiment, records: Mapping[int, Record], grid: Grid
 ) -> list[Extrapolated]:
-    """Extrapolate level Records over all levels, at their common times: one row for each scheme of the ladder."""
+    """Extrapolate level Records over all levels, at their common times; return one row per scheme of the ladder."""
     finest = records[grid.levels[-1]]
     group = members(experiment, int(finest["case"][0]), int(finest["case"][-1]) + 1)
     states = [state.name for state in experiment.model.definition.states]
     levels = [tuple(take(grid, records[level], name) for name in states) for level in grid.levels]
-    every = [grid.stride * n // grid.steps[0] for n in grid.steps]
+    strides = [grid.stride * n // grid.steps[0] for n in grid.steps]
     t = (np.arange(len(grid.t)) * grid.stride / grid.steps[0])[:, None]
     rows = []
     for i in experiment.ladder:
         parts = []
         for method, start, where in starts(experiment, i, group):
-            # in memory time comes first, and all members are taken without a copy
-            some = slice(None) if len(where) == len(group.end) else where
-            pairs: list[Pair] = [(u[i].T[:, some], v[i].T[:, some]) for u, v in levels]
-            noise = noise_of(method, start, grid.steps, every, pairs)
+            # time is outermost in memory; a slice of all members avoids a copy
+            columns = slice(None) if len(where) == len(group.end) else where
+            pairs: list[Pair] = [(u[i].T[:, columns], v[i].T[:, columns]) for u, v in levels]
+            noise = noise_of(method, start, grid.steps, strides, pairs)
             parts.append((extrapolate_members(method, start, grid.steps, t, pairs, noise), where))
         rows.append(in_order(parts))
     model = experiment.model.definition
@@ -85,37 +85,37 @@ def extrapolated(
         return rows
     corners = corners_of(model, finest, group, grid.dt[0])
     unseen = corners.unseen(group.end, grid.steps, np.asarray(finest["omega_dt"]))
-    return [_beside(row, unseen[i]) for row, i in zip(rows, experiment.ladder, strict=True)]
+    return [_widened(row, unseen[i]) for row, i in zip(rows, experiment.ladder, strict=True)]
 
 
-def _beside(row: Extrapolated, part: Floats) -> Extrapolated:
-    """Add to the bounds of a scheme a part of the size of each state, shape (case,)."""
+def _widened(row: Extrapolated, share: Floats) -> Extrapolated:
+    """Add a share, of shape (case,), of the size of each state to its bounds."""
     return replace(
         row,
-        position_error=row.position_error + part * np.max(np.abs(row.position), axis=0),
-        velocity_error=row.velocity_error + part * np.max(np.abs(row.velocity), axis=0),
+        position_error=row.position_error + share * np.max(np.abs(row.position), axis=0),
+        velocity_error=row.velocity_error + share * np.max(np.abs(row.velocity), axis=0),
     )
 
 
 def starts(
     experiment: Experiment, scheme: int, group: Members
 ) -> Iterator[tuple[Method, Start, Integers]]:
-    """Yield the methods of one scheme, which differ where options are swept, with the members that have each."""
+    """Yield each method of one scheme with its members; there are several if options are swept."""
     model, method = experiment.model.definition, experiment.schemes[scheme].method
     initial = np.stack([group.initial[state.name] for state in model.states], axis=-1)
     frequency = np.asarray(model.natural_frequency(group.parameters))
-    every = Start(
+    all_members = Start(
         group.numbers(model), initial, group.end, np.broadcast_to(frequency, group.end.shape)
     )
-    for options, where in sweep_columns.option_groups(experiment, scheme, group.columns):
-        yield Method(model, method, options), every.of(where), where
+    for options, indices in sweep_columns.option_groups(experiment, scheme, group.columns):
+        yield Method(model, method, options), all_members.of(indices), indices
 
 
 def in_order(parts: Sequence[tuple[Extrapolated, Integers]]) -> Extrapolated:
-    """Put members that were stepped with different options where they belong."""
+    """Join members that ran with different options, in their original order."""
     if len(parts) == 1:
         return parts[0][0]
-    order = np.argsort(np.concatenate([where for _, where in parts]))
+    order = np.argsort(np.concatenate([indices for _, indices in parts]))
     return join_members([part for part, _ in parts], order)
 
 
@@ -125,7 +125,7 @@ def record_of(
     coords: Mapping[str, Variable],
     rows: Sequence[Extrapolated],
 ) -> Record:
-    """Name what was extrapolated, one row for each scheme."""
+    """Return the Record of extrapolated solutions, one row for each scheme."""
     model = experiment.model.definition
     coords_of_best = {
         name: v for name, v in coords.items() if v.dims in (("scheme",), ("case",), ("t",))
@@ -144,8 +144,8 @@ def record_of(
         add(state.name, (getattr(row, field) for row in rows), words, state.unit)
     for state, field in states:
         words = f"{state.long_name}: bound of the error of the extrapolation"
-        found = (getattr(row, f"{field}_error") for row in rows)
-        add(f"{state.name}_error", found, words, state.unit)
+        bounds = (getattr(row, f"{field}_error") for row in rows)
+        add(f"{state.name}_error", bounds, words, state.unit)
     numbers = np.array([*levels, -1], dtype=np.int8)
     for name, words in (("first", "coarsest"), ("last", "finest")):
         words = f"{words} level used for the {model.states[0].long_name}, -1 for none"
@@ -157,9 +157,9 @@ def record_of(
             f"whether every bound of the member is at most {tolerance:g} in the unit of its state"
         )
         variables["reached"] = Variable.of(MEMBER, reached.astype(np.int8), text, **flags(REACHED))
-    about: dict[str, Attribute] = {
+    attributes: dict[str, Attribute] = {
         "title": experiment.title,
         "model": model.kind,
         "levels": list(levels),
     }
-    return in_scales(Record(coords_of_best, variables, about), experiment)
+    return in_scales(Record(coords_of_best, variables, attributes), experiment)

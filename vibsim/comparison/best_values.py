@@ -1,8 +1,8 @@
-"""The most accurate value of every number that a ladder holds: extrapolated, with a bound of its error.
+"""The most accurate value of each number of a ladder: extrapolated, with a bound of its error.
 
-Numbers are those that a ``value`` check may ask for at ``level: best``. Each is worked out at every level first
-(`vibsim.comparison.value_numbers`), and its limit taken from these (`vibsim.convergence.number_extrapolation`): an
-extrapolated solution has no peaks of its own. Beside the bound stands the grid convergence index of the finest level
+The numbers are those that a ``value`` check may use at ``level: best``. Each is computed at all levels
+(`vibsim.comparison.value_numbers`) and then extrapolated (`vibsim.convergence.number_extrapolation`), since the peaks
+of an extrapolated solution are meaningless. The grid convergence index of the finest level is added
 (`vibsim.convergence.gci`).
 """
 
@@ -21,7 +21,7 @@ from vibsim.comparison import value_numbers
 from vibsim.comparison.comparison_variables import Table
 from vibsim.comparison.extremum_of_levels import extremum_of_levels
 from vibsim.comparison.quantity_comparison import Compared
-from vibsim.comparison.thresholds import IRREGULAR, OF_A_LINE, OF_GRID, OF_PARABOLA
+from vibsim.comparison.thresholds import ERROR_OF_LINE, IRREGULAR, ORDER_OF_GRID, ORDER_OF_PARABOLA
 from vibsim.convergence import gci
 from vibsim.convergence.differences import safe_ratio
 from vibsim.convergence.ladder_blocks import batches
@@ -35,53 +35,54 @@ from vibsim.observe import oscillation, spectrum, steady_state
 from vibsim.observe.member_block import MemberBlock
 from vibsim.schemes.orders import depends_on_velocity, is_autonomous
 
-OF_PEAK_TIMES = (
+FROM_PEAK_TIMES = (
     "period", "period_error", "frequency", "error_of_frequency", "phase_error_per_period"
 )  # fmt: skip
-"""Numbers that are worked out from the times of peaks, but for those of a recurrence."""
+"""Numbers computed from the times of peaks, unless the motion has a recurrence."""
 
 
 @dataclass(frozen=True)
 class Scalar:
-    """A number of every scheme and member that has a limit."""
+    """A number of each scheme and member that has a limit."""
 
     variable: str  # name in the convergence Record
     value: str  # name among `vibsim.experiment.value_names.VALUES`
-    quantity: str  # empty where it is of none
+    quantity: str  # empty if it belongs to none
     units: str
     words: str
 
 
 def value(name: str, place: value_numbers.Place) -> tuple[Floats, Floats, Floats]:
-    """Return the number `name` at `place`, the bound of its error, and what of that no level shows, (scheme, case).
+    """Return the number `name` at `place`, the bound of its error, and the part of it that no level shows.
 
-    The bound is NaN where the number is not a limit, or its levels bound nothing; infinite where no level can.
+    Each has the shape (scheme, case). The bound is NaN if the number is not a limit or the levels give no bound, and
+    infinite if no levels can give one.
     """
     if not VALUES[name].has_limit(place.level):
         return value_numbers.value(name, place), place.missing, np.zeros(place.block.shape)
     ladder = _ladder(name, place)
-    found = ladder.limit()
-    # what is no smaller than 0 has no smaller limit
+    best = ladder.limit()
+    # an absolute value has no negative limit
     least = 0.0 if name == "max_abs" else -np.inf
-    return np.maximum(found.value, least), found.bound, ladder.missed
+    return np.maximum(best.value, least), best.bound, ladder.missed
 
 
 @dataclass(frozen=True)
 class _Ladder:
-    """A number at every level, and what is promised of it; shapes (scheme, case, level) and (scheme, case)."""
+    """A number at each level, and its promised order; shapes (scheme, case, level) and (scheme, case)."""
 
     levels: tuple[int, ...]
-    values: Floats  # NaN for schemes that have no levels
+    values: Floats  # NaN for adaptive schemes, which have no levels
     order: Floats
     even: Flags
     floor: Floats
-    size: Floats  # that such a number has: of the solution, or of the number itself
-    missed: Floats  # what no level shows: of an extremum between points, of a corner of the force; may be infinite
-    safety: Floats  # on the bound
-    of_series: Floats  # of a sample its value and bound in the extrapolated series, (..., 2); NaN of all else
+    size: Floats  # size of the solution, or of the number itself
+    missed: Floats  # error that no level shows: of an extremum between points, of a corner of the force; or infinite
+    safety: Floats  # factor on the bound
+    of_series: Floats  # value and bound of a sample in the extrapolated series, (..., 2); NaN for other numbers
 
     def limit(self) -> Limit:
-        """Return the limit; where its ladder bounds a sample, that of the series if this bounds it more closely."""
+        """Return the limit, with a bound that includes `missed`; or that of the series, if closer."""
         found = limit(self.values, self.levels, self.order, self.even, self.floor)
         bound = self.safety * found.bound + self.missed
         value, least = np.moveaxis(self.of_series, -1, 0)
@@ -120,15 +121,15 @@ def _ladder(name: str, place: value_numbers.Place) -> _Ladder:
     if row.measured_by == "points":
         values, error, is_smooth = extremum_of_levels(name, place, values, floor, size, order)
         missed = missed + error
-        order = np.where(is_smooth, order, np.minimum(order, OF_GRID))
+        order = np.where(is_smooth, order, np.minimum(order, ORDER_OF_GRID))
         even = even & is_smooth
-    if name in OF_PEAK_TIMES:
+    if name in FROM_PEAK_TIMES:
         missed = missed + _error_of_period(place) * size
     if row.rests_on_run:
         missed = missed + _of_run(name, place)
     safety = np.broadcast_to(block.safety(IRREGULAR), size.shape)
     if row.needs_events:
-        # an event on the mesh is late by an accident
+        # how late an event on the mesh is depends on the mesh by accident
         missed = np.where(np.isnan(block.left_to_the_mesh), missed, np.inf)
     missed = np.where(np.isfinite(block.missed.time), np.inf, missed)
     of_series = np.full((*size.shape, 2), np.nan)
@@ -138,7 +139,7 @@ def _ladder(name: str, place: value_numbers.Place) -> _Ladder:
 
 
 def _stacked(rows: Sequence[_Ladder]) -> _Ladder:
-    """Return ladders of the same levels as one, along a new first axis."""
+    """Stack ladders of the same levels along a new first axis."""
     _, *names = vars(rows[0])
     return _Ladder(rows[0].levels, *(np.stack([getattr(r, name) for r in rows]) for name in names))
 
@@ -146,9 +147,8 @@ def _stacked(rows: Sequence[_Ladder]) -> _Ladder:
 def _error_of_period(place: value_numbers.Place) -> Floats:
     """Return the relative error of a period that is the mean time between peaks, shape (scheme, case).
 
-    A peak is where the straight line between two velocities is 0, which is off by ``dt^2/8 |u'''/u''|`` at most. That
-    vanishes with the velocity where a force of the position alone acts; else the rate of the damping and the frequency
-    bound the quotient.
+    A peak is the zero of the straight line between two velocities, with an error of at most ``dt^2/8 |u'''/u''|``. That
+    vanishes if the force depends only on the position; otherwise the damping rate and the frequency bound the quotient.
     """
     block, model = place.block, place.block.model
     if model.is_alone and is_autonomous(model) and not depends_on_velocity(model):
@@ -159,12 +159,12 @@ def _error_of_period(place: value_numbers.Place) -> Floats:
     dt = block.group.end / block.grid.steps[-1]
     with np.errstate(invalid="ignore", divide="ignore"):
         rate = block.decay + 2.0 * np.pi / period
-        error_of_peak = rate * OF_A_LINE * dt**2
+        error_of_peak = rate * ERROR_OF_LINE * dt**2
         return np.asarray(2.0 * error_of_peak / (count * period))
 
 
 def _of_run(name: str, place: value_numbers.Place) -> Floats:
-    """Return how far a number may be off because the run is no longer, shape (scheme, case)."""
+    """Return the error of a number due to the finite length of the run, shape (scheme, case)."""
     at = place.block, place.levels[-1], place.quantity
     if name == "peak_frequency":
         return spectrum.error_by_other_lines(*at)
@@ -173,7 +173,7 @@ def _of_run(name: str, place: value_numbers.Place) -> Floats:
 
 
 def _promised(name: str, place: value_numbers.Place) -> tuple[Floats, Flags]:
-    """Return the order that a number should have, and whether its powers are even, shape (scheme, case)."""
+    """Return the promised order of a number, and whether its powers are even, shape (scheme, case)."""
     block, experiment = place.block, place.block.experiment
     quantity = place.quantity or block.model.position
     if name == "relative_energy_error":
@@ -181,14 +181,14 @@ def _promised(name: str, place: value_numbers.Place) -> tuple[Floats, Flags]:
     order = formal_orders(experiment, quantity, block.columns, block.eventless)
     even = even_powers(experiment, quantity, block.columns)
     if VALUES[name].measured_by == "parabola":
-        order, even = np.minimum(order, OF_PARABOLA), np.zeros_like(even)
+        order, even = np.minimum(order, ORDER_OF_PARABOLA), np.zeros_like(even)
     elif name == "relative_energy_error":
-        order, even = np.minimum(order, OF_GRID), np.zeros_like(even)
+        order, even = np.minimum(order, ORDER_OF_GRID), np.zeros_like(even)
     return np.broadcast_to(order, block.shape), np.broadcast_to(even, block.shape)
 
 
 def _size(name: str, place: value_numbers.Place, values: Floats) -> Floats:
-    """Return the size that such a number has: of the solution, or of the number itself."""
+    """Return the size that errors are relative to: of the solution, or of the number itself."""
     finest, row = replace(place, level=place.levels[-1]), VALUES[name]
     if row.is_sample or row.measured_by == "points":
         q = place.comparison()
@@ -205,7 +205,7 @@ def _size(name: str, place: value_numbers.Place, values: Floats) -> Floats:
 
 
 def scalars(model: Model, lean: bool = False) -> tuple[Scalar, ...]:
-    """Name the numbers whose limits are kept; where storage is bounded, period and amplitude."""
+    """Return the numbers whose limits are stored: only period and amplitude if storage is bounded (`lean`)."""
     rows = [("period", "s", "period"), ("amplitude", model.states[0].unit, "amplitude")]
     if not lean:
         rows += [
@@ -213,13 +213,13 @@ def scalars(model: Model, lean: bool = False) -> tuple[Scalar, ...]:
             ("growth_per_period", "1", "growth factor per period"),
             ("relative_energy_error", "1", "max |E - E(0)| / |E(0)|"),
         ]
-    found = [Scalar(name, name, "", unit, words) for name, unit, words in rows]
-    for quantities, which in ((model.states, WORDS), (model.outputs, ("min", "max"))):
+    result = [Scalar(name, name, "", unit, words) for name, unit, words in rows]
+    for quantities, names in ((model.states, WORDS), (model.outputs, ("min", "max"))):
         for row in () if lean else quantities:
-            for w in which:
-                words = f"{row.long_name}, {WORDS[w]}"
-                found.append(Scalar(f"{row.name}_{w}", w, row.name, row.unit, words))
-    return tuple(found)
+            for name in names:
+                words = f"{row.long_name}, {WORDS[name]}"
+                result.append(Scalar(f"{row.name}_{name}", name, row.name, row.unit, words))
+    return tuple(result)
 
 
 WORDS = {"end": "at the end", "min": "least value", "max": "largest value"}
@@ -232,55 +232,55 @@ COLUMNS = {
     "first": "coarsest level used",
     "last": "finest level used",
 }
-"""What is kept along the numbers where series are kept."""
+"""Further variables for each number, stored unless storage is bounded."""
 
 
 def table(block: MemberBlock, compared: Compared) -> Table:
     """Return the limits of all numbers with their bounds, as variables of the convergence Record."""
-    found: Table = {}
-    columns_found: dict[str, list[NDArray[Any]]] = {name: [] for name in COLUMNS}
+    variables: Table = {}
+    columns_by_name: dict[str, list[NDArray[Any]]] = {name: [] for name in COLUMNS}
     levels = np.array(block.grid.levels, dtype=np.int16)
     for rows in batches(scalars(block.model, block.lean), math.prod(block.shape)):
         places = [
             value_numbers.Place(block, compared, r.quantity, "best", None, None) for r in rows
         ]
-        one = _stacked([_ladder(r.value, p) for r, p in zip(rows, places, strict=True)])
-        best = one.limit()
+        ladder = _stacked([_ladder(r.value, p) for r, p in zip(rows, places, strict=True)])
+        best = ladder.limit()
         bound = np.where(np.isinf(best.bound), np.nan, best.bound)
         numbers = {
             "richardson": (best.value, "extrapolated over the levels"),
             "richardson_error": (bound, "bound of the error of the extrapolated value"),
         }
         if not block.lean:
-            kinds = gci.classify(one.values, one.levels, one.floor)
-            index = gci.index(one.values, one.levels, one.order, kinds)
+            kinds = gci.classify(ladder.values, ladder.levels, ladder.floor)
+            index = gci.index(ladder.values, ladder.levels, ladder.order, kinds)
             numbers["gci"] = index, "grid convergence index of the finest level"
         for i, row in enumerate(rows):
             for key, (values, words) in numbers.items():
-                text, own = f"{row.words}: {words}", values[i].copy()
-                found[f"{row.variable}_{key}"] = Variable.of(MEMBER, own, text, row.units)
+                text, entry = f"{row.words}: {words}", values[i].copy()
+                variables[f"{row.variable}_{key}"] = Variable.of(MEMBER, entry, text, row.units)
         if block.lean:
             continue
         columns: tuple[NDArray[Any], ...] = (
-            one.values[..., -1],
-            gci.relative(index, one.values[..., -1], one.size),
-            observed_order(one.values, one.levels, one.floor),
+            ladder.values[..., -1],
+            gci.relative(index, ladder.values[..., -1], ladder.size),
+            observed_order(ladder.values, ladder.levels, ladder.floor),
             kinds,
             levels[best.first],
             levels[best.last],
         )
-        for column, values in zip(columns_found.values(), columns, strict=True):
+        for column, values in zip(columns_by_name.values(), columns, strict=True):
             column.extend(values)
-    for name, of_rows in columns_found.items():
-        if of_rows:
-            more = flags(gci.CLASSES) if name == "convergence" else {}
-            dims, values = ("scalar", *MEMBER), np.stack(of_rows)
-            found[f"scalar_{name}"] = Variable.of(dims, values, COLUMNS[name], **more)
-    return found
+    for name, rows_of_column in columns_by_name.items():
+        if rows_of_column:
+            attributes = flags(gci.CLASSES) if name == "convergence" else {}
+            dims, values = ("scalar", *MEMBER), np.stack(rows_of_column)
+            variables[f"scalar_{name}"] = Variable.of(dims, values, COLUMNS[name], **attributes)
+    return variables
 
 
 def coordinate(block: MemberBlock) -> Table:
-    """Return the coordinate of the numbers; empty where only their limits are kept."""
+    """Return the coordinate of the numbers; empty if only their limits are stored."""
     if block.lean:
         return {}
     names = np.array([row.variable for row in scalars(block.model)])

@@ -1,4 +1,4 @@
-"""Every quantity of a block of members, compared between its levels."""
+"""The quantities of a block of members, compared between its levels."""
 
 from __future__ import annotations
 
@@ -17,18 +17,18 @@ def comparisons(block: MemberBlock, names: tuple[str, ...]) -> Compared:
     error_parts = error_parts_to_compare(block, names)
     names = tuple(name for name in names if name not in error_parts)
     values = {name: block.series(name) for name in dict.fromkeys((*positions, *names))}
-    # of the energy what it was plus what became of it
-    became = solution_size(block.series("energy_deviation"))
-    sizes = {"energy": np.abs(energy_at_start(block.finest)) + became}
-    # what is rounded in one coordinate is felt by the others
-    whole = [block.size(name, values[name], sizes) for name in positions]
-    sizes |= {name: np.asarray(np.maximum.reduce(whole)) for name in positions}
-    found: dict[str, Comparison] = {}
+    # the size of an energy is its initial value plus its change
+    change = solution_size(block.series("energy_deviation"))
+    sizes = {"energy": np.abs(energy_at_start(block.finest)) + change}
+    # rounding of one coordinate affects the others
+    position_sizes = [block.size(name, values[name], sizes) for name in positions]
+    sizes |= {name: np.asarray(np.maximum.reduce(position_sizes)) for name in positions}
+    compared: dict[str, Comparison] = {}
     for name in names:
         scale = block.size(name, values[name], sizes)
         floor = block.floor_of(name, scale)
         attrs = block.finest.variables[name].attrs if name in block.finest else {}
-        found[name] = Comparison(
+        compared[name] = Comparison(
             block=block,
             name=name,
             long_name=str(attrs.get("long_name", name)),
@@ -40,4 +40,4 @@ def comparisons(block: MemberBlock, names: tuple[str, ...]) -> Compared:
             scale=scale,
             blur=np.zeros_like(floor),
         )
-    return found | parts_of_errors(block, found, error_parts)
+    return compared | parts_of_errors(block, compared, error_parts)

@@ -1,4 +1,4 @@
-"""What is kept of a comparison, as variables of the convergence Record."""
+"""The variables of the convergence Record that hold comparisons."""
 
 from __future__ import annotations
 
@@ -38,13 +38,13 @@ PROMISED_ORDER = "order that the scheme promises, infinite for what is exact"
 LEAST_ORDER = (
     "order that the scheme promises for the position, at least that of a part of its error"
 )
-"""What is said of the order of a part of an error of which theory says nothing."""
+"""Long name of the order of a part of an error for which theory makes no promise."""
 NORM, KNOWN = "_error_norm", "_error_known"
-"""What follows the name of a quantity in the names of the norms of its true error, and of whether one is known."""
+"""Suffixes of a quantity for the norms of its true error, and for whether one is known."""
 
 
 def _adder(table: Table, q: Comparison) -> Add:
-    """Return the function that puts values into a table under the quantity's name, in its unit if no other is given."""
+    """Return a function that adds a variable of the quantity to a table, by default in the unit of the quantity."""
 
     def add(
         name: str, dims: tuple[str, ...], values: NDArray[Any], words: str, units: str = q.units
@@ -59,27 +59,27 @@ def _adder(table: Table, q: Comparison) -> Add:
 
 
 def numbers(q: Comparison) -> Table:
-    """Return the numbers that a quantity is compared by: norms, orders, bounds.
+    """Return the norms, orders and bounds of a quantity.
 
-    Where storage is bounded, ratios and coincidence are in single precision.
+    Ratios and coincidence are in single precision if storage is bounded.
     """
     table: Table = {}
     add = _adder(table, q)
     block, levels = q.block, len(q.block.grid.levels)
-    of_level, of_triple = OF_LEVEL, (*MEMBER, "triple", "norm")
+    level_dims, triple_dims = OF_LEVEL, (*MEMBER, "triple", "norm")
 
-    def stacked(of: Callable[[str], Floats]) -> Floats:
-        return np.stack([of(norm) for norm in block.norms], axis=-1)
+    def over_norms(number: Callable[[str], Floats]) -> Floats:
+        return np.stack([number(norm) for norm in block.norms], axis=-1)
 
     words = "true error in a norm over time"
-    add("error_norm", (*of_level, "norm"), stacked(lambda n: q.in_norm(n).error), words)
+    add("error_norm", (*level_dims, "norm"), over_norms(lambda n: q.in_norm(n).error), words)
     words = "true error of the extrapolation in a norm over time"
-    found = stacked(lambda n: q.in_norm(n).extrapolation)
-    add("richardson_error_norm", (*MEMBER, "norm"), found, words)
+    norms = over_norms(lambda n: q.in_norm(n).extrapolation)
+    add("richardson_error_norm", (*MEMBER, "norm"), norms, words)
     if block.lean:
         words = "largest error bound of the extrapolation"
         add("richardson_error_max", MEMBER, q.largest_bound, words)
-    add("floor", of_level, q.floor, "predicted round-off")
+    add("floor", level_dims, q.floor, "predicted round-off")
     is_due = not is_error_part(q.name) or is_promised(block.experiment, q.name)
     words = f"{q.long_name}: {PROMISED_ORDER if is_due else LEAST_ORDER}"
     dims: tuple[str, ...] = MEMBER[:1]
@@ -88,18 +88,18 @@ def numbers(q: Comparison) -> Table:
         dims, orders = MEMBER, np.broadcast_to(q.order, block.shape)
     table[f"{q.name}_formal_order"] = Variable.of(dims, orders, words, promised=int(is_due))
     if levels > 1:
-        found = stacked(lambda n: q.in_norm(n).difference)
-        add("difference_norm", (*MEMBER, "pair", "norm"), found, "difference in a norm over time")
+        norms = over_norms(lambda n: q.in_norm(n).difference)
+        add("difference_norm", (*MEMBER, "pair", "norm"), norms, "difference in a norm over time")
     if levels > 2:
         words = "ratio of successive differences in a norm over time"
-        add("ratio_norm", of_triple, in_precision(q, stacked(q.ratios)), words, "1")
-        add("observed_order", of_triple, stacked(q.observed_orders), "observed order", "1")
+        add("ratio_norm", triple_dims, in_precision(q, over_norms(q.ratios)), words, "1")
+        add("observed_order", triple_dims, over_norms(q.observed_orders), "observed order", "1")
         words = "relative distance of the rescaled differences"
-        add("coincidence", of_triple[:-1], in_precision(q, q.coincidence), words, "1")
+        add("coincidence", triple_dims[:-1], in_precision(q, q.coincidence), words, "1")
     if levels > 1 and not block.lean:
         words = "grid convergence index of the finest level in a norm over time"
-        found = stacked(lambda n: _index(q, n, q.in_norm(n).difference[..., -1]))
-        add("gci_norm", (*MEMBER, "norm"), found, words)
+        norms = over_norms(lambda n: _index(q, n, q.in_norm(n).difference[..., -1]))
+        add("gci_norm", (*MEMBER, "norm"), norms, words)
     return table
 
 
@@ -119,9 +119,9 @@ def _index(q: Comparison, norm: str, change: Floats) -> Floats:
 
 
 def in_precision(q: Comparison, values: Floats) -> NDArray[np.floating]:
-    """Return ratios and orders in the type in which they are kept: infinite where they are beyond its range."""
+    """Return ratios and orders in the type that is stored; infinite if they exceed its range."""
     with np.errstate(over="ignore"):
-        # seven digits are more than they have
+        # single precision has more digits than they need
         return values.astype(np.float32 if q.block.lean else np.float64)
 
 
@@ -151,10 +151,10 @@ def _pairs(q: Comparison, add: Add) -> None:
     unknown = [np.full_like(x, np.nan) for x in d]
     rescaled = [x * differences.rescaling(p, levels[: i + 2]) for i, x in enumerate(d)]
     errors = unknown if q.errors is None else q.errors[:-1]
-    # where a difference passes zero, the error does not
-    around = np.where(np.isfinite(d[-1]), differences.local_scale(d[-1]), np.nan)
+    # the error need not cross zero where the difference does
+    local_size = np.where(np.isfinite(d[-1]), differences.local_scale(d[-1]), np.nan)
     words = "grid convergence index of the finest level"
-    add("gci", SERIES, _index(q, TYPICAL_NORM, around), words)
+    add("gci", SERIES, _index(q, TYPICAL_NORM, local_size), words)
     add("difference", dims, np.stack(d, 2), "level minus next level")
     add("rescaled", dims, np.stack(rescaled, 2), "difference, rescaled")
     add("error_estimate", dims, np.stack(estimates(q), 2), "estimated error")
@@ -162,7 +162,7 @@ def _pairs(q: Comparison, add: Add) -> None:
 
 
 def estimates(q: Comparison) -> list[Floats]:
-    """Return the estimated error of every level but the finest, each of shape (scheme, case, t)."""
+    """Return the estimated error of each level but the finest, each of shape (scheme, case, t)."""
     levels, p = q.block.grid.levels, q.order[..., None]
     return [
         x * differences.error_factor(p, levels[i + 1] - levels[i])
@@ -171,7 +171,7 @@ def estimates(q: Comparison) -> list[Floats]:
 
 
 def _triples(q: Comparison, add: Add) -> None:
-    """Add ratios, and the order of every triple as a function of time, with its interval, in single precision."""
+    """Add ratios, and the order of each triple as a function of time with its interval, in single precision."""
     grid, dims = q.block.grid, (*MEMBER, "triple", "t")
     counts = window_points(ORDER_WINDOW * period_scale(q.block), grid.spacing, len(grid.t))
     floor = [q.floor[..., i] + q.floor[..., i + 1] for i in range(len(q.differences))]
@@ -184,28 +184,28 @@ def _triples(q: Comparison, add: Add) -> None:
     add("ratio", dims, np.stack(ratios, 2), "ratio of successive differences", "1")
     words = "least-squares factor between successive differences"
     add("proportionality", dims[:-1], by_level(factors), words, "1")
-    of = "end of the interval of the order over time"
-    ends = {"": "order over time", "_low": f"lower {of}", "_high": f"upper {of}"}
+    text = "end of the interval of the order over time"
+    ends = {"": "order over time", "_low": f"lower {text}", "_high": f"upper {text}"}
     for k, (end, words) in enumerate(ends.items()):
-        found = np.stack([row[k] for row in orders], 2).astype(np.float32)
-        add(f"local_order{end}", dims, found, words, "1")
+        values = np.stack([row[k] for row in orders], 2).astype(np.float32)
+        add(f"local_order{end}", dims, values, words, "1")
 
 
 def known_errors(record: Record) -> dict[str, Variable]:
-    """Return of each quantity of a convergence Record whether a true error is known at some level.
+    """Return for each quantity of a convergence Record whether a true error is known at any level.
 
-    It is `<q>_error_known` over ``scheme, case``, of every q with `<q>_error_norm`: all that verdicts need of norms.
+    This is `<q>_error_known` over ``scheme, case`` for each q with `<q>_error_norm`. Verdicts need no more of norms.
     """
-    found, words = {}, "whether a true error is known"
+    table, words = {}, "whether a true error is known"
     for name, norms in record.variables.items():
         if norms.dims[:2] == MEMBER and name.endswith(NORM):
             known = np.isfinite(norms.values).any(axis=tuple(range(2, norms.values.ndim)))
-            found[name.removesuffix(NORM) + KNOWN] = Variable.of(MEMBER, known, words)
-    return found
+            table[name.removesuffix(NORM) + KNOWN] = Variable.of(MEMBER, known, words)
+    return table
 
 
 def has_exact(record: Record, quantity: str, scheme: int, case: int) -> bool:
-    """Tell whether a true error of a quantity is known at some level."""
+    """Tell whether a true error of a quantity is known at any level."""
     name = quantity + KNOWN
     known = record.variables if name in record else known_errors(record)
     # parts of an error are measured against the motion itself

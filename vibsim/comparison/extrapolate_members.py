@@ -1,10 +1,10 @@
-"""Members extrapolated over the levels of a ladder, and what the tableau has to know about them.
+"""Members extrapolated over the levels of a ladder, and the facts about them that the tableau needs.
 
-`vibsim.convergence.state_extrapolation` chooses at every time of every member. It must know the powers in which the
-errors of a scheme expand, and how large the round-off of the levels is. Schemes predict that relative to the solution,
-from the arithmetic and the number of steps, but a motion may magnify it a millionfold: near the separatrix of the
-pendulum. So it is measured. The coarsest level is run once more in another arithmetic, which is the same method with
-other rounding errors, and the difference of the two runs says what this motion makes of them.
+`vibsim.convergence.state_extrapolation` needs the powers in which the errors of a scheme expand, and the round-off of
+the levels. Schemes predict round-off relative to the solution, from the arithmetic and the number of steps, but a
+motion may amplify it a millionfold, as near the separatrix of the pendulum. So it is measured: the coarsest level runs
+once more in another arithmetic, which is the same method with other rounding errors, and the difference of the two runs
+shows the amplification.
 """
 
 from __future__ import annotations
@@ -45,17 +45,17 @@ class Method:
 
     @cached_property
     def position_powers(self) -> tuple[int, int]:
-        """First power of the expansion of the error, and the distance to the next."""
+        """First power of the expansion of the position error, and the distance to the next power."""
         return self._powers(self.model.position, self.options)
 
     @cached_property
     def velocity_powers(self) -> tuple[int, int]:
-        """The same of the velocity before the last time."""
+        """The same for the velocity before the last time."""
         return self._powers(self.model.velocity, self._own_end())
 
     @cached_property
     def end_powers(self) -> tuple[int, int]:
-        """The same of the velocity at the last time."""
+        """The same for the velocity at the last time."""
         return self._powers(self.model.velocity, self.options)
 
     @cached_property
@@ -63,7 +63,7 @@ class Method:
         """Whether position and velocity have the same powers at all times."""
         return self.position_powers == self.velocity_powers == self.end_powers
 
-    def _others(self) -> Iterator[Options]:
+    def _variants(self) -> Iterator[Options]:
         """Yield the options with another choice of one word."""
         for option in self.scheme.words:
             for choice in option.choices:
@@ -71,9 +71,11 @@ class Method:
 
     @cached_property
     def twin(self) -> Options | None:
-        """Options of the same method with other rounding errors; None where there are none."""
+        """Options of the same method with other rounding errors, or None."""
         own = self.scheme.round_off(self.options, LONG_RUN)
-        return next((o for o in self._others() if self.scheme.round_off(o, LONG_RUN) != own), None)
+        return next(
+            (o for o in self._variants() if self.scheme.round_off(o, LONG_RUN) != own), None
+        )
 
     def tableau(self, steps: tuple[int, ...], powers: tuple[int, int]) -> Tableau:
         """Return the tableau of a quantity whose error has these powers."""
@@ -92,11 +94,11 @@ class Method:
         return p, 2 if self.scheme.has_even_powers(quantity, self.model, options) else 1
 
     def _own_end(self) -> Options:
-        """Return the options with which the last velocity is the scheme's own, as all others are."""
-        mine = self.scheme.stepper(self.options)
-        for other in self._others():
+        """Return options with which the last velocity is computed like all others."""
+        own = self.scheme.stepper(self.options)
+        for other in self._variants():
             its = self.scheme.stepper(other)
-            same = (mine.start, mine.step, mine.variant) == (its.start, its.step, its.variant)
+            same = (own.start, own.step, own.variant) == (its.start, its.step, its.variant)
             if its.end == "own" and same:
                 return other
         return self.options
@@ -111,13 +113,13 @@ class Start:
     end: Floats  # shape (case,)
     frequency: Floats  # angular frequency of small oscillations, shape (case,)
 
-    def of(self, some: Integers | slice) -> Start:
+    def of(self, subset: Integers | slice) -> Start:
         """Return the numbers of some of the members."""
-        return Start(*(values[some] for values in vars(self).values()))
+        return Start(*(values[subset] for values in vars(self).values()))
 
 
 def rate_of(start: Start) -> Floats:
-    """Return w, shape (case,): a change of the velocity is w times one of the position. At least 1 over the time."""
+    """Return the ratio w of velocity to position changes, at least 1/end, shape (case,)."""
     return np.asarray(np.fmax(start.frequency, 1.0 / start.end))
 
 
@@ -129,11 +131,11 @@ class Extrapolated:
     velocity: Floats
     position_error: Floats
     velocity_error: Floats
-    first: NDArray[np.intp]  # place of the coarsest level used for the position; -1 for none
+    first: NDArray[np.intp]  # index of the coarsest level used for the position; -1 for none
     last: NDArray[np.intp]
 
     def largest_bounds(self) -> tuple[Floats, Floats]:
-        """Return the largest bounds of position and velocity over all times, shape (case,); infinite without one."""
+        """Return the largest bounds of position and velocity over all times, shape (case,); infinite if unknown."""
 
         def largest(values: Floats, errors: Floats) -> Floats:
             is_known = np.isfinite(values) & ~np.isnan(errors)
@@ -155,7 +157,7 @@ def level_at(
 ) -> Pair:
     """Run one level; return position and velocity at every `every`-th step, each of shape (t, case).
 
-    The options of the scheme are those of the method where None.
+    The options of the scheme are those of the method by default.
     """
     run = integrate(
         method.model,
@@ -181,40 +183,39 @@ def noise_of(
     levels: Sequence[Pair],
     run: Callable[..., Pair] = level_at,
 ) -> Floats | None:
-    """Measure what the motion makes of rounding errors, relative to their prediction for a motion of size 1.
+    """Measure round-off so far, in units of its prediction for a motion of size 1.
 
     It is measured at the coarsest level that resolves the motion of the member.
 
     Parameters
     ----------
     steps, every, levels
-        Number of steps of every level, the stride of its samples, and position and velocity, each of shape (t, case).
-        The coarsest may have been sampled more often than the rest, a whole number of times.
+        Number of steps of each level, the stride of its samples, and position and velocity, each of shape (t, case).
+        Coarse levels may have an integer multiple of the samples of the finest one.
     run
         `level_at`, with threads and lane of the engine.
 
     Returns
     -------
     array
-        Shape (t, case), the largest so far; NaN where no level resolves the motion, None where the scheme has no other
-        arithmetic.
+        Shape (t, case); NaN if no level resolves the motion; None if the scheme has only one arithmetic.
     """
     if method.twin is None:
         return None
     turned = rate_of(start) * start.end
     if np.all(turned <= RESOLVED_STEP * steps[0]):
-        found = _distance_of_twin(method, start, steps[0], every[0], levels[0], run)
-        return found[:: (len(found) - 1) // (len(levels[-1][0]) - 1)]
+        distance = _distance_of_twin(method, start, steps[0], every[0], levels[0], run)
+        return distance[:: (len(distance) - 1) // (len(levels[-1][0]) - 1)]
     noise = np.full(levels[-1][0].shape, np.nan)
-    left = np.arange(len(turned))
+    unresolved = np.arange(len(turned))
     for n, stride, (u, v) in zip(steps, every, levels, strict=True):
-        is_resolved = turned[left] <= RESOLVED_STEP * n
-        now, left = left[is_resolved], left[~is_resolved]
-        if len(now):
-            part = u[:, now], v[:, now]
-            found = _distance_of_twin(method, start.of(now), n, stride, part, run)
-            noise[:, now] = found[:: (len(u) - 1) // (len(noise) - 1)]
-        if not len(left):
+        is_resolved = turned[unresolved] <= RESOLVED_STEP * n
+        resolved, unresolved = unresolved[is_resolved], unresolved[~is_resolved]
+        if len(resolved):
+            level = u[:, resolved], v[:, resolved]
+            distance = _distance_of_twin(method, start.of(resolved), n, stride, level, run)
+            noise[:, resolved] = distance[:: (len(u) - 1) // (len(noise) - 1)]
+        if not len(unresolved):
             break
     return noise
 
@@ -227,7 +228,7 @@ def _distance_of_twin(
     level: Pair,
     run: Callable[..., Pair],
 ) -> Floats:
-    """Return how far apart a level and its twin have been so far, over the predicted round-off, shape (t, case)."""
+    """Return the largest distance so far of a level from its twin, over the predicted round-off, shape (t, case)."""
     assert method.twin is not None
     twin = run(method, start, steps, every, method.twin)
     u, v = level
@@ -252,24 +253,24 @@ def extrapolate_members(
     t
         Times as fractions of the end, shape (t, 1).
     levels
-        Position and velocity of every level, each of shape (t, case).
+        Position and velocity of each level, each of shape (t, case).
     noise
-        What `noise_of` returned.
+        Result of `noise_of`.
     """
     size = max(POINTS_AT_A_TIME // len(t), 1)
-    parts = []
+    blocks = []
     for first in range(0, len(start.end), size):
-        part = slice(first, first + size)
-        some = [(np.ascontiguousarray(u[:, part]), v[:, part] + 0.0) for u, v in levels]
-        of_part = None if noise is None else noise[:, part]
-        parts.append(_extrapolate(method, start.of(part), steps, t, some, of_part))
-    return join_members(parts)
+        members = slice(first, first + size)
+        pairs = [(np.ascontiguousarray(u[:, members]), v[:, members] + 0.0) for u, v in levels]
+        block_noise = None if noise is None else noise[:, members]
+        blocks.append(_extrapolate(method, start.of(members), steps, t, pairs, block_noise))
+    return join_members(blocks)
 
 
 def join_members(
     parts: Sequence[Extrapolated], order: NDArray[np.intp] | slice = slice(None)
 ) -> Extrapolated:
-    """Return the members of all parts, in their order, or in the order that is given."""
+    """Return the members of all parts, in this order."""
     if len(parts) == 1 and isinstance(order, slice):
         return parts[0]
     names = Extrapolated.__dataclass_fields__
@@ -286,33 +287,31 @@ def _extrapolate(
     noise: Floats | None,
 ) -> Extrapolated:
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
-        known = circumstances(method, start, t, levels, noise)
+        facts = circumstances(method, start, t, levels, noise)
         powers = method.position_powers, method.velocity_powers
         if powers[0] == powers[1]:
-            both = best_entry(method.tableau(steps, powers[0]), levels, known)
-            found = [both, both]
+            both = best_entry(method.tableau(steps, powers[0]), levels, facts)
+            best = [both, both]
         else:
-            found = [
-                _one_quantity(method, steps, x, levels, i, known) for i, x in enumerate(powers)
-            ]
-        values = [found[0].position, found[1].velocity]
-        errors = [found[0].error, found[1].error + 0.0]
+            best = [_one_quantity(method, steps, p, levels, i, facts) for i, p in enumerate(powers)]
+        values = [best[0].position, best[1].velocity]
+        errors = [best[0].error, best[1].error + 0.0]
         if method.end_powers != powers[1] and t[-1, 0] == 1.0:
-            recent = {name: getattr(known, name)[-RECENT:] for name in ("phase", "noise", "spread")}
-            known = replace(known, **recent)
+            recent = {name: getattr(facts, name)[-RECENT:] for name in ("phase", "noise", "spread")}
+            facts = replace(facts, **recent)
             levels = [(u[-RECENT:], v[-RECENT:]) for u, v in levels]
-            for i, x in enumerate((powers[0], method.end_powers)):
-                end = _one_quantity(method, steps, x, levels, i, known)
+            for i, p in enumerate((powers[0], method.end_powers)):
+                end = _one_quantity(method, steps, p, levels, i, facts)
                 values[i][-1], errors[i][-1] = end[i][-1], end.error[-1]
                 if i == 0:
-                    found[0].entry[-1] = end.entry[-1]
-        row, column = np.divmod(found[0].entry.astype(np.intp), len(steps))
-        is_none = found[0].entry < 0
+                    best[0].entry[-1] = end.entry[-1]
+        row, column = np.divmod(best[0].entry.astype(np.intp), len(steps))
+        is_none = best[0].entry < 0
         return Extrapolated(
             position=values[0],
             velocity=values[1],
             position_error=errors[0],
-            velocity_error=errors[1] * known.rate,
+            velocity_error=errors[1] * facts.rate,
             first=np.where(is_none, -1, row - column),
             last=np.where(is_none, -1, row),
         )
@@ -323,16 +322,16 @@ def _one_quantity(
     steps: tuple[int, ...],
     powers: tuple[int, int],
     levels: Sequence[Pair],
-    which: int,
-    known: Circumstances,
+    state: int,
+    facts: Circumstances,
 ) -> Best:
-    """Extrapolate the position (0) or the velocity (1) by itself."""
-    alone = [(0.0 * u, v) if which else (u, 0.0 * v) for u, v in levels]
-    return best_entry(method.tableau(steps, powers), alone, known)
+    """Extrapolate the position (0) or the velocity (1) alone."""
+    alone = [(0.0 * u, v) if state else (u, 0.0 * v) for u, v in levels]
+    return best_entry(method.tableau(steps, powers), alone, facts)
 
 
 def inverse_power(x: Any, p: int) -> Any:
-    """Return x^-p by multiplication: library powers differ in the last bit."""
+    """Return x^-p by multiplication, since powers of libraries differ in the last bit."""
     product = x
     for _ in range(p - 1):
         product = product * x
@@ -342,7 +341,7 @@ def inverse_power(x: Any, p: int) -> Any:
 def circumstances(
     method: Method, start: Start, t: Floats, levels: Sequence[Pair], noise: Floats | None
 ) -> Circumstances:
-    """Return what is known of members besides their levels; arguments as for `extrapolate_members`."""
+    """Return the facts about members besides their levels; arguments as for `extrapolate_members`."""
     rate, model = rate_of(start), method.model
     size = np.zeros(len(start.end))
     for u, v in levels:
@@ -353,7 +352,7 @@ def circumstances(
     return Circumstances(
         rate=rate,
         size=size,
-        # at rest there is no error that one could not believe
+        # at rest any error is credible
         limit=np.where(
             size > 0, KNOWN_DIGIT * np.fmin(size, 0.25 * (model.turn or np.inf)), np.inf
         ),

@@ -1,4 +1,4 @@
-"""An extremum of a motion at every level: between the grid points where the motion is smooth, and how far it is off."""
+"""An extremum of a motion at each level, interpolated between grid points if the motion is smooth, and its error."""
 
 from __future__ import annotations
 
@@ -10,16 +10,16 @@ from vibsim.comparison.largest_between_samples import (
     largest_between_samples,
     rise_of_other_crests,
 )
-from vibsim.comparison.thresholds import OF_A_LINE
+from vibsim.comparison.thresholds import ERROR_OF_LINE
 from vibsim.convergence.differences import error_factor
 from vibsim.convergence.thresholds import ORDER_ABOVE_ROUND_OFF
 from vibsim.core.array_types import Flags, Floats
 from vibsim.observe.member_block import MemberBlock
 
 _UPWARD = {"min": np.negative, "max": np.positive, "max_abs": np.abs}
-"""What turns an extremum of a series into its largest value."""
+"""Functions that turn an extremum of a series into its largest value."""
 Series = dict[int, Floats]
-"""Of levels, by their positions, whose largest values are sought, shape (scheme x case, t)."""
+"""Series by the index of their level, shape (scheme x case, t)."""
 
 
 def extremum_of_levels(
@@ -30,47 +30,47 @@ def extremum_of_levels(
     size: Floats,
     order: Floats,
 ) -> tuple[Floats, Floats, Flags]:
-    """Return an extremum at every level, how far it is off at the finest one, and where it is that of a smooth motion.
+    """Return an extremum at each level, a bound of its error at the finest one, and where the motion is smooth.
 
-    Elsewhere it stays that over grid points: without a series, near a velocity that events change, and where levels
-    with the same number have met it, which the series does not pass.
+    Elsewhere it is the extremum over grid points: without a series, near a velocity that events change, and where all
+    levels have the same value and the interpolated series does not exceed it.
 
     Parameters
     ----------
     name
         ``min``, ``max`` or ``max_abs``.
     over_points
-        The extremum over the grid points, shape (scheme, case, level), as its `floor`.
+        The extremum over the grid points, shape (scheme, case, level); `floor` is its round-off.
     size
-        Of the solution, shape (scheme, case).
+        Size of the solution, shape (scheme, case).
     order
-        With which the extremum converges, shape (scheme, case).
+        Order of convergence of the extremum, shape (scheme, case).
     """
-    near = ORDER_ABOVE_ROUND_OFF * floor[..., -1]
-    rise = _rise_after_start(name, place, over_points[..., -1], near)
-    error = _error_over_points(place, over_points, near, size, rise)
+    noise = ORDER_ABOVE_ROUND_OFF * floor[..., -1]
+    rise = _rise_after_start(name, place, over_points[..., -1], noise)
+    error = _error_over_points(place, over_points, noise, size, rise)
     series = _upward(name, place)
     smooth, error_smooth = _between_points(name, series, over_points)
-    # a scheme may miss a crest in the first step at all levels
-    is_missed = np.abs(smooth[..., -1] - over_points[..., -1]) <= near
+    # all levels may miss a crest in the first step
+    is_missed = np.abs(smooth[..., -1] - over_points[..., -1]) <= noise
     error_smooth = error_smooth + np.where(is_missed, rise, 0.0)
     is_smooth = (error > 0.0) | (np.abs(smooth[..., -1] - over_points[..., -1]) > error_smooth)
     is_smooth = np.where(_is_struck(place.block), error_smooth < error, is_smooth)
     is_smooth = is_smooth & np.isfinite(error_smooth) & ~place.block.adaptive[:, None]
-    found = np.where(is_smooth[..., None], smooth, over_points)
-    other = _rise_of_other_crests(series, place.levels, order)
-    return found, np.where(is_smooth, error_smooth, error) + other, is_smooth
+    values = np.where(is_smooth[..., None], smooth, over_points)
+    other_rise = _rise_of_other_crests(series, place.levels, order)
+    return values, np.where(is_smooth, error_smooth, error) + other_rise, is_smooth
 
 
 def _upward(name: str, place: value_numbers.Place) -> Series:
-    """Return the series of the levels that have one with enough samples, turned so that the extremum is the largest."""
-    found = {}
+    """Return the series of all levels with enough samples, transformed so that the extremum is the largest value."""
+    series_of_levels = {}
     for i, level in enumerate(place.levels):
         record = place.block.records[level]
         if place.quantity in record and np.shape(record[place.quantity])[-1] >= WIDTH:
             series = np.asarray(record[place.quantity], dtype=np.float64)
-            found[i] = _UPWARD[name](series).reshape(-1, series.shape[-1])
-    return found
+            series_of_levels[i] = _UPWARD[name](series).reshape(-1, series.shape[-1])
+    return series_of_levels
 
 
 def _is_struck(block: MemberBlock) -> Flags:
@@ -79,10 +79,12 @@ def _is_struck(block: MemberBlock) -> Flags:
     return np.logical_not(block.eventless) & (events is not None and events.jumps)
 
 
-def _rise_after_start(name: str, place: value_numbers.Place, value: Floats, near: Floats) -> Floats:
-    """Return how far a position moves on beyond an extremum that is its start, at most; 0 elsewhere, (scheme, case).
+def _rise_after_start(
+    name: str, place: value_numbers.Place, value: Floats, noise: Floats
+) -> Floats:
+    """Return how far a position can move beyond an extremum that is its start; 0 elsewhere, shape (scheme, case).
 
-    A velocity that has turned within a step has led no further than half a step goes with it.
+    If its velocity changes sign within the first step, it moves at most half a step at the initial velocity.
     """
     model, data = place.block.model, place.block.finest
     speed = dict(zip(model.positions, model.velocities, strict=True)).get(place.quantity, "")
@@ -91,46 +93,46 @@ def _rise_after_start(name: str, place: value_numbers.Place, value: Floats, near
     start, slope = (np.asarray(data[q][..., 0]) for q in (place.quantity, speed))
     outward = slope * {"min": -1.0, "max": 1.0, "max_abs": np.sign(start)}[name]
     with np.errstate(invalid="ignore"):
-        at_start = np.abs(np.abs(value) - np.abs(start)) <= near
+        at_start = np.abs(np.abs(value) - np.abs(start)) <= noise
         return np.where(at_start & (outward > 0.0), 0.5 * place.block.grid.dt[-1] * outward, 0.0)
 
 
 def _error_over_points(
-    place: value_numbers.Place, values: Floats, near: Floats, size: Floats, rise: Floats
+    place: value_numbers.Place, values: Floats, noise: Floats, size: Floats, rise: Floats
 ) -> Floats:
-    """Return how much of an extremum lies between grid points: ``w^2 dt^2/8`` of its size at most.
+    """Return a bound of how much grid points miss of an extremum: ``w^2 dt^2/8`` of its size.
 
-    Where impacts change a velocity, a state turns without rest, and ``w dt`` may be missed. How much differs from level
-    to level by accident, which no extrapolation takes away. Nothing is missed where the levels have the same number,
-    unless it is that of a start from which the position moves on beyond it, by `rise`.
+    If impacts change a velocity, a state turns abruptly, and the bound is ``w dt``. The missed part varies irregularly
+    between levels, so extrapolation cannot remove it. Nothing is missed if the levels have the same value, unless that
+    is a start beyond which the position moves by `rise`.
     """
-    p = np.minimum(place.block.omega_dt[:, -1], 1.0)
+    w_dt = np.minimum(place.block.omega_dt[:, -1], 1.0)
     changes = np.abs(np.diff(values[..., -3:], axis=-1))
     with np.errstate(invalid="ignore"):
-        same = np.all(changes <= near[..., None], axis=-1) & (rise == 0.0)
-    part = np.where(_is_struck(place.block), p, OF_A_LINE * p**2)
-    return np.where(same, 0.0, part * size)
+        is_constant = np.all(changes <= noise[..., None], axis=-1) & (rise == 0.0)
+    missed_share = np.where(_is_struck(place.block), w_dt, ERROR_OF_LINE * w_dt**2)
+    return np.where(is_constant, 0.0, missed_share * size)
 
 
 def _between_points(name: str, series: Series, over_points: Floats) -> tuple[Floats, Floats]:
-    """Return an extremum between the grid points at every level, and how far it may be off at the finest one.
+    """Return an extremum between the grid points at each level, and a bound of its error at the finest one.
 
-    Shapes (scheme, case, level) and (scheme, case). The bound is NaN where there is no series. A level with too few
-    samples keeps its value over the grid points.
+    Shapes (scheme, case, level) and (scheme, case). The bound is NaN without a series. A level with too few samples
+    keeps its value over the grid points.
     """
-    found, errors = over_points.copy(), np.full(over_points.shape, np.nan)
+    values, errors = over_points.copy(), np.full(over_points.shape, np.nan)
     if series:
         largest, error = largest_between_samples(list(series.values()))
         shape, levels = (*over_points.shape[:-1], -1), list(series)
-        found[..., levels] = (-1.0 if name == "min" else 1.0) * largest.reshape(shape)
+        values[..., levels] = (-1.0 if name == "min" else 1.0) * largest.reshape(shape)
         errors[..., levels] = error.reshape(shape)
-    # the limit is made of the level before the finest, too
-    two = errors[..., -2:]
-    return found, np.where(np.isnan(two[..., -1]), np.nan, np.fmax.reduce(two, axis=-1))
+    # extrapolation uses the second finest level, too
+    last = errors[..., -2:]
+    return values, np.where(np.isnan(last[..., -1]), np.nan, np.fmax.reduce(last, axis=-1))
 
 
 def _rise_of_other_crests(series: Series, levels: tuple[int, ...], order: Floats) -> Floats:
-    """Return how much larger another extremum than that of the finest level may be in the limit, (scheme, case)."""
+    """Return by how much another extremum may exceed that of the finest level in the limit, (scheme, case)."""
     finest = len(levels) - 1
     if not {finest - 1, finest} <= set(series):
         return np.zeros(order.shape)

@@ -1,4 +1,4 @@
-"""The largest value of a smooth function between its samples, by the polynomials through those around a crest."""
+"""The largest value of a smooth function between its samples, from polynomials through the samples around a crest."""
 
 from __future__ import annotations
 
@@ -13,125 +13,125 @@ from numpy.polynomial import polynomial
 from vibsim.core.array_types import Flags, Floats, Integers
 
 WIDTH, NARROW = 7, 5
-"""Samples that the polynomial goes through, and those of a narrower one, whose distance from it is the error bound."""
+"""Points of the polynomial, and of a narrower one: their distance is the error bound."""
 ALIKE = 0.1
-"""Crests whose extrapolations differ by a smaller part of what these add are taken to be equal. [chosen]"""
+"""Crests count as equal if their extrapolated values differ by less than this part of the extrapolation. [chosen]"""
 SMOOTH = 0.25
-"""Fifth differences over third ones, below which a function has no corner: that of w dt = 1/2. [derived]"""
+"""A function has no corner if its fifth differences are below this part of the third ones: w dt = 1/2. [derived]"""
 _SIDE = WIDTH // 2
 _NEWTON_STEPS = 4
 
 
 def largest_between_samples(grids: Sequence[Floats]) -> tuple[Floats, Floats]:
-    """Return the largest value of functions, and a bound of its error, shape (m, grid).
+    """Return the largest value of each function, and a bound of its error, shape (m, grid).
 
     Parameters
     ----------
     grids
-        At least `WIDTH` samples at equal distances, shape (m, t), on every grid. NaN where one is not finite.
+        At least `WIDTH` equally spaced samples on each grid, shape (m, t). The result is NaN if one is not finite.
     """
-    known = np.stack([np.isfinite(series).all(axis=-1) for series in grids])
-    finite = [np.where(k[:, None], x, 0.0) for k, x in zip(known, grids, strict=True)]
+    is_finite = np.stack([np.isfinite(series).all(axis=-1) for series in grids])
+    finite = [np.where(k[:, None], x, 0.0) for k, x in zip(is_finite, grids, strict=True)]
     largest = np.stack([np.max(series, axis=-1) for series in finite])
     bound = np.zeros(largest.shape)
     crests = [_crests(series, top) for series, top in zip(finite, largest, strict=True)]
     grid = np.repeat(np.arange(len(grids)), [len(crest.row) for crest in crests])
-    row, _, place, limit, around = (np.concatenate(x) for x in zip(*crests, strict=True))
-    _, value, error = _highest(around, place)
+    row, _, place, limit, samples = (np.concatenate(x) for x in zip(*crests, strict=True))
+    _, value, error = _highest(samples, place)
     np.maximum.at(largest, (grid, row), np.minimum(value, limit))
     np.maximum.at(bound, (grid, row), error)
-    return np.where(known, largest, np.nan).T, np.where(known, bound, np.nan).T
+    return np.where(is_finite, largest, np.nan).T, np.where(is_finite, bound, np.nan).T
 
 
 class _Crests(NamedTuple):
-    """Samples that no neighbour exceeds, near which a function may be larger than all samples; shape (crest,)."""
+    """Local maxima of the samples, near which a function may exceed all samples; arrays of shape (crest,)."""
 
     row: Integers
-    centre: Integers  # index of the middle one of the samples around it
-    place: Integers  # among the samples around it, of which the middle one is 0
-    limit: Floats  # a smooth function stays below it
-    around: Floats  # shape (crest, WIDTH)
+    centre: Integers  # index of the middle sample of the polynomial
+    place: Integers  # index of the crest relative to the middle sample
+    limit: Floats  # upper bound of a smooth function near the crest
+    samples: Floats  # samples of the polynomial, shape (crest, WIDTH)
 
 
 def _crests(series: Floats, top: Floats) -> _Crests:
-    """Return the crests of functions with these largest samples."""
+    """Return the crests that may exceed the largest sample `top` of their function."""
     row, index = np.nonzero(_is_crest(series))
     centre = np.clip(index, _SIDE, series.shape[-1] - 1 - _SIDE)
-    around = series[row[:, None], centre[:, None] + np.arange(-_SIDE, _SIDE + 1)]
-    # at a corner a function is half of a second difference above the straight line
-    limit = series[row, index] + 0.5 * _largest_difference(around, 2)
+    samples = series[row[:, None], centre[:, None] + np.arange(-_SIDE, _SIDE + 1)]
+    # at a corner a function exceeds its samples by half of a second difference
+    limit = series[row, index] + 0.5 * _largest_difference(samples, 2)
     may = limit >= top[row]
-    return _Crests(row[may], centre[may], (index - centre)[may], limit[may], around[may])
+    return _Crests(row[may], centre[may], (index - centre)[may], limit[may], samples[may])
 
 
 def rise_of_other_crests(coarse: Floats, fine: Floats, fall: Floats) -> Floats:
-    """Return how much larger than the crest that is the largest on a fine grid another one may be in the limit.
+    """Return by how much another crest may exceed, in the limit, the crest that is the highest on the fine grid.
 
-    Each crest moves on from a coarse to a fine grid and beyond it; those that do so alike are no danger.
+    The values of all crests are extrapolated from the coarse and the fine grid. Crests that change alike are harmless.
 
     Parameters
     ----------
     coarse, fine
         Samples of functions over the same interval, shape (m, t).
     fall
-        What is left to the limit, over the change from the coarse to the fine grid, shape (m,).
+        Remaining change to the limit, over the change from the coarse to the fine grid, shape (m,).
 
     Returns
     -------
     array
-        Shape (m,); 0 where no other crest may be the largest.
+        Shape (m,); 0 if no other crest can be the highest.
     """
-    (of_coarse, was), (row_and_place, now) = (_crest_values(series) for series in (coarse, fine))
-    other, back = _nearest(of_coarse, row_and_place), _nearest(row_and_place, of_coarse)
-    is_pair = back[other] == np.arange(len(other))
-    row = row_and_place.astype(np.int64) // 2
-    left = np.where(is_pair, fall[row] * (now - was[other]), 0.0)
-    top = np.full(len(fine), -np.inf)
-    np.maximum.at(top, row, now)
-    limit_of_top = np.full(len(fine), -np.inf)
-    is_top = now == top[row]
-    np.maximum.at(limit_of_top, row[is_top], (now + left)[is_top])
-    above = now + left - limit_of_top[row]
-    found = np.zeros(len(fine))
-    np.maximum.at(found, row, np.where(above > ALIKE * np.abs(left), above + np.abs(left), 0.0))
-    return found
+    (coarse_keys, before), (fine_keys, now) = (_crest_values(series) for series in (coarse, fine))
+    partner, partner_of_partner = _nearest(coarse_keys, fine_keys), _nearest(fine_keys, coarse_keys)
+    is_mutual = partner_of_partner[partner] == np.arange(len(partner))
+    row = fine_keys.astype(np.int64) // 2
+    rest = np.where(is_mutual, fall[row] * (now - before[partner]), 0.0)
+    highest = np.full(len(fine), -np.inf)
+    np.maximum.at(highest, row, now)
+    limit_of_highest = np.full(len(fine), -np.inf)
+    is_highest = now == highest[row]
+    np.maximum.at(limit_of_highest, row[is_highest], (now + rest)[is_highest])
+    above = now + rest - limit_of_highest[row]
+    rise = np.zeros(len(fine))
+    np.maximum.at(rise, row, np.where(above > ALIKE * np.abs(rest), above + np.abs(rest), 0.0))
+    return rise
 
 
 def _crest_values(series: Floats) -> tuple[Floats, Floats]:
-    """Return row and place of all crests as one number, twice the row and a part of the interval, and their values."""
-    found = _crests(series, np.full(len(series), -np.inf))
-    place, value, _ = _highest(found.around, found.place)
-    part = np.clip((found.centre + place) / (series.shape[-1] - 1), 0.0, 1.0)
-    return 2.0 * found.row + part, np.minimum(value, found.limit)
+    """Return keys and values of all crests; a key is twice the row plus the position as a part of the interval."""
+    crests = _crests(series, np.full(len(series), -np.inf))
+    place, value, _ = _highest(crests.samples, crests.place)
+    position = np.clip((crests.centre + place) / (series.shape[-1] - 1), 0.0, 1.0)
+    return 2.0 * crests.row + position, np.minimum(value, crests.limit)
 
 
-def _nearest(rising: Floats, to: Floats) -> Integers:
-    """Return the position of the nearest of some rising numbers to each of others."""
-    above = np.clip(np.searchsorted(rising, to), 1, max(len(rising) - 1, 1))
-    above = np.minimum(above, len(rising) - 1)
+def _nearest(ascending: Floats, targets: Floats) -> Integers:
+    """Return the index of the nearest of some ascending numbers to each target."""
+    above = np.clip(np.searchsorted(ascending, targets), 1, max(len(ascending) - 1, 1))
+    above = np.minimum(above, len(ascending) - 1)
     below = np.maximum(above - 1, 0)
-    return np.where(to - rising[below] <= rising[above] - to, below, above)
+    return np.where(targets - ascending[below] <= ascending[above] - targets, below, above)
 
 
 def _largest_difference(samples: Floats, order: int) -> Floats:
-    """Return the largest difference of an order, in size, of every row."""
+    """Return the largest absolute difference of this order in each row."""
     return np.asarray(np.max(np.abs(np.diff(samples, order, axis=-1)), axis=-1))
 
 
 def _is_crest(series: Floats) -> Flags:
-    """Mark samples that are above the one before, and not below the one behind."""
+    """Mark samples that exceed the previous sample and are not below the next one."""
     rises = np.diff(series, axis=-1) > 0.0
-    before = np.pad(rises, ((0, 0), (1, 0)), constant_values=True)
-    behind = np.pad(~rises, ((0, 0), (0, 1)), constant_values=True)
-    return np.asarray(before & behind)
+    rises_before = np.pad(rises, ((0, 0), (1, 0)), constant_values=True)
+    falls_after = np.pad(~rises, ((0, 0), (0, 1)), constant_values=True)
+    return np.asarray(rises_before & falls_after)
 
 
 def _highest(samples: Floats, crest: Integers) -> tuple[Floats, Floats, Floats]:
-    """Return the place of the highest value within one unit of the crests, that value, and how far it may be off.
+    """Return the position of the highest value within one unit of the crests, that value, and a bound of its error.
 
-    That is the distance from the narrower polynomial, where differences fall with their order; else a third difference,
-    as far as a polynomial is from a function with a corner. The samples, of shape (m, WIDTH), have the places -3 to 3,
-    of which `crest` is one.
+    The bound is the distance from the narrower polynomial if differences fall with their order; otherwise it is a third
+    difference, the distance of a polynomial from a function with a corner. The samples, of shape (m, WIDTH), have the
+    positions -3 to 3, and `crest` is one of these.
     """
     shift = np.clip(crest, -1, 1)
     low, high = np.maximum(crest - 1, -_SIDE), np.minimum(crest + 1, _SIDE)
@@ -152,15 +152,15 @@ def _highest(samples: Floats, crest: Integers) -> tuple[Floats, Floats, Floats]:
 
 
 def _through(samples: Floats) -> Floats:
-    """Return the coefficients of the polynomials through samples at whole places about 0, lowest power first."""
+    """Return the coefficients, lowest power first, of the polynomials through samples at integers around 0."""
     terms = zip(_lagrange(samples.shape[-1]), samples.T, strict=True)
-    # added up one by one: a solver of linear equations has other bits on other machines
+    # summed term by term: a linear solver has other bits on other machines
     return sum((basis[:, None] * row for basis, row in terms), np.zeros((1, 1)))
 
 
 @cache
 def _lagrange(count: int) -> list[Floats]:
-    """Return Lagrange's polynomials of whole places about 0; those of their integer roots are exact."""
+    """Return the Lagrange polynomials of integers around 0; their coefficients before division are exact."""
     places = range(-(count // 2), count // 2 + 1)
     others = {i: [j for j in places if j != i] for i in places}
     return [

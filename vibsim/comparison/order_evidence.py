@@ -1,11 +1,11 @@
-"""The numbers that a verdict on an order rests on, the verdict, and why the order is another one than expected.
+"""The evidence of a verdict on an order, the verdict, and why the order differs from the expected one.
 
-Too low: is it one time (the last point, which has a formula of its own), one quantity, or everything? Too high: is
-it the whole solution, or is the leading error hidden: at times where it vanishes by symmetry, in one quantity, in one
-norm? An error that is cancelled there is no mistake, and no higher order either.
+If the order is too low: is it at one time (the last point, which may have a special formula), in one quantity, or
+everywhere? If it is too high: is it that of the whole solution, or is the leading error hidden, at times where it
+vanishes by symmetry, in one quantity, or in one norm? An error that cancels is neither a fault nor a higher order.
 
-Most of an error of an oscillation is a shift in time, ``e(t) = -s(t) u'(t)``: it vanishes wherever u' does. Common
-times that all lie at turning points (Dt = pi/w after a release from rest) therefore show the next power only.
+Most of the error of an oscillation is a shift in time, ``e(t) = -s(t) u'(t)``, which vanishes wherever u' does. So
+common times that all lie at turning points (Dt = pi/w after a release from rest) show only the next power.
 """
 
 from __future__ import annotations
@@ -38,14 +38,14 @@ CAUSES = (
     *("none", "last_point", "one_quantity", "everything", "special_times", "one_norm", "theory"),
     *("stored", "still", "pulse", "noise", "decay", "parted", "zero"),
 )
-"""What was found; files hold a position here."""
+"""Causes of an order; files store an index into this tuple."""
 NONE, LAST_POINT, ONE_QUANTITY, EVERYTHING, SPECIAL_TIMES, ONE_NORM, THEORY = range(7)
 STORED, STILL, PULSE, NOISE, DECAY, PARTED, ZERO = range(7, len(CAUSES))
 
 UNSEEN = ("pre_asymptotic", "not_applicable")
-"""What is said of a motion that lies still wherever levels are compared."""
+"""Reasons for a motion that is at rest where levels are compared."""
 ROUGH = ("pre_asymptotic", "non_smooth")
-"""What is said where the force has a pulse that no level sees."""
+"""Reasons if the force has a pulse that no level sees."""
 
 
 def judge_orders(
@@ -53,7 +53,7 @@ def judge_orders(
 ) -> None:
     """Judge the named quantities by the orders that their schemes promise, and all by those that checks expect.
 
-    `judgement` and `judge_check` return what was found.
+    The results are cached for `judgement` and `judge_check`.
     """
     due: list[tuple[str, float | str, str]] = [(name, "scheme", TYPICAL_NORM) for name in names]
     due += [
@@ -63,25 +63,25 @@ def judge_orders(
     ]
     due = list(dict.fromkeys(due))
     ladders = math.prod(quantities[due[0][0]].block.shape) if due else 0
-    for part in batches(due, ladders):
+    for batch in batches(due, ladders):
         rows = [
             evidence(quantities[name], norm, order_of(quantities[name], order), ORDER_TOLERANCE)
-            for name, order, norm in part
+            for name, order, norm in batch
         ]
-        for (name, order, norm), judged in zip(part, judge_together(rows), strict=True):
+        for (name, order, norm), judged in zip(batch, judge_together(rows), strict=True):
             quantities[name].judged[norm, order] = judged
 
 
 def judgement(q: Comparison, norm: str, order: float | str = "scheme") -> Judgement:
     """Judge a quantity by the order that its scheme promises, or by another one."""
     if (norm, order) not in q.judged:
-        found = judge(evidence(q, norm, order_of(q, order), ORDER_TOLERANCE))
-        q.judged[norm, order] = found
+        judged = judge(evidence(q, norm, order_of(q, order), ORDER_TOLERANCE))
+        q.judged[norm, order] = judged
     return q.judged[norm, order]
 
 
 def judge_check(q: Comparison, check: ConvergesCheck) -> Judgement:
-    """Judge a quantity as a check asks for it."""
+    """Judge a quantity by the order that a check expects."""
     if not _is_usual(check):
         return judge(evidence(q, check.norm, order_of(q, check.order), check.tolerance))
     return judgement(q, check.norm, _expected(q, check))
@@ -90,17 +90,17 @@ def judge_check(q: Comparison, check: ConvergesCheck) -> Judgement:
 def order_in(q: Comparison, norm: str) -> Floats:
     """Return the order of a quantity in a norm, shape (scheme, case).
 
-    In a norm that is not judged, it is the local order where the verdict in the typical norm has its own.
+    In a norm that is not judged, it is the local order of the levels that the verdict in the typical norm rests on.
     """
     if (norm, "scheme") in q.judged:
         return q.judged[norm, "scheme"].order
     typical, orders = judgement(q, TYPICAL_NORM), q.observed_orders(norm)
     if not orders.shape[-1]:
         return typical.order
-    # of the finest three levels up to the last one of the window
-    at = np.searchsorted(q.block.grid.levels, typical.last) - 2
-    found = pick(orders, at)
-    return np.where(np.isnan(typical.order), np.nan, found)
+    # the finest three levels of the window
+    triple = np.searchsorted(q.block.grid.levels, typical.last) - 2
+    orders_there = pick(orders, triple)
+    return np.where(np.isnan(typical.order), np.nan, orders_there)
 
 
 def _is_usual(check: ConvergesCheck) -> bool:
@@ -108,53 +108,53 @@ def _is_usual(check: ConvergesCheck) -> bool:
 
 
 def _expected(q: Comparison, check: ConvergesCheck) -> float | str:
-    """Return the order that a check expects: "scheme" where it is the promised one of every scheme and member."""
+    """Return the order that a check expects: "scheme" if all schemes and members promise it."""
     promised = check.order == "scheme" or bool(np.all(order_of(q, check.order) == q.order))
     return "scheme" if promised else check.order
 
 
 def order_of(q: Comparison, order: float | str) -> Floats:
-    """Return the order that a check expects of a quantity, which broadcasts against (scheme, case)."""
+    """Return the order that a check expects of a quantity; it broadcasts against (scheme, case)."""
     return q.order if order == "scheme" else np.full((1, 1), float(order))
 
 
 def evidence(q: Comparison, norm: str, order: Floats, tolerance: float) -> Evidence:
-    """Collect the evidence on a quantity in a norm, for the order that is expected, shape (scheme, 1 or case)."""
+    """Return the evidence on a quantity in a norm for the expected order, shape (scheme, 1 or case)."""
     block = q.block
     grid, shape = block.grid, block.shape
     size, exists = largest(q.values[-1]), np.ones(shape, dtype=bool)
     if not np.all(np.isfinite(size)):
-        # of a member that has broken down, what there is of it
+        # use the finite values of a member that broke down
         finest = q.values[-1]
         size, exists = largest(np.nan_to_num(finest)), np.any(np.isfinite(finest), axis=-1)
     if plain_name(q.name) in ENERGIES or is_error_part(q.name):
-        # what is left of an energy is known no better than the energy, and a part of an error no better than the motion
+        # an energy deviation is known no better than the energy, and a part of an error no better than the motion
         size = q.scale
 
     def all_cases(values: Floats) -> Floats:
         return np.broadcast_to(values, shape)
 
-    worst = SPACING_AT_ONE * grid.steps[-1] ** 2 * q.scale * block.magnified
+    ceiling = SPACING_AT_ONE * grid.steps[-1] ** 2 * q.scale * block.magnified
     moved, straight = _motion(q, order, size)
-    # a corner within the last step of every level: a scheme that looks at its beginning alone knows nothing of it
+    # a scheme that evaluates the force only at the start of a step misses a corner in the last step of each level
     with np.errstate(invalid="ignore"):
         unseen = block.corners.time > block.group.end * (1.0 - 1.0 / grid.steps[-1])
-    # where nothing oscillates, no order is promised of a part of an error
+    # without oscillations no order is promised for a part of an error
     promised = ~block.adaptive[:, None] & ~np.isnan(order)
     measured, cosines = q.in_norm(norm), q.cosines(norm)
-    # of an error that is not known there is no row
-    missing = len(grid.levels) - cosines.shape[-1]
-    # noise of size 1 at every point
+    # an unknown error has no row
+    unknown_rows = len(grid.levels) - cosines.shape[-1]
+    # norm of noise of size 1 at each point
     weight = norm_of_floor(np.ones(1), norm, len(grid.t), grid.spacing)
     return Evidence(
         levels=grid.levels,
         order=all_cases(order),
         tolerance=tolerance,
         difference=measured.difference,
-        cosines=np.pad(cosines, [(0, 0), (0, 0), (0, missing), (0, missing)]),
+        cosines=np.pad(cosines, [(0, 0), (0, 0), (0, unknown_rows), (0, unknown_rows)]),
         error=measured.error[..., -1],
         floor=q.floor * weight[:, None],
-        ceiling=np.maximum(worst, q.floor[..., -1]) * weight,
+        ceiling=np.maximum(ceiling, q.floor[..., -1]) * weight,
         relative_floor=all_cases(block.relative_floor[..., 0]),
         size=size * weight,
         scale=q.scale * weight,
@@ -182,104 +182,106 @@ def evidence(q: Comparison, norm: str, order: Floats, tolerance: float) -> Evide
 
 
 def _motion(q: Comparison, order: Floats, size: Floats) -> tuple[Floats, Flags]:
-    """Return by how much a quantity moves, and whether along a straight line, each of shape (scheme, case).
+    """Return the relative change of a quantity, and whether it is along a straight line, each of shape (scheme, case).
 
-    What is promised to stay as it is, or is a part of an error, shows a scheme where the positions move.
+    For a quantity that is promised to be exact, or a part of an error, the change is that of the positions.
     """
-    # the start is the same on every level: what lies still at all other common times shows nothing of a scheme
+    # all levels share the start: a quantity at rest at all other common times shows nothing about a scheme
     block, later = q.block, q.values[-1][..., 1:]
     with np.errstate(all="ignore"):
         change = np.asarray(np.max(later, axis=-1) - np.min(later, axis=-1))
         bend = np.max(np.abs(np.diff(later, 2, axis=-1)), axis=-1, initial=0.0)
         moved, straight = change / size, np.asarray(bend <= STRAIGHT * change)
-    whole = [name for name in block.model.positions if f"{name}_max" in block.finest]
-    if not whole:
+    positions = [name for name in block.model.positions if f"{name}_max" in block.finest]
+    if not positions:
         return moved, straight
-    ends = [[block.finest[f"{name}_{end}"] for end in ("min", "max")] for name in whole]
+    ends = [[block.finest[f"{name}_{end}"] for end in ("min", "max")] for name in positions]
     with np.errstate(all="ignore"):
-        of_states = [(high - low) / np.maximum(np.abs(low), np.abs(high)) for low, high in ends]
-    exactly = np.broadcast_to(np.isinf(order) | is_error_part(q.name), block.shape)
-    return np.where(exactly, np.fmax.reduce(of_states), moved), straight & ~exactly
+        changes = [(high - low) / np.maximum(np.abs(low), np.abs(high)) for low, high in ends]
+    by_motion = np.broadcast_to(np.isinf(order) | is_error_part(q.name), block.shape)
+    return np.where(by_motion, np.fmax.reduce(changes), moved), straight & ~by_motion
 
 
 def causes(
     q: Comparison, others: Compared, judged: Judgement, norm: str, order: Floats, tolerance: float
 ) -> Codes:
-    """Return why orders are too low, too high, or not seen, as positions in `CAUSES`, shape (scheme, case).
+    """Return why orders are too low, too high, or not visible, as indices into `CAUSES`, shape (scheme, case).
 
     Parameters
     ----------
     q, others
-        The quantity, compared between levels, and the quantities beside it.
+        The quantity and the other quantities, compared between levels.
     judged
-        The verdict on it.
+        The verdict on the quantity.
     norm, order, tolerance
         The norm, the expected order (which broadcasts against (scheme, case)) and its tolerance.
     """
-    found, shape = _causes_unseen(q, judged, norm, order, tolerance), judged.reason.shape
+    result, shape = _causes_unseen(q, judged, norm, order, tolerance), judged.reason.shape
     low, high = (is_one_of(judged.reason, reason) for reason in ("order_low", "order_high"))
     if not np.any(low | high):
-        return found
-    wanted, model = np.broadcast_to(order, shape), q.block.model
-    beside = [state.name for state in model.states if state.name != q.name and state.name in others]
+        return result
+    expected, model = np.broadcast_to(order, shape), q.block.model
+    states = [state.name for state in model.states if state.name != q.name and state.name in others]
 
-    def near(of: Comparison, kind: str, order: Floats) -> Flags:
+    def has_order(quantity: Comparison, in_norm: str, order: Floats) -> Flags:
         with np.errstate(invalid="ignore"):
-            return np.asarray(np.abs(order_in(of, kind) - order) <= tolerance)
+            return np.asarray(np.abs(order_in(quantity, in_norm) - order) <= tolerance)
 
-    def is_usual(names: Iterable[str]) -> Flags:
-        """Say where one of other states has the expected order."""
-        return np.asarray(np.any([near(others[name], norm, wanted) for name in names], axis=0))
+    def any_expected(names: Iterable[str]) -> Flags:
+        """Say where any of these states has the expected order."""
+        masks = [has_order(others[name], norm, expected) for name in names]
+        return np.asarray(np.any(masks, axis=0))
 
-    def is_alike() -> Flags:
-        """Say where every state has the order of the quantity: one of which nothing is known need not."""
-        return np.asarray(
-            np.all([near(others[name], norm, judged.order) for name in beside], axis=0)
-        )
+    def all_same() -> Flags:
+        """Say where all other states have the order of the quantity; an unknown order does not count as the same."""
+        masks = [has_order(others[name], norm, judged.order) for name in states]
+        return np.asarray(np.all(masks, axis=0))
 
     if np.any(low):
-        inside = near(q, "linf_interior", wanted) & (norm != "linf_interior")
-        kinds = [(inside, LAST_POINT), (is_usual(beside), ONE_QUANTITY), (is_alike(), EVERYTHING)]
-        found = np.where(low, _first(kinds, shape), found)
+        inside = has_order(q, "linf_interior", expected) & (norm != "linf_interior")
+        kinds = [(inside, LAST_POINT), (any_expected(states), ONE_QUANTITY)]
+        kinds.append((all_same(), EVERYTHING))
+        result = np.where(low, _first(kinds, shape), result)
     if np.any(high):
-        # frequency and growth are those of the position: one of the expected order says that they are not the cause
-        positions = [name for name in beside if name in model.positions]
-        in_other_norm = [near(q, other, wanted) for other in NORMS if other != norm]
-        same = np.all([near(q, other, judged.order) for other in NORMS], axis=0)
+        # frequency and growth are those of the position: if that has the expected order, they are not the cause
+        positions = [name for name in states if name in model.positions]
+        in_other_norm = [has_order(q, other, expected) for other in NORMS if other != norm]
+        same_in_all_norms = np.all([has_order(q, other, judged.order) for other in NORMS], axis=0)
         kinds = [
             (_at_rest(q, others), SPECIAL_TIMES),
-            (_in_theory(q, judged) & ~is_usual(positions), THEORY),
+            (_in_theory(q, judged) & ~any_expected(positions), THEORY),
             (np.any(in_other_norm, axis=0), ONE_NORM),
-            (is_usual(beside), ONE_QUANTITY),
-            (is_alike() & same, EVERYTHING),
+            (any_expected(states), ONE_QUANTITY),
+            (all_same() & same_in_all_norms, EVERYTHING),
         ]
-        found = np.where(high, _first(kinds, shape), found)
-    return found.astype(np.int8)
+        result = np.where(high, _first(kinds, shape), result)
+    return result.astype(np.int8)
 
 
 def _causes_unseen(
     q: Comparison, judged: Judgement, norm: str, order: Floats, tolerance: float
 ) -> Codes:
-    """Return why no order is seen, as positions in `CAUSES`; arguments as for `causes`."""
-    found = np.full(judged.reason.shape, NONE, dtype=np.int8)
+    """Return why no order is visible, as indices into `CAUSES`; arguments as for `causes`."""
+    result = np.full(judged.reason.shape, NONE, dtype=np.int8)
     has = partial(is_one_of, judged.reason)
-    lost, unseen, coarse = has("round_off"), has(*UNSEEN), has("pre_asymptotic")
-    if np.any(lost | unseen | coarse):
+    lost, is_still, is_coarse = has("round_off"), has(*UNSEEN), has("pre_asymptotic")
+    if np.any(lost | is_still | is_coarse):
         e = evidence(q, norm, order, tolerance)
-        found[lost & (e.difference[..., -1] > ABOVE_ROUND_OFF * floor_of_pairs(e)[..., -1])] = NOISE
+        noisy = e.difference[..., -1] > ABOVE_ROUND_OFF * floor_of_pairs(e)[..., -1]
+        result[lost & noisy] = NOISE
         if q.block.stored_floor[-1] > 0.0:
-            found[lost] = STORED
+            result[lost] = STORED
         if q.name in (state.name for state in q.block.model.states):
-            found[lost & (e.difference[..., -1] >= FAR * e.size)] = PARTED
-            found[lost & (e.size <= ROUND_OFF_SAFETY * e.relative_floor * e.scale)] = ZERO
-        found[unseen & at_rest(e)] = STILL
-        found[coarse & unresolved(e) & (found == NONE)] = DECAY
-    found[has(*ROUGH) & np.isfinite(q.block.missed.time)] = PULSE
-    return found
+            result[lost & (e.difference[..., -1] >= FAR * e.size)] = PARTED
+            result[lost & (e.size <= ROUND_OFF_SAFETY * e.relative_floor * e.scale)] = ZERO
+        result[is_still & at_rest(e)] = STILL
+        result[is_coarse & unresolved(e) & (result == NONE)] = DECAY
+    result[has(*ROUGH) & np.isfinite(q.block.missed.time)] = PULSE
+    return result
 
 
 def _first(kinds: list[tuple[Flags, int]], shape: tuple[int, ...]) -> Codes:
-    """Return the first cause that applies, `NONE` where none is seen."""
+    """Return the first cause that applies, or `NONE`."""
     masks = [np.broadcast_to(mask, shape) for mask, _ in kinds]
     return np.asarray(np.select(masks, [code for _, code in kinds], NONE), dtype=np.int8)
 
@@ -298,28 +300,28 @@ def _at_rest(q: Comparison, others: Compared) -> Flags:
     rate = others[name].exact
     if rate is None:
         rate = others[name].extrapolation[0]
-    # over every step; data of other programs do not tell
+    # gathered over all steps; NaN in data of other programs
     low, high = (
         stored_or_nan(block.finest, f"{name}_{end}", block.shape) for end in ("min", "max")
     )
-    most = np.maximum(np.abs(low), np.abs(high))
+    largest_rate = np.maximum(np.abs(low), np.abs(high))
     with np.errstate(invalid="ignore"):
-        return np.asarray((most > 0) & (largest(rate) <= VANISHING_RATE * most))
+        return np.asarray((largest_rate > 0) & (largest(rate) <= VANISHING_RATE * largest_rate))
 
 
 def _in_theory(q: Comparison, judged: Judgement) -> Flags:
-    """Say where the theory of the scheme has the measured order too: of its frequency and its growth."""
+    """Say where frequency and growth in the theory of the scheme have the measured order, too."""
     block, theory = q.block, predicted_oscillation
     if not theory.is_simple(block) or len(block.grid.levels) < 2:
         return np.zeros(block.shape, dtype=bool)
     coarse, fine = block.grid.levels[-2:]
-    # a phase error in units of 1/w: a time would be small in small units alone
+    # phase errors in units of 1/w, to be independent of the unit of time
     w = theory.natural_frequency(block)
     phases = [theory.phase_error(block, level) * w for level in (coarse, fine)]
     growths = [theory.growth_per_period(block, level) - 1.0 for level in (coarse, fine)]
     orders = []
-    for found in (phases, growths):
-        errors = np.abs(found)
+    for values in (phases, growths):
+        errors = np.abs(values)
         with np.errstate(divide="ignore", invalid="ignore"):
             fall = on_arrays.log2(safe_ratio(errors[0], errors[1])) / (fine - coarse)
         exact = np.all(errors <= THEORY_ROUNDING, axis=0)

@@ -1,4 +1,4 @@
-"""One quantity compared between levels: its series, and the numbers that are made of them."""
+"""One quantity compared between levels: its series, and the numbers derived from them."""
 
 from __future__ import annotations
 
@@ -23,14 +23,14 @@ from vibsim.observe.member_block import MemberBlock, by_level
 class InNorm:
     """A quantity in a norm over time."""
 
-    difference: Floats  # of successive levels, shape (scheme, case, pair)
-    error: Floats  # exact less computed, shape (scheme, case, level); NaN where not known
-    extrapolation: Floats  # exact less extrapolated, shape (scheme, case)
+    difference: Floats  # norm of the differences of successive levels, shape (scheme, case, pair)
+    error: Floats  # norm of exact minus computed, shape (scheme, case, level); NaN if unknown
+    extrapolation: Floats  # norm of exact minus extrapolated, shape (scheme, case); NaN if unknown
 
 
 @dataclass(frozen=True)
 class Comparison:
-    """One quantity at every level, on the common grid; series have the shape (scheme, case, t)."""
+    """One quantity at each level, on the common grid; series have the shape (scheme, case, t)."""
 
     block: MemberBlock
     name: str
@@ -41,14 +41,14 @@ class Comparison:
     order: Floats  # formal order, shape (scheme, 1 or case)
     floor: Floats  # predicted round-off at one point, shape (scheme, case, level)
     scale: Floats  # size that round-off is relative to, shape (scheme, case)
-    blur: Floats  # what it is measured wrong by, rounding apart, shape (scheme, case, level)
-    # judgements with the usual tolerance that were made so far, by norm and expected order
+    blur: Floats  # measurement error without rounding, shape (scheme, case, level)
+    # cached judgements with the usual tolerance, by norm and expected order
     judged: dict[tuple[str, float | str], Judgement] = field(default_factory=dict, repr=False)
     _norms: dict[str, InNorm] = field(default_factory=dict, repr=False)
 
     @property
     def power(self) -> Floats:
-        """Order by which differences are rescaled: 0 where the quantity is promised to be exact."""
+        """Order by which differences are rescaled: 0 if the quantity is promised to be exact."""
         return np.where(np.isinf(self.order), 0.0, self.order)
 
     @cached_property
@@ -58,18 +58,18 @@ class Comparison:
 
     @cached_property
     def differences(self) -> list[Floats]:
-        """Level minus next level; NaN for a scheme that has no levels."""
-        # two levels without bound have no difference
+        """Level minus next level; NaN for adaptive schemes, which have no levels."""
+        # the difference of two infinite values is NaN
         with np.errstate(over="ignore", invalid="ignore"):
-            found = [coarse - fine for coarse, fine in pairwise(self.values)]
+            results = [coarse - fine for coarse, fine in pairwise(self.values)]
         if self.block.adaptive.any():
-            for d in found:
+            for d in results:
                 d[self.block.adaptive] = np.nan
-        return found
+        return results
 
     @cached_property
     def errors(self) -> list[Floats] | None:
-        """Exact minus level; None where the exact solution is not known."""
+        """Exact minus level; None if the exact solution is unknown."""
         if self.exact is None:
             return None
         with np.errstate(over="ignore", invalid="ignore"):
@@ -77,7 +77,7 @@ class Comparison:
 
     @cached_property
     def extrapolation(self) -> tuple[Floats, Floats]:
-        """Extrapolation to a vanishing step, and the bound of its error; for a lean part its largest value only."""
+        """Extrapolation to a vanishing step, and the bound of its error; only the largest bound in a lean block."""
         block = self.block
         even = even_powers(block.experiment, self.name, block.columns)
         order = np.where(np.isinf(self.order), th.EXACT_ORDER, self.order)
@@ -91,7 +91,7 @@ class Comparison:
     @property
     def largest_bound(self) -> Floats:
         """The largest bound over time, shape (scheme, case)."""
-        # a bound never falls with time
+        # a bound never decreases with time
         return self.extrapolation[1][..., -1]
 
     @cached_property
@@ -100,8 +100,8 @@ class Comparison:
         if not self.differences:
             return np.zeros(self.block.shape, dtype=bool)
         d = self.differences[-1]
-        least = th.VANISHING_POINT * differences.largest(d)[..., None]
-        count = np.count_nonzero((d > least) | (d < -least), axis=-1)
+        threshold = th.VANISHING_POINT * differences.largest(d)[..., None]
+        count = np.count_nonzero((d > threshold) | (d < -threshold), axis=-1)
         return np.asarray(count <= th.SHAPELESS_POINTS)
 
     def in_norm(self, kind: str) -> InNorm:
@@ -111,39 +111,39 @@ class Comparison:
         return self._norms[kind]
 
     def cosines(self, kind: str) -> Floats:
-        """Return cosines between the differences, and the last error where known, shape (scheme, case, row, row)."""
+        """Return the cosines between the differences and, if known, the last error, (scheme, case, row, row)."""
         rows = self.differences + ([] if self.errors is None else [-self.errors[-1]])
         if not rows:
-            # of a single level whose error is not known
+            # a single level whose error is unknown
             return np.zeros((*self.block.shape, 0, 0))
         return differences.cosines(rows, kind, self.block.grid.end_included)
 
     def combined(self, kind: str, rows: Flags, first: int, weights: Floats) -> Floats:
-        """Return the norm of a weighted sum of successive differences from a first one on, shape (count of rows,).
+        """Return the norm of a weighted sum of successive differences, starting with index `first`.
 
-        `rows` says of which schemes and members, shape (scheme, case).
+        `rows` selects schemes and members, shape (scheme, case); the result is flat.
         """
         grid = self.block.grid
-        parts = zip(weights, self.differences[first:], strict=False)
-        whole = sum((w * d[rows] for w, d in parts), np.zeros(1))
+        terms = zip(weights, self.differences[first:], strict=False)
+        combination = sum((w * d[rows] for w, d in terms), np.zeros(1))
         spacing = np.broadcast_to(grid.spacing, self.block.shape)[rows]
-        return differences.norm(whole, kind, spacing, grid.end_included)
+        return differences.norm(combination, kind, spacing, grid.end_included)
 
     def _measured(self, kind: str) -> InNorm:
         grid, shape, errors = self.block.grid, self.block.shape, self.errors
 
-        def stacked(rows: list[Floats]) -> Floats:
+        def by_levels(rows: list[Floats]) -> Floats:
             return by_level(rows) if rows else np.empty((*shape, 0))
 
-        def size(of: Floats) -> Floats:
-            return differences.norm(of, kind, grid.spacing, grid.end_included)
+        def norm(series: Floats) -> Floats:
+            return differences.norm(series, kind, grid.spacing, grid.end_included)
 
         unknown = np.full((*shape, len(grid.levels)), np.nan)
-        of_limit = None if self.exact is None else self.exact - self.extrapolation[0]
+        error_of_limit = None if self.exact is None else self.exact - self.extrapolation[0]
         return InNorm(
-            difference=stacked([size(x) for x in self.differences]),
-            error=unknown if errors is None else stacked([size(e) for e in errors]),
-            extrapolation=unknown[..., 0] if of_limit is None else size(of_limit),
+            difference=by_levels([norm(x) for x in self.differences]),
+            error=unknown if errors is None else by_levels([norm(e) for e in errors]),
+            extrapolation=unknown[..., 0] if error_of_limit is None else norm(error_of_limit),
         )
 
     @cached_property
@@ -163,9 +163,9 @@ class Comparison:
         return differences.safe_ratio(norms[..., :-1], norms[..., 1:])
 
     def observed_orders(self, kind: str) -> Floats:
-        """Return the order of every triple in a norm, shape (scheme, case, triple)."""
+        """Return the order of each triple in a norm, shape (scheme, case, triple)."""
         return differences.local_orders(self.ratios(kind), self.block.grid.levels)
 
 
 Compared = Mapping[str, Comparison]
-"""Quantities by name, compared between the levels of a block."""
+"""Quantities of a block, compared between levels, by name."""

@@ -1,8 +1,8 @@
-"""How far the solution of a scheme is from another scheme's, from the exact one, or from that of its own steps.
+"""The distance of a solution from that of another scheme, from the exact one, or from its exact difference equations.
 
-What may be called equal follows from the arithmetic: each side is known no better than its accumulated rounding errors.
-For the states of a linear model theory bounds them (`vibsim.theory.rounding_bound`); elsewhere, and for energies,
-it is `ABOVE_ROUND_OFF` times the predicted floor, an order of magnitude.
+Solutions are equal if they differ by no more than their accumulated rounding errors. Theory bounds these for the states
+of a linear model (`vibsim.theory.rounding_bound`); elsewhere, and for energies, the bound is `ABOVE_ROUND_OFF` times
+the predicted floor, an order of magnitude.
 """
 
 from __future__ import annotations
@@ -27,18 +27,18 @@ from vibsim.observe.predicted_oscillation import is_simple, natural_frequency, s
 
 @dataclass(frozen=True)
 class SolutionDistance:
-    """How far two solutions are from each other, in the unit of the quantity; NaN where one of them does not exist."""
+    """The distance of two solutions, in the unit of the quantity; NaN where one of them does not exist."""
 
-    scheme: int  # number of the scheme that is compared
+    scheme: int  # index of the compared scheme
     over_time: Floats  # shape (case, t); NaN without a value, at the ends of ``[D_2t u]``
     largest: Floats  # shape (case,)
-    allowed: Floats  # what that may be, shape (case,)
+    allowed: Floats  # largest distance of equal solutions, shape (case,)
 
 
 def solution_distance(
     block: MemberBlock, compared: Compared, check: EqualCheck
 ) -> SolutionDistance:
-    """Return how far the two solutions that a check compares are from each other."""
+    """Return the distance of the two solutions that a check compares."""
     names = [scheme.name for scheme in block.experiment.schemes]
     level = block.grid.levels[-1] if check.level is None else check.level
     first, name = names.index(check.first), check.quantity
@@ -51,7 +51,7 @@ def solution_distance(
         other, more = values[second], rounding(block, level, name, second, floor[second])
     elif check.second == "exact":
         other = exact_series(block, level, name)[first]
-        more = _of_exact(block, level, name, values[first])
+        more = _accuracy_of_exact(block, level, name, values[first])
     else:
         other, more = discrete(block, level, name, first), np.zeros_like(bound)
     inside = slice(1, -1) if name.endswith(CENTRED) else slice(None)
@@ -68,39 +68,39 @@ def rounding(block: MemberBlock, level: int, name: str, scheme: int, floor: Floa
     plain = plain_name(name)
     if not is_simple(block) or plain in ENERGIES or block.adaptive[scheme]:
         return np.broadcast_to(floor, block.shape[1:])
-    found = np.full(block.shape[1:], np.nan)
+    result = np.full(block.shape[1:], np.nan)
     steps, numbers = _numbers(block, level)
     for options, where in steppers(block, scheme):
         stepper = block.experiment.schemes[scheme].method.stepper(options)
         w, dt, u, v = (x[where] for x in numbers)
         bounds = theory.rounding_bound(stepper, w, dt, u, v, steps)
         # the centred difference divides the rounding errors of two positions by 2 dt
-        own = bounds[int(plain == block.model.velocity)]
-        found[where] = bounds[0] / dt if name.endswith(CENTRED) else own
-    return found
+        bounds_of_state = bounds[int(plain == block.model.velocity)]
+        result[where] = bounds[0] / dt if name.endswith(CENTRED) else bounds_of_state
+    return result
 
 
 def discrete(block: MemberBlock, level: int, name: str, scheme: int) -> Floats:
-    """Return the exact solution of one scheme's own steps at the stored times, shape (case, t).
+    """Return the exact solution of the difference equations of one scheme at the stored times, shape (case, t).
 
-    Of a linear model without damping; NaN elsewhere, and for what is no state.
+    It is NaN unless the model is linear and undamped and `name` is a state.
     """
     record, model = block.records[level], block.model
-    found = np.full((*block.shape[1:], len(record["t"])), np.nan)
+    series = np.full((*block.shape[1:], len(record["t"])), np.nan)
     if not is_simple(block) or name not in (model.position, model.velocity):
-        return found
+        return series
     steps, numbers = _numbers(block, level)
     n = np.arange(len(record["t"])) * whole(record, "every")
     for options, where in steppers(block, scheme):
         w, dt, u, v = (x[where] for x in numbers)
         stepper = block.experiment.schemes[scheme].method.stepper(options)
         states = theory.discrete(stepper, w, dt, u, v, n, steps=steps)
-        found[where] = states[int(name == model.velocity)]
-    return found
+        series[where] = states[int(name == model.velocity)]
+    return series
 
 
 def discrete_error(block: MemberBlock, level: int, name: str) -> Floats:
-    """Return the largest distance of a state from the exact solution of the scheme's own steps, (scheme, case)."""
+    """Return the largest distance of a state from the exact solution of the difference equations, (scheme, case)."""
     record = block.records[level]
     if name not in record:
         return np.full(block.shape, np.nan)
@@ -119,7 +119,7 @@ def _numbers(block: MemberBlock, level: int) -> tuple[int, tuple[Floats, ...]]:
 
 
 def exact_series(block: MemberBlock, level: int, name: str) -> Floats:
-    """Return the exact values at the stored times of a level, shape (scheme, case, t); NaN where they are not known."""
+    """Return the exact values at the stored times of a level, shape (scheme, case, t); NaN if they are unknown."""
     record, model, plain = block.records[level], block.model, plain_name(name)
     shape = (*block.shape, len(record["t"]))
     if plain == "energy" and model.conservative:
@@ -131,14 +131,14 @@ def exact_series(block: MemberBlock, level: int, name: str) -> Floats:
     else:
         names = (model.position, model.velocity)
         states = {n: record[f"{n}_exact"] for n in names if f"{n}_exact" in record}
-    found = states.get(plain)
-    if found is None:
-        found = known_values(model, plain, states, t, block.group)
-    return np.broadcast_to(np.nan if found is None else np.asarray(found), shape)
+    exact = states.get(plain)
+    if exact is None:
+        exact = known_values(model, plain, states, t, block.group)
+    return np.broadcast_to(np.nan if exact is None else np.asarray(exact), shape)
 
 
-def _of_exact(block: MemberBlock, level: int, name: str, values: Floats) -> Floats:
-    """Return how well an exact solution is known, shape (case,): its phase w t has a rounding error."""
+def _accuracy_of_exact(block: MemberBlock, level: int, name: str, values: Floats) -> Floats:
+    """Return the accuracy of an exact solution, shape (case,): its phase w t has a rounding error."""
     record, bound = block.records[level], f"{plain_name(name)}_exact_error"
     if bound in record:
         return np.asarray(record[bound], dtype=float)

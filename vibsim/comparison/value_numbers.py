@@ -1,4 +1,4 @@
-"""The numbers that a ``value`` check asks for, worked out for every scheme and member at once.
+"""The numbers of ``value`` checks, computed for all schemes and members at once.
 
 Names, quantities and places are those of `vibsim.experiment.value_names`. A number that does not exist is NaN.
 """
@@ -26,11 +26,11 @@ from vibsim.observe.member_block import MemberBlock, energy_at_start, stored_or_
 
 @dataclass(frozen=True)
 class Place:
-    """Where a value is taken, and what it may be taken from."""
+    """The quantity, level and time of a value, and the data to take it from."""
 
     block: MemberBlock
-    compared: Compared  # quantities that were compared between levels
-    quantity: str  # empty where the value is of none
+    compared: Compared  # quantities compared between levels
+    quantity: str  # empty if the value belongs to none
     level: int | str | None
     t: float | None
     step: int | None
@@ -48,25 +48,25 @@ class Place:
 
     @property
     def at_level(self) -> int | None:
-        """The level that is asked for, by default the finest; None for one that is not there."""
+        """The selected level, by default the finest; None if it does not exist."""
         level = self.levels[-1] if self.level is None else self.level
         return level if isinstance(level, int) and level in self.block.records else None
 
     def data(self) -> Record | None:
-        """Return the level Record that is asked for."""
+        """Return the Record of the selected level."""
         return None if self.at_level is None else self.block.records[self.at_level]
 
     def gathered(self, name: str) -> Floats:
-        """Return what the level that is asked for holds of every member; NaN where it does not hold it."""
+        """Return a variable of the selected level for all members; NaN if the level does not have it."""
         data = self.data()
         return self.missing if data is None else stored_or_nan(data, name, self.block.shape)
 
     def of_quantity(self, which: str) -> Floats:
-        """Return what was gathered of the quantity over every step."""
+        """Return a number of the quantity that was gathered over all steps."""
         return self.gathered(f"{self.quantity}_{which}")
 
     def comparison(self) -> Comparison | None:
-        """Return the quantity as it was compared between levels."""
+        """Return the comparison of the quantity between levels, or None."""
         return self.compared.get(self.quantity)
 
 
@@ -75,12 +75,12 @@ Number = Callable[[Place], Any]
 
 def value(name: str, place: Place) -> Floats:
     """Return the number `name` at `place`, shape (scheme, case)."""
-    found = np.asarray(KNOWN[name](place), dtype=np.float64)
-    return np.array(np.broadcast_to(found, place.block.shape))
+    number = np.asarray(NUMBERS[name](place), dtype=np.float64)
+    return np.array(np.broadcast_to(number, place.block.shape))
 
 
 def samples(p: Place) -> list[Floats]:
-    """Return the value of a series at a common time, by default the last one, at every level."""
+    """Return the values of a series at a common time, by default the last one, at all levels."""
     q, grid = p.comparison(), p.block.grid
     index = _index(p, grid.t, grid.stride)
     if q is None or index is None:
@@ -98,29 +98,29 @@ def sample_of_series(p: Place) -> Floats:
 
 
 def _index(p: Place, t: Floats, every: int) -> int | None:
-    """Return the index of the sample that is asked for; None where it was not stored."""
+    """Return the index of the selected sample; None if it was not stored."""
     if p.step is not None:
-        index, rest = divmod(p.step, every)
-        return index if rest == 0 and index < len(t) else None
+        index, remainder = divmod(p.step, every)
+        return index if remainder == 0 and index < len(t) else None
     if p.t is None:
         return len(t) - 1
     index = int(np.argmin(np.abs(t - p.t)))
     return index if abs(float(t[index]) - p.t) <= 1e-9 * float(t[-1]) else None
 
 
-def _needs_data(of: Callable[[Place, Record], Any]) -> Number:
-    """Return a number that is made of the Record of a level."""
+def _needs_data(number: Callable[[Place, Record], Any]) -> Number:
+    """Wrap a number that is computed from the Record of a level; it is missing without that Record."""
 
     def take(p: Place) -> Any:
         data = p.data()
-        return p.missing if data is None else of(p, data)
+        return p.missing if data is None else number(p, data)
 
     return take
 
 
-def _at_level(of: Callable[[MemberBlock, int], Floats]) -> Number:
-    """Return what belongs to a level of the members."""
-    return lambda p: p.missing if p.at_level is None else of(p.block, p.at_level)
+def _at_level(number: Callable[[MemberBlock, int], Floats]) -> Number:
+    """Wrap a number of the members at a level."""
+    return lambda p: p.missing if p.at_level is None else number(p.block, p.at_level)
 
 
 @_needs_data
@@ -132,21 +132,21 @@ def _sample(p: Place, data: Record) -> Floats:
     return p.missing if index is None else np.asarray(data[p.quantity][..., index], dtype=float)
 
 
-def _extreme(which: str, of_series: Callable[..., Floats]) -> Number:
-    """Return what was gathered of a state over every step; of an output, that of its samples."""
+def _extreme(which: str, reduce: Callable[..., Floats]) -> Number:
+    """Return an extreme value: gathered over all steps for a state, taken from the samples for an output."""
 
     def take(p: Place, data: Record) -> Any:
         is_output = p.quantity in {output.name for output in p.block.model.outputs}
-        # NaN where a member has failed
+        # NaN if a member failed
         sampled = is_output and p.quantity in data
-        return of_series(data[p.quantity], axis=-1) if sampled else p.of_quantity(which)
+        return reduce(data[p.quantity], axis=-1) if sampled else p.of_quantity(which)
 
     return _needs_data(take)
 
 
 @_needs_data
 def _max_abs(p: Place, data: Record) -> Floats:
-    """Return the largest absolute value: gathered as such, or from the least and the largest value."""
+    """Return the largest absolute value, from the gathered one or from the least and the largest value."""
     if f"{p.quantity}_max_abs" in data:
         return p.of_quantity("max_abs")
     return np.asarray(np.maximum(*(np.abs(p.of_quantity(which)) for which in ("min", "max"))))
@@ -154,23 +154,23 @@ def _max_abs(p: Place, data: Record) -> Floats:
 
 @_needs_data
 def _event_time(p: Place, data: Record) -> Floats:
-    """Return the time of an event by its number; NaN where there are fewer."""
+    """Return the time of an event by its number; NaN if there are fewer events."""
     times = np.asarray(data["event_time"]) if "event_time" in data else p.missing[..., :0]
     index = (p.event or 0) - 1
     return times[..., index] if 0 <= index < times.shape[-1] else p.missing
 
 
-def _of_quantity(of: Callable[[MemberBlock, int, str], Floats]) -> Number:
-    """Return what belongs to a quantity of the members at a level."""
-    return lambda p: p.missing if p.at_level is None else of(p.block, p.at_level, p.quantity)
+def _of_quantity(number: Callable[[MemberBlock, int, str], Floats]) -> Number:
+    """Wrap a number of a quantity of the members at a level."""
+    return lambda p: p.missing if p.at_level is None else number(p.block, p.at_level, p.quantity)
 
 
 def _max_abs_interior(p: Place) -> Floats:
     return p.of_quantity("max_abs_interior")
 
 
-def _fall(of: Number) -> Number:
-    """Return how many times smaller a number is at the next finer level; by default the last two are compared."""
+def _fall(number: Number) -> Number:
+    """Return the ratio of a number to that at the next finer level; by default for the finest two levels."""
 
     def take(p: Place) -> Floats:
         levels = p.levels
@@ -178,7 +178,7 @@ def _fall(of: Number) -> Number:
         if level not in levels[:-1]:
             return p.missing
         finer = levels[levels.index(int(level)) + 1]
-        return safe_ratio(*(of(replace(p, level=which)) for which in (level, finer)))
+        return safe_ratio(*(number(replace(p, level=lv)) for lv in (level, finer)))
 
     return take
 
@@ -198,23 +198,23 @@ def _second_difference(p: Place, data: Record) -> Floats:
     if f"{position}_exact" not in data or whole(data, "every") != 1:
         return p.missing
     exact = np.asarray(data[f"{position}_exact"])
-    inner = exact[..., 1:-1]
-    ahead, behind = exact[..., 2:] - inner, inner - exact[..., :-2]
-    squares = np.sum(inner**2, axis=-1) * np.asarray(data["omega_dt"]) ** 2
-    return safe_ratio(-np.sum((ahead - behind) * inner, axis=-1), squares)
+    inside = exact[..., 1:-1]
+    forward, backward = exact[..., 2:] - inside, inside - exact[..., :-2]
+    squares = np.sum(inside**2, axis=-1) * np.asarray(data["omega_dt"]) ** 2
+    return safe_ratio(-np.sum((forward - backward) * inside, axis=-1), squares)
 
 
 def _running_max(p: Place) -> Any:
-    """Return the largest deviation so far; at the end it is the largest of all, which is there without the series."""
+    """Return the largest deviation so far; at the end this is the overall largest, which needs no series."""
     at_end = p.t is None and p.step is None
     return _max_abs(p) if at_end else _sample(replace(p, quantity=f"{p.quantity}_running_max"))
 
 
-def _over_initial(of: Number) -> Number:
-    """Return a number over the size of the energy at the start."""
+def _over_initial(number: Number) -> Number:
+    """Return a number divided by the absolute initial energy."""
 
     def take(p: Place, data: Record) -> Floats:
-        return safe_ratio(*np.broadcast_arrays(of(p), np.abs(energy_at_start(data))))
+        return safe_ratio(*np.broadcast_arrays(number(p), np.abs(energy_at_start(data))))
 
     return _needs_data(take)
 
@@ -224,23 +224,25 @@ def _error(norm: str) -> Number:
         q = p.comparison()
         if q is None:
             return p.missing
-        found = q.in_norm(norm)
-        return found.extrapolation if p.level == "best" else _along(p, found.error)
+        in_norm = q.in_norm(norm)
+        return in_norm.extrapolation if p.level == "best" else _along(p, in_norm.error)
 
     return take
 
 
-def _along(p: Place, found: Floats) -> Floats:
-    """Return the entry at the level that is asked for, by default the last one; entries begin at the coarsest level."""
-    levels = p.levels[: found.shape[-1]]
+def _along(p: Place, entries: Floats) -> Floats:
+    """Return the entry of the selected level, by default the last one; entries begin at the coarsest level."""
+    levels = p.levels[: entries.shape[-1]]
     level = levels[-1] if p.level is None and levels else p.level
-    return found[..., levels.index(level)] if level in levels else p.missing
+    return entries[..., levels.index(level)] if level in levels else p.missing
 
 
-def _of_triple(of: Callable[[Comparison], Floats]) -> Number:
+def _of_triple(number: Callable[[Comparison], Floats]) -> Number:
     def take(p: Place) -> Floats:
         q = p.comparison()
-        return p.missing if q is None or len(p.levels) < LEVELS_OF_AN_ORDER else _along(p, of(q))
+        return (
+            p.missing if q is None or len(p.levels) < LEVELS_OF_AN_ORDER else _along(p, number(q))
+        )
 
     return take
 
@@ -269,9 +271,9 @@ GATHERED = (
     *("period", "period_grid", "exact_period", "amplitude"),
     *("event_count", "first_event_time", "last_event_time", "rest_time"),
 )
-"""Numbers that the levels hold under their own names."""
+"""Numbers that the levels store under these names."""
 
-KNOWN: Mapping[str, Number] = {
+NUMBERS: Mapping[str, Number] = {
     **{name: _gathered(name) for name in GATHERED},
     "event_time": _event_time,
     "end": _sample,
@@ -321,4 +323,4 @@ KNOWN: Mapping[str, Number] = {
     "coincidence": _of_triple(lambda q: q.coincidence),
     "richardson_error": _richardson_error,
 }
-"""How every value name is worked out."""
+"""The function that computes each number, by its name."""

@@ -1,10 +1,10 @@
-"""What an error costs: the error of every scheme and level against its steps and its evaluations of the force.
+"""Work against precision: the error of each scheme and level, with its steps and evaluations of the force.
 
-The error is the largest one over the common times, of the position. Its reference is the exact solution; where that is
-not known, the extrapolation of a ladder to a vanishing step that has the smallest bound of all schemes, and no error
-below that bound means anything. Times are no part of it: they are measured by `bench.work_precision`.
+The error is the largest error of the position over the common times. The reference is the exact solution or, if that is
+unknown, the extrapolation with the smallest bound of all schemes; errors below that bound are meaningless. Run times
+are measured by `bench.work_precision`.
 
-An adaptive scheme has a tolerance and no levels: one point, which stands at the finest level.
+An adaptive scheme has a tolerance instead of levels: its single point is stored at the finest level.
 
 Source: E. Hairer, S. P. Norsett and G. Wanner, Solving Ordinary Differential Equations I, section II.10 (diagrams of
 error against work); vibration text (B), section 5 and exercise 4.
@@ -23,21 +23,21 @@ from vibsim.observe import oscillation
 from vibsim.observe.member_block import MemberBlock, by_level
 
 
-def work_precision(block: MemberBlock, found: Compared) -> Table:
+def work_precision(block: MemberBlock, compared: Compared) -> Table:
     """Return the data of a work-precision diagram.
 
     Parameters
     ----------
-    found
-        The comparisons of `block`, that of the position among them.
+    compared
+        The comparisons of `block`, including that of the position.
 
     Returns
     -------
     dict
         ``work_steps``, ``work_force_evaluations`` and ``work_error``, shape (scheme, case, level), and
-        ``work_reference_error``, shape (case,): 0 where the exact solution is known, else the bound of the reference.
+        ``work_reference_error``, shape (case,): 0 if the exact solution is known, else the bound of the reference.
     """
-    position, levels = found[block.model.position], block.grid.levels
+    position, levels = compared[block.model.position], block.grid.levels
     reference, bound = reference_of(position)
     errors = by_level([np.max(np.abs(u - reference), axis=-1) for u in position.values])
     steps = by_level([oscillation.steps_taken(block, level) for level in levels])
@@ -45,23 +45,23 @@ def work_precision(block: MemberBlock, found: Compared) -> Table:
     is_exact = position.exact is not None
     words = "the exact solution" if is_exact else "the best extrapolation"
     reference_name = {"reference": "exact" if is_exact else "Richardson"}
-    of_forces = "evaluations of the acceleration, of an implicit scheme per iteration"
-    of_error = f"largest distance of the {position.long_name} from {words}"
+    forces_text = "evaluations of the acceleration, of an implicit scheme per iteration"
+    error_text = f"largest distance of the {position.long_name} from {words}"
     table = {}
-    for name, values, text, units, more in (
+    for name, values, text, units, attributes in (
         ("work_steps", steps, "steps that were taken", "1", {}),
-        ("work_force_evaluations", forces, of_forces, "1", {}),
-        ("work_error", errors, of_error, position.units, reference_name),
+        ("work_force_evaluations", forces, forces_text, "1", {}),
+        ("work_error", errors, error_text, position.units, reference_name),
     ):
         values[block.adaptive, :, :-1] = np.nan
         long_name = f"{text}; of an adaptive scheme once, at the finest level"
-        table[name] = Variable.of(OF_LEVEL, values, long_name, units, **more)
-    of_bound = Variable.of(("case",), bound, f"largest error bound of {words}", position.units)
-    return table | {"work_reference_error": of_bound}
+        table[name] = Variable.of(OF_LEVEL, values, long_name, units, **attributes)
+    bounds = Variable.of(("case",), bound, f"largest error bound of {words}", position.units)
+    return table | {"work_reference_error": bounds}
 
 
 def reference_of(position: Comparison) -> tuple[Floats, Floats]:
-    """Return what errors are relative to, shape (case, t) or (1, t), and the bound of its error, shape (case,)."""
+    """Return the reference of errors, shape (case, t) or (1, t), and the bound of its error, shape (case,)."""
     cases = position.block.shape[1]
     if position.exact is not None:
         return position.exact[0], np.zeros(cases)

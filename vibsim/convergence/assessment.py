@@ -123,9 +123,7 @@ class Decision:
     """The verdicts on ladders; arrays of shape (ladder,)."""
 
     reason: Codes  # index into `vocabulary.REASON_NAMES`
-    order: (
-        Floats  # order of the finest three levels that the verdict rests on; NaN if there is none
-    )
+    order: Floats  # order of the finest three levels of the verdict; NaN if there is none
     low: Floats  # lower end of the interval of the order
     high: Floats  # upper end
     first: Integers  # index of the coarsest level that the verdict rests on
@@ -140,9 +138,7 @@ class Assessment(Decision):
     # NaN for levels without a decided order that approach each other slowly or not at all
     error: Floats  # norm of the error of the finest level, estimated if the exact solution is not known
     error_bound: Floats  # upper bound of that norm
-    weights: (
-        Floats  # the best value is the sum of the levels with these weights, shape (ladder, level)
-    )
+    weights: Floats  # weights of the levels in the best value, shape (ladder, level)
     best_bound: Floats  # upper bound of the distance from the best value to the limit
 
 
@@ -176,9 +172,7 @@ class _Evaluation:
     only_noise: Flags  # levels differ by noise alone
     misses_exact: Flags  # the exact solution is missed, whatever the order is
     exact_known: bool
-    cut_short: (
-        Flags  # noise that may be far less than predicted ends the window: no order is decided
-    )
+    cut_short: Flags  # predicted noise, perhaps too large, ends the window: no order is decided
     contradicted: Flags  # levels finer than the window contradict it: no order is decided
 
     @property
@@ -374,23 +368,21 @@ def _is_contradicted(ladder: Ladder, p: Posterior, question: Question) -> Flags:
     return np.asarray(np.any(is_finer & (sizes > np.maximum(largest, noise)), axis=1))
 
 
-def _reasons(evaluation: _Evaluation, missed: Flags) -> Codes:
+def _reasons(e: _Evaluation, missed: Flags) -> Codes:
     """Return the reasons of the verdicts by the table in the docstring of this module."""
-    p, (lower, right, higher) = evaluation.posterior, evaluation.sides
-    risk = np.where(evaluation.rests_on_three, RISK_OF_THREE, RISK)
+    p, (lower, right, higher) = e.posterior, e.sides
+    risk = np.where(e.rests_on_three, RISK_OF_THREE, RISK)
     # two powers may fit levels that do not approach each other, but expansions begin with order 1/2
-    decidable = ~(
-        evaluation.cut_short | evaluation.contradicted | (evaluation.order < LEAST_WITH_LIMIT)
-    )
+    decidable = ~(e.cut_short | e.contradicted | (e.order < LEAST_WITH_LIMIT))
     other_order = (lower + higher > 1.0 - risk) & (right < risk) & decidable
     if np.any(other_order):
         other_order &= most_near_a_power(p) > DEFINITE
     cases = [
         (missed, "wrong_limit"),
-        (evaluation.only_noise, "exact"),
+        (e.only_noise, "exact"),
         (
-            (right > 1.0 - (RISK if evaluation.exact_known else risk))
-            & evaluation.question.is_met_by(evaluation.order)
+            (right > 1.0 - (RISK if e.exact_known else risk))
+            & e.question.is_met_by(e.order)
             & decidable,
             "asymptotic",
         ),

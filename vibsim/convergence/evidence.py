@@ -32,9 +32,7 @@ class Evidence:
     size: Floats  # norm of the solution
     scale: Floats  # norm of the whole that the quantity is a part of, such as the energy
     error: Floats  # norm of the true error of the finest level; NaN if unknown
-    blur: (
-        Floats  # measurement error of the quantity at each level, without rounding, shape (..., n)
-    )
+    blur: Floats  # measurement error of each level, without rounding, shape (..., n)
     promised: Floats  # order that the scheme promises; infinite for exactness, NaN for none
     special: Floats  # highest order of the scheme in a special case
     combined: Callable[[Flags, int, Floats], Floats]  # norms of weighted sums of differences

@@ -76,11 +76,11 @@ def triangular_scheme(
     n = len(steps)
     depth = n - 1 if columns is None else min(columns, n - 1)
     h = [Fraction(steps[0], count) for count in steps]
-    remaining = [[_power(x, p + k * q) for k in range(depth)] for x in h]
+    left = [[_power(x, p + k * q) for k in range(depth)] for x in h]
     weights = [[Fraction(int(k == i)) for k in range(n)] for i in range(n)]
     rows: list[tuple[Entry, ...]] = [() for _ in steps]
     for j in range(1, depth + 1):
-        size = [row[j - 1] for row in remaining]
+        size = [row[j - 1] for row in left]
         factors = {i: size[i] / (size[i - 1] - size[i]) for i in range(j, n)}
         combined = {i: _combined(weights, i, f) for i, f in factors.items()}
         for i, f in factors.items():
@@ -94,9 +94,7 @@ def triangular_scheme(
                     weights=tuple(abs(float(w)) for w in combined[i][i - j : i + 1]),
                 ),
             )
-        remaining = [
-            _combined(remaining, i, factors[i]) if i >= j else remaining[i] for i in range(n)
-        ]
+        left = [_combined(left, i, factors[i]) if i >= j else left[i] for i in range(n)]
         weights = [combined.get(i, weights[i]) for i in range(n)]
     return tuple(rows)
 
@@ -208,18 +206,16 @@ def extrapolate_series(
             return first[-1] + np.where(even, even_factor, odd)[..., None] * change, so_far(change)
         previous = first[-2] - first[-3]
         observed_fall = _observed_fall(previous, change)
-        fall_1, fall_2 = (
-            of_orders(levels, order, q, lambda s: s[3][1].change_fall) for q in (1, 2)
-        )
-        is_even = np.nan_to_num(observed_fall, nan=2.0) > np.sqrt(fall_2 * fall_1)
+        slow, fast = (of_orders(levels, order, q, lambda s: s[3][1].change_fall) for q in (1, 2))
+        is_even = np.nan_to_num(observed_fall, nan=2.0) > np.sqrt(fast * slow)
         value = first[-1] + np.where(is_even, even_factor, odd)[..., None] * change
-        most = np.where(even, fall_2, fall_1)
+        most = np.where(even, fast, slow)
         fall = np.clip(np.nan_to_num(observed_fall, nan=2.0), 2.0, np.maximum(most, 2.0))
         # a change that fell faster than any power happens to vanish here: predict it from the previous one
-        expected = so_far(previous) / np.maximum(fall_1, 2.0)[..., None]
+        expected = so_far(previous) / np.maximum(slow, 2.0)[..., None]
         vanishing = observed_fall > most * SERIES_SAFETY
         size = np.maximum(so_far(change), np.where(vanishing[..., None], expected, 0.0))
-        fall = np.where(vanishing, np.minimum(fall, np.maximum(fall_1, 2.0)), fall)
+        fall = np.where(vanishing, np.minimum(fall, np.maximum(slow, 2.0)), fall)
         return value, np.asarray(error_left(SERIES_SAFETY * size, fall[..., None]))
 
 

@@ -126,11 +126,9 @@ def _fitted(values: Floats, levels: Sequence[int], promised: Floats) -> Floats:
     for fraction in np.linspace(0.0, 1.0, th.GCI_EXPONENTS):
         p = th.GCI_LEAST_ORDER + fraction * np.maximum(promised - th.GCI_LEAST_ORDER, 0.0)
         x = on_arrays.power(h, p[..., None])
-        deviation = x - np.mean(x, axis=-1)[..., None]
-        slope = np.sum(deviation * (u - mean[..., None]), axis=-1) / np.sum(
-            deviation * deviation, axis=-1
-        )
-        residual = u - mean[..., None] - slope[..., None] * deviation
+        dx = x - np.mean(x, axis=-1)[..., None]
+        slope = np.sum(dx * (u - mean[..., None]), axis=-1) / np.sum(dx * dx, axis=-1)
+        residual = u - mean[..., None] - slope[..., None] * dx
         # three numbers are fitted
         sigma = np.sqrt(np.sum(residual * residual, axis=-1) / (m - 3))
         error = np.abs(slope) * x[..., -1]

@@ -137,15 +137,13 @@ def _append_end(
 ) -> tuple[Floats, Floats]:
     """Append the last point: compared alone, or, near a zero crossing, with the values of the last window."""
     ends = [np.abs(series[..., -1:]) for series in pair]
-    stands_alone = np.ones(ends[0].shape, dtype=bool)
+    alone = np.ones(ends[0].shape, dtype=bool)
     for end, square in zip(ends, sums, strict=False):
-        stands_alone &= end > LAST_POINT_ALONE * np.sqrt(square[..., -1:])
+        alone &= end > LAST_POINT_ALONE * np.sqrt(square[..., -1:])
     signs = np.sign(pair[0][..., -1:]) * np.sign(pair[1][..., -1:])
     one_point = np.stack([ends[0] ** 2, ends[1] ** 2, signs * ends[0] * ends[1]])
     at_end = _ratio_and_error(one_point, noise)
-    last = [
-        np.where(stands_alone, x, y[..., -1:]) for x, y in zip(at_end, (ratio, error), strict=True)
-    ]
+    last = [np.where(alone, x, y[..., -1:]) for x, y in zip(at_end, (ratio, error), strict=True)]
     joined = [np.concatenate(rows, axis=-1) for rows in ((ratio, last[0]), (error, last[1]))]
     return joined[0], joined[1]
 

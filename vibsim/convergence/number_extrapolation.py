@@ -65,12 +65,10 @@ def limit(
     result = Limit(values[..., -1].copy(), unknown, finest, finest.copy())
     start = np.max(np.where(np.isfinite(values), 0, np.arange(1, n + 1)), axis=-1)
     for k in np.unique(start[start < n]).tolist():
-        rows = start == k
-        limits = _limit(
-            values[rows][:, k:], levels[k:], order[rows], even[rows], floor[rows][:, k:]
-        )
-        result.value[rows], result.bound[rows] = limits.value, limits.bound
-        result.first[rows], result.last[rows] = limits.first + k, limits.last + k
+        own = start == k
+        limits = _limit(values[own][:, k:], levels[k:], order[own], even[own], floor[own][:, k:])
+        result.value[own], result.bound[own] = limits.value, limits.bound
+        result.first[own], result.last[own] = limits.first + k, limits.last + k
     return result
 
 
@@ -146,9 +144,8 @@ def _bound_of_finest(values: Floats, levels: Sequence[int], floor: Floats) -> Fl
     # an extremum over grid points converges raggedly, depending on where the points lie
     recent = values[..., -th.RAGGED_LEVELS :]
     wide = th.SPREAD * (np.max(recent, axis=-1) - np.min(recent, axis=-1)) + noise
-    ragged = np.max(change[..., -2:], axis=-1) < th.RAGGED_DECLINE * np.max(
-        change[..., :-2], axis=-1
-    )
+    last, earlier = (np.max(x, axis=-1) for x in (change[..., -2:], change[..., :-2]))
+    ragged = last < th.RAGGED_DECLINE * earlier
     return np.where(ragged, np.fmin(narrow, wide), narrow)
 
 

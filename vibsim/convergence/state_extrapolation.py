@@ -86,9 +86,7 @@ class Circumstances:
     size: Any  # size of the solution over the whole run
     limit: Any  # larger estimated errors count as unknown
     phase: Any  # w t
-    response: (
-        Any  # ``1/(w end)^p``, the factor of `Tableau.amplification`; 0 if disturbances do not grow
-    )
+    response: Any  # ``1/(w end)^p``, a factor of the response; 0 if disturbances do not grow
     noise: Any  # round-off so far, in units of its prediction for a solution of size 1; at least `size`
     # ratio of the responses to a lasting and to a momentary disturbance: ``max(1, w t)``, or 1 if the noise was not
     # measured
@@ -115,9 +113,7 @@ class Tableau:
     """The coefficients that depend only on the steps of the levels and on the scheme with its options."""
 
     entries: tuple[tuple[Entry, ...], ...]  # row i holds the entries j = 1, ..., i
-    round_off: tuple[
-        tuple[float, ...], ...
-    ]  # round-off of the same entries, relative to the solution
+    round_off: tuple[tuple[float, ...], ...]  # relative round-off of the entries
     # Row i times the change of its level times ``1/(w end)^p`` is the response of the motion to a lasting relative
     # disturbance of its equation. (Central differences disturb it by ``(w h)^p / (2 (p+1)!)``.)
     amplification: tuple[float, ...]
@@ -184,16 +180,13 @@ def best_entry(
 
 
 def _least(
-    candidates: Sequence[tuple[int, Pair, Any]], finest: Pair, finest_entry: int, ops: Arithmetic
+    found: Sequence[tuple[int, Pair, Any]], finest: Pair, code: int, ops: Arithmetic
 ) -> Best:
     """Return the entries with the least bounds; among equals that of the finest row and the last column."""
     position, velocity = finest
     is_finite = (position - position) + (velocity - velocity) == 0.0
-    entry, error = (
-        ops.choose(is_finite, finest_entry, -1),
-        ops.choose(is_finite, math.inf, math.inf),
-    )
-    for entry_number, (x, y), bound in reversed(candidates):
+    entry, error = (ops.choose(is_finite, code, -1), ops.choose(is_finite, math.inf, math.inf))
+    for entry_number, (x, y), bound in reversed(found):
         better = bound < error
         if ops.holds_anywhere(better):
             # false for entries that are not finite
@@ -209,33 +202,31 @@ def _next_row(
     """Return the row of a level, with bounds that exclude round-off; `row` is the previous one."""
     position, dx = next_row(entries, level[0], row.position)
     velocity, dy = next_row(entries, level[1], row.velocity)
-    changes, bounds, all_remaining = list[Any](), list[Any](), list[Any]()
+    changes, bounds, lefts = list[Any](), list[Any](), list[Any]()
     trust: Any = 1.0
     for j, entry in enumerate(entries):
         change = ops.so_far(ops.larger(abs(dx[j]), abs(dy[j]) / facts.rate)) + _TINY
         changes.append(change)
-        remaining = change
+        left = change
         if entry.change_fall:
             fall = row.changes[j] / (change * entry.change_fall) + _TINY
             trust = ops.smaller(ops.smaller(fall, 1.0 / fall), trust)
             has_fall = fall == fall
         if j or entry.change_fall:
-            remaining = error_left(change, ops.larger(entry.fall * trust, th.LEAST_FALL))
+            left = error_left(change, ops.larger(entry.fall * trust, th.LEAST_FALL))
         if j == 0 and entry.change_fall:
-            remaining = ops.choose(has_fall, remaining, change)
+            left = ops.choose(has_fall, left, change)
         if j > 1:
-            gain = ops.smaller(entry.coarser * all_remaining[-1] / all_remaining[-2], 1.0)
-            remaining = ops.larger(all_remaining[-1] * gain, remaining)
-        bound = ops.choose(
-            th.STATE_SAFETY * remaining > facts.limit, math.inf, th.STATE_SAFETY * remaining
-        )
+            gain = ops.smaller(entry.coarser * lefts[-1] / lefts[-2], 1.0)
+            left = ops.larger(lefts[-1] * gain, left)
+        bound = ops.choose(th.STATE_SAFETY * left > facts.limit, math.inf, th.STATE_SAFETY * left)
         if j:
             safety = (
                 th.GAIN_SAFETY if len(entries) > 2 or entry.change_fall else th.FIRST_GAIN_SAFETY
             )
-            gain = safety * entry.coarser * remaining / (all_remaining[-1] * trust)
+            gain = safety * entry.coarser * left / (lefts[-1] * trust)
             bound = bound * ops.larger(ops.smaller(gain, 1.0), th.LARGEST_GAIN)
             bounds[-1] = ops.larger(entry.factor * change, bounds[-1])
-        all_remaining.append(remaining)
+        lefts.append(left)
         bounds.append(bound / (trust * trust + _TINY))
     return _Row(position, velocity, changes, bounds)

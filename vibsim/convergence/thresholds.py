@@ -94,7 +94,7 @@ RATIO_TOLERANCE, PREVIOUS_RATIO_TOLERANCE, SINGLE_RATIO_TOLERANCE = 0.3, 0.6, 0.
 NUMBER_SAFETY, NUMBER_SAFETY_ALONE = (
     2.0,
     4.0,
-)  # factor on a change if two ratios agree, or one [calibrated]
+)  # on a change, if two ratios agree or one [calibrated]
 # With one change only, at least this part of the last correction is the error. [calibrated]
 LEAST_SHARE = 0.01
 # `SINGLE_RATIO_TOLERANCE`, `NUMBER_SAFETY_ALONE` and `LEAST_SHARE` for three levels, whose only ratio may be an

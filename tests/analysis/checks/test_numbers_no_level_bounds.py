@@ -262,4 +262,4 @@ def test_a_number_rests_on_the_levels_behind_one_that_broke_down() -> None:
         {**cubic, **ladder}, {**asked, **BEST}, {**asked, "at": {"level": 2}}
     ).verdicts
     assert (best.status, coarsest.reason) == ("PASS", "non_finite")
-    assert "from the levels behind 2, which broke down" in best.text
+    assert "from the levels finer than 2, which broke down" in best.text

@@ -512,7 +512,7 @@ def test_no_line_of_the_table_of_cases_can_go(monkeypatch: pytest.MonkeyPatch) -
         with monkeypatch.context() as context:
             context.setattr(verdict, "_cases", without(line))
             for name, (fields, facts, expected, _) in TABLE.items():
-                context.setattr(verdict, "_believed", once(name))
+                context.setattr(verdict, "_decisions", once(name))
                 if decide(fields, FOUR, **facts) != expected:
                     needed.add(line)
                     break

@@ -25,7 +25,7 @@ evidence is a power of one ratio (see `hypotheses.Table`). Four kinds of hypothe
 - *no expansion*: each row has an unrelated size, down to some level; all finer rows are noise.
 
 Rows coarser than the window have not reached the expansion: each has an unrelated size, at the cost
-`FREE_ROW_PENALTY`. Rows finer than the window are noise that grows as the steps shrink. Noise of the predicted size
+`FREE_PENALTY`. Rows finer than the window are noise that grows as the steps shrink. Noise of the predicted size
 costs least, and noise below what the expansion would leave there is improbable (`posterior._Fit.finer_rows`).
 
 Hypotheses with provably negligible evidence are skipped: whole tables by the size of the last row, and groups of

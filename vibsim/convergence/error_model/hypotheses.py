@@ -46,9 +46,7 @@ class Table:
     # squared scale; limit minus finest level as weights of the rows; shape (hypothesis, 5 + w).
     columns: Floats
     pair: Integers  # index of the pair of powers, shape (hypothesis,)
-    groups: (
-        Integers  # first hypothesis of each group, and the number of hypotheses, shape (group + 1,)
-    )
+    groups: Integers  # start of each group, and the end of the last one, shape (group + 1,)
     # The evidence of a group is at most ``(root/tr(M G))^(N w/2)``: root for N = 1 and N = 2, and the form of M; shape
     # (2 + packed, group).
     bounds: Floats
@@ -64,9 +62,7 @@ class Promise(NamedTuple):
     """An expected order."""
 
     order: float
-    by_theory: bool = (
-        False  # theory promises it, and so restricts the other powers; otherwise a user expects it
-    )
+    by_theory: bool = False  # theory, not a user, expects it: that restricts other powers
 
 
 @lru_cache
@@ -116,9 +112,8 @@ def noise_of_rows(variance: Floats) -> Floats:
     covariance = np.zeros((*variance.shape[:-1], count, count))
     index = np.arange(count)
     covariance[..., index, index] = variance[..., :-1] + variance[..., 1:]
-    covariance[..., index[1:], index[:-1]] = covariance[..., index[:-1], index[1:]] = -variance[
-        ..., 1:-1
-    ]
+    shared = -variance[..., 1:-1]
+    covariance[..., index[1:], index[:-1]] = covariance[..., index[:-1], index[1:]] = shared
     return covariance
 
 
@@ -240,9 +235,8 @@ def _table(
     limit = -matvec(precision, to_limit)
     limit_variance = prior[0] + 2.0 * prior[1] + prior[2] + finest_noise
     limit_left = np.maximum(limit_variance + np.sum(limit * to_limit, axis=-1), 0.0)
-    forms = np.stack(
-        [form(x) for x in (precision, *(outer(g, g) for g in (*gains, limit)))], axis=1
-    )
+    squares = [outer(g, g) for g in (*gains, limit)]
+    forms = np.stack([form(x) for x in (precision, *squares)], axis=1)
     t_precision, t_log_det = (None, 0.0) if orthogonal is None else inverse(orthogonal)
     # for one shape, one dimension is parallel to the last row, and all others are orthogonal to it
     dimensions = [(n, n if orthogonal is None else 1) for n in (1, 2)]

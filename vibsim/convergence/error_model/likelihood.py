@@ -18,6 +18,7 @@ from vibsim.elementary import on_arrays
 TINY = 1e-300
 """Smallest square used as a divisor or in a logarithm."""
 LN_HALF = on_arrays.log(0.5)
+LOG_OTHER_NOISE = on_arrays.log(priors.OTHER_NOISE_PRIOR) - priors.FREE_PENALTY
 _NONE = np.empty((1, 0))
 
 
@@ -64,9 +65,7 @@ class WindowRows(NamedTuple):
     points: Integers
     exponents: Integers
     orthogonal: Floats
-    orthogonal_squares: (
-        Floats  # squares of the components orthogonal to the last row, over `last_square`
-    )
+    orthogonal_squares: Floats  # squares orthogonal to the last row, over `last_square`
 
 
 def window_rows(gram: Floats, points: Floats, *, split: bool) -> WindowRows:
@@ -128,9 +127,8 @@ def weigh_table(
         the squared distance to the limit, shape (ladder,).
     """
     count, w, half = len(rows.last_square), table.columns.shape[1] - 5, 0.5 * rows.exponents[:, 0]
-    orthogonal_forms, bounds = (
-        _NONE if x is None else x for x in (table.orthogonal_forms, table.orthogonal_bounds)
-    )
+    optional = table.orthogonal_forms, table.orthogonal_bounds
+    orthogonal_forms, bounds = (_NONE if x is None else x for x in optional)
     pairs, size = int(table.pair[-1]) + 1, len(table.pair)
     result = np.empty((count, 3 + w + 3 * pairs))
     threshold = on_arrays.exp(np.clip((least - rows.log_scale) / half, -600.0, 600.0))
@@ -140,10 +138,10 @@ def weigh_table(
         np.empty(size, dtype=np.int64), *np.empty((3, size)), result,
     )  # fmt: skip
     # rows far from every hypothesis have zero weight
-    is_zero = result[:, 1] <= 0.0
-    largest, total = np.where(is_zero, 1.0, result[:, 0]), np.where(is_zero, 1.0, result[:, 1])
+    empty = result[:, 1] <= 0.0
+    largest, total = np.where(empty, 1.0, result[:, 0]), np.where(empty, 1.0, result[:, 1])
     log = np.where(
-        is_zero, -np.inf, rows.log_scale + half * on_arrays.log(largest) + on_arrays.log(total)
+        empty, -np.inf, rows.log_scale + half * on_arrays.log(largest) + on_arrays.log(total)
     )
     result[:, 2:] /= total[:, None]
     pair_weights = result[:, 3 + w :].reshape(count, 3, pairs)
@@ -175,23 +173,21 @@ def single_power(
         and are 0 if the error of the finest level is known.
     """
     w, known, m = gram.shape[-1], sizes[-1] == 0.0, priors.MISFIT**2
-    indices = range(w if known else w + 1)
-    levels = len(indices)
+    every = range(w if known else w + 1)
+    levels = len(every)
     products = np.zeros((len(gram), levels, levels))
     products[:, :w, :w] = gram[:, ::-1, ::-1].cumsum(axis=1).cumsum(axis=2)[:, ::-1, ::-1]
     # a and 1/a of each level
-    a = [on_arrays.power(sizes[k], powers) for k in indices]
+    a = [on_arrays.power(sizes[k], powers) for k in every]
     b = [1.0 / x for x in a]
 
     def square(x: list[Floats]) -> Floats:
-        total = sum(products[:, k, k, None] * x[k] ** 2 for k in indices)
-        for j, k in combinations(indices, 2):
+        total = sum(products[:, k, k, None] * x[k] ** 2 for k in every)
+        for j, k in combinations(every, 2):
             total = total + 2.0 * products[:, j, k, None] * (x[j] * x[k])
         return np.asarray(total)
 
-    trace = (
-        sum(products[:, k, k, None] * b[k] ** 2 for k in indices) - square(b) / (m + levels)
-    ) / m
+    trace = (sum(products[:, k, k, None] * b[k] ** 2 for k in every) - square(b) / (m + levels)) / m
     product = np.prod(sizes[:levels])
     log_det = (
         levels * on_arrays.log(m)
@@ -211,10 +207,8 @@ def single_power(
         left = m / (m + levels) + mean**2 / total
         squares = square(per_level) + trace / w * left
     # rounding must not make it less than the contribution of the last row alone
-    last_signal, last_noise = (
-        (a[-1], a[-1] ** 2) if known else (a[-2] - a[-1], a[-2] ** 2 + a[-1] ** 2)
-    )
-    trace = np.maximum(trace, _last_square(gram)[:, None] / (last_signal**2 + m * last_noise))
+    signal, noise = (a[-1], a[-1] ** 2) if known else (a[-2] - a[-1], a[-2] ** 2 + a[-1] ** 2)
+    trace = np.maximum(trace, _last_square(gram)[:, None] / (signal**2 + m * noise))
     return scale_free(trace, log_det, points, w), gains, squares
 
 
@@ -237,7 +231,7 @@ def free_row_evidence(gram: Floats, points: Floats) -> Floats:
 def noise_evidence(sizes: Floats, gram: Floats, points: Floats, floor: Floats) -> Floats:
     """Return the log evidence that the differences of these levels are noise, shape (ladder,).
 
-    Noise within `PREDICTION_FACTOR` of its prediction is expected; other noise has the prior `UNEXPECTED_PRIOR`.
+    Noise within `PREDICTION_FACTOR` of its prediction is expected; other noise has the prior `OTHER_NOISE_PRIOR`.
     """
     count = gram.shape[-1]
     if not count:
@@ -251,24 +245,20 @@ def noise_evidence(sizes: Floats, gram: Floats, points: Floats, floor: Floats) -
     else:
         levels[:, 1:, 1:] = gram.cumsum(axis=1).cumsum(axis=2)
     variance = on_arrays.power(sizes / sizes[-1], -2.0 * np.array(priors.GROWTHS)[:, None])
-    precision, log_det = 1.0 / variance, np.sum(on_arrays.log(variance), axis=-1)
-    products = levels[:, : len(sizes), : len(sizes)]
+    weights, log_det = 1.0 / variance, np.sum(on_arrays.log(variance), axis=-1)
+    values = levels[:, : len(sizes), : len(sizes)]
     # shape (growth, ladder)
-    trace = np.sum(np.diagonal(products, axis1=1, axis2=2) * precision[:, None], axis=-1)
+    trace = np.sum(np.diagonal(values, axis1=1, axis2=2) * weights[:, None], axis=-1)
     if not exact_known:
-        total = np.sum(precision, axis=-1)
-        trace -= (
-            np.sum(products * outer(precision, precision)[:, None], axis=(-2, -1)) / total[:, None]
-        )
+        total = np.sum(weights, axis=-1)
+        trace -= np.sum(values * outer(weights, weights)[:, None], axis=(-2, -1)) / total[:, None]
         log_det += on_arrays.log(total)
     trace = np.maximum(trace, TINY)
     size = 0.5 * on_arrays.log10(trace / count) - on_arrays.log10(np.maximum(floor[:, -1], TINY))
     decades = size / on_arrays.log10(priors.PREDICTION_FACTOR)
     ln_width = on_arrays.log(math.sqrt(2.0 * np.pi) * on_arrays.log(priors.PREDICTION_FACTOR))
     expected = -0.5 * decades**2 - ln_width
-    unexpected = np.full_like(
-        expected, on_arrays.log(priors.UNEXPECTED_PRIOR) - priors.FREE_ROW_PENALTY
-    )
+    unexpected = np.full_like(expected, LOG_OTHER_NOISE)
     size_prior = log_sum_exp(np.stack([expected, unexpected], axis=-1))
     log = scale_free(trace, log_det[:, None], points, count) + size_prior
     return np.asarray(log_sum_exp(np.stack(list(log), axis=-1)) - on_arrays.log(len(log)))
@@ -280,8 +270,6 @@ def finest_noise_log_priors(floor: Floats, last_square: Floats) -> tuple[Floats,
     A window should not end with a difference below the predicted noise: that costs a penalty.
     """
     ratio = floor / np.sqrt(np.maximum(last_square, TINY))
-    noisy = np.clip(ratio / (0.3 * priors.FINEST_NOISE[1]), priors.UNEXPECTED_PRIOR, 0.999)
-    penalty = np.where(
-        ratio > 1.0, on_arrays.log(priors.UNEXPECTED_PRIOR) - priors.FREE_ROW_PENALTY, 0.0
-    )
+    noisy = np.clip(ratio / (0.3 * priors.FINEST_NOISE[1]), priors.OTHER_NOISE_PRIOR, 0.999)
+    penalty = np.where(ratio > 1.0, LOG_OTHER_NOISE, 0.0)
     return on_arrays.log(1.0 - noisy) + penalty, on_arrays.log(noisy) + penalty

@@ -118,10 +118,8 @@ class Posterior:
 
     def per_ladder(self) -> list[str]:
         """Return the names of the fields with one row per ladder."""
-        names = [field.name for field in fields(self)]
-        return [
-            name for name in names if name not in ("powers", "grid", "reach", "windows", "pairs")
-        ]
+        shared = "powers", "grid", "reach", "windows", "pairs"
+        return [field.name for field in fields(self) if field.name not in shared]
 
 
 def orders_of(ladder: Ladder) -> Floats:
@@ -167,7 +165,7 @@ class _Fit:
         ]
         # of the evidence that may be skipped, half is for whole tables and half for single hypotheses
         share = 0.5 * left_out / len(self.windows)
-        self.log_table_share, self.log_hypothesis_share = (
+        self.log_table, self.log_single = (
             on_arrays.log(share / x) for x in (MOST_TABLES, MOST_HYPOTHESES)
         )
         # rounding of a level is relative to the largest difference at this and finer levels
@@ -177,15 +175,14 @@ class _Fit:
         # it is added to the Gram matrix, so that no difference is smaller
         self.rounding = priors.ROUNDING * (ladder.floor**2 + priors.EPSILON**2 * largest + TINY)
         self.differences = self.gram(0, n - 1)
-        self.free_rows = free_row_evidence(self.differences, self.points) - priors.FREE_ROW_PENALTY
+        self.free_rows = free_row_evidence(self.differences, self.points) - priors.FREE_PENALTY
         # all evidence is relative to that of differences with unrelated sizes
         self.log_unit = np.sum(self.free_rows, axis=-1)
         if ladder.exact_known:
             # the true error of the coarsest level may have any size, too
             squared = np.maximum(self.gram(0, 0, with_exact=True)[:, 0, 0], TINY)
-            self.log_unit = self.log_unit + (
-                scale_free(squared, 0.0, self.points, 1) - priors.FREE_ROW_PENALTY
-            )
+            evidence = scale_free(squared, 0.0, self.points, 1)
+            self.log_unit = self.log_unit + (evidence - priors.FREE_PENALTY)
         self.finer_by_end = {end: self.finer_rows(end) for end in range(2, n)}
         self.total, self.index = np.ones(count), np.arange(count)
         pairs, windows = len(terms.first_of_pairs), len(self.windows)
@@ -214,9 +211,7 @@ class _Fit:
             sizes = np.append(sizes, 0.0)
         else:
             finer = self.finer_products(start, end)
-        log_priors = [
-            outside + prior for prior in finest_noise_log_priors(ladder.floor[:, end], smallest)
-        ]
+        log_priors = [outside + x for x in finest_noise_log_priors(ladder.floor[:, end], smallest)]
         # rounding the sizes makes windows with equal ratios share their hypotheses
         hypotheses = hypotheses_of(tuple(np.round(sizes, 12)), self.promise)
         tables = [(table, log_priors[i]) for i, table in enumerate(hypotheses.two_shapes)]
@@ -245,9 +240,9 @@ class _Fit:
     def relevant(self, bound: Floats) -> tuple[Subset, Floats]:
         """Return the ladders for which evidence up to this bound matters, and the least that a hypothesis needs."""
         total = self.log_unit + on_arrays.log(self.total)
-        keep = bound > total + self.log_table_share
+        keep = bound > total + self.log_table
         subset = slice(None) if np.all(keep) else np.flatnonzero(keep)
-        return subset, total + self.log_hypothesis_share
+        return subset, total + self.log_single
 
     def add_table(
         self,
@@ -323,9 +318,8 @@ class _Fit:
         with_finer = np.sum(self.differences[:, :, end:], axis=-1)
         square = np.sum(with_finer[:, end:], axis=-1, keepdims=True)
         last = np.maximum(self.differences[:, end - 1, end - 1], TINY)
-        return np.asarray(
-            np.concatenate([with_finer[:, start:end], square], axis=-1) / last[:, None]
-        )
+        products = np.concatenate([with_finer[:, start:end], square], axis=-1)
+        return np.asarray(products / last[:, None])
 
     def add_to_window(
         self, index: int, subset: Subset, log: Floats, limit: Floats, squared: Floats
@@ -388,12 +382,8 @@ class _Fit:
         ladder, n = self.ladder, len(self.ladder.h)
         for k in range(n - 1):
             log = np.sum(self.free_rows[:, :k], axis=-1)
-            log += noise_evidence(
-                ladder.h[k:],
-                self.gram(k, n - 1, with_exact=ladder.exact_known),
-                self.points,
-                ladder.floor[:, k:],
-            )
+            gram = self.gram(k, n - 1, with_exact=ladder.exact_known)
+            log += noise_evidence(ladder.h[k:], gram, self.points, ladder.floor[:, k:])
             self.values["noise"] += self.add_to_total(slice(None), log)
 
     def posterior(self) -> Posterior:
@@ -414,9 +404,8 @@ class _Fit:
             window = values["window"]
             likely = window > LIKELY * np.max(window, axis=-1, keepdims=True)
             expansion = np.maximum(np.sum(window * likely, axis=-1), TINY)
-            values["limit_weights"] = (
-                np.sum(values["limit_weights"] * likely[..., None], axis=1) / expansion[:, None]
-            )
+            limit = np.sum(values["limit_weights"] * likely[..., None], axis=1)
+            values["limit_weights"] = limit / expansion[:, None]
             values["limit_square"] = np.sum(values["limit_square"] * likely, axis=1) / expansion
         for name in ("alternating", "noise"):
             values[name] = values[name] / total

@@ -3,9 +3,8 @@
 Origins: [expansion] follows from expansions of the error. [arithmetic] follows from double precision. [chosen] is a
 prior that was written down before any ladder was judged. [calibrated] was set on seeds 1 and 3 of the random ladders
 with known truth (``tests/analysis/synthetic.py``). Except for `POINTS` and `MISFIT`, doubling or halving one of these
-numbers hardly changes the counts there.
-
-A *row* is the difference of two successive levels; a *free* row has a size unrelated to the others.
+numbers hardly changes the counts there. A *row* is the difference of two successive levels; the size of a *free* row is
+unrelated to the others.
 """
 
 from __future__ import annotations
@@ -15,12 +14,7 @@ import numpy as np
 # ---- Powers of an expansion
 
 POINTS = 2.0  # independent points of a series or field; a single number has one [calibrated]
-POWERS = (
-    *(0.5 * k for k in range(1, 11)),
-    6.0,
-    7.0,
-    8.0,
-)  # powers that expansions have [expansion]
+POWERS = (*(0.5 * k for k in range(1, 11)), 6.0, 7.0, 8.0)  # powers of expansions [expansion]
 MAX_POWER = 8.0  # largest power considered [chosen]
 ANY_POWER_PRIOR = 0.1  # prior of one power of any value up to `MAX_POWER` [chosen]
 SPACING = 0.05  # spacing of the grid on which such powers are counted [chosen]
@@ -29,54 +23,35 @@ _POSITIVE = 3e-4 * 2.0 ** np.arange(9)
 OFFSETS = np.concatenate([-_POSITIVE[::-1], [0.0], _POSITIVE])
 EXPECTED_PRIOR = 0.5  # part of the prior reserved for a whole order that a user expects [chosen]
 THEORY_PRIOR = 0.9  # the same for the order that the theory of a scheme promises [chosen]
-FRACTIONAL_FACTOR = (
-    0.01  # on the prior of powers not a whole number away from the promised one [chosen]
-)
+FRACTIONAL_FACTOR = 0.01  # on powers that are not a whole number from the promised one [chosen]
 DISTANCES = (0.5, 1.0, 2.0)  # second power minus first power [expansion]
 PURE_PRIOR = 0.3  # prior that no second power is visible [chosen]
 # Size of the second power relative to the first, at the finest level of a window. [chosen]
 SHARES = tuple(10.0 ** (-4.25 + 0.5 * k) for k in range(15))
 DOMINATES = 0.1  # a power dominates if every other one is less than this part of it [chosen]
-LEAST_SIGNAL = (
-    0.1  # least mean square of both powers, given the rows, relative to the expected one [chosen]
-)
+LEAST_SIGNAL = 0.1  # least mean square of both powers, over the expected one [chosen]
 LONGEST_WINDOW = 11  # rows; halving from one step reaches round-off in as many [chosen]
 
 # ---- Deviations from an expansion
 
-MISFIT = (
-    3e-4  # standard deviation of a level from its expansion, relative to its error [calibrated]
-)
+MISFIT = 3e-4  # standard deviation of a level from its expansion, over its error [calibrated]
 TAIL = 40.0  # degrees of freedom of Student's t for the misfit of one shape: nearly normal [chosen]
 ONE_SHAPE_PRIOR = 0.1  # prior of one shape, relative to two shapes [calibrated, on seed 501]
-JITTER_PRIOR = 0.15  # prior that the error of each level is off by a factor of its own [calibrated]
+JITTER_PRIOR = 0.15  # prior that each level is off by a factor of its own [calibrated]
 # Standard deviations of these factors, and their priors. [calibrated]
 JITTERS, JITTER_PRIORS = (5e-3, 2.5e-2, 0.1), (0.5, 0.3, 0.2)
 # Prior that the second power then also has a shape of its own, and the standard deviation of the factors in that case:
 # with a larger one, a third power looks like factors. [calibrated]
 OWN_SHAPE_PRIOR, OWN_SHAPE_JITTER = 0.4, 5e-3
 ALTERNATING_PRIOR = 0.02  # prior of errors whose sign alternates from level to level [chosen]
-COHERENCES = (
-    3e-4,
-    3e-3,
-    3e-2,
-    0.3,
-    1.0,
-)  # part of a free row that is orthogonal to the next row [chosen]
-FREE_ROW_PENALTY = 2.0  # log of the range of sizes that a free row may have [calibrated]
+COHERENCES = (3e-4, 3e-3, 3e-2, 0.3, 1.0)  # part of a free row orthogonal to the next row [chosen]
+FREE_PENALTY = 2.0  # log of the range of sizes that a free row may have [calibrated]
 
 # ---- Noise
 
-FINEST_NOISE = (0.0, 0.1)  # noise of the finest level of a window, relative to its error [chosen]
-UNEXPECTED_PRIOR = 0.03  # prior of noise that differs from its prediction [chosen]
+FINEST_NOISE = (0.0, 0.1)  # noise of the finest level of a window, over its error [chosen]
+OTHER_NOISE_PRIOR = 0.03  # prior of noise that differs from its prediction [chosen]
 PREDICTION_FACTOR = 10.0  # predicted noise is known to within this factor [arithmetic]
-GROWTHS = (
-    0.0,
-    0.5,
-    1.0,
-    1.5,
-)  # noise grows as the number of steps to one of these powers [arithmetic]
-ROUNDING = 0.1  # least noise variance of a level, relative to the predicted one [chosen]
-EPSILON = (
-    2.0**-53
-)  # least noise of a level, relative to the largest difference at it or at finer ones [arithmetic]
+GROWTHS = (0.0, 0.5, 1.0, 1.5)  # noise grows as the number of steps to such a power [arithmetic]
+ROUNDING = 0.1  # least noise variance of a level, over the predicted one [chosen]
+EPSILON = 2.0**-53  # least noise of a level, over the largest difference from it on [arithmetic]

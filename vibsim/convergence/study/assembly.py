@@ -132,7 +132,7 @@ def _rounding(outcome: Outcome) -> tuple[str, ...]:
         )
     if not outcome.rounded > ROUNDING_SAID * outcome.error_bound or outcome.exact_known:
         return ()
-    if one.comes_in_steps:
+    if outcome.comes_in_steps:
         return (
             "Levels with the same value show that values come in steps, which the bounds include.",
         )

@@ -129,16 +129,14 @@ def exact_values(exact: Any, common: CommonValues, *, members: bool = False) -> 
     if callable(exact):
         result = _of_function(exact, common, common.dims[1:] if members else common.dims)
     else:
-        labelled = grid_values(exact, "exact")
-        named = bool(labelled.coords) or set(labelled.dims) == set(common.dims)
-        if named and not set(labelled.dims) <= set(common.dims):
-            raise refused(
-                "exact", _listed(labelled.dims), f"the values have {_listed(common.dims)}"
-            )
-        result = labelled.values
+        data = grid_values(exact, "exact")
+        named = bool(data.coords) or set(data.dims) == set(common.dims)
+        if named and not set(data.dims) <= set(common.dims):
+            raise refused("exact", _listed(data.dims), f"the values have {_listed(common.dims)}")
+        result = data.values
         if named:
-            present = [dim for dim in common.dims if dim in labelled.dims]
-            result = _at_common_points(_transposed(labelled, present), labelled, present, common)
+            present = [dim for dim in common.dims if dim in data.dims]
+            result = _at_common_points(_transposed(data, present), data, present, common)
             index = [slice(None) if dim in present else None for dim in common.dims]
             result = result[tuple(index)]
     try:
@@ -152,12 +150,12 @@ def exact_values(exact: Any, common: CommonValues, *, members: bool = False) -> 
 
 
 def _at_common_points(
-    values: Floats, labelled: GridValues, dims: Sequence[str], common: CommonValues
+    values: Floats, data: GridValues, dims: Sequence[str], common: CommonValues
 ) -> Floats:
     """Return the values at the common points, for the dimensions with coordinates."""
     for axis, dim in enumerate(dims):
-        if dim in labelled.coords and dim in common.coords:
-            index = restriction.positions(common.coords[dim], labelled.coords[dim])
+        if dim in data.coords and dim in common.coords:
+            index = restriction.positions(common.coords[dim], data.coords[dim])
             if index is None:
                 rule = f"must be given at the {len(common.coords[dim])} common points of the levels"
                 raise refused("exact", f"coordinates {dim}", rule)

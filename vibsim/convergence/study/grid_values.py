@@ -58,14 +58,8 @@ def grid_values(value: Any, key: str) -> GridValues:
         value = value[names[0]]
     if hasattr(value, "dims") and hasattr(value, "coords"):
         dims = tuple(map(str, value.dims))
-        index_coords = {
-            str(n): c for n, c in value.coords.items() if tuple(map(str, c.dims)) == (str(n),)
-        }
-        coords = {
-            name: plain_coordinate(np.asarray(index_coords[name]))
-            for name in dims
-            if name in index_coords
-        }
+        axes = {str(n): c for n, c in value.coords.items() if tuple(map(str, c.dims)) == (str(n),)}
+        coords = {name: plain_coordinate(np.asarray(axes[name])) for name in dims if name in axes}
         numbers, epsilon = real(np.asarray(value), key)
         return GridValues(
             numbers,
@@ -74,7 +68,7 @@ def grid_values(value: Any, key: str) -> GridValues:
             str(value.name or ""),
             epsilon,
             units_in(getattr(value, "attrs", {}))[0],
-            {name: units_in(index_coords[name].attrs) for name in coords},
+            {name: units_in(axes[name].attrs) for name in coords},
         )
     try:
         array = value if isinstance(value, np.ma.MaskedArray) else np.asarray(value)

@@ -14,11 +14,11 @@ if TYPE_CHECKING:
 COLUMNS = {
     "value": "value, or norm of the values",
     "difference": "this level minus the next finer one",
-    "ratio": "this difference divided by the next one",
-    "order": "order that corresponds to this ratio",
+    "ratio": "this difference over the next one",
+    "order": "order that belongs to this ratio",
     "error": "this level minus the exact or the extrapolated values",
 }
-"""Columns of the table of levels and their meaning."""
+"""Columns of the table of levels and their meanings."""
 
 
 def dataset(verdict: LadderVerdict) -> xarray.Dataset:

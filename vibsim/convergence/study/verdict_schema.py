@@ -9,13 +9,13 @@ from vibsim.core.json_schema import DRAFT, REASON, STATUS, TEXT, list_of, object
 from vibsim.core.vocabulary import FORMAT
 
 NUMBERS = {
-    "order": "observed order; a number whenever three levels give an estimate, whatever the status",
-    "order_low": "lower end of its 95 % interval",
-    "order_high": "upper end of its 95 % interval",
-    "error": "error of the finest level: computed minus exact for a number, root mean square for a series or field",
-    "error_bound": "upper bound of the size of that error, which holds for 95 % of such ladders",
-    "best": "number extrapolated over the levels; null for a series or field",
-    "best_bound": "upper bound of the error of `best`",
+    "order": "observed order; a number wherever three levels give an estimate, whatever the status",
+    "order_low": "lower end of its interval of 95 %",
+    "order_high": "upper end of its interval of 95 %",
+    "error": "error of the finest level: computed minus exact of a number, root mean square of a series or field",
+    "error_bound": "what the size of that error does not exceed, in 95 % of such ladders",
+    "best": "number extrapolated over the levels; null of a series or field",
+    "best_bound": "what the error of `best` does not exceed",
     "gci": "grid convergence index of the finest level, relative, with safety factor 1.25",
 }
 """Numbers of a verdict and their meaning; null if the levels do not determine them."""
