@@ -109,9 +109,7 @@ COMPARED_SERIES_FILE = 60_000
 
 
 def work(force_evaluations: int, explicit: bool, alone: float | None = None) -> tuple[float, float]:
-    """Return the work of a step in units of an explicit step with one force evaluation.
-
-    The first number is the work that is vectorised over members, the second the work that is done member by member.
+    """Return the vectorised and the member-by-member work of a step, in explicit steps with one force evaluation.
 
     Parameters
     ----------
@@ -179,10 +177,9 @@ class LevelCost:
     @property
     def shard(self) -> int:
         """Members of a shard: a power of two of chains, so that a remeasured constant seldom changes it."""
-        by_time = SHARD_SECONDS / (
-            self.steps * self._step(MANY_SECONDS, ONE_SECONDS) + self.scipy_seconds
-        )
-        largest = min(int(by_time), SHARD_BYTES // self.held, LARGEST_SHARD) // self.chain
+        seconds = self.steps * self._step(MANY_SECONDS, ONE_SECONDS) + self.scipy_seconds
+        by_time = int(SHARD_SECONDS / seconds)
+        largest = min(by_time, SHARD_BYTES // self.held, LARGEST_SHARD) // self.chain
         return self.chain << (max(largest, 1).bit_length() - 1)
 
     def shards(self, members: int) -> int:
@@ -275,10 +272,8 @@ def analysis_disk(levels: Sequence[LevelCost], members: int, is_lean: bool) -> i
     size, file = once + per_level * len(levels), COMPARED_FILE
     if not is_lean:
         once, per_level = COMPARED_SERIES
-        size += levels[0].samples * (once + per_level * len(levels))
-        size += (
-            EXTREMUM_BYTES * len(levels) * max(level.extrema for level in levels) + COMPARED_NUMBERS
-        )
+        size += levels[0].samples * (once + per_level * len(levels)) + COMPARED_NUMBERS
+        size += EXTREMUM_BYTES * len(levels) * max(level.extrema for level in levels)
         size += EVENT_BYTES * len(levels) * max(level.events for level in levels)
         file += COMPARED_SERIES_FILE
         # so far for one coordinate

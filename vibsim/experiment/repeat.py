@@ -109,14 +109,12 @@ class _Writer:
             return self.mapping(path, value, out, values)
         if not isinstance(value, list | tuple):
             return self._put(path, value, values) if isinstance(value, str) else value
-        entries: list[Any] = []
+        items: list[Any] = []
         for i, item in enumerate(value):
-            for own_values in self._values(item, {}) if isinstance(item, str) else [{}]:
-                self.origins[*out, len(entries)] = (*path, i)
-                entries.append(
-                    self._put((*path, i), item, own_values) if isinstance(item, str) else item
-                )
-        return entries
+            for own in self._values(item, {}) if isinstance(item, str) else [{}]:
+                self.origins[*out, len(items)] = (*path, i)
+                items.append(self._put((*path, i), item, own) if isinstance(item, str) else item)
+        return items
 
     def _values(self, text: str, above: Mapping[str, int]) -> Iterator[dict[str, int]]:
         """Yield `above` extended by all combinations of the further indices in a text, the last index fastest."""

@@ -77,19 +77,16 @@ def columns_of(axes: Sequence[Axis], start: int, stop: int) -> dict[str, Column]
         index = member // inner
         first, last = (int(index[0]), int(index[-1])) if len(index) else (0, -1)
         if last - first + 1 >= axis.count:
-            blocks, position = _block(axis, 0, axis.count), index % axis.count
+            blocks, rows = _block(axis, 0, axis.count), index % axis.count
         elif first % axis.count <= last % axis.count:
-            blocks, position = (
-                _block(axis, first % axis.count, last % axis.count + 1),
-                index - first,
-            )
+            blocks, rows = _block(axis, first % axis.count, last % axis.count + 1), index - first
         else:
             # the range wraps around the end of the axis
             head = _block(axis, first % axis.count, axis.count)
             tail = _block(axis, 0, last % axis.count + 1)
             pairs = zip(head, tail, strict=True)
-            blocks, position = [np.concatenate(pair) for pair in pairs], index - first
-        columns_ |= {key: block[position] for key, block in zip(axis.keys, blocks, strict=True)}
+            blocks, rows = [np.concatenate(pair) for pair in pairs], index - first
+        columns_ |= {key: block[rows] for key, block in zip(axis.keys, blocks, strict=True)}
     return columns_
 
 

@@ -186,28 +186,26 @@ def _comparison(symbol: str, a: Interval, b: Interval) -> Interval:
     return np.where(is_true, 1.0, 0.0), np.where(is_false, 0.0, 1.0)
 
 
-def _call(function: str, arguments: Sequence[Interval]) -> Interval:
+def _call(function: str, args: Sequence[Interval]) -> Interval:
     match function:
         case "min" | "max" | "hypot":
-            a, b = (_absolute(x) for x in arguments) if function == "hypot" else arguments
+            a, b = (_absolute(x) for x in args) if function == "hypot" else args
             return _function_value(function, a[0], b[0]), _function_value(function, a[1], b[1])
         case "atan2":
-            is_right = arguments[1][0] > 0.0
-            low, high = _corners(on_arrays.atan2, *arguments)
+            is_right = args[1][0] > 0.0
+            low, high = _corners(on_arrays.atan2, *args)
             return np.where(is_right, low, -np.pi), np.where(is_right, high, np.pi)
         case "mod":
-            return _modulo(*arguments)
+            return _modulo(*args)
         case "where":
-            return _where(*arguments)
+            return _where(*args)
         case "sin" | "cos":
-            return _periodic(function, arguments[0])
+            return _periodic(function, args[0])
         case "tan":
-            low, high = (_function_value("tan", x) for x in arguments[0])
-            on_one_branch = np.floor(arguments[0][0] / np.pi - 0.5) == np.floor(
-                arguments[0][1] / np.pi - 0.5
-            )
-            return np.where(on_one_branch, low, -np.inf), np.where(on_one_branch, high, np.inf)
-    ends = _absolute(arguments[0]) if function in EVEN else arguments[0]
+            low, high = (_function_value("tan", x) for x in args[0])
+            same_branch = np.floor(args[0][0] / np.pi - 0.5) == np.floor(args[0][1] / np.pi - 0.5)
+            return np.where(same_branch, low, -np.inf), np.where(same_branch, high, np.inf)
+    ends = _absolute(args[0]) if function in EVEN else args[0]
     low, high = (_function_value(function, x) for x in ends)
     return (high, low) if function in FALLING else (low, high)
 
@@ -231,11 +229,11 @@ def _periodic(function: str, x: Interval) -> Interval:
 
 def _modulo(x: Interval, y: Interval) -> Interval:
     whole = [np.floor(end / y[0]) for end in x]
-    on_one_branch = (whole[0] == whole[1]) & (y[0] == y[1])
+    same_branch = (whole[0] == whole[1]) & (y[0] == y[1])
     low, high = (end - whole[0] * y[0] for end in x)
     return (
-        np.where(on_one_branch, np.minimum(low, high), np.minimum(y[0], 0.0)),
-        np.where(on_one_branch, np.maximum(low, high), np.maximum(y[1], 0.0)),
+        np.where(same_branch, np.minimum(low, high), np.minimum(y[0], 0.0)),
+        np.where(same_branch, np.maximum(low, high), np.maximum(y[1], 0.0)),
     )
 
 

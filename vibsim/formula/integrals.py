@@ -6,8 +6,7 @@ corners or jumps (`BROKEN`) are also integrated for ``a x + b``, although ``F(a 
 some digits. A term that is switched on by a condition is integrated up to, or from, the switching point. Everything
 else is integrated by a Gauss-Legendre rule from 0 to x, written as a formula. It is accurate to round-off for a smooth
 function, even with a corner at 0. For functions with complex poles near the real axis, such as ``x/sqrt(1 + x^2)`` at
-i, the rule integrates over asinh(x): the interval from 0 to 128 then has length 5.5, and the pole keeps a distance of
-1.6.
+i, the rule integrates over asinh(x): the interval from 0 to 128 then has length 5.5, and the pole is 1.6 away.
 """
 
 from __future__ import annotations
@@ -150,12 +149,12 @@ def _power(node: Expression, base: Expression, power: float, name: str) -> Expre
             return filled("x**n/n", x=base, n=n) if power > 0.0 else None
         case Call("max", (x, Number(0.0))):
             return _linear_argument("max(x, 0)**n/n", x, node, name, n=n) if power > 0.0 else None
-    if power < 1.0 or not power.is_integer() or not _may_start_at_zero(base, name):
+    if power < 1.0 or not power.is_integer() or not _may_be_zero(base, name):
         return None
     return _linear_argument("x**n/n", base, node, name, n=n)
 
 
-def _may_start_at_zero(x: Expression, name: str) -> bool:
+def _may_be_zero(x: Expression, name: str) -> bool:
     """Tell whether an argument may be 0 at the start of the integral: it is 0, or depends on other names.
 
     Functions of u - 1, say, are left to quadrature, which does not cancel.
@@ -170,11 +169,7 @@ def _function(
     """Return the integral of a function of ``a x + b``."""
     x, *others = arguments
     if function in SMOOTH:
-        return (
-            _linear_argument(SMOOTH[function], x, node, name)
-            if _may_start_at_zero(x, name)
-            else None
-        )
+        return _linear_argument(SMOOTH[function], x, node, name) if _may_be_zero(x, name) else None
     if function in BROKEN:
         return _linear_argument(BROKEN[function], x, node, name)
     if len(others) != 1:

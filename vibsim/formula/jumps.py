@@ -123,15 +123,12 @@ def hidden_pulses(formula: Expression, numbers: Mapping[str, Floats], t: Floats)
         for _ in range(HALVINGS):
             parameters = {name: x[row] for name, x in flat.items()}
             lowest, highest = bounds(formula, {**parameters, "t": (a, b)})
-            excess_bound = np.broadcast_to(
-                np.maximum(low[row] - lowest, highest - high[row]), a.shape
-            )
-            remaining = np.flatnonzero((excess_bound > 0.0) & np.isnan(time[case[row]]))
-            if len(remaining) > MOST_INTERVALS:
-                remaining = remaining[
-                    np.argsort(-excess_bound[remaining], kind="stable")[:MOST_INTERVALS]
-                ]
-            row, a, b = row[remaining], a[remaining], b[remaining]
+            bound = np.broadcast_to(np.maximum(low[row] - lowest, highest - high[row]), a.shape)
+            candidates = np.flatnonzero((bound > 0.0) & np.isnan(time[case[row]]))
+            if len(candidates) > MOST_INTERVALS:
+                largest = np.argsort(-bound[candidates], kind="stable")[:MOST_INTERVALS]
+                candidates = candidates[largest]
+            row, a, b = row[candidates], a[candidates], b[candidates]
             if not len(row):
                 break
             middle = 0.5 * (a + b)

@@ -179,9 +179,7 @@ def parts_of(*formulas: Expression, but: Callable[[Expression], bool] = _never) 
     stack = [*reversed(formulas)]
     while stack:
         node = stack[-1]
-        missing = [
-            operand for operand in node.operands if operand not in ordered and not but(operand)
-        ]
+        missing = [x for x in node.operands if x not in ordered and not but(x)]
         if missing and not but(node):
             stack += reversed(missing)
             continue

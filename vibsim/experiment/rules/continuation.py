@@ -52,9 +52,7 @@ def check_equation(model: Model, numbers: MemberNumbers, report: Report) -> None
         report.add(KEY, f"{rule}, and the exact solution says where these start")
         return
     if not why_not_free(model):
-        report.add(
-            KEY, "needs a steady state to start from, which a free linear motion does not have"
-        )
+        report.add(KEY, "needs a steady state to start from, which no free linear motion has")
         return
     forces = [tree(model, formula) for formula in model.accelerations]
     if not any("t" in force.names for force in forces):

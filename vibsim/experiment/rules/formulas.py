@@ -102,7 +102,7 @@ def read_formulas(
             report.add(("model", row.name), rule, "leave the key out", at_key=True)
         elif value == NONE and row.terms and NONE not in declared:
             continue
-        elif value is not None and is_valid_formula(value, row, ("model", row.name), known, report):
+        elif value is not None and is_valid(value, row, ("model", row.name), known, report):
             texts[row.name] = value.strip()
         _check_companions(row, section, report)
     if model.takes_events:
@@ -139,7 +139,7 @@ def _table(
 
 def _is_linear_in_time(text: str, path: Path_, known: Collection[str], report: Report) -> bool:
     """Tell whether the abscissa formula of a table is a constant times t; report a fault otherwise."""
-    if not is_valid_formula(text, FormulaField(AT, ("t",), "", ""), path, known, report):
+    if not is_valid(text, FormulaField(AT, ("t",), "", ""), path, known, report):
         return False
     place = parse(text, ("t", *known))
     speed = derivative(place, "t")
@@ -177,7 +177,7 @@ def _named_formulas(
         is_list = isinstance(written, tuple)
         formulas: dict[str, str] = {}
         for i, text in enumerate(written if is_list else (written,)):
-            if is_valid_formula(text, row, (*path, i) if is_list else path, known, report):
+            if is_valid(text, row, (*path, i) if is_list else path, known, report):
                 formulas[f"{row.name}.{i}"] = text.strip()
         return formulas
     if not isinstance(written, Mapping):
@@ -185,7 +185,7 @@ def _named_formulas(
             rule = f"must have a formula for each of {_shortlist(model.positions)}"
             report.add(path, rule, f"e.g. {{{model.position}: ...}}")
             return {}
-        if not is_valid_formula(written, row, path, known, report):
+        if not is_valid(written, row, path, known, report):
             return {}
         return {f"{row.name}.{name}": written.strip() for name in model.positions}
     if row.paired:
@@ -198,16 +198,15 @@ def _named_formulas(
             report.add((*path, name), "unknown coordinate", hint, at_key=True)
         elif row.of == "output" and (fault := name_fault(name, tuple(used))):
             report.add((*path, name), fault, "choose another name", at_key=True)
-        elif is_valid_formula(text, row, (*path, name), known, report):
+        elif is_valid(text, row, (*path, name), known, report):
             formulas[f"{row.name}.{name}"] = text.strip()
         used.append(name)
     missing = [name for name in model.positions if name not in written]
     # a misspelt name is already reported
     is_reported = any(name not in model.positions for name in written)
     if row.of == "coordinate" and missing and not is_reported:
-        report.add(
-            path, f"must have a formula for each coordinate, has none for {_shortlist(missing)}"
-        )
+        rule = f"must have a formula for each coordinate, has none for {_shortlist(missing)}"
+        report.add(path, rule)
     return formulas
 
 
@@ -235,7 +234,7 @@ def _pair_formulas(
         elif names[0] != names[-1] and names[::-1] in formulas and names > names[::-1]:
             rule = f"is that of {names[1]} and {names[0]}, which is given already"
             report.add(path, rule, "leave it out", at_key=True)
-        elif is_valid_formula(text, row, path, known, report):
+        elif is_valid(text, row, path, known, report):
             valid[".".join((row.name, *names))] = text.strip()
     return valid
 
@@ -276,7 +275,7 @@ def _check_positive(
                 report.add(("model", *key.split(".")), rule, value=text)
 
 
-def is_valid_formula(
+def is_valid(
     text: str, row: FormulaField, path: Path_, known: Collection[str], report: Report
 ) -> bool:
     """Tell whether a formula of the variables of `row` and `known` parameters is valid; report its fault if not."""

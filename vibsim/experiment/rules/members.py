@@ -84,17 +84,17 @@ class MemberNumbers:
         """Yield blocks of all members: their number, their variables at t = 0 by name, and their swept values."""
         for start, stop in _chunks(math.prod(axis.count for axis in self.axes)):
             swept = columns_of(self.axes, start, stop)
-            start_values = (
+            initial = (
                 self.model.start(self._parameters(swept)) if self.model.start else self.initial
             )
             numbers: dict[str, Any] = {"t": 0.0, **self._by_name(swept)}
             for state in self.model.states:
-                value = start_values.get(state.name, 0.0)
+                value = initial.get(state.name, 0.0)
                 numbers[state.name] = swept.get(f"initial.{state.name}", value)
             yield stop - start, numbers, swept
 
     def _distinct_axes(self) -> list[Axis]:
-        return [axis for axis in self.axes if any(map(_is_distinguishing, axis.keys))]
+        return [axis for axis in self.axes if any(map(_is_relevant, axis.keys))]
 
     @property
     def count(self) -> int:
@@ -102,11 +102,8 @@ class MemberNumbers:
         return math.prod(axis.count for axis in self._distinct_axes())
 
     def _block(self, start: int, stop: int) -> tuple[dict[str, Any], Floats]:
-        swept = {
-            k: v
-            for k, v in columns_of(self._distinct_axes(), start, stop).items()
-            if _is_distinguishing(k)
-        }
+        columns = columns_of(self._distinct_axes(), start, stop)
+        swept = {key: column for key, column in columns.items() if _is_relevant(key)}
         end = swept.get("time.end", np.full(stop - start, self.time.end))
         if self.time.is_of_model:
             with np.errstate(divide="ignore"):
@@ -137,7 +134,7 @@ def _chunks(count: int) -> Iterator[tuple[int, int]]:
     yield from ((start, min(start + CHUNK, count)) for start in range(0, count, CHUNK))
 
 
-def _is_distinguishing(key: str) -> bool:
+def _is_relevant(key: str) -> bool:
     return key.startswith("model.") or key == "time.end"
 
 

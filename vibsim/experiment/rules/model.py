@@ -12,12 +12,7 @@ import numpy as np
 from vibsim.experiment.data import StructureSpec, TableSpec
 from vibsim.experiment.faults import Report
 from vibsim.experiment.kinds import COORDINATES
-from vibsim.experiment.rules.formulas import (
-    NAME,
-    declared_parameters,
-    is_valid_formula,
-    read_formulas,
-)
+from vibsim.experiment.rules.formulas import NAME, declared_parameters, is_valid, read_formulas
 from vibsim.experiment.rules.potential import NOT_FOUND, check_potential, note_potential
 from vibsim.experiment.rules.structure import read_structure, terms_of_damping
 from vibsim.experiment.schema.fields import AT, DECLARED, Section
@@ -111,7 +106,7 @@ def _equation_of_structure(
     load_field = FormulaField("load", ("t",), "", "load")
     known = (*(row.name for row in RAYLEIGH), *declared)
     for text, path in loads.values():
-        is_valid_formula(text, load_field, path, known, report)
+        is_valid(text, load_field, path, known, report)
     if spec is None or report.has_faulty_model:
         return Equation(None)
     texts = {key: text for key, (text, _) in loads.items()}

@@ -33,10 +33,7 @@ _LEAN = 3
 
 @dataclass(frozen=True)
 class Setting:
-    """The parts of an experiment that checks and limits are validated against.
-
-    A part is None or empty if its section is faulty; rules about it are then skipped.
-    """
+    """The parts of an experiment that rules refer to; None or empty (which skips rules) if a section is faulty."""
 
     model: Model | None
     time: TimeSpec | None

@@ -58,11 +58,9 @@ def read_structure(
     if report.has_faulty_model:
         return None, formulas
     assembled = assemble(spec, folder, ratios if isinstance(ratios, float) else None)
-    if assembled.unnamed:
-        rule = (
-            f"must be given above {MOST_OBSERVED} degrees of freedom, there are {assembled.unnamed}"
-        )
-        report.add(("model", "observe"), rule, f"e.g. {{tip: {assembled.unnamed}}}")
+    if dofs := assembled.unnamed:
+        rule = f"must be given above {MOST_OBSERVED} degrees of freedom, there are {dofs}"
+        report.add(("model", "observe"), rule, f"e.g. {{tip: {dofs}}}")
     for key, rule, hint in assembled.faults:
         shown = arrays[key].file if key in arrays else None
         report.add(_place(key, report), rule, hint, shown)

@@ -198,13 +198,11 @@ class SweepReader:
             hint = f"sweep a parameter, such as {example}"
         elif model is not None and not (self.lacks_scheme and key.startswith("schemes.")):
             last = key.lower().split(".")[-1]
-            similar = [name for name in self.types if name.lower() == key.lower()]
-            similar = similar or [
-                name for name in self.types if name.lower().split(".")[-1] == last
-            ]
-            rule, hint = "cannot be swept", nearest(key, similar or list(self.types))
-            if len(similar) == 1:
-                hint = f"did you mean '{similar[0]}'?"
+            close = [name for name in self.types if name.lower() == key.lower()]
+            close = close or [name for name in self.types if name.lower().split(".")[-1] == last]
+            rule, hint = "cannot be swept", nearest(key, close or list(self.types))
+            if len(close) == 1:
+                hint = f"did you mean '{close[0]}'?"
         if rule:
             self.report.add(path, rule, hint, at_key=True)
         return None
