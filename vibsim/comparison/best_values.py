@@ -26,6 +26,7 @@ from vibsim.convergence import gci
 from vibsim.convergence.differences import safe_ratio
 from vibsim.convergence.ladder_blocks import batches
 from vibsim.convergence.number_extrapolation import Limit, limit, observed_order
+from vibsim.convergence.thresholds import NUMBER_SAFETY_ALONE
 from vibsim.core.array_types import Flags, Floats
 from vibsim.core.record import Variable, flags
 from vibsim.core.vocabulary import LEVELS_OF_AN_ORDER, MEMBER
@@ -85,9 +86,11 @@ class _Ladder:
         """Return the limit, with a bound that includes `missed`; or that of the series, if closer."""
         found = limit(self.values, self.levels, self.order, self.even, self.floor)
         bound = self.safety * found.bound + self.missed
-        value, least = np.moveaxis(self.of_series, -1, 0)
-        is_closer = least < bound
-        bound = np.where(is_closer, least, bound)
+        value, series_bound = np.moveaxis(self.of_series, -1, 0)
+        # a series has one change, as a number whose extrapolation rests on one
+        series_bound = NUMBER_SAFETY_ALONE * series_bound
+        is_closer = series_bound < bound
+        bound = np.where(is_closer, series_bound, bound)
         return Limit(
             np.where(is_closer, value, found.value),
             np.where(np.isinf(self.missed), np.inf, bound),
