@@ -172,7 +172,10 @@ def test_a_member_that_follows_is_not_run_alone() -> None:
 @pytest.mark.parametrize(
     ("sections", "message"),
     [
-        ({"sweep": {"model.omega": [1, 2], "follow": "model.omeg"}}, "not a swept key.*model.omega"),
+        (
+            {"sweep": {"model.omega": [1, 2], "follow": "model.omeg"}},
+            "not a swept key.*model.omega",
+        ),
         ({"sweep": {"model.omega": [1, 2], "follow": True}}, "must name a swept key"),
         (
             {"sweep": {"model.omega": [1, 2], "model.gamma": [1, 2], "follow": "model.omega"}},
