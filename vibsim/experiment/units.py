@@ -277,7 +277,7 @@ class Unit:
         return _words().get(self.text, f"a quantity in {self.text}")
 
     def fits(self, wanted: Unit) -> bool:
-        """Whether a number with this unit is valid where `wanted` is expected; an angle is also a plain number."""
+        """Whether a number with this unit is valid where `wanted` is expected; an angle counts as plain radians."""
         return self.powers == wanted.powers or (not wanted.powers and self.powers == {"rad": 1})
 
     def times(self, other: Unit, exponent: int) -> Unit:

@@ -155,7 +155,7 @@ class _Expected:
             else:
                 break
         self.section: Any = bare if _is_section(bare) else None
-        """The `Section` class, if a mapping is expected that one describes."""
+        """The `Section` class, if the value is a mapping described by one."""
         discriminator: Any = next((m for m in metadata if isinstance(m, Discriminator)), None)
         self.one_of = next((m for m in metadata if isinstance(m, OneOf)), None)
         self.tag_for = discriminator.discriminator if discriminator else None
