@@ -149,10 +149,9 @@ def describe(f: Found, check: StableCheck) -> Description:
             "`model:`.",
         )
     factors = f.fact("predicted_growth"), f.fact("growth")
-    sentence = (
-        f"Scheme {f.scheme_name} is {'stable' if f.reason == 'match' else 'unstable'} at level {level}"
-        f"{f', where w dt = {number(p, 4)}' if math.isfinite(p) else ''}."
-    )
+    brief = f"{'stable' if f.reason == 'match' else 'unstable'} at level {level}"
+    brief += f", where w dt = {number(p, 4)}" if math.isfinite(p) else ""
+    sentence = f"Scheme {f.scheme_name} is {brief}."
     if f.reason == "unstable" and not time and f.model.linear and _is_at_limit(p, _limit(f)):
         sentence += " This is its limit, at which the amplitude grows in proportion to the time."
     else:
@@ -170,7 +169,7 @@ def describe(f: Found, check: StableCheck) -> Description:
         sentence += f" It produced a number that is not finite or too large at t = {time}."
     if f.reason == "mismatch":
         sentence += " Prediction and measurement disagree, so this is not the scheme that the theory describes."
-    return Description(sentence, _advice(f, level, p, time))
+    return Description(sentence, _advice(f, level, p, time), brief)
 
 
 def _is_at_limit(p: Floats, limit: Floats) -> Flags:

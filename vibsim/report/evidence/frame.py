@@ -37,21 +37,25 @@ def evidence(caption: str, alt: str = "", figure: Figure | None = None) -> Pictu
 
 def panel(figure: Figure, title: str, x_name: str, width: float = 2.5) -> Axes:
     """Return a new panel to the right of those that a figure has, all of one `width` [inch]."""
-    figure.add_axes((0.0, 0.0, 1.0, 1.0))
-    room, high = LEFT + width + RIGHT, ABOVE + HEIGHT + BELOW
-    wide = room * len(figure.axes)
-    figure.set_size_inches(wide, high)
-    for i, ax in enumerate(figure.axes):
-        left, bottom = (i * room + LEFT) / wide, BELOW / high
-        ax.set_position((left, bottom, width / wide, HEIGHT / high))
+    ax = figure.add_axes((0.0, 0.0, 1.0, 1.0))
+    place(figure, LEFT + width + RIGHT, HEIGHT)
     ax.set_title(title, fontsize=SIZE, fontweight="normal")
     ax.set_xlabel(x_name, fontsize=SIZE, color=SOFT)
-    # a place of their own costs less than one that matplotlib finds
-    ax.xaxis.set_label_coords(0.5, -0.24)
     ax.tick_params(labelsize=SIZE, color=SOFT, labelcolor=SOFT)
     ax.grid(visible=False)
     round_ticks(ax.xaxis, 5)
     return ax
+
+
+def place(figure: Figure, room: float, height: float) -> None:
+    """Put the panels of a figure beside each other, each of so much room, and so high [inch]."""
+    wide, high = room * len(figure.axes), ABOVE + height + BELOW
+    figure.set_size_inches(wide, high)
+    for i, ax in enumerate(figure.axes):
+        left, bottom = (i * room + LEFT) / wide, BELOW / high
+        ax.set_position((left, bottom, (room - LEFT - RIGHT) / wide, height / high))
+        # a place of their own costs less than one that matplotlib finds
+        ax.xaxis.set_label_coords(0.5, -0.24 / height)
 
 
 def round_ticks(axis: Any, most: int = 4) -> None:

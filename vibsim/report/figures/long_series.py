@@ -63,7 +63,7 @@ def long_series(
     if (
         is_short
         or (len(rows) == 1 and not is_known)
-        or moments.is_undersampled(record, t, compared)
+        or moments.is_undersampled(int(record["steps"][0]), t, (t, compared))
     ):
         return None
     # a group of neighbours keeps two points

@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 
 from vibsim.core.array_types import Floats
-from vibsim.core.record import Record
 from vibsim.models import Model
 from vibsim.report import data
 from vibsim.report.figures.scenes import Motion
@@ -50,10 +49,13 @@ def period(t: Floats, u: Floats) -> float:
     return float(t[-1] - t[0]) / max(1.0, 0.5 * turns)
 
 
-def is_undersampled(record: Record, t: Floats, u: Floats) -> bool:
-    """Say whether lines between samples would hide what the steps between them show of a motion."""
-    has_more = int(np.min(record["steps"])) > t.size - 1
-    return has_more and t.size * period(t, u) < FEWEST_SAMPLES * float(t[-1] - t[0])
+def is_undersampled(steps: int, t: Floats, curve: tuple[Floats, Floats]) -> bool:
+    """Say whether lines between the samples at `t` would hide what so many steps show of a motion.
+
+    Its turns are those of `curve`: samples that are too few may show a slower motion.
+    """
+    has_more = steps > t.size - 1
+    return has_more and t.size * period(*curve) < FEWEST_SAMPLES * float(t[-1] - t[0])
 
 
 def at_times(times: Floats, t: Floats, x: Floats) -> Floats:
