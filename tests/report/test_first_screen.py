@@ -99,7 +99,7 @@ def test_an_order_of_some_members_alone_says_of_how_many(theta, where):
     asked = 2 if theta == 1.0 else 1
     assert f"The check asks about {asked} of the 3 members" in shown["meaning"]
     assert (f"of {asked} of the 3 members" in shown["numbers"][0]["note"]) == (asked > 1)
-    assert assertions.about(record, exp.checks[0]) == f"Order of θ (initial θ = {theta:g})"
+    assert assertions.about(exp.checks[0], record) == f"Order of θ (initial θ = {theta:g})"
     drawn_of = {member.case for member in gallery.choose(exp, record, decisive.member)[0]}
     assert decisive.member.case in drawn_of
     _, tables = page_tables.collect(exp, record, summary, decisive, [])

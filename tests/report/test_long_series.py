@@ -105,7 +105,7 @@ def test_few_samples_a_period_are_dots_on_a_smooth_exact_solution():
     assert "Dots" not in picture.caption
 
 
-@pytest.mark.parametrize(("every", "is_dotted"), [(2, False), (16, True)])
+@pytest.mark.parametrize(("every", "is_dotted"), [(2, False), (16, True), (32, True), (64, True)])
 def test_a_motion_of_few_samples_has_no_line_between_them(every, is_dotted):
     """Lines between three samples a period would be a motion of another frequency, of other extremes."""
     exp = samples.experiment(
@@ -116,16 +116,30 @@ def test_a_motion_of_few_samples_has_no_line_between_them(every, is_dotted):
     with style.applied():
         picture = solution.motion(exp, record, "theta", member)
     above, below = picture.figure.axes
-    dashes = {line.get_linestyle() for ax in (above, below) for line in ax.get_lines()}
+    exact, *levels = above.get_lines()
+    dashes = {line.get_linestyle() for line in [*levels, *below.get_lines()]}
     assert (dashes == {"None"}) is is_dotted
+    # the exact solution is known between the samples, too
+    assert exact.get_linestyle() == "-"
+    assert exact.get_xdata().size > 100
     assert ("stored times" in above.get_title(loc="left")) is is_dotted
     assert ("stored samples" in picture.caption) is is_dotted
 
 
+def test_finer_levels_have_no_lines_between_the_few_points_of_the_coarsest():
+    """A level of 64 steps, drawn at nine of them, looked like a motion a third as fast."""
+    exp = samples.experiment(model={"kind": "pendulum", "g": 9.81}, levels=[3, 4, 5, 6])
+    with style.applied():
+        picture = solution.motion(exp, samples.record(exp), "theta", Member(0, 0, "central"))
+    _, coarsest, *finer = picture.figure.axes[0].get_lines()
+    assert coarsest.get_linestyle() != "None"
+    assert {line.get_linestyle() for line in finer} == {"None"}
+
+
 def test_the_points_of_the_steps_themselves_keep_their_line():
     """Where every step is drawn, as at the limit of stability, nothing is hidden between."""
-    record = samples.record(samples.experiment())
-    t = np.linspace(0.0, 20.0, int(record["steps"][0]) + 1)
+    steps = 64
+    t = np.linspace(0.0, 20.0, steps + 1)
     fast = np.cos(0.8 * np.pi * np.arange(t.size))
-    assert not moments.is_undersampled(record, t, fast)
-    assert moments.is_undersampled(record, t[::2], fast[::2])
+    assert not moments.is_undersampled(steps, t, (t, fast))
+    assert moments.is_undersampled(steps, t[::2], (t[::2], fast[::2]))

@@ -107,7 +107,7 @@ def test_no_page_names_a_norm_by_its_key() -> None:
     )
     record = samples.record(experiment)
     told = [
-        assertions.about(record, check) + assertions.measured(record, check)
+        assertions.about(check, record) + assertions.measured(check, record)
         for check in experiment.checks
     ]
     told += [

@@ -51,6 +51,10 @@ _DRIFTS = {
     "exponential": "shows that the energy grows exponentially",
     "unclear": "exceeds round-off, but this run does not show how it grows",
 }
+_BRIEF = {
+    "none": "round-off", "bounded": "bounded", "linear": "grows like t", "quadratic": "grows like t²",
+    "exponential": "exponential", "unclear": "growth not known",
+}  # fmt: skip
 _RATES = {
     "linear": ", by {} of the energy per period",
     "quadratic": ", by {} of the energy per period squared",
@@ -134,7 +138,7 @@ def describe(f: MemberFacts, check: ConservesCheck) -> Description:
                 "Take a coarser `level:`, whose error is larger than round-off, lengthen the run (`time: end`), or set "
                 "`drift: none`, which is what this level shows.",
             )
-    sentence = _DRIFTS[drift]
+    brief = sentence = _DRIFTS[drift]
     if drift == "exponential" and rate < 0:
         sentence = "shows that the energy decays exponentially"
     if rate and math.isfinite(rate):
@@ -142,8 +146,9 @@ def describe(f: MemberFacts, check: ConservesCheck) -> Description:
     most = "The energy is 0"
     if math.isfinite(size):
         most = f"The error is at most {number(size, 4)} of the energy"
-    finding = f"The error of {name} {sentence}. {most}"
-    return Description(f"{finding}. {expects}", _advice(f, drift, check), finding)
+        brief = f"{_BRIEF[drift]}, at most {number(size, 4)} of the energy"
+    sentence = f"The error of {name} {sentence}. {most}. {expects}"
+    return Description(sentence, _advice(f, drift, check), brief)
 
 
 def _advice(f: MemberFacts, drift: str, check: ConservesCheck) -> str:

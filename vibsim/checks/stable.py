@@ -150,10 +150,9 @@ def describe(f: MemberFacts, check: StableCheck) -> Description:
             "`model:`.",
         )
     factors = f.fact("predicted_growth"), f.fact("growth")
-    sentence = (
-        f"Scheme {f.scheme_name} is {'stable' if f.reason == 'match' else 'unstable'} at level {level}"
-        f"{f', where w dt = {number(w_dt, 4)}' if math.isfinite(w_dt) else ''}."
-    )
+    brief = f"{'stable' if f.reason == 'match' else 'unstable'} at level {level}"
+    brief += f", where w dt = {number(w_dt, 4)}" if math.isfinite(w_dt) else ""
+    sentence = f"Scheme {f.scheme_name} is {brief}."
     if f.reason == "unstable" and not time and f.model.linear and _is_at_limit(w_dt, _limit(f)):
         sentence += " This is its limit, at which the amplitude grows in proportion to the time."
     else:
@@ -171,7 +170,7 @@ def describe(f: MemberFacts, check: StableCheck) -> Description:
         sentence += f" It produced a number that is not finite or too large at t = {time}."
     if f.reason == "mismatch":
         sentence += " Prediction and measurement disagree, so this is not the scheme that the theory describes."
-    return Description(sentence, _advice(f, level, w_dt, time))
+    return Description(sentence, _advice(f, level, w_dt, time), brief)
 
 
 def _is_at_limit(w_dt: Floats, limit: Floats) -> Flags:

@@ -37,21 +37,25 @@ def evidence(caption: str, alt: str = "", figure: Figure | None = None) -> Pictu
 
 def panel(figure: Figure, title: str, x_name: str, width: float = 2.5) -> Axes:
     """Add a panel to the right of the panels of a figure, all of one `width` [inch], and return it."""
-    figure.add_axes((0.0, 0.0, 1.0, 1.0))
-    pitch, height = LEFT + width + RIGHT, ABOVE + HEIGHT + BELOW
-    total = pitch * len(figure.axes)
-    figure.set_size_inches(total, height)
-    for i, ax in enumerate(figure.axes):
-        left, bottom = (i * pitch + LEFT) / total, BELOW / height
-        ax.set_position((left, bottom, width / total, HEIGHT / height))
+    ax = figure.add_axes((0.0, 0.0, 1.0, 1.0))
+    place(figure, LEFT + width + RIGHT, HEIGHT)
     ax.set_title(title, fontsize=SIZE, fontweight="normal")
     ax.set_xlabel(x_name, fontsize=SIZE, color=SOFT)
-    # a fixed position is faster than one that matplotlib computes
-    ax.xaxis.set_label_coords(0.5, -0.24)
     ax.tick_params(labelsize=SIZE, color=SOFT, labelcolor=SOFT)
     ax.grid(visible=False)
     round_ticks(ax.xaxis, 5)
     return ax
+
+
+def place(figure: Figure, pitch: float, height: float) -> None:
+    """Arrange the panels of a figure side by side, with their distance `pitch` and their height [inch]."""
+    total, high = pitch * len(figure.axes), ABOVE + height + BELOW
+    figure.set_size_inches(total, high)
+    for i, ax in enumerate(figure.axes):
+        left, bottom = (i * pitch + LEFT) / total, BELOW / high
+        ax.set_position((left, bottom, (pitch - LEFT - RIGHT) / total, height / high))
+        # a fixed position is faster than one that matplotlib computes
+        ax.xaxis.set_label_coords(0.5, -0.24 / height)
 
 
 def round_ticks(axis: Any, most: int = 4) -> None:

@@ -80,7 +80,7 @@ def _steps(run: _Run) -> str:
     p, limit = float(run.p[run.index]), run.limit
     if not 0.0 < limit < math.inf or not usable(run.p).size:
         return ""
-    ax = run.panel("w dt, and its limit (dashed)")
+    ax = run.panel("w dt (limit dashed)")
     frame.scale(ax, run.p, limit * np.array([0.5, 2.0]), is_log=True, margin=0.08)
     frame.below(ax, limit)
     run.points(ax, run.p)

@@ -65,7 +65,7 @@ def long_series(
     if (
         is_short
         or (len(rows) == 1 and not is_known)
-        or moments.is_undersampled(record, t, reference)
+        or moments.is_undersampled(int(record["steps"][0]), t, (t, reference))
     ):
         return None
     # thinning keeps two points of each group of neighbours

@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 
 from vibsim.core.array_types import Floats
-from vibsim.core.record import Record
 from vibsim.models import Model
 from vibsim.report import data
 from vibsim.report.figures.scenes import Motion
@@ -48,10 +47,13 @@ def period(t: Floats, u: Floats) -> float:
     return float(t[-1] - t[0]) / max(1.0, 0.5 * turns)
 
 
-def is_undersampled(record: Record, t: Floats, u: Floats) -> bool:
-    """Return whether lines between the stored samples would hide motion that the steps between them resolve."""
-    has_more = int(np.min(record["steps"])) > t.size - 1
-    return has_more and t.size * period(t, u) < FEWEST_SAMPLES * float(t[-1] - t[0])
+def is_undersampled(steps: int, t: Floats, curve: tuple[Floats, Floats]) -> bool:
+    """Return whether lines between the samples at `t` would hide motion that a number of steps resolves.
+
+    The period is that of `curve` (times, values), since too few samples may show a slower motion.
+    """
+    has_more = steps > t.size - 1
+    return has_more and t.size * period(*curve) < FEWEST_SAMPLES * float(t[-1] - t[0])
 
 
 def at_times(times: Floats, t: Floats, x: Floats) -> Floats:

@@ -152,15 +152,17 @@ def motion(experiment: Experiment, record: Record, quantity: str, member: Member
     has_errors = bool(np.isfinite(best).any()) and len(levels) > (0 if is_known else 1)
     axes = panels.stacked([2.3, *[1.7] * has_errors], style.TIME)
     text = "exact" if is_known else "extrapolated"
-    is_dotted = moments.is_undersampled(record, t, data.at(record, f"{quantity}_finest", member))
+    smooth = series.exact_curve(experiment, record, quantity, member) if is_known else (t, best)
+    finest = (t, data.at(record, f"{quantity}_finest", member))
+    turns = smooth if is_known else finest
+    dotted = [i for i in chosen if moments.is_undersampled(int(record["steps"][i]), t, turns)]
+    is_dotted = bool(dotted)
     if has_errors:
         pale: Look = {"color": style.PALE, "linewidth": 5.0, "label": text, "zorder": 1}
-        if is_dotted:
-            axes[0].plot(*style.thin(t, best), **pale | DOTS | {"markersize": 6.0})
-        else:
-            smooth = series.exact_curve(experiment, record, quantity, member)
-            axes[0].plot(*style.thin(*(smooth if is_known else (t, best))), **pale)
-    looks = {i: _look(k, record, i) | (DOTS if is_dotted else {}) for k, i in enumerate(chosen)}
+        is_line = not is_dotted or smooth[0].size > t.size
+        dots: Look = {} if is_line else DOTS | {"markersize": 6.0}
+        axes[0].plot(*style.thin(*smooth), **pale | dots)
+    looks = {i: _look(k, record, i) | (DOTS if i in dotted else {}) for k, i in enumerate(chosen)}
     _draw_levels(axes[0], t, runs, looks, best)
     title = f"{letter}(t){' at the stored times alone' if is_dotted else ''}"
     axes[0].set(ylabel=style.label(letter, measure), title=title)
@@ -170,12 +172,12 @@ def motion(experiment: Experiment, record: Record, quantity: str, member: Member
         axes[1].set_title(f"Each level minus the {text} solution", fontweight="normal", fontsize=9)
         axes[1].set_ylabel(style.label(f"error of {letter}", measure, exponent))
     axes[-1].set_xlabel(data.time_label(record))
-    dots = " Dots: the stored samples, which are too few for lines between them." * is_dotted
+    told = " Dots: the stored samples, which are too few for lines between them." * is_dotted
     guide = f"Wide and grey is the {text} solution, the lines are the levels; below it, how far each level is from it."
     return Picture(
         f"motion_{quantity}_{member.stem}",
         f"{words.title(quantity)}(t), {member.title}",
-        (guide if has_errors else "Each line is a level.") + dots,
+        (guide if has_errors else "Each line is a level.") + told,
         f"{words.name(quantity)} against time on all levels for {member.title}"
         + ", and the error of each level" * has_errors,
         axes[0].get_figure(root=True),

@@ -18,7 +18,7 @@ from vibsim.core.record import Record
 from vibsim.core.vocabulary import decisive_number
 from vibsim.report import choice, data, finest_level, style, words
 from vibsim.report.choice import Lead, is_refutation, is_trap
-from vibsim.report.evidence import figure
+from vibsim.report.evidence import figure, frame
 from vibsim.report.figures import hero as drawn
 from vibsim.report.figures import solution
 from vibsim.report.style import Picture
@@ -30,6 +30,10 @@ from vibsim.report.types import Experiment
 
 MOST_NUMBERS = 3  # large numbers on the first screen
 MOST_SCHEMES = 3  # schemes that are named
+NARROWEST, EVIDENCE = (
+    1.8,
+    1.7,
+)  # least width of a panel of evidence with its title, and its height [inch]
 MOST_STATEMENTS = 3  # claims that are shown beside the finding
 MEASURED = {
     "stable": "Growth per period", "conserves": "Largest energy error over E(0)", "equal": "Largest difference",
@@ -138,7 +142,7 @@ def _measured(experiment: Experiment, record: Record, lead: Lead) -> Iterator[Nu
     unit, label, form = "", MEASURED.get(kind, ""), "brief"  # a size has two digits
     if check is not None and check.kind == "value":
         unit, form = data.pretty_unit(unit_of(experiment, record, check)), "step"
-        label = words.PAGE.opening(assertions.subject(record, check))
+        label = words.PAGE.opening(assertions.subject(check, record))
     if kind in ("equal", "accurate"):
         unit = data.norm_unit(record, lead.quantity, "l2" if kind == "accurate" else "linf")
     if check is not None and check.kind == "accurate" and check.is_relative:
@@ -280,11 +284,11 @@ def pictures(experiment: Experiment, record: Record, lead: Lead) -> list[Picture
     if data.swept(record):
         left = drawn.response(experiment, record, lead)
         right = drawn.orders(experiment, record, lead) if has_order else None
-        right = right or _evidence(experiment, record, lead)
+        right = right or _evidence(experiment, record, lead, drawn.RIGHT)
     else:
         right = drawn.against_step(record, lead) if has_order else None
         if lead.entry is not None and not lead.is_on_order:
-            left = _evidence(experiment, record, lead)
+            left = _evidence(experiment, record, lead, drawn.LEFT)
         elif has_order:
             left = drawn.differences(record, lead)
     found = [picture for picture in (left, right) if picture is not None]
@@ -297,11 +301,12 @@ def pictures(experiment: Experiment, record: Record, lead: Lead) -> list[Picture
     return [moving, *found] if left is None else [*found, moving]
 
 
-def _evidence(experiment: Experiment, record: Record, lead: Lead) -> Picture | None:
-    """Return the picture that shows why the decisive check came out as it did."""
+def _evidence(experiment: Experiment, record: Record, lead: Lead, width: float) -> Picture | None:
+    """Return the picture of this width that shows why the decisive check came out as it did."""
     if lead.entry is None:
         return None
     found = figure.picture(experiment, record, lead.asserted, lead.entry)
     if found is None or found.figure is None:
         return None
+    frame.place(found.figure, max(width / len(found.figure.axes), NARROWEST), EVIDENCE)
     return replace(found, name="hero_evidence", title="What decides")

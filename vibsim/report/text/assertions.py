@@ -31,17 +31,17 @@ SOLUTIONS = {"exact": "the exact solution", "discrete": "the exact solution of i
 OF_TOLERANCE = "Error of the extrapolated solution, in the unit of each state, at every stored time"
 
 
-def about(record: Record, check: Check | None) -> str:
+def about(check: Check | None, record: Record | None = None) -> str:
     """Return the subject of a check in one line: its claim or what it measures; without a check, the tolerance."""
     if check is None:
         return OF_TOLERANCE
     if check.kind == "claim":
         return f"“{check.claim}”"
     if check.kind == "converges":
-        return f"Order of {words.title(check.converges)}{_where(record, check, norm=check.norm)}"
+        return f"Order of {words.title(check.converges)}{_where(check, record, norm=check.norm)}"
     if check.kind == "accurate":
-        return f"Error of {words.title(check.accurate)} at the finest level{_where(record, check)}"
-    return words.PAGE.opening(subject(record, check))
+        return f"Error of {words.title(check.accurate)} at the finest level{_where(check, record)}"
+    return words.PAGE.opening(subject(check, record))
 
 
 def wanted(experiment: Experiment, check: Measurement | None, promised: float | None = None) -> str:
@@ -56,15 +56,15 @@ def wanted(experiment: Experiment, check: Measurement | None, promised: float | 
     return f"order {order} ± {check.tolerance:g}{', promised' * (check.order == 'scheme')}"
 
 
-def source(record: Record, check: Check | None) -> str:
+def source(check: Check | None, record: Record | None = None) -> str:
     """Return the source of a claim and what measures it; empty for other kinds of checks."""
     if check is None or check.kind != "claim":
         return ""
     origin = f"{check.source}. " if check.source else ""
-    return f"{origin}Measured by: {measured(record, check.that)}."
+    return f"{origin}Measured by: {measured(check.that, record)}."
 
 
-def measured(record: Record, check: Measurement) -> str:
+def measured(check: Measurement, record: Record | None = None) -> str:
     """Say what a check measures and expects."""
     match check.kind:
         case "converges":
@@ -83,7 +83,7 @@ def measured(record: Record, check: Measurement) -> str:
             statement = (
                 f"{words.title(check.accurate)} is {rule(check, words.PAGE)} at the finest level"
             )
-            return f"{statement}{_where(record, check)}"
+            return f"{statement}{_where(check, record)}"
         case "value":
             bounds = {"equals": check.equals, "is below": check.below, "is above": check.above}
             conditions = [
@@ -94,25 +94,25 @@ def measured(record: Record, check: Measurement) -> str:
                 f"{key} {words.PAGE.number(x)}" for key, x in tolerance_keys if x is not None
             ]
             extra = f" ({', '.join(tolerances)})" if tolerances else ""
-            return f"{subject(record, check)}{conditions[0] if conditions else ' '}{extra}"
+            return f"{subject(check, record)}{conditions[0] if conditions else ' '}{extra}"
         case "stable":
-            return f"{STABLE[check.stable]}{_where(record, check)}"
+            return f"{STABLE[check.stable]}{_where(check, record)}"
         case "conserves":
             velocity = "the scheme's own velocity" if check.conserves == "energy" else "[D₂ₜu]"
-            return f"the energy by {velocity} {DRIFTS[check.drift]}{_where(record, check)}"
+            return f"the energy by {velocity} {DRIFTS[check.drift]}{_where(check, record)}"
         case "equal":
             other = SOLUTIONS.get(check.second, check.second)
             within = "round-off" if check.atol is None else words.PAGE.number(check.atol)
             letter = words.title(check.quantity)
-            return f"{letter} by {check.first} equals that of {other} to {within}{_where(record, check)}"
+            return f"{letter} by {check.first} equals that of {other} to {within}{_where(check, record)}"
 
 
-def subject(record: Record, check: Measurement) -> str:
+def subject(check: Measurement, record: Record | None = None) -> str:
     """Say what a check measures, and where; of a number or a difference without its expected value."""
     if check.kind == "equal":
-        return f"{words.title(check.quantity)} by {check.first}{_where(record, check)}"
+        return f"{words.title(check.quantity)} by {check.first}{_where(check, record)}"
     if check.kind != "value":
-        return measured(record, check)
+        return measured(check, record)
     statement, is_sampled = what(check, words.PAGE), check.number.is_sample
     keys = ("level", "scheme", "case") if is_sampled else PLACES
     places = ((key, getattr(check.at, key)) for key in keys)
@@ -124,7 +124,7 @@ def subject(record: Record, check: Measurement) -> str:
     return statement.replace("level best", "the limit of the levels")
 
 
-def _where(record: Record, check: Measurement, norm: str = TYPICAL_NORM) -> str:
+def _where(check: Measurement, record: Record | None = None, norm: str = TYPICAL_NORM) -> str:
     """Write in brackets the norm, unless it is the typical one, and the schemes, level and members of a check."""
     names = getattr(check, "schemes", None)
     parts = [] if norm == TYPICAL_NORM else [words.NORMS[norm]]
@@ -135,10 +135,12 @@ def _where(record: Record, check: Measurement, norm: str = TYPICAL_NORM) -> str:
     return f" ({words.swept(', '.join(parts))})" if parts else ""
 
 
-def _place(record: Record, key: str, value: Any) -> str:
-    """Name a place where a number is taken: a member by its swept values."""
-    place = data.case_position(record, value) if key == "case" else None
-    return f"{key} {value}" if place is None else data.case_name(record, place)
+def _place(record: Record | None, key: str, value: Any) -> str:
+    """Name a place where a number is taken: a member by its swept values, if these are known."""
+    case = data.case_position(record, value) if record is not None and key == "case" else None
+    if record is None or case is None:
+        return f"{key} {value}"
+    return data.case_name(record, case)
 
 
 def swept_values(check: Measurement) -> list[str]:

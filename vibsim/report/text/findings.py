@@ -191,7 +191,7 @@ def _phrases(experiment: Experiment, record: Record, lead: Lead) -> dict[str, st
         return filled
     match measured.kind:
         case "value":
-            subject = assertions.subject(record, measured)
+            subject = assertions.subject(measured, record)
             filled |= {"subject": subject, "Subject": _capitalized(words.PAGE.opening(subject))}
         case "equal":
             second = assertions.SOLUTIONS.get(measured.second, f"that by {measured.second}")
