@@ -292,7 +292,7 @@ def test_levels_of_the_phase_plane_are_those_that_were_computed(text):
     exp, rec, _ = text
     member = choice.members(rec, "u")[2]
     model = MODELS["spring"]
-    values = data.state_on_level(rec, model.position, member, 0)
+    values = data.state_at(rec, model.position, member, 0)
     error = rec["u_exact"][0] - values
     np.testing.assert_allclose(error, rec["u_error"][2, 0, 0], atol=1e-13)
     picture = figures_plane.phase(exp, rec, choice.members(rec, "u"))

@@ -78,8 +78,8 @@ def has_swept_options(experiment: Experiment, spec: SchemeSpec) -> bool:
 def quantities(experiment: Experiment, record: Record) -> list[str]:
     """Return the quantities to show: the position, those of checks, and the energy deviation."""
     extra = ["energy_deviation"] if experiment.model.definition.conservative else []
-    wanted = dict.fromkeys([position(experiment), *checked_quantities(experiment), *extra])
-    return [name for name in wanted if f"{name}_order" in record]
+    names = dict.fromkeys([position(experiment), *checked_quantities(experiment), *extra])
+    return [name for name in names if f"{name}_order" in record]
 
 
 def first(experiment: Experiment, record: Record) -> str:

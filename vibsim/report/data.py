@@ -67,8 +67,8 @@ def at(record: Record, name: str, member: Member, **index: int) -> Floats:
     return np.asarray(values, dtype=np.float64)
 
 
-def pick_or_nan(record: Record, name: str, dims: tuple[str, ...], **index: int) -> Floats:
-    """Return the slice that `pick` gives, or NaN of shape `dims` if the record lacks the variable.
+def optional(record: Record, name: str, dims: tuple[str, ...], **index: int) -> Floats:
+    """Return the slice of an optional variable (see `pick`); NaN of shape `dims` if the record lacks it.
 
     Not every model has an exact solution or an exact period.
     """
@@ -79,33 +79,30 @@ def pick_or_nan(record: Record, name: str, dims: tuple[str, ...], **index: int) 
 
 def exact_series(record: Record, quantity: str, member: Member) -> Floats:
     """Return the exact solution of a member at the common times, shape (t,); NaN if it has none."""
-    return pick_or_nan(record, f"{quantity}_exact", ("t",), scheme=member.scheme, case=member.case)
+    return optional(record, f"{quantity}_exact", ("t",), scheme=member.scheme, case=member.case)
 
 
 def exact_periods(record: Record) -> Floats:
     """Return the exact period of every member, shape (case,); NaN if it has none."""
-    return pick_or_nan(record, "exact_period", ("case",))
+    return optional(record, "exact_period", ("case",))
 
 
 def natural_frequency(record: Record, case: int) -> float:
     """Return the natural frequency w of a member; NaN if it has none."""
-    return float(np.ravel(pick_or_nan(record, "natural_frequency", ("case",), case=case))[0])
+    return float(np.ravel(optional(record, "natural_frequency", ("case",), case=case))[0])
 
 
 def omega_dt(record: Record) -> Floats:
     """Return w dt of every member and level, shape (case, level); NaN if the record lacks it."""
     shape = (len(record["case"]), len(record["level"]))
-    return np.broadcast_to(pick_or_nan(record, "omega_dt", ("case", "level")), shape)
+    return np.broadcast_to(optional(record, "omega_dt", ("case", "level")), shape)
 
 
 def phase_error(record: Record, origin: str) -> Floats:
-    """Return the phase error per period as a fraction of the period, shape (scheme, case, level).
-
-    `origin` is ``theory`` or ``measured``.
-    """
+    """Return the phase error per period over the period, of ``theory`` or ``measured``, shape (scheme, case, level)."""
     # dt has the shape (level, case) or (level,)
     frequency = omega_dt(record) / (2.0 * np.pi) / np.asarray(record["dt"], dtype=np.float64).T
-    return pick_or_nan(record, f"{origin}_phase_error", OF_LEVEL) * frequency
+    return optional(record, f"{origin}_phase_error", OF_LEVEL) * frequency
 
 
 def unit(record: Record, name: str) -> str:
@@ -270,10 +267,7 @@ def formal_orders(record: Record, quantity: str) -> Floats:
 
 
 def basis_of_order(record: Record, quantity: str) -> str:
-    """Return ``promised`` for an order from theory, ``expected`` for one that only a check states.
-
-    Theory gives no order for some parts of an error, such as a phase.
-    """
+    """Return ``promised`` for an order of theory, ``expected`` for a part of an error whose order only checks state."""
     is_promised = record.variable(f"{quantity}_formal_order").attrs["promised"]
     return "promised" if is_promised else "expected"
 
@@ -341,7 +335,7 @@ def floor_norm(record: Record, quantity: str, member: Member, norm: str) -> Floa
     return norm_of_floor(floor, norm, count, steps_of(record, member.case)[:1])
 
 
-def state_on_level(record: Record, name: str, member: Member, level: int) -> Floats:
+def state_at(record: Record, name: str, member: Member, level: int) -> Floats:
     """Return a state at a position of level, shape (t,): the finest level plus the differences down to this one."""
     values = at(record, f"{name}_finest", member)
     for pair in range(level, len(whole(record, "pair"))):

@@ -14,7 +14,7 @@ from vibsim.core.array_types import Floats
 from vibsim.core.record import Record
 from vibsim.core.vocabulary import MEMBER, TYPICAL_NORM
 from vibsim.report import data
-from vibsim.report.data import Member, formal_orders, norm_index, pick_or_nan, whole
+from vibsim.report.data import Member, formal_orders, norm_index, optional, whole
 from vibsim.report.style import finite, no_zeros
 
 VARIES = 1e-6
@@ -67,7 +67,7 @@ def error(record: Record, quantity: str) -> Error:
 def true_error(record: Record, quantity: str) -> Floats:
     """Return the norm of the true error of the finest level, shape (scheme, case); NaN without an exact solution."""
     norm = norm_index(record)
-    return pick_or_nan(record, f"{quantity}_error_norm", MEMBER, norm=norm, level=-1)
+    return optional(record, f"{quantity}_error_norm", MEMBER, norm=norm, level=-1)
 
 
 def norms(record: Record, quantity: str, member: Member) -> Floats:
@@ -86,7 +86,7 @@ def orders(
     """Return the stated order of every scheme and member and the ends of its interval, shape (scheme, case)."""
     order, low, high = (
         # a large sweep has orders only for the quantities of checks
-        pick_or_nan(record, f"{quantity}_order{end}", MEMBER, norm=norm_index(record, norm))
+        optional(record, f"{quantity}_order{end}", MEMBER, norm=norm_index(record, norm))
         for end in ("", "_low", "_high")
     )
     return order, low, high
@@ -107,10 +107,10 @@ def _error_fraction(record: Record, order: Floats) -> Floats:
 
 def measured(record: Record, name: str, position: str) -> Measured:
     """Return the size of the ``period`` or ``amplitude``, whose sign is arbitrary if a run grows without bound."""
-    value = np.abs(pick_or_nan(record, name, MEMBER, level=-1))
+    value = np.abs(optional(record, name, MEMBER, level=-1))
     error = np.full(value.shape, np.nan)
     if whole(record, "pair"):
-        coarser = np.abs(pick_or_nan(record, name, MEMBER, level=-2))
+        coarser = np.abs(optional(record, name, MEMBER, level=-2))
         error = np.abs(value - coarser) * _error_fraction(record, formal_orders(record, position))
     return Measured(name, data.unit(record, name), value, error)
 
@@ -123,7 +123,7 @@ def varies(values: Floats) -> bool:
 
 def period_error(record: Record, level: int) -> Floats:
     """Return the relative error of the period at a position of `level`, shape (scheme, case); NaN if unknown."""
-    period, exact = pick_or_nan(record, "period", MEMBER, level=level), data.exact_periods(record)
+    period, exact = optional(record, "period", MEMBER, level=level), data.exact_periods(record)
     with np.errstate(invalid="ignore", divide="ignore"):
         # on the separatrix the exact period is infinite
         return np.asarray(np.where(np.isinf(exact), np.nan, np.abs(period / exact - 1.0)))

@@ -12,7 +12,7 @@ from vibsim.core.array_types import Flags, Floats
 from vibsim.core.record import Record
 from vibsim.core.vocabulary import MEMBER, OF_LEVEL, TYPICAL_NORM
 from vibsim.report import data
-from vibsim.report.data import Member, pick_or_nan
+from vibsim.report.data import Member, optional
 from vibsim.report.style import positive
 from vibsim.report.types import Axes
 
@@ -23,9 +23,7 @@ GROWS = "grows without bound"
 ROUND_OFF = "lost in round-off"
 UNLIKE = "no longer proportional"
 NO_VALUE = "no value"
-LOOKS_ALIKE = (
-    0.004  # curves that differ by less than this fraction of the frame's height look the same
-)
+LOOKS_ALIKE = 0.004  # curves closer than this fraction of the frame's height look the same
 LEAVING = "Triangles at an edge: values beyond the frame."  # for captions
 
 
@@ -41,11 +39,9 @@ def sizes(record: Record, quantity: str) -> Floats:
         exact = np.max(np.abs(np.asarray(variable.values, dtype=np.float64)), axis=others)
         return positive(np.broadcast_to(exact, (count,)))
     if quantity.startswith("energy") and "energy_initial" in record:
-        size = np.abs(pick_or_nan(record, "energy_initial", MEMBER))
+        size = np.abs(optional(record, "energy_initial", MEMBER))
     elif f"{quantity}_max" in record:
-        ends = [
-            np.abs(pick_or_nan(record, f"{quantity}_{end}", OF_LEVEL)) for end in ("min", "max")
-        ]
+        ends = [np.abs(optional(record, f"{quantity}_{end}", OF_LEVEL)) for end in ("min", "max")]
         size = np.swapaxes(np.maximum(*ends), 1, 2).reshape(-1, count)
     else:
         return np.full(count, np.nan)

@@ -23,10 +23,7 @@ SMOOTH = 700  # points of an exact solution: few enough, with its gaps, that thi
 def numbers_of(
     experiment: Experiment, record: Record, case: int
 ) -> tuple[dict[str, Floats], dict[str, Floats]]:
-    """Return the parameters of a member, by their keys in the file, and its initial values.
-
-    `case` is its position in the record.
-    """
+    """Return the parameters, by their keys in the file, and the initial values of the member at position `case`."""
     index = int(record["case"][case])
     member = members(experiment, index, index + 1)
     parameters, initial = (
@@ -50,15 +47,13 @@ def on_level(
     `level` is a position. A quantity that the record lacks is computed from the states by its formula.
     """
     if f"{quantity}_finest" in record:
-        return data.state_on_level(record, quantity, member, level)
+        return data.state_at(record, quantity, member, level)
     model = experiment.model.definition
     names = [state.name for state in model.states]
     if any(f"{name}_finest" not in record for name in names):
         return None
-    states = {name: data.state_on_level(record, name, member, level) for name in names}
-    return _from_states(
-        experiment, record, quantity, member, states, data.times(record, member.case)
-    )
+    states = {name: data.state_at(record, name, member, level) for name in names}
+    return _derived(experiment, record, quantity, member, states, data.times(record, member.case))
 
 
 def exact(
@@ -72,7 +67,7 @@ def exact(
     states = model.exact(t, initial, parameters)
     if quantity in states:
         return np.asarray(states[quantity])
-    return _from_states(experiment, record, quantity, member, states, t)
+    return _derived(experiment, record, quantity, member, states, t)
 
 
 def exact_curve(
@@ -96,7 +91,7 @@ def exact_curve(
     return fine, best
 
 
-def _from_states(
+def _derived(
     experiment: Experiment,
     record: Record,
     quantity: str,

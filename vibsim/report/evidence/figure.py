@@ -71,13 +71,13 @@ def _of_members(
     other_field, remark = BESIDE.get(check.kind, ("", ""))
     values = numbers(DECISIVE[check.kind])
     beside = numbers(other_field) if other_field else np.full(count, np.nan)
-    known = usable(values)
-    if not known.size:
+    finite = usable(values)
+    if not finite.size:
         return evidence(f"{member.title}: no member has a number to draw.")
     # on this range members that differ by rounding look alike
-    around = np.median(known) * 10.0 ** np.array([-0.5, 0.5])
+    around = np.median(finite) * 10.0 ** np.array([-0.5, 0.5])
     if check.kind == "stable":
-        scale, around = frame.growth_scale(known), frame.ALIKE
+        scale, around = frame.growth_scale(finite), frame.ALIKE
     elif check.kind == "conserves":
         scale = GrowthScale("largest energy error / E(0)", is_log=True)
     else:
@@ -93,10 +93,10 @@ def _of_members(
         style.log_axis(ax, "x", *style.log_limits(x, margin=0.02))
     else:
         ax.set_xlim(*style.limits(x, margin=0.02))
-    shown, other = values - scale.less, beside - scale.less
-    frame.scale(ax, shown, other, around - scale.less, is_log=scale.is_log, margin=0.1)
+    shown, shown_beside = values - scale.less, beside - scale.less
+    frame.scale(ax, shown, shown_beside, around - scale.less, is_log=scale.is_log, margin=0.1)
     order = np.argsort(x, kind="stable")
-    ax.plot(*style.thin(x[order], other[order], 160), color=frame.SECOND, linewidth=0.9)
+    ax.plot(*style.thin(x[order], shown_beside[order], 160), color=frame.SECOND, linewidth=0.9)
     if count > MANY:
         ax.plot(*style.thin(x[order], shown[order], 160), color=frame.COLOUR, linewidth=0.8)
     else:

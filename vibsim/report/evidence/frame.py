@@ -107,10 +107,10 @@ def points(ax: Axes, x: Sequence[float], y: Floats, counts: Sequence[bool]) -> N
 
 def level_axis(ax: Axes, levels: Sequence[int], most: int = MOST_LEVELS, extra: str = "") -> None:
     """Label the levels, if there are many every second or third, and with `extra` the position after the last."""
-    named = {float(level): str(level) for level in levels[:: 1 + len(levels) // (most + 1)]}
-    named |= {levels[-1] + 1.0: extra} if extra else {}
+    labels = {float(level): str(level) for level in levels[:: 1 + len(levels) // (most + 1)]}
+    labels |= {levels[-1] + 1.0: extra} if extra else {}
     ax.set_xlim(levels[0] - 0.5, levels[-1] + (1.5 if extra else 0.5))
-    ax.set_xticks(list(named), list(named.values()))
+    ax.set_xticks(list(labels), list(labels.values()))
 
 
 class GrowthScale(NamedTuple):

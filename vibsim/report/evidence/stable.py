@@ -17,7 +17,7 @@ from vibsim.core.record import Record
 from vibsim.core.vocabulary import HIGHEST
 from vibsim.report import style, words
 from vibsim.report.choice import position
-from vibsim.report.data import Member, at, pick_or_nan, whole
+from vibsim.report.data import Member, at, optional, whole
 from vibsim.report.evidence import frame
 from vibsim.report.evidence.frame import brief, evidence, measured, short, usable
 from vibsim.report.style import Picture
@@ -61,9 +61,7 @@ def picture(
     p = at(record, HIGHEST if HIGHEST in record else "omega_dt", member)
     limit = float(at(record, "stability_limit", member))
     run = _Run(levels, levels.index(level), p, limit, style.canvas(1.0))
-    size = pick_or_nan(
-        record, "size_over_exact", ("level",), scheme=member.scheme, case=member.case
-    )
+    size = optional(record, "size_over_exact", ("level",), scheme=member.scheme, case=member.case)
     letter = words.symbol(position(experiment))
     drawn = [_steps(run), _sizes(run, size, letter), _growths(run, record, member, name)]
     texts = [text for text in drawn if text]
@@ -123,7 +121,7 @@ def _sizes(run: _Run, size: Floats, letter: str) -> str:
 def _growths(run: _Run, record: Record, member: Member, name: str) -> str:
     """Draw the measured and predicted growth factors per period; a prediction may be for small oscillations only."""
     observed, predicted = (
-        np.array(at(record, f"{who}_growth", member)) for who in ("measured", "theory")
+        np.array(at(record, f"{origin}_growth", member)) for origin in ("measured", "theory")
     )
     is_near = not math.isfinite(predicted[run.index])
     for values, field in ((observed, "growth"), (predicted, "predicted_growth")):

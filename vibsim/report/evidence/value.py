@@ -41,19 +41,19 @@ def picture(
     bar = values[-1] + np.array([-row.bound, row.bound])
     if check.equals is None:
         return _beside_border(row, check, title, bar)
-    wanted, allowed = check.equals, check.allowed
-    away = np.abs(values - wanted)
-    known = frame.usable(away)
+    target, allowed = check.equals, check.allowed
+    away = np.abs(values - target)
+    nonzero = frame.usable(away)
     # finer levels do not approach the number expected of a coarser one
     is_limit = row.counts[-1] or check.at.level is None
-    if not is_limit or not known.size or allowed <= 0.0:
-        around = wanted + np.array([-allowed, allowed])
+    if not is_limit or not nonzero.size or allowed <= 0.0:
+        around = target + np.array([-allowed, allowed])
         ax = row.panel(title, values, around, is_log=False)
-        band_text = f"what the tolerance allows around {number(wanted, 'step')} (dashed)"
-        return row.finish(ax, (around[0], around[1]), wanted, bar, band_text)
+        band_text = f"what the tolerance allows around {number(target, 'step')} (dashed)"
+        return row.finish(ax, (around[0], around[1]), target, bar, band_text)
     ends = np.maximum(away[-1] + np.array([-row.bound, row.bound]), 0.0)
-    around = np.append(ends[1:], [allowed, 0.1 * known.max()])
-    ax = row.panel(f"distance of {title} from {number(wanted, 'step')}", away, around, is_log=True)
+    around = np.append(ends[1:], [allowed, 0.1 * nonzero.max()])
+    ax = row.panel(f"distance of {title} from {number(target, 'step')}", away, around, is_log=True)
     edge = "; a triangle at the lower edge has no distance at all" if np.any(away == 0.0) else ""
     return row.finish(ax, (0.0, allowed), allowed, ends, f"what the tolerance allows{edge}")
 
@@ -92,8 +92,8 @@ def _values(
     norm, errors = check.value.removeprefix("error_"), f"{check.quantity}_error_norm"
     if norm == check.value or errors not in record or norm not in record.words("norm"):
         return None
-    found = at(record, errors, member, norm=norm_index(record, norm))
-    return found, norm_unit(record, str(check.quantity), norm)
+    error = at(record, errors, member, norm=norm_index(record, norm))
+    return error, norm_unit(record, str(check.quantity), norm)
 
 
 @dataclass(frozen=True)

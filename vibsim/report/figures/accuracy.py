@@ -14,7 +14,7 @@ import numpy as np
 from vibsim.core.array_types import Floats
 from vibsim.core.record import Record
 from vibsim.report import data, style, words
-from vibsim.report.data import Member, omega_dt, pick_or_nan
+from vibsim.report.data import Member, omega_dt, optional
 from vibsim.report.figures import panels
 from vibsim.report.style import Picture
 from vibsim.report.types import Axes, Experiment
@@ -33,7 +33,7 @@ def frequency(experiment: Experiment, record: Record) -> Picture | None:
     usable = w_dt[np.isfinite(w_dt) & (w_dt > 0.0)]
     if not usable.size or "measured_phase_error" not in record:
         return None
-    limits = pick_or_nan(record, "stability_limit", ("scheme", "case"))
+    limits = optional(record, "stability_limit", ("scheme", "case"))
     grid = np.linspace(1e-3, float(usable.max()), POINTS)
     measured = 1.0 / (1.0 - data.phase_error(record, "measured"))
     (ax,) = panels.stacked([3.0])

@@ -14,13 +14,13 @@ from vibsim.core.array_types import Floats
 from vibsim.core.record import Record
 from vibsim.core.vocabulary import MEMBER
 from vibsim.report import frame, style
-from vibsim.report.data import flags, largest, pick, pick_or_nan, time_label, times, unit, whole
+from vibsim.report.data import flags, largest, optional, pick, time_label, times, unit, whole
 from vibsim.report.figures.panels import stacked
 from vibsim.report.style import Picture
 from vibsim.report.types import Axes
 
 OWN, CENTRED = "energy_deviation_running_max", "energy_deviation_d2t_running_max"
-MOST_SCHEMES = 6  # in one panel
+MOST = 6  # schemes in one panel
 DASHED = (0, (4, 1.6))
 WIDEST_RANGE = 1e18  # of the error axis: smaller errors, relative to the largest, are left out
 
@@ -35,7 +35,7 @@ def running(record: Record, case: int) -> Picture | None:
     t, level = times(record, case)[1:], whole(record, "level")[0]
     if not np.isfinite(np.asarray(record[CENTRED], dtype=np.float64)).any():
         return None
-    first = np.abs(pick_or_nan(record, "energy_initial", MEMBER)[:, case])
+    first = np.abs(optional(record, "energy_initial", MEMBER)[:, case])
     is_relative = bool(np.all(first > 0.0))
     # running maxima of the coarsest level, shape (scheme, t), without the first time
     scale = first[:, None] if is_relative else 1.0
@@ -44,14 +44,10 @@ def running(record: Record, case: int) -> Picture | None:
     )
     both = [style.no_zeros(part[:, 1:] / scale) for part in maxima]
     # without an initial energy only the errors themselves give a size
-    sizes = (
-        [1.0] if is_relative else [size for part in both for row in part if (size := largest(row))]
-    )
-    most = frame.UNBOUNDED * min(sizes, default=1.0)
+    sizes = [size for part in both for row in part if (size := largest(row))]
+    most = frame.UNBOUNDED * (1.0 if is_relative else min(sizes, default=1.0))
     names = record.words("scheme")
-    groups = [
-        range(i, min(i + MOST_SCHEMES, len(names))) for i in range(0, len(names), MOST_SCHEMES)
-    ]
+    groups = [range(i, min(i + MOST, len(names))) for i in range(0, len(names), MOST)]
     axes = stacked([2.5] * len(groups), style.TIME)
     leaves = False
     for ax, group in zip(axes, groups, strict=True):
@@ -65,8 +61,8 @@ def running(record: Record, case: int) -> Picture | None:
         style.log_axis(ax, "x", float(t[0]), float(t[-1]))
         style.log_axis(ax, "y", *_limits([part[s] for part in both for s in group], most))
         for s in group:
-            own = both[0][s] if np.isfinite(both[0][s]).any() else both[1][s]
-            leaves |= frame.mark_leaving(ax, t, own, color=style.look(s)["color"])
+            values = both[0][s] if np.isfinite(both[0][s]).any() else both[1][s]
+            leaves |= frame.mark_leaving(ax, t, values, color=style.look(s)["color"])
         ax.plot([], [], color=style.GREY, label="own velocity")
         ax.plot([], [], color=style.GREY, linestyle=DASHED, label="[D₂ₜu]")
         style.beside(ax, fontsize=8, handlelength=2.4)

@@ -163,11 +163,11 @@ def _peaks(record: Record, member: Member, level: int) -> tuple[Floats, Floats, 
 
 def heights(time: Floats, peak: Floats, trough_time: Floats, trough: Floats) -> Floats:
     """Return half the height from every peak to the following, else to the preceding trough; NaN without troughs."""
-    known = np.isfinite(trough_time)
-    if not known.any():
+    is_known = np.isfinite(trough_time)
+    if not is_known.any():
         return np.full(peak.shape, np.nan)
-    after = np.minimum(np.searchsorted(trough_time[known], time), known.sum() - 1)
-    return np.asarray(0.5 * (peak - trough[known][after]))
+    after = np.minimum(np.searchsorted(trough_time[is_known], time), is_known.sum() - 1)
+    return np.asarray(0.5 * (peak - trough[is_known][after]))
 
 
 def first_peak(experiment: Experiment, record: Record, case: int, period: float) -> float:

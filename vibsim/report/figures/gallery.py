@@ -225,6 +225,6 @@ def choose(
         singular, plural = ("scheme", "schemes")
         if is_swept:
             singular, plural = "member with its scheme", "members with their schemes"
-        who = f"1 more {singular} has" if count == 1 else f"{count} more {plural} have"
-        parts.append(f"{who} no figures over time; the tables hold their numbers.")
+        subject = f"1 more {singular} has" if count == 1 else f"{count} more {plural} have"
+        parts.append(f"{subject} no figures over time; the tables hold their numbers.")
     return shown, " ".join(parts)

@@ -214,7 +214,7 @@ def _errors(record: Record, quantity: str, member: Member, name: str) -> tuple[F
     the finer one d/(r - 1).
     """
     norm, levels = data.norm_index(record, name), data.whole(record, "level")
-    true = data.pick_or_nan(
+    true = data.optional(
         record, f"{quantity}_error_norm", ("level",), scheme=member.scheme, case=member.case, norm=norm
     )  # fmt: skip
     estimate = np.full(len(levels), np.nan)

@@ -57,10 +57,8 @@ def long_series(
         return None
     span = float(t[-1] - t[0])
     period = moments.period(t, reference)
-    most_curves = MOST_POINTS / (POINTS_A_PERIOD * span / period)
-    rows = _rows(
-        record, quantity, member, int(np.clip(most_curves / 2, FEWEST_PANELS, MOST_PANELS))
-    )
+    count = MOST_POINTS / (POINTS_A_PERIOD * span / period)
+    rows = _rows(record, quantity, member, int(np.clip(count / 2, FEWEST_PANELS, MOST_PANELS)))
     is_short = span <= MANY_PERIODS * period
     if (
         is_short
@@ -111,13 +109,13 @@ def _rows(record: Record, quantity: str, member: Member, most: int) -> list[Row]
         members = data.of_case(record, member.case)
         members.sort(key=lambda one: one.scheme != member.scheme)
         return [
-            Row(f"{one.scheme_name}, level {levels[0]}", data.state_on_level(record, quantity, one, 0), None)
+            Row(f"{one.scheme_name}, level {levels[0]}", data.state_at(record, quantity, one, 0), None)
             for one in members[:most]
         ]  # fmt: skip
     rows = []
     for i in style.spaced(len(levels), most):
         steps = words.number(int(record["steps"][i]), "integer")
-        values = data.state_on_level(record, quantity, member, i)
+        values = data.state_at(record, quantity, member, i)
         rows.append(Row(f"{steps} steps", values, style.of_level(levels[i])))
     return rows
 

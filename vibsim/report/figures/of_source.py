@@ -54,14 +54,14 @@ def pictures(
     """Return the pictures of every figure of the file; none if the data that it shows are not stored."""
     drawn, names = [], set[str]()
     for i, figure in enumerate(experiment.figures, 1):
-        named = []
+        titled = []
         for picture in _drawn(experiment, record, lead, figure, f"source_{i}"):
             # a figure that is named twice is on the page twice
             name = picture.name if picture.name not in names else f"source_{i}_{picture.name}"
             names.add(name)
             title = f"{words.capitalized(figure.source)}: {picture.title}"
-            named.append(replace(picture, name=name, title=title))
-        drawn.append((figure, named))
+            titled.append(replace(picture, name=name, title=title))
+        drawn.append((figure, titled))
     return drawn
 
 

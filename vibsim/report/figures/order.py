@@ -189,9 +189,9 @@ def _has_order(ax: Axes, record: Record, quantity: str, case: int) -> bool:
     name = f"{quantity}_observed_order"
     if name in record and np.isfinite(data.pick(record, name, case=case)).any():
         return True
-    few = len(data.whole(record, "level")) < 3
+    is_short = len(data.whole(record, "level")) < 3
     ax.set(xticks=[], yticks=[])
-    why = " it takes three levels" if few else "\nno ratio of differences exists"
+    why = " it takes three levels" if is_short else "\nno ratio of differences exists"
     style.remark(ax, f"no order:{why}")
     return False
 

@@ -14,9 +14,7 @@ from vibsim.report.types import Axes, Figure
 
 LOG_RATIO = 1e6
 """Curves whose largest value exceeds this multiple of the median are drawn on a logarithmic scale."""
-LOG_SPREAD = (
-    8.0  # ratio of the largest to the smallest spread above which their scale is logarithmic
-)
+LOG_SPREAD = 8.0  # ratio of largest to smallest spread above which their scale is logarithmic
 LONG_LABEL = 36  # characters; longer labels have the unit on a second line
 LEGEND_COLUMNS = 7  # most columns of a legend above panels
 
@@ -207,7 +205,7 @@ def _sizes(series: list[Floats]) -> list[Floats]:
 def _look(i: int, count: int, points: int) -> dict[str, Any]:
     """Return the look of the i-th line, which leaves earlier ones visible beneath it."""
     part = i / max(1, count - 1)
-    every = max(1, points // 9)
+    stride = max(1, points // 9)
     return {
         "color": style.COLOURS[i],
         "linestyle": style.DASHES[i],
@@ -217,7 +215,7 @@ def _look(i: int, count: int, points: int) -> dict[str, Any]:
         "markersize": 5.0,
         "markerfacecolor": "white",
         "markeredgewidth": 1.0,
-        "markevery": (i * every // count, every),
+        "markevery": (i * stride // count, stride),
         "zorder": 2 + 0.1 * i,
     }
 

@@ -15,7 +15,7 @@ from vibsim.core.array_types import Flags, Floats
 from vibsim.core.record import Record
 from vibsim.models import Model
 from vibsim.report import data, style, words
-from vibsim.report.data import Member, state_on_level, unit, whole
+from vibsim.report.data import Member, state_at, unit, whole
 from vibsim.report.figures.panels import legend_above, rows_of
 from vibsim.report.style import Picture
 from vibsim.report.types import Axes, Experiment
@@ -64,9 +64,7 @@ def phase(experiment: Experiment, record: Record, shown: list[Member]) -> Pictur
     largest = 0.0
     for ax, i in zip(axes, chosen, strict=True):
         for k, member in enumerate(members):
-            u, v = (
-                state_on_level(record, name, member, i) for name in (model.position, model.velocity)
-            )
+            u, v = (state_at(record, name, member, i) for name in (model.position, model.velocity))
             v = v / w
             for keep, width in parts:
                 colour = style.look(k)["color"]
@@ -189,7 +187,7 @@ def _points(record: Record, names: tuple[str, ...], member: Member, level: int |
     if level is None:
         x, y = (data.exact_series(record, name, member) for name in names)
     else:
-        x, y = (state_on_level(record, name, member, level) for name in names)
+        x, y = (state_at(record, name, member, level) for name in names)
     return x, y
 
 

@@ -148,7 +148,7 @@ def motion(experiment: Experiment, record: Record, quantity: str, member: Member
     name = f"{quantity}_richardson"
     best = exact if is_known or name not in record else data.at(record, name, member)
     chosen = style.spaced(len(levels), MOST)
-    runs = {i: data.state_on_level(record, quantity, member, i) for i in chosen}
+    runs = {i: data.state_at(record, quantity, member, i) for i in chosen}
     has_errors = bool(np.isfinite(best).any()) and len(levels) > (0 if is_known else 1)
     axes = panels.stacked([2.3, *[1.7] * has_errors], style.TIME)
     text = "exact" if is_known else "extrapolated"

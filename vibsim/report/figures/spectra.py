@@ -14,7 +14,7 @@ import numpy as np
 from vibsim.core.record import Record
 from vibsim.observe import spectrum as observed
 from vibsim.report import choice, data, style, words
-from vibsim.report.data import Member, state_on_level, whole
+from vibsim.report.data import Member, state_at, whole
 from vibsim.report.figures import panels
 from vibsim.report.style import Picture
 from vibsim.report.types import Experiment
@@ -39,7 +39,7 @@ def spectrum(experiment: Experiment, record: Record, member: Member) -> Picture 
     highest, last = 0.0, 0.0
     chosen = range(max(len(levels) - MOST_LEVELS, 0), len(levels))
     for k, level in enumerate(chosen):
-        amplitudes = observed.lines(state_on_level(record, name, member, level))
+        amplitudes = observed.lines(state_at(record, name, member, level))
         frequencies, values = w[: amplitudes.size], amplitudes[: w.size]
         colour, text = style.look(k)["color"], f"level {levels[level]}"
         ax.plot(frequencies, values, color=colour, linewidth=1.0, label=text)
@@ -100,10 +100,7 @@ def poincare(experiment: Experiment, record: Record, shown: list[Member]) -> Pic
     units = [data.unit(record, f"{name}_finest") for name in (model.position, model.velocity)]
     drawn = []
     for ax, member in zip(axes, first, strict=True):
-        u, v = (
-            state_on_level(record, name, member, finest)
-            for name in (model.position, model.velocity)
-        )
+        u, v = (state_at(record, name, member, finest) for name in (model.position, model.velocity))
         n = (u.size - 1) // round(periods)
         u, v = (values[::n][round(periods) // 2 :] for values in (u, v))
         ax.plot(u, v, linestyle="none", marker=".", markersize=3.0, color=style.look(0)["color"])

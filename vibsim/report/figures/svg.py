@@ -273,8 +273,8 @@ class Writer(RendererBase):  # type: ignore[misc, unused-ignore]
     def _legend(self, legend: Any) -> None:
         """Draw a legend; each entry carries the key of its curve."""
         parent = legend.parent
-        every = parent.axes if isinstance(parent, Figure) else [parent]
-        lines = [line for ax in every if ax.get_gid() for line in ax.get_lines()]
+        panels = parent.axes if isinstance(parent, Figure) else [parent]
+        lines = [line for ax in panels if ax.get_gid() for line in ax.get_lines()]
         keys = {
             str(line.get_label()): str(line.get_gid() or line.get_label())
             for line in lines

@@ -16,16 +16,14 @@ from vibsim.core.record import Record
 from vibsim.core.vocabulary import MEMBER, OF_LEVEL
 from vibsim.report import choice, data, frame, style, words
 from vibsim.report.choice import position
-from vibsim.report.data import Member, omega_dt, pick_or_nan
+from vibsim.report.data import Member, omega_dt, optional
 from vibsim.report.figures.panels import stacked
 from vibsim.report.style import Picture
 from vibsim.report.tables.theory import predicted
 from vibsim.report.types import Axes, Experiment
 
 CURVE_POINTS = 240  # points of a curve
-SMALLEST = (
-    1e-13  # smaller growth and phase errors are round-off of the numbers they are computed from
-)
+SMALLEST = 1e-13  # smaller growth and phase errors are round-off
 KINDS = ("growth", "phase error")
 SAME_CURVE = 1e-9  # relative difference below which curves are the same
 FEW_DOTS = 40  # dots of one scheme up to which they are large
@@ -48,17 +46,17 @@ def order_and_stability(experiment: Experiment, record: Record) -> Picture | Non
     if not predicted(record) or np.unique(p[np.isfinite(p) & (p > 0.0)]).size < 2:
         return None
     growth = [
-        pick_or_nan(record, f"{who}_growth", OF_LEVEL) - 1.0 for who in ("theory", "measured")
+        optional(record, f"{origin}_growth", OF_LEVEL) - 1.0 for origin in ("theory", "measured")
     ]
-    phase = [data.phase_error(record, who) for who in ("theory", "measured")]
+    phase = [data.phase_error(record, origin) for origin in ("theory", "measured")]
     axes = stacked([2.9, 2.9])
     lowest, highest = float(np.min(style.finite(p[p > 0.0]))), float(np.nanmax(p))
     grid = np.geomspace(0.9 * lowest, 1.1 * highest, CURVE_POINTS)
     curves = [_theory(experiment, s, grid) for s in range(len(record["scheme"]))]
-    limits = pick_or_nan(record, "stability_limit", MEMBER)[:, 0]
+    limits = optional(record, "stability_limit", MEMBER)[:, 0]
     for k, (ax, (from_theory, measured)) in enumerate(zip(axes, (growth, phase), strict=True)):
         # schemes without theory, such as adaptive ones, have no w dt
-        found = np.where(np.isnan(from_theory), np.nan, measured)
+        shown = np.where(np.isnan(from_theory), np.nan, measured)
         for s, name in enumerate(record.words("scheme")):
             if np.isnan(from_theory[s]).all():
                 continue
@@ -70,8 +68,8 @@ def order_and_stability(experiment: Experiment, record: Record) -> Picture | Non
                 for keep, dashes, width in ((y > 0.0, "-", 1.1), (y < 0.0, (0, (1, 1.3)), 1.5)):
                     line: dict[str, Any] = {"linestyle": dashes, "linewidth": width}
                     ax.plot(grid, np.where(keep, size, np.nan), color=look["color"], **line)
-            _dots(ax, p, found[s], look, style.entry(name))
-        _finish(ax, from_theory, found, limits, grid)
+            _dots(ax, p, shown[s], look, style.entry(name))
+        _finish(ax, from_theory, shown, limits, grid)
     alike = _alike(record.words("scheme"), curves)
     axes[0].set_ylabel("|growth per period − 1|")
     axes[0].set_title("Growth of the amplitude: filled grows, hollow decays")
@@ -82,7 +80,7 @@ def order_and_stability(experiment: Experiment, record: Record) -> Picture | Non
         # in the upper panel below the legend
         rows = len(axes[0].get_legend_handles_labels()[0]) + 2
         for ax, kind, below in zip(axes, KINDS, ("\n" * rows, ""), strict=True):
-            same = [f"{name}:\n  same as {other}" for of, name, other in alike if of == kind]
+            same = [f"{name}:\n  same as {first}" for of, name, first in alike if of == kind]
             small: dict[str, Any] = {"va": "top", "fontsize": 7.5, "linespacing": 1.25}
             if same:
                 ax.text(1.02, 1.0, below + "\n".join(same), transform=ax.transAxes, **small)
@@ -193,7 +191,7 @@ def growing(experiment: Experiment, record: Record) -> Picture | None:
     sizes, reference = [], 0.0
     for k, (member, level) in enumerate(runs):
         t, colour = data.times(record, member.case), style.look(k)["color"]
-        values = data.state_on_level(record, quantity, member, level)
+        values = data.state_at(record, quantity, member, level)
         exact = data.exact_series(record, quantity, member)
         most = data.largest(exact)
         reference = max(reference, most)
@@ -243,8 +241,8 @@ def growing(experiment: Experiment, record: Record) -> Picture | None:
 
 def _unstable(record: Record) -> list[tuple[Member, int]]:
     """Choose the unstable runs, from the slowest growth to the fastest."""
-    growth = pick_or_nan(record, "theory_growth", OF_LEVEL)
-    limit, product = pick_or_nan(record, "stability_limit", MEMBER), omega_dt(record)
+    growth = optional(record, "theory_growth", OF_LEVEL)
+    limit, product = optional(record, "stability_limit", MEMBER), omega_dt(record)
     runs: list[tuple[float, Member, int]] = []
     for member in data.all_members(record):
         most = float(limit[member.scheme, member.case])
@@ -258,8 +256,8 @@ def _unstable(record: Record) -> list[tuple[Member, int]]:
 
 def _run_label(record: Record, member: Member, level: int) -> str:
     from_theory, measured = (
-        words.number(data.at(record, f"{who}_growth", member, level=level).item())
-        for who in ("theory", "measured")
+        words.number(data.at(record, f"{origin}_growth", member, level=level).item())
+        for origin in ("theory", "measured")
     )
     product = words.number(float(omega_dt(record)[member.case, level]), "step")
     return style.entry(

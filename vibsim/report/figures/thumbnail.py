@@ -82,7 +82,7 @@ def _solutions(record: Record, position: str, member: Member, layout: Along | Gr
         series = [data.at(record, f"{position}_finest", one) for one in of]
     else:
         levels = [0, len(data.whole(record, "level")) - 1]
-        series = [data.state_on_level(record, position, member, level) for level in levels]
+        series = [data.state_at(record, position, member, level) for level in levels]
     largest = [data.largest(values) for values in series if np.isfinite(values).all()]
     known = frame.sizes(record, position)
     lines = []
@@ -99,7 +99,7 @@ def _response(record: Record, along: Along, names: Sequence[str]) -> Lines:
     if key.distinct.size < FEWEST_VALUES:
         return []
     for name in names:
-        values = np.abs(data.pick_or_nan(record, name, MEMBER, level=-1)[0])
+        values = np.abs(data.optional(record, name, MEMBER, level=-1)[0])
         if is_telling(values):
             if data.largest(values) > WIDE * np.median(style.finite(values)):
                 values = np.log10(style.no_zeros(values))
@@ -111,7 +111,7 @@ def _response(record: Record, along: Along, names: Sequence[str]) -> Lines:
 
 def _map(record: Record, grid: Grid, names: Sequence[str], position: str) -> list[str]:
     """Return the coloured cells of a map; empty if no number varies."""
-    found = [np.abs(data.pick_or_nan(record, name, MEMBER, level=-1)[0]) for name in names]
+    found = [np.abs(data.optional(record, name, MEMBER, level=-1)[0]) for name in names]
     found.append(np.log10(style.no_zeros(finest_level.error(record, position).best[0])))
     values = next((values for values in found if is_telling(values)), None)
     if values is None:

@@ -36,9 +36,9 @@ def overlay(record: Record, quantity: str, member: Member) -> Picture:
     """Draw the rescaled level differences of a quantity, their spread, ratio and order over time."""
     t, order = data.times(record, member.case), data.rescaling_order(record, member, quantity)
     letter, measure = words.symbol(quantity), data.unit(record, f"{quantity}_difference")
-    levels, good = data.whole(record, "level"), data.sound_triples(record, quantity, member)
+    levels, sound = data.whole(record, "level"), data.sound_triples(record, quantity, member)
     curves = differences(record, quantity, member)
-    spread, ratios = panels.comparable(curves), bool(good)
+    spread, ratios = panels.comparable(curves), bool(sound)
     orders = ratios and has_order(record, quantity, member)
     axes = panels.stacked([2.4, *[1.3] * spread, *[1.5] * ratios, *[1.5] * orders], style.TIME)
     panels.draw_curves(axes[0], t, curves, f"rescaled difference of {letter}", measure)
@@ -46,9 +46,9 @@ def overlay(record: Record, quantity: str, member: Member) -> Picture:
     if spread:
         panels.draw_spread(axes[1], t, curves, measure)
     if ratios:
-        _draw_ratios(axes[-2 if orders else -1], t, record, quantity, member, good)
+        _draw_ratios(axes[-2 if orders else -1], t, record, quantity, member, sound)
     if orders:
-        _draw_orders(axes[-1], t, record, quantity, member, good)
+        _draw_orders(axes[-1], t, record, quantity, member, sound)
     axes[-1].set_xlabel(data.time_label(record))
     law = f"dt{words.superscript(order)}" if order != 1.0 else "dt"
     what = f", {_multiplied(order, levels)}; if the error shrinks as {law}, the curves fall on one another."
@@ -161,24 +161,24 @@ def _few(sound: list[bool]) -> list[int]:
 
 
 def _draw_ratios(
-    ax: Axes, t: Floats, record: Record, quantity: str, member: Member, good: list[bool]
+    ax: Axes, t: Floats, record: Record, quantity: str, member: Member, sound: list[bool]
 ) -> None:
     levels, order = data.whole(record, "level"), data.rescaling_order(record, member, quantity)
     drawn: list[Floats] = []
-    lost = [_lost(record, quantity, member, [i, i + 1, i + 2]) for i in range(len(good))]
-    for k, i in enumerate(_few(good)):
+    lost = [_lost(record, quantity, member, [i, i + 1, i + 2]) for i in range(len(sound))]
+    for k, i in enumerate(_few(sound)):
         values = data.at(record, f"{quantity}_ratio", member, triple=i)
         if not np.isfinite(values).any():
             continue
         look: dict[str, Any] = {"color": style.PALE, "linewidth": 0.6, "zorder": 1.5}
-        if good[i] or not any(good):
+        if sound[i] or not any(sound):
             look = {"color": style.COLOURS[k], "linestyle": style.DASHES[k], "linewidth": 1.3}
             drawn.append(values)
-        text = _triple(levels, i) + ("" if good[i] else f"\n({lost[i]})")
+        text = _triple(levels, i) + ("" if sound[i] else f"\n({lost[i]})")
         style.curve(ax, t, values, label=text, gid=style.of_level(levels[i]), **look)
     if not drawn:
-        style.remark(ax, _why_no_ratio(good, lost))
-    targets = sorted({float(target_ratio(order, levels[i : i + 3])) for i in _few(good)})
+        style.remark(ax, _why_no_ratio(sound, lost))
+    targets = sorted({float(target_ratio(order, levels[i : i + 3])) for i in _few(sound)})
     # a line would cross out the remark
     for k, target in enumerate(targets if drawn else []):
         text = "" if k else data.basis_of_order(record, quantity)
@@ -199,9 +199,9 @@ def _triple(levels: list[int], i: int) -> str:
     return "levels " + ", ".join(map(str, levels[i : i + 3]))
 
 
-def _why_no_ratio(good: list[bool], lost: list[str]) -> str:
+def _why_no_ratio(sound: list[bool], lost: list[str]) -> str:
     """Say why no triple has a ratio at any time."""
-    if any(good):
+    if any(sound):
         return "too few common times for ratios: a difference changes its sign beside each of them"
     if set(lost) != {frame.ROUND_OFF}:
         return "no ratio means anything: the runs grow without bound, or break down"
@@ -216,20 +216,20 @@ def has_order(record: Record, quantity: str, member: Member) -> bool:
 
 def finest_sound(sound: list[bool]) -> list[int]:
     """Choose triples: the finest ones above round-off, else the coarsest."""
-    return [i for i, good in enumerate(sound) if good][-ORDERS:] or [0]
+    return [i for i, is_sound in enumerate(sound) if is_sound][-ORDERS:] or [0]
 
 
 def _draw_orders(
-    ax: Axes, t: Floats, record: Record, quantity: str, member: Member, good: list[bool]
+    ax: Axes, t: Floats, record: Record, quantity: str, member: Member, sound: list[bool]
 ) -> None:
     """Draw the order over time of the finest triples with their intervals, and the formal order.
 
     A triple has the colour of its ratio. The last point is drawn separately; uncertain orders are grey dots.
     """
     levels, promised = data.whole(record, "level"), data.formal_order(record, member, quantity)
-    colours = _few(good)
+    colours = _few(sound)
     drawn: list[Floats] = []
-    for i in finest_sound(good):
+    for i in finest_sound(sound):
         order, low, high = (
             data.at(record, f"{quantity}_local_order{end}", member, triple=i)
             for end in ("", "_low", "_high")

@@ -14,18 +14,9 @@ import numpy as np
 from vibsim.core.array_types import Floats
 from vibsim.core.record import Record
 from vibsim.experiment.cost import ONE_SECONDS
-from vibsim.report import style, words
+from vibsim.report import data, style, words
 from vibsim.report.choice import position
-from vibsim.report.data import (
-    Member,
-    at,
-    case_name,
-    ends_of,
-    natural_frequency,
-    pick_or_nan,
-    unit,
-    whole,
-)
+from vibsim.report.data import Member, at, case_name, optional, unit, whole
 from vibsim.report.figures.panels import legend_above, rows_of
 from vibsim.report.style import Picture
 from vibsim.report.tables.table import Cell, Column, Table
@@ -40,7 +31,7 @@ def precision(experiment: Experiment, record: Record, case: int) -> Picture | No
     figure, axes = rows_of(3, [(0.675 + 2.835 * i, 2.565) for i in range(3)], 3.1, 0.4, 0.55)
     for ax in axes[1:]:
         ax.sharey(axes[0])
-    floor = float(pick_or_nan(record, "work_reference_error", ("case",))[case])
+    floor = float(optional(record, "work_reference_error", ("case",))[case])
     for k, ax in enumerate(axes):
         for i, line in enumerate(drawn):
             look = style.look(i) | {"markersize": 4.5, "linewidth": 1.0}
@@ -124,7 +115,8 @@ def _over_tolerances(
     """Return the points of the schemes of one adaptive kind, from the loosest tolerance to the tightest."""
     from vibsim.schemes.adaptive import seconds
 
-    periods = natural_frequency(record, case) * float(ends_of(record)[case]) / math.tau
+    duration = float(data.ends_of(record)[case])
+    periods = data.natural_frequency(record, case) * duration / math.tau
     rows = []
     for s in schemes:
         tolerance = float(experiment.schemes[s].options["tolerance"])
@@ -143,8 +135,8 @@ def _numbers(record: Record, member: Member) -> tuple[Floats, Floats, Floats]:
 
 def table(experiment: Experiment, record: Record) -> Table | None:
     """Return error and work of the first member for every scheme and level, or tolerance; None without such data."""
-    found = lines(experiment, record, 0)
-    if len(found) < 2:
+    drawn = lines(experiment, record, 0)
+    if len(drawn) < 2:
         return None
     columns = (
         Column("scheme"), Column("level or tolerance"), Column("steps", form="integer"),
@@ -153,7 +145,7 @@ def table(experiment: Experiment, record: Record) -> Table | None:
     )  # fmt: skip
     rows: list[tuple[Cell, ...]] = [
         (line.name, label, *(float(part[i]) for part in line.work), float(line.error[i]))
-        for line in found
+        for line in drawn
         for i, label in enumerate(line.labels)
     ]
     name = case_name(record, 0)

@@ -69,9 +69,9 @@ def frames(film: Film, dots_per_inch: float) -> Iterator[Pixels]:
 def _trace(figure: Any, film: Film, share: float) -> Callable[[int], None]:
     """Draw the series in the lower `share` of the figure; return a function that moves the window to a frame."""
     ax = figure.add_axes((0.09, 0.2 * share, 0.88, 0.62 * share))
-    known = next((run for run in film.runs if run.exact is not None), None)
-    if known is not None and known.exact is not None:
-        ax.plot(known.t, known.exact, color=PALE, linewidth=5.0, label="exact", zorder=1)
+    reference = next((run for run in film.runs if run.exact is not None), None)
+    if reference is not None and reference.exact is not None:
+        ax.plot(reference.t, reference.exact, color=PALE, linewidth=5.0, label="exact", zorder=1)
     for run, look in zip(film.runs, CURVES, strict=False):
         # with two drawings, the titles are below them
         label = "_" if len(film.scenes) > 1 else style.entry(run.title)

@@ -42,8 +42,8 @@ def check(form: str) -> None:
         try:
             import_module("av")
         except ImportError as error:
-            rest = "install it (pip install av), or write a .gif, which needs nothing"
-            raise VibsimError(f"{form}: the package av cannot be used ({error}): {rest}") from None
+            hint = "install it (pip install av), or write a .gif, which needs nothing"
+            raise VibsimError(f"{form}: the package av cannot be used ({error}): {hint}") from None
 
 
 def movie(frames: Iterable[Pixels], fps: float, form: str) -> bytes:

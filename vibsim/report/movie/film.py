@@ -77,10 +77,10 @@ def run(experiment: Experiment, record: Record, scheme: str, quantity: str) -> R
     names = [state.name for state in model.states]
     exact = f"{quantity}_exact"
     step = words.number(float(t[-1]) / int(str(record.attrs["steps"])), "brief")
-    who = scheme if len(record["scheme"]) > 1 else ""
+    prefix = scheme if len(record["scheme"]) > 1 else ""
     text = f"level {int(record['level'])}, dt = {step} {data.time_unit(record)}".strip()
     return Run(
-        title=", ".join(filter(None, [who, text, words.swept(data.case_name(record, 0))])),
+        title=", ".join(filter(None, [prefix, text, words.swept(data.case_name(record, 0))])),
         t=t,
         series=np.asarray(record[quantity][place, 0], dtype=np.float64),
         states={name: record[name][place, 0] for name in names if name in record},
@@ -152,17 +152,17 @@ def film(
 def _as_needed(start: float, end: float, period: float, fps: float, most: int) -> tuple[int, float]:
     """Return the number of frames that the motion needs, and the last time that they show."""
     periods = (end - start) / period
-    wanted = max(LEAST_SECONDS * fps, moments.SECONDS_A_PERIOD * fps * periods)
-    frames = math.ceil(min(most, wanted))
+    needed = max(LEAST_SECONDS * fps, moments.SECONDS_A_PERIOD * fps * periods)
+    frames = math.ceil(min(most, needed))
     return frames, min(end, start + period * frames / FEWEST_FRAMES_A_PERIOD)
 
 
 def _scenes(experiment: Experiment, runs: Sequence[Run], t: Floats) -> tuple[Scene, ...]:
     model = experiment.model.definition
     draw = scenes.scene_of(model)
-    every = [x for one in runs for x in one.states.values()]
+    series = [x for one in runs for x in one.states.values()]
     is_whole = all(len(one.states) == len(model.states) for one in runs)
-    if draw is None or not is_whole or not all(np.isfinite(x).all() for x in every):
+    if draw is None or not is_whole or not all(np.isfinite(x).all() for x in series):
         return ()
     reach = {name: max(data.largest(one.states[name]) for one in runs) for name in runs[0].states}
     motions = [moments.motion(model, t, one.t, one.states, one.parameters, reach) for one in runs]

@@ -105,7 +105,7 @@ def _chosen(
     finest = len(data.whole(record, "level")) - 1
 
     def series(one: Member, level: int) -> dict[str, Floats]:
-        return {name: data.state_on_level(record, name, one, level) for name in names}
+        return {name: data.state_at(record, name, one, level) for name in names}
 
     first = series(member, finest)
     if len(names) < len(model.states) or not all(np.isfinite(x).all() for x in first.values()):

@@ -85,7 +85,7 @@ def failures(summary: Mapping[str, Any], record: Record) -> Table | None:
         Column("t", data.time_unit(record), "step"), Column("step", form="integer"), Column("error"),
     )  # fmt: skip
     keys = ("scheme", "level", "case", "member", "t", "step", "error")
-    named = [{**row, "member": member(record, row["case"])} for row in listed]
-    rows = tuple(tuple(row[key] for key in keys) for row in named)
+    with_names = [{**row, "member": member(record, row["case"])} for row in listed]
+    rows = tuple(tuple(row[key] for key in keys) for row in with_names)
     caption = "Runs that broke down: the first moment at which the solution was not finite"
     return Table("failures", caption, columns, rows)

@@ -15,7 +15,7 @@ from vibsim.core.array_types import Flags, Floats
 from vibsim.core.record import Record
 from vibsim.core.vocabulary import MEMBER, OF_LEVEL, ORDER_TOLERANCE, TYPICAL_NORM
 from vibsim.report import data, frame, style, words
-from vibsim.report.data import Member, pick_or_nan, time_unit, unit, whole
+from vibsim.report.data import Member, optional, time_unit, unit, whole
 from vibsim.report.tables.table import Cell, Column, Table, Written
 
 OWN, CENTRED = "energy_deviation_max_abs", "energy_deviation_d2t_max_abs"
@@ -33,9 +33,9 @@ def by_level(
     filled: Sequence[tuple[Column, Fill] | None],
     *,
     titled: bool = False,
-    there: Flags | None = None,
+    included: Flags | None = None,
 ) -> Table:
-    """Return a table with a row for every member and level, or for the `there` ones, shape (scheme, case, level).
+    """Return a table with a row for every member and level, or for the `included` ones, shape (scheme, case, level).
 
     `filled` are the columns after scheme, member and level, each with its fill function (None is left out). In a
     `titled` table scheme and member share a column.
@@ -49,7 +49,7 @@ def by_level(
         heads = [text for text in (member.scheme_name, member.case_name) if text]
         heads = [", ".join(heads)] if titled else heads
         for i, level in enumerate(whole(record, "level")):
-            if there is None or there[member.scheme, member.case, i]:
+            if included is None or included[member.scheme, member.case, i]:
                 rows.append((*heads, level, *(fill(member, i) for _, fill in shown)))
     return Table(name, caption, columns, tuple(rows), len(names) if data.swept(record) else 0)
 
@@ -76,7 +76,7 @@ def orders(
     notes = {member: _notes(record, quantity, member, n) for member in shown}
 
     def cells(name: str) -> Fill:
-        values = pick_or_nan(record, f"{quantity}_{name}", (*MEMBER, "level"), norm=n)
+        values = optional(record, f"{quantity}_{name}", (*MEMBER, "level"), norm=n)
         return lambda m, i: float(values[m.scheme, m.case, i]) if i < values.shape[2] else math.nan
 
     filled = (
@@ -98,7 +98,7 @@ def _notes(record: Record, quantity: str, member: Member, norm: int) -> list[str
     """Return for every level whether the stated order uses the three levels from there on, or why not."""
     levels, (first, last) = whole(record, "level"), data.window(record, quantity, member)
     stated, *_ = data.stated_order(record, quantity, member, norm)
-    orders = pick_or_nan(record, f"{quantity}_observed_order", (*MEMBER, "level"), norm=norm)
+    orders = optional(record, f"{quantity}_observed_order", (*MEMBER, "level"), norm=norm)
     local = orders[member.scheme, member.case]
     above = data.sound_pairs(record, quantity, member) if len(levels) > 1 else []
     notes = []
@@ -129,7 +129,7 @@ def maxima(record: Record, shown: Sequence[Member]) -> Table | None:
     ):
         # lean records lack the second
         if name in record:
-            values, is_sound = pick_or_nan(record, name, OF_LEVEL), record["status"] == 0
+            values, is_sound = optional(record, name, OF_LEVEL), record["status"] == 0
             filled.append((Column(text, measure, "norm"), _cells(values)))
             if several:
                 filled.append((Column(ratio, form="order"), _cells(_ratios(values, is_sound))))
@@ -148,7 +148,7 @@ def _ratios(values: Floats, is_sound: Flags) -> Floats:
 
 def scalars(record: Record, shown: Sequence[Member]) -> Table | None:
     """Return period, amplitude and the period's error on every level."""
-    period, exact = pick_or_nan(record, "period", OF_LEVEL), data.exact_periods(record)
+    period, exact = optional(record, "period", OF_LEVEL), data.exact_periods(record)
     if not np.isfinite(period).any():
         return None
     time, angle = unit(record, "period"), unit(record, "amplitude")
@@ -166,18 +166,18 @@ def scalars(record: Record, shown: Sequence[Member]) -> Table | None:
 
 def velocities(record: Record) -> Table | None:
     """Return the largest relative energy error with both velocities; None if no scheme has its own velocity."""
-    if CENTRED not in record or not np.isfinite(pick_or_nan(record, CENTRED, OF_LEVEL)).any():
+    if CENTRED not in record or not np.isfinite(optional(record, CENTRED, OF_LEVEL)).any():
         return None
-    first = style.positive(np.abs(pick_or_nan(record, "energy_initial", MEMBER)))[..., None]
+    first = style.positive(np.abs(optional(record, "energy_initial", MEMBER)))[..., None]
     own, centred, interior = (
-        pick_or_nan(record, name, OF_LEVEL) / first for name in (OWN, CENTRED, f"{OWN}_interior")
+        optional(record, name, OF_LEVEL) / first for name in (OWN, CENTRED, f"{OWN}_interior")
     )
     # a scheme without its own velocity uses the centred difference, except at the last step
     is_same = np.asarray(np.isnan(centred).all(axis=-1))
     second = np.where(is_same[..., None], interior, centred)
     is_named = "energy_drift_kind" in record
     kinds = data.flags(record, "energy_drift_kind") if is_named else np.full(own.shape, "")
-    rates = pick_or_nan(record, "energy_drift_rate", OF_LEVEL)
+    rates = optional(record, "energy_drift_rate", OF_LEVEL)
 
     def quotient(member: Member, i: int) -> Cell:
         place = member.scheme, member.case, i
@@ -217,8 +217,8 @@ def _plain(quotient: float) -> Cell:
 
 def events(record: Record) -> Table | None:
     """Return number and times of impacts, turns under friction and rest; None if there are none."""
-    count, first, last, rest = (
-        pick_or_nan(record, name, OF_LEVEL)
+    count, first, last, rest_time = (
+        optional(record, name, OF_LEVEL)
         for name in ("event_count", "first_event_time", "last_event_time", "rest_time")
     )
     if not (count > 0.0).any():
@@ -227,7 +227,7 @@ def events(record: Record) -> Table | None:
         "Events (impacts; turns and starts of a body under friction; events of the file): where they are located, "
         "their times move with the level as the error of the scheme does, else by part of a step"
     )
-    seconds, has_rest = time_unit(record, "first_event_time"), np.isfinite(rest).any()
+    seconds, has_rest = time_unit(record, "first_event_time"), np.isfinite(rest_time).any()
 
     def change(member: Member, i: int) -> Cell:
         """Return the time of the last event minus that on the next finer level; None if it is a different event."""
@@ -240,7 +240,7 @@ def events(record: Record) -> Table | None:
         (Column("events", form="integer"), _cells(count, int)),
         (Column("first", seconds, "value"), _cells(first)),
         (Column("last", seconds, "value"), _cells(last)),
-        (Column("at rest from", seconds, "value"), _cells(rest)) if has_rest else None,
+        (Column("at rest from", seconds, "value"), _cells(rest_time)) if has_rest else None,
         (Column("last, less that of the next finer level", seconds, "small"), change),
     )
     return by_level(record, "events", caption, data.all_members(record), filled)

@@ -61,7 +61,7 @@ def table(record: Record, quantity: str) -> Table | None:
     schemes = record.words("scheme")
     if not swept(record) or len(record["case"]) * len(schemes) > LISTED:
         return None
-    found = [
+    shown = [
         (column, values)
         for column, values in fields(record, quantity)
         if values.dtype.kind != "f" or np.isfinite(values).any()
@@ -69,10 +69,10 @@ def table(record: Record, quantity: str) -> Table | None:
     rows = [
         (scheme, *row)
         for s, scheme in enumerate(schemes)
-        for row in zip(*(values[s].tolist() for _, values in found), strict=True)
+        for row in zip(*(values[s].tolist() for _, values in shown), strict=True)
     ]
     caption = f"Members: order of {words.symbol(quantity)} ({words.USUAL_NORM}), and numbers of the finest level"
-    columns = (Column("scheme"), *(column for column, _ in found))
+    columns = (Column("scheme"), *(column for column, _ in shown))
     return Table("members", caption, columns, tuple(rows))
 
 

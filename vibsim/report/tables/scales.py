@@ -26,16 +26,16 @@ def table(experiment: Experiment, record: Record) -> Table | None:
     else:
         parameters, initial = dict(scaling.parameters), dict(scaling.initial)
     sizes, numbers = scales(model, parameters, initial), dimensionless(model, parameters, initial)
-    named = [(f"{row.name}_c", f"scale of the {row.words}", row) for row in sizes]
-    named += [(row.name, row.words, row) for row in numbers]
+    listed = [(f"{row.name}_c", f"scale of the {row.words}", row) for row in sizes]
+    listed += [(row.name, row.words, row) for row in numbers]
     ends = []
-    for _, _, row in named:
-        known = finite(np.asarray(row.value))
-        ends.append((float(known.min()), float(known.max())) if known.size else (np.nan, np.nan))
+    for _, _, row in listed:
+        shown = finite(np.asarray(row.value))
+        ends.append((float(shown.min()), float(shown.max())) if shown.size else (np.nan, np.nan))
     values = ("least", "largest") if any(low < high for low, high in ends) else ("value",)
     rows: list[tuple[Cell, ...]] = [
         (name, words, row.formula, *span[: len(values)], data.pretty_unit(row.unit) or "1")
-        for (name, words, row), span in zip(named, ends, strict=True)
+        for (name, words, row), span in zip(listed, ends, strict=True)
     ]
     columns = (
         *map(Column, ("name", "what it is", "formula")),

@@ -55,7 +55,7 @@ def listed(results: Path, folders: Iterable[Path]) -> list[tuple[str, list[Place
 
     A table that cannot be read, or has other columns, counts as missing, since no verdict depends on it.
     """
-    found: dict[str, list[Place]] = {}
+    by_figure: dict[str, list[Place]] = {}
     for folder in folders:
         rows: list[dict[str, str]] = []
         with (
@@ -66,11 +66,11 @@ def listed(results: Path, folders: Iterable[Path]) -> list[tuple[str, list[Place
         page = quote((folder / PAGE).relative_to(results).as_posix())
         for row in rows:
             figure, shows, place = (row.get(name) or "" for name in HEADERS)
-            places = found.setdefault(figure, [])
+            places = by_figure.setdefault(figure, [])
             # the link leads to the first of several pictures
             if place and (folder.name, shows) not in {(p.name, p.shows) for p in places}:
                 places.append(Place(folder.name, shows, f"{page}#{quote(place)}"))
-    return sorted(((f, p) for f, p in found.items() if f and p), key=lambda row: order(row[0]))
+    return sorted(((f, p) for f, p in by_figure.items() if f and p), key=lambda row: order(row[0]))
 
 
 def order(figure: str) -> list[tuple[int, str]]:

@@ -16,7 +16,7 @@ from vibsim.core.array_types import Floats
 from vibsim.core.record import Record
 from vibsim.core.vocabulary import MEMBER, OF_LEVEL
 from vibsim.report import choice, data, finest_level, words
-from vibsim.report.data import Member, pick_or_nan, swept, whole
+from vibsim.report.data import Member, optional, swept, whole
 from vibsim.report.tables.levels import Fill, by_level
 from vibsim.report.tables.table import Cell, Column, Table, Written
 from vibsim.report.types import Experiment
@@ -29,7 +29,7 @@ ROUNDINGS = 32.0
 
 def predicted(record: Record) -> bool:
     """Return whether the record has predictions of theory, as for linear models."""
-    return bool(np.isfinite(pick_or_nan(record, "theory_growth", OF_LEVEL)).any())
+    return bool(np.isfinite(optional(record, "theory_growth", OF_LEVEL)).any())
 
 
 def schemes(experiment: Experiment, record: Record) -> Table | None:
@@ -68,10 +68,10 @@ def _scheme(
     scheme = spec.method
     kinds = ["adaptive" if scheme.adaptive else "explicit" if scheme.explicit else "implicit"]
     kinds += ["s"] if scheme.symplectic else []
-    named = spec.name if spec.name.startswith(spec.kind) else f"{spec.name} ({spec.kind})"
-    yield from (named, scheme.family, ", ".join(kinds))
+    name = spec.name if spec.name.startswith(spec.kind) else f"{spec.name} ({spec.kind})"
+    yield from (name, scheme.family, ", ".join(kinds))
     yield None if scheme.adaptive else scheme.force_evaluations
-    limit = _common(pick_or_nan(record, "stability_limit", MEMBER)[s])
+    limit = _common(optional(record, "stability_limit", MEMBER)[s])
     if isinstance(limit, float):
         limit = Written(limit, LIMITS.get(limit, words.number(limit, "step")))
     yield limit
@@ -118,10 +118,10 @@ def predictions(record: Record) -> list[Table]:
 
 
 def _predictions(
-    record: Record, name: str, caption: str, shown: dict[str, tuple[str, str]]
+    record: Record, stem: str, caption: str, shown: dict[str, tuple[str, str]]
 ) -> Table:
-    p, limit = data.omega_dt(record), pick_or_nan(record, "stability_limit", MEMBER)
-    rate = np.abs(pick_or_nan(record, "theory_frequency", OF_LEVEL))
+    p, limit = data.omega_dt(record), optional(record, "stability_limit", MEMBER)
+    rate = np.abs(optional(record, "theory_frequency", OF_LEVEL))
     with np.errstate(divide="ignore", invalid="ignore"):
         step = np.where(p > 0.0, math.ulp(1.0) * ROUNDINGS * 2.0 * math.pi / p, 0.0)
         sizes = {"frequency": rate, "phase_error": np.where(rate > 0.0, 2.0 * math.pi / rate, 1.0)}
@@ -135,7 +135,7 @@ def _predictions(
     ]
     for kind, (text, measure) in shown.items():
         from_theory, measured = (
-            pick_or_nan(record, f"{who}_{kind}", OF_LEVEL) for who in ("theory", "measured")
+            optional(record, f"{origin}_{kind}", OF_LEVEL) for origin in ("theory", "measured")
         )
         noise = step * sizes.get(kind, np.fmax(np.abs(from_theory), 1.0))
         less = float(kind == "growth")
@@ -145,10 +145,8 @@ def _predictions(
             (Column("difference", measure, "brief"), _beyond(measured - from_theory, noise)),
         ]
     caption = f"Theory beside measurement: {caption}"
-    there = np.isfinite(pick_or_nan(record, "theory_growth", OF_LEVEL))
-    table = by_level(
-        record, f"theory_{name}", caption, data.all_members(record), filled, there=there
-    )
+    included, name = np.isfinite(optional(record, "theory_growth", OF_LEVEL)), f"theory_{stem}"
+    table = by_level(record, name, caption, data.all_members(record), filled, included=included)
     short = table.without_empty(["difference"])
     agree = ". Where no difference is shown, the two agree to round-off"
     return short if short.columns == table.columns else replace(short, caption=caption + agree)

@@ -71,8 +71,8 @@ def measured(check: Measurement, record: Record | None = None) -> str:
             order = (
                 "the order of its scheme" if check.order == "scheme" else f"order {check.order:g}"
             )
-            named = [_listed(check.schemes)] if check.schemes else []
-            only = "".join(f", {part}" for part in [*named, *swept_values(check)])
+            schemes = [_listed(check.schemes)] if check.schemes else []
+            only = "".join(f", {part}" for part in [*schemes, *swept_values(check)])
             statement = (
                 f"converges with {order} ± {check.tolerance:g} ({words.NORMS[check.norm]}{only})"
             )
@@ -101,10 +101,10 @@ def measured(check: Measurement, record: Record | None = None) -> str:
             velocity = "the scheme's own velocity" if check.conserves == "energy" else "[D₂ₜu]"
             return f"the energy by {velocity} {DRIFTS[check.drift]}{_where(check, record)}"
         case "equal":
-            other = SOLUTIONS.get(check.second, check.second)
+            partner = SOLUTIONS.get(check.second, check.second)
             within = "round-off" if check.atol is None else words.PAGE.number(check.atol)
             letter = words.title(check.quantity)
-            return f"{letter} by {check.first} equals that of {other} to {within}{_where(check, record)}"
+            return f"{letter} by {check.first} equals that of {partner} to {within}{_where(check, record)}"
 
 
 def subject(check: Measurement, record: Record | None = None) -> str:

@@ -180,11 +180,11 @@ def _phrases(experiment: Experiment, record: Record, lead: Lead) -> dict[str, st
     """Return the words that fill the template of a title."""
     measured, what = lead.measured, _in_words(experiment, lead.quantity)
     order, expected = lead.facts.get("order"), lead.facts.get("expected")
-    named = _named_schemes(record, lead)
+    judged = _named_schemes(record, lead)
     filled = {
         "what": what, "What": _capitalized(what), "everywhere": _everywhere(record, lead),
         "at": _at(expected, order), **_contrast(order, expected),
-        "Schemes": f"Scheme {named[0]}" if len(named) == 1 else "The schemes",
+        "Schemes": f"Scheme {judged[0]}" if len(judged) == 1 else "The schemes",
         "first": "", "second": "", "drift": "", "stability": "", "not_stability": "", "subject": "", "Subject": "",
     }  # fmt: skip
     if measured is None:
@@ -200,13 +200,13 @@ def _phrases(experiment: Experiment, record: Record, lead: Lead) -> dict[str, st
             filled["drift"] = assertions.DRIFTS[measured.drift]
         case "stable":
             outcomes = ["is stable", "makes the amplitude grow"]
-            if len(named) > 1:
+            if len(judged) > 1:
                 outcomes = ["are stable", "make the amplitude grow"]
             expected, opposite = outcomes if measured.stable else outcomes[::-1]
             filled |= {"stability": expected, "not_stability": f"{opposite}, against what is asked"}
     if _has_several_orders(record, lead):
         filled["at"] = "at the order that its scheme promises"
-        if (count := len(named)) > 1:
+        if (count := len(judged)) > 1:
             schemes = "both schemes promise" if count == 2 else f"each of {count} schemes promises"
             filled |= {"at": f"at the order that {schemes}", "everywhere": ""}
     return filled
@@ -262,10 +262,10 @@ def _everywhere(record: Record, lead: Lead) -> str:
     """Say for which members and schemes the finding holds; empty for one result of the only scheme."""
     assert lead.entry is not None
     total, schemes = sum(lead.entry["counts"].values()), record.words("scheme")
-    named = _named_schemes(record, lead)
+    judged = _named_schemes(record, lead)
     kind = lead.measured.kind if lead.measured else ""
-    is_named = kind in ("converges", "accurate") and len(named) == 1 < len(schemes)
-    by = f" with scheme {named[0]}" if is_named else ""
+    is_named = kind in ("converges", "accurate") and len(judged) == 1 < len(schemes)
+    by = f" with scheme {judged[0]}" if is_named else ""
     members = len(record["case"])
     is_of_one = total < 2 and (members < 2 or kind not in ("converges", "accurate"))
     if is_of_one:
@@ -359,10 +359,8 @@ def asked_of(record: Record, lead: Lead) -> str:
 def keeps_promise(record: Record, measured: Measurement | None, check: Mapping[str, Any]) -> bool:
     """Return whether the decisive result has the order of its scheme although the check states an order of its own."""
     decisive: Mapping[str, Any] = next(iter(check.get("results") or []), {})
-    order, case = (
-        words.fact(decisive, "order"),
-        data.case_position(record, decisive.get("case", -1)),
-    )
+    order = words.fact(decisive, "order")
+    case = data.case_position(record, decisive.get("case", -1))
     if measured is None or measured.kind != "converges" or measured.order == "scheme":
         return False
     if order is None or case is None:

@@ -50,11 +50,9 @@ def setup(experiment: Experiment, record: Record) -> Iterator[tuple[str, str]]:
         # the rest of the page is dimensionless
         parameters = _listing("model", scaling.parameters, sizes)
         initial = _listing("initial", scaling.initial, units)
-        remark = (
-            "the run uses the scales of the table below, and every other number is dimensionless"
-        )
+        note = "the run uses the scales of the table below, and every other number is dimensionless"
         original = f"the file has {parameters}; {initial}; end = {_plain(scaling.end)} s"
-        yield "Scaled", f"{original}; {remark}"
+        yield "Scaled", f"{original}; {note}"
         sizes, units = {}, {}
     yield "Parameters", _listing("model", experiment.model.parameters, sizes, keys, letters)
     yield "Initial values", _listing("initial", experiment.initial, units, keys)
@@ -81,8 +79,8 @@ def _scheme(spec: SchemeSpec, swept: set[str]) -> str:
             options.append(f"{key} swept")
         elif value is not False:
             options.append(f"{key}: {'true' if value is True else _plain(value)}")
-    named = spec.kind if spec.name == spec.kind else f"{spec.name}: {spec.kind}"
-    return f"{named} ({', '.join(options)})" if options else named
+    name = spec.kind if spec.name == spec.kind else f"{spec.name}: {spec.kind}"
+    return f"{name} ({', '.join(options)})" if options else name
 
 
 def _times(experiment: Experiment, record: Record) -> Iterator[tuple[str, str]]:
@@ -93,11 +91,11 @@ def _times(experiment: Experiment, record: Record) -> Iterator[tuple[str, str]]:
     differs = " (differs between members)" if "end" in record else ""
     yield "Time", f"0 to {' … '.join(extent)} {time}{differs}"
     run = levels == list(range(levels[0], levels[-1] + 1))
-    named = words.levels(levels) if run else ", ".join(map(str, levels))
+    listed = words.levels(levels) if run else ", ".join(map(str, levels))
     sizes = [words.number(float(value), "step") for value in (dt.max(), dt.min())]
     # a single level has one number of steps and one step size
     steps, sizes = (pair[: len(levels)] for pair in ([counts[0], counts[-1]], sizes))
-    yield "Levels", f"{named}: {' to '.join(steps)} steps, dt = {' to '.join(sizes)} {time}"
+    yield "Levels", f"{listed}: {' to '.join(steps)} steps, dt = {' to '.join(sizes)} {time}"
     if "omega_dt" in record:
         last = 0.0
         for name, term, text in (

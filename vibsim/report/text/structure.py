@@ -16,27 +16,25 @@ WORDS = {"mass": "M", "stiffness": "K", "damping": "C"}
 
 def as_written(spec: StructureSpec, formulas: Mapping[str, str]) -> dict[str, Any]:
     """Return the content of the section ``model`` apart from kind, Rayleigh damping and parameters."""
-    section: dict[str, Any] = {
-        key: _array(row) for key, row in spec.arrays.items() if "." not in key
-    }
+    node: dict[str, Any] = {key: _array(row) for key, row in spec.arrays.items() if "." not in key}
     if spec.ratios:
         is_same = len(set(spec.ratios)) == 1 and len(spec.ratios) > 1
-        section["damping_ratios"] = spec.ratios[0] if is_same else spec.ratios
+        node["damping_ratios"] = spec.ratios[0] if is_same else spec.ratios
     shapes = {key: row for key, row in spec.arrays.items() if key.startswith(f"{LOAD}.")}
     if shapes:
         factors = {key: formulas.get(key) or _table(spec, key) for key in shapes}
         rows = [(row.entries, factors[key]) for key, row in shapes.items()]
         if all(len(entries) == 1 and entries[0][1] == 1.0 for entries, _ in rows):
-            section[LOAD] = {str(entries[0][0]): factor for entries, factor in rows}
+            node[LOAD] = {str(entries[0][0]): factor for entries, factor in rows}
         else:
             ((key, row),) = shapes.items()
-            section[LOAD] = {"shape": _array(row), "times": factors[key]}
+            node[LOAD] = {"shape": _array(row), "times": factors[key]}
     for key, row in spec.arrays.items():
         if key.startswith("start."):
-            section.setdefault("start", {})[key.removeprefix("start.")] = _array(row)
+            node.setdefault("start", {})[key.removeprefix("start.")] = _array(row)
     if not spec.is_free:
-        section["observe"] = {name: _entries(entries) for name, entries in spec.observe}
-    return section
+        node["observe"] = {name: _entries(entries) for name, entries in spec.observe}
+    return node
 
 
 def _table(spec: StructureSpec, key: str) -> dict[str, Any]:
@@ -71,11 +69,11 @@ def rows(spec: StructureSpec, loaded: Loaded) -> Iterator[tuple[str, str]]:
     yield "Structure", ", ".join(facts)
     frequencies = structure.modes.frequencies
     listed = ", ".join(words.number(float(w)) for w in frequencies[:MOST_SHOWN])
-    rest = ", ..." if len(frequencies) > MOST_SHOWN or structure.dofs > len(frequencies) else ""
+    more = ", ..." if len(frequencies) > MOST_SHOWN or structure.dofs > len(frequencies) else ""
     tables = [row.file for key, row in spec.arrays.items() if key.startswith(f"{HISTORY}.")]
     if tables:
         yield "Loads", f"straight between the points of {', '.join(map(str, tables))}"
-    yield "Natural frequencies", f"{listed}{rest} (radians per unit of time)"
+    yield "Natural frequencies", f"{listed}{more} (radians per unit of time)"
     parts = []
     for name, entries in spec.observe:
         sums = [f"u_{dof}" if x == 1.0 else f"{words.number(x)} u_{dof}" for dof, x in entries]
@@ -83,5 +81,5 @@ def rows(spec: StructureSpec, loaded: Loaded) -> Iterator[tuple[str, str]]:
     yield "Observed", ", ".join(parts)
     if structure.ratios:
         shown = ", ".join(words.number(x) for x in structure.ratios[:MOST_SHOWN])
-        rest = ", ..." if len(structure.ratios) > MOST_SHOWN else ""
-        yield "Damping ratios", f"{shown}{rest} of the lowest modes"
+        more = ", ..." if len(structure.ratios) > MOST_SHOWN else ""
+        yield "Damping ratios", f"{shown}{more} of the lowest modes"

@@ -90,11 +90,8 @@ def _maps(experiment: Experiment, record: Record, names: list[str], scheme: int)
 
 
 def _period(quantity: str, record: Record, scheme: int) -> Iterator[Map]:
-    time, periods = (
-        finest_level.measured(record, "period", quantity),
-        data.exact_periods(record),
-    )
-    value, exact = time.value[scheme], np.where(np.isfinite(periods), periods, np.nan)
+    time, exact = finest_level.measured(record, "period", quantity), data.exact_periods(record)
+    value, exact = time.value[scheme], np.where(np.isfinite(exact), exact, np.nan)
     if not np.isfinite(value).any():
         return
     label, caption = style.label("period", time.unit), _finest_level(record)
@@ -358,8 +355,8 @@ def _scale(ax: Axes, image: Any, shown: Map, table: Floats) -> None:
     values = style.finite(table)
     low, high = float(image.norm.vmin), float(image.norm.vmax)
     below, above = values.min() < low, values.max() > high
-    beyond = "both" if below and above else "min" if below else "max" if above else "neither"
-    bar = ax.figure.colorbar(image, cax=ax, extend=beyond)
+    extend = "both" if below and above else "min" if below else "max" if above else "neither"
+    bar = ax.figure.colorbar(image, cax=ax, extend=extend)
     bar.outline.set_linewidth(0.5)
     bar.ax.grid(visible=False)
     if shown.kind == "distance":

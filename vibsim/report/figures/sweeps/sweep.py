@@ -166,9 +166,9 @@ class _Drawing:
 
     def error(self, quantity: str) -> Iterator[View | str]:
         """Yield the error of every member at the finest level."""
-        found = finest_level.error(self.record, quantity)
+        error = finest_level.error(self.record, quantity)
         explanation = "At the finest level, estimated from two levels"
-        if found.kind == "true":
+        if error.kind == "true":
             explanation = (
                 "At the finest level: true (dots), and what two levels alone say of it (lines)"
             )
@@ -176,7 +176,7 @@ class _Drawing:
         explanation = f"{explanation}, with the interval of the order." if has_pairs else "True."
         unit = data.norm_unit(self.record, quantity)
         yield from self._view(
-            f"sweep_error_{quantity}", f"error of {words.symbol(quantity)}", quantity, found.best, explanation,
+            f"sweep_error_{quantity}", f"error of {words.symbol(quantity)}", quantity, error.best, explanation,
             lambda ax: _draw_errors(ax, self.record, self.along, quantity), unit, "norm",
         )  # fmt: skip
 
@@ -200,20 +200,20 @@ class _Drawing:
     def number(self, name: str, check: ValueCheck) -> Iterator[View | str]:
         """Yield the number that a check asks for of every member."""
         values = view.of_check(self.record, name, check)
-        found = Measured(view.check_words(check), "", values, np.full(values.shape, np.nan))
+        number = Measured(view.check_words(check), "", values, np.full(values.shape, np.nan))
         yield from self._view(
             f"sweep_check_{name}", name, position(self.experiment), values, "",
-            lambda ax: _draw_numbers(ax, self.record, self.along, found, None, name),
+            lambda ax: _draw_numbers(ax, self.record, self.along, number, None, name),
         )  # fmt: skip
 
 
-def _finish(ax: Axes, key: Key, found: list[float]) -> str:
+def _finish(ax: Axes, key: Key, positions: list[float]) -> str:
     """Give the axis of the key its scale, label and separatrix; return the sentence on the latter."""
     view.key_axis(ax, key, 0.03)
     ax.set_xlabel(key.label)
-    for x in found:
+    for x in positions:
         ax.axvline(x, color="black", linestyle=(0, (1, 2)), linewidth=1.0, zorder=1)
-    return "Dotted: the separatrix, where the exact period is infinite." if found else ""
+    return "Dotted: the separatrix, where the exact period is infinite." if positions else ""
 
 
 @dataclass(frozen=True)

@@ -74,8 +74,8 @@ def by_scheme(record: Record, scheme: int, values: Floats) -> Floats:
 
 def check_words(check: ValueCheck) -> str:
     """Return the name of the number of a check."""
-    of = f" of {words.symbol(check.quantity)}" if check.quantity else ""
-    return f"{check.value}{of}".replace("_", " ")
+    suffix = f" of {words.symbol(check.quantity)}" if check.quantity else ""
+    return f"{check.value}{suffix}".replace("_", " ")
 
 
 def shared_verdict(record: Record, quantity: str, scheme: int | None = None) -> str:
