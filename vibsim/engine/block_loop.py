@@ -281,8 +281,8 @@ def gather_block(rows: Any, old: int, new: int, filled: int, n: int, turn: float
 def velocity_d2t(rows: Any, old: int, new: int, j: int) -> float:
     """Return ``[D_2t u]^n`` of a lane, whose next position is the first entry of its new state."""
     ahead = float(rows[new + j])
-    behind = float(rows[old + POSITION + j])
-    return (ahead - behind) * float(rows[RATE + j])
+    previous = float(rows[old + POSITION + j])
+    return (ahead - previous) * float(rows[RATE + j])
 
 
 def deviation_d2t(rows: Any, old: int, new: int, j: int, n: int) -> float:
@@ -330,9 +330,9 @@ def note(rows: Any, lane: Lane, turn: float, results: Any) -> None:
         kinetic, potential = energies(u, velocity_d2t(rows, old, new, j), n * h, p)
         rows[PENDING + j] = abs((kinetic + potential) - rows[ENERGY + j])
     if KEEP:
-        behind, middle = rows[old + BEFORE + j], rows[old + POSITION + j]
-        if is_turned(behind, middle, u):
-            note_turned(kept, counts, case, n - 1, h, behind, middle, u)
+        before, middle = rows[old + BEFORE + j], rows[old + POSITION + j]
+        if is_turned(before, middle, u):
+            note_turned(kept, counts, case, n - 1, h, before, middle, u)
     if STAGGERED:
         slope, slope_before = rows[SLOPE + j], rows[SLOPE_BEFORE + j]
     else:

@@ -188,14 +188,14 @@ def landing(variant: int, u: float, v: float, t: float, left: float, p: P) -> fl
     guard that is 0 at the beginning, because of the previous event, does not count as the root.
     """
     low, high = 0.0, left
-    behind = guard(u, v, t, p)
+    at_low = guard(u, v, t, p)
     ahead, own = leap(variant, u, v, t, left, p)
-    beyond = guard(ahead, own, t + left, p)
+    at_high = guard(ahead, own, t + left, p)
     side = 0
     for k in range(MOST_TRIALS):
         tau = 0.5 * (low + high)
-        if k % 3 != 2 and behind > 0.0:
-            guess = high - beyond * ((high - low) / (beyond - behind))
+        if k % 3 != 2 and at_low > 0.0:
+            guess = high - at_high * ((high - low) / (at_high - at_low))
             # not within rounding of an end, which would gain nothing
             least = 0.25 * SHARP * left
             guess = low + least if guess < low + least else guess
@@ -206,14 +206,14 @@ def landing(variant: int, u: float, v: float, t: float, left: float, p: P) -> fl
         ahead, own = leap(variant, u, v, t, tau, p)
         value = guard(ahead, own, t + tau, p)
         if value < 0.0:
-            high, beyond = tau, value
+            high, at_high = tau, value
             if side == -1:
-                behind = 0.5 * behind
+                at_low = 0.5 * at_low
             side = -1
         else:
-            low, behind = tau, value
+            low, at_low = tau, value
             if side == 1:
-                beyond = 0.5 * beyond
+                at_high = 0.5 * at_high
             side = 1
     return high
 

@@ -28,17 +28,17 @@ N_KEPT = 2 * OF_A_KIND
 PEAK_COUNT, TROUGH_COUNT, PLATEAU_STEP, PLATEAU_SIDE, N_COUNTS_KEPT = range(3, 8)
 
 
-def is_turned(behind: float, middle: float, ahead: float) -> bool:
+def is_turned(before: float, middle: float, ahead: float) -> bool:
     """Tell, without a branch, whether `note_turned` has something to write: an extremum, or either end of a plateau."""
-    tops = (behind < middle) & (ahead <= middle)
-    bottoms = (behind > middle) & (ahead >= middle)
-    leaves = (behind == middle) & (ahead != middle)
+    tops = (before < middle) & (ahead <= middle)
+    bottoms = (before > middle) & (ahead >= middle)
+    leaves = (before == middle) & (ahead != middle)
     return tops | bottoms | leaves
 
 
 @called
 def note_turned(
-    kept: Any, counts: Any, case: int, n: int, dt: float, behind: float, middle: float, ahead: float
+    kept: Any, counts: Any, case: int, n: int, dt: float, before: float, middle: float, ahead: float
 ) -> None:
     """Write the extremum at step `n`, if there is one, or note that a plateau begins there.
 
@@ -48,10 +48,10 @@ def note_turned(
         Shape (`N_KEPT`, case, extremum): the first extrema of each kind, as many as fit.
     counts
         Shape (case, `N_COUNTS_KEPT`): the numbers of all extrema, and the current plateau.
-    behind, middle, ahead
+    before, middle, ahead
         Positions at steps n - 1, n and n + 1.
     """
-    if behind == middle:
+    if before == middle:
         side = counts[case, PLATEAU_SIDE]
         first = counts[case, PLATEAU_STEP]
         counts[case, PLATEAU_SIDE] = 0
@@ -62,9 +62,9 @@ def note_turned(
             keep(kept, counts, case, kind, 0.5 * (first + n) * dt, height, first * dt, middle)
     elif ahead == middle:
         counts[case, PLATEAU_STEP] = n
-        counts[case, PLATEAU_SIDE] = 1 if behind < middle else -1
+        counts[case, PLATEAU_SIDE] = 1 if before < middle else -1
     else:
-        left, right = middle - behind, middle - ahead
+        left, right = middle - before, middle - ahead
         share = 0.5 * ((left - right) / (left + right))
         time, height = (n + share) * dt, middle + 0.25 * (left - right) * share
         keep(kept, counts, case, 0 if left > 0.0 else 1, time, height, n * dt, middle)

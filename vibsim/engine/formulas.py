@@ -278,7 +278,7 @@ def _of_events(
         case Crossings(rows):
             guards = [tree(model, row.guard) for row in rows]
             rates = [rate(model, guard) for guard in guards]
-            found = {
+            functions = {
                 name: {f"{result}_{k}": put(formula) for k, formula in enumerate(formulas)}
                 for name, result, formulas in (
                     ("guards", "_guard", guards),
@@ -287,14 +287,14 @@ def _of_events(
                 )
             }
             for name, place in places(model, model.events).items():
-                found[name] = {"_place": put(place)}
+                functions[name] = {"_place": put(place)}
             states = [state.name for state in model.states]
             for k, row in enumerate(rows):
                 new = dict(row.then)
-                found[f"crossed_{k}"] = {
+                functions[f"crossed_{k}"] = {
                     f"_new_{name}": put(new.get(name, name)) for name in states
                 }
-            return found
+            return functions
 
 
 def _with_functions(module: Module, suffix: str, is_rare: bool, node: Expression) -> Expression:

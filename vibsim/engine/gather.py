@@ -5,9 +5,8 @@ change at every step form a tuple of floats, which stays in registers; values th
 member's row of `stats` and `counts`.
 
 A peak of the position is where the velocity falls through zero, located by linear interpolation of the velocity: the
-third derivative of the position vanishes there with the velocity, so the interpolation error of the time is O(dt^3)
-while the scheme's is O(dt^2). The time on the grid is that of the larger neighbour, as in the vibration text (B),
-section 3.5.
+third derivative of the position vanishes there with the velocity, so the time has an interpolation error of O(dt^3)
+beside the O(dt^2) of the scheme. The time on the grid is that of the larger neighbour, as in text (B), section 3.5.
 """
 
 from __future__ import annotations

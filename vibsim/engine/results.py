@@ -104,9 +104,8 @@ class Trajectories:
     gathered: Gathered | None
     """None if nothing was gathered."""
     series: Series | None = None
-    """None if not requested."""
+    """None if not requested, as are extrema."""
     extrema: Extrema | None = None
-    """None if not requested."""
     events: EventTimes | None = None
     """None for a smooth model, or if nothing was gathered."""
     energies: Floats | None = None

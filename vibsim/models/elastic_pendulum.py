@@ -130,8 +130,8 @@ def elastic_pendulum(
 ) -> Model:
     """Return the elastic pendulum, with drag if `terms` contains ``gamma``, off the vertical if it has ``Theta``."""
     is_dragged, formulas = "gamma" in terms, dict(texts)
-    own = (BETA, DRAG) if formulas else (BETA, *START, DRAG)
-    parameters = (*own, *declared_parameters(declared))
+    fixed = (BETA, DRAG) if formulas else (BETA, *START, DRAG)
+    parameters = (*fixed, *declared_parameters(declared))
     known = tuple(row.name for row in parameters)
     states = tuple(state.name for state in STATES)
     drags = [f" - (gamma/beta)*{SPEED}*{name}" if is_dragged else "" for name in ("vx", "vy")]
@@ -141,8 +141,8 @@ def elastic_pendulum(
     ]
     more: dict[str, Any] = {"start": start}
     if formulas:
-        given = (formulas.get(field.name, field.default) for field in FORMULAS)
-        positions = tuple(parse(text, ("t", *known)) for text in given)
+        motions = (formulas.get(field.name, field.default) for field in FORMULAS)
+        positions = tuple(parse(text, ("t", *known)) for text in motions)
         followed = Manufactured(positions, tuple(formulas.values()), states, parameters)
         pushes = followed.forces(forces)
         forces = [force + push for force, push in zip(forces, pushes, strict=True)]
@@ -182,8 +182,8 @@ def _equation(is_dragged: bool, formulas: Mapping[str, str]) -> str:
     drags = [f" - (gamma/beta) |v| {name}'" if is_dragged else "" for name in ("x", "y")]
     pushes = (" + F_x(t)", " + F_y(t)") if formulas else ("", "")
     equations = EQUATION.format(*(drag + push for drag, push in zip(drags, pushes, strict=True)))
-    given = (f"{name.removeprefix('exact_')} = {text}" for name, text in formulas.items())
-    return f"{equations}, with F such that {', '.join(given)}" if formulas else equations
+    motions = (f"{name.removeprefix('exact_')} = {text}" for name, text in formulas.items())
+    return f"{equations}, with F such that {', '.join(motions)}" if formulas else equations
 
 
 ELASTIC_PENDULUM = replace(written({}, ()), equation=_equation(is_dragged=True, formulas={}))

@@ -77,11 +77,11 @@ class Written:
     @cached_property
     def parameters(self) -> tuple[Parameter, ...]:
         """Every parameter, in the order of the engine."""
-        own = [MASS]
+        rows = [MASS]
         if kind := self.term:
             words, least = f"coefficient of the {kind} damping", 0.0 if kind == COULOMB else None
-            own.append(Parameter("b", 0.0, UNITS[kind], words, least, path=f"damping.{kind}"))
-        return (*own, *declared_parameters(self.declared))
+            rows.append(Parameter("b", 0.0, UNITS[kind], words, least, path=f"damping.{kind}"))
+        return (*rows, *declared_parameters(self.declared))
 
     def read(self, name: str) -> Expression:
         """Return the formula of a field, or its default if the user wrote none."""
@@ -142,35 +142,35 @@ def oscillator(
     formulas: tuple[tuple[str, str], ...], declared: tuple[str, ...], terms: frozenset[str]
 ) -> Model:
     """Return the model with given formulas, and with a mass in the equation if `terms` contains ``m``."""
-    own = Written(dict(formulas), declared, MASS.name in terms)
+    user = Written(dict(formulas), declared, MASS.name in terms)
     forces = Forces(
-        spring=own.spring,
-        damping=own.damping,
-        force=own.force,
-        mass=own.mass,
-        potential=own.read("potential") if "potential" in own.formulas else None,
+        spring=user.spring,
+        damping=user.damping,
+        force=user.force,
+        mass=user.mass,
+        potential=user.read("potential") if "potential" in user.formulas else None,
     )
     more: dict[str, Any] = {}
-    if own.term == COULOMB:
-        more = _friction(own, forces)
-    elif own.crossings is not None:
+    if user.term == COULOMB:
+        more = _friction(user, forces)
+    elif user.crossings is not None:
         more = {
             "linear": False,
             "conservative": False,
             "exact": None,
             "exact_period": None,
             "scales": lambda forces: None,
-            "events": own.crossings,
+            "events": user.crossings,
         }
-    elif own.manufactured is not None:
-        more = {"exact": own.manufactured.exact, "start": own.manufactured.start}
+    elif user.manufactured is not None:
+        more = {"exact": user.manufactured.exact, "start": user.manufactured.start}
     return mechanical(
         forces,
-        own.parameters,
+        user.parameters,
         kind="oscillator",
         title="Oscillator",
         source="vibration text, section 8, equation (59)",
-        equation=_equation(own),
+        equation=_equation(user),
         formulas=FORMULAS,
         takes_events=True,
         written=written,
@@ -180,14 +180,14 @@ def oscillator(
     )
 
 
-def _friction(own: Written, forces: Forces) -> dict[str, Any]:
+def _friction(user: Written, forces: Forces) -> dict[str, Any]:
     """Return the fields of the model that differ with Coulomb friction.
 
     The energy that friction takes is summed along the path (`vibsim.engine.events`), so there is no power of damping.
     """
 
     def held(t: Floats, initial: Numbers, parameters: Numbers) -> dict[str, Floats]:
-        numbers = {row.name: parameters[row.key] for row in own.parameters}
+        numbers = {row.name: parameters[row.key] for row in user.parameters}
         stiffness = values(forces.stiffness, numbers)
         w = np.sqrt(stiffness / numbers["m"])
         u, v = friction_motion(t, w, numbers["b"] / stiffness, initial["u"], initial["v"])
@@ -205,17 +205,17 @@ def _friction(own: Written, forces: Forces) -> dict[str, Any]:
     }
 
 
-def _equation(own: Written) -> str:
+def _equation(user: Written) -> str:
     """Return the equation of motion as a user would write it."""
-    terms = ["m u''" if own.with_mass else "u''"]
-    if not is_zero(own.damping):
-        terms.append(_term(put(own.damping, "v", Name("u'"))))
-    terms.append(_term(own.spring))
+    terms = ["m u''" if user.with_mass else "u''"]
+    if not is_zero(user.damping):
+        terms.append(_term(put(user.damping, "v", Name("u'"))))
+    terms.append(_term(user.spring))
     sides = " + ".join(terms).replace("+ -", "- ")
-    if own.manufactured is None:
-        events = described(own.crossings, own.formulas) if own.crossings else ""
-        return f"{sides} = {to_formula(own.force)}{events}"
-    return f"{sides} = F(t), with F such that u = {to_formula(own.read('exact'))}"
+    if user.manufactured is None:
+        events = described(user.crossings, user.formulas) if user.crossings else ""
+        return f"{sides} = {to_formula(user.force)}{events}"
+    return f"{sides} = F(t), with F such that u = {to_formula(user.read('exact'))}"
 
 
 def _term(node: Expression) -> str:

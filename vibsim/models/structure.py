@@ -103,9 +103,9 @@ class Structure:
 
     def __post_init__(self) -> None:
         matrices = (self.mass, self.stiffness, self.damping)
-        own = [row.digest if row else "" for row in matrices]
+        digests = [row.digest if row else "" for row in matrices]
         numbers, tables = zip(*self.histories, strict=True) if self.histories else ((), ())
-        digest = hashlib.sha256(repr((own, self.ratios, self.names, numbers)).encode())
+        digest = hashlib.sha256(repr((digests, self.ratios, self.names, numbers)).encode())
         for array in (self.observed, *(self.start or ()), self.shapes, *tables):
             digest.update(repr(array.shape).encode())
             digest.update(np.ascontiguousarray(array, dtype="<f8").tobytes())

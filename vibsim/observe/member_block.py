@@ -52,9 +52,7 @@ class MemberBlock:
     group: Members  # the values of the members
     stability_limit: Floats  # largest stable w dt, infinite for none, shape (s, 1 or c)
     adaptive: Flags  # whether a scheme chooses its own steps and so has no levels, shape (s,)
-    left_to_the_mesh: (
-        Floats  # order of errors if events or corners are left to the mesh, else NaN, shape (s, c)
-    )
+    left_to_the_mesh: Floats  # order of errors that the mesh limits, else NaN, shape (s, c)
     corners: Corners  # the first corner of the force within a step
     missed: Missed  # pulses of the force between the points of every level
     growth: Floats  # largest position over the largest exact one, shape (s, c, l); NaN if not known

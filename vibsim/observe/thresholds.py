@@ -48,9 +48,7 @@ LEAST_SAMPLES = 32  # samples on [0, T], four of them on the shortest window [de
 # Samples per period that resolve its extrema to 2 %; with fewer the range is not used. [derived]
 LEAST_PER_PERIOD = 16.0
 STILL = 0.01  # relative rise of M between windows that counts as no rise [checked]
-STILL_CREEPS = (
-    0.2  # largest relative rise of a maximum that is only sampled better with time [checked]
-)
+STILL_CREEPS = 0.2  # largest relative rise of a maximum that is only sampled better [checked]
 CREEP = -0.5  # largest k of such a rise [checked]
 SMALL_RISE = 0.1  # relative rise of M from which on it need not continue until the end [chosen]
 STILL_WIDENS = 0.5  # least rise in the last T/8 relative to that of a steady drift [checked]
@@ -90,8 +88,6 @@ SHORTEST_RUN = 0.6  # shortest run, in periods [checked]
 ROUNDS = ((0.02, 4), (0.5, 6), (math.inf, 10))
 # Largest correction in the last iteration, in radians and relative to the amplitude. [checked]
 LAST_ROUND_MOVES = 1e-6
-LARGE_SHIFT = ROUNDS[1][
-    0
-]  # shift in radians above which the initial guess comes from the phase plane [checked]
+LARGE_SHIFT = ROUNDS[1][0]  # radians: larger shifts are guessed from the phase plane [checked]
 # Fraction of a cell by which a shifted point may lie beyond the ends of the template. [convention]
 BEYOND_THE_ENDS = 0.5

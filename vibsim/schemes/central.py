@@ -80,8 +80,8 @@ def start_three_term(
 
 def backward_three_term(state: tuple[float, float], dt: float) -> float:
     """Return ``(u^n - u^(n-1))/dt``: B, section 2.1."""
-    u, behind = state
-    return (u - behind) / dt
+    u, previous = state
+    return (u - previous) / dt
 
 
 def start_increment(
@@ -165,10 +165,10 @@ def step_increment(state, t, dt, p, {handed}):
 _THREE_TERM = '''
 def step_three_term(state, t, dt, p, {handed}):
     """Return u^(n+1), u^n and the velocity at n: A (9)."""
-    u, behind = state
+    u, previous = state
 {increment}    push = (dt * dt) * acceleration(u, {velocity}, t, p)
-{lines}    ahead = 2.0 * u - behind + {kick}
-    return (ahead, u), (ahead - behind) * (0.5 / dt)
+{lines}    ahead = 2.0 * u - previous + {kick}
+    return (ahead, u), (ahead - previous) * (0.5 / dt)
 '''
 
 
@@ -220,7 +220,7 @@ def _step(arithmetic: str, treatment: Treatment) -> Callable[..., Any]:
         velocity=treatment.velocity,
         kick=treatment.kick,
         lines=lines,
-        increment="" if treatment is UNDAMPED else "    d = u - behind\n",
+        increment="" if treatment is UNDAMPED else "    d = u - previous\n",
     )
     functions = {"sqrt": ELEMENTARY["sqrt"].full} if "sqrt" in lines else {}
     return written(text.lstrip("\n"), {"ZERO": "0"}, functions)

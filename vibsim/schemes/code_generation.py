@@ -55,10 +55,7 @@ def _written(
 def weighted(
     prefix: str, weights: Sequence[str], names: Sequence[str], formulas: dict[str, str]
 ) -> str:
-    """Return the text of a weighted sum of names, and add the weights to `formulas` as ``prefix_1``, ...
-
-    Terms of weight 0 are omitted; weight 1 is not written.
-    """
+    """Return the text of a weighted sum of names; weights other than 0 and 1 join `formulas` as ``prefix_1``, ..."""
     terms = []
     for j, (weight, name) in enumerate(zip(weights, names, strict=True), 1):
         if weight not in ("0", "1"):

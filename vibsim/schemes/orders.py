@@ -77,10 +77,10 @@ class Orders:
     @property
     def highest(self) -> float:
         """The highest order of position, velocity or energy over all cases above."""
-        own = (self.position, self.velocity, self.energy, self.energy_linear)
+        base = (self.position, self.velocity, self.energy, self.energy_linear)
         others = (self.velocity_dependent, self.from_rest, self.from_balance)
         cases = (case.highest for case in others if case is not None)
-        return max(*own, self.position_linear or 0.0, *cases)
+        return max(*base, self.position_linear or 0.0, *cases)
 
     def of(self, quantity: str, model: Model, beginning: Beginning = "any") -> float:
         """Return the order of a state or an energy (`vibsim.models.ENERGIES`), with or without the suffix ``_d2t``."""
@@ -101,8 +101,8 @@ def _of_quantities(orders: Orders, model: Model) -> tuple[Mapping[str, float], f
     linear = orders.position if orders.position_linear is None else orders.position_linear
     position = linear if is_simple else orders.position
     energy = orders.energy_linear if is_sum else orders.energy
-    given = orders.energy_d2t_linear if is_sum else orders.energy_d2t
-    energy_d2t = min(energy, 2.0) if given is None else given
+    stated = orders.energy_d2t_linear if is_sum else orders.energy_d2t
+    energy_d2t = min(energy, 2.0) if stated is None else stated
     velocity_d2t = min(position, 2.0) if orders.velocity_d2t is None else orders.velocity_d2t
     of_both = min(position, orders.velocity)
     moving = set(model.velocities)

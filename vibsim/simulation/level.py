@@ -99,7 +99,7 @@ def simulate_record(
     kept = extrema_kept(experiment.trajectories)
     of_states = {state.name for state in model.states}.union(ENERGIES)
     of_states |= {output.name for output in model.outputs}
-    found = solve(
+    solution = solve(
         experiment,
         group,
         steps,
@@ -109,9 +109,9 @@ def simulate_record(
         n_extrema=0 if is_lean and not asks_for_peaks(experiment) else kept,
         n_events=event_times(experiment),
     )
-    run = found.gathered
+    run = solution.gathered
     assert run is not None
-    rows = [*_ranges(model, run), *_peaks(model, run), *_ends(found, group.end, steps)]
+    rows = [*_ranges(model, run), *_peaks(model, run), *_ends(solution, group.end, steps)]
     if experiment.own_velocity or not is_lean:
         words = "largest absolute deviation of the energy with [D_2t u] as velocity, over every inner step"
         name = "energy_deviation_d2t_max_abs"
@@ -119,17 +119,17 @@ def simulate_record(
     outcomes = _table(MEMBER, rows)
     status = outcomes["status"]
     outcomes["status"] = replace(status, attrs={**status.attrs, **flags(STATUS)})
-    variables = _series(model, group, found, steps, every, wanted)
+    variables = _series(model, group, solution, steps, every, wanted)
     if not is_lean:
         number = np.arange(0, steps + 1, every, dtype=np.int64)
         variables |= _exact(experiment, group, number, steps)
     variables |= outcomes
-    if found.extrema:
-        variables |= _extrema(model, found.extrema)
-    if found.events:
-        variables |= _table(MEMBER, _events(found.events))
+    if solution.extrema:
+        variables |= _extrema(model, solution.extrema)
+    if solution.events:
+        variables |= _table(MEMBER, _events(solution.events))
         if event_times(experiment):
-            variables |= _event_times(found.events)
+            variables |= _event_times(solution.events)
     if any(scheme.adaptive for scheme in experiment.schemes):
         variables |= _table(MEMBER, _own_steps(run))
     variables |= _table(("case",), _constants(model, group, steps))
@@ -143,8 +143,8 @@ def simulate_record(
     names = [scheme.name for scheme in experiment.schemes]
     coords = coordinates(model, names, group, steps, every, same_end=not experiment.end_varies)
     coords |= _table((), [("level", np.array(level, dtype=np.int16), "level", "1")])
-    if found.extrema:
-        places = np.arange(found.extrema.peak.shape[-1], dtype=np.int32)
+    if solution.extrema:
+        places = np.arange(solution.extrema.peak.shape[-1], dtype=np.int32)
         words = "number of the peak or trough, from 0"
         coords |= _table(("extremum",), [("extremum", places, words, "1")])
     return in_scales(Record(coords, variables, attrs), experiment)
@@ -198,24 +198,24 @@ def _table(dims: tuple[str, ...], rows: Iterable[Row]) -> dict[str, Variable]:
 def _series(
     model: Model,
     group: Members,
-    found: Trajectories,
+    solution: Trajectories,
     steps: int,
     every: int,
     wanted: Collection[str],
 ) -> dict[str, Variable]:
     unit = model.energy_unit
     rows: list[Row] = [
-        (state.name, found.states[:, k], state.long_name, state.unit)
+        (state.name, solution.states[:, k], state.long_name, state.unit)
         for k, state in enumerate(model.states)
     ]
-    if found.series is not None:
+    if solution.series is not None:
         velocities = model.states[model.coordinates :]
         for k, (name, velocity) in enumerate(zip(centred(model), velocities, strict=False)):
             words = f"{velocity.long_name} by [D_2t u], the centred difference of the position"
-            rows.append((name, found.series.velocities_d2t[:, :, k], words, velocity.unit))
+            rows.append((name, solution.series.velocities_d2t[:, :, k], words, velocity.unit))
         for name, values in (
-            ("energy_deviation", found.series.deviation_running),
-            ("energy_deviation_d2t", found.series.deviation_d2t_running),
+            ("energy_deviation", solution.series.deviation_running),
+            ("energy_deviation_d2t", solution.series.deviation_d2t_running),
         ):
             words = f"largest absolute {_ENERGY_WORDS[name]}, over every step so far"
             rows.append((name + RUNNING, values, words, unit))
@@ -226,7 +226,7 @@ def _series(
     columns = [(name, words, unit) for name, words in words_of.items()]
     columns += [(row.name, row.long_name, row.unit) for row in model.outputs]
     columns = [row for row in columns if row[0] in wanted]
-    values_of = derived(model, group, found, steps, every, [name for name, _, _ in columns])
+    values_of = derived(model, group, solution, steps, every, [name for name, _, _ in columns])
     rows += [(name, values_of[name], words, own_unit) for name, words, own_unit in columns]
     start = values_of["energy_initial"]
     return {
@@ -319,15 +319,15 @@ def _peaks(model: Model, run: Gathered) -> Iterable[Row]:
     yield "period_count", run.period_count, "number of periods in the mean", "1"
 
 
-def _ends(found: Trajectories, end: Floats, steps: int) -> Iterable[Row]:
-    failed = found.last_step < steps
+def _ends(solution: Trajectories, end: Floats, steps: int) -> Iterable[Row]:
+    failed = solution.last_step < steps
     yield "status", failed.astype(np.int8), "what became of the member", "1"
-    yield "last_step", found.last_step, "last step with finite values", "1"
-    time = np.where(failed, (found.last_step + 1) * end / steps, np.nan)
+    yield "last_step", solution.last_step, "last step with finite values", "1"
+    time = np.where(failed, (solution.last_step + 1) * end / steps, np.nan)
     yield "failure_time", time, "time of the first value that is not finite or too large", "s"
 
 
-def _extrema(model: Model, found: Extrema) -> dict[str, Variable]:
+def _extrema(model: Model, extrema: Extrema) -> dict[str, Variable]:
     """Return the local extrema of the position, and their numbers (vibration text, section 3.5)."""
     unit, parabola = model.states[0].unit, "on the parabola through three points"
     parabola += " or of the event" if model.events is not None else ""
@@ -340,26 +340,26 @@ def _extrema(model: Model, found: Extrema) -> dict[str, Variable]:
             (f"{kind}_grid", f"height of the {kind}s at grid points", unit),
         )
         table |= _table(
-            (*MEMBER, "extremum"), ((row[0], getattr(found, row[0]), *row[1:]) for row in rows)
+            (*MEMBER, "extremum"), ((row[0], getattr(extrema, row[0]), *row[1:]) for row in rows)
         )
         name, words = f"{kind}_count", f"number of {kind}s, including those that are not stored"
-        table |= _table(MEMBER, [(name, getattr(found, name), words, "1")])
+        table |= _table(MEMBER, [(name, getattr(extrema, name), words, "1")])
     return table
 
 
-def _events(found: EventTimes) -> Iterable[Row]:
+def _events(events: EventTimes) -> Iterable[Row]:
     words = "number of events, where the motion is not smooth"
-    yield "event_count", found.event_count, words, "1"
-    yield "first_event_time", found.first_event_time, "time of the first event", "s"
-    yield "last_event_time", found.last_event_time, "time of the last event", "s"
+    yield "event_count", events.event_count, words, "1"
+    yield "first_event_time", events.first_event_time, "time of the first event", "s"
+    yield "last_event_time", events.last_event_time, "time of the last event", "s"
     words = "time from which the member was at rest to the end, or of its stop"
-    yield "rest_time", found.rest_time, words, "s"
+    yield "rest_time", events.rest_time, words, "s"
 
 
-def _event_times(found: EventTimes) -> dict[str, Variable]:
+def _event_times(events: EventTimes) -> dict[str, Variable]:
     """Return the times of single events."""
     words = "times of the first events, NaN behind the last"
-    return _table((*MEMBER, "event"), [("event_time", found.event_time, words, "s")])
+    return _table((*MEMBER, "event"), [("event_time", events.event_time, words, "s")])
 
 
 def _own_steps(run: Gathered) -> Iterable[Row]:

@@ -5,8 +5,7 @@ damping. Every step keeps the observed displacements and velocities and the ener
 The engine's loop then gathers extrema, norms and periods over the table, with the energies as one more coordinate
 (`vibsim.simulation.adaptive.gather_over`).
 
-The last bits depend on the versions of SciPy and its linear algebra libraries and on the machine, but not on other
-members.
+The last bits depend on the versions of SciPy and its libraries and on the machine, but not on other members.
 """
 
 from __future__ import annotations
@@ -23,6 +22,7 @@ from vibsim.engine import Trajectories
 from vibsim.engine.gather import OVERFLOW
 from vibsim.formula import Name
 from vibsim.models import Model, State
+from vibsim.models.base import Numbers
 from vibsim.models.shared.matrices import factored
 from vibsim.models.structure import Loaded
 from vibsim.schemes.base import Options, Scheme, Weights
@@ -98,12 +98,7 @@ def _without_energies(run: Trajectories, count: int) -> Trajectories:
 
 
 def points(
-    loaded: Loaded,
-    weights: Weights,
-    named: dict[str, float],
-    initial: Floats,
-    dt: float,
-    steps: int,
+    loaded: Loaded, weights: Weights, named: Numbers, initial: Floats, dt: float, steps: int
 ) -> Floats:
     """Return the observed states and the energies at t = 0 and after each of `steps` steps of length `dt`.
 

@@ -69,11 +69,8 @@ def crossings(texts: Mapping[str, str], names: tuple[str, ...]) -> Crossings | N
         head = f"events.{number}."
         for word, direction in DIRECTIONS.items():
             if head + word in texts:
-                then = tuple(
-                    (key.split(".")[-1], parse(text, names))
-                    for key, text in texts.items()
-                    if key.startswith(f"{head}then.")
-                )
+                new = {key: text for key, text in texts.items() if key.startswith(f"{head}then.")}
+                then = tuple((key.split(".")[-1], parse(text, names)) for key, text in new.items())
                 rows.append(Crossing(parse(texts[head + word], names), direction, then))
     if STOP in texts:
         rows.append(Crossing(guard_of(parse(texts[STOP], names)), -1, ends=True))

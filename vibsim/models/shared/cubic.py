@@ -69,21 +69,21 @@ def motion(t: Any, alpha: Any, beta: Any, u_0: Any, v_0: Any) -> tuple[Floats, F
         np.broadcast_to(x, rows).reshape(-1) for x in orbit
     )
     t = np.broadcast_to(t, shape).reshape(-1, shape[-1])
-    found = np.full((2, *t.shape), np.nan)
-    rest, linear = kind == REST, kind == LINEAR
-    found[:, rest] = np.stack([u[rest], v[rest]])[:, :, None]
+    states = np.full((2, *t.shape), np.nan)
+    at_rest, linear = kind == REST, kind == LINEAR
+    states[:, at_rest] = np.stack([u[at_rest], v[at_rest]])[:, :, None]
     if linear.any():
         starts = (x[linear, None] for x in (alpha, np.zeros_like(alpha), u, v))
-        found[:, linear] = damped_motion(t[linear], *starts)
-    own = (size, rate, complement, u, v)
+        states[:, linear] = damped_motion(t[linear], *starts)
+    columns = (size, rate, complement, u, v)
     # for initial values beyond 1e77 the energy overflows, and the result is NaN
     with np.errstate(all="ignore"):
-        well = (*own, alpha + beta * u * u, beta)
-        for code, move, numbers in ((CN, _cn, own), (DN, _dn, well), (SN, _sn, own)):
+        well = (*columns, alpha + beta * u * u, beta)
+        for code, move, numbers in ((CN, _cn, columns), (DN, _dn, well), (SN, _sn, columns)):
             mask = kind == code
             if mask.any():
-                found[:, mask] = move(t[mask], *(x[mask] for x in numbers))
-    return found[0].reshape(shape), found[1].reshape(shape)
+                states[:, mask] = move(t[mask], *(x[mask] for x in numbers))
+    return states[0].reshape(shape), states[1].reshape(shape)
 
 
 def _added(
@@ -93,13 +93,9 @@ def _added(
     sn, cn, dn, _ = jacobi(rate[:, None] * t, complement[:, None])
     m = (1.0 - complement)[:, None]
     # 1 - m s^2 sn^2, as a sum of nonnegative terms
-    denominator = complement[:, None] + m * (c * c + (s * cn) ** 2)
+    scale = complement[:, None] + m * (c * c + (s * cn) ** 2)
     sine, cosine = s * cn * dn + sn * c * d, c * cn - s * sn * d * dn
-    return (
-        sine / denominator,
-        cosine / denominator,
-        (d * dn - m * s * sn * c * cn) / denominator,
-    )
+    return sine / scale, cosine / scale, (d * dn - m * s * sn * c * cn) / scale
 
 
 def _cn(

@@ -175,8 +175,8 @@ def pendulum_motion(t: Floats, initial: Numbers, parameters: Numbers) -> dict[st
     for move, mask in ((_libration, swings), (_rotation, ~swings)):
         if mask.any():
             chosen = slice(None) if mask.all() else mask
-            own = (x[chosen] for x in (w, k, sine, cosine, speed, complement))
-            theta[chosen], omega[chosen] = move(t[chosen], *own)
+            columns = (x[chosen] for x in (w, k, sine, cosine, speed, complement))
+            theta[chosen], omega[chosen] = move(t[chosen], *columns)
     theta += (2.0 * np.pi * turns)[:, None]
     return {"theta": theta.reshape(shape), "omega": omega.reshape(shape)}
 

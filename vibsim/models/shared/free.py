@@ -63,6 +63,6 @@ def free_oscillation(model: Model, initial: Numbers, parameters: Numbers) -> Fre
     rate = values(tree(model, model.damping.rate), named) if model.damping is not None else 0.0
     with np.errstate(all="ignore"):
         w = np.sqrt(np.where(stiffness > 0.0, stiffness, np.nan))
-        rest = values(at_rest, named) / stiffness
-    numbers = w, rate / w, initial[model.position] - rest, initial[model.velocity] / w
+        equilibrium = values(at_rest, named) / stiffness
+    numbers = w, rate / w, initial[model.position] - equilibrium, initial[model.velocity] / w
     return FreeOscillation(*np.broadcast_arrays(*(np.atleast_1d(x) for x in numbers)))

@@ -84,14 +84,14 @@ def damped_motion(
         rise = np.where(small, decay * t, -0.5 * slow * loss / q)
         # C + half S and C - half S: above critical damping one of the sums cancels
         is_near, width = 2.0 * angle < 1.0, 2.0 * q
-        rest = np.where(is_near, slow * (1.0 - least * loss / width), most * slow - least * fast)
-        kick = np.where(is_near, slow * (1.0 + most * loss / width), most * fast - least * slow)
-        rest, kick = (np.where(is_near, part, part / width) for part in (rest, kick))
+        plus = np.where(is_near, slow * (1.0 - least * loss / width), most * slow - least * fast)
+        minus = np.where(is_near, slow * (1.0 + most * loss / width), most * fast - least * slow)
+        plus, minus = (np.where(is_near, part, part / width) for part in (plus, minus))
         is_wave = (square >= 0.0) | small
         odd = np.where(square >= 0.0, wave, rise)
-        rest = np.where(is_wave, even + half * odd, rest)
-        kick = np.where(is_wave, even - half * odd, kick)
-    return np.asarray(u_0 * rest + v_0 * odd), np.asarray(v_0 * kick - stiffness * u_0 * odd)
+        plus = np.where(is_wave, even + half * odd, plus)
+        minus = np.where(is_wave, even - half * odd, minus)
+    return np.asarray(u_0 * plus + v_0 * odd), np.asarray(v_0 * minus - stiffness * u_0 * odd)
 
 
 def exponentials(node: Expression, numbers: Mapping[str, Any]) -> list[Term]:

@@ -119,7 +119,7 @@ def mechanical(
         Further fields of `Model`; they override those that follow from the forces.
     """
     velocity = Name(forces.velocity)
-    scales_of_forces = scales(forces)
+    base = scales(forces)
     is_free = not forces.is_driven and not forces.is_damped
     keys = {row.name: row.key for row in parameters}
 
@@ -153,10 +153,8 @@ def mechanical(
         "dissipation": forces.damping * velocity if forces.is_damped else None,
         "driving": forces.force * velocity if forces.is_driven else None,
         "exact": _linear_motion(forces, numbers),
-        "scales": scales_of_forces
-        and with_scaled_run(
-            replace(scales_of_forces, outputs=output_scales), forces, parameters, powers or {}
-        ),
+        "scales": base
+        and with_scaled_run(replace(base, outputs=output_scales), forces, parameters, powers or {}),
         "exact_period": exact_period if is_free and forces.is_linear else None,
     }
     if forces.known_damping is not None:
@@ -198,10 +196,10 @@ def damping_of(
     speed, size = Name(velocity), Call("abs", (Name(velocity),))
     if factors.count(speed) != 1 or factors.count(size) != 1:
         return None
-    rest = [factor for factor in factors if factor not in (speed, size)]
-    if any(velocity in factor.names for factor in rest):
+    others = [factor for factor in factors if factor not in (speed, size)]
+    if any(velocity in factor.names for factor in others):
         return None
-    return "quadratic", math.prod(rest, start=ONE)
+    return "quadratic", math.prod(others, start=ONE)
 
 
 def _factors(node: Expression) -> list[Expression]:

@@ -60,23 +60,23 @@ def scales(model: Model, parameters: Numbers, initial: Numbers) -> tuple[Charact
     parameters, initial
         Numbers, or arrays that broadcast: by the keys of the parameters and the names of the states.
     """
-    own = model.scales
-    if own is None:
+    spec = model.scales
+    if spec is None:
         return ()
-    numbers = _numbers(model, own, parameters, initial)
+    numbers = _numbers(model, spec, parameters, initial)
     x, v = model.states
     with np.errstate(all="ignore"):
         speed = numbers[X_C.name] / numbers[T_C.name]
-    formulas = dict(own.outputs)
-    rows = [("energy", "energy", own.energy, model.energy_unit)]
+    formulas = dict(spec.outputs)
+    rows = [("energy", "energy", spec.energy, model.energy_unit)]
     rows += [
         (row.name, row.long_name, formulas[row.name], row.unit)
         for row in model.outputs
         if row.name in formulas
     ]
     return (
-        Characteristic("t", "time", _text(model, own.time), "s", numbers[T_C.name]),
-        Characteristic(x.name, x.long_name, _text(model, own.position), x.unit, numbers[X_C.name]),
+        Characteristic("t", "time", _text(model, spec.time), "s", numbers[T_C.name]),
+        Characteristic(x.name, x.long_name, _text(model, spec.position), x.unit, numbers[X_C.name]),
         Characteristic(v.name, v.long_name, f"{x.name}_c/t_c", v.unit, speed),
         *(
             Characteristic(
@@ -112,18 +112,18 @@ def scaled_parameters(model: Model, parameters: Numbers, initial: Numbers) -> di
 
     Raises ValueError if the model has no scaled equation.
     """
-    own = model.scales
-    if own is None or own.parameters is None:
+    spec = model.scales
+    if spec is None or spec.parameters is None:
         raise ValueError(f"the model {model.kind} has no scaled equation")
-    numbers = _numbers(model, own, parameters, initial)
-    return {key: _value(model, formula, numbers) for key, formula in own.parameters}
+    numbers = _numbers(model, spec, parameters, initial)
+    return {key: _value(model, formula, numbers) for key, formula in spec.parameters}
 
 
-def _numbers(model: Model, own: Scales, parameters: Numbers, initial: Numbers) -> dict[str, Any]:
+def _numbers(model: Model, spec: Scales, parameters: Numbers, initial: Numbers) -> dict[str, Any]:
     """Return values by name for the formulas: parameters, initial values, scales of time and position."""
     numbers = {row.name: parameters[row.key] for row in model.parameters} | dict(initial)
-    numbers[T_C.name] = _value(model, own.time, numbers)
-    size = _value(model, own.position, numbers)
+    numbers[T_C.name] = _value(model, spec.time, numbers)
+    size = _value(model, spec.position, numbers)
     numbers[X_C.name] = np.where(size == 0.0, 1.0, size)
     return numbers
 

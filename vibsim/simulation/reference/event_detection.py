@@ -154,10 +154,7 @@ def _outside(q: Floats, low: Floats, high: Floats) -> Floats:
 
 
 def overshoot(exits: Exits, aim: Integers, goal: Floats) -> Floats:
-    """Return the distance from where the switch `aim` has the value `goal` to the end of the step, over its length.
-
-    NaN if `aim` is -1.
-    """
+    """Return the fraction of a step from where the switch `aim` has the value `goal` to its end; NaN if `aim` is -1."""
     q = exits.quantity[np.maximum(aim, 0), :, np.arange(len(aim))].T
     with np.errstate(all="ignore"):
         slope = (q[LAST + 2] - q[LAST + 1]) / (2.0 * NUDGE)

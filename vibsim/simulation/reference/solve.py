@@ -175,9 +175,9 @@ def computed(model: Model, numbers: tuple[bytes, ...]) -> Chosen:
     """Compute the solutions; see `choose`."""
     states = len(model.states)
     columns = [np.frombuffer(column) for column in numbers]
-    start, end, rest = np.array(columns[:states]), columns[states], columns[states + 1 :]
+    start, end, parameters = np.array(columns[:states]), columns[states], columns[states + 1 :]
     names = [row.name for row in model.parameters]
-    held = sides(model, dict(zip(names, rest, strict=True)))
+    held = sides(model, dict(zip(names, parameters, strict=True)))
     with np.errstate(all="ignore"):
         return _accepted(_Refined(held, start, end))
 
