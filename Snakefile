@@ -1,4 +1,4 @@
-# From experiment files to results/index.html. The rules name files and call vibsim; nothing is decided here.
+# The workflow from experiment files to results/index.html. The rules only name files and call vibsim.
 import sys
 from pathlib import Path
 from shlex import quote
@@ -7,18 +7,18 @@ from vibsim.cli.run.lock import hold
 from vibsim.cli.workflow import names_of
 from vibsim.cli.supervise import children_end_with_this
 
-# What allows programs of users to run is read from the command line alone, never from a file.
+# Permission to run users' programs comes from the command line alone, never from a file.
 names = names_of(config, workflow.config_settings.config)
 
 
-# Jobs run the vibsim that stands beside this Python, whatever else is installed.
-# They take the place of their shell (`exec`), which makes them children of Snakemake, and end with it.
+# Jobs run the vibsim in the environment of this Python, whatever else is on the PATH.
+# They replace their shell (`exec`), so that they are children of Snakemake and end with it.
 children_end_with_this()
 shell.prefix(f"export PATH={quote(str(Path(sys.executable).parent))}:$PATH; ")
 
 
-# Every path below is relative to the results folder, and so are Snakemake's own records. Jobs work elsewhere: what
-# libraries read from the folder that they are in must not come with results.
+# Every path below is relative to the results folder, which also has Snakemake's own records. Jobs change to another
+# working directory, so that libraries load no files that came with the results.
 workdir: str(names.results)
 
 
@@ -35,7 +35,7 @@ rule all:
         "index.html",
         "summary.csv",
         names.files,
-        # Of what a job writes, Snakemake misses only what is asked for.
+        # Listed here, since Snakemake notices only missing targets.
         expand("{name}/{part}", name=list(names.plans), part=["figures", "tables"]),
 
 

@@ -1,8 +1,8 @@
 """The catalogue of the two source texts: ``python workflow/catalogue.py [--check]``.
 
-It is the page ``docs/catalogue.md``, and for the index of results the experiments of each section. Both are written
+It consists of the page ``docs/catalogue.md`` and, for the index of results, the experiments of each section. Both come
 from ``docs/catalogue.yaml``, which lists what the texts describe and where they are wrong, and from the claims of the
-shipped experiments. They hold no number that a run would have to measure.
+shipped experiments. They contain no measured numbers.
 """
 
 from __future__ import annotations
@@ -24,14 +24,14 @@ from vibsim.report.text import assertions
 ROOT = Path(__file__).resolve().parents[1]
 PAGE = ROOT / "docs" / "catalogue.md"
 SECTIONS = ROOT / "vibsim" / "report" / "templates" / "sections.json"
-"""What the index of results knows of the texts (`vibsim.report.page.source_sections`)."""
+"""The sections of the texts, for the index of results (`vibsim.report.page.source_sections`)."""
 TEXTS = ("pendulum lecture", "vibration text")
 PROVIDED = "PROVIDED"
 EXERCISES = "Exercises"
 MOST_CHECKS = 1
-"""So many checks of an experiment are written out."""
-WAYS = {"things": ("shown_by", "see", "open"), "errata": ("shown_by", "not_run")}
-"""What a row of each list has at least one of."""
+"""Number of checks of an experiment that are listed."""
+REQUIRED = {"things": ("shown_by", "see", "open"), "errata": ("shown_by", "not_run")}
+"""Keys of which an entry of each list must have at least one."""
 HEAD = """# The two source texts, section by section
 
 What the pendulum lecture and the vibration text describe, and which experiment shows it. To find an equation, a
@@ -63,9 +63,9 @@ class Row:
     shown: str
     badge: str
     told: str
-    """What is true, what is missing, or what decides."""
+    """The true statement, what is missing, or what decides."""
     see: str = ""
-    """The command, or the page of the documentation, that it leads to."""
+    """A command, or a page of the documentation."""
 
 
 def experiments() -> dict[str, Experiment]:
@@ -75,42 +75,42 @@ def experiments() -> dict[str, Experiment]:
 
 
 def data() -> dict[str, Any]:
-    """Return what ``docs/catalogue.yaml`` holds."""
-    found: dict[str, Any] = yaml.safe_load((ROOT / "docs/catalogue.yaml").read_text("utf-8"))
-    return found
+    """Return the content of ``docs/catalogue.yaml``."""
+    content: dict[str, Any] = yaml.safe_load((ROOT / "docs/catalogue.yaml").read_text("utf-8"))
+    return content
 
 
 def faults(listed: dict[str, Any], known: dict[str, Experiment]) -> list[str]:
-    """Return what is wrong with the lists: names that do not exist, and statements that their checks contradict."""
+    """Return the faults of the lists: names that do not exist, and statements that their checks contradict."""
     checks = {f"{name}#{c.id}": c for name, experiment in known.items() for c in experiment.checks}
     refuted = {name: c for name, c in checks.items() if c.kind == "claim" and not c.holds}
-    found, named = [], set()
-    every = [(kind, *row) for kind in WAYS for row in listed[kind].items()]
-    for kind, number, content in every:
+    messages, named = [], set()
+    entries = [(kind, *row) for kind in REQUIRED for row in listed[kind].items()]
+    for kind, number, content in entries:
         where = f"{kind}, {number}"
         shown = content.get("shown_by", [])
         unknown = [name for name in shown if name not in (checks if "#" in name else known)]
-        found += [f"{where}: {name} does not exist" for name in unknown]
-        if not set(WAYS[kind]) & set(content):
-            found.append(f"{where}: has none of {', '.join(WAYS[kind])}")
+        messages += [f"{where}: {name} does not exist" for name in unknown]
+        if not set(REQUIRED[kind]) & set(content):
+            messages.append(f"{where}: has none of {', '.join(REQUIRED[kind])}")
         if kind == "errata":
             named.update(shown)
             if ("truth" in content) == ("confirmed" in content):
-                found.append(f"{where}: has not one of truth, confirmed")
+                messages.append(f"{where}: has not one of truth, confirmed")
             if "confirmed" in content:
-                found += [f"{where}: {name} refutes it" for name in shown if name in refuted]
+                messages += [f"{where}: {name} refutes it" for name in shown if name in refuted]
         else:
-            found += [f"{where}: {name} refutes it" for name in shown if name in refuted]
+            messages += [f"{where}: {name} refutes it" for name in shown if name in refuted]
     for name, claim in refuted.items():
         if not str(claim.source).startswith(TEXTS):
-            found.append(f"{name}: a statement of no text is refuted: say what is true")
+            messages.append(f"{name}: a statement of no text is refuted: say what is true")
         elif name not in named:
-            found.append(f"{name}: a text is refuted, and no erratum names the check")
-    return found
+            messages.append(f"{name}: a text is refuted, and no erratum names the check")
+    return messages
 
 
 def rows(listed: dict[str, Any], known: dict[str, Experiment]) -> Iterator[Row]:
-    """Yield the rows of the two lists, and of every claim on the texts."""
+    """Yield the rows of the two lists, and a row for every claim on the texts."""
     for number, thing in listed["things"].items():
         measured = CONFIRMED if thing.get("shown_by") else PROVIDED
         badge = OPEN if "open" in thing else measured
@@ -144,9 +144,9 @@ def rows(listed: dict[str, Any], known: dict[str, Experiment]) -> Iterator[Row]:
             yield Row(source, "", says, _link(f"{name}#{check.id}"), badge, told)
 
 
-def unnamed(found: Sequence[Row], known: dict[str, Experiment]) -> Iterator[Row]:
-    """Yield a row for every experiment on the texts that no other one shows."""
-    shown = " ".join(row.shown for row in found)
+def unnamed(named: Sequence[Row], known: dict[str, Experiment]) -> Iterator[Row]:
+    """Yield a row for every experiment on the texts that no row in `named` shows."""
+    shown = " ".join(row.shown for row in named)
     for name, experiment in known.items():
         if str(experiment.source).startswith(TEXTS) and _link(name) not in shown:
             yield Row(
@@ -160,16 +160,16 @@ def unnamed(found: Sequence[Row], known: dict[str, Experiment]) -> Iterator[Row]
 
 
 def _decided_by(places: Sequence[str], known: dict[str, Experiment]) -> str:
-    """Return what the checks measure that decide at some places; of many checks of an experiment the first ones."""
+    """Return what the deciding checks at `places` measure; of many checks of an experiment, the first ones."""
     texts = []
     for place in places:
-        name, _, wanted = place.partition("#")
-        checks = [check for check in known[name].checks if wanted in ("", check.id)]
-        of_each = (check.that if check.kind == "claim" else check for check in checks)
-        every = [assertions.measured(check) for check in of_each]
-        shown = every[:MOST_CHECKS] if len(every) > MOST_CHECKS + 1 else every
-        rest = len(every) - len(shown)
-        texts.append("; ".join([*shown, f"and {rest} more checks"] if rest else shown))
+        name, _, id_ = place.partition("#")
+        checks = [check for check in known[name].checks if id_ in ("", check.id)]
+        deciding = (check.that if check.kind == "claim" else check for check in checks)
+        measured = [assertions.measured(check) for check in deciding]
+        shown = measured[:MOST_CHECKS] if len(measured) > MOST_CHECKS + 1 else measured
+        more = len(measured) - len(shown)
+        texts.append("; ".join([*shown, f"and {more} more checks"] if more else shown))
     return ". ".join(dict.fromkeys(texts))
 
 
@@ -187,10 +187,10 @@ def _link(name: str) -> str:
 
 
 def _heading(row: Row) -> tuple[str, list[str]]:
-    """Return the text, and the sections under which a row stands."""
-    found = citation.fields(row.source)
-    assert found is not None
-    text, section = found["text"], found["section"]
+    """Return the text and the sections to which a row belongs."""
+    cited = citation.fields(row.source)
+    assert cited is not None
+    text, section = cited["text"], cited["section"]
     if text not in TEXTS:
         raise ValueError(f"{row.source}: no text of these: {', '.join(TEXTS)}")
     return text, citation.numbers(section) if section else [EXERCISES]
@@ -198,9 +198,9 @@ def _heading(row: Row) -> tuple[str, list[str]]:
 
 def _place(row: Row) -> str:
     """Return equation, figure and exercise of a row."""
-    found = citation.fields(row.source)
-    assert found is not None
-    return citation.place(found)
+    cited = citation.fields(row.source)
+    assert cited is not None
+    return citation.place(cited)
 
 
 def _order(section: str) -> tuple[bool, list[int]]:
@@ -213,20 +213,20 @@ def _line(row: Row) -> str:
 
 
 def _every_row(listed: dict[str, Any], known: dict[str, Experiment]) -> list[Row]:
-    found = list(rows(listed, known))
-    return [*found, *unnamed(found, known)]
+    named = list(rows(listed, known))
+    return [*named, *unnamed(named, known)]
 
 
 def sections(listed: dict[str, Any], known: dict[str, Experiment]) -> str:
-    """Return the sections and the exercises of both texts with the experiments that belong to each, as JSON."""
-    found: dict[tuple[str, str], dict[str, Any]] = {}
+    """Return the sections and exercises of both texts, each with its experiments, as JSON."""
+    entries: dict[tuple[str, str], dict[str, Any]] = {}
     for text, titles in listed["sections"].items():
         for number, title in titles.items():
             ends = listed["equations"][text].get(number)
             equations = [f"({i})" for i in range(ends[0], ends[1] + 1)] if ends else []
-            found[text, number] = _section(text, f"section {number}", title, equations)
+            entries[text, number] = _section(text, f"section {number}", title, equations)
         for number in range(1, 24) if text == "vibration text" else ():
-            found[text, f"exercise {number}"] = _section(text, f"exercise {number}", "", [])
+            entries[text, f"exercise {number}"] = _section(text, f"exercise {number}", "", [])
     for row in _every_row(listed, known):
         text, under = _heading(row)
         cited = citation.fields(row.source)
@@ -235,32 +235,32 @@ def sections(listed: dict[str, Any], known: dict[str, Experiment]) -> str:
         keys = [number for number in under if number != EXERCISES]
         for key in (*keys, *([f"exercise {exercise[0]}"] if exercise else [])):
             names = re.findall(r"\(\.\./configs/([\w/]+)\.yaml\)", row.shown)
-            found[text, key]["experiments"].update(dict.fromkeys(names))
+            entries[text, key]["experiments"].update(dict.fromkeys(names))
             if cited["figure"]:
-                found[text, key]["words"].update({f"figure {cited['figure']}": None})
-            found[text, key]["see"].update({row.see: None} if row.see else {})
+                entries[text, key]["words"].update({f"figure {cited['figure']}": None})
+            entries[text, key]["see"].update({row.see: None} if row.see else {})
     content = [
-        {key: list(value) if isinstance(value, dict) else value for key, value in one.items()}
-        for one in found.values()
+        {key: list(value) if isinstance(value, dict) else value for key, value in entry.items()}
+        for entry in entries.values()
     ]
-    return "".join(("[\n", ",\n".join(json.dumps(one) for one in content), "\n]\n"))
+    return "".join(("[\n", ",\n".join(map(json.dumps, content)), "\n]\n"))
 
 
 def _section(text: str, place: str, title: str, words: Sequence[str]) -> dict[str, Any]:
-    """Return a section without experiments; dictionaries stand for sets that keep their order."""
+    """Return the entry of a section, still without experiments; its dictionaries serve as ordered sets."""
     names: dict[str, Any] = {"text": text, "place": place, "title": title}
     return {**names, "words": dict.fromkeys(words), "experiments": {}, "see": {}}
 
 
 def page(listed: dict[str, Any], known: dict[str, Experiment]) -> str:
     """Return the page."""
-    found: dict[str, dict[str, list[Row]]] = {text: {} for text in TEXTS}
+    by_text: dict[str, dict[str, list[Row]]] = {text: {} for text in TEXTS}
     for row in _every_row(listed, known):
         text, sections = _heading(row)
         for section in sections:
-            found[text].setdefault(section, []).append(row)
+            by_text[text].setdefault(section, []).append(row)
     lines = [HEAD.format(things=len(listed["things"]), errata=len(listed["errata"]))]
-    for text, parts in found.items():
+    for text, parts in by_text.items():
         titles = listed["sections"][text]
         sections = sorted({*parts, *titles}, key=_order)
         lines.append(f"## {text.capitalize()}\n")
@@ -300,7 +300,7 @@ def _exercise(row: Row) -> list[int]:
 
 
 def main(arguments: list[str], path: Path = PAGE) -> int:
-    """Write both, or with ``--check`` say whether they are current; return 1 if one is not, or if a list is wrong."""
+    """Write both files, or with ``--check`` report whether they are current; return 1 if not, or if a list is wrong."""
     listed, known = data(), experiments()
     wrong = faults(listed, known)
     if wrong:

@@ -1,7 +1,7 @@
 """The JSON Schemas of ``workflow/schemas``: ``python workflow/schemas.py [--check]``.
 
-Written from the code that reads experiment files, writes summaries and verdicts, and prints JSON: for editors and for
-programs that read results.
+They are generated from the code that reads experiment files, writes summaries and verdicts, and prints JSON. Editors
+and programs that read results use them.
 """
 
 from __future__ import annotations
@@ -29,12 +29,12 @@ FOLDER = Path(__file__).resolve().parent / "schemas"
 
 
 def text(name: str) -> str:
-    """Return a schema as its file holds it."""
+    """Return the content of the file of a schema."""
     return json.dumps(SCHEMAS[name](), indent=2, ensure_ascii=False) + "\n"
 
 
 def main(arguments: list[str], folder: Path = FOLDER) -> int:
-    """Write the schemas, or with ``--check`` say which files are not current; return 1 if one is not."""
+    """Write the schemas, or with ``--check`` report which files are not current; return 1 if there are any."""
     files = {folder / f"{name}.schema.json": text(name) for name in SCHEMAS}
     if "--check" not in arguments:
         for path, content in files.items():

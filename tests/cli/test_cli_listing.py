@@ -133,7 +133,7 @@ def test_an_entry_of_another_list_is_its_line(
 @pytest.mark.parametrize(
     ("words", "told"),
     [
-        (["schemes", "rk5"], "rk5: is no scheme: did you mean 'rk4'?"),
+        (["schemes", "rk5"], "rk5: is not a scheme: did you mean 'rk4'?"),
         (["models", "pendulm"], "did you mean 'pendulum'?"),
         (["checks", "perid"], "did you mean 'period'?"),
         (["experiments", "vehicel"], "did you mean 'vehicle'?"),

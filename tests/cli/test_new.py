@@ -87,9 +87,9 @@ def test_a_shipped_experiment_comes_with_its_tables(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("arguments", "told"),
     [
-        (["taken.yaml"], "is there already, and is not overwritten"),
-        (["dangling.yaml"], "is there already, and is not overwritten"),
-        (["other.yaml", "--like", "bumpy_road"], "bumpy_road.csv: is there already"),
+        (["taken.yaml"], "exists already, and is not overwritten"),
+        (["dangling.yaml"], "exists already, and is not overwritten"),
+        (["other.yaml", "--like", "bumpy_road"], "bumpy_road.csv: exists already"),
         (["Mine.yaml"], "a name of a to z"),
         (["mine.json"], "end in .yaml"),
         (["none/mine.yaml"], "there is no folder none"),
@@ -132,6 +132,6 @@ def test_a_schema_of_somebody_else_is_left_alone_and_one_of_vibsim_renewed(
     for other in ("{}", "[1]", "not JSON"):
         schema.write_text(other)
         assert main(["new", str(tmp_path / "three.yaml")]) == 2
-        assert "is no schema of vibsim" in capsys.readouterr().err
+        assert "is not a schema of vibsim" in capsys.readouterr().err
         assert schema.read_text() == other
         assert not (tmp_path / "three.yaml").exists()

@@ -110,7 +110,7 @@ def test_what_is_no_experiment_file_is_refused(
     file: Path, capsys: pytest.CaptureFixture[str], name: str
 ) -> None:
     assert main(["watch", str(file.with_name(name))]) == 2
-    assert "must be an experiment file that is there" in capsys.readouterr().err
+    assert "must be an existing experiment file" in capsys.readouterr().err
 
 
 @pytest.mark.slow

@@ -199,7 +199,7 @@ def test_what_is_not_finite_is_data(word: str, table: Callable[..., str], capsys
         (TABLE, ["--exact", "u"], "--exact: u: must be QUANTITY=VALUE"),
         (TABLE, ["--exact", "3"], "--exact: 3: must be QUANTITY=VALUE: such as u=1.5"),
         (TABLE, ["--exact", "=3"], "--exact: =3: must be QUANTITY=VALUE"),
-        (TABLE, ["--exact", "v=3"], "--exact: v: is no quantity that is judged"),
+        (TABLE, ["--exact", "v=3"], "--exact: v: is not a judged quantity"),
         (TABLE, ["--exact", "u=three"], "--exact: u=three: its value must be a finite number"),
         (TABLE, ["--exact", "u=nan"], "--exact: u=nan: its value must be a finite number"),
         (TABLE, ["--exact", "u=3", "--exact", "u=4"], "--exact: u: is given twice"),
@@ -425,7 +425,7 @@ def test_files_that_do_not_fit_are_refused(tmp_path: Path, capsys: Capture) -> N
         ([*files, files[0], "--h", "dx", *quantity], f"{files[0]}: dx: 0.1: is the step size of {files[0]}, too"),
         ([*files, "--h", "dx", "--quantity", "t"], f"{files[0]}: --quantity: t: the file has no such variable"),
         ([*files, str(empty), "--h", "dx", *quantity], f"{empty}: --h: dx: is neither"),
-        ([*files, str(other), "--h", "dx", *quantity], f"{other}: is no netCDF file"),
+        ([*files, str(other), "--h", "dx", *quantity], f"{other}: is not a netCDF file"),
     ):  # fmt: skip
         assert main(["judge", *arguments]) == 2
         captured = capsys.readouterr()

@@ -143,13 +143,11 @@ def _beside(block: MemberBlock, compared: Compared) -> Table:
     columns = np.full((len(ids), block.shape[1], width), np.nan)
     for i, table in enumerate(experiment.published, 1):
         for j, row in enumerate(table.rows, 1):
-            at, quantity = row_at(row), table.quantity or ""
-            row_place = value_numbers.Place(
-                block, compared, quantity, at.level, at.t, at.step, at.event
-            )
+            at, about = row_at(row), table.quantity or ""
+            base = value_numbers.Place(block, compared, about, at.level, at.t, at.step, at.event)
             for k, name in enumerate(table.beside):
                 has_quantity = VALUES[name].of != "none"
-                place = row_place if has_quantity else replace(row_place, quantity="")
+                place = base if has_quantity else replace(base, quantity="")
                 values, _, _ = best_values.value(name, place)
                 columns[ids.index(row_id(i, j)), :, k] = values[names.index(row.scheme)]
     words = "numbers beside each row of a published table"

@@ -33,7 +33,7 @@ SOURCE = {
         {"type": "null"},
         object_of({name: TEXT if name == "text" else or_null("string") for name in FIELDS}),
     ],
-    "description": "the text where it stands, and the numbers of what is meant there",
+    "description": "the cited text, and the numbers of its section, equation, figure and exercise",
 }
 
 
@@ -114,7 +114,7 @@ def schema() -> dict[str, Any]:
         "failure_count": COUNT,
         "settings": list_of(TEXT)
         | {
-            "description": "what the command line gave in place of values of the file, as KEY=VALUE"
+            "description": "values of the command line that replace those of the file, as KEY=VALUE"
         },
         "digest": TEXT,
         "integrity": TEXT,

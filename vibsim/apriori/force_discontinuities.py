@@ -31,15 +31,13 @@ from vibsim.simulation.members import Members
 from vibsim.simulation.reference.one_sided_forces import TABLE, Sides, sides
 
 FAR, NEAR = 1.0 / 16.0, 1.0 / 128.0
-"""Distances from the corner at which both formulas are compared, relative to the largest value of the switch quantity.
-[convention]"""
+"""Distances from the corner at which both formulas are compared, over the largest switch quantity. [convention]"""
 HALVINGS = 40
 """Number of bisections that locate a corner within a step. [convention]"""
 ROUGH = 2.0
-"""Largest power k + 1 that counts as rough: corners of the force that limit most schemes. [convention]"""
+"""Largest power k + 1 that counts as rough: that of a jump (1) or a kink (2) of the force itself. [convention]"""
 TURN_ERROR = 0.5
-"""Error of an extrapolation over levels where the slope of a table changes by s, as a multiple of ``s dt^2``.
-[convention]"""
+"""Error of an extrapolation where the slope of a table changes by s, as a multiple of ``s dt^2``. [convention]"""
 MOST_SMOOTH = 8
 """Jumps of this derivative and of higher ones are ignored. [convention]"""
 
@@ -79,10 +77,9 @@ class Corners:
         """Return the relative error at jumps and corners of the force that no level may show, shape (scheme, case).
 
         Close to a point that all levels share, all levels have the same error, which their differences do not show.
-        Within a step of the finest level it is at most ``(w dt)^(k+1)``, with dt over the time since the corner in
-        place of w dt if that is larger. For a table, an error J of the impulse gives errors J of the velocity and J/w
-        of the position. The position itself is taken as p/w^2 or s/w^3, whichever is smaller, for a force of size p
-        whose slope changes by s.
+        Within a step of the finest level it is at most ``(w dt)^(k+1)``, with dt over the time since the corner for
+        w dt if larger. For a table, an error J of the impulse gives an error J/w of the position, whose size is p/w^2
+        or s/w^3, whichever is smaller, for a force of size p whose slope changes by s.
 
         Parameters
         ----------
@@ -144,10 +141,10 @@ def corners_of(model: Model, finest: Record, group: Members, dt: Floats) -> Corn
         return Corners(none, none, np.full(none.shape, -1), none, none, nowhere, *tables)
     number = np.arange(samples) * int(np.asarray(finest.attrs["every"]).item())
     t = number * (group.end / int(np.asarray(finest.attrs["steps"]).item()))[:, None]
-    held = sides(model, {name: np.repeat(x, samples) for name, x in numbers.items()})
+    law = sides(model, {name: np.repeat(x, samples) for name, x in numbers.items()})
     with np.errstate(all="ignore"):
         changed = _has_event(finest, t, schemes)
-        rows = [_of_scheme(held, states[:, k], t, numbers, dt, changed[k]) for k in range(schemes)]
+        rows = [_of_scheme(law, states[:, k], t, numbers, dt, changed[k]) for k in range(schemes)]
     power, time, switch, least, least_time = (
         np.stack(column) for column in zip(*rows, strict=True)
     )
@@ -171,7 +168,7 @@ def _has_event(finest: Record, t: Floats, schemes: int) -> Flags:
 
 
 def _of_scheme(
-    held: Sides,
+    law: Sides,
     states: Floats,
     t: Floats,
     numbers: Mapping[str, Floats],
@@ -181,15 +178,15 @@ def _of_scheme(
     """Return power, time, switch, least and least_time of `Corners` for one scheme, each of shape (case,)."""
     cases, samples = t.shape
     u, v = np.split(states.reshape(len(states), -1), 2)
-    q, modes = held.modes(u, v, t.ravel())
+    q, modes = law.modes(u, v, t.ravel())
     q, modes = (row.reshape(len(q), cases, samples) for row in (q, modes))
     edge = np.maximum(modes[..., :-1], modes[..., 1:])
-    edge = np.where(held.whole[:, None, None], edge, 0.0)
+    edge = np.where(law.whole[:, None, None], edge, 0.0)
     fraction = (edge - q[..., :-1]) / (q[..., 1:] - q[..., :-1])
     at = t[:, :-1] + fraction * np.diff(t)
-    in_time = np.array(_depends_on_time(held))[:, None, None]
+    in_time = np.array(_depends_on_time(law))[:, None, None]
     passed = (np.diff(modes) != 0.0) & (in_time | ~has_event)
-    passed &= np.array([_is_inside_steps(held.model, row) for row in held.switches])[:, None, None]
+    passed &= np.array([_is_inside_steps(law.model, row) for row in law.switches])[:, None, None]
     is_within = ~is_on_a_point(at, dt[:, None])
     every = np.arange(cases)
 
@@ -201,7 +198,7 @@ def _of_scheme(
         # other switches that change between these two samples are other corners
         after[switch, every] = modes[switch, every, sample + 1]
         path = _Path(
-            Sides(held.model, held.formulas, held.switches, numbers),
+            Sides(law.model, law.formulas, law.switches, numbers),
             switch,
             np.stack([states[:, every, sample], states[:, every, sample + 1]]),
             np.stack([t[every, sample], t[every, sample + 1]]),
@@ -214,7 +211,7 @@ def _of_scheme(
         return (
             power,
             np.where(exists, when[switch, every, sample], np.nan),
-            np.where(exists, switch - len(held.switches) + len(switches_of(held.model)), -1),
+            np.where(exists, switch - len(law.switches) + len(switches_of(law.model)), -1),
         )
 
     jump = first(np.where(passed & in_time & ~is_within, at, np.inf))
@@ -232,11 +229,11 @@ def _of_scheme(
     return power, time, np.asarray(switch, dtype=np.int64), least, least_time
 
 
-def _depends_on_time(held: Sides) -> list[bool]:
+def _depends_on_time(law: Sides) -> list[bool]:
     """Tell for every switch whether it depends on time alone, and not on the state."""
-    state_names = {state.name for state in held.model.states}
+    state_names = {state.name for state in law.model.states}
     in_time = []
-    for row in held.switches:
+    for row in law.switches:
         in_time.append(state_names.isdisjoint(row.quantity.names))
         if not in_time[-1]:
             state_names.add(row.mode)
@@ -247,7 +244,7 @@ def _depends_on_time(held: Sides) -> list[bool]:
 class _Path:
     """The straight path between the samples before and after a corner, for n members."""
 
-    held: Sides
+    law: Sides
     switch: Integers
     """Index of the switch, shape (n,)."""
     states: Floats
@@ -264,7 +261,7 @@ class _Path:
 
     def quantity(self, s: Floats) -> Floats:
         """Return the value of the switch quantity at the fraction `s` of the path."""
-        return self.held.quantities(self.modes[0], *self.at(s))[self.switch, np.arange(len(s))]
+        return self.law.quantities(self.modes[0], *self.at(s))[self.switch, np.arange(len(s))]
 
     def crossing(self, edge: Floats) -> Floats:
         """Return the fraction of the path at which the switch quantity is `edge`, by bisection."""
@@ -277,16 +274,13 @@ class _Path:
         return 0.5 * (low + high)
 
     def power(self, edge: Floats, size: Floats) -> Floats:
-        """Return the highest regular power of dt, k + 1, shape (n,); NaN where both formulas agree.
-
-        Near the corner, their difference grows as the distance to the power k.
-        """
+        """Return k + 1, shape (n,): both formulas differ as distance^k near the corner; NaN where they agree."""
         s = self.crossing(edge)
         slope = self.quantity(np.ones(len(s))) - self.quantity(np.zeros(len(s)))
         gaps = []
         for distance in (FAR, NEAR):
             place = self.at(s + distance * size / slope)
-            before, after = (self.held.force(modes)(*place) for modes in self.modes)
+            before, after = (self.law.force(modes)(*place) for modes in self.modes)
             gaps.append(np.max(np.abs(after - before), axis=0))
         k = np.round(on_arrays.log(gaps[0] / gaps[1]) / on_arrays.log(FAR / NEAR))
         exists = (gaps[0] > 0.0) & (k < MOST_SMOOTH)

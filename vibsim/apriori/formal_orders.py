@@ -111,21 +111,20 @@ def formal_orders(
     """Return the order that every scheme promises for a quantity, shape (scheme, case).
 
     The order is infinite for an exact quantity, and NaN for a scheme that chooses its own steps. The order of an error
-    part follows from theory, or is that of the position where theory does not apply. Here and below, the length of the
-    dimension case is 1 if no option is swept, except for error parts, which depend on all parameters of a member, and
-    for orders that depend on how the motion begins. For a model with events, `eventless`, shape (scheme, case), marks
-    the members that met none.
+    part follows from theory, or is that of the position where theory does not apply. Here and below, the dimension case
+    has length 1 if no option is swept, except for error parts, which depend on all parameters of a member, and for
+    orders that depend on how the motion begins. `eventless`, shape (scheme, case), marks members that met no event.
     """
     if is_promised(experiment, quantity):
         return part_orders(experiment, quantity, columns)
-    model, whole = experiment.model.definition, whole_of(quantity)
+    model, name = experiment.model.definition, whole_of(quantity)
 
     def promised(beginning: Beginning, meets_events: bool = True) -> Floats:
         return _each(
             experiment,
             columns,
-            lambda scheme, options: float(
-                scheme.formal_order(whole, model, options, beginning, meets_events=meets_events)
+            lambda s, o: float(
+                s.formal_order(name, model, o, beginning, meets_events=meets_events)
             ),
         )
 

@@ -124,7 +124,7 @@ SETTINGS = _row(
     "--set",
     _word,
     "KEY=VALUE",
-    "a value in place of one of the file, such as model.g=1.62; may be repeated",
+    "replace a value of the file, such as model.g=1.62; may be repeated",
     dest="settings",
     action="append",
     default=[],
@@ -140,7 +140,7 @@ THREADS = _row(
 )
 ONE = _row("experiment", _word, "EXPERIMENT", "experiment or FILE.yaml")
 FOLDER = _row("--out", _path, "DIR", "folder to write to")
-_CHANGED = "refuse when the experiment or the code is not the one with this digest"
+_CHANGED = "refuse to run unless the experiment and the code have this digest"
 _DISCARDED = "delete a damaged or outdated input, so that the next run makes it again"
 JOB_OPTIONS = (
     *(RESULTS, SETTINGS),
@@ -162,11 +162,13 @@ def commands() -> Iterator[Command]:
     text = "Show members, jobs, steps, memory, disk space and time of experiments before they run."
     as_json = _flag("--json", "print the plans as JSON")
     yield "plan", "commands.plan", text, (RESULTS, FILES, SETTINGS, as_json)
-    text = "Show verdicts, and the solution of the finest level down the screen."
+    text = "Show verdicts, and the solution of the finest level as a text plot."
     yield "show", "commands.show", text, (RESULTS, SETTINGS, *_show())
     text = "Judge whether the results of any solver converge."
     yield "judge", "commands.judge", text, tuple(_judge())
-    text = "List what there is to choose from, or print the JSON Schema of experiment files."
+    text = (
+        "List models, schemes, checks or experiments, or print the JSON Schema of experiment files."
+    )
     name = _row("name", _word, "NAME", "one entry, in full", nargs="?")
     yield "list", "commands.listing", text, (("what", {"choices": LISTS}), name)
     text = "Write a commented experiment file to begin with, and the JSON Schema for editors."
@@ -181,14 +183,14 @@ def commands() -> Iterator[Command]:
     yield "explain", "commands.explain", text, (reason,)
     text = "Print the theory of a scheme on u'' + w^2 u = 0 as formulas in w dt."
     yield "theory", "commands.theory", text, tuple(_theory())
-    text = "Open a report in the browser; print its path where there is none."
+    text = "Open a report in the browser; print its path if there is no browser."
     what = "experiment whose report is opened (default: the index over all results)"
     page = _row("experiment", _word, "EXPERIMENT", what, nargs="?")
     yield "open", "commands.open", text, (RESULTS, page)
     text = "Write the movie of an experiment that has been run: MP4, WebM or GIF, or numbered PNG frames."
     yield "movie", "commands.movie", text, (RESULTS, SETTINGS, *_movie())
-    text = "Print what a shell needs to complete commands, options and names."
-    what = "the shell; `words` is what its script asks"
+    text = "Print the script with which a shell completes commands, options and names."
+    what = "the shell; `words` is for its script"
     words = _row("words", str, "WORD", "the command line so far", nargs="*")
     shell = "shell", {"choices": SHELLS, "help": what}
     yield "completion", "commands.completion", text, (shell, words)
@@ -209,10 +211,10 @@ def _run() -> Iterator[_Row]:
     yield _row("experiments", _word, "EXPERIMENT", _NAMES, nargs="*")
     yield from (SETTINGS, CORES)
     yield _row("--executor", _word, "NAME", "where jobs run: an executor plug-in of Snakemake")
-    yield _row("--jobs", _positive, "N", "jobs that an executor has at once")
+    yield _row("--jobs", _positive, "N", "limit on the jobs that an executor has at once")
     yield _row("--profile", _path, "DIR", "a profile of Snakemake: slurm, generic, or a folder")
     yield _flag("--dry-run", "show what would run and why")
-    text = "compare every result with its digest, also where size, time and inode are as they were"
+    text = "compare every result with its digest, even if size, time and inode are unchanged"
     yield _flag("--verify", text)
     yield ALLOW
     yield _flag("--json", "print the outcome as JSON")
@@ -232,10 +234,10 @@ def _verify() -> Iterator[_Row]:
 
 def _simulate() -> Iterator[_Row]:
     """Yield the options of ``vibsim simulate``."""
-    text = "one level, or several to the places of the plan"
+    text = "one level, or several, written to the paths in the plan"
     yield _row("--level", int, "L", text, nargs="+", required=True)
-    yield _row("--shard", int, "K", "range of members (from 0)", default=0)
-    text = "netCDF file to write (default: the place of the plan, unless it is made already)"
+    yield _row("--shard", int, "K", "number of the shard, a range of members (from 0)", default=0)
+    text = "netCDF file to write (default: the path in the plan, unless that file is up to date)"
     yield _row("--out", _path, "FILE", text)
 
 
@@ -247,23 +249,21 @@ def _report() -> Iterator[_Row]:
     yield _row("--formats", _word, "LIST", text)
     text = "copy pages, data, experiment file and metadata (RO-Crate) to a new folder"
     yield _row("--publish", _path, "DIR", text)
-    yield _row(
-        "--license", _word, "TEXT", "licence of what is published: its address, or a sentence"
-    )
+    yield _row("--license", _word, "TEXT", "licence of the published files: address or sentence")
 
 
 def _detail() -> Iterator[_Row]:
     """Yield the options for the amount of output; the last one on the command line counts."""
     for names, value, text in (
         (("-v", "--verbose"), "full", "show every check, also those that passed"),
-        (("-q", "--quiet"), "quiet", "print nothing but errors; the exit status tells the rest"),
+        (("-q", "--quiet"), "quiet", "print errors only; the exit status has the result"),
     ):
         yield names, {"action": "store_const", "const": value, "dest": "detail", "help": text}
 
 
 def _new() -> Iterator[_Row]:
     """Yield the options of ``vibsim new``."""
-    yield _row("file", _path, "FILE", "experiment file to write; one that is there is kept")
+    yield _row("file", _path, "FILE", "new experiment file; an existing one is kept")
     yield _row("--model", _word, "KIND", "kind of the model (default: pendulum)")
     yield _row("--like", _word, "EXPERIMENT", "begin with the text of a shipped experiment")
 
@@ -283,7 +283,7 @@ def _show() -> Iterator[_Row]:
     yield _row("what", _word, "EXPERIMENT", text)
     yield _row("--quantity", _word, "NAME", "what to draw (default: the first position)")
     yield _row("--scheme", _word, "NAME", "scheme to draw (default: the first)")
-    yield _row("--level", _index, "L", "level to draw (default: the finest that is there)")
+    yield _row("--level", _index, "L", "level to draw (default: the finest that was made)")
     yield _row("--case", _index, "K", "member of a sweep to draw (default: 0)")
     yield _row("--rows", _positive, "N", "lines of the plot (default: 40)", default=40)
     yield _row("--from", _finite, "T", "time at which the plot begins", default=0.0, dest="start")
@@ -298,18 +298,18 @@ def _movie() -> Iterator[_Row]:
     yield _row("--output", _path, "FILE", text)
     text = "folder for the frames, as frame_0000.png and so on; no movie is written unless --output names one"
     yield _row("--frames-to", _path, "DIR", text)
-    text = "one scheme, or two side by side (default: the first, beside it what differs visibly)"
+    text = "one scheme, or two side by side (default: the first, and another that differs visibly)"
     yield _row("--scheme", _word, "NAME", text, nargs="+", action="extend")
-    text = "one level, or two side by side (default: the finest, beside it the coarsest)"
+    text = "one level, or two side by side (default: the finest, and the coarsest beside it)"
     yield _row("--level", _index, "L", text, nargs="+", action="extend")
     yield _row("--case", _index, "K", "member of a sweep (default: 0)")
-    yield _row("--quantity", _word, "NAME", "what is shown over time (default: the first position)")
-    yield _row("--from", _finite, "T", "first time that is shown", dest="start")
-    yield _row("--to", _finite, "T", "last time that is shown", dest="end")
+    yield _row("--quantity", _word, "NAME", "quantity over time (default: the first position)")
+    yield _row("--from", _finite, "T", "time at which the movie begins", dest="start")
+    yield _row("--to", _finite, "T", "time at which the movie ends", dest="end")
     text = "periods in the moving window (default: 6 of a run of more than 9)"
     yield _row("--window", _above_zero, "PERIODS", text)
     yield _row("--fps", _above_zero, "N", "frames a second (default: 25, of a GIF 10)")
-    text = "number of frames over the whole time (default: as the motion needs, 1500 at most)"
+    text = "number of frames over the whole time (default: what the motion needs, up to 1500)"
     yield _row("--frames", _positive, "N", text)
 
 
@@ -321,13 +321,13 @@ def _judge() -> Iterator[_Row]:
     yield _row("--h", _word, "NAME", text, required=True)
     text = "columns (default: all others) or netCDF variables to judge"
     yield _row("--quantity", _word, "NAME", text, nargs="+", action="extend")
-    text = "how netCDF fields are brought to common points (default: subset)"
+    text = "how netCDF fields are restricted to common points (default: subset)"
     yield "--restrict", {"choices": RESTRICTIONS, "help": text}
-    yield _row("--order", _above_zero, "P", "the order that is expected")
-    yield _row("--at-least", _above_zero, "P", "the lowest order that is expected")
-    text = "the exact value of a quantity, where it is known; may be repeated"
+    yield _row("--order", _above_zero, "P", "the expected order")
+    yield _row("--at-least", _above_zero, "P", "the lowest acceptable order")
+    text = "the exact value of a quantity, if known; may be repeated"
     yield _row("--exact", _word, "QUANTITY=VALUE", text, action="append")
-    text = "how noisy each level is (root mean square; default: round-off)"
+    text = "noise of the values of each level (root mean square; default: round-off)"
     yield _row("--noise", _from_zero, "X", text)
     yield _row("--report", _path, "DIR", "write report.html and verdict.json to this folder")
     yield _flag("--json", "print the verdicts as JSON, and nothing else")

@@ -49,7 +49,7 @@ def run() -> dict[str, Any]:
         }
     ) | {"title": "vibsim run --json"}
     job = object_of(
-        {"job": TEXT, "rule": TEXT, "reason": TEXT | {"description": "in words of Snakemake"}}
+        {"job": TEXT, "rule": TEXT, "reason": TEXT | {"description": "as Snakemake states it"}}
     )
     dry = object_of({"jobs": list_of(job)}) | {"title": "vibsim run --dry-run --json"}
     definitions = {"summary": summary, "lost": lost}
@@ -64,16 +64,16 @@ def plan() -> dict[str, Any]:
         {
             "jobs": COUNT,
             "member_steps": COUNT,
-            "bytes": COUNT | {"description": "of all files, the page among them, estimated"},
-            "memory": COUNT | {"description": "bytes of the largest job"},
+            "bytes": COUNT | {"description": "estimated size of all files, with the page"},
+            "memory": COUNT | {"description": "estimated memory of the largest job, in bytes"},
             "seconds": {
                 "type": "number",
-                "description": "of one core, of the steps and files of all levels",
+                "description": "estimated time of the steps and files of all levels on one core",
             },
-            "cpu_seconds": {"type": "number", "description": "CPU time of a whole run"},
+            "cpu_seconds": {"type": "number", "description": "estimated CPU time of a whole run"},
             "wall_seconds": {
                 "type": "object",
-                "description": "time of a whole run, by the number of cores: 1, and those at hand",
+                "description": "estimated time of a whole run, by number of cores: 1, and all of this machine",
                 "additionalProperties": {"type": "number"},
             },
         }

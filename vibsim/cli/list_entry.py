@@ -35,7 +35,7 @@ def in_full(what: str, name: str) -> list[str]:
     if what == "schemes":
         return laid_out(scheme_rows(scheme_named(name)))
     if name not in MODELS:
-        raise refusal("NAME", name, "is no model", nearest(name, sorted(MODELS)))
+        raise refusal("NAME", name, "is not a model", nearest(name, sorted(MODELS)))
     return laid_out(model_rows(MODELS[name]))
 
 
@@ -50,13 +50,13 @@ def scheme_named(name: str) -> Scheme:
     from vibsim.schemes import SCHEMES
 
     if name not in SCHEMES:
-        raise refusal("NAME", name, "is no scheme", nearest(name, sorted(SCHEMES)))
+        raise refusal("NAME", name, "is not a scheme", nearest(name, sorted(SCHEMES)))
     return SCHEMES[name]
 
 
-def laid_out(found: Iterable[Row]) -> list[str]:
+def laid_out(entries: Iterable[Row]) -> list[str]:
     """Format rows as lines with aligned texts, no wider than the terminal."""
-    rows = list(found)
+    rows = list(entries)
     width = max(len(label) for label, _ in rows)
     columns = min(terminal.columns(), _WIDEST)
     lines = []

@@ -52,11 +52,11 @@ def of_failures(failures: Sequence[Entry]) -> Iterator[str]:
 
 def count(summaries: Sequence[Entry], status: str) -> str:
     """Return the numbers of experiments and of passed checks, with the status of the whole run."""
-    found = [check["status"] for entry in summaries for check in entry["checks"]]
+    statuses = [check["status"] for entry in summaries for check in entry["checks"]]
     experiments = "1 experiment" if len(summaries) == 1 else f"{len(summaries)} experiments"
-    passed = (
-        f"{found.count('PASS')} of {len(found)} checks passed" if found else "no check was judged"
-    )
+    passed = "no check was judged"
+    if statuses:
+        passed = f"{statuses.count('PASS')} of {len(statuses)} checks passed"
     return f"{experiments}, {passed}: {painted(status, status)}"
 
 

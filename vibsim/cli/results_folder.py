@@ -107,7 +107,7 @@ def _refuse(paths: Iterable[os.PathLike[str]]) -> None:
         with suppress(FileNotFoundError, NotADirectoryError):
             kind = stat.S_IFMT(os.lstat(path).st_mode)
             if kind not in (stat.S_IFREG, stat.S_IFDIR):
-                name = _KINDS.get(kind, "no file and no folder")
+                name = _KINDS.get(kind, "neither a file nor a folder")
                 rule = f"is {name}, and vibsim writes to real files and folders only"
                 faults.append(Fault(os.fspath(path), 0, "", "", rule, advice))
     if faults:

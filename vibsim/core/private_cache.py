@@ -3,9 +3,8 @@
 It holds compiled kernels and templates, reference solutions, plans, and the imports of modules, each kind in its own
 folder in ``$VIBSIM_CACHE_DIR``, by default in ``vibsim`` in the user's cache folder. A seal detects damaged entries and
 identifies each one, but anybody can make a seal: security rests on the file system. Only the user and root can write to
-the folders or replace them. A folder that others can write to is refused and left as it is, since restricting it
-afterwards would keep what they put there; a folder that others can only read is made private. An entry that cannot be
-stored is made again each time.
+the folders or replace them. A folder that others can write to is refused and left as it is, since restricting it would
+keep what they put there; a folder that others can only read is made private.
 """
 
 from __future__ import annotations
@@ -61,12 +60,9 @@ def cached(
         The folder, one of `KINDS`.
     name
         Name of the entry, which begins with a digest of all that it depends on.
-    make
-        Makes the entry.
-    dump
-        Returns the entry as bytes, or None if it shall not be stored.
-    load
-        Returns the entry from bytes, or None if they are invalid.
+    make, dump, load
+        Make the entry; return its bytes, or None if it shall not be stored; return the entry from bytes, or None if
+        these are invalid.
     """
     folder = opened(kind)
     if folder is None:
@@ -219,8 +215,8 @@ class Folder:
             if entry.name.startswith("lock_"):
                 continue
             with suppress(FileNotFoundError):
-                status = entry.stat(follow_symlinks=False)
-                rows.append((status.st_atime_ns, status.st_size, entry.name))
+                info = entry.stat(follow_symlinks=False)
+                rows.append((info.st_atime_ns, info.st_size, entry.name))
         total = sum(size for _, size, _ in rows)
         for _, size, name in sorted(rows):
             if total <= MOST_BYTES:
@@ -262,16 +258,16 @@ def check(place: Path, *, writable: bool = False) -> None:
 def _check_parents(path: Path, links: int = 0) -> None:
     """Refuse `path` if another user owns or can write to it, to a folder above it, or to a link among them."""
     for folder in (*reversed(path.parents), path):
-        status = folder.lstat()
-        if status.st_uid not in (0, os.geteuid()):
+        info = folder.lstat()
+        if info.st_uid not in (0, os.geteuid()):
             raise _refusal(folder, "belongs to another user")
-        if stat.S_ISLNK(status.st_mode):
+        if stat.S_ISLNK(info.st_mode):
             if links == _MOST_LINKS:
                 raise OSError(errno.ELOOP, os.strerror(errno.ELOOP), str(path))
             target = folder.parent / folder.readlink() / path.relative_to(folder)
             return _check_parents(target, links + 1)
         # in a sticky folder, users cannot rename the files of others
-        if status.st_mode & _OTHERS_WRITE and not status.st_mode & stat.S_ISVTX:
+        if info.st_mode & _OTHERS_WRITE and not info.st_mode & stat.S_ISVTX:
             raise _refusal(folder, "others can write to it")
     return None
 
@@ -283,14 +279,14 @@ def _open_folder(path: Path, outer: int | None = None) -> int:
     except OSError as error:
         reason = "is a link" if path.is_symlink() else error.strerror
         raise OSError(error.errno, reason, str(path)) from None
-    status = os.fstat(folder)
+    info = os.fstat(folder)
     try:
-        if status.st_uid != os.geteuid():
+        if info.st_uid != os.geteuid():
             raise _refusal(path, "belongs to another user")
-        if status.st_mode & _OTHERS_WRITE:
+        if info.st_mode & _OTHERS_WRITE:
             raise _refusal(path, "others can write to it")
         # the folder that the user names keeps its mode: it is no danger that others can read it
-        if outer is not None and stat.S_IMODE(status.st_mode) != _MODE:
+        if outer is not None and stat.S_IMODE(info.st_mode) != _MODE:
             os.fchmod(folder, _MODE)
     except OSError:
         os.close(folder)
@@ -301,9 +297,8 @@ def _open_folder(path: Path, outer: int | None = None) -> int:
 def _file(name: str, flags: int, folder: int) -> int:
     """Open a file in an open folder; raises OSError unless it is a regular file that only this user can write to."""
     file = regular_files.descriptor(name, flags | os.O_NOFOLLOW, folder=folder)
-    status = os.fstat(file)
-    is_ours = status.st_uid == os.geteuid() and not status.st_mode & _OTHERS_WRITE
-    if is_ours and status.st_nlink == 1:
+    info = os.fstat(file)
+    if info.st_uid == os.geteuid() and info.st_nlink == 1 and not info.st_mode & _OTHERS_WRITE:
         return file
     os.close(file)
     raise _refusal(Path(name), "is not ours alone")

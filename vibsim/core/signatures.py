@@ -29,24 +29,21 @@ def misfit_of(signature: inspect.Signature, *args: Any, **named: Any) -> tuple[s
 def signature_of(node: ast.FunctionDef) -> inspect.Signature:
     """Return the signature of a parsed function, which is not executed: default values are source text."""
     kinds, args = inspect.Parameter, node.args
-    positional = [*args.posonlyargs, *args.args]
-    defaults: list[ast.expr | None] = [None] * (len(positional) - len(args.defaults))
-    defaults += args.defaults
+    plain = [*args.posonlyargs, *args.args]
+    texts: list[ast.expr | None] = [None] * (len(plain) - len(args.defaults))
+    texts += args.defaults
     rows: list[tuple[ast.arg | None, Any, ast.expr | None]] = [
-        *(
-            (arg, kinds.POSITIONAL_OR_KEYWORD, default)
-            for arg, default in zip(positional, defaults, strict=True)
-        ),
+        *((arg, kinds.POSITIONAL_OR_KEYWORD, text) for arg, text in zip(plain, texts, strict=True)),
         (args.vararg, kinds.VAR_POSITIONAL, None),
         *(
-            (arg, kinds.KEYWORD_ONLY, default)
-            for arg, default in zip(args.kwonlyargs, args.kw_defaults, strict=True)
+            (arg, kinds.KEYWORD_ONLY, text)
+            for arg, text in zip(args.kwonlyargs, args.kw_defaults, strict=True)
         ),
         (args.kwarg, kinds.VAR_KEYWORD, None),
     ]
     parameters = [
-        kinds(arg.arg, kind, default=kinds.empty if default is None else ast.unparse(default))
-        for arg, kind, default in rows
+        kinds(arg.arg, kind, default=kinds.empty if text is None else ast.unparse(text))
+        for arg, kind, text in rows
         if arg is not None
     ]
     only = len(args.posonlyargs)

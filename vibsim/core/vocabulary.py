@@ -77,10 +77,7 @@ def decisive_number(facts: Mapping[str, Any]) -> float | None:
 
 
 def order_interval(low: float, high: float) -> tuple[str, ...]:
-    """Return the ends of the interval of an order as text, with the 3 to 6 decimals that distinguish them.
-
-    If they agree to 6 decimals, a single text is returned.
-    """
+    """Return the ends of an order's interval as text, with the 3 to 6 decimals that differ; one text if none do."""
     for decimals in range(3, 7):
         ends = f"{low:.{decimals}f}", f"{high:.{decimals}f}"
         if ends[0] != ends[1]:

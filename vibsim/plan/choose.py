@@ -65,47 +65,47 @@ def choose(words: Sequence[str], root: Path, settings: Sequence[str] = ()) -> li
     chosen: dict[tuple[Path, int | None], Choice] = {}
     faults: list[Fault] = []
     for word in words:
-        found, rule = _find_member(word, known, root)
+        choices, rule = _find_member(word, known, root)
         if rule:
             faults.append(Fault(word, 0, "", "", *rule))
-        chosen.update(((choice.file, choice.case), choice) for choice in found)
+        chosen.update(((choice.file, choice.case), choice) for choice in choices)
     faults.extend(_clashes(list(chosen.values())))
     if faults:
         raise InputError(faults)
     return [replace(choice, settings=tuple(settings)) for choice in chosen.values()]
 
 
-Found = tuple[list[Choice], tuple[str, str] | None]
+Match = tuple[list[Choice], tuple[str, str] | None]
 """The experiments that a word names, or the rule that the word breaks and a hint."""
 
 
-def _find_member(word: str, known: list[Choice], root: Path) -> Found:
+def _find_member(word: str, known: list[Choice], root: Path) -> Match:
     """Find what `word` names, which may be one member of a sweep."""
     name, at, case = word.rpartition("@")
     if not at or word.endswith(ENDINGS):
         return _find(word, known, root)
     if not (case.isascii() and case.isdigit() and len(case) <= MAX_DIGITS):
         return [], ("a member is named by @ and its number, from 0", f"e.g. {name}@0")
-    if found := [c for c in known if c.collection == name]:
-        return [], ("a collection has no members", _list(found))
-    found, rule = _find(name, known, root)
-    return [replace(choice, case=int(case)) for choice in found], rule
+    if collection := [choice for choice in known if choice.collection == name]:
+        return [], ("a collection has no members", _list(collection))
+    choices, rule = _find(name, known, root)
+    return [replace(choice, case=int(case)) for choice in choices], rule
 
 
-def _find(word: str, known: list[Choice], root: Path) -> Found:
+def _find(word: str, known: list[Choice], root: Path) -> Match:
     if word.endswith(ENDINGS):
         return [_choice(Path(word), root)], None
-    of_collection = [choice for choice in known if choice.collection == word]
-    found = of_collection or [choice for choice in known if word in (choice.key, choice.name)]
-    if len(found) > 1 and not of_collection:
-        return [], ("is the name of several experiments", _list(found))
-    if found:
-        return found, None
+    collection = [choice for choice in known if choice.collection == word]
+    choices = collection or [choice for choice in known if word in (choice.key, choice.name)]
+    if len(choices) > 1 and not collection:
+        return [], ("is the name of several experiments", _list(choices))
+    if choices:
+        return choices, None
     if os.path.lexists(word):
         return [], ("a file of an experiment must end in .yaml or .yml", "")
     names = [*dict.fromkeys(c.collection for c in known), *(c.key for c in known)]
     names += [c.name for c in known]
-    rule = "is no experiment, no collection and no YAML file"
+    rule = "is not an experiment, a collection or a YAML file"
     hint = nearest(word, names) if known else ""
     if len(names) > MOST_CHOICES and not likely(word, names):
         hint = "`vibsim list experiments` shows all"

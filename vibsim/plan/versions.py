@@ -21,7 +21,7 @@ def versions(names: tuple[str, ...]) -> dict[str, str]:
 
 @cache
 def _installed() -> dict[str, str]:
-    found: dict[str, str] = {}
+    installed: dict[str, str] = {}
     for folder in sys.path:
         try:
             entries = [entry.name for entry in os.scandir(folder or ".")]
@@ -30,5 +30,5 @@ def _installed() -> dict[str, str]:
         for entry in entries:
             if entry.endswith(".dist-info"):
                 name, _, version = entry.removesuffix(".dist-info").partition("-")
-                found.setdefault(name.lower(), version)
-    return found
+                installed.setdefault(name.lower(), version)
+    return installed

@@ -112,7 +112,7 @@ def _simulation(plan: Plan, batches: Sequence[Batch], rule: str, cores: int) -> 
 
 
 def _disk(size: float) -> int:
-    """Return the size of files in megabytes, from the size in bytes, which is 0 if unknown."""
+    """Return the size of files [MB] from their size in bytes; `UNKNOWN_DISK` for an unknown size (0)."""
     return math.ceil(size / 10**6) or UNKNOWN_DISK
 
 
@@ -234,10 +234,7 @@ class Names:
     """Limit on the files of such a job [MB]: ten times those of the default run."""
 
     def memory(self, megabytes: int) -> Callable[[Any, int], int]:
-        """Return a function that gives the memory of a job [MB], as Snakemake expects for ``resources``.
-
-        It includes the overhead of the executor and grows with each attempt.
-        """
+        """Return a function that gives the memory of a job [MB], for ``resources``; it grows with each attempt."""
 
         def megabytes_of(wildcards: Any, attempt: int) -> int:
             return (megabytes + self.overhead) * attempt

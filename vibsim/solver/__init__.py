@@ -1,5 +1,5 @@
-"""What solvers of other people computed: reading their files, running them level by level, and judging the levels.
+"""Other people's solvers: read their files, run them level by level, and judge the levels.
 
-`level_tables` and `level_files` read studies of `vibsim judge`, `run` makes a level of an experiment with a solver,
-`level_output` is what it wrote, and `analysis` and `verdicts` compare all levels.
+`level_tables` and `level_files` read the studies of `vibsim judge`. In an experiment with a solver, `run` makes a
+level, `level_output` reads and stores it, and `analysis` and `verdicts` compare all levels.
 """

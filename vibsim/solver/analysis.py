@@ -1,4 +1,4 @@
-"""The levels of a solver compared, member by member: the content of ``convergence.nc`` and of ``summary.json``."""
+"""Compare the levels of a user's solver, member by member: the content of ``convergence.nc`` and ``summary.json``."""
 
 from __future__ import annotations
 
@@ -25,30 +25,30 @@ from vibsim.solver.level_output import plain
 from vibsim.solver.verdicts import SolverResult, expected, judge
 
 SCHEME = "solver"
-"""In place of the name of a scheme, in results."""
+"""Takes the place of the name of a scheme in results."""
 ORDER = "order"
-"""What a page compares errors with, also where the check does not ask for it."""
+"""Fact that is stored for every check, because the page compares errors with it."""
 SHOWN = ("values", "best_values")
-"""Arrays of the decisive member, beside the table of levels of every one."""
+"""Arrays that are stored for the decisive member only; the table of levels is stored for every member."""
 
 
 @dataclass(frozen=True)
 class CheckResults:
-    """What was decided of one check: every member, the worst first."""
+    """The results of one check for every member, the worst first."""
 
     check: SolverCheck
     results: Sequence[SolverResult]
-    """Without the compared values, but of the first."""
+    """Only the first one has the values of its levels."""
 
     @property
     def counts(self) -> dict[str, int]:
-        """Number of results by status, compared with what was expected."""
-        found = [result.compared for result in self.results]
-        return {status: found.count(status) for status in STATUSES}
+        """Number of results by status, after comparison with the expected one."""
+        statuses = [result.compared for result in self.results]
+        return {status: statuses.count(status) for status in STATUSES}
 
     @property
     def status(self) -> str:
-        """The worst of them."""
+        """The worst status of the results."""
         return worst(result.compared for result in self.results)
 
 
@@ -65,7 +65,7 @@ def judge_members(
     Raises
     ------
     VibsimError
-        With the member, the quantity and the levels that cannot be compared.
+        Where levels cannot be compared; it names member, quantity and levels.
     """
     rows: list[list[SolverResult]] = [[] for _ in experiment.checks]
     for member in range(experiment.members):
@@ -73,15 +73,15 @@ def judge_members(
         for check, row in zip(experiment.checks, rows, strict=True):
             values = [level_output.stored(record, str(check.about)) for record in records]
             try:
-                found = judge(experiment, check, member, values)
+                result = judge(experiment, check, member, values)
             except VibsimError as error:
                 where = f"member {member}: " if experiment.sweep else ""
                 raise VibsimError(f"{where}{error}") from None
-            if row and _severity(found) < _severity(row[0]):
-                row[0], found = found, row[0]
-            # the worst one is shown with its values
-            bare = replace(found.verdict, values=np.empty(0), best_values=None, coords={})
-            row.append(replace(found, verdict=bare) if row else found)
+            if row and _severity(result) < _severity(row[0]):
+                row[0], result = result, row[0]
+            # only the worst result, the first in the row, keeps its values
+            bare = replace(result.verdict, values=np.empty(0), best_values=None, coords={})
+            row.append(replace(result, verdict=bare) if row else result)
     return [
         CheckResults(check, sorted(row, key=_severity))
         for check, row in zip(experiment.checks, rows, strict=True)
@@ -108,44 +108,44 @@ def summarise(experiment: SolverExperiment, checks: Sequence[CheckResults]) -> d
     return plain
 
 
-def _check(experiment: SolverExperiment, found: CheckResults) -> dict[str, Any]:
-    check, decides = found.check, found.results[0]
-    status, most = found.status, None if experiment.sweep is None else WORST
-    advice = decides.verdict.advice or "Compare the expectation with the levels."
+def _check(experiment: SolverExperiment, checked: CheckResults) -> dict[str, Any]:
+    check, verdict = checked.check, checked.results[0].verdict
+    status, most = checked.status, None if experiment.sweep is None else WORST
+    advice = verdict.advice or "Compare the expectation with the levels."
     return {
         "id": check.id,
         "kind": check.kind,
-        "text": _text(experiment, found),
+        "text": _text(experiment, checked),
         "quantity": check.about,
         "expected": expected(check),
         "status": status,
-        "reason": compared_reason(check, status, decides.verdict.status, decides.verdict.reason),
+        "reason": compared_reason(check, status, verdict.status, verdict.reason),
         "advice": "" if status == "PASS" else advice,
-        "results": [_result(experiment, result) for result in found.results[:most]],
-        "counts": found.counts,
+        "results": [_result(experiment, result) for result in checked.results[:most]],
+        "counts": checked.counts,
         "where": {},
         "note": None,
         "source": None,
     }
 
 
-def _text(experiment: SolverExperiment, found: CheckResults) -> str:
-    """Say what was found where it decides, and of how many members."""
-    decides, status = found.results[0], found.status
-    sentence = decides.verdict.sentence
-    total = len(found.results)
+def _text(experiment: SolverExperiment, checked: CheckResults) -> str:
+    """Return the sentence of the decisive member, after the number of members with its status."""
+    decisive, status = checked.results[0], checked.status
+    sentence = decisive.verdict.sentence
+    total = len(checked.results)
     if total == 1:
         return sentence
-    head = f"{status} in {found.counts[status]} of {total} members"
+    head = f"{status} in {checked.counts[status]} of {total} members"
     if status == "PASS":
         head = f"{'Both' if total == 2 else f'All {total}'} members passed"
-    place = ", ".join(f"{k} = {v}" for k, v in experiment.parameters_of(decides.member).items())
-    return f"{head}. The hardest is member {decides.member} ({place}). {sentence}"
+    place = ", ".join(f"{k} = {v}" for k, v in experiment.parameters_of(decisive.member).items())
+    return f"{head}. The hardest is member {decisive.member} ({place}). {sentence}"
 
 
 def _result(experiment: SolverExperiment, result: SolverResult) -> dict[str, Any]:
     verdict = result.verdict
-    found = {
+    fields = {
         "scheme": SCHEME,
         "case": result.member,
         "status": verdict.status,
@@ -154,9 +154,9 @@ def _result(experiment: SolverExperiment, result: SolverResult) -> dict[str, Any
         "sentence": verdict.sentence,
     }
     if experiment.sweep is None:
-        return found
+        return fields
     flag = "" if experiment.solver.kind == "files" else " --allow-commands"
-    return found | {
+    return fields | {
         "values": experiment.parameters_of(result.member),
         "command": experiment.command_of(result.member) + flag,
     }
@@ -166,7 +166,7 @@ def _result(experiment: SolverExperiment, result: SolverResult) -> dict[str, Any
 
 
 def record(experiment: SolverExperiment, checks: Iterable[CheckResults]) -> Record:
-    """Return what is stored of all checks: the table of levels of every member, and the values of the decisive one."""
+    """Return the stored results of all checks: the table of levels of every member, the values of the decisive one."""
     members, levels = experiment.members, list(experiment.levels)
     coords = {
         "level": plain(("level",), levels, "position of the level, the coarsest 0"),
@@ -178,44 +178,44 @@ def record(experiment: SolverExperiment, checks: Iterable[CheckResults]) -> Reco
         column = [experiment.parameters_of(i)[name] for i in range(members)]
         coords[name] = plain(("case",), column, f"parameter {name}")
     variables: dict[str, Variable] = {}
-    for found in checks:
-        variables |= _of_check(found)
+    for checked in checks:
+        variables |= _check_variables(checked)
     return Record(coords, variables)
 
 
-def _of_check(found: CheckResults) -> dict[str, Variable]:
+def _check_variables(checked: CheckResults) -> dict[str, Variable]:
     """Return the variables of a check."""
-    id_, decides = found.check.id, found.results[0]
+    id_, decisive = checked.check.id, checked.results[0]
     table: dict[str, Variable] = {}
 
     def add(name: str, dims: tuple[str, ...], values: Any, meaning: str, **more: Any) -> None:
         text = attributes(f"check {id_}: {meaning}", "1", **more)
         table[name_of(id_, name)] = Variable(dims, np.asarray(values), text, GROUP)
 
-    by_member = sorted(found.results, key=lambda result: result.member)
+    by_member = sorted(checked.results, key=lambda result: result.member)
     for name, words in (("status", STATUSES), ("reason", REASON_NAMES)):
         codes = [words.index(getattr(result.verdict, name)) for result in by_member]
         add(name, ("case",), np.array(codes, dtype=np.int8), f"measured {name}", **flags(words))
-    # of numbers None becomes NaN
+    # None becomes NaN
     orders = np.array([result.verdict.order for result in by_member], float)
     add(ORDER, ("case",), orders, SOLVER_FACTS["converges"][ORDER])
-    for name, meaning in SOLVER_FACTS[found.check.kind].items():
+    for name, meaning in SOLVER_FACTS[checked.check.kind].items():
         add(name, ("case",), np.array([r.facts[name] for r in by_member], float), meaning)
     for name, meaning in COLUMNS.items():
         rows = [[getattr(row, name) for row in result.verdict.levels] for result in by_member]
         add(f"level_{name}", ("case", "level"), np.array(rows, float), meaning)
-    add("member", (), np.int64(decides.member), "member that decides")
-    shown = dataset(decides.verdict)
+    add("member", (), np.int64(decisive.member), "member that decides")
+    shown = dataset(decisive.verdict)
     for name in SHOWN:
         if name in shown:
             dims = ("level" if dim == "h" else _dim(id_, str(dim)) for dim in shown[name].dims)
             add(f"of_{name}", tuple(dims), shown[name].values, shown[name].attrs["long_name"])
-    for dim, points in decides.verdict.coords.items():
+    for dim, points in decisive.verdict.coords.items():
         add(f"at_{dim}", (_dim(id_, dim),), points, f"common points along {dim}")
     return table
 
 
-def _known(value: float) -> float | None:
+def _or_none(value: float) -> float | None:
     return None if math.isnan(value) else value
 
 
@@ -224,25 +224,25 @@ def _dim(id_: str, dim: str) -> str:
 
 
 def restored(
-    experiment: SolverExperiment, found: Record, check: SolverCheck, entry: Mapping[str, Any]
+    experiment: SolverExperiment, stored: Record, check: SolverCheck, entry: Mapping[str, Any]
 ) -> LadderVerdict:
-    """Return the verdict on the decisive member, from ``convergence.nc`` and the entry of a check in the summary."""
+    """Return the verdict on the decisive member, from ``convergence.nc`` and the entry of the check in the summary."""
     id_ = check.id
     result = entry["results"][0]
     facts = result["facts"]
-    member = int(found[name_of(id_, "member")])
-    columns = {name: found[name_of(id_, f"level_{name}")][member].tolist() for name in COLUMNS}
+    member = int(stored[name_of(id_, "member")])
+    columns = {name: stored[name_of(id_, f"level_{name}")][member].tolist() for name in COLUMNS}
     rows = zip(experiment.sizes[experiment.step], *columns.values(), strict=True)
-    known = [(h, *map(_known, entries)) for h, *entries in rows]
+    table = [(h, *map(_or_none, entries)) for h, *entries in rows]
     values, best = (name_of(id_, f"of_{name}") for name in SHOWN)
-    dims = found.variable(values).dims[1:] if values in found else ()
+    dims = stored.variable(values).dims[1:] if values in stored else ()
     head = _dim(id_, "")
     is_order = check.kind == "converges"
     return LadderVerdict(
         quantity=str(check.about),
         status=result["status"],
         reason=result["reason"],
-        order=_known(float(found[name_of(id_, ORDER)][member])),
+        order=_or_none(float(stored[name_of(id_, ORDER)][member])),
         order_low=facts.get("order_low"),
         order_high=facts.get("order_high"),
         h_used=tuple(facts.get("h_used") or ()),
@@ -254,15 +254,15 @@ def restored(
         gci=facts["gci"],
         sentence=entry["text"],
         advice=entry["advice"],
-        levels=tuple(Level(*row) for row in known),
+        levels=tuple(Level(*row) for row in table),
         expected=getattr(check, "order", None) if is_order else None,
         at_least=getattr(check, "at_least", None) if is_order else None,
         size_name=experiment.step,
         is_exact_known=experiment.quantities[str(check.about)].exact is not None,
         dims=tuple(dim.removeprefix(head) for dim in dims),
-        coords={dim.removeprefix(head): found[dim] for dim in dims if dim in found},
-        values=found[values]
-        if values in found
-        else np.array([row[1] for row in known], dtype=float),
-        best_values=np.asarray(found[best]) if best in found else None,
+        coords={dim.removeprefix(head): stored[dim] for dim in dims if dim in stored},
+        values=stored[values]
+        if values in stored
+        else np.array([row[1] for row in table], dtype=float),
+        best_values=np.asarray(stored[best]) if best in stored else None,
     )

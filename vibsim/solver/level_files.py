@@ -1,4 +1,4 @@
-"""Values of levels from netCDF files of any program, a file for each level."""
+"""Read the values of levels from netCDF files of any program, one file for each level."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from vibsim.core.errors import Fault, InputError, nearest
 from vibsim.solver.level_tables import Study, check_sizes
 
 MAGIC = (b"CDF", b"\x89HDF")
-"""With what the files of netCDF 3 and 4 begin."""
+"""First bytes of netCDF 3 and 4 files."""
 
 
 def is_netcdf(path: Path) -> bool:
-    """Tell whether a file is one of netCDF; InputError where it cannot be read."""
+    """Tell whether a file is a netCDF file; raise InputError where it cannot be read."""
     try:
         with regular_files.reading(path) as stream:
             return stream.read(4).startswith(MAGIC)
@@ -29,44 +29,44 @@ def is_netcdf(path: Path) -> bool:
 
 
 def read(paths: Sequence[Path], size: str, quantities: Sequence[str]) -> list[Study]:
-    """Return the studies that files hold, one for each variable.
+    """Return a study for each variable in the files.
 
     Parameters
     ----------
     paths
-        A file for each level.
+        One file for each level.
     size
-        Name of an attribute or of a variable with one value, the step size of a file; or the step sizes themselves,
-        separated by commas, in the order of the files.
+        Name of an attribute, or of a variable with one value, that holds the step size of a file; or the step sizes
+        themselves, separated by commas, in the order of the files.
     quantities
-        Names of the variables; in a group ``group/name``.
+        Names of the variables; ``group/name`` for a variable in a group.
 
     Raises
     ------
     InputError
-        Where a file cannot be read, or does not have them.
+        Where a file cannot be read, or lacks the step size or a variable.
     """
     if not quantities:
         with opened(paths[0]) as dataset:
-            sized = (name for name in dataset.variables if name not in (*dataset.dimensions, size))
-            hint = f"choose from {', '.join(sized)}"
+            names = (name for name in dataset.variables if name not in (*dataset.dimensions, size))
+            hint = f"choose from {', '.join(names)}"
         _refuse(str(paths[0]), "--quantity", "", "must name the variables to be judged", hint)
     listed = _listed(size)
     if listed is not None and len(listed) != len(paths):
         rule = f"has {len(listed)} step sizes for {len(paths)} files"
         _refuse("vibsim judge", "--h", size, rule)
-    names = list(dict.fromkeys(quantities))
+    chosen = list(dict.fromkeys(quantities))
     h: list[float] = []
-    values: dict[str, list[GridValues]] = {name: [] for name in names}
+    values: dict[str, list[GridValues]] = {name: [] for name in chosen}
     for i, path in enumerate(paths):
         with opened(path) as dataset:
             h.append(listed[i] if listed is not None else _step_size(str(path), dataset, size))
-            for name in names:
+            for name in chosen:
                 values[name].append(grid_values(str(path), dataset, name, key="--quantity"))
     files = [str(path) for path in paths]
     check_sizes(((file, 0) for file in files), size if listed is None else "h", h)
     key = "h" if listed is not None else size.rpartition("/")[2]
-    return [Study(name, {key: h}, values[name], files) for name in names]
+    return [Study(name, {key: h}, values[name], files) for name in chosen]
 
 
 def _refuse(file: str, key: str, value: str, rule: str, hint: str = "") -> NoReturn:
@@ -74,7 +74,7 @@ def _refuse(file: str, key: str, value: str, rule: str, hint: str = "") -> NoRet
 
 
 def _listed(size: str) -> list[float] | None:
-    """Return step sizes that are given as a list; None for a name."""
+    """Return the step sizes in a comma-separated list; None if `size` is a name."""
     try:
         return [float(part) for part in size.split(",")]
     except ValueError:
@@ -84,7 +84,7 @@ def _listed(size: str) -> list[float] | None:
 
 
 def opened(path: Path) -> Any:
-    """Return the dataset of a netCDF file; InputError where the library cannot read it."""
+    """Open a netCDF file; raise InputError where the library cannot read it."""
     try:
         return netcdf.foreign(path)
     except (OSError, RuntimeError) as error:
@@ -92,7 +92,7 @@ def opened(path: Path) -> Any:
 
 
 def _variable(dataset: Any, name: str) -> Any | None:
-    """Return a variable of the root, or of a group by its path; None where there is none."""
+    """Return a variable of the root group, or of another group by its path; None if it does not exist."""
     *groups, last = name.strip("/").split("/")
     for group in groups:
         if group not in dataset.groups:
@@ -102,7 +102,7 @@ def _variable(dataset: Any, name: str) -> Any | None:
 
 
 def _step_size(file: str, dataset: Any, name: str) -> float:
-    """Return the step size of a file, an attribute or a variable with one value."""
+    """Return the step size of a file, from an attribute or a variable with one value."""
     variable = _variable(dataset, name)
     if name in dataset.ncattrs():
         value = np.asarray(dataset.getncattr(name))
@@ -123,14 +123,15 @@ def _step_size(file: str, dataset: Any, name: str) -> float:
 def grid_values(
     file: str, dataset: Any, name: str, dims: Sequence[str] | None = None, key: str = ""
 ) -> GridValues:
-    """Return a variable of the root of a dataset, or of a group by its path; `key` is the option that names it.
+    """Return the values of a variable of the root group, or of another group by its path.
 
-    A dimension along which lies one of the coordinates `dims` that are wanted gets the name of that.
+    `dims` are requested coordinates: a dimension with such a coordinate takes its name. `key` is the option that names
+    the variable, for messages.
 
     Raises
     ------
     InputError
-        Where there is no such variable, or it holds no real numbers.
+        Where the variable does not exist, or does not hold real numbers.
     """
     variable = _variable(dataset, name)
     if variable is None:
@@ -143,21 +144,21 @@ def grid_values(
     except InputError as error:
         fault = error.faults[0]
         _refuse(file, name, fault.value, fault.rule, fault.hint)
-    places = {dim: dim for dim in variable.dimensions}
-    for wanted in dims or ():
-        along: Sequence[str] = getattr(_variable(dataset, wanted), "dimensions", ())
-        if wanted not in places and len(along) == 1 and along[0] in places:
-            places[along[0]] = wanted
-    rows = ((name, _coordinate(variable, dataset, dim, name)) for dim, name in places.items())
-    found = {name: row for name, row in rows if row is not None}
+    new_names = {dim: dim for dim in variable.dimensions}
+    for requested in dims or ():
+        along: Sequence[str] = getattr(_variable(dataset, requested), "dimensions", ())
+        if requested not in new_names and len(along) == 1 and along[0] in new_names:
+            new_names[along[0]] = requested
+    rows = ((new, _coordinate(variable, dataset, dim, new)) for dim, new in new_names.items())
+    coordinates = {new: row for new, row in rows if row is not None}
     return GridValues(
         values,
-        tuple(places.values()),
-        {name: _points(row) for name, row in found.items()},
+        tuple(new_names.values()),
+        {new: _points(row) for new, row in coordinates.items()},
         name,
         epsilon,
         units_in(_attributes(variable))[0],
-        {name: units_in(_attributes(row)) for name, row in found.items()},
+        {new: units_in(_attributes(row)) for new, row in coordinates.items()},
     )
 
 
@@ -173,17 +174,17 @@ def _points(coordinate: Any) -> NDArray[Any]:
     return np.ma.filled(points, np.nan) if is_float else plain_coordinate(np.asarray(points))
 
 
-def _coordinate(variable: Any, dataset: Any, dim: str, wanted: str) -> Any | None:
-    """Return the coordinate of a dimension of a variable; None where it has none.
+def _coordinate(variable: Any, dataset: Any, dim: str, name: str) -> Any | None:
+    """Return the coordinate of a dimension of a variable; None if it has none.
 
-    It is the variable of a name that is wanted, by default that of the dimension, in the group of the values or in the
-    root; else the one along that dimension alone that the attribute ``coordinates`` of the values names (CF
-    conventions).
+    It is a one-dimensional variable along this dimension, in the group of the values or in the root group: the one
+    called `name`, else the one called as the dimension, else one that the attribute ``coordinates`` of the values lists
+    (CF conventions).
     """
-    named = str(getattr(variable, "coordinates", "")).split()
+    listed = str(getattr(variable, "coordinates", "")).split()
     scopes: tuple[Mapping[str, Any], ...] = (variable.group().variables, dataset.variables)
-    for scope, name in product(scopes, (wanted, dim, *named)):
-        found = scope.get(name)
-        if found is not None and found.dimensions == (dim,):
-            return found
+    for scope, key in product(scopes, (name, dim, *listed)):
+        candidate = scope.get(key)
+        if candidate is not None and candidate.dimensions == (dim,):
+            return candidate
     return None

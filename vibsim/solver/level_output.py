@@ -1,4 +1,4 @@
-"""What a solver wrote for one level: from its file or its dataset to values, and to the record that is stored."""
+"""The output of a user's solver for one level: read its file or dataset, and make the Record that is stored."""
 
 from __future__ import annotations
 
@@ -23,15 +23,15 @@ Quantities = Mapping[str, QuantitySection]
 LEVEL = "level"
 """Name of the coordinate with the position of a level, the coarsest 0."""
 EPSILON = "epsilon"
-"""Attribute with the distance of neighbouring numbers near 1 in the precision that values were computed in."""
+"""Attribute with the machine epsilon of the precision that the values were computed in."""
 WRITTEN = "written"
 """Attribute of a number with the digits that it was written with in a table."""
 
 
 def read(path: Path, quantities: Quantities, *, is_shown: bool = True) -> dict[str, GridValues]:
-    """Return the quantities in a netCDF or CSV file; VibsimError where it does not have them as they are wanted.
+    """Return the quantities in a netCDF or CSV file; raise VibsimError where one is missing or has other coordinates.
 
-    `is_shown`: whether messages may show what is in a table; see `vibsim.solver.level_tables.columns`.
+    `is_shown`: whether messages may show the content of a table; see `vibsim.solver.level_tables.columns`.
     """
     if level_files.is_netcdf(path):
         with level_files.opened(path) as dataset:
@@ -45,28 +45,28 @@ def read(path: Path, quantities: Quantities, *, is_shown: bool = True) -> dict[s
 
 
 def from_dataset(dataset: Any, quantities: Quantities) -> dict[str, GridValues]:
-    """Return the quantities in what a function returned; VibsimError where it does not have them as they are wanted."""
+    """Return the quantities in a function's result; raise VibsimError where one is missing or has other coordinates."""
     if not hasattr(dataset, "data_vars"):
         kind = type(dataset).__name__
         raise VibsimError(f"returned a value of type {kind}, and must return an xarray.Dataset")
-    found = {}
+    values = {}
     for name, row in quantities.items():
         if name not in dataset.variables:
             hint = nearest(name, list(map(str, dataset.data_vars)))
             raise VibsimError(f"{name}: the dataset has no such variable: {hint}")
         array = dataset[name]
-        for wanted in row.coordinates or ():
-            if wanted not in array.dims and wanted in array.coords:
-                array = array.swap_dims(dict.fromkeys(array.coords[wanted].dims, wanted))
+        for requested in row.coordinates or ():
+            if requested not in array.dims and requested in array.coords:
+                array = array.swap_dims(dict.fromkeys(array.coords[requested].dims, requested))
         try:
-            found[name] = _checked(name, grid_values(array, name), row)
+            values[name] = _checked(name, grid_values(array, name), row)
         except InputError as error:
             raise VibsimError(f"{name}: {error.faults[0].value} {error.faults[0].rule}") from None
-    return found
+    return values
 
 
 def _from_table(path: Path, quantities: Quantities, is_shown: bool) -> dict[str, GridValues]:
-    """Return the quantities in the columns of a table: a row for each point, or a single one."""
+    """Return the quantities in the columns of a table with a row for each point, or a single row."""
     columns = [name for row in quantities.values() for name in row.coordinates or ()]
     names = list(dict.fromkeys([*columns, *quantities]))
     table, first = level_tables.columns(path, names, MOST_LINES, is_shown=is_shown)
@@ -81,7 +81,7 @@ def _from_table(path: Path, quantities: Quantities, is_shown: bool) -> dict[str,
 def _on_grid(
     name: str, table: Mapping[str, Floats], first: Mapping[str, Decimal], dims: Sequence[str]
 ) -> GridValues:
-    """Return a column as values on the grid of its coordinates; without them a number, or a series over the rows."""
+    """Return a column as values on the grid of its coordinates `dims`; without these a number, or one value per row."""
     column = table[name]
     if not dims:
         if len(column) == 1:
@@ -100,20 +100,20 @@ def _on_grid(
     return GridValues(values.reshape(shape), tuple(dims), coords, name)
 
 
-def _checked(name: str, values: GridValues, wanted: QuantitySection) -> GridValues:
-    """Return values with the coordinates that are wanted; VibsimError where they have others."""
+def _checked(name: str, values: GridValues, quantity: QuantitySection) -> GridValues:
+    """Return values if their coordinates are valid and those of the experiment; else raise VibsimError."""
     for dim, points in values.coords.items():
         if points.dtype.kind == "f" and not np.isfinite(points).all():
             raise VibsimError(f"{name}: coordinate {dim} must be finite")
         if len(np.unique(points)) < len(points):
             raise VibsimError(f"{name}: the points of coordinate {dim} must differ from each other")
-    if wanted.coordinates is None:
+    if quantity.coordinates is None:
         return values
-    if set(values.dims) != set(wanted.coordinates):
-        found = ", ".join(values.dims) or "none (a number)"
-        rule = f"has the dimensions {found}, and must have {', '.join(wanted.coordinates)}"
+    if set(values.dims) != set(quantity.coordinates):
+        actual = ", ".join(values.dims) or "none (a number)"
+        rule = f"has the dimensions {actual}, and must have {', '.join(quantity.coordinates)}"
         raise VibsimError(f"{name}: {rule}")
-    missing = [dim for dim in wanted.coordinates if dim not in values.coords]
+    missing = [dim for dim in quantity.coordinates if dim not in values.coords]
     if missing:
         raise VibsimError(f"{name}: dimension {missing[0]} has no coordinate")
     return values
@@ -122,7 +122,7 @@ def _checked(name: str, values: GridValues, wanted: QuantitySection) -> GridValu
 def record(
     experiment: SolverExperiment, level: int, member: int, values: Mapping[str, GridValues]
 ) -> Record:
-    """Return what is stored of a level: its quantities and their coordinates, its sizes and parameters.
+    """Return the stored Record of a level: its quantities with their coordinates, its sizes and its parameters.
 
     Raises
     ------
@@ -137,9 +137,9 @@ def record(
     for name, parameter in experiment.parameters_of(member).items():
         coords[name] = plain((), parameter, f"parameter {name}")
     lengths: dict[str, int] = {}
-    for name, one in values.items():
-        for dim, length in zip(one.dims, one.values.shape, strict=True):
-            points = one.coords.get(dim)
+    for name, quantity in values.items():
+        for dim, length in zip(quantity.dims, quantity.values.shape, strict=True):
+            points = quantity.coords.get(dim)
             known = coords.get(dim)
             is_other = known is not None and (
                 points is None or not np.array_equal(known.values, points)
@@ -147,29 +147,30 @@ def record(
             if lengths.setdefault(dim, length) != length or is_other:
                 raise VibsimError(f"{name}: has other points along {dim} than another quantity")
             if points is not None and known is None:
-                unit, calendar = one.units_of_coords.get(dim, (NO_UNIT, ""))
+                unit, calendar = quantity.units_of_coords.get(dim, (NO_UNIT, ""))
                 more = {"calendar": calendar} if SINCE in unit else {}
                 text = attributes(f"coordinate {dim}", unit or NO_UNIT, **more)
                 coords[dim] = Variable((dim,), np.asarray(points), text)
     variables = {}
-    for name, one in values.items():
-        digits = {} if one.written is None else {WRITTEN: str(one.written)}
-        text = attributes(name, one.units or NO_UNIT, **{EPSILON: one.epsilon}, **digits)
-        variables[name] = Variable(one.dims, one.values, text)
+    for name, quantity in values.items():
+        digits = {} if quantity.written is None else {WRITTEN: str(quantity.written)}
+        units = quantity.units or NO_UNIT
+        text = attributes(name, units, **{EPSILON: quantity.epsilon}, **digits)
+        variables[name] = Variable(quantity.dims, quantity.values, text)
     return Record(coords, variables)
 
 
 def plain(dims: tuple[str, ...], values: Any, text: str) -> Variable:
-    """Return what is stored of values without a unit."""
+    """Return a variable without a unit."""
     return Variable(dims, np.asarray(values), attributes(text, "1"))
 
 
-def stored(found: Record, name: str) -> GridValues:
-    """Return a quantity of a level as it was stored."""
-    variable = found.variable(name)
+def stored(level: Record, name: str) -> GridValues:
+    """Return a quantity from the stored Record of a level."""
+    variable = level.variable(name)
     epsilon = variable.attrs[EPSILON]
     assert isinstance(epsilon, float)
-    coords = {dim: found[dim] for dim in variable.dims if dim in found.coords}
+    coords = {dim: level[dim] for dim in variable.dims if dim in level.coords}
     digits = variable.attrs.get(WRITTEN)
     return GridValues(
         np.asarray(variable.values),
@@ -178,6 +179,6 @@ def stored(found: Record, name: str) -> GridValues:
         name,
         epsilon,
         units_in(variable.attrs)[0],
-        {dim: units_in(found.coords[dim].attrs) for dim in coords},
+        {dim: units_in(level.coords[dim].attrs) for dim in coords},
         None if digits is None else Decimal(str(digits)),
     )

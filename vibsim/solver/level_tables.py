@@ -1,4 +1,4 @@
-"""Numbers of levels from a table: a row for each level, a column of step sizes, and a column for each quantity."""
+"""Read a table with a row for each level, a column of step sizes, and a column for each quantity."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ MOST_LEVELS = csv_text.ROWS_WRITTEN
 
 @dataclass(frozen=True)
 class Study:
-    """The levels of one quantity, in the order of the file or the files."""
+    """The levels of one quantity, in the order of the rows or the files."""
 
     quantity: str
     h: Mapping[str, Sequence[float]]
@@ -30,7 +30,7 @@ class Study:
 
 
 def read(path: Path, size: str, quantities: Sequence[str]) -> list[Study]:
-    """Return the studies that a table holds.
+    """Return a study for each quantity in a table.
 
     Parameters
     ----------
@@ -39,12 +39,12 @@ def read(path: Path, size: str, quantities: Sequence[str]) -> list[Study]:
     size
         Name of the column of step sizes.
     quantities
-        Names of the columns of numbers; none for all others.
+        Names of the columns of quantities; empty for all other columns.
 
     Raises
     ------
     InputError
-        With the file, the line, the column, the value and the rule that it breaks.
+        Where the table is invalid; it names file, line, column and value, and the rule that the value breaks.
     """
     file = str(path)
     names: list[str] = []
@@ -76,25 +76,25 @@ def _as_written(cell: str) -> Decimal:
 def columns(
     path: Path, names: Sequence[str], most: int, *, is_shown: bool
 ) -> tuple[dict[str, Floats], dict[str, Decimal]]:
-    """Return the columns `names` of a table of `most` rows at most, and their first numbers as they are written.
+    """Return the columns `names` of a table with up to `most` rows, and their first numbers with their digits.
 
-    InputError as `read`.
+    Raises InputError, as `read`.
 
-    Where the file may be anything (`is_shown` is false), no message shows what is in it but numbers.
+    With `is_shown` false, the file may be anything, and messages show only numbers of its content.
     """
 
     def choose(known: list[str], is_table: bool) -> Sequence[str]:
         for name in names:
             if known.count(name) != 1:
-                what = "more than one such column" if name in known else "no such column"
+                problem = "more than one such column" if name in known else "no such column"
                 hint = _hint(name, known) if name not in known and (is_shown or is_table) else ""
-                raise InputError([Fault(str(path), 0, "", name, f"the table has {what}", hint)])
+                raise InputError([Fault(str(path), 0, "", name, f"the table has {problem}", hint)])
         return names
 
     cells: list[list[str]] = []
-    found, _ = _read(path, choose, most, cells, is_shown=is_shown)
+    values, _ = _read(path, choose, most, cells, is_shown=is_shown)
     first = map(_as_written, cells[0]) if cells else ()
-    return dict(zip(names, found, strict=True)), dict(zip(names, first, strict=False))
+    return dict(zip(names, values, strict=True)), dict(zip(names, first, strict=False))
 
 
 def _read(
@@ -105,9 +105,9 @@ def _read(
     *,
     is_shown: bool = True,
 ) -> tuple[list[Floats], Integers]:
-    """Return the columns that `choose` names of those that there are, and the line of every row.
+    """Return the columns that `choose` selects from the names of all columns, and the line of every row.
 
-    `cells` takes those of these columns.
+    The cells of these columns are appended to `cells`.
     """
 
     def numbers(known: list[str], is_table: bool) -> list[int]:
@@ -122,37 +122,37 @@ def _read(
 
 
 def _printable(text: str) -> str:
-    """Return a text as a terminal can show it: what controls terminals is written out."""
+    """Return a text with control characters escaped, so that a terminal can show it."""
     return text if text.isprintable() else ascii(text)
 
 
 def _chosen(file: str, known: list[str], size: str, quantities: Sequence[str]) -> list[str]:
-    """Return the names of the columns that are judged; InputError where the table does not have them."""
+    """Return the names of the columns to be judged; raise InputError where the table lacks one."""
     if all(csv_text.is_shown(name) for name in known):
         raise InputError([Fault(file, 1, "", ",".join(known), "must be the names of the columns")])
     chosen = list(dict.fromkeys(quantities)) or [name for name in known if name != size]
-    found: list[tuple[str, str, str, str]] = []
+    faults: list[tuple[str, str, str, str]] = []
     for name, option in ((size, "--h"), *((name, "--quantity") for name in chosen)):
         if name not in known:
-            found.append((option, name, "the table has no such column", _hint(name, known)))
+            faults.append((option, name, "the table has no such column", _hint(name, known)))
         elif known.count(name) > 1:
-            found.append((option, name, "the table has more than one such column", ""))
+            faults.append((option, name, "the table has more than one such column", ""))
         elif not name.isprintable():
-            found.append((option, _printable(name), "must be printable", ""))
+            faults.append((option, _printable(name), "must be printable", ""))
         elif not name:
             hint = "name it, or choose with --quantity"
-            found.append(("", "", "has a column without a name", hint))
+            faults.append(("", "", "has a column without a name", hint))
     if size in quantities:
-        found.append(("--quantity", size, "holds the step sizes (--h)", ""))
+        faults.append(("--quantity", size, "holds the step sizes (--h)", ""))
     if not chosen:
-        found.append(("", "", f"has no column beside '{size}'", ""))
-    if found:
-        raise InputError(dict.fromkeys(Fault(file, 0, *fault) for fault in found))
+        faults.append(("", "", f"has no column beside '{size}'", ""))
+    if faults:
+        raise InputError(dict.fromkeys(Fault(file, 0, *fault) for fault in faults))
     return chosen
 
 
 def _hint(name: str, known: list[str]) -> str:
-    """Return what to do where a table does not have a column."""
+    """Return a hint for a column that the table lacks."""
     if all(csv_text.is_shown(other) for other in known):
         return "the first line must hold the names of the columns"
     if len(known) == 1 and name in known[0].split():
@@ -166,9 +166,9 @@ def check_sizes(places: Iterable[tuple[str, int]], key: str, h: Sequence[float])
     Parameters
     ----------
     places
-        Where each stands: the file, and its line, 0 in a file with one step size.
+        File and line of each step size; line 0 for a file with a single one.
     key
-        What has the step sizes there.
+        Name of the step size in the files.
     """
     faults, seen = [], dict[float, str]()
     for (file, line), size in zip(places, h, strict=True):

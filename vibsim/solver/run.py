@@ -1,4 +1,4 @@
-"""Make one level of an experiment with a solver of the user: run its command, call its function, or read its file."""
+"""Make one level with the user's own solver: run its command, call its function, or read its file."""
 
 from __future__ import annotations
 
@@ -25,31 +25,31 @@ def make(
     experiment: SolverExperiment,
     level: int,
     member: int,
-    place: Path,
+    work: Path,
     threads: int = 1,
 ) -> dict[str, GridValues]:
-    """Return the quantities of one level of one member.
+    """Return the quantities of one member at one level.
 
     Parameters
     ----------
-    place
+    work
         An empty folder for the output of a command.
     threads
-        What stands for ``{threads}``.
+        The value of ``{threads}`` in the command.
 
     Raises
     ------
     VibsimError
-        Where the solver fails, or its output is not as the experiment says; where it cannot be read, InputError.
+        Where the solver fails, or its output is not as the experiment says; InputError where it cannot be read.
     """
     kind, quantities = experiment.solver.kind, experiment.quantities
     if kind == "files":
         path = experiment.folder / experiment.path(level, member)
-        # nobody has looked at the file, which may be a link to anything
+        # the file is untrusted: it may be a link to any file of the user, so messages must not show its content
         return level_output.read(path, quantities, is_shown=False)
     if kind == "python":
         return level_output.from_dataset(_called(experiment, level, member), quantities)
-    files = {name: str(place / (name if "." in name else f"{name}.nc")) for name in OUTPUTS}
+    files = {name: str(work / (name if "." in name else f"{name}.nc")) for name in OUTPUTS}
     command = experiment.arguments(level, member, {**files, "threads": str(threads)})
     _run(command, experiment.folder)
     written = [path for path in map(Path, dict.fromkeys(files.values())) if path.exists()]
@@ -63,16 +63,16 @@ def make(
 
 
 def _run(command: list[str], folder: Path) -> None:
-    """Run a program without a shell, which ends with this process; what it prints goes where this process prints."""
+    """Run a program without a shell; it ends with this process, and shares its stdout and stderr."""
     sys.stdout.flush()
     prepare = partial(end_with, os.getpid())
-    # the programs beside this Python come first, as in jobs of the workflow
-    places = (str(Path(sys.executable).parent), os.environ.get("PATH", os.defpath))
+    # programs in the folder of this Python come first, as in jobs of the workflow
+    folders = (str(Path(sys.executable).parent), os.environ.get("PATH", os.defpath))
     try:
         ended = subprocess.run(
             command,
             cwd=folder,
-            env=os.environ | {"PATH": os.pathsep.join(places)},
+            env=os.environ | {"PATH": os.pathsep.join(folders)},
             stdin=subprocess.DEVNULL,
             preexec_fn=prepare,
             check=False,
@@ -89,20 +89,21 @@ def _run(command: list[str], folder: Path) -> None:
 
 
 def _called(experiment: SolverExperiment, level: int, member: int) -> Any:
-    """Return what the function of the user returns; its module may stand beside the experiment file."""
+    """Call the user's function and return its result; its module may be in the folder of the experiment file."""
     text = experiment.solver.text
-    module, _, name = text.partition(":")
+    module_name, _, name = text.partition(":")
     arguments = {**experiment.sizes_of(level), **experiment.parameters_of(member)}
     folder = str(experiment.folder.absolute())
     if folder not in sys.path:
-        # behind everything that is installed
+        # last, so that installed packages come first
         sys.path.append(folder)
     with chdir(folder):
         try:
-            found = importlib.import_module(module)
-            if not callable(getattr(found, name, None)):
-                raise VibsimError(f"{module} has no function {name}: {nearest(name, dir(found))}")
-            function = getattr(found, name)
+            module = importlib.import_module(module_name)
+            function = getattr(module, name, None)
+            if not callable(function):
+                hint = nearest(name, dir(module))
+                raise VibsimError(f"{module_name} has no function {name}: {hint}")
             if misfits := misfit(function, **arguments):
                 takes, why = misfits
                 rule = "it gets sizes and parameters by name, and returns an xarray.Dataset"

@@ -1,4 +1,4 @@
-"""What is decided of the levels of a solver: a check of a quantity, of one member, with its facts and its words."""
+"""Decide a check on the levels of a user's solver, for one member: the verdict, its facts and its sentences."""
 
 from __future__ import annotations
 
@@ -35,16 +35,16 @@ from vibsim.formula import values as formula_values
 
 @dataclass(frozen=True)
 class SolverResult:
-    """What was decided of one check and one member."""
+    """The result of one check for one member."""
 
     member: int
     verdict: LadderVerdict
-    """With status, reason, sentence and advice of the check."""
+    """Verdict with the status, reason, sentence and advice of the check."""
     compared: str
-    """The status after comparison with what was expected."""
+    """The status after comparison with the expected one."""
     facts: dict[str, Any]
     away: float
-    """How far the outcome is from what was asked; larger is worse."""
+    """Distance of the outcome from the expectation; larger is worse."""
 
 
 def judge(
@@ -61,7 +61,7 @@ def judge(
     quantity = experiment.quantities[str(check.about)]
     restrict = quantity.restrict
     try:
-        (found,) = verdicts(
+        (verdict,) = verdicts(
             _steps(experiment),
             values,
             quantity=check.about,
@@ -73,21 +73,21 @@ def judge(
         )
     except InputError as error:
         fault = error.faults[0]
-        key = fault.key if fault.key.startswith("level") else _place(values, restrict) + fault.key
+        key = fault.key if fault.key.startswith("level") else _misfit(values, restrict) + fault.key
         parts = (str(check.about), key, fault.value, fault.rule, fault.hint)
         raise VibsimError(": ".join(dict.fromkeys(filter(None, parts)))) from None
     if isinstance(check, SolverAccurateCheck):
-        found, facts, away = _accuracy(check, found)
+        verdict, facts, away = _accuracy(check, verdict)
     else:
-        facts, away = _order(experiment, check, found)
-    (status,) = as_expected(check.expect, np.array([code(found.reason)]))
-    return SolverResult(member, found, STATUSES[status], facts, away)
+        facts, away = _order(experiment, check, verdict)
+    (status,) = as_expected(check.expect, np.array([code(verdict.reason)]))
+    return SolverResult(member, verdict, STATUSES[status], facts, away)
 
 
 def _exact(
     quantity: QuantitySection, parameters: Mapping[str, Any], dims: Sequence[str]
 ) -> Callable[..., Floats] | Floats | None:
-    """Return the exact values of a quantity of a member, as a function of its coordinates where it has some."""
+    """Return the exact value of a quantity, as a function of its coordinates if it has any; None if unknown."""
     if quantity.exact is None:
         return None
     numbers = {name: value for name, value in parameters.items() if not isinstance(value, str)}
@@ -99,8 +99,8 @@ def _exact(
     return at if dims else at()
 
 
-def _place(values: Sequence[GridValues], restrict: str) -> str:
-    """Name the first level that cannot be compared with the coarsest one; empty where each can."""
+def _misfit(values: Sequence[GridValues], restrict: str) -> str:
+    """Return the first level that cannot be compared with the coarsest one, as text; empty if all can."""
     for level in range(1, len(values)):
         try:
             common_values([values[0], values[level]], restrict, None)
@@ -110,18 +110,18 @@ def _place(values: Sequence[GridValues], restrict: str) -> str:
 
 
 def _promise(experiment: SolverExperiment, check: SolverCheck) -> SolverConvergesCheck | None:
-    """Return the check that says which order is expected: of an accuracy another one of the same quantity, if any."""
+    """Return the check with the expected order: for an `accurate` check, another check of the same quantity, if any."""
     if isinstance(check, SolverConvergesCheck):
         return check
     for other in experiment.checks:
-        is_ours = other.about == check.about and other.expect == Expect()
-        if is_ours and isinstance(other, SolverConvergesCheck):
+        matches = other.about == check.about and other.expect == Expect()
+        if matches and isinstance(other, SolverConvergesCheck):
             return other
     return None
 
 
 def _steps(experiment: SolverExperiment) -> dict[str, tuple[float, ...]]:
-    """Return the sizes that fall with the step size; others, such as numbers of cells, are no sizes of steps."""
+    """Return the step size, and other sizes that decrease with it; numbers of cells, for example, do not."""
     falling = {
         name: values
         for name, values in experiment.sizes.items()
@@ -131,71 +131,72 @@ def _steps(experiment: SolverExperiment) -> dict[str, tuple[float, ...]]:
 
 
 def _order(
-    experiment: SolverExperiment, check: SolverConvergesCheck, found: LadderVerdict
+    experiment: SolverExperiment, check: SolverConvergesCheck, verdict: LadderVerdict
 ) -> tuple[dict[str, Any], float]:
-    """Return the facts on an order, and how far it is from the expected one."""
-    places = [experiment.sizes[experiment.step].index(h) for h in found.h_used]
-    wanted = check.order or check.at_least
-    facts = {name: getattr(found, name, None) for name in SOLVER_FACTS["converges"]}
+    """Return the facts on an order, and its distance from the expected one."""
+    levels = [experiment.sizes[experiment.step].index(h) for h in verdict.h_used]
+    promised = check.order or check.at_least
+    facts = {name: getattr(verdict, name, None) for name in SOLVER_FACTS["converges"]}
     facts |= {
-        "promised": wanted,
-        "levels": [places[0], places[-1]] if places else None,
-        "h_used": list(found.h_used),
+        "promised": promised,
+        "levels": [levels[0], levels[-1]] if levels else None,
+        "h_used": list(verdict.h_used),
     }
-    if found.reason == "exact":
-        # no order that could be hard to reach
+    order = verdict.order
+    if verdict.reason == "exact":
+        # an exact result has no order to compare
         return facts, 0.0
-    return facts, math.inf if found.order is None else abs(found.order - (wanted or found.order))
+    return facts, math.inf if order is None else abs(order - (promised or order))
 
 
 def _accuracy(
-    check: SolverAccurateCheck, found: LadderVerdict
+    check: SolverAccurateCheck, verdict: LadderVerdict
 ) -> tuple[LadderVerdict, dict[str, Any], float]:
-    """Return the verdict on an error, its facts, and the bound of the error over what is allowed."""
-    size = abs(found.levels[-1].value or 0.0)
+    """Return the verdict on an error, its facts, and the ratio of the error bound to the allowed error."""
+    size = abs(verdict.levels[-1].value or 0.0)
     allowed = check.accuracy * (size if check.is_relative else 1.0)
-    error = None if found.error is None else abs(found.error)
-    bound = found.error_bound
-    is_error_known = found.is_exact_known or found.reason in ORDER_KNOWN
+    error = None if verdict.error is None else abs(verdict.error)
+    bound = verdict.error_bound
+    is_error_known = verdict.is_exact_known or verdict.reason in ORDER_KNOWN
     decides = is_error_known and error is not None and bound is not None
-    if found.reason == "non_finite":
+    if verdict.reason == "non_finite":
         reason = "non_finite"
     elif not allowed > 0.0:
         reason = "not_applicable"
     elif decides and error is not None and bound is not None:
-        # as far below the error as the bound is above it
+        # the lower bound is as far below the error as the upper bound is above it
         least = max(2.0 * error - bound, 0.0)
         reason = "match" if bound < allowed else "mismatch" if least > allowed else "pre_asymptotic"
     else:
-        reason = found.reason
-    facts = {name: getattr(found, name, None) for name in SOLVER_FACTS["accurate"]}
+        reason = verdict.reason
+    facts = {name: getattr(verdict, name, None) for name in SOLVER_FACTS["accurate"]}
     facts |= {"size": size, "accuracy": check.accuracy}
-    sentence, advice = _words(check, found, reason, size, decides)
-    changed = replace(
-        found, status=REASONS[reason], reason=reason, sentence=sentence, advice=advice
+    sentence, advice = _words(check, verdict, reason, size, decides)
+    decided = replace(
+        verdict, status=REASONS[reason], reason=reason, sentence=sentence, advice=advice
     )
     away = math.inf if bound is None or not allowed > 0.0 else bound / allowed
-    return changed, facts, away
+    return decided, facts, away
 
 
 def _words(
-    check: SolverAccurateCheck, found: LadderVerdict, reason: str, size: float, decides: bool
+    check: SolverAccurateCheck, verdict: LadderVerdict, reason: str, size: float, decides: bool
 ) -> tuple[str, str]:
     """Return sentence and advice of a verdict on an error."""
     unit, of_size = (size, " of its size") if check.is_relative else (1.0, "")
     accuracy = f"as asked ({number(check.accuracy, 3)}{of_size})"
-    name, h = found.quantity, f"{found.size_name} = {number(found.levels[-1].h, 6)}"
+    name, h = verdict.quantity, f"{verdict.size_name} = {number(verdict.levels[-1].h, 6)}"
     if reason == "non_finite":
-        return found.sentence, found.advice
+        return verdict.sentence, verdict.advice
     if reason == "not_applicable":
         return (
             f"{name} is 0, so it has no relative error.",
             "Give `absolute:` in place of `relative:`.",
         )
     if not decides:
-        finding = f"{name} may or may not be as accurate {accuracy}. {found.sentence}"
-        return finding, found.advice or "Add a finer level."
-    error, bound = abs(found.error or 0.0) / unit, (found.error_bound or 0.0) / unit
+        finding = f"{name} may or may not be as accurate {accuracy}. {verdict.sentence}"
+        return finding, verdict.advice or "Add a finer level."
+    error, bound = abs(verdict.error or 0.0) / unit, (verdict.error_bound or 0.0) / unit
     least = max(2.0 * error - bound, 0.0)
     finding = f"The error at {h} is {number(error, 2)}{of_size}"
     finer = f"Add a finer level, or change `{check.key}:`."
@@ -208,18 +209,18 @@ def _words(
 
 
 def expected(check: SolverCheck) -> str:
-    """Say what a check expects."""
+    """Return the expectation of a check in words."""
     if isinstance(check, SolverAccurateCheck):
         of_size = " of its size" if check.is_relative else ""
-        wanted = f"accurate to {number(check.accuracy, 3)}{of_size}"
+        text = f"accurate to {number(check.accuracy, 3)}{of_size}"
     elif check.order is not None:
-        wanted = f"order {check.order:g}"
+        text = f"order {check.order:g}"
     elif check.at_least is not None:
-        wanted = f"order {check.at_least:g} at least"
+        text = f"order {check.at_least:g} at least"
     else:
-        wanted = "an order that can be believed"
+        text = "an order that can be believed"
     expect = check.expect
     if (expect.status, expect.reason) == ("PASS", None):
-        return wanted
+        return text
     reason = f" ({expect.reason})" if expect.reason else ""
-    return f"{wanted}: {expect.status}{reason}"
+    return f"{text}: {expect.status}{reason}"

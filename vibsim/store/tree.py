@@ -47,7 +47,7 @@ def open(  # noqa: A001
         raise VibsimError(f"{folder}: no such folder")
     nodes = dict(_nodes(folder, chunks))
     if not nodes:
-        raise VibsimError(f"{folder}: no results lie in this folder")
+        raise VibsimError(f"{folder}: there are no results in this folder")
     return xr.DataTree.from_dict(nodes, name=folder.resolve().name)
 
 

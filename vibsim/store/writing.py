@@ -175,7 +175,7 @@ def _define_variable(
         if dims[-1] not in dataset.dimensions:
             dataset.createDimension(dims[-1], width)
     elif kind.kind not in "fiu":
-        raise ValueError(f"{name}: values of type {kind} have no place in a file")
+        raise ValueError(f"{name}: values of type {kind} cannot be stored")
     storage = _storage(dataset, variable.dims, kind, packed) if values.size and dims else {}
     group = dataset.createGroup(variable.group) if variable.group else dataset
     target = group.createVariable(name, kind, dims, fill_value=False, **storage)

@@ -1,4 +1,4 @@
-# All levels of one experiment compared, and the verdicts.
+# Compare all levels of one experiment and decide its checks.
 rule analyse:
     input:
         names.shards,

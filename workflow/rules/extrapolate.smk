@@ -1,4 +1,4 @@
-# The solution of one experiment extrapolated over all its levels, where it is asked for.
+# Extrapolate the solution of one experiment over all its levels (`output: best`).
 rule extrapolate:
     input:
         names.shards,

@@ -1,5 +1,5 @@
-# The page over all experiments: those chosen, and those that were found among the results. It takes no time, and is made
-# where the workflow runs.
+# The index of all experiments: the chosen ones, and others in the results folder. It is quick, so it is made where the
+# workflow runs.
 localrules:
     index,
 
@@ -25,7 +25,7 @@ rule index:
         'exec > {log:q} 2>&1; cd / && exec vibsim report --results "$OLDPWD"'
 
 
-# One page, its figures and its tables.
+# The report of one experiment, with its figures and tables.
 rule report:
     input:
         "{experiment}/convergence.nc",

@@ -1,4 +1,4 @@
-# Levels: several cheap ones in one job, or one file of one level. What is whole and up to date is kept.
+# Levels: one job makes several cheap levels, or one file of a level. It keeps files that are intact and up to date.
 for simulation in names.simulations:
 
     rule:

@@ -31,7 +31,7 @@ def explain(options: Namespace) -> int:
         return 0
     if options.reason not in REASONS:
         hint = nearest(options.reason, list(REASONS))
-        raise refusal("REASON", options.reason, "is no reason of a verdict", hint)
+        raise refusal("REASON", options.reason, "is not a reason of a verdict", hint)
     print(*_lines(options.reason), sep="\n")
     return 0
 

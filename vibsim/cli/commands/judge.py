@@ -67,7 +67,7 @@ def _studies(options: Namespace) -> list[Study]:
         return level_files.read(paths, options.h, quantities)
     first = paths[are_netcdf.index(False)]
     if len(paths) > 1:
-        rule = "is no netCDF file, and a table holds all levels itself"
+        rule = "is not a netCDF file, and a table holds all levels itself"
         hint = "name one table, or a netCDF file for each level; an experiment file with `solver: {files: ...}` "
         hint += "takes a CSV file for each level"
         raise InputError([Fault(str(first), 0, "", "", rule, hint)])
@@ -86,7 +86,7 @@ def _exact(entries: Sequence[str] | None, known: Sequence[str]) -> Mapping[str, 
         if not has_value or not name:
             _refuse("--exact", entry, "must be QUANTITY=VALUE", f"such as {known[0]}=1.5")
         if name not in known:
-            _refuse("--exact", name, "is no quantity that is judged", nearest(name, list(known)))
+            _refuse("--exact", name, "is not a judged quantity", nearest(name, list(known)))
         if name in exact:
             _refuse("--exact", name, "is given twice")
         try:

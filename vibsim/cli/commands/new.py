@@ -60,7 +60,7 @@ def new(options: Namespace) -> int:
     written[file.name] = "\n".join([f"{EDITOR}{schema}", *lines, ""]).encode()
     for name in written:
         if os.path.lexists(file.parent / name):
-            raise refusal("FILE", file.parent / name, "is there already, and is not overwritten")
+            raise refusal("FILE", file.parent / name, "exists already, and is not overwritten")
     if schema == SCHEMA:
         _write_schema(file.parent / SCHEMA)
     for name, content in written.items():
@@ -76,7 +76,7 @@ def _of_model(kind: str) -> list[str]:
     from vibsim.models import MODELS
 
     if kind not in MODELS:
-        raise refusal("--model", kind, "is no model", nearest(kind, sorted(MODELS)))
+        raise refusal("--model", kind, "is not a model", nearest(kind, sorted(MODELS)))
     return list(_lines(MODELS[kind]))
 
 
@@ -119,7 +119,7 @@ def _write_schema(path: Path) -> None:
         except (OSError, ValueError, AttributeError, RecursionError):
             title = None
         if title != content["title"]:
-            raise refusal("FILE", path, "is there already, and is no schema of vibsim")
+            raise refusal("FILE", path, "exists already, and is not a schema of vibsim")
     write_text(path, json.dumps(content, indent=2, ensure_ascii=False) + "\n")
 
 

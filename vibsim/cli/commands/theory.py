@@ -43,10 +43,8 @@ def theory(options: Namespace) -> int:
     if scheme.adaptive:
         rule = "chooses its own steps: there is no theory in w dt"
         raise refusal("SCHEME", scheme.kind, rule)
-    rows = theory_rows(
-        scheme, _options(scheme, options.options), options.terms, latex=options.latex
-    )
-    print(*laid_out(rows), sep="\n")
+    chosen = _options(scheme, options.options)
+    print(*laid_out(theory_rows(scheme, chosen, options.terms, latex=options.latex)), sep="\n")
     return 0
 
 
@@ -247,7 +245,7 @@ def _options(scheme: Scheme, words: Sequence[str]) -> Options:
         name, equals, value = word.partition("=")
         if name not in known:
             hint = nearest(name, list(known)) if known else "it has none"
-            raise refusal("OPTION", name, f"is no option of {scheme.kind}", hint)
+            raise refusal("OPTION", name, f"is not an option of {scheme.kind}", hint)
         if not equals:
             raise refusal("OPTION", word, "needs a value", f"such as {name}={values[name]}")
         values[name] = _value(known[name], value)
@@ -270,4 +268,4 @@ def _value(option: AnyOption, text: str) -> str | float | bool:
             value = constant(text)
             if option.least <= value <= option.most:
                 return value
-    raise refusal(option.name, text, "is no value of this option", hint)
+    raise refusal(option.name, text, "is not a valid value", hint)

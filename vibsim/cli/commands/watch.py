@@ -30,7 +30,7 @@ def watch(options: Namespace) -> int:
     """
     file: Path = options.file
     if file.suffix not in ENDINGS or not file.is_file():
-        raise refusal("FILE", file, "must be an experiment file that is there (.yaml)")
+        raise refusal("FILE", file, "must be an existing experiment file (.yaml)")
     while True:
         watched = _files(file, options.settings)
         before = _saved(watched)

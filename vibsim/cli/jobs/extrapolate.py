@@ -23,7 +23,7 @@ def extrapolate(options: Namespace) -> int:
     """Extrapolate the solution over all levels; write ``best.nc``."""
     plan, results = one_plan(options)
     if plan.best is None:
-        raise refusal("EXPERIMENT", options.experiment, "does not ask for `output: best`")
+        raise refusal("EXPERIMENT", options.experiment, "does not have `output: best`")
     check_digest(plan, options.digest, plan.extrapolation)
     from vibsim import store
     from vibsim.comparison.best_solution import best_record

@@ -31,7 +31,7 @@ def simulate(options: Namespace) -> int:
         make = solve.make
     if options.out is not None:
         if len(jobs) > 1:
-            raise refusal("--out", options.out, "is one file, and several levels are several")
+            raise refusal("--out", options.out, "is one file, and cannot hold several levels")
         make(plan, options.level[0], jobs[0], options.out, options.threads)
         return 0
     failed = []

@@ -63,7 +63,7 @@ def _problem(folder: Path, name: str, entries: dict[str, Entry], every: bool) ->
         if not stat.S_ISREG(status.st_mode):
             return "is not a file"
         if not known and path.suffix not in _SEALED:
-            return "has no entry in the record of what was made"
+            return "has no entry in the manifest"
         digest = made_files.content(path)
     except FileNotFoundError:
         return ""
@@ -78,7 +78,7 @@ def _problem(folder: Path, name: str, entries: dict[str, Entry], every: bool) ->
     else:
         entries[name] = known._replace(inode=status.st_ino)
         if status.st_mtime_ns != known.time:
-            # If this fails, only work is lost: Snakemake makes files again that seem older than their input.
+            # If this fails, only time is lost: Snakemake makes files again that seem older than their input.
             with suppress(OSError):
                 os.utime(path, ns=(status.st_atime_ns, known.time), follow_symlinks=False)
     return ""
@@ -92,7 +92,9 @@ def stale(plans: Sequence[Plan], results: Path) -> list[FileError]:
         for name, entry in made_files.load(results, plan.key).items():
             path = f"{plan.key}/{name}"
             if entry.job and jobs.get(path, entry.job) != entry.job and (results / path).exists():
-                errors.append(StaleFileError(results / path, "is of another input, title or code"))
+                errors.append(
+                    StaleFileError(results / path, "was made from another input, title or code")
+                )
     return errors
 
 

@@ -1,4 +1,4 @@
-"""``vibsim run``: run experiment files, repeating the workflow while results prove damaged, and show the verdicts."""
+"""``vibsim run``: run experiments, start the workflow again while results prove damaged, and show the verdicts."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def run(options: Namespace) -> int:
     """Run the chosen experiments and show every verdict."""
     with private_cache.provided() as problem:
         if problem:
-            text = f"the cache is not used ({problem}); this run has one of its own until it ends"
+            text = f"the cache is not used ({problem}); this run uses a temporary one"
             print(f"vibsim: {text}", file=sys.stderr, flush=True)
         return _run(options)
 
@@ -61,7 +61,7 @@ def _run(options: Namespace) -> int:
         return _dry_run(plans, results, target, options)
     if options.junit:
         junit.check_place(options.junit)
-    descriptor = lock.hold(results)
+    lock_fd = lock.hold(results)
     lock.claim(plans, results)
     results_folder.deleted(results)
     _clear(plans, results, options)
@@ -70,7 +70,7 @@ def _run(options: Namespace) -> int:
     progress = None if is_quiet else Progress()
     jobs: list[Job] = []
     for _ in range(_STAGES):
-        ended = _workflow(plans, results, descriptor, target, progress)
+        ended = _workflow(plans, results, lock_fd, target, progress)
         if ended.jobs:
             _refuse_edited(plans, options)
         summaries = [outcome.collect(plan, results) for plan in plans]
@@ -88,14 +88,14 @@ def _run(options: Namespace) -> int:
 def _workflow(
     plans: Sequence[Plan],
     results: Path,
-    descriptor: int,
+    lock_fd: int,
     target: Executor,
     progress: Progress | None = None,
 ) -> snakemake.Outcome:
     """Run Snakemake; if it breaks on its own records, delete these, since the manifest suffices, and run it again."""
-    ended = snakemake.run(plans, results, descriptor, target, progress)
+    ended = snakemake.run(plans, results, lock_fd, target, progress)
     if ended.broke and results_folder.forget(results):
-        return snakemake.run(plans, results, descriptor, target, progress)
+        return snakemake.run(plans, results, lock_fd, target, progress)
     return ended
 
 
@@ -144,17 +144,17 @@ def _dry_run(plans: Sequence[Plan], results: Path, target: Executor, options: Na
     with ExitStack() as stack:
         if not results.exists():
             results = stack.enter_context(temporary_folder())
-        descriptor = lock.hold(results)
+        lock_fd = lock.hold(results)
         lock.claim(plans, results, dry_run=True)
         bad = changes.changed(plans, results, every=options.verify)
         for error in bad:
             print(f"vibsim: would be deleted and made again: {error}", file=sys.stderr)
         for path in changes.leftovers(plans, results):
             print(f"vibsim: would be removed, no longer asked for: {path}", file=sys.stderr)
-        ended = _preview(plans, results, descriptor, target, bad)
+        ended = _preview(plans, results, lock_fd, target, bad)
         outputs = {results / path for job in ended.jobs for path in job.outputs}
         if missed := [e for e in changes.stale(plans, results) if e.path not in outputs]:
-            ended = _preview(plans, results, descriptor, target, [*bad, *missed])
+            ended = _preview(plans, results, lock_fd, target, [*bad, *missed])
         jobs = list(_by_file(ended.jobs, plans, results))
         words = list(reasons.in_words(jobs, plans, results))
     if options.json:
@@ -168,18 +168,14 @@ def _dry_run(plans: Sequence[Plan], results: Path, target: Executor, options: Na
 
 
 def _preview(
-    plans: Sequence[Plan],
-    results: Path,
-    descriptor: int,
-    target: Executor,
-    bad: Sequence[FileError],
+    plans: Sequence[Plan], results: Path, lock_fd: int, target: Executor, bad: Sequence[FileError]
 ) -> snakemake.Outcome:
     """Ask Snakemake which jobs it would run if the files in `bad` were missing."""
     arguments = [*target.arguments, "--dry-run"]
     if bad:
         paths = dict.fromkeys(error.path.relative_to(results).as_posix() for error in bad)
         arguments += ["--forcerun", *paths]
-    ended = _workflow(plans, results, descriptor, replace(target, arguments=arguments))
+    ended = _workflow(plans, results, lock_fd, replace(target, arguments=arguments))
     _check(ended)
     return ended
 

@@ -161,7 +161,7 @@ class Outcome:
 def run(
     plans: Sequence[Plan],
     results: Path,
-    descriptor: int,
+    lock_fd: int,
     target: Executor,
     progress: Progress | None = None,
 ) -> Outcome:
@@ -169,8 +169,8 @@ def run(
 
     Parameters
     ----------
-    results, descriptor
-        The results folder, and the descriptor of its lock, which Snakemake inherits.
+    results, lock_fd
+        The results folder, and the lock_fd of its lock, which Snakemake inherits.
     target
         Where jobs run.
     progress
@@ -194,8 +194,8 @@ def run(
                 _command(config, results, target, writing),
                 # Snakemake imports modules from .snakemake/pip-deployments in its working directory.
                 cwd="/",
-                env=_environment() | lock.inherited(descriptor),
-                pass_fds=(descriptor, writing),
+                env=_environment() | lock.inherited(lock_fd),
+                pass_fds=(lock_fd, writing),
                 stdin=subprocess.DEVNULL,
                 stdout=subprocess.PIPE,
                 stderr=subprocess.STDOUT,
@@ -238,7 +238,7 @@ def _write_config(plans: Sequence[Plan], results: Path, target: Executor) -> Pat
 
 
 def _command(config: Path, results: Path, target: Executor, pipe: int) -> list[str]:
-    """Return the command that starts Snakemake, which writes its events to the descriptor `pipe`."""
+    """Return the command that starts Snakemake, which writes its events to the lock_fd `pipe`."""
     command = [sys.executable, "-P", "-m", "vibsim.cli.run.snakemake_process", str(os.getpid())]
     command.append("remote" if target.is_remote else "here")
     command += ["--logger", "vibsim", "--logger-vibsim-pipe", str(pipe)]
