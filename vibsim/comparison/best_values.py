@@ -82,9 +82,9 @@ class _Ladder:
 
     def limit(self) -> Limit:
         """Return the limit, with a bound that includes `missed`."""
-        found = limit(self.values, self.levels, self.order, self.even, self.floor)
-        bound = self.safety * found.bound + self.missed
-        return replace(found, bound=np.where(np.isinf(self.missed), np.inf, bound))
+        best = limit(self.values, self.levels, self.order, self.even, self.floor)
+        bound = self.safety * best.bound + self.missed
+        return replace(best, bound=np.where(np.isinf(self.missed), np.inf, bound))
 
 
 def _ladder(name: str, place: value_numbers.Place) -> _Ladder:
