@@ -67,7 +67,7 @@ MOST_MORE_LEVELS = 12
 
 
 def measure(block: MemberBlock, compared: Compared, check: AccurateCheck) -> Measured:
-    """Return what a check measures."""
+    """Return the measured fields of a check."""
     quantity = compared[check.accurate]
     finest, judged = error_of_finest(quantity), judgement(quantity, TYPICAL_NORM)
     # an adaptive scheme has no order, but may have a true error

@@ -63,7 +63,7 @@ _RATES = {
 
 
 def measure(block: MemberBlock, compared: Compared, check: ConservesCheck) -> Measured:
-    """Return what a check measures."""
+    """Return the measured fields of a check."""
     level = block.grid.levels[-1] if check.level is None else check.level
     drift = drift_at(block, level, check.about or "")
     return {

@@ -38,7 +38,7 @@ PLACES = 241
 
 
 def measure(block: MemberBlock, compared: Compared, check: EqualCheck) -> Measured:
-    """Return what a check measures."""
+    """Return the measured fields of a check."""
     level = block.grid.levels[-1] if check.level is None else check.level
     distances = solution_distance(block, compared, check)
     distance, allowed = (np.full(block.shape, np.nan) for _ in range(2))

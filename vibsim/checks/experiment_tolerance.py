@@ -1,7 +1,6 @@
 """Whether every member reached the tolerance of its experiment.
 
-A pilot with a few members chose the levels. This checks all other members, from the solution of ``best.nc``, which need
-not be written.
+A pilot with a few members chose the levels. This checks all others, by the extrapolated solution (as in ``best.nc``).
 """
 
 from __future__ import annotations

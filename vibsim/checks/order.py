@@ -93,7 +93,7 @@ FINEST_LEVEL = 40
 
 
 def measure(block: MemberBlock, compared: Compared, check: ConvergesCheck) -> Measured:
-    """Return what a check measures, and what would settle or explain the verdict."""
+    """Return the measured fields of a check, with those that would settle or explain the verdict."""
     quantity, norm = compared[check.converges], check.norm
     judged, order = judge_check(quantity, check), order_of(quantity, check.order)
     is_state = check.converges in (state.name for state in block.model.states)

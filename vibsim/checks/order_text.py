@@ -490,11 +490,11 @@ class _Phrases(OrderContext):
 
     def beside_corner(self) -> str:
         """Add the last estimate, and the order that the scheme promises without the corner if that is too low."""
-        found = f"; the last estimate is {self.measured()}" if self.order > 0.0 else ""
+        text = f"; the last estimate is {self.measured()}" if self.order > 0.0 else ""
         if self.promises_less:
             order = self.notation.number(self.promised)
-            found += f". Scheme {self.scheme} promises no more than order {order} without it"
-        return found
+            text += f". Scheme {self.scheme} promises no more than order {order} without it"
+        return text
 
     def end_before_corner(self) -> str:
         """Ask to end before the corner, or for a scheme of an order that the corner leaves regular."""

@@ -228,8 +228,8 @@ def describe(f: MemberFacts, check: ValueCheck) -> Description:
         rule = f"{f.notation.opening(subject)} cannot be taken together: at {place}, {finding}."
         return Description(rule, description.advice, f"not known at {place}")
     measured = {name: field_values(f.record, f.id, name) for name in ("value", "error_bound")}
-    one = _reduced(f.experiment, f.record, check, measured, f.scheme, members)
-    finding = _finding(f, check, one, members)
+    r = _reduced(f.experiment, f.record, check, measured, f.scheme, members)
+    finding = _finding(f, check, r, members)
     holds, doubted, not_so = _asked(f, check)
     if f.reason == "match":
         return Description(f"{finding}{holds}.", "", finding)
@@ -238,7 +238,7 @@ def describe(f: MemberFacts, check: ValueCheck) -> Description:
         return Description(
             f"{finding}{not_so}.", f"Change `{key}:`, `model:` or `sweep:`.", finding
         )
-    places = members[np.flatnonzero(one.open)]
+    places = members[np.flatnonzero(r.open)]
     more = " and others" if len(places) > 1 else ""
     which = f" ({_at(f, check, int(places[0]))}{more})" if len(places) else ""
     verb = "is" if len(places) == 1 else "are"

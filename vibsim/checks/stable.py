@@ -62,7 +62,7 @@ GROWTH_TOLERANCE = 0.1
 
 
 def measure(block: MemberBlock, compared: Compared, check: StableCheck) -> Measured:
-    """Return what a check measures."""
+    """Return the measured fields of a check."""
     level = block.grid.levels[-1] if check.level is None else check.level
     index = block.grid.levels.index(level)
     w_dt = np.broadcast_to(block.fastest[:, index], block.shape)

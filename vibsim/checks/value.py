@@ -156,8 +156,7 @@ def _prospects(
 
     The former is `SETTLED`, `MOVING` or `UNKNOWN`; for a `fulfilled` check it is `MOVING` if finer levels may miss it
     again, otherwise `UNKNOWN`. `numbers` has the shape (scheme, case, level). If the bound `is_open` and the changes do
-    not shrink, each of `MOST_FINER` finer levels may change a number by as much again. The error `unseen`, which no
-    level shows, is added.
+    not shrink, each of `MOST_FINER` finer levels may change a number by as much again. `unseen` errors are added.
     """
     holds, distance = compare(check, numbers)
     finer = holds & (np.array(levels) > level)

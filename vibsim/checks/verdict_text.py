@@ -68,7 +68,7 @@ class Wording:
 
     def _describe(self, result: Result) -> Description:
         record, check = self.record, self._measured
-        found = MemberFacts(
+        facts = MemberFacts(
             self.experiment,
             record,
             check,
@@ -79,9 +79,9 @@ class Wording:
             self.notation,
         )
         return (
-            experiment_tolerance.describe(found)
+            experiment_tolerance.describe(facts)
             if check is None
-            else KINDS[check.kind].describe(found, check)
+            else KINDS[check.kind].describe(facts, check)
         )
 
     def sentence(self, result: Result) -> str:

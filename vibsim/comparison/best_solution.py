@@ -44,8 +44,7 @@ def best_record(experiment: Experiment, records: Mapping[int, Record]) -> Record
     Record
         The contents of ``best.nc``: dims scheme, case, t; each state, and ``<state>_error``, the bound of its error;
         ``level_first`` and ``level_last``, the range of the used levels; if the experiment has a tolerance,
-        ``reached(scheme, case)``: whether no bound exceeds it. The numbers of a member do not depend on the others in
-        the Records.
+        ``reached(scheme, case)``: whether no bound exceeds it. The numbers of a member do not depend on other members.
 
     Raises
     ------

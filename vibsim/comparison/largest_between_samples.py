@@ -143,12 +143,12 @@ def _highest(samples: Floats, crest: Integers) -> tuple[Floats, Floats, Floats]:
     for _ in range(_NEWTON_STEPS):
         s, b = (polynomial.polyval(x, of, tensor=False) for of in (slope, bend))
         x = np.clip(x - np.divide(s, b, out=np.zeros_like(s), where=b < 0.0), low, high)
-    value, other = (
+    value, narrow_value = (
         np.asarray(polynomial.polyval(at, of, tensor=False), dtype=np.float64)
         for at, of in ((x, wide), (x - shift, narrow))
     )
     third, fifth = (_largest_difference(samples, order) for order in (3, 5))
-    return x, value, np.where(fifth < SMOOTH * third, np.abs(value - other), third)
+    return x, value, np.where(fifth < SMOOTH * third, np.abs(value - narrow_value), third)
 
 
 def _through(samples: Floats) -> Floats:

@@ -48,18 +48,18 @@ def solution_distance(
     bound = rounding(block, level, name, first, floor[first])
     if check.second in names:
         second = names.index(check.second)
-        other, more = values[second], rounding(block, level, name, second, floor[second])
+        reference, accuracy = values[second], rounding(block, level, name, second, floor[second])
     elif check.second == "exact":
-        other = exact_series(block, level, name)[first]
-        more = _accuracy_of_exact(block, level, name, values[first])
+        reference = exact_series(block, level, name)[first]
+        accuracy = _accuracy_of_exact(block, level, name, values[first])
     else:
-        other, more = discrete(block, level, name, first), np.zeros_like(bound)
+        reference, accuracy = discrete(block, level, name, first), np.zeros_like(bound)
     inside = slice(1, -1) if name.endswith(CENTRED) else slice(None)
     distance = np.full(block.shape[1:] + values.shape[-1:], np.nan)
     with np.errstate(invalid="ignore", over="ignore"):
-        distance[:, inside] = np.abs(values[first] - other)[..., inside]
+        distance[:, inside] = np.abs(values[first] - reference)[..., inside]
     largest = np.max(distance[:, inside], axis=-1)
-    allowed = np.full(largest.shape, check.atol) if check.atol is not None else bound + more
+    allowed = np.full(largest.shape, check.atol) if check.atol is not None else bound + accuracy
     return SolutionDistance(first, distance, largest, np.asarray(allowed))
 
 

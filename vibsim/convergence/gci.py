@@ -9,8 +9,7 @@ and C. J. Roy, Verification and Validation in Scientific Computing, 2010, sectio
 
 If levels do not converge monotonically, four or more of them are fitted by ``u + c h^p`` with least squares, and the
 index follows from the fit and its scatter (L. Eca and M. Hoekstra, J. Comput. Phys. 262, 2014); three levels get three
-times their range, as there. If they converge monotonically with another order than the promised one, the index is at
-least that of the fit.
+times their range, as there. This is also a lower bound if they converge monotonically with an unexpected order.
 
 It is absolute, in the unit of the number, so that a number may be negative or cross zero; `relative` divides by the
 number if it is not near zero.
@@ -45,8 +44,7 @@ UNKNOWN, MONOTONE, OSCILLATING, DIVERGING, SWINGING, ROUND_OFF = range(len(CLASS
 def classify(values: Floats, levels: Sequence[int], floor: Floats) -> Codes:
     """Return how numbers converge, as indices into `CLASSES`; arguments as for `number_extrapolation.limit`.
 
-    ``R`` is the ratio of the last difference to the previous one: monotone for 0 < R < 1, oscillating for -1 < R < 0,
-    otherwise diverging.
+    ``R`` is the last difference over the previous one: monotone in (0, 1), oscillating in (-1, 0), else diverging.
     """
     classes = np.full(values.shape[:-1], UNKNOWN, dtype=np.int8)
     if len(levels) < LEVELS_OF_AN_ORDER:

@@ -6,8 +6,7 @@ show r. So p is accepted only if the data exclude h^r. Ratios cannot: a small pa
 
 Differences ``d_k = b h_k^r + a h_k^p + c h_k^q + ...`` are combined so that h^p and as many further powers as possible
 cancel, while h^r keeps its size in the last difference. Except for cancellation, the norm of the combination, plus its
-round-off, is an upper bound of b. The least bound counts, with p + 1, p + 2, ... or p + 2, p + 4, ... as further
-powers.
+round-off, is an upper bound of b. The least bound counts, with further powers p + 1, p + 2, ... or p + 2, p + 4, ...
 """
 
 from __future__ import annotations

@@ -73,8 +73,7 @@ def _unknown(count: int, levels: int) -> dict[str, np.ndarray]:
 def _scaled(ladder: Ladder, rows: Integers) -> tuple[Ladder, Floats, Floats]:
     """Return some ladders divided by the norm of their largest row, that norm, and a factor for each difference.
 
-    The factors shrink differences of coarse levels that have blown up, whose squares would overflow or make others
-    underflow.
+    The factors shrink differences of coarse levels that have blown up, whose squares would overflow.
     """
     gram, count = ladder.gram[rows], len(ladder.h) - 1
     norms = np.sqrt(np.diagonal(gram, axis1=1, axis2=2))

@@ -1,8 +1,7 @@
 r"""The order of convergence as a function of time, from the differences of three successive levels.
 
 The ratio of two differences at one time is meaningless where they change sign, as those of an oscillation do twice per
-period. So the order at t is that of their norms in a window around t, half a period long, which always contains a zero
-crossing and a hump:
+period. So the order at t is that of their norms in a window around t, half a period long, which always holds a hump:
 
     p(t) = log2 R(t),     R(t) = ||d_k|| / ||d_(k+1)||,     ||d||^2 = sum of d^2 over the window
 
@@ -16,8 +15,7 @@ times the predicted floor). Where the order changes, or two powers of dt have si
 and the interval is wide; it is unbounded if e is 1 or more. The interval tells how well this ratio is known, not what
 finer levels would show.
 
-Some schemes have a different formula at the last point of a run (a one-sided velocity). It is compared alone, and all
-windows exclude it.
+Some schemes compute the last point of a run differently (a one-sided velocity). It is compared alone, not in windows.
 
 Source: pendulum lecture, section 2.5 (ratios of differences); the windows are our own.
 """

@@ -88,8 +88,7 @@ class Circumstances:
     phase: Any  # w t
     response: Any  # ``1/(w end)^p``, a factor of the response; 0 if disturbances do not grow
     noise: Any  # round-off so far, in units of its prediction for a solution of size 1; at least `size`
-    # ratio of the responses to a lasting and to a momentary disturbance: ``max(1, w t)``, or 1 if the noise was not
-    # measured
+    # ratio of the responses to a lasting and to a momentary disturbance: ``max(1, w t)``; 1 without measured noise
     spread: Any
 
 
@@ -99,8 +98,7 @@ class Best(NamedTuple):
     position: Any
     velocity: Any
     error: Any  # bound of the errors of the position and of velocity/w; infinite if unknown
-    # row of the entry times the number of levels, plus its column: the finest level if the error is unknown, -1 if that
-    # level failed
+    # row of the entry times number of levels plus its column; the finest level if the error is unknown, -1 if failed
     entry: Any
 
 

@@ -47,8 +47,7 @@ class Table:
     columns: Floats
     pair: Integers  # index of the pair of powers, shape (hypothesis,)
     groups: Integers  # start of each group, and the end of the last one, shape (group + 1,)
-    # The evidence of a group is at most ``(root/tr(M G))^(N w/2)``: root for N = 1 and N = 2, and the form of M; shape
-    # (2 + packed, group).
+    # The evidence of a group is at most ``(root/tr(M G))^(N w/2)``: roots for N = 1, 2, form of M; (2 + packed, group).
     bounds: Floats
     # Upper bound of the log evidence of the table for N = 1 and N = 2, if the last row has the square 1.
     log_bound: Floats
@@ -215,8 +214,7 @@ def _table(
     prior
         Variance of the first power, covariance of both, variance of the second, each of shape (hypothesis,).
     orthogonal
-        For one shape: covariance of the components of the other rows orthogonal to the last one, shape (hypothesis,
-        w - 1, w - 1).
+        For one shape: covariance of the components orthogonal to the last row, shape (hypothesis, w - 1, w - 1).
     """
     precision, log_det = inverse(signal + noise_of_rows(variance))
     finest = np.flatnonzero(variance[0])[-1]
@@ -290,8 +288,7 @@ def _bounds(
     """Return `Table.bounds`.
 
     If C exceeds ``K/t`` for all hypotheses of a group, ``tr(K^-1 G) >= tr(C^-1 G)/t``. Here ``t = 1 + share^2``, and C
-    is built from the largest variances over t in the group. A correlated signal is at most `factor` times as large as
-    an uncorrelated one.
+    is built from the largest variances over t in the group. Correlation enlarges the signal by at most `factor`.
     """
     start, t = groups[:-1], 1.0 + share**2
     squares = [np.maximum.reduceat(square / t, start) for square in (np.ones_like(t), share**2)]

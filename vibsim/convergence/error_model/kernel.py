@@ -87,8 +87,7 @@ def kernel(
 ) -> None:
     """Weigh the hypotheses on a window of w rows, and sum their estimates with these weights.
 
-    The evidence of a hypothesis is ``(root/tr(K^-1 G))^(a/2) (1 + tr(B X))^(-b/2)``, with its own root and matrices K
-    and B.
+    The evidence of a hypothesis is ``(root/tr(K^-1 G))^(a/2) (1 + tr(B X))^(-b/2)``, with its own root, K and B.
 
     Parameters
     ----------

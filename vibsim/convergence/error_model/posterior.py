@@ -428,10 +428,7 @@ class _Fit:
         )
 
     def sum_by_power(self, powers: Floats) -> Callable[[Floats], Floats]:
-        """Return a function that sums values of pairs over all pairs with the same power; (ladder, power).
-
-        `powers` holds one power of each pair.
-        """
+        """Return a function that sums values of pairs by the given power of each pair, shape (ladder, power)."""
         order = np.argsort(powers, kind="stable")
         distinct, start = np.unique(powers[order], return_index=True)
         columns = np.searchsorted(self.powers, distinct)

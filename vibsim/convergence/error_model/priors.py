@@ -3,8 +3,7 @@
 Origins: [expansion] follows from expansions of the error. [arithmetic] follows from double precision. [chosen] is a
 prior that was written down before any ladder was judged. [calibrated] was set on seeds 1 and 3 of the random ladders
 with known truth (``tests/analysis/synthetic.py``). Except for `POINTS` and `MISFIT`, doubling or halving one of these
-numbers hardly changes the counts there. A *row* is the difference of two successive levels; the size of a *free* row is
-unrelated to the others.
+numbers hardly changes the counts there. Rows are differences of successive levels; *free* ones have unrelated sizes.
 """
 
 from __future__ import annotations

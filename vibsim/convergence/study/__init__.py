@@ -1,1 +1,1 @@
-"""The ladder of any solver: from what a user has (numbers, arrays, xarray objects) to a verdict in words."""
+"""A study of the ladder of any solver: from numbers, arrays or xarray objects to a verdict in words."""
