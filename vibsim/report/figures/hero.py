@@ -38,7 +38,7 @@ SIZES = {
     "linf_interior": "largest error without the last point",
 }  # fmt: skip
 """What a norm over time, over the same power of the duration as of a second, is as a size of the error."""
-STRIP = 0.12  # of the height of the axes, for a row of a legend
+STRIP = 0.097  # of the height of the axes, for a row of a legend
 LONG = 24  # letters of a label above which it is set smaller
 
 
@@ -58,12 +58,13 @@ def _name(ax: Axes, title: str) -> None:
 
 def _legend(ax: Axes, columns: int, size: float) -> None:
     """Write the legend in a strip of its own above the curves, where it hides none."""
-    rows = -(-len(ax.get_legend_handles_labels()[0]) // columns)
+    strip = STRIP * -(-len(ax.get_legend_handles_labels()[0]) // columns)
     low, high = ax.get_ylim()
+    more = strip / (1.0 - strip)
     if ax.get_yscale() == "log":
-        ax.set_ylim(low, high * (high / low) ** (STRIP * rows))
+        ax.set_ylim(low, high * (high / low) ** more)
     else:
-        ax.set_ylim(low, high + STRIP * (high - low) * rows)
+        ax.set_ylim(low, high + more * (high - low))
     ax.legend(
         loc="upper left", ncols=columns, fontsize=size, handlelength=1.6, borderaxespad=0.2, columnspacing=1.9
     )  # fmt: skip
