@@ -6,6 +6,7 @@ import samples
 
 from vibsim import simulate
 from vibsim.report import choice, data, style, words
+from vibsim.report.data import Member
 from vibsim.report.figures import gallery, plane
 
 CONTENT = {
@@ -100,6 +101,19 @@ def test_a_body_at_rest_and_one_coordinate_have_no_path():
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize(("phase", "is_drawn"), [(0.0, False), (0.3, True)])
+def test_coordinates_that_move_together_have_no_path(phase, is_drawn):
+    """The deflections of a beam in one mode gave three panels with one straight line."""
+    model = {"kind": "system", "coordinates": ["x", "y"], "acceleration": {"x": "-x", "y": "-y"}}
+    exp = samples.experiment(
+        model=model, initial={"x": 1.0, "y": 0.3, "vy": phase}, schemes=["rk4"], checks=[]
+    )
+    record = samples.record(exp)
+    with style.applied():
+        picture = plane.path(exp, record, [Member(0, 0, "rk4")])
+    assert (picture is not None) is is_drawn
+
+
 def test_of_many_coordinates_the_one_that_decides_is_drawn_and_no_path():
     """A path of the first two of a chain says nothing of its motion."""
     chain = {

@@ -38,7 +38,7 @@ SIZES = {
     "linf_interior": "largest error without the last point",
 }  # fmt: skip
 """Norm to its name after division by the power of the duration that makes it an average."""
-STRIP = 0.12  # height of a legend row over that of the axes
+STRIP = 0.097  # height of a legend row as a part of that of the axes
 LONG = 24  # characters of a label from which it is smaller
 
 
@@ -58,12 +58,13 @@ def _name(ax: Axes, title: str) -> None:
 
 def _legend(ax: Axes, columns: int, size: float) -> None:
     """Write the legend in its own strip above the curves."""
-    rows = -(-len(ax.get_legend_handles_labels()[0]) // columns)
+    strip = STRIP * -(-len(ax.get_legend_handles_labels()[0]) // columns)
     low, high = ax.get_ylim()
+    more = strip / (1.0 - strip)
     if ax.get_yscale() == "log":
-        ax.set_ylim(low, high * (high / low) ** (STRIP * rows))
+        ax.set_ylim(low, high * (high / low) ** more)
     else:
-        ax.set_ylim(low, high + STRIP * (high - low) * rows)
+        ax.set_ylim(low, high + more * (high - low))
     ax.legend(
         loc="upper left", ncols=columns, fontsize=size, handlelength=1.6, borderaxespad=0.2, columnspacing=1.9
     )  # fmt: skip

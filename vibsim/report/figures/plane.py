@@ -124,7 +124,8 @@ def _draw_end(ax: Axes, points: Points, k: int, width: float, name: str) -> None
 def path(experiment: Experiment, record: Record, shown: list[Member]) -> Picture | None:
     """Draw the paths of the schemes in `shown`: one panel per level, or per member of a sweep at the finest level.
 
-    None unless the model has two coordinates.
+    None unless the model has two coordinates, or if the paths run along a line, such as those of two points of a beam in
+    one mode.
     """
     from matplotlib.ticker import MaxNLocator
 
@@ -146,6 +147,8 @@ def path(experiment: Experiment, record: Record, shown: list[Member]) -> Picture
             i for i, paths in enumerate(curves) if i == last or _differ(paths, curves[last])
         ]
         panels, curves = [panels[i] for i in distinct], [curves[i] for i in distinct]
+    if all(_is_line(points) for paths in curves for points in paths):
+        return None
     references = [_points(record, names, members[0], None) for _, members, _ in panels]
     is_known = [bool(np.isfinite(reference).all()) for reference in references]
     rows = zip(references, is_known, curves, strict=True)
@@ -189,6 +192,13 @@ def _points(record: Record, names: tuple[str, ...], member: Member, level: int |
     else:
         x, y = (state_at(record, name, member, level) for name in names)
     return x, y
+
+
+def _is_line(points: Points) -> bool:
+    """Say whether a path runs along a line that is parallel to no axis: both coordinates move together."""
+    x, y = (values - values.mean() for values in points)
+    both, together = float(np.sum(x * x) * np.sum(y * y)), float(np.sum(x * y)) ** 2
+    return both > 0.0 and both - together <= SEEN**2 * both
 
 
 def _differ(panel: list[Points], finest: list[Points]) -> bool:
