@@ -15,6 +15,7 @@ from vibsim.convergence.error_model.hypotheses import (
     between,
     hypotheses_of,
     noise_of_rows,
+    times,
     two_powers,
 )
 from vibsim.convergence.error_model.likelihood import (
@@ -364,6 +365,8 @@ class _Fit:
             rest = behind[rows] * inside[:, -1:, -1]
             path = -np.sum(weight[..., None] * gains, axis=1)
             squares += rest[:, -1:] - 2.0 * np.sum(gains * rest[:, None, :-1], axis=-1)
+            slope = (gains[:, -1] - gains[:, 0]) / (2.0 * priors.AROUND[-1])
+            squares += priors.DRIFT**2 * np.sum(slope * times(inside, slope), axis=-1)[:, None]
             squared = np.sum(weight * squares, axis=-1)
         weight = self.add(index, rows, total + prior[rows], path, squared)
         nearest = self.nearest[rows, self.windows[index][1] - 2]
