@@ -200,6 +200,16 @@ def test_values_that_come_in_steps_are_no_better_than_a_step(
     assert judge(h, levels, exact=exact).reason != "wrong_limit"
 
 
+@pytest.mark.parametrize("counts", [[4 * 2**k for k in range(6)], [9, 14, 21, 32, 47, 70, 106]])
+def test_a_power_that_no_expansion_has_may_drift_on_the_way_to_the_limit(counts: list[int]) -> None:
+    """The midpoint rule for x^(3/4) (1 - 1.5 x): errors in h^(7/4) and h^2 look like order 1.84."""
+    centres = [(np.arange(n) + 0.5) / n for n in counts]
+    values = [float(np.mean(x**0.75 * (1.0 - 1.5 * x))) for x in centres]
+    verdict = judge([1.0 / n for n in counts], values)
+    assert verdict.reason == "asymptotic"
+    assert abs(verdict.best - (1.0 / 1.75 - 1.5 / 2.75)) <= verdict.best_bound
+
+
 def test_a_field_of_three_decimals_is_exact_to_these() -> None:
     fields = [np.round(np.cos(2.0 * np.linspace(0.0, 1.0, n)), 3) for n in (11, 21, 41)]
     verdict = judge([0.1, 0.05, 0.025], fields)

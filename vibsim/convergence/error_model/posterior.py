@@ -14,6 +14,7 @@ from vibsim.convergence.error_model.hypotheses import (
     Table,
     hypotheses_of,
     level_differences,
+    matvec,
     noise_of_rows,
     two_powers,
 )
@@ -372,6 +373,8 @@ class _Fit:
             products = finer[subset] * gram[:, -1:, -1]
             limit = -np.sum(weight[..., None] * gains, axis=1)
             squares += products[:, -1:] - 2.0 * np.sum(gains * products[:, None, :-1], axis=-1)
+            slope = (gains[:, -1] - gains[:, 0]) / (2.0 * priors.OFFSETS[-1])
+            squares += priors.DRIFT**2 * np.sum(slope * matvec(gram, slope), axis=-1)[:, None]
             squared = np.sum(weight * squares, axis=-1)
         weight = self.add_to_window(index, subset, total + prior[subset], limit, squared)
         nearest = self.nearest[subset, self.windows[index][1] - 2]

@@ -20,6 +20,9 @@ SPACING = 0.05  # spacing of the grid on which such powers are counted [chosen]
 _POSITIVE = 3e-4 * 2.0 ** np.arange(9)
 # Offsets from the measured order at which such a power is sampled. [chosen]
 OFFSETS = np.concatenate([-_POSITIVE[::-1], [0.0], _POSITIVE])
+# Standard deviation of such a power between the finest level and the limit, since it may stand for two close powers.
+# Three of them are half of `SPACING`: a power that moves by all of it is half-way in the mean. [chosen]
+DRIFT = SPACING / 6.0
 EXPECTED_PRIOR = 0.5  # part of the prior reserved for a whole order that a user expects [chosen]
 THEORY_PRIOR = 0.9  # the same for the order that the theory of a scheme promises [chosen]
 FRACTIONAL_FACTOR = 0.01  # on powers that are not a whole number from the promised one [chosen]

@@ -124,8 +124,8 @@ def _draw_end(ax: Axes, points: Points, k: int, width: float, name: str) -> None
 def path(experiment: Experiment, record: Record, shown: list[Member]) -> Picture | None:
     """Draw the paths of the schemes in `shown`: one panel per level, or per member of a sweep at the finest level.
 
-    None unless the model has two coordinates, or if the paths run along a line, such as those of two points of a beam in
-    one mode.
+    None unless the model has two coordinates, and if all paths run along a line, such as those of two points of a beam
+    in one mode.
     """
     from matplotlib.ticker import MaxNLocator
 
