@@ -199,6 +199,7 @@ BOUNCES = {"events": [{"when": "u - 0.5", "then": {"v": "-v"}}]}
     [
         ({"kind": "oscillator", "damping": {"linear": 0.1}}, "`converges: energy_budget`"),
         ({"kind": "system", "acceleration": "-u*exp(u*sin(u)**3)"}, "write its `potential`"),
+        ({"kind": "system", "acceleration": "-u - 0.1*v + cos(t)"}, "energy_budget"),
         ({"kind": "system", "acceleration": "-u", **BOUNCES}, "its events may change it"),
         (
             {"kind": "system", "acceleration": "-u", "potential": "u**2/2", **BOUNCES},

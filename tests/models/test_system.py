@@ -5,6 +5,7 @@ import itertools
 import numpy as np
 import pytest
 from model_cases import CASES
+from scipy.integrate import solve_ivp
 
 from vibsim import Experiment, analyse, simulate
 from vibsim.engine import integrate
@@ -335,3 +336,27 @@ def test_names_of_files_are_refused():
 )
 def test_names_that_cannot_be_told_apart_are_refused(names):
     assert any(coordinate_faults(names))
+
+
+def test_what_drives_and_what_damps_are_told_apart():
+    """A pumped pendulum on a driven cart, with damping: against the integrals of both powers."""
+    model = {
+        **{"kind": "system", "coordinates": ["x", "q"], "parameters": {"c": 0.2, "d": 0.1}},
+        "mass": {"x": {"x": 3, "q": "cos(q)"}, "q": 1},
+        "force": {"x": "-4*x - c*vx + cos(1.3*t)", "q": "-(2 + 0.3*sin(t))*sin(q) - d*vq"},
+    }
+    run = {"title": "t", "model": model, "initial": {"q": 1.0}, "time": {"end": 10.0}}
+    run |= {"levels": [10], "schemes": ["rk4"], "checks": [{"stable": True}]}
+
+    def rates(t, y):
+        x, q, vx, vq = y[:4]
+        mass = [[3, np.cos(q)], [np.cos(q), 1]]
+        push, pump = np.cos(1.3 * t), -0.3 * np.sin(t) * np.sin(q)
+        pull = -4 * x - 0.2 * vx + push + np.sin(q) * vq**2
+        a = np.linalg.solve(mass, [pull, -2 * np.sin(q) + pump - 0.1 * vq])
+        return [vx, vq, *a, 0.2 * vx**2 + 0.1 * vq**2, push * vx + pump * vq]
+
+    known = solve_ivp(rates, (0, 10), [0, 1.0, 0, 0, 0, 0], rtol=1e-11, atol=1e-12).y[:, -1]
+    level = simulate(Experiment.from_dict(run), 10)
+    found = [float(level[name][0, 0, -1]) for name in ("x", "q", "dissipated_energy", "work_done")]
+    assert found == pytest.approx(known[[0, 1, 4, 5]], abs=1e-6)

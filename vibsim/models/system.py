@@ -8,8 +8,8 @@ Energy: kinetic ``sum M_ij v_i v_j/2`` and a potential V, unless a user writes t
 origin, of the terms of the forces that depend on positions alone,
 ``-sum_i int_0^(x_i) F_i(x_1, ..., x_(i-1), s, 0, ..., 0) ds``, if rules can integrate it and its gradient gives these
 terms; otherwise V is 0. The power of everything else follows from the equations, ``P = dE/dt``, and a system is
-conservative if P vanishes. Both conditions are tested numerically at random states and parameters, because equal
-functions may have different formulas.
+conservative if P vanishes. Terms of forces that contain the time drive; the rest of P is dissipated. Both conditions
+are tested numerically at random states and parameters, because equal functions may have different formulas.
 
 Frequencies are those of small oscillations about the origin, ``w^2`` the positive eigenvalues of ``-da/dx`` at t = 0.
 
@@ -284,12 +284,36 @@ class Written:
     @cached_property
     def powers(self) -> tuple[Expression, ...]:
         """The terms of the power ``dE/dt``."""
+        return self._powers(self.accelerations)
+
+    def _powers(self, accelerations: tuple[Expression, ...]) -> tuple[Expression, ...]:
         found = (
             derivative(energy, name) * speed
-            for name, speed in speeds(self.coordinates, self.velocities, self.accelerations)
+            for name, speed in speeds(self.coordinates, self.velocities, accelerations)
             for energy in (self.kinetic, self.potential)
         )
         return tuple(term for term in found if term != ZERO)
+
+    @cached_property
+    def damped_and_driven(self) -> dict[str, Expression]:
+        """The power that is lost, and that of the terms of the forces that name the time or the table.
+
+        Beside an exact solution, and for a kinetic energy that is written, all is one power.
+        """
+        power, moving = paired(self.powers, operator.add), {"t", HEIGHT}
+        if moving.isdisjoint(power.names):
+            return {"dissipation": -power}
+        if self.manufactured is not None or self.terms("kinetic"):
+            return {"driving": power}
+        driving, rest = ZERO, []
+        for force, velocity in zip(self.forces, self.velocities, strict=True):
+            terms = list(terms_of(force))
+            pushes = [term for term in terms if not moving.isdisjoint(term.names)]
+            driving += sum(pushes, ZERO) * Name(velocity)
+            rest.append(sum((term for term in terms if moving.isdisjoint(term.names)), ZERO))
+        left = self._powers(self.inertia.accelerations(rest))
+        lost = {} if self.vanishes(left) else {"dissipation": -paired(left, operator.add)}
+        return {"driving": driving, **lost}
 
     def is_constant(self, node: Expression) -> bool:
         """Tell whether a formula depends on parameters alone."""
@@ -437,9 +461,7 @@ def system(
     more: dict[str, Any] = {}
     is_conservative = motion is None and own.vanishes(own.powers)
     if not is_conservative:
-        power: Expression = paired(own.powers, operator.add) if own.powers else ZERO
-        drives = bool({"t", HEIGHT} & set(power.names))
-        more = {"driving": power} if drives else {"dissipation": -power}
+        more |= own.damped_and_driven
     if motion is not None:
         more |= {"exact": motion.exact, "start": motion.start}
     outputs = (key.partition(".") for key, _ in formulas)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from itertools import count
 from typing import Any
 
@@ -151,13 +151,10 @@ def _instead_of_energy(scope: Scope) -> str:
     model = scope.setting.model
     if has_budget and model is not None and model.events is not None:
         return f"its events may change it; {budget}"
-    section = scope.report.source.data.get("model")
-    if isinstance(section, Mapping) and section.get("kind") == "system":
-        if "potential" in section:
-            return (
-                "by the `potential` that is written: leave it out, and vibsim finds it where it can"
-            )
+    if model is not None and model.misses_potential:
         return "write its `potential`, if the forces have one that vibsim does not find"
+    if any(note.key == "model.potential" for note in scope.report.notes):
+        return "by the `potential` that is written: leave it out, and vibsim finds it where it can"
     return budget if has_budget else ""
 
 

@@ -68,7 +68,7 @@ def note_potential(model: Model, parameters: Mapping[str, float], report: Report
     """
     x, v = model.positions, model.velocities
     energy = tree(model, model.potential_energy)
-    power = tree(model, model.dissipation or model.driving or ZERO)
+    power = tree(model, model.driving or ZERO) - tree(model, model.dissipation or ZERO)
     forces, own = (
         [derivative(derivative(of, a), b) for a in first for b in x]
         for of, first in ((power, v), (energy, x))
