@@ -141,6 +141,8 @@ def card(name: str, verdict: LadderVerdict, expected: str, files: Sequence[str])
         "numbers": numbers(verdict),
         "table": _table(verdict),
         "picture": _picture(name, verdict),
+        # the heading of the card that shows the same ladder
+        "above": "",
         "doubt": UNSEEN if verdict.status == "PASS" and not verdict.is_exact_known else "",
     }
 
