@@ -366,7 +366,10 @@ class _Fit:
             path = -np.sum(weight[..., None] * gains, axis=1)
             squares += rest[:, -1:] - 2.0 * np.sum(gains * rest[:, None, :-1], axis=-1)
             slope = (gains[:, -1] - gains[:, 0]) / (2.0 * priors.AROUND[-1])
-            squares += priors.DRIFT**2 * np.sum(slope * times(inside, slope), axis=-1)[:, None]
+            away = np.abs(order[:, None] - np.array(priors.POWERS)).min(axis=-1) > 0.5 * priors.BIN
+            squares += (away * priors.DRIFT**2 * np.sum(slope * times(inside, slope), axis=-1))[
+                :, None
+            ]
             squared = np.sum(weight * squares, axis=-1)
         weight = self.add(index, rows, total + prior[rows], path, squared)
         nearest = self.nearest[rows, self.windows[index][1] - 2]

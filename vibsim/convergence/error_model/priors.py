@@ -18,8 +18,8 @@ OTHER_PRIOR = 0.1  # of a single power of any other value up to `HIGHEST` [chose
 # It is looked for at these distances from the measured order. [chosen]
 _BESIDE = 3e-4 * 2.0 ** np.arange(9)
 AROUND = np.concatenate([-_BESIDE[::-1], [0.0], _BESIDE])
-# Standard deviation of such a power on the way to the limit, since it stands for two powers side by side: three are
-# half of a bin, as a power that moves by a bin is half-way in the mean. [chosen]
+# Standard deviation, on the way to the limit, of a power that is not in the bin of one of an expansion: it stands for
+# two powers side by side. Three are half of a bin, as a power that moves by a bin is half-way in the mean. [chosen]
 DRIFT = BIN / 6.0
 EXPECTED = 0.5  # prior of the whole order that a user expects, beside that of every power [chosen]
 THEORY = 0.9  # the same of the order that the theory of a scheme promises [chosen]
