@@ -348,9 +348,10 @@ def _decide(
         # added up one by one, so that a member has the same digits alone and among others
         one.best = sum((w * row for w, row in zip(weights, part, strict=True)), 0.0 * part[0])
         added_up = ADDED_UP * SINGLE * measured.norms[k, -1] * measured.are_single[k]
-        units = np.maximum(request.halves(part, places), float(added_up))
-        step = step_of_values(part)
-        one.comes_in_steps = step > float(np.max(units))
+        halves, step = request.halves(part, places), step_of_values(part)
+        units = np.maximum(halves, float(added_up))
+        # the last digits are steps, too, of a unit or some
+        one.comes_in_steps = step > 10.0 * float(np.max(units))
         one.rounded = float(np.sum(np.maximum(units, step) * np.abs(weights)))
     if one.reason == "wrong_limit":
         # the floor is that of storing numbers, half a unit
