@@ -370,22 +370,13 @@ class _Fit:
         limit, squared = np.zeros((len(order), w)), np.zeros(len(order))
         if not self.ladder.exact_known:
             weight = on_arrays.exp(log - total[:, None])
-<<<<<<< HEAD
             products = finer[subset] * gram[:, -1:, -1]
             limit = -np.sum(weight[..., None] * gains, axis=1)
             squares += products[:, -1:] - 2.0 * np.sum(gains * products[:, None, :-1], axis=-1)
             slope = (gains[:, -1] - gains[:, 0]) / (2.0 * priors.OFFSETS[-1])
-            squares += priors.DRIFT**2 * np.sum(slope * matvec(gram, slope), axis=-1)[:, None]
-=======
-            rest = behind[rows] * inside[:, -1:, -1]
-            path = -np.sum(weight[..., None] * gains, axis=1)
-            squares += rest[:, -1:] - 2.0 * np.sum(gains * rest[:, None, :-1], axis=-1)
-            slope = (gains[:, -1] - gains[:, 0]) / (2.0 * priors.AROUND[-1])
-            away = np.abs(order[:, None] - np.array(priors.POWERS)).min(axis=-1) > 0.5 * priors.BIN
-            squares += (away * priors.DRIFT**2 * np.sum(slope * times(inside, slope), axis=-1))[
-                :, None
-            ]
->>>>>>> judge
+            drift = priors.DRIFT**2 * np.sum(slope * matvec(gram, slope), axis=-1)
+            distance = np.min(np.abs(order[:, None] - np.array(priors.POWERS)), axis=-1)
+            squares += ((distance > 0.5 * priors.SPACING) * drift)[:, None]
             squared = np.sum(weight * squares, axis=-1)
         weight = self.add_to_window(index, subset, total + prior[subset], limit, squared)
         nearest = self.nearest[subset, self.windows[index][1] - 2]

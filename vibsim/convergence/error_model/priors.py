@@ -13,7 +13,6 @@ import numpy as np
 # ---- Powers of an expansion
 
 POINTS = 2.0  # independent points of a series or field; a single number has one [calibrated]
-<<<<<<< HEAD
 POWERS = (*(0.5 * k for k in range(1, 11)), 6.0, 7.0, 8.0)  # powers of expansions [expansion]
 MAX_POWER = 8.0  # largest power considered [chosen]
 ANY_POWER_PRIOR = 0.1  # prior of one power of any value up to `MAX_POWER` [chosen]
@@ -21,8 +20,9 @@ SPACING = 0.05  # spacing of the grid on which such powers are counted [chosen]
 _POSITIVE = 3e-4 * 2.0 ** np.arange(9)
 # Offsets from the measured order at which such a power is sampled. [chosen]
 OFFSETS = np.concatenate([-_POSITIVE[::-1], [0.0], _POSITIVE])
-# Standard deviation of such a power between the finest level and the limit, since it may stand for two close powers.
-# Three of them are half of `SPACING`: a power that moves by all of it is half-way in the mean. [chosen]
+# Standard deviation, between the finest level and the limit, of a power that is not within half a `SPACING` of one of
+# `POWERS`: it may stand for two close powers. Three of them are half of `SPACING`: a power that moves by all of it is
+# half-way in the mean. [chosen]
 DRIFT = SPACING / 6.0
 EXPECTED_PRIOR = 0.5  # part of the prior reserved for a whole order that a user expects [chosen]
 THEORY_PRIOR = 0.9  # the same for the order that the theory of a scheme promises [chosen]
@@ -30,25 +30,6 @@ FRACTIONAL_FACTOR = 0.01  # on powers that are not a whole number from the promi
 DISTANCES = (0.5, 1.0, 2.0)  # second power minus first power [expansion]
 PURE_PRIOR = 0.3  # prior that no second power is visible [chosen]
 # Size of the second power relative to the first, at the finest level of a window. [chosen]
-=======
-POWERS = (*(0.5 * k for k in range(1, 11)), 6.0, 7.0, 8.0)  # that expansions have [expansion]
-HIGHEST = 8.0  # power that is looked for [chosen]
-BIN = 0.05  # distance of the powers among which such a power is counted [chosen]
-OTHER_PRIOR = 0.1  # of a single power of any other value up to `HIGHEST` [chosen]
-# It is looked for at these distances from the measured order. [chosen]
-_BESIDE = 3e-4 * 2.0 ** np.arange(9)
-AROUND = np.concatenate([-_BESIDE[::-1], [0.0], _BESIDE])
-# Standard deviation, on the way to the limit, of a power that is not in the bin of one of an expansion: it stands for
-# two powers side by side. Three are half of a bin, as a power that moves by a bin is half-way in the mean. [chosen]
-DRIFT = BIN / 6.0
-EXPECTED = 0.5  # prior of the whole order that a user expects, beside that of every power [chosen]
-THEORY = 0.9  # the same of the order that the theory of a scheme promises [chosen]
-# Prior of a power that is not a whole number away from that of theory, beside 1. [chosen]
-BETWEEN = 0.01
-DISTANCES = (0.5, 1.0, 2.0)  # from the first power to the second [expansion]
-PURE_PRIOR = 0.3  # that there is no second power in sight [chosen]
-# Size of the second power over the first, at the finest level of a window. [chosen]
->>>>>>> judge
 SHARES = tuple(10.0 ** (-4.25 + 0.5 * k) for k in range(15))
 DOMINATES = 0.1  # a power dominates if every other one is less than this part of it [chosen]
 LEAST_SIGNAL = 0.1  # least mean square of both powers, over the expected one [chosen]
