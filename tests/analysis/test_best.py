@@ -416,7 +416,7 @@ def test_bounds_of_numbers_by_peaks_know_nothing_of_the_rounding_of_roots() -> N
     assert best(record, "frequency")[1] < 1e-9
 
 
-def test_a_sample_has_no_much_wider_bound_than_the_series() -> None:
+def test_a_sample_has_a_bound_near_that_of_the_series() -> None:
     """Against 2 asin(k sn(K - 20)), k = sin(1/2)."""
     short = {"time": {"end": 20.0}, "levels": [6, 7, 8, 9], "schemes": ["rk4"]}
     value, bound = best(analysed(**(PENDULUM | short))[1], "theta_end")

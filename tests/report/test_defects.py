@@ -129,13 +129,15 @@ def test_missing_cells_of_a_map_are_hatched_and_cells_have_borders():
 def test_a_sweep_names_a_member_once_per_block_of_a_page_and_in_every_row_of_a_file(tmp_path):
     exp = samples.experiment(levels=[6, 7, 8, 9], sweep=GRID)
     record = samples.record(exp)
-    report.write(samples.plan(exp), record, samples.summary(exp, record), tmp_path)
+    summary = samples.summary(exp, record)
+    report.write(samples.plan(exp), record, summary, tmp_path)
     page = (tmp_path / "report.html").read_text(encoding="utf-8")
     start = page.index('<section id="numbers"')
     table = page[start : page.index("</table>", start)]
+    decisive = choice.find_lead(exp, record, summary).member
     assert re.findall(r'rowgroup" colspan="9">([^<]*)<', table) == [
         f"central, {words.swept(data.case_name(record, m.case))}"
-        for m in choice.members(record, "theta")
+        for m in choice.members(record, "theta", decisive)
     ]
     assert table.count('<th scope="col"') == 9
     rows = re.findall(r"<tr><td.*?</tr>", table, flags=re.DOTALL)
