@@ -1,4 +1,4 @@
-"""From values at common points to what the assessment needs: inner products, norms and noise."""
+"""Inner products, norms and noise of values at common points: the input of the assessment."""
 
 from __future__ import annotations
 
@@ -14,43 +14,41 @@ from vibsim.core.array_types import Flags, Floats
 SINGLE = float(np.finfo(np.float32).eps)
 """Relative spacing of single precision."""
 LARGEST = 1e150
-"""Scaled values do not exceed it: their squares are numbers."""
+"""Upper limit of scaled values, so that their squares do not overflow."""
 FURTHEST = 1e100
-"""Distance from the exact solution, and noise, over the size of the values, beyond which it is all the same."""
-
-
+"""Upper limit of the distance from the exact solution and of the noise, relative to the size of the values."""
 FEW_DIGITS = 11
-"""Values with no more decimal digits than these were rounded to them: those of a calculation have 15 and more."""
+"""Values with at most this number of decimal digits were rounded: calculated ones have 15 and more."""
 BINARY = 2.0**20
-"""Multiples of its inverse that are whole have few digits anyway: 0.125, 3 or 65 may be results as they are."""
+"""Multiples of 1/`BINARY`, such as 0.125, 3 or 65, have few digits anyway and may not be rounded."""
 COUNTED = 100.0
-"""Whole numbers of this size are taken to be counted, or rounded to whole ones."""
+"""From this size on, whole numbers are assumed to be rounded."""
 IN_STEPS = 4
-"""So many of the finest levels show whether values come in steps; coarser ones may be the same because all blew up."""
+"""Number of finest levels that show whether values come in steps; coarser ones may agree because all blew up."""
 SINGLE_DIGITS = 7
-"""Fewer digits are printed for another reason than that single precision has no more."""
+"""Least number of printed digits that indicates single precision."""
 SAMPLED = 64
-"""Values of a level whose digits are counted."""
+"""Number of values of a level whose digits are counted."""
 
 
 @dataclass(frozen=True)
 class Measurement:
-    """What was measured of the ladders of all members."""
+    """The measurements of the ladders of all members."""
 
     ladder: Ladder
     """In units of `scale`, with the leading dimension member."""
     scale: Floats
     """A power of two for each member, so that squares neither overflow nor vanish, shape (member,)."""
     norms: Floats
-    """Root mean square of the values of every level, shape (member, n)."""
+    """Root mean square of the values of each level, shape (member, n)."""
     are_single: Flags
-    """Whether the finest level is one of single precision, shape (member,)."""
+    """Whether the finest level has single precision, shape (member,)."""
 
 
 def scale_of(values: Floats) -> Floats:
-    """Return a power of two near the size of the finest level of each member, shape (member,), for (member, n, points).
+    """Return a power of two near the size of the finest level of each member, shape (member,).
 
-    It is larger where a coarse level has blown up, whose square would overflow.
+    It is larger if a coarse level has blown up, whose square would overflow. `values` have the shape (member, n, points).
     """
     sizes = np.max(np.abs(values), axis=2)
     size = np.maximum(sizes[:, -1], np.max(sizes, axis=1) / LARGEST)
@@ -66,12 +64,12 @@ def half_last_digits(
 ) -> Floats:
     """Return half a unit of the last decimal digit of the values of each level, shape (n,).
 
-    It is how far values are from what they were before they were printed or stored with no more than `few` digits; else
-    0. All values may have as many decimal places, or as many digits: the last digit of larger ones is then at another
-    place, and the larger unit counts. Finite values have the shape (n, points).
+    It is the largest rounding error of values that were printed or stored with at most `few` digits, and 0 for others.
+    The values may share the number of decimal places or the number of digits; the larger unit counts. Finite `values`
+    have the shape (n, points).
 
-    Binary fractions have few digits anyway: without `of_binary` they are taken as they are. Where the levels are
-    numbers as they were `written`, with zeros at the end, these are digits of all.
+    Binary fractions have few digits anyway: without `of_binary` they count as exact. If the levels are numbers as
+    `written`, zeros at the end count as digits.
     """
     if written is not None and any(map(_is_padded, written)):
         return _half_units(written)
@@ -92,7 +90,7 @@ def half_last_digits(
         return none
     units = np.full(len(values), min(last, 0) if is_whole else last)
     if not is_whole:
-        # the digits of 0.5 or 1 may be all that they have
+        # 0.5 or 1 may be exact
         own = np.max(np.where(are_binary, 0.0, np.abs(sampled)), axis=1)
         sizes = [Decimal(repr(x)).adjusted() if x else last for x in own.tolist()]
         units = np.maximum(units, np.array(sizes) - digits + 1)
@@ -100,13 +98,13 @@ def half_last_digits(
 
 
 def _is_padded(number: Decimal) -> bool:
-    """Say whether a number is written with zeros at its end, as for its precision: 1.20, not 120 or 1.0."""
+    """Say whether a number is written with zeros that show its precision: 1.20, but not 120 or 1.0."""
     _, digits, last = number.as_tuple()
     return last not in (-1, 0) and isinstance(last, int) and digits[-1] == 0
 
 
 def _half_units(written: Sequence[Decimal]) -> Floats:
-    """Return half a unit of the last digit of numbers with as many decimal places, or as many digits."""
+    """Return half a unit of the last digit of numbers that share the number of decimal places or of digits."""
     last = min(int(number.as_tuple().exponent) for number in written)
     digits = max(len(number.as_tuple().digits) for number in written)
     units = (max(last, number.adjusted() - digits + 1) if number else last for number in written)
@@ -114,15 +112,15 @@ def _half_units(written: Sequence[Decimal]) -> Floats:
 
 
 def half_written(number: Decimal) -> float:
-    """Return half a unit of the last digit of a finite number as it is written: zeros at its end count."""
+    """Return half a unit of the last digit of a finite number as written; zeros at its end count."""
     last = number.as_tuple().exponent
     return float(Decimal(5).scaleb(last - 1)) if isinstance(last, int) else 0.0
 
 
 def rounding_of_sizes(h: Floats) -> Floats:
-    """Return half a unit of the last digit of step sizes, if all may be rounded to as many digits; else 0, shape (n,).
+    """Return half a unit of the last digit of step sizes that may be rounded, else 0; shape (n,).
 
-    Sizes in one ratio are as they are written: rounding would change it.
+    Sizes with a constant ratio count as exact: rounding would change the ratio.
     """
     ratios = h[1:] / h[:-1]
     numbers = [Decimal(repr(float(size))).normalize() for size in h]
@@ -133,10 +131,10 @@ def rounding_of_sizes(h: Floats) -> Floats:
 
 
 def step_of_values(values: Floats) -> float:
-    """Return the least difference of levels where two of the finest are the same to the last bit and others differ.
+    """Return the least difference of levels if values come in steps, such as a largest value over grid points; else 0.
 
-    Then values come in steps, such as a largest value over grid points, and are off by as much. Shape (n, points); 0
-    where no two of the finest `IN_STEPS` are the same, or all levels. Coarser ones count only if all of these are.
+    They do if some of the finest `IN_STEPS` levels are equal to the last bit and others differ. Coarser levels count
+    only if all of these are equal. The values are off by about one step. They have the shape (n, points).
     """
     sizes = np.max(np.abs(np.diff(values, axis=0)), axis=1)
     finest = sizes[1 - IN_STEPS :]
@@ -147,12 +145,12 @@ def step_of_values(values: Floats) -> float:
 
 
 def is_single(values: Floats) -> bool:
-    """Say whether finite values, shape (n, points), are those of single precision, as they are or as it prints them."""
+    """Say whether finite values, shape (n, points), have single precision, stored or printed."""
     sampled = values[:, :: -(-values.shape[1] // SAMPLED)].ravel()
     with np.errstate(over="ignore"):
         single = sampled.astype(np.float32)
     if np.all(single == sampled):
-        # a few bits may be those of a result as it is
+        # a value with few bits may be exact
         bits = np.frexp(sampled)[0] * BINARY
         return bool(np.any(bits != np.rint(bits)))
     digits = 0
@@ -177,9 +175,9 @@ def measurement(
     epsilon
         Relative spacing of the precision of every level, shape (n,).
     noise
-        Root mean square of the noise of every level, as the user states it; None for round-off alone.
+        Root mean square of the noise of each level, as stated by the user; None for round-off alone.
     exact
-        Exact values, shape (member, points); None where they are not known.
+        Exact values, shape (member, points); None if unknown.
     """
     scale = scale_of(values)
     scaled = values / scale[:, None, None]
@@ -189,7 +187,7 @@ def measurement(
     if exact is not None:
         with np.errstate(over="ignore"):
             true_error = scaled[:, -1] - exact / scale[:, None]
-        # an exact value that is further away is just as wrong, and its square would overflow
+        # the square of a larger distance would overflow
         true_error = np.clip(true_error, -FURTHEST, FURTHEST)
         rows = np.concatenate([rows, true_error[:, None]], axis=1)
     with np.errstate(over="ignore"):
@@ -198,7 +196,7 @@ def measurement(
     epsilon = np.where(single, np.maximum(epsilon, SINGLE), np.broadcast_to(epsilon, norms.shape))
     floor = 0.5 * epsilon * norms
     if noise is not None:
-        # what is larger says no more, and its square would overflow
+        # the square of larger noise would overflow
         with np.errstate(over="ignore"):
             floor = np.maximum(floor, np.minimum(noise / scale[:, None], FURTHEST))
     ladder = Ladder(

@@ -1,4 +1,4 @@
-"""What is measured and decided of the ladders of a study, before it is put into words."""
+"""Measurements and decisions on the ladders of a study, before they are put into words."""
 
 from __future__ import annotations
 
@@ -25,48 +25,48 @@ from vibsim.core.vocabulary import LEVELS_OF_AN_ORDER, REASON_NAMES
 from vibsim.elementary import on_arrays
 
 MOST_ROUNDED = 5e-4
-"""Exact values of more than three digits may be rounded to them: half of their last digit is a smaller part."""
+"""Largest relative rounding of exact values: with more than three digits, half a unit of the last one is less."""
 EXACT_DIGITS = 16
-"""Exact values with no more decimal digits than these may be rounded to them: whoever writes them down stops there."""
+"""Exact values with at most this number of decimal digits may be rounded."""
 MOST_UNITS = 8.0
-"""Exact values that are further from the finest level, in half units of its last digit, were not missed by rounding."""
+"""Largest distance of exact values from the finest level, in half units of its last digit, that rounding explains."""
 MOST_ADDED_UP, ADDED_UP = 100.0, 10.0
-"""What rounding errors add up to in a calculation, in units of the precision of the values: at most, and usually.
+"""Largest and usual accumulated rounding error of a calculation, in units of the precision of the values.
 
-Bounds count the latter for single precision, whose steps are often seen beside the error."""
+Bounds include the usual one for single precision, where it is often visible beside the error."""
 LEAST_RATIO = 1.4
-"""Of levels whose step sizes have a smaller ratio some are left out of the verdict [calibrated].
+"""Smallest ratio of the step sizes that a verdict rests on; levels closer together are left out [calibrated].
 
-The two powers of the error model leave a smooth rest. At levels side by side it is no independent misfit, as the model
-takes it, and their many differences would make any order seem sure."""
+The two powers of the error model leave a smooth remainder. At close levels it is not the independent misfit that the
+model assumes, so their many differences would make any order seem certain."""
 SMOOTH = 0.05
-"""Levels lie on a smooth curve if each is off it by so small a part of what levels differ by [calibrated]."""
+"""Largest distance of a level from a smooth curve, relative to the differences of the levels [calibrated]."""
 SEEN = 0.1
-"""The rounding of exact values is seen where it is so large a part of the error of the finest level."""
+"""The rounding of exact values matters if it is at least this part of the error of the finest level."""
 
 
 @dataclass(frozen=True)
 class Request:
-    """What a user asks of a ladder."""
+    """The question of a user about a ladder."""
 
     quantity: str
     order: float | None
     at_least: float | None
     noise: float | None
     half_of_exact: float | None = None
-    """Half a unit of the last digit of the exact value as it was written; None where only its value is known."""
+    """Half a unit of the last digit of the exact value as written; None if only its value is known."""
     written: tuple[Decimal, ...] | None = None
-    """Numbers of all levels with the digits that they were written with."""
+    """Numbers of all levels with their digits as written."""
 
-    def halves(self, part: Floats, places: Integers, *, of_binary: bool = False) -> Floats:
-        """Return half a unit of the last digit of levels, whose places are given; see `half_last_digits`."""
+    def halves(self, values: Floats, places: Integers, *, of_binary: bool = False) -> Floats:
+        """Return half a unit of the last digit of the levels at `places`; see `half_last_digits`."""
         written = None if self.written is None else [self.written[i] for i in places]
-        return half_last_digits(part, of_binary=of_binary, written=written)
+        return half_last_digits(values, of_binary=of_binary, written=written)
 
 
 @dataclass
 class Outcome:
-    """What was measured and decided of one member; NaN where nothing is known, and where a level is not finite."""
+    """The measurements and the decision of one member; NaN for unknown numbers and for levels that are not finite."""
 
     values: Floats
     """Numbers, or norms of the values, shape (n,)."""
@@ -78,9 +78,9 @@ class Outcome:
     """Positions of the levels that are finite."""
     reason: str = "non_finite"
     differences: Floats = field(default_factory=lambda: np.empty(0))
-    """Of successive finite levels, with their sign where they are numbers or of opposite shape, shape (finite - 1,)."""
+    """Differences of successive finite levels, shape (finite - 1,): signed for numbers, else norms."""
     ratios: Floats = field(default_factory=lambda: np.empty(0))
-    """With their sign, shape (finite - 2,)."""
+    """Signed ratios of successive differences, shape (finite - 2,)."""
     size: float = np.nan
     floor: float = np.nan
     """Norm and noise of the finest level."""
@@ -92,30 +92,30 @@ class Outcome:
     is_contradicted: bool = False
     """Whether finer levels contradict that order."""
     left_out: int = 0
-    """How many finite levels the verdict leaves out, because their step sizes are close to those of others."""
+    """Number of finite levels that the verdict leaves out because their step sizes are close to those of others."""
     error: float = np.nan
     error_bound: float = np.nan
     best: Floats | None = None
     """Extrapolated values, shape (points,)."""
     best_bound: float = np.nan
-    """How far they are from the limit at most, in the norm."""
+    """Bound of the norm of their error."""
     agrees_to_digits: bool = False
-    """Whether the levels were judged without the exact values, which have too few digits to tell their error."""
+    """Whether the exact values were ignored because they have too few digits to show the error of the levels."""
     rounded: float = 0.0
-    """How far the extrapolated values are off because those of the levels have few digits; part of the bounds."""
+    """Error of the extrapolated values due to the rounding of the levels; part of the bounds."""
     comes_in_steps: bool = False
-    """Whether they are so far off because the values come in steps."""
+    """Whether that error is due to values that come in steps."""
 
 
 def outcomes(
     request: Request, h: Floats, values: Floats, epsilon: Floats, exact: Floats | None
 ) -> list[Outcome]:
-    """Return what was decided of each member.
+    """Return the outcome of each member.
 
     Parameters
     ----------
-    asked
-        What is asked of all of them.
+    request
+        The question about all members.
     h
         Step sizes, strictly decreasing, shape (n,).
     values
@@ -123,92 +123,92 @@ def outcomes(
     epsilon
         Relative spacing of the precision of every level, shape (n,).
     exact
-        Exact values, shape (member, points); None where they are not known.
+        Exact values, shape (member, points); None if unknown.
     """
     finite: Flags = np.asarray(np.isfinite(values).all(axis=2))
     patterns = np.stack([finite, _judged(h, values, finite)], axis=1)
-    found: dict[int, Outcome] = {}
+    results: dict[int, Outcome] = {}
     for pattern in np.unique(patterns, axis=0):
         members = np.flatnonzero(np.all(patterns == pattern, axis=(1, 2)))
         truth = None if exact is None else exact[members]
-        some = _with_finite(request, h, values[members], epsilon, truth, pattern)
-        found |= dict(zip(members.tolist(), some, strict=True))
+        subset = _with_finite(request, h, values[members], epsilon, truth, pattern)
+        results |= dict(zip(members.tolist(), subset, strict=True))
     if exact is not None:
-        for i, one in found.items():
-            half = _rounding_of_exact(one, exact[i], request.half_of_exact)
+        for i, outcome in results.items():
+            half = _rounding_of_exact(outcome, exact[i], request.half_of_exact)
             if not half:
                 continue
             (levels,) = _with_finite(request, h, values[i : i + 1], epsilon, None, patterns[i])
-            is_better = one.reason == "wrong_limit" or levels.reason in (*DECIDED, "exact")
+            is_better = outcome.reason == "wrong_limit" or levels.reason in (*DECIDED, "exact")
             if is_better and _agrees(levels, exact[i], half):
                 levels.agrees_to_digits = True
-                found[i] = levels
-    return [found[i] for i in range(len(values))]
+                results[i] = levels
+    return [results[i] for i in range(len(values))]
 
 
 def _judged(h: Floats, values: Floats, finite: Flags) -> Flags:
-    """Say which levels of each member a verdict rests on: finite ones, and of those side by side only some.
+    """Say which levels of each member the verdict rests on: finite ones, and of close ones only some.
 
-    Some are left out where all lie on a smooth curve. Else there is noise, of which every level tells.
+    Close levels are left out only if they lie on a smooth curve; otherwise there is noise, and every level counts.
     """
     judged = finite.copy()
     for i, row in enumerate(finite):
         places = np.flatnonzero(row)
-        kept = spread_out(h[places])
-        others = np.setdiff1d(np.arange(len(places)), kept)
+        chosen = spread_out(h[places])
+        others = np.setdiff1d(np.arange(len(places)), chosen)
         if len(others) and _is_smooth(h[places], values[i, places], others):
             judged[i, places[others]] = False
     return judged
 
 
 def _is_smooth(h: Floats, values: Floats, places: Integers) -> bool:
-    """Say whether levels at some places are where the cubic through the four levels around them has them.
+    """Say whether each level at `places` is close to the cubic through the four levels nearest to it.
 
-    Nothing is asked of the coarsest one, which has none before it. They may be off by a small part
-    of what these differ by. `values` are of shape (n, points).
+    The tolerance is a small part of the differences of these four. The coarsest level is not tested. `values` have the
+    shape (n, points).
     """
     scale = float(np.max(np.abs(values)))
     u = values / (scale if scale > 0.0 else 1.0)
-    moved = np.sqrt(np.mean(np.diff(u, axis=0) ** 2, axis=1))
+    changes = np.sqrt(np.mean(np.diff(u, axis=0) ** 2, axis=1))
     for j in places[places > 0].tolist():
         others = np.delete(np.arange(len(h)), j)
         (weights,), (near,), _ = polynomials(h[[j]], h[others], min(4, len(others)), 0.0)
         around = others[near]
-        off = u[j] - np.sum(weights[:, None] * u[around], axis=0)
-        allowed = SMOOTH * np.mean(moved[np.min(around) : np.max(around)])
-        if not np.sqrt(np.mean(off**2)) <= allowed:
+        distance = u[j] - np.sum(weights[:, None] * u[around], axis=0)
+        tolerance = SMOOTH * np.mean(changes[np.min(around) : np.max(around)])
+        if not np.sqrt(np.mean(distance**2)) <= tolerance:
             return False
     return True
 
 
 def spread_out(h: Floats) -> Integers:
-    """Return the places of step sizes of which each is `LEAST_RATIO` times the next finer one at least.
+    """Return the positions of step sizes that are each at least `LEAST_RATIO` times the next finer one.
 
-    Of three levels and more they are three at least: the ends, and the one that is nearest to their middle.
+    There are at least three positions if there are three levels: both ends, and the level nearest to their middle.
     """
-    kept = [len(h) - 1]
+    chosen = [len(h) - 1]
     for i in range(len(h) - 2, -1, -1):
-        if h[i] >= LEAST_RATIO * h[kept[-1]]:
-            kept.append(i)
-    if len(kept) < LEVELS_OF_AN_ORDER <= len(h):
+        if h[i] >= LEAST_RATIO * h[chosen[-1]]:
+            chosen.append(i)
+    if len(chosen) < LEVELS_OF_AN_ORDER <= len(h):
         sizes = on_arrays.log(h)
         middle = np.argmin(np.abs(sizes[1:-1] - 0.5 * (sizes[0] + sizes[-1])))
-        kept = [len(h) - 1, int(middle) + 1, 0]
-    return np.array(kept[::-1])
+        chosen = [len(h) - 1, int(middle) + 1, 0]
+    return np.array(chosen[::-1])
 
 
-def _rounding_of_exact(one: Outcome, exact: Floats, half: float | None) -> float:
-    """Return half a unit of the last digit of exact values, if that may be why nothing else was decided; else 0."""
-    if one.reason not in ("wrong_limit", "pre_asymptotic", "round_off", "oscillating"):
+def _rounding_of_exact(outcome: Outcome, exact: Floats, half: float | None) -> float:
+    """Return half a unit of the last digit of exact values if their rounding may explain the outcome; else 0."""
+    if outcome.reason not in ("wrong_limit", "pre_asymptotic", "round_off", "oscillating"):
         return 0.0
     if half is None:
         half = float(half_last_digits(exact[None], EXACT_DIGITS)[0])
     at_most = MOST_ROUNDED * float(np.max(np.abs(exact)))
-    return half if SEEN * abs(one.error) <= half <= at_most else 0.0
+    return half if SEEN * abs(outcome.error) <= half <= at_most else 0.0
 
 
 def _agrees(levels: Outcome, exact: Floats, half: float) -> bool:
-    """Say whether exact values may be the limit of the levels, but for a rounding of up to `half`."""
+    """Say whether exact values, with a rounding error of up to `half`, may be the limit of the levels."""
     if levels.best is None:
         return False
     away = np.sqrt(np.mean((levels.best - exact) ** 2))
@@ -223,91 +223,102 @@ def _with_finite(
     exact: Floats | None,
     pattern: Flags,
 ) -> list[Outcome]:
-    """Return what was decided of members that have the same finite levels, and the same ones that are judged."""
+    """Return the outcomes of members with the same finite and the same judged levels (the rows of `pattern`)."""
     finite, (count, n, points) = np.flatnonzero(pattern[0]), values.shape
     judged = np.flatnonzero(pattern[1][finite])
     exact_known = exact is not None and len(finite) > 0
-    found = [
+    results = [
         Outcome(np.full(n, np.nan), np.full(n, np.nan), points == 1, exact_known, finite)
         for _ in range(count)
     ]
     if not len(finite):
-        return found
-    part = values[:, finite]
-    measured = measurement(part, h[finite], epsilon[finite], request.noise, exact)
-    few, rest = measured, part[:, judged]
+        return results
+    finite_values = values[:, finite]
+    measured = measurement(finite_values, h[finite], epsilon[finite], request.noise, exact)
+    judged_measured, judged_values = measured, finite_values[:, judged]
     if len(judged) < len(finite):
-        few = measurement(rest, h[finite][judged], epsilon[finite][judged], request.noise, exact)
-    decided = None
+        judged_measured = measurement(
+            judged_values, h[finite][judged], epsilon[finite][judged], request.noise, exact
+        )
+    assessment = None
     if len(finite) >= LEVELS_OF_AN_ORDER:
         question = Question(request.order, request.at_least)
         if request.noise:
             question = question.with_stated_noise
-        decided = assess(few.ladder, question)
+        assessment = assess(judged_measured.ladder, question)
         if not request.noise:
-            half = np.array([request.halves(rows, finite[judged]) for rows in rest])
-            _allow_for_rounding(decided, few, half, question)
-    for k, one in enumerate(found):
+            half = np.array([request.halves(rows, finite[judged]) for rows in judged_values])
+            _allow_for_rounding(assessment, judged_measured, half, question)
+    for k, outcome in enumerate(results):
         truth = None if exact is None else exact[k]
-        _measure(one, measured, k, part[k], truth, request.noise or 0.0)
-        if decided is not None:
-            _decide(one, decided, k, few, part[k], judged, truth, request)
+        _measure(outcome, measured, k, finite_values[k], truth, request.noise or 0.0)
+        if assessment is not None:
+            _decide(
+                outcome, assessment, k, judged_measured, finite_values[k], judged, truth, request
+            )
         if len(finite) < n:
-            # levels that are not finite decide, whatever the others say; the error is that of the finest level
-            one.reason = "non_finite"
+            # a level that is not finite decides, whatever the others show; the error is that of the finest level
+            outcome.reason = "non_finite"
         if finite[-1] < n - 1:
-            one.error = one.error_bound = np.nan
-    return found
+            outcome.error = outcome.error_bound = np.nan
+    return results
 
 
 def _allow_for_rounding(
-    decided: Assessment, measured: Measurement, half: Floats, question: Question
+    assessment: Assessment, measured: Measurement, half: Floats, question: Question
 ) -> None:
-    """Take back what was decided of values of few digits, if noise as large as their rounding decides otherwise.
+    """Revise the assessment of values with few digits if noise as large as their rounding leads to another one.
 
-    What is decided in both cases has an interval that holds both. `half` is half a unit of the last digit, of shape
+    If both agree, the interval of the order becomes the union of both. `half` is half a unit of the last digit, shape
     (member, n).
     """
-    near = decided.error * measured.scale <= MOST_UNITS * half[:, -1]
-    doubtful = is_one_of(decided.reason, *DECIDED) | (
-        near & is_one_of(decided.reason, "wrong_limit")
+    is_near = assessment.error * measured.scale <= MOST_UNITS * half[:, -1]
+    is_doubtful = is_one_of(assessment.reason, *DECIDED) | (
+        is_near & is_one_of(assessment.reason, "wrong_limit")
     )
-    rows = np.flatnonzero((half[:, -1] > 0.0) & doubtful)
+    rows = np.flatnonzero((half[:, -1] > 0.0) & is_doubtful)
     if not len(rows):
         return
     ladder = measured.ladder.some(rows)
-    # of a rounding all values within half a unit are equally probable
+    # rounding errors are uniformly distributed within half a unit
     rounding = (half / math.sqrt(3.0) / measured.scale[:, None])[rows]
     ladder = replace(ladder, floor=np.maximum(ladder.floor, rounding))
-    doubted = assess(ladder, question.with_stated_noise)
-    same = doubted.reason == decided.reason[rows]
-    decided.low[rows] = np.fmin(decided.low[rows], doubted.low)
-    decided.high[rows] = np.fmax(decided.high[rows], doubted.high)
-    for one in fields(Assessment):
-        getattr(decided, one.name)[rows[~same]] = getattr(doubted, one.name)[~same]
+    rounded = assess(ladder, question.with_stated_noise)
+    agrees = rounded.reason == assessment.reason[rows]
+    assessment.low[rows] = np.fmin(assessment.low[rows], rounded.low)
+    assessment.high[rows] = np.fmax(assessment.high[rows], rounded.high)
+    for entry in fields(Assessment):
+        getattr(assessment, entry.name)[rows[~agrees]] = getattr(rounded, entry.name)[~agrees]
 
 
 def _measure(
-    one: Outcome, measured: Measurement, k: int, part: Floats, truth: Floats | None, noise: float
+    outcome: Outcome,
+    measured: Measurement,
+    k: int,
+    finite_values: Floats,
+    truth: Floats | None,
+    noise: float,
 ) -> None:
-    """Add what was measured of member `k`, whose finite levels are `part`, shape (finite, points)."""
-    scale, rows = float(measured.scale[k]), len(part) - 1
+    """Add the measurements of member `k`, whose finite levels have `finite_values`, shape (finite, points)."""
+    scale, rows = float(measured.scale[k]), len(finite_values) - 1
     sizes = np.sqrt(np.diagonal(measured.ladder.gram[k]))[:rows]
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        one.differences = part[:-1, 0] - part[1:, 0] if one.is_number else sizes * scale
-    one.ratios = _ratios(measured, k)
-    one.reason = "too_few_levels"
-    one.values[one.finite] = part[:, 0] if one.is_number else measured.norms[k]
-    one.size = float(measured.norms[k, -1])
-    one.floor = max(float(measured.ladder.floor[k, -1]) * scale, noise)
+        outcome.differences = (
+            finite_values[:-1, 0] - finite_values[1:, 0] if outcome.is_number else sizes * scale
+        )
+    outcome.ratios = _ratios(measured, k)
+    outcome.reason = "too_few_levels"
+    outcome.values[outcome.finite] = finite_values[:, 0] if outcome.is_number else measured.norms[k]
+    outcome.size = float(measured.norms[k, -1])
+    outcome.floor = max(float(measured.ladder.floor[k, -1]) * scale, noise)
     if truth is not None:
-        one.errors[one.finite] = _distances(part, truth, one.is_number, scale)
-        one.error = float(one.errors[one.finite[-1]])
-        one.error_bound = abs(one.error) + one.floor
+        outcome.errors[outcome.finite] = _distances(finite_values, truth, outcome.is_number, scale)
+        outcome.error = float(outcome.errors[outcome.finite[-1]])
+        outcome.error_bound = abs(outcome.error) + outcome.floor
 
 
 def _ratios(measured: Measurement, k: int) -> Floats:
-    """Return the ratios of successive differences of member `k`, with their sign, shape (n - 2,)."""
+    """Return the signed ratios of successive differences of member `k`, shape (n - 2,)."""
     rows = len(measured.ladder.h) - 1
     products = measured.ladder.gram[k, :rows, :rows]
     sizes = np.sqrt(np.diagonal(products))
@@ -316,7 +327,7 @@ def _ratios(measured: Measurement, k: int) -> Floats:
 
 
 def _distances(part: Floats, limit: Floats, is_number: bool, scale: float) -> Floats:
-    """Return the distances of all levels from a limit: with their sign of numbers, else root mean squares."""
+    """Return the distances of all levels from a limit: signed for numbers, else root mean squares."""
     if is_number:
         with np.errstate(over="ignore"):
             return np.asarray(part[:, 0] - limit[0])
@@ -324,72 +335,96 @@ def _distances(part: Floats, limit: Floats, is_number: bool, scale: float) -> Fl
 
 
 def _decide(
-    one: Outcome,
-    decided: Assessment,
+    outcome: Outcome,
+    assessment: Assessment,
     k: int,
     measured: Measurement,
-    every: Floats,
+    finite_values: Floats,
     judged: Integers,
     truth: Floats | None,
     request: Request,
 ) -> None:
-    """Add what was decided of member `k`, whose finite levels are `every` and whose exact values are `truth`.
+    """Add the decision on member `k`.
 
-    The verdict rests on the levels at the places `judged`, of which `measured` is.
+    Parameters
+    ----------
+    measured
+        The measurement of the judged levels.
+    finite_values
+        Values of the finite levels, shape (finite, points).
+    judged
+        Positions of the levels that the verdict rests on, among the finite ones.
+    truth
+        Exact values, shape (points,); None if unknown.
     """
-    scale, part, places = float(measured.scale[k]), every[judged], one.finite[judged]
-    one.reason = REASON_NAMES[int(decided.reason[k])]
-    one.order, used, weights = _estimate(one, measured, decided, k)
-    one.used = tuple(places[used].tolist())
-    one.left_out = len(every) - len(part)
-    one.low, one.high = float(decided.low[k]), float(decided.high[k])
-    one.is_contradicted = bool(decided.contradicted[k])
-    if np.isfinite(weights).all():
-        # added up one by one, so that a member has the same digits alone and among others
-        one.best = sum((w * row for w, row in zip(weights, part, strict=True)), 0.0 * part[0])
-        added_up = ADDED_UP * SINGLE * measured.norms[k, -1] * measured.are_single[k]
-        halves, step = request.halves(part, places), step_of_values(part)
-        units = np.maximum(halves, float(added_up))
-        # the last digits are steps, too, of a unit or some
-        one.comes_in_steps = step > 10.0 * float(np.max(units))
-        one.rounded = float(np.sum(np.maximum(units, step) * np.abs(weights)))
-    if one.reason == "wrong_limit":
-        # the floor is that of storing numbers, half a unit
-        most = 0.0 if request.noise else 2.0 * MOST_ADDED_UP * measured.ladder.floor[k, -1]
-        # what was printed as 10.5 was 10.46
-        half = float(request.halves(part, places, of_binary=True)[-1])
-        if abs(one.error) <= max(most * scale, half):
-            one.reason = "round_off"
-    bound_of_best = float(decided.best_bound[k]) * scale
-    if one.reason == "wrong_limit" and one.rounded and one.best is not None and truth is not None:
-        away = float(np.max(np.abs(_distances(one.best[None], truth, one.is_number, scale))))
-        if away <= MISSED * bound_of_best + one.rounded:
-            # the exact values, with so many digits, may be what was printed
-            one.reason = "round_off"
-    one.best_bound = bound_of_best + one.rounded
-    if one.exact_known:
-        return
-    one.error, one.error_bound = (
-        float(decided.error[k]) * scale,
-        max(float(decided.error_bound[k]) * scale, request.noise or 0.0) + one.rounded,
+    scale, judged_values, places = (
+        float(measured.scale[k]),
+        finite_values[judged],
+        outcome.finite[judged],
     )
-    if one.best is not None:
-        one.errors[one.finite] = _distances(every, one.best, one.is_number, scale)
-        if one.is_number and one.errors[one.finite[-1]] < 0.0:
-            one.error = -one.error
+    outcome.reason = REASON_NAMES[int(assessment.reason[k])]
+    outcome.order, used, weights = _estimate(outcome, measured, assessment, k)
+    outcome.used = tuple(places[used].tolist())
+    outcome.left_out = len(finite_values) - len(judged_values)
+    outcome.low, outcome.high = float(assessment.low[k]), float(assessment.high[k])
+    outcome.is_contradicted = bool(assessment.contradicted[k])
+    if np.isfinite(weights).all():
+        # summed one by one, so that a member has the same bits alone and among others
+        outcome.best = sum(
+            (w * row for w, row in zip(weights, judged_values, strict=True)), 0.0 * judged_values[0]
+        )
+        added_up = ADDED_UP * SINGLE * measured.norms[k, -1] * measured.are_single[k]
+        halves, step = request.halves(judged_values, places), step_of_values(judged_values)
+        units = np.maximum(halves, float(added_up))
+        # printed values differ by some units of their last digit: these are no steps
+        outcome.comes_in_steps = step > 10.0 * float(np.max(units))
+        outcome.rounded = float(np.sum(np.maximum(units, step) * np.abs(weights)))
+    if outcome.reason == "wrong_limit":
+        # the floor is the rounding of stored numbers, half a unit
+        most = 0.0 if request.noise else 2.0 * MOST_ADDED_UP * measured.ladder.floor[k, -1]
+        # 10.46 may have been printed as 10.5
+        half = float(request.halves(judged_values, places, of_binary=True)[-1])
+        if abs(outcome.error) <= max(most * scale, half):
+            outcome.reason = "round_off"
+    bound_of_best = float(assessment.best_bound[k]) * scale
+    if (
+        outcome.reason == "wrong_limit"
+        and outcome.rounded
+        and outcome.best is not None
+        and truth is not None
+    ):
+        distance = float(
+            np.max(np.abs(_distances(outcome.best[None], truth, outcome.is_number, scale)))
+        )
+        if distance <= MISSED * bound_of_best + outcome.rounded:
+            # rounded to the digits of the levels, the exact values may agree
+            outcome.reason = "round_off"
+    outcome.best_bound = bound_of_best + outcome.rounded
+    if outcome.exact_known:
+        return
+    outcome.error, outcome.error_bound = (
+        float(assessment.error[k]) * scale,
+        max(float(assessment.error_bound[k]) * scale, request.noise or 0.0) + outcome.rounded,
+    )
+    if outcome.best is not None:
+        outcome.errors[outcome.finite] = _distances(
+            finite_values, outcome.best, outcome.is_number, scale
+        )
+        if outcome.is_number and outcome.errors[outcome.finite[-1]] < 0.0:
+            outcome.error = -outcome.error
 
 
 def _estimate(
-    one: Outcome, measured: Measurement, decided: Assessment, k: int
+    outcome: Outcome, measured: Measurement, assessment: Assessment, k: int
 ) -> tuple[float, slice, Floats]:
-    """Return the order of member `k`, the places of its levels, and the weights of the extrapolation.
+    """Return the order of member `k`, the positions of its levels, and the weights of the extrapolation.
 
-    Where no order may be believed, they are those of the finest three levels that have one. The verdict says that such
-    an estimate is not to be trusted.
+    If no order is certain, they are those of the finest three levels with an order. The verdict then says that the
+    estimate is not reliable.
     """
-    h, order, weights = measured.ladder.h, float(decided.order[k]), decided.weights[k]
-    first, last = int(decided.first[k]), int(decided.last[k])
-    if one.reason == "exact":
+    h, order, weights = measured.ladder.h, float(assessment.order[k]), assessment.weights[k]
+    first, last = int(assessment.first[k]), int(assessment.last[k])
+    if outcome.reason == "exact":
         return order, slice(first, last + 1), weights
     if not np.isfinite(order):
         orders = orders_of_steps(_ratios(measured, k), h)
@@ -399,7 +434,7 @@ def _estimate(
             order, last = float(orders[first]), first + 2
     if not np.isfinite(weights).all() and order >= LEAST_WITH_LIMIT:
         fine = last if last > 0 else len(h) - 1
-        part = 1.0 / on_arrays.expm1(order * on_arrays.log(h[fine - 1] / h[fine]))
+        weight = 1.0 / on_arrays.expm1(order * on_arrays.log(h[fine - 1] / h[fine]))
         weights = np.zeros(len(h))
-        weights[[fine - 1, fine]] = -part, 1.0 + part
+        weights[[fine - 1, fine]] = -weight, 1.0 + weight
     return order, slice(first, last + 1), weights

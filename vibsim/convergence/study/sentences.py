@@ -1,4 +1,4 @@
-"""Facts in, words out: a sentence and an advice for every reason of a verdict on any ladder."""
+"""Sentence and advice for every reason of a verdict on any ladder, made from facts."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Setting:
-    """What the words on a ladder are made from beside the facts of its verdict."""
+    """Facts beside the verdict that the words on a ladder use."""
 
     noise: float = 0.0
     """Noise of the levels, as the user states it."""
@@ -33,23 +33,23 @@ class Setting:
     is_proportional: bool = True
     """Whether all of them are proportional to the first."""
     interpolation: tuple[str, int] | None = None
-    """Kind and order of an interpolation that hides the order."""
+    """Kind and order of the interpolation, if it hides the order."""
     is_contradicted: bool = False
-    """Whether finer levels than those of an order contradict it."""
+    """Whether levels finer than those of the order contradict it."""
     are_sizes_rounded: bool = False
-    """Whether the digits of the sizes are so few that their rounding may move the order by more than the tolerance."""
+    """Whether the rounding of the sizes may change the order by more than the tolerance."""
     notes: tuple[str, ...] = ()
-    """What else may be wrong, where it does not pass with an expected order above 1."""
+    """Other possible faults, for a ladder that does not pass with an expected order above 1."""
     parts: tuple[str, ...] = ()
     """Which part of the points is compared."""
 
 
 NOISE_SEEN = 4.0
-"""A difference of two levels that is larger than so many times their noise is hardly noise."""
+"""A difference of two levels above this multiple of their noise is hardly noise."""
 BEYOND_ROUND_OFF = 1e-10
-"""A difference that is a larger part of the values is no round-off."""
+"""A difference above this part of the values is not round-off."""
 APART = 1e-3
-"""Differences that grow up to this part of the values are levels that move apart, unless a noise is stated."""
+"""Growing differences above this part of the values mean levels that move apart, unless a noise is stated."""
 LOOK_FOR = (
     "Look for a part of lower order, such as the first step, a formula at a boundary, a limiter, or an iteration that "
     "stops too early"
@@ -136,12 +136,12 @@ SENTENCES: Mapping[str, tuple[str, str]] = MappingProxyType(
         ),
     }
 )
-"""Reason to the templates of sentence and advice; ``interpolation`` is a case of ``not_applicable``, ``noisy`` is a
-case of ``pre_asymptotic``, as is ``contradicted``, and ``growing`` of that and of ``round_off``."""
+"""Templates of sentence and advice by reason. ``interpolation`` is a case of ``not_applicable``; ``noisy`` and
+``contradicted`` are cases of ``pre_asymptotic``, and ``growing`` is one of this and of ``round_off``."""
 
 
 def describe(facts: LadderVerdict, setting: Setting) -> tuple[str, str]:
-    """Return the sentence on a ladder, and the advice; the advice on one that passed is empty."""
+    """Return sentence and advice on a ladder; the advice is empty if it passed."""
     key = "interpolation" if setting.interpolation else facts.reason
     if key == "pre_asymptotic" and _is_noise_seen(facts, setting):
         key = "noisy"
@@ -166,7 +166,7 @@ def describe(facts: LadderVerdict, setting: Setting) -> tuple[str, str]:
         _copies(facts),
     ]
     if facts.status == "PASS":
-        # points that are not the same have an error of order 1 of their own
+        # a mismatch of points has an error of order 1
         confirmed = (facts.expected or 0.0) > 1.0 + ORDER_TOLERANCE
         return _joined([sentence, *more, *(() if confirmed else setting.notes)]), ""
     if is_moved and setting.are_sizes_rounded:
@@ -175,13 +175,13 @@ def describe(facts: LadderVerdict, setting: Setting) -> tuple[str, str]:
 
 
 def _is_noise_seen(facts: LadderVerdict, setting: Setting) -> bool:
-    """Say whether the finest difference may be the stated noise: a finer level would show no more."""
+    """Say whether the finest difference may be the stated noise, so that a finer level would not help."""
     finest = facts.levels[-2:][0].difference
     return finest is not None and abs(finest) <= NOISE_SEEN * setting.noise
 
 
 def _is_growth(facts: LadderVerdict, setting: Setting) -> bool:
-    """Say whether levels whose differences grow move apart: by more than noise, where that is the reason."""
+    """Say whether growing differences mean levels that move apart, and not noise."""
     if facts.reason != "round_off":
         return facts.reason == "pre_asymptotic"
     finest = facts.levels[-2:][0]
@@ -197,7 +197,7 @@ def _phrases(facts: LadderVerdict, setting: Setting) -> dict[str, Any]:
     kind, own = setting.interpolation or ("", 0)
     h, count = [level.h for level in facts.levels], len(facts.levels)
     finer = number(h[-1] * (h[-1] / h[-2] if count > 1 else 0.5), 6)
-    # of sizes near the ends of double precision there may be none
+    # sizes near the limits of double precision may have no finer one
     such_as = f", such as {facts.size_name} = {finer}" if 0.0 < float(finer) < h[-1] else ""
     not_finite = [level.h for level in facts.levels if level.value is None]
     if facts.expected is not None:
@@ -244,7 +244,7 @@ def order_with_interval(facts: LadderVerdict) -> str:
 
 
 def higher_part(order: float, expected: float, tolerance: float) -> str:
-    """Say why the measured order is away from the one that dominates; empty where it is near."""
+    """Say why the measured order differs from the dominant one; empty if it does not."""
     if abs(order - expected) <= tolerance:
         return ""
     moves = "raises" if order > expected else "lowers"
@@ -252,7 +252,7 @@ def higher_part(order: float, expected: float, tolerance: float) -> str:
 
 
 def opposite_part(reason: str, order: float | None, wanted: float | None) -> str:
-    """Say why an order fails as too low or too high although the measured one is not; empty where it is."""
+    """Say why an order fails as too low or too high although the measured one is not; otherwise empty."""
     if order is None or wanted is None or not math.isfinite(wanted):
         return ""
     if reason == "order_low" and order >= wanted:
@@ -269,7 +269,7 @@ def _higher_part(facts: LadderVerdict) -> str:
 
 
 def _interval(facts: LadderVerdict) -> str:
-    """Say between which orders the levels leave it open."""
+    """Say which orders are consistent with the levels of an open verdict."""
     if facts.reason != "pre_asymptotic" or facts.order_low is None or facts.order_high is None:
         return ""
     if facts.order_high - facts.order_low < ORDER_TOLERANCE:
@@ -278,7 +278,7 @@ def _interval(facts: LadderVerdict) -> str:
 
 
 def _finer(facts: LadderVerdict) -> str:
-    """Say behind which level an order that was decided on is not seen."""
+    """Say from which level on a decided order is not visible."""
     decided = facts.reason in ("asymptotic", "order_low", "order_high")
     if not decided or not facts.h_used or facts.h_used[-1] == facts.levels[-1].h:
         return ""
@@ -287,7 +287,7 @@ def _finer(facts: LadderVerdict) -> str:
 
 
 def _copies(facts: LadderVerdict) -> str:
-    """Doubt neighbouring levels that do not differ at all, where those beside them differ by more than round-off."""
+    """Question neighbouring levels that are equal although the levels beside them differ by more than round-off."""
     levels, size = facts.levels, facts.size_name
     sizes = [abs(level.difference or 0.0) for level in levels[:-1]]
     if facts.reason == "exact" and sizes and not any(sizes):
@@ -304,7 +304,7 @@ def _copies(facts: LadderVerdict) -> str:
 
 
 def _error(facts: LadderVerdict) -> str:
-    """Say the error of the finest level with its bound."""
+    """State the error of the finest level with its bound."""
     if facts.error is None:
         return ""
     if facts.reason == "exact" and facts.error_bound is not None:
@@ -319,7 +319,7 @@ def _error(facts: LadderVerdict) -> str:
 
 
 def _best(facts: LadderVerdict) -> str:
-    """Say the extrapolated number with its bound."""
+    """State the extrapolated number with its bound."""
     if (
         facts.best is None
         or facts.is_exact_known
@@ -333,7 +333,7 @@ def _best(facts: LadderVerdict) -> str:
 
 
 def _together(setting: Setting) -> str:
-    """Say what an order counts where sizes are refined together, but not in proportion."""
+    """Say what the order refers to if sizes are refined together, but not in proportion."""
     if setting.is_proportional:
         return ""
     first, *others = setting.sizes
