@@ -48,7 +48,7 @@ class Measurement:
 def scale_of(values: Floats) -> Floats:
     """Return a power of two near the size of the finest level of each member, shape (member,).
 
-    It is larger if a coarse level has blown up, whose square would overflow. `values` have the shape (member, n, points).
+    It is larger if a coarse level has blown up, whose square would overflow. `values`: shape (member, n, points).
     """
     sizes = np.max(np.abs(values), axis=2)
     size = np.maximum(sizes[:, -1], np.max(sizes, axis=1) / LARGEST)
