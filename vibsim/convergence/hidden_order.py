@@ -6,7 +6,8 @@ show r. So p is accepted only if the data exclude h^r. Ratios cannot: a small pa
 
 Differences ``d_k = b h_k^r + a h_k^p + c h_k^q + ...`` are combined so that h^p and as many further powers as possible
 cancel, while h^r keeps its size in the last difference. Except for cancellation, the norm of the combination, plus its
-round-off, is an upper bound of b. The least bound counts, with further powers p + 1, p + 2, ... or p + 2, p + 4, ...
+round-off, is an upper bound of that part. The least bound counts, with further powers p + 1, p + 2, ... or p + 2,
+p + 4, ...
 """
 
 from __future__ import annotations
@@ -42,11 +43,12 @@ def is_promise_hidden(e: Evidence, order: Floats, last: Integers) -> Flags:
 
 
 def _largest_share(e: Evidence, rows: Flags, last: int, p: float, r: float) -> Floats:
-    """Return an upper bound of the part of h^r in an error of h^p at level `last`, shape (rows,)."""
+    """Return an upper bound of the part of h^r in an error of h^p at the finer level of difference `last`."""
     difference = pick(e.difference[rows], np.full(np.count_nonzero(rows), last))
     floor = floor_of_pairs(e)[rows]
     # from parts of differences to parts of errors
-    steeper = on_arrays.expm1(p * on_arrays.LN_2) / on_arrays.expm1(r * on_arrays.LN_2)
+    log_ratio = on_arrays.LN_2 * (e.levels[last + 1] - e.levels[last])
+    steeper = on_arrays.expm1(p * log_ratio) / on_arrays.expm1(r * log_ratio)
     share = np.full(difference.shape, np.inf)
     for step in (1.0, 2.0):
         for count in range(1, min(last, HIGHER_POWERS) + 1):

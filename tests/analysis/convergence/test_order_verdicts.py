@@ -7,10 +7,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from ladders import T, Truth, evidence_of, random_truth, shape_in_time
+from ladders import T, Truth, evidence_of, evidence_with, random_truth, shape_in_time
 
 from vibsim.convergence import verdict
 from vibsim.convergence.evidence import Evidence
+from vibsim.convergence.hidden_order import is_promise_hidden
 from vibsim.convergence.ladder_blocks import STACKED_LADDERS, batches
 from vibsim.convergence.verdict import judge, judge_together
 from vibsim.core.vocabulary import NORMS, REASON_NAMES, STATUSES
@@ -582,3 +583,31 @@ def test_batches_hold_every_row_once_and_few_ladders(ladders: int) -> None:
     assert [row for part in found for row in part] == list(rows)
     assert all(len(part) == 1 or len(part) * ladders <= STACKED_LADDERS for part in found)
     assert not list(batches((), ladders))
+
+
+@pytest.mark.parametrize("levels", [(4, 5, 6, 7, 8), (4, 6, 8, 10, 12), (3, 4, 6, 9, 12)])
+def test_a_hidden_part_is_bounded_whatever_the_gaps_between_levels(levels: tuple[int, ...]) -> None:
+    """``h^2 + s h_L h``: of the error of the finest level the part s is of first order."""
+    h = 2.0 ** -np.array(levels, dtype=float)
+
+    def is_hidden(part: float) -> bool:
+        d = -np.diff(h**2 + part * h[-1] * h)
+        e = evidence_with(
+            levels=levels,
+            difference=d[None],
+            cosines=np.ones((1, len(levels), len(levels))),
+            floor=np.zeros((1, len(levels))),
+            order=one(2.0),
+            promised=one(1.0),
+            special=one(2.0),
+            omega_dt=h[None],
+            relative_floor=one(0.0),
+            size=one(1.0),
+            combined=lambda rows, first, weights: np.abs(
+                d[None, first : first + len(weights)] @ weights
+            ),
+        )
+        return bool(is_promise_hidden(e, one(2.0), np.array([len(levels) - 1]))[0])
+
+    assert is_hidden(1.2e-6)
+    assert not is_hidden(0.8e-6)
