@@ -51,6 +51,7 @@ from vibsim.convergence.likely_powers import (
     rests_on_three,
     sides,
     tails,
+    windows_of_three,
 )
 from vibsim.convergence.reasons import code, first_reason, is_one_of
 from vibsim.convergence.thresholds import (
@@ -67,6 +68,7 @@ from vibsim.convergence.thresholds import (
     RISK_OF_THREE,
     STATED_LIMIT_FACTOR,
     STATED_NOISE_FACTOR,
+    THREE_DECIDE,
 )
 from vibsim.core.array_types import Codes, Flags, Floats, Integers
 from vibsim.core.vocabulary import ORDER_TOLERANCE
@@ -96,6 +98,8 @@ class Question:
     """The same for the finest level and the exact solution; `noise_factor` by default."""
     by_theory: bool = False
     """Whether theory promises the expected order."""
+    may_be_exact: bool = True
+    """Whether levels that differ by noise only are exact; otherwise the caller decides that."""
 
     def is_met_by(self, order: Floats) -> Flags:
         """Say which measured orders are nearer to the expected one than to the next order of an expansion.
@@ -270,7 +274,7 @@ def _is_sure(ladder: Ladder, evaluation: _Evaluation, question: Question) -> Fla
     ]
     window = np.sort(p.window, axis=-1)
     if window.shape[1] > 1:
-        margins.append(window[:, -1] - window[:, -2])
+        margins += [window[:, -1] - window[:, -2], windows_of_three(p) - THREE_DECIDE]
     sure: Flags = np.all(np.abs(margins) > ROUGH_LEFT_OUT, axis=0) & ~evaluation.cut_short
     sure &= ~(evaluation.rests_on_three & (fails | (not evaluation.exact_known)))
     if ladder.exact_known:
@@ -428,7 +432,7 @@ def _is_only_noise(ladder: Ladder, question: Question) -> Flags:
     if question.limit_factor is not None:
         factor = 1.0 + (factor - 1.0) / np.sqrt(ladder.points)
         furthest = n - 1
-    result = np.ones(len(ladder.gram), dtype=bool)
+    result = np.full(len(ladder.gram), question.may_be_exact)
     for gap in range(1, furthest + 1):
         for i in range(n - gap):
             square = np.sum(ladder.gram[:, i : i + gap, i : i + gap], axis=(1, 2))
@@ -439,7 +443,7 @@ def _is_only_noise(ladder: Ladder, question: Question) -> Flags:
 
 
 def _least_noise(ladder: Ladder) -> Floats:
-    """Return the least noise of each level that the two finest differences allow, shape (ladder, n).
+    """Return the least noise of each level that the two finest rows allow, shape (ladder, n).
 
     It is never less than predicted for the coarsest level: storing numbers makes noise even if differences are 0.
     """

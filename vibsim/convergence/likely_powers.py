@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from vibsim.convergence.error_model.posterior import Posterior
-from vibsim.convergence.thresholds import ORDER_INTERVAL
+from vibsim.convergence.thresholds import ORDER_INTERVAL, THREE_DECIDE
 from vibsim.core.array_types import Flags, Floats, Integers
 from vibsim.core.vocabulary import ORDER_TOLERANCE
 
@@ -40,12 +40,17 @@ def sides(
 
 def rests_on_three(p: Posterior) -> Flags:
     """Say where most of the probability is on windows of three levels that exclude coarser ones."""
+    return np.asarray(windows_of_three(p) > THREE_DECIDE)
+
+
+def windows_of_three(p: Posterior) -> Floats:
+    """Return the probability of windows of three levels that exclude coarser ones."""
     three = [start > 0 and end - start == 2 for start, end in p.windows]
-    return np.asarray(np.sum(p.window[:, three], axis=-1) > 0.5)
+    return np.asarray(np.sum(p.window[:, three], axis=-1))
 
 
 def most_near_a_power(p: Posterior) -> Floats:
-    """Return the largest probability of any power, within the usual tolerance, to dominate or to be mixed."""
+    """Return the probability that the most probable power, within the usual tolerance, dominates or is one of two."""
     # mixed powers are further apart than the tolerance
     present = p.lowest + p.highest - p.dominant
     near = _sums_near(present, p, ORDER_TOLERANCE + 1e-9)

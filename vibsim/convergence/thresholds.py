@@ -42,13 +42,14 @@ FLOOR_DECLINE = 0.5  # round-off differences stay above this part of the previou
 
 RISK = 0.01  # accepted probability that a verdict is wrong [convention]
 RISK_OF_THREE = 0.1 * RISK  # the same for three levels that coarser ones do not fit [calibrated]
+THREE_DECIDE = 0.5  # probability of windows of such three levels, above which they decide [derived]
 # An order fails only if one power, dominating or mixed, has at least this probability. [calibrated]
 DEFINITE = 0.9
 ORDER_INTERVAL = 0.95  # probability of the interval of an order [convention]
 # Standard deviations in the bound of a best value; given the tails of the posterior, they cover 95 %. [calibrated]
 BEST_BOUND = 3.0
-# A limit is missed by more than this number of bounds of the best value, and by more than this part of the estimated
-# error of the finest level. [calibrated]
+# The exact solution is missed if its distance from the best value exceeds this number of bounds, and this part of the
+# estimated error of the finest level. [calibrated]
 MISSED, MISSED_SHARE = 3.0, 0.5
 # With at least this number of levels, whose differences fall, an exact solution is missed at any order if it is this
 # factor further away than the levels have moved and can still move. [convention]
@@ -59,8 +60,8 @@ NOISE_FACTOR, STATED_NOISE_FACTOR = 10.0, 2.0
 # Extra factor for pairs of non-adjacent levels: there are more of them, so the largest difference is larger. Of ten
 # normal numbers two are more than 5 standard deviations apart in one of 70 cases. [derived]
 NON_ADJACENT_FACTOR = 1.25
-# The same for the distance of one level from an exact solution: the noise of a level is smaller than that of a
-# difference by the root of 2. [derived]
+# `STATED_NOISE_FACTOR` for the distance of one level from an exact solution: the noise of a level is smaller than that
+# of a difference by the root of 2. [derived]
 STATED_LIMIT_FACTOR = 2.0 * STATED_NOISE_FACTOR / math.sqrt(2.0)
 
 # ---- Facts from outside a ladder

@@ -160,8 +160,8 @@ def _decisions(e: Evidence, judged: Flags) -> Decision:
         question = Question(
             expected=expected,
             tolerance=e.tolerance,
-            noise_factor=0.0,
             by_theory=bool(by_theory),
+            may_be_exact=False,
         )
         answer = decide(ladder, question)
         for name, values in vars(decision).items():
