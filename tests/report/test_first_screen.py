@@ -256,6 +256,20 @@ def test_an_equation_becomes_markup():
     assert "&lt;" in equation.mathml("a < b")
 
 
+@pytest.mark.parametrize(
+    ("exponent", "shown"),
+    [
+        ("-2", "<mo>−</mo><mn>2</mn>"),
+        ("(1/3)", "<mn>1</mn><mo>/</mo><mn>3</mn>"),
+        ("(2*(n+1))", "<mn>2</mn><mo>·</mo><mo>(</mo><mi>n</mi><mo>+</mo><mn>1</mn><mo>)</mo>"),
+        ("sin(t)", "<mi>sin</mi><mo>(</mo><mi>t</mi><mo>)</mo>"),
+    ],
+)
+def test_an_exponent_is_raised_as_a_whole(exponent, shown):
+    made = str(equation.mathml(f"x**{exponent} + y")).replace(' stretchy="false"', "")
+    assert f"<msup><mi>x</mi><mrow>{shown}</mrow></msup><mspace" in made
+
+
 def test_a_long_equation_has_powers_of_python_and_may_be_broken_between_its_terms():
     text = "a'' = (-3*g*sin(a) - 2*sin(a - b)*(b'**2 + a'**2*cos(a - b)))/(3 - cos(b)), b'' = -b + (a - b)"
     made = str(equation.mathml(text))

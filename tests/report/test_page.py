@@ -612,4 +612,6 @@ def test_a_page_cuts_a_table_between_its_blocks():
         assert len(shown.rows) == kept
         assert [column.header for column in shown.columns] == ["member", "level"]
         more = sum(sizes) - kept
-        assert told == (f"{more} more rows are in tables/t.csv." if more else "")
+        assert told == (
+            f"{more} more {'row is' if more == 1 else 'rows are'} in tables/t.csv." if more else ""
+        )

@@ -227,13 +227,17 @@ def kind_of_call(node: ast.expr, name: str, arguments: Sequence[Kind]) -> Kind:
     """Return the kind of the result of a library function."""
     if name == "vector":
         return (FLOAT,) * len(arguments)
-    if name == "abs" and is_vector(arguments[0]):
+    if name == "abs" and arguments and is_vector(arguments[0]):
         return FLOAT
     if name not in _CALLS:
         raise refusal(node, f"there is no function {name}; there are {', '.join(_CALLS)}")
     count, kind, _ = _CALLS[name]
-    if (count and len(arguments) != count) or not all(isinstance(one, str) for one in arguments):
-        raise refusal(node, f"{name} takes {count or 'some'} numbers")
+    if (
+        not arguments
+        or (count and len(arguments) != count)
+        or not all(isinstance(one, str) for one in arguments)
+    ):
+        raise refusal(node, f"{name} takes {count or 'some'} number{'s' * (count != 1)}")
     widest = _widest(arguments)
     return kind or (WHOLE if widest == TRUTH else widest)
 

@@ -54,10 +54,10 @@ def collect(
     every = [*printed, *listed, *others, scales, checks.checks(summary), broken]
     every += [source_figures.table(sources), everyone]
     texts = texts_of(table for table in every if table is not None)
-    failures, more = words.broken(summary), len(summary.get("failures") or [])
+    failures, count = words.broken(summary), len(summary.get("failures") or [])
     return texts, {
         "failures": broken and cut(broken),
-        "unlisted": f"In all {failures} runs broke down; listed are the first {more}." * (failures > more),
+        "unlisted": f"{failures} runs broke down; the first {count} are listed." * (failures > count),
         "numbers_shown": [cut(table) for table in listed],
         "tables": {table.name: _copied(texts[table.name]) for table in (*printed, *listed)},
         "scales": scales,
@@ -110,7 +110,9 @@ def cut(table: Table) -> tuple[str, Table, str]:
         last = table.rows[len(shown)][:heads]
         shown = tuple(row for row in shown if row[:heads] != last) or shown
     more = len(table.rows) - len(shown)
-    note = f"{more} more rows are in tables/{table.name}.csv." if more else ""
+    note = f"{more} more {'row is' if more == 1 else 'rows are'} in tables/{table.name}.csv." * (
+        more > 0
+    )
     return _heading(table.caption), replace(table, rows=shown).without_empty(), note
 
 

@@ -102,7 +102,12 @@ def title(experiment: Experiment, record: Record, lead: Lead, printed: Collectio
         against = ", against what the check expects" if _is_trap_of_a_number(lead) else ""
         return f"{finding}{against}{_share_of_runs(record, entry)}"
     if entry["id"] in printed:
-        return f"All {len(printed)} printed numbers are as expected"
+        count = len(printed)
+        return (
+            f"All {count} printed numbers are as expected"
+            if count > 1
+            else "The printed number is as expected"
+        )
     checked = [check.value for check in experiment.checks if check.kind == "value"]
     if len(checked) > 1 and lead.asserted is not None and lead.asserted.kind == "value":
         finding = f"All {len(checked)} numbers are as expected"
