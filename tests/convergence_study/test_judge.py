@@ -549,7 +549,7 @@ def test_step_sizes_of_few_digits_are_suspected_where_they_may_move_the_order() 
     known = judge(rounded, values, order=2, exact=ERF)
     assert known.status == "PASS"
     assert "higher order is still seen" not in known.sentence
-    assert "step sizes are rounded" in known.sentence
+    assert "step sizes were rounded" in known.sentence
     unknown = judge(rounded, values, order=2)
     assert unknown.status == "INCONCLUSIVE"
     assert unknown.advice.startswith("Give h with more digits")

@@ -53,8 +53,9 @@ FIELDS = {
 SAME_TIME = 0.15
 """Failure times within this relative distance are equal: the finer level fails at most a step earlier."""
 FAR = 1000.0
-"""Linear equations are unstable if their solution exceeds the theoretical growth by this factor. Theory knows a single
-oscillation without damping; the square of its growth is allowed."""
+"""On linear equations a scheme is unstable if its solution exceeds the theoretical growth by this factor.
+
+Theory knows a single oscillation without damping; the square of its growth is allowed."""
 GROWS = 1.01
 """Least growth factor per period of a motion that grows."""
 GROWTH_TOLERANCE = 0.1
@@ -180,9 +181,9 @@ def _is_at_limit(w_dt: Floats, limit: Floats) -> Flags:
 
 
 def _limit(f: MemberFacts) -> Floats:
-    """Return the limit of w dt of a scheme; 0 if unknown."""
+    """Return the limit of w dt of a scheme: 0 if it grows at every step, NaN if the record has none."""
     known = "stability_limit" in f.record
-    return np.asarray(f.record["stability_limit"][f.scheme, f.case] if known else 0.0)
+    return np.asarray(f.record["stability_limit"][f.scheme, f.case] if known else np.nan)
 
 
 def _vanishing(f: MemberFacts, factors: tuple[float, float]) -> str:

@@ -15,7 +15,7 @@ from vibsim.plan import Plan, ShardJob
 if TYPE_CHECKING:
     from vibsim.core.record import Record
 
-OUTDATED = "note: these results were made before the experiment or vibsim changed; run it again for new ones"
+OUTDATED = "note: these results were made before the experiment or vibsim changed; run the experiment again"
 
 
 def are_outdated(plan: Plan, summary: Mapping[str, Any]) -> bool:

@@ -16,7 +16,7 @@ def best_value(
 ) -> dict[str, Floats]:
     """Return the best value and the error of the finest level, with bounds; see `assessment.Assessment`.
 
-    Three levels are extrapolated by their own order; more levels have the mean over all hypotheses. Where levels
+    Three levels are extrapolated by their own order; more levels have the mean over likely expansions. Where levels
     differ by noise alone (`exact`), the finest level is the best value.
     """
     n = len(ladder.h)

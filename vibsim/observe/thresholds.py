@@ -1,8 +1,8 @@
 """Thresholds of this package: value, meaning and origin.
 
 The origin is in brackets: *derived* from the motion or the arithmetic; *checked*: chosen, and confirmed on runs of
-every scheme (``tests/analysis/checks/test_drift_of_real_runs.py``, ``test_recurrence.py``, ``test_shift.py``);
-*convention* or *chosen*: a matter of choice.
+every scheme (``tests/analysis/checks/test_drift_of_real_runs.py``, ``tests/analysis/observe/test_recurrence.py`` and
+``test_shift.py``); *convention* or *chosen*: a matter of choice.
 """
 
 from __future__ import annotations
@@ -32,8 +32,8 @@ A_WHILE = 0.1
 DISTURBANCE = 1e-12
 PLACES = 8  # number of times along the run at which a disturbance is tried [convention]
 INSTANT = 1e-6  # a time in units of 1/w over which the motion is linear in time [convention]
-# A start counts as next to an equilibrium if its speed, relative to w times the size of the motion, is below this: C is
-# then so large that rounding of the disturbed solution dominates its differences. [convention]
+# A start counts as next to an equilibrium if its speed, relative to w times the size of the motion, is below this:
+# the shift in time (`sensitivity`) is then so large that the rounding of the disturbed solution dominates. [convention]
 NEAR_REST = 1e-3
 
 # ---- Pulses

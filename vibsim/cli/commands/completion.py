@@ -20,7 +20,7 @@ _vibsim() {
 complete -o default -F _vibsim vibsim
 """
 ZSH = """\
-# in ~/.zshrc, behind compinit: source <(vibsim completion zsh)
+# in ~/.zshrc, after compinit: source <(vibsim completion zsh)
 _vibsim() {
     local -a found
     found=("${(@f)$("${words[1]}" completion words -- "${(@)words[2,CURRENT]}" 2>/dev/null)}")

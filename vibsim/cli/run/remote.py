@@ -2,8 +2,8 @@
 
 Executors query their scheduler at a fixed interval, or with growing pauses while no job ends: the one for SLURM waits
 10 s longer each time, and notices the end of a one-minute job half a minute late. Here the pause grows with the age of
-the jobs only. The end of a job is noticed after at most a fifth of its run time, and long jobs cause one query per
-minute.
+the jobs only. The end of a job is noticed after at most a fifth of the mean age of all jobs, and long jobs cause one
+query per minute.
 
 Snakemake loses the reason why a job of a group failed; here each job of the group is reported with the reason.
 

@@ -13,7 +13,7 @@ expansion holds, and how levels deviate from it. Its functions A and B are Gauss
 
 for w rows and N independent points, with the Gram matrix ``G_kl = <d_k, d_l>`` of the rows and their covariance K under
 the hypothesis. G is the only data the model reads. Except for a factor that all hypotheses on w rows share, the
-evidence is a power of one ratio (see `hypotheses.Table`). Four kinds of hypotheses compete:
+evidence is a power of one ratio (see `hypotheses.Table`). Six kinds of hypotheses compete:
 
 - *two shapes*: A and B are unrelated. ``K = c(p) c(p)^T + s^2 c(q) c(q)^T + noise``;
 - *one shape*: B is a multiple of A, of unknown sign and about the stated size. The components of the rows along the
@@ -22,6 +22,8 @@ evidence is a power of one ratio (see `hypotheses.Table`). Four kinds of hypothe
 - *off by factors*: the error of each level is off by a factor of its own (`JITTERS`), as where events fall between
   grid points. B is a multiple of A of a given size and sign, and may also have a shape of its own. The evidence is
   that of one shape, where the orthogonal components include the shape of B;
+- *any power*: one power of any value near the measured order;
+- *alternating*: the sign of the error alternates from level to level;
 - *no expansion*: each row has an unrelated size, down to some level; all finer rows are noise.
 
 Rows coarser than the window have not reached the expansion: each has an unrelated size, at the cost

@@ -58,7 +58,7 @@ class Table:
 
 
 class Promise(NamedTuple):
-    """An expected order."""
+    """The order that a user expects or that theory promises."""
 
     order: float
     by_theory: bool = False  # theory, not a user, expects it: that restricts other powers

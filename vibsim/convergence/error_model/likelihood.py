@@ -154,7 +154,7 @@ def single_power(
     """Weigh hypotheses of one power on the rows of a window.
 
     They equal those of two shapes without a second power. In terms of the errors of the levels the covariance
-    ``a a^T + m^2 diag(a^2)`` has a closed inverse.
+    ``a a^T + m diag(a^2)``, m the square of `MISFIT`, has a closed inverse.
 
     Parameters
     ----------

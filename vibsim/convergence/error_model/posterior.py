@@ -197,7 +197,7 @@ class _Fit:
         self.values = {name: np.zeros((count, *shape)) for name, shape in shapes.items()}
 
     def add_window(self, index: int) -> None:
-        """Add the hypotheses that the expansion holds exactly in this window."""
+        """Add the hypotheses that the expansion holds on the levels of this window and on no others."""
         start, end = self.windows[index]
         ladder = self.ladder
         outside = np.sum(self.free_rows[:, :start], axis=-1)

@@ -12,9 +12,9 @@ import numpy as np
 
 # ---- Powers of an expansion
 
-POINTS = 2.0  # independent points of a series or field; a single number has one [calibrated]
+POINTS = 2.0  # independent points of a series or field, and 1 of a number: `kernel` has no other [calibrated]
 POWERS = (*(0.5 * k for k in range(1, 11)), 6.0, 7.0, 8.0)  # powers of expansions [expansion]
-MAX_POWER = 8.0  # largest power considered [chosen]
+MAX_POWER = 8.0  # largest power of the hypothesis of any power [chosen]
 ANY_POWER_PRIOR = 0.1  # prior of one power of any value up to `MAX_POWER` [chosen]
 SPACING = 0.05  # spacing of the grid on which such powers are counted [chosen]
 _POSITIVE = 3e-4 * 2.0 ** np.arange(9)
@@ -32,7 +32,7 @@ PURE_PRIOR = 0.3  # prior that no second power is visible [chosen]
 # Size of the second power relative to the first, at the finest level of a window. [chosen]
 SHARES = tuple(10.0 ** (-4.25 + 0.5 * k) for k in range(15))
 DOMINATES = 0.1  # a power dominates if every other one is less than this part of it [chosen]
-LEAST_SIGNAL = 0.1  # least mean square of both powers, over the expected one [chosen]
+LEAST_SIGNAL = 0.1  # least mean square of both powers, over that expected of the first [chosen]
 LONGEST_WINDOW = 11  # rows; halving from one step reaches round-off in as many [chosen]
 
 # ---- Deviations from an expansion
@@ -48,7 +48,7 @@ JITTERS, JITTER_PRIORS = (5e-3, 2.5e-2, 0.1), (0.5, 0.3, 0.2)
 OWN_SHAPE_PRIOR, OWN_SHAPE_JITTER = 0.4, 5e-3
 ALTERNATING_PRIOR = 0.02  # prior of errors whose sign alternates from level to level [chosen]
 COHERENCES = (3e-4, 3e-3, 3e-2, 0.3, 1.0)  # part of a free row orthogonal to the next row [chosen]
-FREE_PENALTY = 2.0  # log of the range of sizes that a free row may have [calibrated]
+FREE_PENALTY = 2.0  # log of the width of the range of the log size of a free row [calibrated]
 
 # ---- Noise
 

@@ -101,7 +101,7 @@ def _hidden(request: Request, common: CommonValues, outcome: Outcome) -> bool:
     least = common.interpolation_order - ORDER_TOLERANCE
     if outcome.order < least or outcome.reason in ("exact", "non_finite"):
         return False
-    # the values converge at least as fast as values and interpolation together
+    # without the interpolation, the values converge at least as fast
     is_reached = request.at_least is not None and request.at_least <= least
     return not (is_reached and outcome.reason == "asymptotic")
 

@@ -419,8 +419,7 @@ def _estimate(
 ) -> tuple[float, slice, Floats]:
     """Return the order of member `k`, the positions of its levels, and the weights of the extrapolation.
 
-    If no order is certain, they are those of the finest three levels with an order. The verdict then says that the
-    estimate is not reliable.
+    If the assessment has no order, it is that of the finest three levels with one, which may be noise.
     """
     h, order, weights = measured.ladder.h, float(assessment.order[k]), assessment.weights[k]
     first, last = int(assessment.first[k]), int(assessment.last[k])

@@ -41,7 +41,7 @@ class Setting:
     notes: tuple[str, ...] = ()
     """Other possible faults, for a ladder that does not pass with an expected order above 1."""
     parts: tuple[str, ...] = ()
-    """Which part of the points is compared."""
+    """Sentences on what was compared: points, levels left out, rounding."""
 
 
 NOISE_SEEN = 4.0
@@ -56,7 +56,7 @@ LOOK_FOR = (
 )
 NOT_FINER = "Use coarser levels, or compute {quantity} with less noise."
 ROUNDED = (
-    "If the step sizes are rounded to the digits that they have, that alone may move the order."
+    "If the step sizes were rounded to the digits that they have, that alone may change the order."
 )
 MORE_DIGITS = "Give {size} with more digits, such as 1/n for n cells. If it has no more, add a finer level{such_as}."
 SENTENCES: Mapping[str, tuple[str, str]] = MappingProxyType(
@@ -166,7 +166,7 @@ def describe(facts: LadderVerdict, setting: Setting) -> tuple[str, str]:
         _copies(facts),
     ]
     if facts.status == "PASS":
-        # a mismatch of points has an error of order 1
+        # points that do not match make an error of order 1, which a confirmed higher order rules out
         confirmed = (facts.expected or 0.0) > 1.0 + ORDER_TOLERANCE
         return _joined([sentence, *more, *(() if confirmed else setting.notes)]), ""
     if is_moved and setting.are_sizes_rounded:
