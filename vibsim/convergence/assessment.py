@@ -139,7 +139,7 @@ class Decision:
 class Assessment(Decision):
     """The verdicts on ladders, and their best values; arrays of shape (ladder,) unless another shape is given."""
 
-    # NaN for levels without a decided order that approach each other slowly or not at all
+    # NaN if the levels show no limit: an undecided order below 1/4, or three levels without an order
     error: Floats  # norm of the error of the finest level, estimated if the exact solution is not known
     error_bound: Floats  # upper bound of that norm
     weights: Floats  # weights of the levels in the best value, shape (ladder, level)

@@ -99,7 +99,7 @@ def interval(p: Posterior, order: Floats) -> tuple[Floats, Floats]:
 
 
 def tails(p: Posterior) -> tuple[Floats, Floats]:
-    """Return the probabilities, given an expansion, of powers up to each one, and from each one on, highest first."""
+    """Return, given an expansion, P(lowest power <= p) of each p, and P(highest power >= p), largest p first."""
     expansion = np.maximum(p.expansion, 1e-300)[:, None]
     below = np.cumsum(p.lowest, axis=-1) / expansion
     above = np.cumsum(p.highest[:, ::-1], axis=-1) / expansion

@@ -3,8 +3,9 @@
 The origin stands in brackets:
 
 - *derived*: it follows from the expansion of the error, or from floating-point arithmetic;
-- *calibrated*: set on seeds 1, 3 and 4 of the random ladders with known truth (``tests/analysis/synthetic.py``), those
-  of numbers on seeds 1 and 3. The tables of ``docs/method.md`` are for other seeds, which set none;
+- *calibrated*: set on random ladders with known truth (``tests/analysis/synthetic.py``), of the seeds that
+  ``docs/method.md``, Calibration, names; those of numbers on seeds 1 and 3. The tables there are for other seeds,
+  which set none;
 - *pendulums*: set on random ladders of pendulums and springs (``tests/analysis/test_extrapolation.py``);
 - *convention*: a usual value of the field, or a chosen one.
 
