@@ -78,7 +78,7 @@ def test_the_worst_members_are_listed_with_their_command(tmp_path):
     assert len(check["results"]) == 10
     for result in check["results"]:
         assert f".venv/bin/vibsim run pendulum_lab/theta@{result['case']} " in text
-    assert "all with model.g of 300 or more." in text
+    assert "all with g of 300 or more." in text
 
 
 @pytest.mark.slow

@@ -487,7 +487,7 @@ def test_every_line_of_the_table_of_cases(case: str) -> None:
 @pytest.mark.slow
 def test_no_line_of_the_table_of_cases_can_go(monkeypatch: pytest.MonkeyPatch) -> None:
     """Without any one of them, some ladder of the table above is judged otherwise."""
-    cases, believed, needed, lines = verdict._cases, verdict._believed, set(), []
+    cases, decisions, needed, lines = verdict._cases, verdict._decisions, set(), []
     kept: dict[str, Any] = {}
 
     def once(name: str) -> Any:
@@ -495,7 +495,7 @@ def test_no_line_of_the_table_of_cases_can_go(monkeypatch: pytest.MonkeyPatch) -
 
         def of_ladder(*given: Any) -> Any:
             if name not in kept:
-                kept[name] = believed(*given)
+                kept[name] = decisions(*given)
             return kept[name]
 
         return of_ladder

@@ -108,7 +108,11 @@ def card(experiment: Experiment, record: Record, check: Mapping[str, Any]) -> di
         "results": results,
         "more": more,
         # except for the one in the text of the check
-        "where": [f"{place['text']}." for word, place in check["where"].items() if word != decides],
+        "where": [
+            words.swept(f"{place['text']}.")
+            for word, place in check["where"].items()
+            if word != decides
+        ],
         "alone": _alone(check),
         "picture": figure.picture(experiment, record, asserted, check),
         "text": text,
