@@ -94,7 +94,12 @@ def half_last_digits(
         own = np.max(np.where(are_binary, 0.0, np.abs(sampled)), axis=1)
         sizes = [Decimal(repr(x)).adjusted() if x else last for x in own.tolist()]
         units = np.maximum(units, np.array(sizes) - digits + 1)
-    return np.array([float(Decimal(5).scaleb(unit - 1)) for unit in units.tolist()])
+    return np.array([_half_unit(unit) for unit in units.tolist()])
+
+
+def _half_unit(exponent: int) -> float:
+    """Return half a unit of the digit with this power of ten."""
+    return float(Decimal(5).scaleb(exponent - 1))
 
 
 def _is_padded(number: Decimal) -> bool:
@@ -108,13 +113,13 @@ def _half_units(written: Sequence[Decimal]) -> Floats:
     last = min(int(number.as_tuple().exponent) for number in written)
     digits = max(len(number.as_tuple().digits) for number in written)
     units = (max(last, number.adjusted() - digits + 1) if number else last for number in written)
-    return np.array([float(Decimal(5).scaleb(unit - 1)) for unit in units])
+    return np.array([_half_unit(unit) for unit in units])
 
 
 def half_written(number: Decimal) -> float:
     """Return half a unit of the last digit of a finite number as written; zeros at its end count."""
     last = number.as_tuple().exponent
-    return float(Decimal(5).scaleb(last - 1)) if isinstance(last, int) else 0.0
+    return _half_unit(last) if isinstance(last, int) else 0.0
 
 
 def rounding_of_sizes(h: Floats) -> Floats:
@@ -127,7 +132,7 @@ def rounding_of_sizes(h: Floats) -> Floats:
     digits = max(len(number.as_tuple().digits) for number in numbers)
     if digits >= FEW_DIGITS or np.ptp(ratios) <= SINGLE * np.max(ratios):
         return np.zeros_like(h)
-    return np.array([float(Decimal(5).scaleb(x.adjusted() - digits)) for x in numbers])
+    return np.array([_half_unit(x.adjusted() - digits + 1) for x in numbers])
 
 
 def step_of_values(values: Floats) -> float:

@@ -62,9 +62,9 @@ def check_potential(
 def note_potential(model: Model, parameters: Mapping[str, float], report: Report) -> None:
     """Note a written potential energy V of a system that is not that of its forces F.
 
-    The power dE/dt has the slopes grad V - F by velocities of 0. If the slopes of these by the positions are symmetric
-    and not 0, the forces have a potential of their own, which V lacks. Damping, driving, constant forces, and forces
-    without a potential are not like that.
+    At rest the derivative of the power dE/dt with respect to the velocities is grad V - F. If its Jacobian with respect
+    to the positions is symmetric and not 0, the remaining forces have a potential, which V lacks. Damping, driving,
+    constant forces, and forces without a potential do not satisfy this.
     """
     x, v = model.positions, model.velocities
     energy = tree(model, model.potential_energy)
@@ -80,13 +80,17 @@ def note_potential(model: Model, parameters: Mapping[str, float], report: Report
     if any(formula.names - numbers.keys() for formula in forces) or energy.names & set(v):
         return
     found = [np.broadcast_to(value, TESTS) for value in values_of(forces + own, numbers)]
-    missing, kept = np.reshape(found, (2, len(x), len(x), TESTS))
-    size = np.max(np.abs(missing) + np.abs(kept), axis=(0, 1))
+    remaining, curvature = np.reshape(found, (2, len(x), len(x), TESTS))
+    size = np.max(np.abs(remaining) + np.abs(curvature), axis=(0, 1))
     is_known = np.isfinite(size)
     with np.errstate(invalid="ignore"):
-        is_even = np.abs(missing - np.swapaxes(missing, 0, 1)) <= AGREE * size
-        is_odd = np.abs(missing) > AGREE * size
-    if is_known.any() and is_even[..., is_known].all() and is_odd[..., is_known].all(axis=-1).any():
+        is_symmetric = np.abs(remaining - np.swapaxes(remaining, 0, 1)) <= AGREE * size
+        is_nonzero = np.abs(remaining) > AGREE * size
+    if (
+        is_known.any()
+        and is_symmetric[..., is_known].all()
+        and is_nonzero[..., is_known].all(axis=-1).any()
+    ):
         rule = "is not that of the forces, so that the energy changes without damping"
         hint = "leave it out, and vibsim finds it where it can; beside `acceleration` masses are 1"
         report.note(("model", "potential"), rule, hint)

@@ -30,10 +30,8 @@ from vibsim.report.types import Experiment
 
 MOST_NUMBERS = 3  # large numbers on the first screen
 MOST_SCHEMES = 3  # schemes that are named
-NARROWEST, EVIDENCE = (
-    1.8,
-    1.7,
-)  # least width of a panel of evidence with its title, and its height [inch]
+# Least width of a panel of evidence with its title, and its height [inch].
+NARROWEST, EVIDENCE = 1.8, 1.7
 MOST_STATEMENTS = 3  # claims that are shown beside the finding
 MEASURED = {
     "stable": "Growth per period", "conserves": "Largest energy error over E(0)", "equal": "Largest difference",
