@@ -20,6 +20,7 @@ lint: set-up-dev  ## check style, types, layers, workflow and generated files
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
+	$(BIN)/mypy --config-file tests/mypy.ini
 	$(BIN)/lint-imports
 	$(BIN)/python workflow/schemas.py --check
 	$(BIN)/snakefmt --check Snakefile workflow

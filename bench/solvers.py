@@ -87,7 +87,7 @@ def _numbalsoda_loop() -> Any:
             out[i] = y[-1, 0] if success else np.nan
 
     # the function behind the address lives as long as this
-    loop.right = right
+    loop.right = right  # type: ignore[attr-defined]
     return loop
 
 

@@ -156,8 +156,10 @@ def some(record: Record, start: int, stop: int) -> Record:
         index = (slice(None),) * variable.dims.index("case") + (slice(start, stop),)
         return Variable(variable.dims, variable.values[index], variable.attrs)
 
-    tables = ({n: cut(v) for n, v in t.items()} for t in (record.coords, record.variables))
-    return Record(*tables, record.attrs)
+    coords, variables = (
+        {n: cut(v) for n, v in t.items()} for t in (record.coords, record.variables)
+    )
+    return Record(coords, variables, record.attrs)
 
 
 def test_a_member_that_does_not_oscillate_is_not_judged() -> None:

@@ -106,8 +106,8 @@ def test_a_model_in_full_has_every_state_and_every_key(
     text = " ".join(capsys.readouterr().out.split())
     model = MODELS[kind]
     assert " ".join(model.equation.split()) in text
-    for row in (*model.states, *model.formulas, *model.outputs):
-        assert f"{row.name}: " in text
+    for name in (x.name for rows in (model.states, model.formulas, model.outputs) for x in rows):
+        assert f"{name}: " in text
     for parameter in model.parameters:
         assert f"{parameter.key}: {parameter.description}" in text
         assert f"default {parameter.default:g}" in text

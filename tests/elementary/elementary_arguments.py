@@ -59,7 +59,7 @@ EXTENDED = {
 }
 """Those that numpy knows with the 11 bits more of an extended double."""
 
-INTERVALS = {
+INTERVALS: dict[str, list[tuple[float, float]]] = {
     "abs": [(-2, 2)],
     "acos": [(-1, 1), (0.99, 1), (-1, -0.99), (0.3, 0.4), (0.7, 0.71)],
     "acosh": [(1, 1.01), (1, 2), (1, 100), (9e9, 1.1e10)],

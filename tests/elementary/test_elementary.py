@@ -23,7 +23,7 @@ ODD = (
 )
 EVEN = ("abs", "cos", "cosh")
 
-SPECIAL_VALUES = {
+SPECIAL_VALUES: dict[str, list[tuple[float, ...]]] = {
     "abs": [(-0.0, 0.0), (-INF, INF), (NAN, NAN), (-3.0, 3.0)],
     "acos": [(1.0, 0.0), (-1.0, PI), (0.0, PI / 2), (1.0 + 2**-52, NAN), (INF, NAN), (NAN, NAN)],
     "acosh": [(1.0, 0.0), (1.0 - 2**-53, NAN), (-2.0, NAN), (INF, INF), (-INF, NAN), (NAN, NAN)],

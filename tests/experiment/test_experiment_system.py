@@ -1,5 +1,7 @@
 """Experiments with equations of a user: what they take, what they refuse, and all faults at once."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
@@ -11,7 +13,7 @@ from vibsim.report.text import experiment_file
 from vibsim.schemes import SCHEMES
 from vibsim.theory import exact_degree
 
-PAIR = {
+PAIR: dict[str, Any] = {
     "coordinates": ["x", "y"],
     "acceleration": {"x": "-k*x + y", "y": "-y"},
     "parameters": {"k": 2},

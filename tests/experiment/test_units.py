@@ -19,7 +19,7 @@ from test_fuzz import QUIET, attempt
 from vibsim.experiment import Experiment, sweep_columns
 from vibsim.experiment.schema.unit_text import MAX_EXPONENT, MAX_UNIT, UnitError, factors, split
 from vibsim.experiment.units import DEFINITIONS, MAX_OWN, finite, meaning, registry, unit_named
-from vibsim.models import MODELS
+from vibsim.models import MODELS, Model
 
 OSCILLATOR = {"kind": "oscillator", "spring": "k*u", "damping": {"linear": 0.1}}
 
@@ -146,15 +146,15 @@ def test_swept_oscillator() -> None:
 
 
 @pytest.mark.parametrize("model", MODELS.values(), ids=MODELS)
-def test_every_unit_of_a_model_is_known(model: object) -> None:
-    units = [row.unit for row in (*model.states, *model.parameters)]
+def test_every_unit_of_a_model_is_known(model: Model) -> None:
+    units = [*(row.unit for row in model.states), *(row.unit for row in model.parameters)]
     units += [unit for row in model.formulas for unit in row.term_units.values()]
     for unit in [*units, model.energy_unit]:
         assert meaning(unit).factor > 0
 
 
 @pytest.mark.parametrize("model", MODELS.values(), ids=MODELS)
-def test_every_coefficient_has_a_unit(model: object) -> None:
+def test_every_coefficient_has_a_unit(model: Model) -> None:
     for row in model.formulas:
         assert set(row.term_units) == set(row.terms)
 

@@ -309,7 +309,9 @@ CASES = {
                 chain(u, v, t, 1.3, 0.2),
                 (
                     a - b
-                    for a, b in zip(wanted(t), chain(*wanted_motion(t), t, 1.3, 0.2), strict=True)
+                    for a, b in zip(
+                        wanted(t), chain(*wanted_motion(t), t=t, k=1.3, c=0.2), strict=True
+                    )
                 ),
                 strict=True,
             )

@@ -189,7 +189,7 @@ def by_scipy(case: Case, times: np.ndarray) -> np.ndarray:
     found = []
     for end in times:
         while start[0] < end:
-            events = []
+            events: list[Any] = []
             for corner, sign in zip(case.corners, signs, strict=True):
                 # at the start a switch may be 0 by its rounding
                 events.append(
@@ -366,7 +366,7 @@ def test_schemes_converge_to_it_at_their_orders(scheme: str, end: float, order: 
     for level in (levels[0], levels[-1]):
         found = simulate(experiment, level)
         assert "every corner" in found["u_exact"].attrs["method"]
-        gaps = np.abs(found["u"] - found["u_exact"]).values[0]
+        gaps = np.abs((found["u"] - found["u_exact"]).values[0])
         errors.append(np.mean(np.log2(np.max(gaps, axis=-1))))
     measured = (errors[0] - errors[1]) / (levels[-1] - levels[0])
     assert measured == pytest.approx(order, abs=0.15)

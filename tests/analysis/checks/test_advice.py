@@ -127,7 +127,7 @@ def made(kind: str, reason: str, **more: Any) -> tuple[Any, Record]:
         basis = BASES.index("none" if reason == "not_applicable" else "extrapolated")
         numbers = {"error": error, "error_bound": error + 0.1, "order_reason": of_order}
         return exp, changed(record, basis=basis, **numbers)
-    numbers = {
+    by_reason: dict[str, dict[str, Any]] = {
         "match": {"value": 1.0, "distance": 1.0, "allowed": 2.0, "drift": DRIFTS.index("linear")},
         "mismatch": {
             **{"value": 3.0, "error_bound": 0.1, "distance": 3.0, "allowed": 2.0},
@@ -144,7 +144,7 @@ def made(kind: str, reason: str, **more: Any) -> tuple[Any, Record]:
         "round_off": {"energy_error": 1e-14, "drift": DRIFTS.index("none")},
         "non_finite": {},
     }
-    known = {n: v for n, v in numbers[reason].items() if name_of("check_1", n) in record}
+    known = {n: v for n, v in by_reason[reason].items() if name_of("check_1", n) in record}
     return exp, changed(record, **known)
 
 

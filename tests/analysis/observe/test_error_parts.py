@@ -267,9 +267,8 @@ def test_the_last_estimates_of_parts_that_are_open_blame_none() -> None:
         time={"end": 40.0},
         levels=[6, 7, 8],
     )
-    assert "amplitude" in sentence(
-        *(orders(found, f"u_{x}_error").item() for x in ("phase", "amplitude")), 0.0, 2.0
-    )
+    phase, amplitude = (orders(found, f"u_{x}_error").item() for x in ("phase", "amplitude"))
+    assert "amplitude" in sentence(phase, amplitude, 0.0, 2.0)
     (verdict,) = found.verdicts
     assert verdict.reason == "pre_asymptotic"
     assert "amplitude" not in verdict.text

@@ -18,7 +18,7 @@ H = np.full(1, T[1])
 
 def cosine(t: Any, w: float = W) -> Any:
     return quintic_interpolant(
-        *(x[None] for x in (np.cos(w * t), -w * np.sin(w * t), -(w**2) * np.cos(w * t))), H
+        *(x[None] for x in (np.cos(w * t), -w * np.sin(w * t), -(w**2) * np.cos(w * t))), spacing=H
     )
 
 
@@ -92,7 +92,7 @@ def test_a_pendulum_of_another_amplitude_is_late_by_what_its_period_says() -> No
     p = np.full(1, period(2.0))
     for change in (1e-2, 1e-3):
         other = motion(2.0 * (1 + change))
-        found = fit_shift(*other, of, p, strides(p, h, len(t)))
+        found = fit_shift(*other, of=of, period=p, stride=strides(p, h, len(t)))
         late = t * (period(2.0) / period(2.0 * (1 + change)) - 1)
         # peaks are where the shift is known: at whole half-periods
         np.testing.assert_allclose(found[0, 0], late, rtol=0.02, atol=0.3 * change)
@@ -108,7 +108,7 @@ def test_a_shift_of_more_than_a_period_is_followed() -> None:
 
 def test_what_does_not_oscillate_has_no_parts() -> None:
     turning = quintic_interpolant(
-        *(x[None] for x in (T + 0.1 * np.sin(T), 1 + 0.1 * np.cos(T), -0.1 * np.sin(T))), H
+        *(x[None] for x in (T + 0.1 * np.sin(T), 1 + 0.1 * np.cos(T), -0.1 * np.sin(T))), spacing=H
     )
     time, factor = told(T, np.ones_like(T), turning)
     assert np.isnan(time).all()
@@ -138,7 +138,7 @@ def test_a_row_has_the_same_bits_alone_and_among_others() -> None:
     h = np.repeat(H, 4)
     of = quintic_interpolant(
         *(np.tile(x, (4, 1)) for x in (np.cos(W * T), -W * np.sin(W * T), -(W**2) * np.cos(W * T))),
-        h,
+        spacing=h,
     )
     stride = strides(period, h, len(T))
     together = fit_shift(u, v, of, period, stride)
