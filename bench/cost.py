@@ -14,6 +14,10 @@ from bench.pipeline import EXPERIMENT
 from bench.timing import interleave, seconds
 
 TITLE = "Cost against members, levels and cores"
+ANSWER = (
+    "A step of one of many members costs {0[cost.stepping]:.2g} ns, {0[cost.gathering]:.2g} ns with all that is "
+    "gathered; all cores together are {0[cost.speed_up]:.2f} times as fast as one."
+)
 PICTURE = Path(__file__).resolve().parents[1] / "docs" / "images" / "cost-members.svg"
 Measured = tuple[list[str], dict[str, float]]
 
@@ -52,10 +56,7 @@ def members(small: bool) -> Measured:
     for count in counts:
         found = nanoseconds(np.linspace(0.1, 2.5, count), 256, 3 if count < 10**6 else 2)
         rows.append([count, *found])
-    caption = (
-        "Compensated, level 8 (256 steps), one thread, ns per member-step of the whole call of the engine, which "
-        "chooses the lane itself."
-    )
+    caption = "Compensated, level 8 (256 steps), one thread, ns per member-step. The engine chooses the lane itself."
     picture = ""
     if not small:
         curves = {
@@ -65,7 +66,8 @@ def members(small: bool) -> Measured:
         PICTURE.write_text(chart("Cost of a member-step against members", "ns", curves))
         picture = f"![Cost of a member-step against members](images/{PICTURE.name})"
     lines = table(caption, ["members", "gathering", "stepping alone"], rows)
-    return [*lines, picture, ""] if picture else lines, {}
+    figures = dict(zip(("cost.gathering", "cost.stepping"), found, strict=True))
+    return [*lines, picture, ""] if picture else lines, figures
 
 
 def levels(small: bool) -> Measured:
@@ -94,7 +96,7 @@ def cores(small: bool) -> Measured:
         rows.append([threads, gathering, stepping, *speed_up])
     caption = f"{count} members x {steps} steps, compensated, ns per member-step of wall time."
     header = ["threads", "gathering", "stepping alone", "speed-up gathering", "speed-up stepping"]
-    return table(caption, header, rows), {}
+    return table(caption, header, rows), {"cost.speed_up": speed_up[0]}
 
 
 def cores_of_a_run(small: bool) -> Measured:

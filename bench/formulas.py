@@ -17,6 +17,7 @@ from vibsim.models.oscillator import written
 from vibsim.schemes import SCHEMES
 
 TITLE = "Formulas"
+ANSWER = "A model written as a formula takes at most {0[formulas.ratio]:.2f} times the time of the same model built in."
 KINDS = ("central", "rk4")
 IDLE = 1.2
 """Load of a machine that does nothing else."""
@@ -56,9 +57,8 @@ def run(small: bool) -> Section:
         *("formula with a mass, ratio", "formula, mass 1, ratio"),
     ]
     caption = (
-        "The oscillator `m u'' + s(u) = 0` with the spring of a built-in model as a formula, over that model; medians "
-        f"of the ratios of {rounds} interleaved rounds, one thread. A mass that is 1 and not swept is no part of the "
-        f"equation. All three have the same bits.{busy(load)}"
+        "The oscillator `m u'' + s(u) = 0` with the spring of a built-in model as a formula, over that model, with the "
+        f"same bits: medians of the ratios of {rounds} interleaved rounds, one thread.{busy(load)}"
     )
     figures = {"formulas.ratio": max(float(str(row[-1])) for row in rows)}
     return Section(tuple(table(caption, header, rows)), figures)
@@ -68,10 +68,7 @@ def busy(load: float) -> str:
     """Say that the machine had other work, where it had."""
     if load < IDLE:
         return ""
-    return (
-        f" Other work took the machine meanwhile (load {load:.1f}): times are too long, and ratios are those of runs "
-        "that follow each other."
-    )
+    return f" The machine had other work (load {load:.1f}): times are too long; ratios are of neighbouring runs."
 
 
 def ratios(

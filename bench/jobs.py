@@ -17,6 +17,10 @@ from bench.page import Section, gather, table
 from bench.timing import Process, process
 
 TITLE = "Jobs and runs"
+ANSWER = (
+    "A small job takes {0[jobs.small_wall]:.2f} s, nearly all of it to start; the default run takes "
+    "{0[runs.cold]:.0f} s."
+)
 EXPERIMENT = """\
 title: One member at a deep level
 model: {kind: pendulum}
@@ -91,13 +95,13 @@ def levels(file: Path, folder: Path, rounds: int, small: bool) -> Measured:
         small_wall = small_wall or wall
         rows.append([f"level {level}, {steps} steps", wall, cpu, began, beyond[level], peak])
     caption = (
-        "One simulate job of one member and one scheme, kernel from the cache. Stepping is what the engine alone takes "
-        "for the same steps in a process that has everything imported."
+        "One job of one member and one scheme, kernel from the cache. Stepping is the time of the engine alone for the "
+        "same steps."
     )
     header = ["job", "wall s", "CPU s", "stepping s", "CPU beyond stepping s", "peak MiB"]
     figures = {"jobs.beyond_stepping": max(beyond.values()), "jobs.small_wall": small_wall}
     each = (
-        f"One job for each case would cost that again and again: {small_wall:.2f} s per job, 1000 members x 4 levels "
+        "With one job for each case 1000 members x 4 levels would take "
         f"{4000 * small_wall / workflow.CORES / 60:.0f} minutes on {workflow.CORES} cores."
     )
     return [*table(caption, header, rows), each, ""], figures
@@ -140,10 +144,7 @@ def kernels(folder: Path, rounds: int) -> Measured:
         rows.append([lane, statistics.median(first), statistics.median(again)])
         figures[f"kernels.{lane}.compile"] = statistics.median(first)
         figures[f"kernels.{lane}.cached"] = statistics.median(again)
-    caption = (
-        "The first call of a kernel in a process that has imported numpy and vibsim, seconds: with an empty cache "
-        "(import of LLVM, compiling, writing), and from the cache (import of LLVM, reading)."
-    )
+    caption = "The first call of a kernel with an empty cache and from the cache, seconds, with the import of LLVM."
     return table(caption, ["lane", "compiled", "from the cache"], rows), figures
 
 
@@ -186,7 +187,7 @@ def runs(folder: Path, rounds: int, small: bool) -> Measured:
         ["ratio of the two, pair by pair (no unit)", ratio],
     ]
     caption = (
-        f"A whole default run, {len(choices)} experiments, pages and all, {workflow.CORES} cores."
+        f"A default run of {len(choices)} experiments with their pages, {workflow.CORES} cores."
     )
     figures = {"runs.cold": cold.wall, "runs.nothing_ratio": ratio}
     return table(caption, ["run", "wall s"], rows), figures

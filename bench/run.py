@@ -14,6 +14,7 @@ import platform
 import sys
 import time
 import traceback
+from contextlib import suppress
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
@@ -77,6 +78,8 @@ def measure(name: str, small: bool) -> dict[str, Any]:
         entry |= {"lines": list(section.lines), "figures": figures}
         if section.problems:
             entry["failed"] = "; ".join(section.problems)
+        with suppress(KeyError):  # where a figure is missing, there is no answer
+            entry["answer"] = part.ANSWER.format(figures)
     entry["seconds"] = round(time.perf_counter() - began, 1)
     print(f"bench: {name}: {entry['seconds']} s", file=sys.stderr, flush=True)
     return entry
@@ -89,22 +92,30 @@ def page(known: dict[str, Any]) -> str:
     lines = [
         "# Benchmarks",
         "",
-        "`make bench` writes this page. Times are medians of interleaved runs (A B C A B C ...). A ratio is of two "
-        "medians unless the text says otherwise. Nothing else ran on the machine unless a part says so. "
-        "Each part that could not be measured says why.",
+        "`make bench` writes this page. Times are medians of interleaved runs (A B C A B C ...), and ratios those of "
+        "medians, on a machine without other work, unless a part says otherwise.",
         "",
         *(f"{text}\n" for text in machines[:1]),
     ]
     for entry in entries:
         lines += [f"## {entry['title']}", ""]
+        if "answer" in entry:
+            lines += [entry["answer"], ""]
         if entry["machine"] != machines[0]:
-            lines += [entry["machine"], ""]
+            lines += [difference(entry["machine"], machines[0]), ""]
         if "failed" in entry:
             lines += [f"Failed: {entry['failed']}".replace("\n", " "), ""]
         lines += entry["lines"]
     figures = {key: value for entry in entries for key, value in entry["figures"].items()}
     lines += targets.lines(figures)
     return "\n".join(lines).rstrip() + "\n"
+
+
+def difference(one: str, other: str) -> str:
+    """Return what of a description of a machine is not in another one."""
+    known = other.removesuffix(".").split(", ")
+    parts = [part for part in one.removesuffix(".").split(", ") if part not in known]
+    return f"{', '.join(parts)}; the rest as above."
 
 
 def machine() -> str:

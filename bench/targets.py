@@ -24,70 +24,68 @@ class Target:
 
 
 TARGETS = (
+    Target("one member: time over C, gathering", "one_member.ratio", 1.05),
+    Target("the same, stepping alone", "one_member.bare_ratio", 1.05),
     Target(
-        "one member: time over C -O3, same arithmetic, sine and gathering", "one_member.ratio", 1.05
-    ),
-    Target("one member: the same, both stepping alone", "one_member.bare_ratio", 1.05),
-    Target(
-        "one member, three-term: time over C with libm's sine, both stepping alone",
+        "the same, three-term, over C with libm's sine",
         "one_member.three_term_ratio",
         1.0,
     ),
     Target(
-        "many members: time over C, same arithmetic, sine and gathering",
+        "many members: time over C, gathering",
         "many.ratio_gathering",
         1.2,
     ),
     Target(
-        "many members: time over C, same arithmetic and sine, stepping alone",
+        "many members: time over C, stepping alone",
         "many.ratio_stepping",
         1.2,
     ),
     Target(
-        "many members, increment: time over C, same arithmetic and sine, stepping alone",
+        "many members, increment: time over C, stepping alone",
         "many.ratio_increment",
         1.2,
-        note="each step also gives the velocity and looks for overflow and NaN, which the C loop does without",
+        note="each step also gives the velocity and looks for overflow and NaN",
     ),
     Target(
-        "many members: times faster than numpy, same arithmetic",
+        "many members: times faster than numpy",
         "many.over_numpy",
         10.0,
         at_least=True,
-        note="numpy has a vector sine of its own by now: it takes 11 ns, the engine 1.4",
+        note="numpy has a vector sine of its own by now",
     ),
     Target(
-        "formulas: time over the same model built in, the largest of both lanes",
+        "formulas: time over the model built in, the largest",
         "formulas.ratio",
         1.2,
     ),
     Target(
-        "systems of one formula: time over the same model built in, the largest of both lanes",
+        "systems of one formula: the same",
         "systems.ratio",
         1.2,
     ),
     Target(
-        "a chain of 64 coordinates: time over C -O3 written by hand, stepping alone",
+        "a chain of 64 coordinates: time over C, stepping alone",
         "systems.chain_ratio",
         1.3,
     ),
-    Target("a beam of 1024 degrees of freedom, all told", "systems.beam_wall", 60.0, "s"),
+    Target("a beam of 1024 degrees of freedom", "systems.beam_wall", 60.0, "s"),
     Target("the same: order of Newmark's scheme", "systems.beam_order", 1.95, at_least=True),
     Target(
-        "one trajectory at 1e-10: increment ladder, times faster than DOP853",
+        "one trajectory, increment ladder: times faster than DOP853",
         "single.increment_faster_than_dop853",
         100.0,
         at_least=True,
-        note="Python around six kernel calls is over half of the time; one call for a whole ladder would halve it",
+        note="Python around six kernel calls is over half of the time",
     ),
     Target(
         "the same: time over heyoka's",
         "single.increment_over_heyoka",
         2.5,
-        note="the same; and Taylor series of high order need fewer operations per time than second order",
+        note="the same, and Taylor series of high order need fewer operations",
     ),
     Target(
-        "one trajectory at 1e-10: compensated ladder, times faster than DOP853",
+        "one trajectory, compensated ladder: times faster than DOP853",
         "single.compensated_faster_than_dop853",
         80.0,
         at_least=True,
@@ -100,28 +98,28 @@ TARGETS = (
         note="the same",
     ),
     Target(
-        "10^4 members at 1e-10: increment ladder, times faster than a solve_ivp loop",
+        "10^4 trajectories, increment ladder: times faster than solve_ivp",
         "many_error.increment_faster_than_solve_ivp",
         2000.0,
         at_least=True,
     ),
     Target(
-        "the same: times faster than a numbalsoda loop",
+        "the same: times faster than numbalsoda",
         "many_error.increment_faster_than_numbalsoda",
         30.0,
         at_least=True,
-        note="numbalsoda's time is that of its most exact setting where none reaches 1e-10",
+        note="numbalsoda is timed at its most exact setting: none reaches 1e-10",
     ),
     Target(
         "the same: times faster than heyoka in batches",
         "many_error.increment_faster_than_heyoka",
         1.5,
         at_least=True,
-        note="10 912 steps of 1.2 ns; Taylor series of high order need fewer operations per time",
+        note="Taylor series of high order need fewer operations",
     ),
     Target("simulate job: CPU beyond its stepping", "jobs.beyond_stepping", 0.6, "s"),
     Target(
-        "the same: wall time, all told, of a job of 64 steps",
+        "the same: wall time of a job of 64 steps",
         "jobs.small_wall",
         0.59,
         "s",
@@ -136,15 +134,14 @@ TARGETS = (
         "10^6 members x 4 levels: pipeline over the SIMD script on one core",
         "pipeline.1000000.simd_ratio",
         1.5,
-        note="beside the script's numbers: verdicts, exact solution, floors and bounds of every member, sealed files",
+        note="the pipeline also has verdicts, bounds and sealed files",
     ),
     Target(
-        "the same, the script on all cores as the pipeline is",
+        "the same, the script on all cores",
         "pipeline.1000000.both_ratio",
         1.5,
-        note="stricter than what was asked for",
     ),
-    Target("nothing to do: `vibsim run` over bare Snakemake", "runs.nothing_ratio", 1.2),
+    Target("nothing to do: `vibsim run` over Snakemake", "runs.nothing_ratio", 1.2),
     Target("default run after installation, cold", "runs.cold", 120.0, "s"),
     Target("one member at level 30, compensated", "deep.wall", 45.0, "s"),
     Target("the same: peak memory", "deep.peak_mib", 300.0, "MiB"),
@@ -159,7 +156,7 @@ TARGETS = (
     ),
     *(
         Target(
-            f"explicit schemes, lane {lane}, {words}: cost over that of their force evaluations, the worst",
+            f"explicit schemes, lane {lane}, {words}: cost over force evaluations",
             f"lanes.{lane}.{figure}",
             1.3,
         )
@@ -168,7 +165,7 @@ TARGETS = (
     ),
     Target("round-off at level 24: increment over three-term", "round_off.ratio", 1e-4),
     Target(
-        "10^5 members: wall time on two nodes of SLURM over a local run on the same cores",
+        "10^5 members: time on two nodes of SLURM over a local run",
         "cluster.ratio",
         1.5,
     ),
@@ -177,12 +174,14 @@ TARGETS = (
 
 def lines(figures: Mapping[str, float]) -> list[str]:
     """Return the table of targets."""
+    rows = [_row(one, figures) for one in TARGETS]
+    reached = sum(row[3] == "yes" for row in rows)
     caption = (
-        "What was to be reached, and what was measured above. The time of `make catalogue`, which runs all experiments "
-        "but the large ones, is not measured."
+        f"{reached} of {len(rows)} targets are reached. C, written by hand and built with -O3, has the same "
+        "arithmetic and sine unless the row says otherwise."
     )
     header = ["what", "to reach", "measured", "reached", "what limits it"]
-    return ["## Targets", "", *table(caption, header, [_row(one, figures) for one in TARGETS])]
+    return ["## Targets", "", *table(caption, header, rows)]
 
 
 def _row(target: Target, figures: Mapping[str, float]) -> list[object]:

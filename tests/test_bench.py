@@ -108,6 +108,16 @@ def entry(**others: Any) -> dict[str, Any]:
     return {"title": "Part", "machine": "here", "lines": ["text"], "figures": {}, **others}
 
 
+def test_page_has_what_was_measured_and_begins_each_part_with_its_answer() -> None:
+    known = run.stored()
+    text = run.PAGE.read_text()
+    assert text == run.page(known)
+    for name in run.PARTS:
+        part = importlib.import_module(f"bench.{name}")
+        answer = part.ANSWER.format(known[name]["figures"])
+        assert f"## {part.TITLE}\n\n{answer}\n" in text
+
+
 def test_page_says_what_failed_and_keeps_the_rest() -> None:
     text = run.page({"jobs": entry(failed="no\nluck"), "storage": entry(lines=["kept"])})
     assert "Failed: no luck" in text
