@@ -163,6 +163,6 @@ def with_levels(experiment: AnyExperiment, levels: Sequence[int]) -> AnyExperime
     check_published(experiment.published, (), setting, report)
     report.raise_any()
     result = experiment.model_copy(update={"levels": setting.levels})
-    size_limits.check_files(result, report)
+    size_limits.check_costs(result, report)
     report.raise_any()
     return update_tables(result)
