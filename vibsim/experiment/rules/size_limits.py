@@ -52,17 +52,12 @@ class Setting:
     @property
     def trajectories(self) -> int:
         """Number of schemes times number of members, as far as they are known."""
-        return self.scheme_count * (self.members or 1)
+        return max(len(self.schemes), len(self.names), 1) * (self.members or 1)
 
     @property
     def members(self) -> int | None:
         """Number of members, 1 without a sweep; None if the sweep is faulty."""
         return self.sweep.count if self.knows_sweep else None
-
-    @property
-    def scheme_count(self) -> int:
-        """Number of schemes, at least 1."""
-        return max(len(self.schemes), len(self.names), 1)
 
     @cached_property
     def adaptive(self) -> tuple[str, ...]:
