@@ -156,8 +156,7 @@ def command_line() -> Lines:
         yield f"## vibsim {name}"
         yield f"{plain(text)}"
         rows = []
-        for option, settings in options:
-            names = (option,) if isinstance(option, str) else option
+        for names, settings in options:
             metavar = settings.get("metavar") or " | ".join(settings.get("choices", ()))
             if not names[-1].startswith("-"):
                 names, metavar = (metavar or names[0],), ""

@@ -57,12 +57,7 @@ def test_what_may_stand_at_a_place_is_offered(words: list[str], offered: list[st
 def test_every_command_and_option_is_offered() -> None:
     assert {name for name, *_ in commands()} <= set(candidates([""]))
     for name, _, _, rows in commands():
-        options = {
-            option
-            for names, _ in rows
-            for option in ((names,) if isinstance(names, str) else names)
-            if option.startswith("-")
-        }
+        options = {option for names, _ in rows for option in names if option.startswith("-")}
         assert options <= set(candidates([name, "-"])), name
 
 

@@ -38,7 +38,7 @@ from vibsim.cli.arguments import commands
 ROOT = Path(__file__).resolve().parents[2]
 BLOCK = re.compile(r"^```(\w*)\n(.*?)^```", re.DOTALL | re.MULTILINE)
 MARK = re.compile(r"<!-- (not run: .+|slow|from \S+) -->\s*\Z")
-OPTIONS = {name: [option for option, _ in options] for name, _, _, options in commands()}
+OPTIONS = {name: {n for names, _ in rows for n in names} for name, _, _, rows in commands()}
 FILE = re.compile(r"(?:to|into) `(\w+\.(?:yaml|py|csv))`")
 
 

@@ -59,8 +59,7 @@ def test_every_option_of_every_command_is_in_the_reference() -> None:
         part.split("\n", 1) for part in page("command-line").split("## vibsim ")[1:] if part
     )
     for name, _, _, options in commands():
-        for option, _ in options:
-            word = option if isinstance(option, str) else option[-1]
+        for (*_, word), _ in options:
             assert word in sections[name] or not word.startswith("-"), f"vibsim {name} {word}"
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -60,15 +61,16 @@ def read(path: Path, place: int) -> Record:
     """Return member number `place` of a level file, counted within the file."""
     from vibsim import store
 
-    try:
-        store.check(path)
-        with store.open_level([(path, None)]) as level:
-            if not 0 <= place < level.cases:
-                raise refusal("--case", place, f"{path}: must be from 0 to {level.cases - 1}")
-            return level.read(place, place + 1)
-    except KeyError:
-        # a level of a user's solver may lack the dimension ``case``
-        return store.read(path)
+    store.check(path)
+    with ExitStack() as stack:
+        try:
+            level = stack.enter_context(store.open_level([(path, None)]))
+        except KeyError:
+            # a level of a user's solver lacks the dimension ``case``
+            return store.read(path)
+        if not 0 <= place < level.cases:
+            raise refusal("--case", place, f"{path}: must be from 0 to {level.cases - 1}")
+        return level.read(place, place + 1)
 
 
 def series(record: Record) -> list[str]:

@@ -30,28 +30,26 @@ def in_full(what: str, name: str) -> list[str]:
     InputError
         Where the name is unknown; it suggests the nearest one.
     """
-    from vibsim.models import MODELS
-
-    if what == "schemes":
-        return laid_out(scheme_rows(scheme_named(name)))
-    if name not in MODELS:
-        raise refusal("NAME", name, "is not a model", nearest(name, sorted(MODELS)))
-    return laid_out(model_rows(MODELS[name]))
+    rows = scheme_rows(scheme_named(name)) if what == "schemes" else model_rows(model_named(name))
+    return laid_out(rows)
 
 
 def scheme_named(name: str) -> Scheme:
-    """Return the scheme that the user named on the command line.
-
-    Raises
-    ------
-    InputError
-        Where the name is unknown; it suggests the nearest one.
-    """
+    """Return the scheme that the user named on the command line; raise InputError if there is none."""
     from vibsim.schemes import SCHEMES
 
     if name not in SCHEMES:
         raise refusal("NAME", name, "is not a scheme", nearest(name, sorted(SCHEMES)))
     return SCHEMES[name]
+
+
+def model_named(name: str, option: str = "NAME") -> Model:
+    """Return the model that the user named with `option`; raise InputError if there is none."""
+    from vibsim.models import MODELS
+
+    if name not in MODELS:
+        raise refusal(option, name, "is not a model", nearest(name, sorted(MODELS)))
+    return MODELS[name]
 
 
 def laid_out(entries: Iterable[Row]) -> list[str]:

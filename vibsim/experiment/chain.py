@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping
-from dataclasses import replace
 from typing import Any
 
 from vibsim.experiment.faults import Report
@@ -63,8 +62,7 @@ def write_out_chain(report: Report) -> None:
     content = {**data, "model": model}
     if isinstance(data.get("initial"), Mapping):
         content["initial"] = writer.value(("initial",), data["initial"])
-    origins = {**report.source.origins, **writer.origins}
-    report.source = replace(report.source, data=content, origins=origins)
+    report.rewrite(content, writer.origins)
 
 
 def _count(raw: Any, report: Report) -> int:

@@ -13,12 +13,11 @@ from vibsim.experiment.rules.checks import check_published, finish_checks
 from vibsim.experiment.rules.members import update_tables
 from vibsim.experiment.rules.timing import rising_levels
 from vibsim.experiment.schema.checks import (
-    AccurateCheck,
     Check,
     ClaimCheck,
     ConvergesCheck,
+    Members,
     PublishedAt,
-    ValueCheck,
 )
 from vibsim.experiment.schema.document import Levels
 from vibsim.experiment.schema.fields import FrozenDict
@@ -29,7 +28,7 @@ from vibsim.experiment.sweep_columns import Column, columns, members_with
 from vibsim.experiment.validation import read_value
 from vibsim.experiment.yaml.parse import Source
 
-AnyAt = TypeVar("AnyAt", bound=PublishedAt)
+AnyAt = TypeVar("AnyAt", bound=Members)
 
 
 def alone(experiment: AnyExperiment, case: int) -> AnyExperiment:
@@ -121,14 +120,15 @@ def _tables_of_member(
 def _check_of_member(check: Check, unit: float) -> Check:
     if isinstance(check, ClaimCheck):
         return check.model_copy(update={"that": _check_of_member(check.that, unit)})
-    if isinstance(check, ValueCheck):
-        return check.model_copy(update={"at": _at_of_member(check.at, unit)})
-    update: dict[str, Any] = {"at": check.at.without_members()}
-    has_no_case = isinstance(check, ConvergesCheck | AccurateCheck)
-    return check.model_copy(update=update if has_no_case else update | {"case": None})
+    update: dict[str, Any] = {"at": _at_of_member(check.at, unit)}
+    if "case" in type(check).model_fields:
+        update["case"] = None
+    return check.model_copy(update=update)
 
 
 def _at_of_member(at: AnyAt, unit: float) -> AnyAt:
+    if not isinstance(at, PublishedAt):
+        return at.without_members()
     return at.without_members(case=None, t=None if at.t is None else at.t * unit)
 
 
@@ -163,6 +163,6 @@ def with_levels(experiment: AnyExperiment, levels: Sequence[int]) -> AnyExperime
     check_published(experiment.published, (), setting, report)
     report.raise_any()
     result = experiment.model_copy(update={"levels": setting.levels})
-    size_limits.check_files(result, report)
+    size_limits.check_costs(result, report)
     report.raise_any()
     return update_tables(result)

@@ -149,17 +149,14 @@ class Report:
             rule, hint = "unknown key", nearest(written, list(_FORMS) if is_rule else known)
             if "take" in known and path[-1] in _PLACES:
                 hint = f"write at: {{{_PLACES[str(path[-1])]}: ...}}"
-            if self._is_parameter(path):
+            declared = (
+                self.source.data["model"].get("parameters") if path[:-1] == ("model",) else ()
+            )
+            if isinstance(declared, Mapping) and path[-1] in declared:
                 hint = f"the parameter of this name is `model.parameters.{path[-1]}`"
             if value is None and str(path[-1])[0:1].isdigit():
                 hint = "between braces a comma ends a value: write numbers with a decimal point"
         self.add_malformed(path, rule, hint, value, at_key=True)
-
-    def _is_parameter(self, path: Path_) -> bool:
-        """Tell whether a key of the model is the name of a declared parameter."""
-        model = self.source.data["model"] if path[:-1] == ("model",) else {}
-        declared = model.get("parameters")
-        return isinstance(declared, Mapping) and path[-1] in declared
 
     def add_invalid(self, error: ValidationError, path: Path_) -> list[Path_]:
         """Record every fault that pydantic found in the value at `path`, and return their paths."""
@@ -186,7 +183,8 @@ class Report:
                 self.add((*path, name), "unknown key", nearest(name, list(_FORMS)), at_key=True)
             return path
         if kind == "check" and isinstance(value, dict):
-            hint = _nearest_key(value, rule)
+            known = re.split(", | or ", rule.partition(" the key ")[2])
+            hint = next(filter(None, (likely(key, known) for key in value)), "")
         if kind == "tuple_type" and isinstance(value, str | int):
             hint = f"write [{value}]"
         if kind == "literal_error":
@@ -243,6 +241,12 @@ class Report:
             self.add(path, f"{error.rule}{place}{suffix}", hint or error.hint, text)
             return None
 
+    def rewrite(self, data: Any, origins: Mapping[Path_, Path_]) -> None:
+        """Replace the content; `origins` holds the former path of every value that moved."""
+        source = self.source
+        moved = {path: source.origin(before) or before for path, before in origins.items()}
+        self.source = replace(source, data=data, origins={**source.origins, **moved})
+
     def raise_any(self) -> None:
         """Raise `InputError` with all faults, if there are any."""
         if self.faults:
@@ -266,12 +270,6 @@ def _shipped(name: str) -> str:
         return ""
     files = sorted((home() / "configs").glob(f"*/{name}.yaml"))
     return f"{files[0].parent.name}/{name}" if files else ""
-
-
-def _nearest_key(value: dict[Any, Any], rule: str) -> str:
-    """Return the key listed in a rule that is most similar to some key of a mapping; empty if none is."""
-    known = re.split(", | or ", rule.partition(" the key ")[2])
-    return next(filter(None, (likely(key, known) for key in value)), "")
 
 
 def _whole_list(path: Path_, rule: str) -> tuple[Path_, str]:

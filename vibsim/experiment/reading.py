@@ -160,7 +160,7 @@ def build(
     if kind in report.kinds.own_models:
         experiment.model.hold(report.kinds.own_models[kind])
     experiment._file, experiment._settings = file, source.settings
-    size_limits.check_files(experiment, report)
+    size_limits.check_costs(experiment, report)
     report.raise_any()
     unlikely.note_unlikely(document.checks, setting, report)
     experiment._notes = report.note_lines

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping
-from dataclasses import replace
 from itertools import product
 from math import prod
 from types import MappingProxyType
@@ -28,7 +27,7 @@ _BRACE = re.compile(r"[{}]")
 
 def write_out_repeats(report: Report) -> None:
     """Expand all repeated keys in the content of `report`, and report faulty indices."""
-    source, data = report.source, report.source.data
+    data = report.source.data
     section = data.get("model") if isinstance(data, Mapping) else None
     if not isinstance(section, Mapping) or section.get(REPEAT) is None:
         return
@@ -44,8 +43,7 @@ def write_out_repeats(report: Report) -> None:
     expanded = {**data, "model": writer.mapping(("model",), model, ("model",))}
     if isinstance(starts, Mapping):
         expanded["initial"] = writer.mapping(("initial",), starts, ("initial",))
-    origins = {out: source.origin(path) or path for out, path in writer.origins.items()}
-    report.source = replace(source, data=expanded, origins={**source.origins, **origins})
+    report.rewrite(expanded, writer.origins)
 
 
 def _indices(raw: Any, report: Report) -> dict[str, range]:

@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
 from typing import Any
 
 from vibsim.core.errors import likely
@@ -44,7 +43,7 @@ _DERIVATIVE = re.compile(r"([A-Za-z_]\w*)('{1,2})(?!')")
 
 def write_usual_form(report: Report) -> None:
     """Rewrite the content of `report` in the standard notation, and report faults."""
-    source, data = report.source, report.source.data
+    data = report.source.data
     if not isinstance(data, Mapping) or not isinstance(section := data.get("model"), Mapping):
         return
     writer = _Writer(report)
@@ -61,15 +60,14 @@ def write_usual_form(report: Report) -> None:
         else:
             rule = f"the model {known.kind} takes none"
             report.add_malformed((key,), rule, "`kind: system` does", at_key=True)
-    origins = {**source.origins, **writer.origins}
-    report.source = replace(source, data={**content, "model": model}, origins=origins)
+    report.rewrite({**content, "model": model}, writer.origins)
 
 
 class _Writer:
     """Rewrites a section ``model``, and records the paths of its values in the file."""
 
     def __init__(self, report: Report) -> None:
-        self.source, self.report = report.source, report
+        self.report = report
         self.origins: dict[Path_, Path_] = {}
 
     def moved(self, model: dict[str, Any], key: str, value: Any, path: Path_) -> dict[str, Any]:
@@ -77,11 +75,8 @@ class _Writer:
         if key in model:
             self.report.add_malformed(path, f"is also given under `model: {key}`", at_key=True)
             return model
-        self._came_from(("model", key), path)
+        self.origins["model", key] = path
         return {**model, key: value}
-
-    def _came_from(self, path: Path_, written: Path_) -> None:
-        self.origins[path] = self.source.origin(written) or written
 
     def of_structure(self, section: Mapping[str, Any]) -> dict[str, Any]:
         """Return a structure with names in place of the letters of its matrices."""
@@ -108,7 +103,7 @@ class _Writer:
         formulas: dict[str, dict[str, Any]] = {}
         for i, (name, entry) in enumerate(coordinates.items()):
             path: Path_ = ("model", "coordinates", name)
-            self._came_from(("model", "coordinates", i), path)
+            self.origins["model", "coordinates", i] = path
             for key, value in entry.items():
                 if key not in OF_COORDINATE:
                     rule = f"is not a formula of a coordinate: {', '.join(OF_COORDINATE)}"
@@ -119,7 +114,7 @@ class _Writer:
                     formulas.setdefault("mass", {})[name] = 1
                 target = "force" if is_plain_acceleration else key
                 formulas.setdefault(target, {})[name] = value
-                self._came_from(("model", target, name), (*path, key))
+                self.origins["model", target, name] = (*path, key)
         return {
             **{key: value for key, value in model.items() if key not in known},
             "coordinates": list(coordinates),

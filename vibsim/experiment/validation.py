@@ -61,7 +61,7 @@ class _Reader:
         content, broken_rule = kind.normal(raw)
         if broken_rule:
             self.report.add_malformed(path, broken_rule, value=raw)
-        fields, extra = _fields(kind), _extra_values(kind)
+        fields, extra = _fields(kind)
         values: dict[str, Any] = {}
         is_sound = True
         for key, value in content.items():
@@ -188,18 +188,13 @@ _adapter_of = cache(TypeAdapter)
 
 
 @cache
-def _fields(kind: type[Section]) -> dict[str, tuple[_Expected, bool]]:
-    """Return the expected type of each key of a section, and whether the key is required."""
-    return {
+def _fields(kind: type[Section]) -> tuple[dict[str, tuple[_Expected, bool]], _Expected | None]:
+    """Return the expected type of each key of a section and whether it is required, and the type of all other keys."""
+    fields = {
         field.alias or name: (_Expected(field.rebuild_annotation()), field.is_required())
         for name, field in kind.model_fields.items()
     }
-
-
-@cache
-def _extra_values(kind: type[Section]) -> _Expected | None:
-    """Return the expected type of keys that are not fields of a section; None if there are no such keys."""
-    return None if kind.other_values is None else _Expected(kind.other_values)
+    return fields, None if kind.other_values is None else _Expected(kind.other_values)
 
 
 def _is_section(kind: Any) -> bool:

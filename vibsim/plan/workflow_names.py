@@ -235,19 +235,11 @@ class Names:
 
     def memory(self, megabytes: int) -> Callable[[Any, int], int]:
         """Return a function that gives the memory of a job [MB], for ``resources``; it grows with each attempt."""
-
-        def megabytes_of(wildcards: Any, attempt: int) -> int:
-            return (megabytes + self.overhead) * attempt
-
-        return megabytes_of
+        return lambda wildcards, attempt: (megabytes + self.overhead) * attempt
 
     def runtime(self, minutes: int | None) -> Callable[[Any, int], int | None]:
         """Return a function that gives the time limit of a job [minutes]; it grows with each attempt."""
-
-        def minutes_of(wildcards: Any, attempt: int) -> int | None:
-            return minutes and minutes * attempt
-
-        return minutes_of
+        return lambda wildcards, attempt: minutes and minutes * attempt
 
     @property
     def files(self) -> list[str]:

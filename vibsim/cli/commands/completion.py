@@ -72,7 +72,7 @@ def _offered(before: Sequence[str], prefix: str) -> Iterable[str]:
     command, *arguments = before
     if command not in known:
         return []
-    rows = [((n,) if isinstance(n, str) else n, settings) for n, settings in known[command]]
+    rows = known[command]
     slots = [(names[0], settings) for names, settings in rows if not names[0].startswith("-")]
     options = {name: settings for names, settings in rows for name in names if name[0] == "-"}
     last = options.get(arguments[-1], {}) if arguments else {}

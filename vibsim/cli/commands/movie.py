@@ -107,7 +107,7 @@ def _film(plan: Plan, options: Namespace, form: str) -> Film:
     if plan.has_solver:
         rule = "must have a model: a movie cannot show what your own solver does"
         raise refusal("EXPERIMENT", options.experiment, rule)
-    results, case = chosen_results(options), options.case or 0
+    results, case = chosen_results(options), options.case
     levels, made = level_member.made(plan, results, case, options.experiment)
     for level in options.level or ():
         level_member.check_level(level, levels)

@@ -13,8 +13,7 @@ from shlex import quote
 from typing import TYPE_CHECKING
 
 from vibsim.cli.jobs.common import refusal
-from vibsim.cli.list_entry import COORDINATES, needed, parameter_text, unit_text
-from vibsim.core.errors import nearest
+from vibsim.cli.list_entry import COORDINATES, model_named, needed, parameter_text, unit_text
 from vibsim.core.home import called, home
 from vibsim.experiment.collection import ENDINGS
 from vibsim.store import write_bytes, write_text
@@ -56,7 +55,7 @@ def new(options: Namespace) -> int:
     if options.like:
         lines, written = _like(options.like)
     else:
-        lines, written = _of_model(options.model or "pendulum"), {}
+        lines, written = list(_lines(model_named(options.model or "pendulum", "--model"))), {}
     written[file.name] = "\n".join([f"{EDITOR}{schema}", *lines, ""]).encode()
     for name in written:
         if os.path.lexists(file.parent / name):
@@ -69,15 +68,6 @@ def new(options: Namespace) -> int:
     word = quote(str(file))
     print(f"check it: {called(f'vibsim check {word}')}\nrun it:   {called(f'vibsim run {word}')}")
     return 0
-
-
-def _of_model(kind: str) -> list[str]:
-    """Return the lines of a file with a model, its default parameters, four levels and two checks."""
-    from vibsim.models import MODELS
-
-    if kind not in MODELS:
-        raise refusal("--model", kind, "is not a model", nearest(kind, sorted(MODELS)))
-    return list(_lines(MODELS[kind]))
 
 
 def _like(word: str) -> tuple[list[str], dict[str, bytes]]:
@@ -124,7 +114,7 @@ def _write_schema(path: Path) -> None:
 
 
 def _lines(model: Model) -> Iterator[str]:
-    """Yield the lines of the file for a model, after the line of its schema, with comments."""
+    """Yield the lines of a file with a model, its default parameters, four levels and two checks, after its schema."""
     yield "# Check this file with `vibsim check FILE`, run it with `vibsim run FILE`, and see what it costs with"
     yield '# `vibsim plan FILE`. Numbers may have units: "50 cm".'
     yield f"title: {model.title} on four levels"

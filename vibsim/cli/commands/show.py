@@ -24,11 +24,11 @@ if TYPE_CHECKING:
 def show(options: Namespace) -> int:
     """Draw the finest existing level, and print the verdicts below it, where the user sees them last."""
     if options.what.endswith(".nc"):
-        _draw(level_member.read(Path(options.what), options.case or 0), options, options.what)
+        _draw(level_member.read(Path(options.what), options.case), options, options.what)
         return 0
     plan = one_plan_of(options.what, options.settings)
     results = chosen_results(options)
-    case = options.case or 0
+    case = options.case
     levels, made = level_member.made(plan, results, case, options.what)
     if options.level is not None:
         level_member.check_level(options.level, levels)
@@ -71,11 +71,12 @@ def _draw(record: Record, options: Namespace, title: str) -> None:
     quantity = level_member.chosen("--quantity", options.quantity, names)
     scheme = schemes.index(level_member.chosen("--scheme", options.scheme, schemes))
     series = _series(record, quantity, scheme)
-    drawing = draw(series, terminal.columns(), options.rows, options.start)
+    start = options.start or 0.0
+    drawing = draw(series, terminal.columns(), options.rows, start)
     print(f"{title}{_member(record)}, scheme {schemes[scheme]}: {legend(series)}")
     print(*drawing.lines, sep="\n")
     if not drawing.shown:
-        print(f"  nothing from t = {options.start:g} on: the last time is {series.t[-1]:g}")
+        print(f"  nothing from t = {start:g} on: the last time is {series.t[-1]:g}")
     elif drawing.shown[-1] + drawing.shown.step < len(series.t):
         last = f"{series.t[drawing.shown[-1]]:.5g}"
         print(f"  to t = {last} of {series.t[-1]:.5g}; see more with --from {last} or --rows N")

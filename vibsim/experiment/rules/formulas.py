@@ -182,7 +182,7 @@ def _named_formulas(
         return formulas
     if not isinstance(written, Mapping):
         if model.coordinates > 1 and not row.beside:
-            rule = f"must have a formula for each of {_shortlist(model.positions)}"
+            rule = f"must have a formula for each of {shortlist(model.positions)}"
             report.add(path, rule, f"e.g. {{{model.position}: ...}}")
             return {}
         if not is_valid(written, row, path, known, report):
@@ -205,7 +205,7 @@ def _named_formulas(
     # a misspelt name is already reported
     is_reported = any(name not in model.positions for name in written)
     if row.of == "coordinate" and missing and not is_reported:
-        rule = f"must have a formula for each coordinate, has none for {_shortlist(missing)}"
+        rule = f"must have a formula for each coordinate, has none for {shortlist(missing)}"
         report.add(path, rule)
     return formulas
 
@@ -239,7 +239,7 @@ def _pair_formulas(
     return valid
 
 
-def _shortlist(names: Sequence[str]) -> str:
+def shortlist(names: Sequence[str]) -> str:
     """List names for a message, at most `MOST_NAMED`."""
     return ", ".join(names if len(names) <= MOST_NAMED else [*names[: MOST_NAMED - 1], "..."])
 
@@ -279,7 +279,7 @@ def is_valid(
     text: str, row: FormulaField, path: Path_, known: Collection[str], report: Report
 ) -> bool:
     """Tell whether a formula of the variables of `row` and `known` parameters is valid; report its fault if not."""
-    more = f"; it may name {f'{_shortlist(row.names)} and ' if row.names else ''}parameters"
+    more = f"; it may name {f'{shortlist(row.names)} and ' if row.names else ''}parameters"
     is_file = row.table is not None and text.lower().endswith(ENDINGS)
     hint = f"for a table write {{{TABLE}: {text}}}" if is_file else ""
     is_oscillator = report.source.data.get("model", {}).get("kind") == "oscillator"

@@ -14,7 +14,7 @@ from vibsim.experiment.faults import Report
 from vibsim.experiment.kinds import COORDINATES
 from vibsim.experiment.rules.formulas import NAME, declared_parameters, is_valid, read_formulas
 from vibsim.experiment.rules.potential import NOT_FOUND, check_potential, note_potential
-from vibsim.experiment.rules.structure import read_structure, terms_of_damping
+from vibsim.experiment.rules.structure import read_structure
 from vibsim.experiment.schema.fields import AT, DECLARED, Section
 from vibsim.formula import ExpressionError, derivative, parts_of
 from vibsim.models import FormulaField, Model, tree
@@ -65,39 +65,34 @@ def equation(
         # a model with formulas is known only with all of them
         return Equation(model if model is not None and model.written is None else None)
     if model.loaded is not None:
-        result = _equation_of_structure(section, model, swept, folder, report)
-        _note_unused(section, result, report)
-        return result
-    parameters = {row.name: getattr(section, row.name) for row in model.parameters}
-    result = Equation(model, parameters)
-    if model.written is not None:
-        result = _equation_of_formulas(section, model, parameters, folder, report)
-        _note_unused(section, result, report)
+        result = _equation_of_structure(section, model, folder, report)
+    elif model.written is not None:
+        result = _equation_of_formulas(section, model, folder, report)
+    else:
+        result = Equation(model, {row.name: getattr(section, row.name) for row in model.parameters})
     if result.model is None:
         return result
-    neutral = {row.name: row.neutral for row in result.model.parameters}
+    if model.written is not None:
+        _note_unused(section, result.formulas, report)
+    rows = {row.name: row for row in result.model.parameters}
     terms = tuple(
         name
-        for name in result.model.optional
-        if result.parameters[name] != neutral[name] or f"model.{name}" in swept
+        for name, row in ((name, rows[name]) for name in result.model.optional)
+        if result.parameters[row.key] != row.neutral or f"model.{row.key}" in swept
     )
     return replace(result, model=result.model.with_terms(terms), terms=terms)
 
 
-def _note_unused(section: Any, equation_: Equation, report: Report) -> None:
+def _note_unused(section: Any, formulas: Mapping[str, str], report: Report) -> None:
     """Warn about declared parameters that no formula uses."""
-    if equation_.model is None:
-        return
-    used = {name for text in equation_.formulas.values() for name in NAME.findall(text)}
+    used = {name for text in formulas.values() for name in NAME.findall(text)}
     for name in section.parameters:
         if name not in used:
             report.note(("model", DECLARED, name), "no formula names it", "leave it out")
 
 
-def _equation_of_structure(
-    section: Any, model: Model, swept: Collection[str], folder: Path, report: Report
-) -> Equation:
-    """Return the equation of a structure."""
+def _equation_of_structure(section: Any, model: Model, folder: Path, report: Report) -> Equation:
+    """Return the equation of a structure, with all its terms."""
     parameters = {
         row.key: float(getattr(section.rayleigh, row.name, row.default)) for row in RAYLEIGH
     }
@@ -112,17 +107,14 @@ def _equation_of_structure(
     texts = {key: text for key, (text, _) in loads.items()}
     equipped = model.with_formulas(texts, tuple(declared), spec.structure)
     parameters |= {f"{DECLARED}.{name}": value for name, value in declared.items()}
-    terms = terms_of_damping(equipped, parameters, swept)
-    return Equation(equipped.with_terms(terms), parameters, texts, terms=terms, structure=spec)
+    return Equation(equipped, parameters, texts, structure=spec)
 
 
-def _equation_of_formulas(
-    section: Any, model: Model, parameters: dict[str, float], folder: Path, report: Report
-) -> Equation:
+def _equation_of_formulas(section: Any, model: Model, folder: Path, report: Report) -> Equation:
     """Return the equation of a model whose formulas are in the section."""
     declared = declared_parameters(section, model, report)
     texts, coefficients, tables = read_formulas(section, model, declared, folder, report)
-    parameters = parameters | coefficients
+    parameters = {row.name: getattr(section, row.name) for row in model.parameters} | coefficients
     exact = next((name for name in texts if name.startswith("exact")), "")
     _check_combinations(section, texts, exact, f"damping.{COULOMB}" in parameters, report)
     if report.has_faulty_model:

@@ -9,7 +9,7 @@ from vibsim.core.errors import nearest
 from vibsim.experiment.data import SchemeSpec
 from vibsim.experiment.faults import Report
 from vibsim.experiment.kinds import Kinds
-from vibsim.experiment.rules.formulas import MOST_NAMED
+from vibsim.experiment.rules.formulas import shortlist
 from vibsim.experiment.schema.checks import SOLUTIONS
 from vibsim.experiment.schema.model_and_schemes import TOLERANCE
 from vibsim.experiment.schema.sweep import tolerance_name
@@ -56,16 +56,13 @@ def _specs(section: Any, scheme: Scheme, model: Model | None, kinds: Kinds) -> l
         name = section.label or kind
         given = {key: getattr(section, key) for key in options}
         options |= {key: value for key, value in given.items() if value is not None}
-    tolerances = options.get(TOLERANCE)
-    if not isinstance(tolerances, tuple):
-        spec = SchemeSpec(name=name, kind=kind, options=options)
-        if kind in kinds.own_schemes:
-            spec.hold(scheme)
-        return [spec]
-    return [
-        SchemeSpec(name=tolerance_name(name, x), kind=kind, options={**options, TOLERANCE: x})
-        for x in tolerances
-    ]
+    variants = [(name, options)]
+    if isinstance(tolerances := options.get(TOLERANCE), tuple):
+        variants = [(tolerance_name(name, x), {**options, TOLERANCE: x}) for x in tolerances]
+    specs = [SchemeSpec(name=label, kind=kind, options=values) for label, values in variants]
+    for spec in specs if kind in kinds.own_schemes else ():
+        spec.hold(scheme)
+    return specs
 
 
 def _check_names(specs: list[SchemeSpec], i: int, first: dict[str, int], report: Report) -> None:
@@ -117,7 +114,7 @@ def _velocities(model: Model) -> str:
     """List the velocities that the acceleration depends on."""
     named = {name for row in model.accelerations for name in tree(model, row).names}
     used = [name for name in model.velocities if name in named] or [model.velocity]
-    return ", ".join(used if len(used) < MOST_NAMED else [*used[: MOST_NAMED - 1], "..."])
+    return shortlist(used)
 
 
 def _check_options(section: Any, i: int, scheme: Scheme, model: Model, report: Report) -> None:

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property, partial
+from functools import cached_property
 
-from vibsim.experiment.cost import LevelCost, level_cost
+from vibsim.experiment.cost import level_cost
 from vibsim.experiment.data import ExperimentSpec, SchemeSpec, Sweep, TimeSpec
 from vibsim.experiment.faults import Report
-from vibsim.experiment.storage import events_kept, extrema_kept, is_lean, stride
+from vibsim.experiment.storage import stride
 from vibsim.models import Model, quantities
 
 MAX_MEMBERS = 10**7
@@ -22,13 +22,6 @@ MAX_FILES = 10_000
 """Files of all levels. With more of them the overhead of the workflow dominates."""
 MIN_DT = 1e-100
 """Smallest time step: its square, and quotients by that, must stay within the range of floats."""
-
-_SMALLEST_MODEL = 6
-"""Series of the smallest model: two states and the energies."""
-_D2T = 4
-"""Further series with the centred difference as velocity: itself, two energies, and a running maximum."""
-_LEAN = 3
-"""Series that a lean experiment stores: two states and the energy deviation, if checks need no others."""
 
 
 @dataclass(frozen=True)
@@ -59,17 +52,12 @@ class Setting:
     @property
     def trajectories(self) -> int:
         """Number of schemes times number of members, as far as they are known."""
-        return self.scheme_count * (self.members or 1)
+        return max(len(self.schemes), len(self.names), 1) * (self.members or 1)
 
     @property
     def members(self) -> int | None:
         """Number of members, 1 without a sweep; None if the sweep is faulty."""
         return self.sweep.count if self.knows_sweep else None
-
-    @property
-    def scheme_count(self) -> int:
-        """Number of schemes, at least 1."""
-        return max(len(self.schemes), len(self.names), 1)
 
     @cached_property
     def adaptive(self) -> tuple[str, ...]:
@@ -96,25 +84,9 @@ class Setting:
         coarsest = self.steps(self.levels[0])
         return stride(self.samples, coarsest, self.steps(level), self.trajectories)
 
-    def level_cost(self, level: int) -> LevelCost:
-        """Return the cost of `level`, as far as the setting is known."""
-        steps = self.steps(level)
-        has_events = self.model is not None and self.model.events is not None
-        d2t = bool(self.with_own_velocity) and not has_events
-        samples = steps // self.stride(level) + 1
-        cost = partial(LevelCost, self.scheme_count, steps, samples, chain=self.sweep.chain)
-        if is_lean(self.samples, self.steps(self.levels[0]), self.trajectories):
-            return cost(_LEAN, d2t=d2t)
-        known = len(quantities(self.model)) if self.model else 0
-        # 1 is the running maximum of the energy deviation
-        series = max(known, _SMALLEST_MODEL) + 1 + (_D2T if d2t else 0)
-        extrema = extrema_kept(self.trajectories)
-        events = events_kept(self.trajectories) if has_events else 0
-        return cost(series, exact=2, extrema=extrema, events=events, d2t=True)
-
 
 def check(setting: Setting, report: Report) -> None:
-    """Report every limit that is exceeded."""
+    """Report every limit on counts that is exceeded."""
     members = setting.members or 1
     if members > MAX_MEMBERS:
         rule = f"must not have more than {MAX_MEMBERS} members, has {members}"
@@ -134,13 +106,17 @@ def check(setting: Setting, report: Report) -> None:
     if total > MAX_MEMBER_STEPS:
         rule = f"the experiment must not take more than {MAX_MEMBER_STEPS} steps, it takes {total}"
         report.add(("levels",), rule, "steps of every level, scheme and member together")
-        return
-    costs = [setting.level_cost(level) for level in setting.levels]
+
+
+def check_costs(experiment: ExperimentSpec, report: Report) -> None:
+    """Report if a job takes too much memory, or the levels too much disk or too many files."""
+    costs = [level_cost(experiment, level) for level in experiment.levels]
     hint = "store fewer samples, or begin at a lower level"
     # the smallest job makes one member, or one chain of members
-    smallest = setting.sweep.chain
-    memory = max(cost.memory(smallest) for cost in costs)
-    disk = sum(cost.disk(members) for cost in costs)
+    smallest = experiment.chain
+    memory = max((cost.memory(smallest) for cost in costs), default=0)
+    disk = sum(cost.disk(experiment.members) for cost in costs)
+    files = [cost.shards(experiment.members) for cost in costs]
     if memory > MAX_MEMORY:
         what = "one member" if smallest == 1 else f"the {smallest} members that follow each other"
         rule = f"{what} at one level must not take more than {MAX_MEMORY} bytes of memory, it takes {memory}"
@@ -148,13 +124,6 @@ def check(setting: Setting, report: Report) -> None:
     if disk > MAX_DISK:
         rule = f"the files must not take more than {MAX_DISK} bytes, they take {disk}"
         report.add(("levels",), rule, hint, at_key=True)
-
-
-def check_files(experiment: ExperimentSpec, report: Report) -> None:
-    """Report if the levels have too many files."""
-    files = [
-        level_cost(experiment, level).shards(experiment.members) for level in experiment.levels
-    ]
     if sum(files) > MAX_FILES:
         rule = f"the levels must not have more than {MAX_FILES} files, they have {sum(files)}"
         finest = f"{files[-1]} of them are of level {experiment.levels[-1]}"

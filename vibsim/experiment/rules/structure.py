@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -14,7 +14,6 @@ from vibsim.experiment.schema.fields import DECLARED, TABLE
 from vibsim.experiment.schema.structure import LoadTable, Mode, ShapedLoad
 from vibsim.experiment.tables.structure import MATRICES, assemble, with_digests
 from vibsim.experiment.yaml.parse import Path_
-from vibsim.models import Model
 from vibsim.models.structure import HISTORY, LOAD, MOST_OBSERVED, RAYLEIGH
 from vibsim.models.system import name_fault, velocities_of
 
@@ -158,11 +157,3 @@ def check_histories(spec: StructureSpec, end: float, report: Report) -> None:
             rule = f"the table ends at {times[-1]:.10g}, but the motion lasts to {end:.10g}"
             path = _place(f"{HISTORY}.{number}.{TABLE}", report)
             report.add(path, rule, "add the load at the end, 0 if there is none")
-
-
-def terms_of_damping(
-    model: Model, parameters: Mapping[str, float], swept: Collection[str]
-) -> tuple[str, ...]:
-    """Return the names of the parameters of Rayleigh damping that the equation contains: nonzero or swept ones."""
-    keys = {row.name: row.key for row in RAYLEIGH if row.name in model.optional}
-    return tuple(name for name, key in keys.items() if parameters[key] or f"model.{key}" in swept)

@@ -112,13 +112,9 @@ class SweepReader:
             elif key == "sample" and section.sample is not None:
                 axes.append(self.sample_axis(section.sample))
             elif key in section.single:
-                axes.append(self.single_axis(key, section.single[key]))
+                values = self._values(key, section.single[key], ("sweep", key))
+                axes.append(None if values is None else _axis((key,), (values,)))
         return axes
-
-    def single_axis(self, key: str, written: Written) -> Axis | None:
-        """Return the axis of a single key."""
-        values = self._values(key, written, ("sweep", key))
-        return None if values is None else _axis((key,), (values,))
 
     def zip_axis(self, section: Mapping[str, Written]) -> Axis | None:
         """Return the axis of keys that vary together."""
@@ -239,8 +235,8 @@ class SweepReader:
         return (is_faulty_step or self._has_difference(low, high, path)) and not faults
 
     def _has_difference(self, low: float, high: float, path: Path_) -> bool:
-        is_finite = math.isfinite(high - low)
-        if not is_finite:
-            rule = f"is too far from {low:g}: the difference has no finite value"
-            self.report.add((*path, 1), rule)
-        return is_finite
+        if math.isfinite(high - low):
+            return True
+        rule = f"is too far from {low:g}: the difference has no finite value"
+        self.report.add((*path, 1), rule)
+        return False

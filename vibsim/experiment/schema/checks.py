@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Mapping
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self, get_args
 
 from pydantic import BeforeValidator, ConfigDict, Discriminator, Field, StrictBool, WithJsonSchema
 from pydantic_core import PydanticCustomError
@@ -448,22 +448,15 @@ def one_of(members: Mapping[str, type[Section]], discriminate: Callable[[Any], s
     )
 
 
+Measurement = (
+    ConvergesCheck | AccurateCheck | ValueCheck | StableCheck | ConservesCheck | EqualCheck
+)
 MEASURED: Mapping[str, type[Section]] = MappingProxyType(
-    {
-        row.kind: row
-        for row in (
-            *(ConvergesCheck, AccurateCheck, ValueCheck),
-            *(StableCheck, ConservesCheck, EqualCheck),
-        )
-    }
+    {check.kind: check for check in get_args(Measurement)}
 )
 """The checks that measure something, by leading key."""
 KINDS = ("claim", *MEASURED)
 """Leading keys, in the order in which they are tried."""
-
-Measurement = (
-    ConvergesCheck | AccurateCheck | ValueCheck | StableCheck | ConservesCheck | EqualCheck
-)
 if TYPE_CHECKING:
     Measured = Measurement
 else:

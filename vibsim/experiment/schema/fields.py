@@ -107,8 +107,8 @@ def tagged(members: Mapping[str, Any], discriminator: Discriminator) -> Any:
 _FORMS = ("mapping", "text", "number", "list", "rows", "row", "other")
 
 
-def by_form(members: Mapping[str, Any], **error: Any) -> Any:
-    """Return a union of types selected by the YAML form of the value; `error` is raised for a form without a member.
+def by_form(members: Mapping[str, Any], rule: str = "", error: str = "form") -> Any:
+    """Return a union of types selected by the YAML form of the value; any other form breaks `rule`, an `error`.
 
     A member is named after a key that its mapping must have, or is ``mapping``, ``text``, ``number``, ``list``,
     ``rows`` (a list of lists), ``row`` (any other list), or ``other`` for all remaining forms.
@@ -124,7 +124,8 @@ def by_form(members: Mapping[str, Any], **error: Any) -> Any:
             forms = ["text" if isinstance(value, str) else "number"]
         return tag(next((name for name in (*forms, "other") if name in members), forms[0]))
 
-    return tagged(members, Discriminator(form, **error))
+    more: Any = {"custom_error_type": error, "custom_error_message": rule} if rule else {}
+    return tagged(members, Discriminator(form, **more))
 
 
 def number(value: Any) -> float:
@@ -171,12 +172,12 @@ def exponent(value: Any) -> int:
     return level
 
 
-def short(limit: int) -> BeforeValidator:
-    """Refuse a list of more than `limit` entries before its entries are validated."""
+def short(limit: int, what: str = "entries") -> BeforeValidator:
+    """Refuse a list or a mapping of more than `limit` entries before its entries are validated."""
 
     def check(values: Any) -> Any:
-        if isinstance(values, list | tuple) and len(values) > limit:
-            raise refused(f"must not have more than {limit} entries, has {len(values)}")
+        if isinstance(values, list | tuple | dict) and len(values) > limit:
+            raise refused(f"must not have more than {limit} {what}, has {len(values)}")
         return values
 
     return BeforeValidator(check)

@@ -50,21 +50,24 @@ def _class_name(kind: str) -> str:
     return kind.title().replace("_", "")
 
 
+def _key(kind: Any, description: str, default: Any = None) -> tuple[Any, Any]:
+    """Return type and description of a key of a section."""
+    return kind, Field(default=default, description=description)
+
+
 @cache
 def scheme_section(scheme: Scheme) -> type[Section]:
     """Return the class of an entry of ``schemes`` that is a mapping."""
     label = "Name of the scheme in this experiment, if not its kind."
     fields: dict[str, Any] = {
-        "kind": (Literal[scheme.kind], Field(description=scheme.title)),
-        "label": (Line | None, Field(default=None, description=label)),
+        "kind": _key(Literal[scheme.kind], scheme.title, ...),
+        "label": _key(Line | None, label),
     }
     for option in scheme.options:
-        row = Field(default=option.default, description=option.description)
-        fields[option.name] = (_type(option, scheme), row)
+        fields[option.name] = _key(_type(option, scheme), option.description, option.default)
     if not scheme.adaptive:
         words = f"{EVENTS.description}; on models with events only, {EVENTS.default} when left out"
-        treatment = Field(default=None, description=words)
-        fields[EVENTS.name] = (Literal[EVENTS.choices] | None, treatment)
+        fields[EVENTS.name] = _key(Literal[EVENTS.choices] | None, words)
     doc = f"{scheme.title} ({scheme.source})."
     name = f"{_class_name(scheme.kind)}Scheme"
     return create_model(name, __base__=Section, __doc__=doc, **fields)
@@ -131,19 +134,8 @@ def scheme_names(data: Any) -> Iterator[str]:
 MAX_DECLARED, MOST_TERMS = 50, 1000
 
 
-def _at_most(limit: int, what: str) -> AfterValidator:
-    """Refuse a mapping of more than `limit` entries."""
-
-    def check(entries: Mapping[str, Any]) -> Mapping[str, Any]:
-        if len(entries) > limit:
-            raise refused(f"must not have more than {limit} {what}, has {len(entries)}")
-        return entries
-
-    return AfterValidator(check)
-
-
-Declared = Annotated[dict[str, Number], _at_most(MAX_DECLARED, "parameters")]
-_few = _at_most(MOST, "formulas")
+Declared = Annotated[dict[str, Number], short(MAX_DECLARED, "parameters")]
+_few = short(MOST, "formulas")
 
 
 def _formulas(single: Any) -> Any:
@@ -172,17 +164,17 @@ def _formula_type(model: Model, field: FormulaField) -> Any:
     if field.table is not None:
         name += "Table"
         words = f"path of a table, relative to this file: {field.description}; a .csv or a .nc file"
-        fields[TABLE] = (Text, Field(description=words))
+        fields[TABLE] = _key(Text, words, ...)
         # the default name of a column is its key
         for key, what in zip(field.table, ("places", "values"), strict=True):
             words = f"name of the column of {what} in the table, or of the variable"
-            fields[key] = (Text, Field(default=key, description=words))
+            fields[key] = _key(Text, words, key)
     if field.tabled:
         words = "where the table is looked up: a formula in t and parameters, a number times t; t when left out"
-        fields[AT] = (FormulaText, Field(default="t", description=words))
+        fields[AT] = _key(FormulaText, words, "t")
     for word, text in () if field.table else field.terms.items():
         value = Annotated[float, FORMULA, BeforeValidator(_coefficient(field, word))] | None
-        fields[word] = (value, Field(default=None, description=f"b of {text}"))
+        fields[word] = _key(value, f"b of {text}")
     if not fields:
         return FormulaText
     section = create_model(name, __base__=Section, **fields)
@@ -253,24 +245,22 @@ def model_section(model: Model) -> type[Section]:
     """Return the section class of a model."""
     if model.loaded is not None:
         return StructureSection
-    fields: dict[str, Any] = {"kind": (Literal[model.kind], Field(description=model.title))}
+    fields: dict[str, Any] = {"kind": _key(Literal[model.kind], model.title, ...)}
     for row in model.parameters:
-        description = f"{row.description} [{row.unit}]"
-        default = Field(default=row.default, description=description)
-        fields[row.name] = (_parameter_type(row), default)
+        words = f"{row.description} [{row.unit}]"
+        fields[row.name] = _key(_parameter_type(row), words, row.default)
     if model.named is not None:
         words = "names of the coordinates; the velocity of x is vx, that of u alone v"
         listed = Annotated[tuple[Text, ...], Field(min_length=1), short(MOST)]
         mapping = Annotated[dict[str, Coordinate], AfterValidator(_refuse_coordinates)]
         coordinates = by_form({"mapping": mapping, "other": listed})
         words += "; or a mapping of the names to the formulas of each"
-        fields[COORDINATES] = (coordinates, Field(default=model.positions, description=words))
+        fields[COORDINATES] = _key(coordinates, words, model.positions)
         words = "the equation of one coordinate, such as u'' + u = 0, in place of its acceleration"
-        fields["equation"] = (Text | None, Field(default=None, description=words))
+        fields["equation"] = _key(Text | None, words)
         words = "indices with first and last value: every key and entry with {i} in it is written out for each i"
         words += "; or a chain {n: 16, i: {x_i: ...}} with the formulas of each coordinate"
-        repeat = dict[str, tuple[int, int]] | Chain | None
-        fields["repeat"] = (repeat, Field(default=None, description=words))
+        fields["repeat"] = _key(dict[str, tuple[int, int]] | Chain | None, words)
     for field in model.formulas:
         names = ", ".join((*field.names, "parameters"))
         if model.named is not None:
@@ -279,16 +269,14 @@ def model_section(model: Model) -> type[Section]:
             names = " and ".join(filter(None, (", ".join(known), "parameters")))
         words = f"{field.description}; a formula in {names}"
         words += f"; {field.default} when left out" if field.default else ""
-        formula = Field(default=None, description=words)
-        fields[field.name] = (_formula_type(model, field) | None, formula)
+        fields[field.name] = _key(_formula_type(model, field) | None, words)
     if model.formulas:
         words = "names that the formulas use, with their values"
-        fields["parameters"] = (Declared, Field(default={}, description=words))
+        fields["parameters"] = _key(Declared, words, {})
     if model.takes_events:
         words = "events: where a formula crosses 0, states get new values"
-        events = Annotated[tuple[Event, ...], short(MOST_EVENTS)]
-        fields["events"] = (events, Field(default=(), description=words))
+        fields["events"] = _key(Annotated[tuple[Event, ...], short(MOST_EVENTS)], words, ())
         words = "a comparison, u < 0 say, which ends the motion where it begins to hold"
-        fields[STOP] = (FormulaText | None, Field(default=None, description=words))
+        fields[STOP] = _key(FormulaText | None, words)
     doc = f"{model.title}: {model.equation} ({model.source})."
     return create_model(_class_name(model.kind), __base__=Section, __doc__=doc, **fields)

@@ -26,8 +26,7 @@ Row = Annotated[tuple[Number, ...], Field(min_length=1), short(MOST_ROWS)]
 _Rows = Annotated[tuple[Row, ...], Field(min_length=1), short(MOST_ROWS)]
 MatrixText: Any = by_form(
     {"text": Text, "rows": _Rows, "row": Row},
-    custom_error_type="form",
-    custom_error_message="must be the name of a file, rows such as [[2, -1], [-1, 1]], or a diagonal such as [2, 1]",
+    "must be the name of a file, rows such as [[2, -1], [-1, 1]], or a diagonal such as [2, 1]",
 )
 """A file, rows of numbers, or the diagonal alone."""
 Entries = Annotated[dict[str, Number], Field(min_length=1)]
@@ -44,16 +43,11 @@ class Mode(Section):
 
 
 _VECTOR = "must be the name of a file, a list such as [0, 1], or numbers by degree of freedom such as {2: 1}"
-VectorText: Any = by_form(
-    {"text": Text, "row": Row, "mapping": Entries},
-    custom_error_type="form",
-    custom_error_message=_VECTOR,
-)
+VectorText: Any = by_form({"text": Text, "row": Row, "mapping": Entries}, _VECTOR)
 """A file, a list of numbers, or numbers by degree of freedom."""
 StartText: Any = by_form(
     {"text": Text, "row": Row, "mapping": Entries, "mode": Mode},
-    custom_error_type="form",
-    custom_error_message=f"{_VECTOR}, or {{mode: 1, size: 1}}",
+    f"{_VECTOR}, or {{mode: 1, size: 1}}",
 )
 
 
@@ -100,8 +94,7 @@ class ShapedLoad(Section):
 
 Load: Any = by_form(
     {"mapping": Annotated[dict[str, Factor], Field(min_length=1)], "shape": ShapedLoad},
-    custom_error_type="form",
-    custom_error_message="must be formulas by degree of freedom such as {2: cos(t)}, or {shape: ..., times: ...}",
+    "must be formulas by degree of freedom such as {2: cos(t)}, or {shape: ..., times: ...}",
 )
 _Ratios = Annotated[tuple[NonNegative, ...], Field(min_length=1), short(MOST_ROWS)]
 RatiosText: Any = by_form({"other": NonNegative, "row": _Ratios})

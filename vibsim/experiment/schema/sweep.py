@@ -177,9 +177,7 @@ Written = tuple[bool | float | str, ...] | Linspace | Logspace | Range
 if TYPE_CHECKING:
     Spread = Written
 else:
-    Spread = by_form(
-        {**RULES, "list": _List}, custom_error_type="values", custom_error_message=LIST_RULE
-    )
+    Spread = by_form({**RULES, "list": _List}, LIST_RULE, "values")
 
 
 class Sample(_Sampled):
