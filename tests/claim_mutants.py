@@ -10,8 +10,11 @@ import math
 from collections.abc import Iterator
 from typing import Any
 
-from vibsim import Verdict, analyse, simulate, verdicts
+from vibsim import Verdict
+from vibsim.analysis import analyse_records, verdicts
+from vibsim.core.record import Record
 from vibsim.experiment import Experiment
+from vibsim.simulation import simulate_record
 
 PART = 0.25
 """By so much of itself a number is changed that a claim says must be met."""
@@ -78,21 +81,25 @@ def _orders(claim: Any, verdict: Verdict, order: float) -> Iterator[tuple[str, f
 
 def survivors(experiment: Experiment) -> list[str]:
     """Return the claims of an experiment that say the same with another number, and which number it is."""
-    levels = [simulate(experiment, level) for level in experiment.levels]
-    before = {v.id: v for v in verdicts(experiment, analyse(experiment, levels))}
+    claims = tuple(c for c in experiment.checks if c.kind == "claim" and numbers_of(c))
+    if not claims:
+        return []
+    levels = {level: simulate_record(experiment, level) for level in experiment.levels}
+    before = {v.id: v for v in judged(experiment, claims, levels)}
     added, of = [], {}
-    for check in experiment.checks:
-        if check.kind != "claim":
-            continue
+    for check in claims:
         for key, number in mutants(check, before[check.id]):
             name = f"mutant_{len(added)}"
             that = check.that.model_copy(update={key: number})
             added.append(check.model_copy(update={"id": name, "that": that}))
             of[name] = f"{check.id} with {key}: {number:.6g}"
-    if not added:
-        return []
-    other = experiment.model_copy(update={"checks": (*experiment.checks, *added)})
-    after = verdicts(other, analyse(other, levels))
-    return [
-        of[v.id] for v in after if v.id in of and v.status == before[of[v.id].split()[0]].status
-    ]
+    after = judged(experiment, tuple(added), levels) if added else []
+    return [of[v.id] for v in after if v.status == before[of[v.id].split()[0]].status]
+
+
+def judged(
+    experiment: Experiment, checks: tuple[Any, ...], levels: dict[int, Record]
+) -> list[Verdict]:
+    """Judge an experiment by these checks in place of its own."""
+    other = experiment.model_copy(update={"checks": checks, "tolerance": None})
+    return verdicts(other, analyse_records(other, levels))

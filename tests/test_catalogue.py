@@ -134,13 +134,12 @@ def test_every_row_has_a_place_in_a_text() -> None:
         assert found["section"] or found["exercise"], row
 
 
-@pytest.mark.parametrize(
-    ("text", "section"), [(t, s) for t, named in SECTIONS.items() for s in named.split()]
-)
-def test_every_section_leads_to_what_shows_it(text: str, section: str) -> None:
+@pytest.mark.parametrize("text", SECTIONS)
+def test_every_section_leads_to_what_shows_it(text: str) -> None:
     part = PAGE.partition(f"## {text.capitalize()}\n")[2].partition("\n## ")[0]
-    lines = part.partition(f"\n### {section} ")[2].partition("\n### ")[0]
-    assert re.search(r"\| (CONFIRMED|CORRECTED|OPEN|PROVIDED) \|", lines)
+    for section in SECTIONS[text].split():
+        lines = part.partition(f"\n### {section} ")[2].partition("\n### ")[0]
+        assert re.search(r"\| (CONFIRMED|CORRECTED|OPEN|PROVIDED) \|", lines), section
 
 
 def test_the_index_knows_an_experiment_or_a_page_for_every_section_and_exercise() -> None:
@@ -187,18 +186,18 @@ def test_a_statement_is_understood_alone() -> None:
     assert found == []
 
 
-@pytest.mark.parametrize("number", range(1, 24))
-def test_every_exercise_leads_to_what_answers_it(number: int) -> None:
+def test_every_exercise_leads_to_what_answers_it() -> None:
     part = PAGE.rpartition("### Exercises (sections 9 and 11)\n")[2]
-    assert re.search(
-        rf"\| exercise {number} \|[^|]*\|[^|]*(configs|python\.md)[^|]*\| (CONFIRMED|PROVIDED) \|",
+    answered = re.findall(
+        r"\| exercise (\d+) \|[^|]*\|[^|]*(?:configs|python\.md)[^|]*\| (?:CONFIRMED|PROVIDED) \|",
         part,
     )
+    assert {*map(int, answered)} >= {*range(1, 24)}
 
 
-@pytest.mark.parametrize("number", range(1, 18))
-def test_every_figure_of_the_vibration_text_leads_to_its_experiment(number: int) -> None:
-    assert re.search(rf"\| figure {number} \|[^|]*\|[^|]*configs[^|]*\| CONFIRMED \|", PAGE)
+def test_every_figure_of_the_vibration_text_leads_to_its_experiment() -> None:
+    found = re.findall(r"\| figure (\d+) \|[^|]*\|[^|]*configs[^|]*\| CONFIRMED \|", PAGE)
+    assert {*map(int, found)} >= {*range(1, 18)}
 
 
 def test_an_open_row_says_why_and_a_false_statement_what_is_true() -> None:

@@ -24,12 +24,12 @@ def test_there_are_faults_of_every_kind():
     }  # fmt: skip
 
 
-@pytest.mark.parametrize("fault", FAULTS, ids=NAMES)
-def test_a_fault_stands_once_in_its_file_and_leaves_a_program(fault):
-    text = (ROOT / "vibsim" / fault.file).read_text()
-    assert text.count(fault.right) == 1
-    assert fault.wrong != fault.right
-    ast.parse(text.replace(fault.right, fault.wrong))
+def test_a_fault_stands_once_in_its_file_and_leaves_a_program():
+    for fault in FAULTS:
+        text = (ROOT / "vibsim" / fault.file).read_text()
+        assert text.count(fault.right) == 1, fault.name
+        assert fault.wrong != fault.right, fault.name
+        ast.parse(text.replace(fault.right, fault.wrong), fault.name)
 
 
 def test_the_page_tells_of_every_fault():

@@ -163,11 +163,11 @@ def test_there_are_experiments() -> None:
     assert list((ROOT / "configs").rglob("*.yml")) == []
 
 
-@pytest.mark.parametrize("path", configs(), ids=lambda path: path.stem)
-def test_experiment_begins_with_the_editor_line(path: Path) -> None:
-    assert path.read_text().splitlines()[0] == EDITOR_LINE
+def test_every_experiment_begins_with_the_editor_line() -> None:
     schema = EDITOR_LINE.partition("$schema=")[2]
-    assert (path.parent / schema).is_file()
+    for path in configs():
+        assert path.read_text().splitlines()[0] == EDITOR_LINE, path
+        assert (path.parent / schema).is_file(), path
 
 
 # --- documentation ----------------------------------------------------------------------------------

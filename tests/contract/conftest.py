@@ -6,11 +6,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import forked
 import pytest
 from made_once import made_once
 
-from .door import vibsim
+from .door import started, vibsim
 
 TINY = """\
 title: A small linear pendulum
@@ -66,7 +65,7 @@ FILES = {"tiny": TINY, "swept": SWEPT, "failing": FAILING}
 
 @dataclass(frozen=True)
 class Runs:
-    """Two runs: `passing` on two cores, and `mixed` on one, which shares `tiny` and has an experiment that fails."""
+    """Two runs: `passing` on two cores, of `tiny`, and `mixed` on one, of all, one of which fails."""
 
     folder: Path
 
@@ -79,9 +78,8 @@ class Runs:
         return self.folder / "mixed"
 
     def of(self, experiment: str) -> Path:
-        """Folder of an experiment in the run that made it, the one on one core where both did."""
-        run = self.passing if experiment == "swept" else self.mixed
-        return run / "adhoc" / experiment
+        """Folder of an experiment in the run that made all."""
+        return self.mixed / "adhoc" / experiment
 
     def file(self, name: str) -> Path:
         return self.folder / f"{name}.yaml"
@@ -109,8 +107,8 @@ def runs(tmp_path_factory: pytest.TempPathFactory, worker_id: str) -> Runs:
         found = Runs(folder)
         for name, text in FILES.items():
             found.file(name).write_text(text)
-        found.run("passing", 2, "tiny", "swept")
+        found.run("passing", 2, "tiny", start=started)
         # in forks of this process, which makes the same bytes (`test_contract_files`)
-        found.run("mixed", 1, "tiny", "failing", start=forked.vibsim)
+        found.run("mixed", 1, *FILES)
 
     return Runs(made_once(tmp_path_factory, worker_id, "contract runs", make))

@@ -88,7 +88,7 @@ def test_a_second_run_makes_nothing_again(runs: Runs, tmp_path: Path) -> None:
         for path in (runs.passing / "adhoc").rglob("*")
         if path.is_file() and path.suffix in {".nc", ".json", ".html", ".svg", ".csv"}
     }
-    runs.run("passing", 2, "tiny", "swept")
+    runs.run("passing", 2, "tiny")
     assert runs.exit_code("passing") == 0
     for path, before in made.items():
         assert (path.stat().st_mtime_ns, path.stat().st_ino) == before, path

@@ -130,7 +130,7 @@ def test_energies_of_a_level_belong_together(runs: Runs) -> None:
 
 
 def test_a_shard_has_the_swept_values_beside_its_cases(runs: Runs) -> None:
-    data = opened(runs.passing / "adhoc/swept/level_06/shard_0000.nc")
+    data = opened(runs.mixed / "adhoc/swept/level_06/shard_0000.nc")
     np.testing.assert_array_equal(data["case"], [0, 1, 2])
     assert data["initial_theta"].dims == ("case",)
     np.testing.assert_array_equal(data["initial_theta"], [0.5, 1.0, 1.5])
@@ -294,7 +294,7 @@ def test_summary_csv_has_a_line_for_every_check(runs: Runs) -> None:
     ]
     wanted = [
         ("adhoc", name, check["id"], check["kind"], check["status"], check["reason"])
-        for name in ("tiny", "failing")
+        for name in FILES
         for check in summary(runs, name)["checks"]
     ]
     assert sorted(told) == sorted(wanted)
@@ -316,7 +316,7 @@ def test_tables_are_rectangular(runs: Runs) -> None:
 
 def test_pages_open_offline_and_lead_to_each_other(runs: Runs) -> None:
     index = (runs.mixed / "index.html").read_text()
-    for name in ("tiny", "failing"):
+    for name in FILES:
         assert f'href="adhoc/{name}/report.html' in index
         page = (runs.of(name) / "report.html").read_text()
         assert yaml.safe_load(FILES[name])["title"] in page

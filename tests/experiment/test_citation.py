@@ -103,9 +103,11 @@ def sources(part: Any) -> list[str]:
     return []
 
 
-@pytest.mark.parametrize("path", sorted(CONFIGS.glob("*/*.yaml")), ids=lambda path: path.stem)
-def test_every_shipped_source_of_the_two_texts_names_a_place(path: Path) -> None:
-    for source in sources(yaml.safe_load(path.read_text(encoding="utf-8"))):
+def test_every_shipped_source_of_the_two_texts_names_a_place() -> None:
+    files = (path.read_text(encoding="utf-8") for path in CONFIGS.glob("*/*.yaml"))
+    # the loader of the C library, where it is built in, reads the same ten times as fast
+    loader = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
+    for source in (s for text in files for s in sources(yaml.load(text, loader))):
         found = fields(source)
         assert found is not None
         texts = (A, B, f"correction of the {A}", f"correction of the {B}")

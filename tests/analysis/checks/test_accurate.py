@@ -240,12 +240,14 @@ def test_an_estimate_without_an_order_decides_nothing(
 ) -> None:
     """However much or little is asked. The true error, where it is known, does not need the order."""
     checks = [{"accurate": quantity, "relative": asked} for asked in (10.0, 1e-14)]
-    for found in asked(content, *checks, with_exact=False):
+    content = {**content, "checks": checks}
+    levels = levels_of(content)
+    for found in judged(content, without_exact(levels)):
         assert (found.status, found.reason) == ("INCONCLUSIVE", reason)
         assert "cannot be trusted" in found.text
         assert f"converges: {quantity}" in found.advice
     if reason != "non_smooth":
-        much, little = asked(content, *checks)
+        much, little = judged(content, levels)
         assert (much.status, little.status == "PASS") == ("PASS", False)
 
 

@@ -7,6 +7,7 @@ import math
 import re
 from collections.abc import Iterator
 from functools import cache
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -152,21 +153,17 @@ def made(kind: str, reason: str, **more: Any) -> tuple[Any, Record]:
     ("kind", "reason"),
     [(kind, reason) for kind, found in MAKES.items() for reason in sorted(found)],
 )
-@pytest.mark.parametrize("holds", [None, True, False])
-def test_every_reason_of_every_kind_of_check_ends_with_advice(
-    kind: str, reason: str, holds: bool | None
-) -> None:
+def test_every_reason_of_every_kind_of_check_ends_with_advice(kind: str, reason: str) -> None:
     exp, record = made(kind, reason)
-    if holds is not None:
-        claim = {"claim": "it is so", "that": KINDS[kind], "holds": holds}
-        exp = experiment(checks=[claim])
-    (found,) = verdicts(exp, record)
-    measured = found.results[0].reason
-    assert measured == reason
-    if found.status == "PASS":
-        assert found.advice == ""
-    else:
-        assert_specific(found.advice)
+    claim = {"claim": "it is so", "that": KINDS[kind]}
+    claims = (experiment(checks=[claim | {"holds": holds}]) for holds in (True, False))
+    for one in (exp, *claims):
+        (found,) = verdicts(one, record)
+        assert found.results[0].reason == reason
+        if found.status == "PASS":
+            assert found.advice == ""
+        else:
+            assert_specific(found.advice)
 
 
 def test_every_reason_occurs() -> None:
@@ -240,21 +237,21 @@ def advise(context: _Phrases) -> str:
 
 
 @pytest.mark.parametrize("reason", sorted(set(REASON_NAMES) - GOOD - {"mismatch"}))
-@pytest.mark.parametrize("cause", CAUSES)
-@pytest.mark.parametrize("order", [1.02, 4.0, float("nan"), 0.1])
-def test_every_cause_ends_with_advice(reason: str, cause: str, order: float) -> None:
-    if reason == "order_high" and math.isnan(order):
-        return  # an order that is too high is known
-    for more in (
+def test_every_cause_ends_with_advice(reason: str) -> None:
+    orders = (1.02, 4.0, math.nan, 0.1)
+    promises: tuple[dict[str, float], ...] = (
         {},
         {"expected": np.inf, "promised": np.inf},
         {"promised": 1.0},
         {"promised": 4.0},
-    ):
-        for options in ({}, {"arithmetic": "three_term"}, {"tolerance": 1e-6}, {"events": "mesh"}):
-            one = story(reason=reason, cause=cause, order=order, options=options, **more)
-            assert_specific(advise(one))
-            assert tell(one).endswith(".")
+    )
+    given = ({}, {"arithmetic": "three_term"}, {"tolerance": 1e-6}, {"events": "mesh"})
+    for cause, order, more, options in product(CAUSES, orders, promises, given):
+        if reason == "order_high" and math.isnan(order):
+            continue  # an order that is too high is known
+        one = story(reason=reason, cause=cause, order=order, options=options, **more)
+        assert_specific(advise(one))
+        assert tell(one).endswith("."), (cause, order, more, options)
 
 
 @pytest.mark.parametrize(
@@ -593,8 +590,10 @@ def test_as_many_finer_levels_are_asked_for_as_the_measured_changes_need(kind: s
     model = {"kind": "linear_pendulum", "g": 1.0, "L": 1.0}
     run = {**RUN, "model": model, "initial": {"theta": 1.0}, "time": {"end": math.acos(-0.7)}}
     run |= {"schemes": [kind], "checks": [check]}
-    advice = judged({**run, "levels": [8, 9, 10] if kind == "forward_euler" else [3, 4, 5]}).advice
+    first = 8 if kind == "forward_euler" else 3
+    advice = judged({**run, "levels": [first, first + 1, first + 2]}).advice
     (named,) = re.findall(r"^Add levels? ([\w ]+) to `levels:`", advice)
     last = max(map(int, re.findall(r"\d+", named)))
-    assert judged({**run, "levels": [*range(5, last + 1)]}).status == "PASS", advice
-    assert judged({**run, "levels": [*range(5, last)]}).status == "FAIL", advice
+    # the last three levels decide
+    assert judged({**run, "levels": [last - 2, last - 1, last]}).status == "PASS", advice
+    assert judged({**run, "levels": [last - 3, last - 2, last - 1]}).status == "FAIL", advice
