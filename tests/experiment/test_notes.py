@@ -247,3 +247,11 @@ def test_a_setting_that_a_sweep_overrides_has_a_note(
     found = [text for _, text in Experiment.from_yaml(file, settings=[setting]).notes]
     assert len(found) == bool(told)
     assert all(told in text for text in found)
+
+
+def test_a_wall_that_no_formula_needs_has_no_note() -> None:
+    """The first coordinate is written out, so the wall of the chain is not met there."""
+    chain = {"n": 3, "i": {"x_i": {"force": "x_(i+1) - 2*x_i + x_(i-1)"}}}
+    first = {"x_1": {"force": "x_2 - x_1"}}
+    model = {"kind": "system", "repeat": chain, "coordinates": first}
+    assert notes(model=model, initial={}, schemes=["rk4"]) == []

@@ -85,13 +85,14 @@ def equation(
 
 
 def _note_unused(section: Any, equation_: Equation, report: Report) -> None:
-    """Warn about declared parameters that no formula uses."""
+    """Warn about declared parameters that no formula uses; walls of a chain are not declared."""
     if equation_.model is None:
         return
     used = {name for text in equation_.formulas.values() for name in NAME.findall(text)}
     for name in section.parameters:
-        if name not in used:
-            report.note(("model", DECLARED, name), "no formula names it", "leave it out")
+        path = "model", DECLARED, name
+        if name not in used and (report.source.origin(path) or path)[1] == DECLARED:
+            report.note(path, "no formula names it", "leave it out")
 
 
 def _equation_of_structure(
