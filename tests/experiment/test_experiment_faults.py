@@ -382,6 +382,18 @@ CASES: list[tuple[dict[str, Any], str, str, str]] = [
         "round_off",
     ),
     (value(value="maxx"), "checks[0].value", "unknown value", "did you mean 'max'?"),
+    (
+        value(value="energy_deviation"),
+        "checks[0].value",
+        "unknown value",
+        "write `value: end, quantity: energy_deviation` for that at the end",
+    ),
+    (
+        value(value="end", quantity="wire_force", at={"level": "best"}),
+        "checks[0].quantity",
+        "end at `level: best` is not defined for this quantity",
+        "or take one level: `at: {level: 9}`",
+    ),
     (value(quantity="thta"), "checks[0].quantity", "unknown quantity", "did you mean 'theta'?"),
     (value(quantity="energy"), "checks[0].quantity", "is not defined for this quantity", "theta"),
     (value(quantity="energy_deviation"), "checks[0].quantity", "not defined", "from theta, omega"),

@@ -31,6 +31,11 @@ def check(**keys: Any) -> list[str]:
     return notes(checks=[keys])
 
 
+def wave(angle: str) -> dict[str, Any]:
+    """Return a model with the parameter f in hertz and a force that is the cosine of `angle`."""
+    return {"kind": "oscillator", "force": f"cos({angle})", "parameters": {"f": "50 Hz"}}
+
+
 CART: dict[str, Any] = {
     "kind": "system",
     "coordinates": ["x", "th"],
@@ -92,6 +97,10 @@ TOLD = {
         },
         "model.parameters.k: no formula names it: leave it out",
     ),
+    "hertz": (
+        {"model": wave("f*t + 0.1"), "initial": {}},
+        "model.parameters.f: the formulas take it for 50 rad/s",
+    ),
     "of a claim": (
         {"checks": [{"claim": "it is so", "that": {"value": "period", "equals": 6.71}}]},
         "checks[0].that.equals: has no tolerance, and is compared to 1e-9 of it: `atol: 0.005`",
@@ -122,6 +131,7 @@ MEANT = {
     },
     "velocity": {"initial": {"omega": 60}},
     "displacement": {"model": {"kind": "spring"}, "initial": {"u": 60}},
+    "hertz": {"model": wave("t*f*2*pi"), "initial": {}},
     "place of a system": {"model": CART, "initial": {"x": 40}, "schemes": ["rk4"]},
     "tolerance": {"checks": [{"value": "period", "equals": 6.7, "atol": 0.1}]},
     "many digits": {"checks": [{"value": "period", "equals": 6.70024879}]},
@@ -247,3 +257,11 @@ def test_a_setting_that_a_sweep_overrides_has_a_note(
     found = [text for _, text in Experiment.from_yaml(file, settings=[setting]).notes]
     assert len(found) == bool(told)
     assert all(told in text for text in found)
+
+
+def test_a_wall_that_no_formula_needs_has_no_note() -> None:
+    """The first coordinate is written out, so the wall of the chain is not met there."""
+    chain = {"n": 3, "i": {"x_i": {"force": "x_(i+1) - 2*x_i + x_(i-1)"}}}
+    first = {"x_1": {"force": "x_2 - x_1"}}
+    model = {"kind": "system", "repeat": chain, "coordinates": first}
+    assert notes(model=model, initial={}, schemes=["rk4"]) == []

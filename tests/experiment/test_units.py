@@ -145,6 +145,37 @@ def test_swept_oscillator() -> None:
     assert sorted(set(columns["model.parameters.k"])) == [3, 1000]
 
 
+def test_equations_of_the_file_take_any_unit() -> None:
+    """Numbers of a structure with a unit were all 1, and coordinates of a system took none."""
+    system = {
+        "kind": "system",
+        "force": "-k*u",
+        "mass": "m",
+        "parameters": {"k": "2 kN/m", "m": "1 t"},
+    }
+    sweep = {"initial.v": ["60 rpm", "3 m/s"]}
+    experiment = build(model=system, initial={"u": "4 cm"}, sweep=sweep)
+    assert experiment.initial["u"] == 0.04
+    columns = sweep_columns.columns(experiment, 0, 2)
+    assert list(columns["initial.v"]) == [pytest.approx(2 * math.pi), 3.0]
+    structure = {
+        "kind": "structure",
+        "mass": ["2 t", 1000],
+        "stiffness": [["3 kN/m", "-1 kN/m"], ["-1 kN/m", 1000]],
+        "damping_ratios": "5 %",
+        "load": {"2": "F", "1": "3 kN"},
+        "start": {"displacement": {"mode": 1, "size": "2 mm"}, "velocity": [0, "5 mm/s"]},
+        "parameters": {"F": "2 kN"},
+    }
+    sweep = {"model.parameters.F": ["2 kN", 1000]}
+    experiment = build(model=structure, sweep=sweep, initial=None)
+    assert list(sweep_columns.columns(experiment, 0, 2)["model.parameters.F"]) == [2000, 1000]
+    plain = {**structure, "mass": [2000, 1000], "stiffness": [[3000, -1000], [-1000, 1000]]}
+    plain |= {"damping_ratios": 0.05, "load": {"2": "F", "1": 3000.0}, "parameters": {"F": 2000.0}}
+    plain["start"] = {"displacement": {"mode": 1, "size": 0.002}, "velocity": [0, 0.005]}
+    assert experiment.model == build(model=plain, sweep=sweep, initial=None).model
+
+
 @pytest.mark.parametrize("model", MODELS.values(), ids=MODELS)
 def test_every_unit_of_a_model_is_known(model: Model) -> None:
     units = [*(row.unit for row in model.states), *(row.unit for row in model.parameters)]
@@ -253,7 +284,11 @@ def test_a_unit_of_an_unknown_key_is_not_looked_at() -> None:
 def test_texts_are_no_quantities() -> None:
     """A formula of a model, a word of an option and a title may look like one."""
     spring = {"kind": "oscillator", "spring": "3 m"}
-    assert only_fault(model=spring, initial={"u": 1}).key == "model.spring"
+    fault = only_fault(model=spring, initial={"u": 1})
+    assert (fault.key, fault.hint) == (
+        "model.spring",
+        "a formula has no units: declare 3 m under `parameters:`",
+    )
     assert build(title="4.9 m").title == "4.9 m"
     fault = only_fault(sweep={"schemes.central.start": ["3 m"]})
     assert fault.rule == "unknown choice"

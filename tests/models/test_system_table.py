@@ -83,6 +83,15 @@ def test_a_system_follows_its_table_from_point_to_point(folder):
     assert finest["road"][0, 0, :: 4 * 8].values == pytest.approx(HEIGHTS, abs=1e-15)
 
 
+def test_a_spring_that_hardens_between_body_and_table_is_judged(folder):
+    """Stiffness and damping along the motion depend on the table then."""
+    pull = "-50*(u - input) - 4000*(u - input)**3 - (1 + 100*input**2)*v"
+    one = {"coordinates": ["u"], "force": pull, "mass": 2, "outputs": {"reading": "u - input"}}
+    experiment = read(folder, {**one, "parameters": {"speed": 2.0}})
+    levels = [simulate(experiment, level) for level in experiment.levels]
+    assert {v.status for v in verdicts(experiment, analyse(experiment, levels))} == {"PASS"}
+
+
 def test_the_work_of_a_table_is_in_the_budget(folder):
     level = simulate(read(folder, schemes=["gauss4"]), 3)
     energy, budget = (np.abs(level[name][0, 0].values) for name in ("energy", "energy_budget"))

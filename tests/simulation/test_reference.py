@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from scipy.linalg import expm
 from thinned import thinned
 
 from vibsim import Experiment, analyse, simulate, verdicts
@@ -96,6 +97,18 @@ def test_the_reference_knows_its_error_between_the_ends_of_its_steps(mu, u, v, e
         # what SciPy leaves of its own
         left = 3e-13 * np.max(np.abs(series))
         assert np.max(np.abs(found[name][0] - series)) <= bounds[name][0] + left
+
+
+def test_a_slow_iteration_is_not_taken_for_round_off():
+    """The force of a Maxwell element, here the velocity vz, decays: changes of the stages shrink by less than a half."""
+    equations = {"acceleration.u": "-50*u - vz/2", "acceleration.z": "60*vu - 5*vz"}
+    model = written(("u", "z"), equations, ())
+    start = {"u": 0.05, "z": 0.0, "vu": 0.0, "vz": 3.0}
+    found, bounds = reference(model, group(start, {}, [3.0]), FRACTION)
+    matrix = np.array([[0, 0, 1, 0], [0, 0, 0, 1], [-50, 0, 0, -0.5], [0, 0, 60, -5]])
+    true = [expm(3.0 * x * matrix) @ list(start.values()) for x in FRACTION]
+    for name, series in zip(start, np.transpose(true), strict=True):
+        assert np.max(np.abs(found[name][0] - series)) <= bounds[name][0] < 1e-13
 
 
 def test_a_motion_with_events_has_no_reference():

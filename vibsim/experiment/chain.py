@@ -59,6 +59,7 @@ def write_out_chain(report: Report) -> None:
         defined = {**dict.fromkeys(map(str, others)), **parameters}
         walls = {name: 0.0 for name in _walls([chain, model], count) if name not in defined}
         model["parameters"] = {**walls, **parameters}
+        writer.origins |= {("model", "parameters", wall): ("model", REPEAT) for wall in walls}
     content = {**data, "model": model}
     if isinstance(data.get("initial"), Mapping):
         content["initial"] = writer.value(("initial",), data["initial"])

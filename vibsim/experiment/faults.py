@@ -13,6 +13,7 @@ from vibsim.core.errors import Fault, InputError, likely, nearest
 from vibsim.core.home import home
 from vibsim.core.set_option import set_in
 from vibsim.experiment.kinds import Kinds
+from vibsim.experiment.schema.unit_text import split
 from vibsim.experiment.yaml.parse import MAX_FAULTS, Path_, Source, dotted
 from vibsim.formula import MAX_CHARACTERS, Expression, ExpressionError, parse
 
@@ -238,7 +239,10 @@ class Report:
         except ExpressionError as error:
             place = f" at character {error.position + 1}" if error.position < MAX_CHARACTERS else ""
             suffix = more if error.rule.startswith("unknown name") else ""
-            self.add(path, f"{error.rule}{place}{suffix}", hint or error.hint, text)
+            hint = hint or error.hint
+            if not hint and error.rule.startswith("expected") and split(text):
+                hint = f"a formula has no units: declare {text} under `parameters:`"
+            self.add(path, f"{error.rule}{place}{suffix}", hint, text)
             return None
 
     def rewrite(self, data: Any, origins: Mapping[Path_, Path_]) -> None:

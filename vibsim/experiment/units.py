@@ -57,6 +57,10 @@ class Units:
         """The units that the file defines, in SI base units."""
         return {name: f"{float(unit.factor):.10g} {unit.text}" for name, unit in self.own.items()}
 
+    @property
+    def _is_structure(self) -> bool:
+        return self.model is not None and self.model.loaded is not None
+
     def plain(self, path: Path_, written: Any) -> tuple[Any, set[str | int]]:
         """Return the value at `path` with plain numbers in place of those with units.
 
@@ -74,7 +78,7 @@ class Units:
             return (self._plain_number(path, written) if is_number else written), refused
         if isinstance(written, dict):
             entries = written.items()
-        elif isinstance(written, list) and path[0] == "sweep":
+        elif isinstance(written, list) and (path[0] == "sweep" or self._is_structure):
             # the last entry is a count
             entries = enumerate(written[: 2 if path[-1] in ("linspace", "logspace") else None])
         others = [(key, value) for key, value in entries if not isinstance(value, float | int)]
@@ -97,7 +101,8 @@ class Units:
             return text
         has_formulas = self.model is not None and bool(self.model.formulas)
         is_declared = has_formulas and key.startswith(f"model.{DECLARED}.")
-        wanted = self.units.get(key, _ANY if is_declared else _UNKNOWN)
+        is_any = is_declared or (self._is_structure and key.startswith("model."))
+        wanted = self.units.get(key, _ANY if is_any else _UNKNOWN)
         halves = split(text)
         if halves is None:
             return text
@@ -184,6 +189,9 @@ def _wanted_units(model: Model | None) -> tuple[dict[str, str], set[str]]:
         return units, texts
     units |= {f"initial.{state.name}": state.unit for state in model.states}
     units |= {f"model.{row.key}": row.unit for row in model.parameters}
+    if model.named is not None or model.loaded is not None:
+        # equations of the file alone, which are consistent in any units
+        units |= {key: _ANY for key in units if not key.startswith("time.")}
     for row in model.formulas:
         key = f"model.{row.name}"
         units |= {f"{key}.{word}": unit for word, unit in row.term_units.items()}

@@ -20,7 +20,7 @@ import numpy as np
 from vibsim.core.array_types import Floats
 from vibsim.core.record import Record
 from vibsim.formula import derivative, values
-from vibsim.models.base import Formula, Model, tree
+from vibsim.models.base import Formula, Model, looked_up, tree
 from vibsim.observe.common_grid import Grid, take
 from vibsim.observe.thresholds import A_WHILE
 from vibsim.simulation.members import Members
@@ -46,6 +46,7 @@ class Motion:
         slope = derivative(tree(self.model, acceleration), state)
         times = self.grid.times(self.group.end)
         numbers = {**self.group.by_name(self.model), **states, "t": times}
+        numbers |= looked_up(self.model, numbers)
         return np.broadcast_to(-values(slope, numbers), np.shape(states[state]))
 
 

@@ -34,6 +34,7 @@ from vibsim.models.shared.free import why_not_free
 from vibsim.models.structure import MOST_MODES
 
 ENERGIES = ("energy", "energy_deviation")
+AT_BEST = " at `level: best`"
 """The energies that are known exactly if energy is conserved."""
 
 
@@ -331,6 +332,8 @@ def _is_quantity(name: str, choices: tuple[str, ...], scope: Scope, what: str = 
     known = name in scope.setting.quantities
     rule = f"{what} is not defined for this quantity" if known else "unknown quantity"
     hint = "choose from " + ", ".join(choices) if known else nearest(name, choices)
+    if what.endswith(AT_BEST) and scope.setting.levels:
+        hint += f", or take one level: `at: {{level: {max(scope.setting.levels)}}}`"
     scope.refuse(rule, hint, name)
     return False
 
@@ -349,7 +352,9 @@ def _must_have(name: str, schemes: Iterable[tuple[str, Scope]]) -> None:
 def _value_named(name: str, scope: Scope) -> Value | None:
     row = VALUES.get(name)
     if row is None:
-        scope.refuse("unknown value", nearest(name, list(VALUES)), name)
+        is_quantity = name in scope.setting.quantities
+        hint = f"write `value: end, quantity: {name}` for that at the end" if is_quantity else ""
+        scope.refuse("unknown value", hint or nearest(name, list(VALUES)), name)
     return row
 
 
@@ -369,7 +374,7 @@ def _check_value(row: Value, quantity: str | None, best: bool, scope: Scope) -> 
         place.refuse(rule, "choose from " + ", ".join(choices))
     else:
         only_there = best and quantity in _allowed(row, scope.setting, False)
-        what = f"{row.name} at `level: best`" if only_there else row.name
+        what = row.name + (AT_BEST if only_there else "")
         _is_quantity(quantity, choices, place, what)
     _check_support(row, quantity, scope.at("value"))
 

@@ -84,11 +84,12 @@ def equation(
 
 
 def _note_unused(section: Any, formulas: Mapping[str, str], report: Report) -> None:
-    """Warn about declared parameters that no formula uses."""
+    """Warn about declared parameters that no formula uses; walls of a chain are not declared."""
     used = {name for text in formulas.values() for name in NAME.findall(text)}
     for name in section.parameters:
-        if name not in used:
-            report.note(("model", DECLARED, name), "no formula names it", "leave it out")
+        path = "model", DECLARED, name
+        if name not in used and (report.source.origin(path) or path)[1] == DECLARED:
+            report.note(path, "no formula names it", "leave it out")
 
 
 def _equation_of_structure(section: Any, model: Model, folder: Path, report: Report) -> Equation:

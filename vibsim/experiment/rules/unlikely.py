@@ -11,10 +11,13 @@ from typing import Any
 from vibsim.experiment.faults import Report
 from vibsim.experiment.rules.size_limits import Setting
 from vibsim.experiment.schema.checks import AccurateCheck, Check, ConvergesCheck, ValueCheck
+from vibsim.experiment.schema.fields import DECLARED
+from vibsim.experiment.schema.unit_text import split
 from vibsim.experiment.value_names import OF_THE_SAME_KIND, VALUES
 from vibsim.experiment.yaml.parse import Path_
 from vibsim.formula import Binary, Call, Name, walk
 from vibsim.models import Model, tree
+from vibsim.models.system import terms_of
 
 TURN = 2.0 * math.pi
 EXACT_DIGITS = 9
@@ -24,6 +27,7 @@ EXACT_DIGITS = 9
 def note_unlikely(checks: Sequence[Check | None], setting: Setting, report: Report) -> None:
     """Warn about probable mistakes; `checks` are those of the file, None for a malformed one."""
     _warn_angles(setting, report)
+    _warn_hertz(setting, report)
     _warn_repeated(report)
     _warn_set_and_swept(report)
     for i, check in enumerate(checks):
@@ -63,6 +67,36 @@ def _warn_angles(setting: Setting, report: Report) -> None:
             if largest > TURN:
                 rule = f"{largest:g} rad are {largest / TURN:.2g} turns"
                 report.note(path, rule, f"{largest:g} degrees are written `{largest:g} degree`")
+
+
+def _warn_hertz(setting: Setting, report: Report) -> None:
+    """Warn about a declared frequency in hertz that is taken for an angular one: as `w` in ``cos(w*t)``."""
+    model, declared = setting.model, _at_path(report.source.data, ("model", DECLARED))
+    if model is None or not isinstance(declared, Mapping):
+        return
+    for name in sorted(_rates(model) & set(declared)):
+        halves = split(declared[name]) if isinstance(declared[name], str) else None
+        if halves and halves[1].endswith(("Hz", "hertz")):
+            rule = f"the formulas take it for {halves[0]} rad/s: 1 Hz is 1/s, in which they do not turn by 2 pi"
+            hint = f"write 2*pi*{name}*t there, or its value as `2*pi*{halves[0]} rad/s`"
+            report.note(("model", DECLARED, name), rule, hint)
+
+
+def _rates(model: Model) -> set[str]:
+    """Return the names of the rates w in ``sin(w*t)`` and ``cos(w*t + ...)``."""
+    parts = (node for formula in model.accelerations for node in walk(tree(model, formula)))
+    waves = (node for node in parts if isinstance(node, Call) and node.function in ("sin", "cos"))
+    turns = (term for wave in waves for term in terms_of(wave.arguments[0]))
+    factors = (
+        set(turn.operands) for turn in turns if isinstance(turn, Binary) and turn.operator == "*"
+    )
+    return {
+        name.name
+        for both in factors
+        if Name("t") in both
+        for name in both - {Name("t")}
+        if isinstance(name, Name)
+    }
 
 
 def _warn_repeated(report: Report) -> None:

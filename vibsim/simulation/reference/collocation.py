@@ -24,7 +24,7 @@ ITERATIONS = 60
 SETTLED_CHANGE = 2.0**-51
 """Converged if accelerations change by less than this, relative to them plus the velocities over the step."""
 STALLED = 2.0**-30
-"""Largest change that counts as round-off once changes stop decreasing: forces magnify the rounding of positions."""
+"""Largest change that counts as round-off once changes no longer decrease: forces magnify the rounding of positions."""
 
 
 @cache
@@ -92,7 +92,7 @@ def stages(force: Force, u: Floats, v: Floats, t: Floats, h: Floats, a: Floats) 
         size = np.max(np.abs(new) + np.abs(y) / h, axis=(0, 1))
         # a converged member keeps its bits, independent of the others
         a = np.where(going, new, a)
-        stalled = (change <= STALLED * size) & ~(change < 0.5 * before)
+        stalled = (change <= STALLED * size) & ~(change < before)
         going, before = going & ~(change <= SETTLED_CHANGE * size) & ~stalled, change
         if not (going & np.isfinite(change)).any():
             break
