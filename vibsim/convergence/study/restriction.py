@@ -71,6 +71,8 @@ class Common:
     """Possible fault of these points, for a verdict that does not pass with an expected order above 1."""
     part: str = ""
     """Which part of the points is compared, if not all."""
+    averaged: bool = False
+    """Whether averages over cells are compared."""
 
 
 def common(
@@ -269,7 +271,7 @@ def _means(dim: str, coordinates: Sequence[Coordinate], lengths: Sequence[int]) 
         indices = np.arange(n).reshape(first, k)
         restrictions.append(Restriction(indices, np.full(indices.shape, 1.0 / k)))
         _check_centres(dim, coordinates[0], points, indices, level)
-    return Common(tuple(restrictions), coordinates[0])
+    return Common(tuple(restrictions), coordinates[0], averaged=True)
 
 
 def _check_centres(
