@@ -271,6 +271,25 @@ def test_linear_interpolation_that_may_hide_an_order_is_named() -> None:
     assert (cubic.status, cubic.advice) == ("PASS", "")
 
 
+@pytest.mark.parametrize("times", [(0.0, 0.3, 0.6), (0.3,)])
+@pytest.mark.parametrize("dims", [None, ["x"]])
+def test_an_exact_function_is_averaged_only_where_the_levels_are(
+    times: tuple[float, ...], dims: list[str] | None
+) -> None:
+    """Cell averages in x at times that all levels have: an average over time misses the exact solution."""
+    t, levels = np.array(times), []
+    for n in COUNTS:
+        means = -np.diff(np.cos(2 * nodes(n))) / 2 * n * (1 + n**-2.0)
+        field = np.exp(-t)[:, None] * means
+        levels.append(xarray.DataArray(field, {"t": t, "x": centres(n)}, ["t", "x"]))
+
+    def exact(t: np.ndarray, x: np.ndarray) -> np.ndarray:
+        return np.exp(-t) * np.sin(2 * x)
+
+    verdict = judge(H, levels, order=2, restrict="mean", dims=dims, exact=exact)
+    assert verdict.status == "PASS"
+
+
 def test_means_need_cells_of_one_width_within_the_coarse_ones() -> None:
     counts = [8, 16, 32, 64]
 

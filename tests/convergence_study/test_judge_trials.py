@@ -458,3 +458,14 @@ def test_levels_that_move_apart_miss_no_limit() -> None:
     ]
     found = judge([1 / (13 * k) for k in range(1, 8)], values, exact=1.740340983574077)
     assert found.reason == "pre_asymptotic"
+
+
+@pytest.mark.parametrize("kind", ["subset", "cubic"])
+def test_coordinates_that_number_the_points_are_told_of(kind: str) -> None:
+    """Point 3 of 32 is no place of its own: the levels of a method of order 2 agree at point 0 alone."""
+    counts, told = [8, 16, 32, 64], "equally close on all levels"
+    placed = on_grids(counts, 2.0)
+    numbered = [u.assign_coords(x=np.arange(u.size)) for u in placed]
+    h = [1 / n for n in counts]
+    assert told in judge(h, numbered, order=2, restrict=kind).advice
+    assert told not in judge(h, placed, order=1, restrict=kind).advice

@@ -39,6 +39,8 @@ class CommonValues:
     """Possible faults of the points, for a verdict that does not pass with an expected order above 1."""
     parts: tuple[str, ...] = ()
     """Which part of the points is compared, if not all."""
+    averaged: tuple[str, ...] = ()
+    """Dimensions along which averages over cells are compared."""
 
 
 def common_values(
@@ -77,7 +79,7 @@ def common_values(
         _finite_throughout(_transposed(level, first.dims), first.dims, fixed) for level in levels
     ]
     coords: dict[str, NDArray[Any]] = {}
-    notes, parts, interpolated = [], [], False
+    notes, parts, averaged, interpolated = [], [], [], False
     for axis, dim in enumerate(first.dims):
         lengths = [array.shape[axis] for array in arrays]
         coordinates = [level.coords.get(dim) for level in levels]
@@ -92,10 +94,19 @@ def common_values(
         interpolated |= shared.interpolated
         notes += [shared.note] if shared.note else []
         parts += [shared.part] if shared.part else []
+        averaged += [dim] if shared.averaged else []
     order = restriction.INTERPOLATION_ORDERS[kind] if interpolated else None
     epsilon = np.array([level.epsilon for level in levels])
     return CommonValues(
-        np.stack(arrays), first.dims, coords, epsilon, kind, order, tuple(notes), tuple(parts)
+        np.stack(arrays),
+        first.dims,
+        coords,
+        epsilon,
+        kind,
+        order,
+        tuple(notes),
+        tuple(parts),
+        tuple(averaged),
     )
 
 
@@ -118,7 +129,7 @@ def exact_values(exact: Any, common: CommonValues, *, members: bool = False) -> 
 
     `exact` is a number, an array, an xarray object, or a function of the coordinates. The function gets arrays that can
     be broadcast: by name if its parameters have the names of the dimensions, otherwise in the order of the dimensions.
-    If cell averages are compared, it is averaged over each cell. With `members` the first dimension is not an argument.
+    Along dimensions whose cells are averaged, so is it. With `members` the first dimension is not an argument.
 
     Raises
     ------
@@ -177,26 +188,26 @@ def _of_function(exact: Callable[..., Any], common: CommonValues, dims: Sequence
     def evaluate(grids: Sequence[Floats]) -> Any:
         return exact(**dict(zip(dims, grids, strict=True))) if by_name else exact(*grids)
 
-    points = [np.asarray(common.coords[dim], dtype=np.float64) for dim in dims]
-    if common.kind != "mean":
-        grids = np.meshgrid(*points, indexing="ij", sparse=True)
-        return real(np.asarray(evaluate(grids)), "exact")[0]
     nodes, weights = np.polynomial.legendre.leggauss(GAUSS)
-    nodes_of_cells = []
-    for x in points:
-        if len(x) < 2:
-            raise refused(
-                "exact", "a function", "cannot be averaged over a single cell", "give its average"
+    points = []
+    for dim in dims:
+        x = np.asarray(common.coords[dim], dtype=np.float64)
+        if dim in common.averaged:
+            if len(x) < 2:
+                rule = "cannot be averaged over a single cell"
+                raise refused("exact", "a function", rule, "give its average")
+            edges = np.concatenate(
+                [[1.5 * x[0] - 0.5 * x[1]], 0.5 * (x[1:] + x[:-1]), [1.5 * x[-1] - 0.5 * x[-2]]]
             )
-        edges = np.concatenate(
-            [[1.5 * x[0] - 0.5 * x[1]], 0.5 * (x[1:] + x[:-1]), [1.5 * x[-1] - 0.5 * x[-2]]]
-        )
-        middle, half = 0.5 * (edges[1:] + edges[:-1]), 0.5 * np.diff(edges)
-        nodes_of_cells.append((middle[:, None] + half[:, None] * nodes).ravel())
-    grids = np.meshgrid(*nodes_of_cells, indexing="ij", sparse=True)
+            middle, half = 0.5 * (edges[1:] + edges[:-1]), 0.5 * np.diff(edges)
+            x = (middle[:, None] + half[:, None] * nodes).ravel()
+        points.append(x)
+    grids = np.meshgrid(*points, indexing="ij", sparse=True)
     result, _ = real(np.asarray(evaluate(grids)), "exact")
-    result = np.broadcast_to(result, [len(x) for x in nodes_of_cells])
-    for axis, x in enumerate(points):
-        shape = (*result.shape[:axis], len(x), GAUSS, *result.shape[axis + 1 :])
-        result = np.tensordot(result.reshape(shape), 0.5 * weights, axes=([axis + 1], [0]))
-    return result
+    for axis, dim in enumerate(dims):
+        if dim in common.averaged:
+            result = np.broadcast_to(result, [len(x) for x in points])
+            points[axis] = np.asarray(common.coords[dim])
+            shape = (*result.shape[:axis], len(points[axis]), GAUSS, *result.shape[axis + 1 :])
+            result = np.tensordot(result.reshape(shape), 0.5 * weights, axes=([axis + 1], [0]))
+    return np.asarray(result)

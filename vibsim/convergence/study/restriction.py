@@ -71,6 +71,8 @@ class Common:
     """Possible fault of these points, for a verdict that does not pass with an expected order above 1."""
     part: str = ""
     """Which part of the points is compared, if not all."""
+    averaged: bool = False
+    """Whether averages over cells are compared."""
 
 
 def common(
@@ -230,7 +232,19 @@ def _subset(dim: str, coordinates: Sequence[Coordinate], lengths: Sequence[int])
     part = ""
     if count < lengths[0]:
         part = f"The levels have {count} of the {lengths[0]} points of the coarsest one in common along {dim}."
-    return Common(tuple(Restriction(i[is_common]) for i in indices), coarse[is_common], part=part)
+    restrictions = tuple(Restriction(i[is_common]) for i in indices)
+    return Common(restrictions, coarse[is_common], note=_numbered(dim, points), part=part)
+
+
+def _numbered(dim: str, points: Sequence[NDArray[Any]]) -> str:
+    """Doubt coordinates that are equally close on all levels: they may number the points."""
+    spacings = [float(np.ptp(p)) / max(len(p) - 1, 1) for p in points]
+    if np.ptp(spacings) > EQUAL * max(spacings):
+        return ""
+    return (
+        f"The points along {dim} are equally close on all levels. If its coordinates number the points or cells, give "
+        "their positions."
+    )
 
 
 def _nearest(targets: NDArray[Any], points: NDArray[Any]) -> tuple[Integers, Floats]:
@@ -257,7 +271,7 @@ def _means(dim: str, coordinates: Sequence[Coordinate], lengths: Sequence[int]) 
         indices = np.arange(n).reshape(first, k)
         restrictions.append(Restriction(indices, np.full(indices.shape, 1.0 / k)))
         _check_centres(dim, coordinates[0], points, indices, level)
-    return Common(tuple(restrictions), coordinates[0])
+    return Common(tuple(restrictions), coordinates[0], averaged=True)
 
 
 def _check_centres(
@@ -308,7 +322,7 @@ def _interpolations(
     part = ""
     if not inside.all():
         part = f"Of the {len(coarse)} points of the coarsest level along {dim}, {inside.sum()} lie within all levels."
-    note, lengths = "", [len(p) for p in points]
+    note, lengths = _numbered(dim, points) if has_points else "", [len(p) for p in points]
     if not has_points and interpolated and all(n % lengths[0] == 0 for n in lengths):
         counts = ", ".join(map(str, lengths))
         note = (
