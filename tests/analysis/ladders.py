@@ -101,7 +101,7 @@ def evidence_with(**known: Any) -> Evidence:
         "left_to_the_mesh": unknown,
         "corner": unknown,
         "near_a_point": no,
-        "missed": no,
+        "unseen": no,
         "jumps": no,
         "decay": np.zeros(shape),
         "growth": np.full((*shape, n), np.nan),

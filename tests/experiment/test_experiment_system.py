@@ -107,7 +107,7 @@ TURNED = {"coordinates": ["x", "y"], "force": {"x": "-x - 0.3*y", "y": "-y + 0.3
 )
 def test_a_potential_that_is_not_that_of_the_forces_is_noted(model, potential):
     ((_, note),) = read({**model, "potential": potential}, initial={}).notes
-    assert "model.potential: is not that of the forces" in note
+    assert "model.potential: does not give the forces" in note
 
 
 @pytest.mark.parametrize(

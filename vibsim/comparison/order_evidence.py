@@ -138,7 +138,7 @@ def evidence(q: Comparison, norm: str, order: Floats, tolerance: float) -> Evide
     moved, straight = _motion(q, order, size)
     # a scheme that evaluates the force only at the start of a step misses a corner in the last step of each level
     with np.errstate(invalid="ignore"):
-        unseen = block.corners.time > block.group.end * (1.0 - 1.0 / grid.steps[-1])
+        in_last_step = block.corners.time > block.group.end * (1.0 - 1.0 / grid.steps[-1])
     # without oscillations no order is promised for a part of an error
     promised = ~block.adaptive[:, None] & ~np.isnan(order)
     measured, cosines = q.in_norm(norm), q.cosines(norm)
@@ -174,8 +174,8 @@ def evidence(q: Comparison, norm: str, order: Floats, tolerance: float) -> Evide
         left_to_the_mesh=all_cases(block.left_to_the_mesh),
         corner=block.corners.power,
         near_a_point=block.corners.near_a_point,
-        missed=np.isfinite(block.missed.time) | unseen,
-        jumps=block.missed.jumps | unseen,
+        unseen=np.isfinite(block.missed.time) | in_last_step,
+        jumps=block.missed.jumps | in_last_step,
         decay=block.decay * block.group.end / grid.steps[-1],
         growth=block.growth,
     )

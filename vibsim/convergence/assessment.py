@@ -16,8 +16,8 @@ A power *dominates* if no other one has more than a tenth of it. The first row t
 | alternating errors are more probable than everything else | INCONCLUSIVE ``oscillating`` |
 | otherwise | INCONCLUSIVE ``pre_asymptotic`` |
 
-No order is decided if the measured one is below half of the lowest order of an expansion, or if levels finer than the
-window contradict it (`_is_contradicted`).
+No order is decided if none is measured, if the measured one is below half of the lowest order of an expansion, or if
+levels finer than the window contradict it (`_is_contradicted`).
 
 *Surely* means with a probability above ``1 - RISK``. If the order rests on three levels that coarser ones do not fit,
 the probability must exceed ``1 - RISK_OF_THREE`` for a FAIL, and for a PASS that no exact solution confirms: three
@@ -38,7 +38,7 @@ from functools import partial
 import numpy as np
 
 from vibsim.convergence.best_value import best_value, is_missed, norm
-from vibsim.convergence.error_model.hypotheses import Promise
+from vibsim.convergence.error_model.hypotheses import ExpectedOrder
 from vibsim.convergence.error_model.posterior import LEFT_OUT, Ladder, Posterior, posterior
 from vibsim.convergence.error_model.priors import GROWTHS
 from vibsim.convergence.ladder_blocks import in_blocks
@@ -108,8 +108,8 @@ class Question:
         """
         margin = max(self.tolerance, (2.0 if self.by_theory else 1.0) * HALF_SPACING)
         if self.expected is not None:
-            return np.asarray(~(np.abs(order - self.expected) > margin))
-        return np.asarray(~(order < (self.at_least or -np.inf) - margin))
+            return np.asarray(np.abs(order - self.expected) <= margin)
+        return np.asarray(order >= (self.at_least or -np.inf) - margin)
 
     @property
     def with_stated_noise(self) -> Question:
@@ -117,9 +117,9 @@ class Question:
         return replace(self, noise_factor=STATED_NOISE_FACTOR, limit_factor=STATED_LIMIT_FACTOR)
 
     @property
-    def promise(self) -> Promise | None:
+    def expected_order(self) -> ExpectedOrder | None:
         """The expected order, which has a prior of its own."""
-        return None if self.expected is None else Promise(self.expected, self.by_theory)
+        return None if self.expected is None else ExpectedOrder(self.expected, self.by_theory)
 
 
 @dataclass(frozen=True)
@@ -209,7 +209,7 @@ def _assess_block(ladder: Ladder, factors: Floats, question: Question) -> dict[s
     levels_only, missed = evaluation.posterior, evaluation.misses_exact
     if ladder.exact_known:
         # estimate the limit without the exact solution, and compare
-        levels_only = posterior(ladder.without_exact(), question.promise)
+        levels_only = posterior(ladder.without_exact(), question.expected_order)
         risk = np.where(rests_on_three(levels_only), RISK_OF_THREE, RISK)
         order = finest_order(levels_only.orders, likely_window(levels_only)[1])
         approaches = (levels_only.expansion > 1.0 - risk) & ~(order < LEAST_WITH_LIMIT)
@@ -232,7 +232,7 @@ def _decide_block(ladder: Ladder, factors: Floats, question: Question) -> dict[s
 
 
 def _evaluate(ladder: Ladder, question: Question, left_out: float) -> _Evaluation:
-    p = posterior(ladder, question.promise, left_out=left_out)
+    p = posterior(ladder, question.expected_order, left_out=left_out)
     probabilities = np.stack(sides(p, question.expected, question.at_least, question.tolerance))
     only_noise = _is_only_noise(ladder, question)
     misses_exact = np.zeros_like(only_noise)
@@ -281,7 +281,7 @@ def _is_sure(ladder: Ladder, evaluation: _Evaluation, question: Question) -> Fla
         unclear = np.flatnonzero(sure & ~_meets(ladder, p))
         if len(unclear):
             levels = ladder.some(unclear).without_exact()
-            levels_only = posterior(levels, question.promise, left_out=ROUGH_LEFT_OUT)
+            levels_only = posterior(levels, question.expected_order, left_out=ROUGH_LEFT_OUT)
             sure[unclear] = levels_only.expansion < 1.0 - RISK - ROUGH_LEFT_OUT
     return sure
 
@@ -376,8 +376,9 @@ def _reasons(e: _Evaluation, missed: Flags) -> Codes:
     """Return the reasons of the verdicts by the table in the docstring of this module."""
     p, (lower, right, higher) = e.posterior, e.sides
     risk = np.where(e.rests_on_three, RISK_OF_THREE, RISK)
-    # two powers may fit levels that do not approach each other, but expansions begin with order 1/2
-    decidable = ~(e.cut_short | e.contradicted | (e.order < LEAST_WITH_LIMIT))
+    # powers may fit levels that do not approach each other or whose differences change sign, but expansions begin with
+    # order 1/2
+    decidable = (e.order >= LEAST_WITH_LIMIT) & ~(e.cut_short | e.contradicted)
     other_order = (lower + higher > 1.0 - risk) & (right < risk) & decidable
     if np.any(other_order):
         other_order &= most_near_a_power(p) > DEFINITE
@@ -443,8 +444,9 @@ def _is_only_noise(ladder: Ladder, question: Question) -> Flags:
 
 
 def _least_noise(ladder: Ladder) -> Floats:
-    """Return the least noise of each level that the two finest rows allow, shape (ladder, n).
+    """Return the least noise of each level that the larger one of the two finest rows allows, shape (ladder, n).
 
+    With an exact solution these rows are the finest difference and the error: both hold the noise of the finest level.
     It is never less than predicted for the coarsest level: storing numbers makes noise even if differences are 0.
     """
     finest = np.sqrt(np.max(np.diagonal(ladder.gram, axis1=1, axis2=2)[:, -2:], axis=-1))

@@ -192,6 +192,11 @@ def masked_ratio(first: Floats, second: Floats, floor: Floats | float = 0.0) -> 
     return np.where(keep, safe_ratio(first, second), np.nan)
 
 
+def _length(series: Floats) -> Floats:
+    """Return the root of the sum of squares, shape (...)."""
+    return norm(series, "l2", np.ones(1))
+
+
 def unit(series: Floats, length: Floats) -> Floats:
     """Return a series divided by its length; NaN if that is zero or not finite."""
     usable = np.isfinite(length) & (length != 0)
@@ -200,15 +205,13 @@ def unit(series: Floats, length: Floats) -> Floats:
 
 def inner(first: Floats, second: Floats) -> Floats:
     """Return the cosine of the angle between two series, shape (...); NaN if one of them vanishes."""
-    units = [unit(series, norm(series, "l2", np.ones(1))) for series in (first, second)]
+    units = [unit(series, _length(series)) for series in (first, second)]
     return total(units[0] * units[1])
 
 
 def proportionality(first: Floats, second: Floats) -> Floats:
     """Return the least-squares factor ``r = <d, d'>/<d', d'>`` of ``d = r d'``, shape (...)."""
-    one = np.ones(1)
-    lengths = (norm(series, "l2", one) for series in (first, second))
-    return inner(first, second) * safe_ratio(*lengths)
+    return inner(first, second) * safe_ratio(_length(first), _length(second))
 
 
 def coincidence(first: Floats, second: Floats, ratio: Floats) -> Floats:
@@ -216,10 +219,9 @@ def coincidence(first: Floats, second: Floats, ratio: Floats) -> Floats:
 
     R is the `target_ratio` of the order. The result is 0 if both differences vanish, and NaN if only d does.
     """
-    one = np.ones(1)
-    size = norm(first, "l2", one)
+    size = _length(first)
     with np.errstate(over="ignore", invalid="ignore"):
-        residual = norm(first - np.asarray(ratio)[..., None] * second, "l2", one)
+        residual = _length(first - np.asarray(ratio)[..., None] * second)
     return np.where((size == 0) & (residual == 0), 0.0, safe_ratio(residual, size))
 
 
@@ -231,12 +233,11 @@ def cosines(rows: Sequence[Floats], kind: str, end_included: bool = True) -> Flo
     """
     if kind == "linf_interior" and end_included:
         rows = [series[..., :-1] for series in rows]
-    one = np.ones(1)
     if kind in {"linf", "linf_interior"}:
         sizes = [np.abs(np.nan_to_num(unit(series, largest(series)))) for series in rows]
         weight = whole_power(np.maximum.reduce(sizes), PEAKS)
         rows = [np.nan_to_num(unit(series, largest(series))) * weight for series in rows]
-    units = [np.nan_to_num(unit(series, norm(series, "l2", one, False))) for series in rows]
+    units = [np.nan_to_num(unit(series, _length(series))) for series in rows]
     result = np.empty((*units[0].shape[:-1], len(units), len(units)))
     for i, first in enumerate(units):
         for j, second in enumerate(units[: i + 1]):

@@ -49,7 +49,7 @@ class Evidence:
     left_to_the_mesh: Floats
     corner: Floats  # highest power that a corner of the force within a step leaves, or NaN
     near_a_point: Flags  # whether that corner lies within a finest step of a point of all levels
-    missed: Flags  # whether the force has a pulse, or a corner in the last step, that no level sees
+    unseen: Flags  # whether the force has a pulse, or a corner in the last step, that no level sees
     jumps: Flags  # whether the force jumps there
     decay: Floats  # largest decay rate of a velocity times the finest step
     growth: Floats  # largest position over the largest exact one, shape (..., n); NaN if unknown
@@ -84,7 +84,7 @@ def breakdown(e: Evidence) -> tuple[Flags, Flags, Flags]:
     # long steps keep a velocity that has decayed, and its rounding: then every level moves as far
     growing &= ~(unresolved(e) & (last <= th.BLOWN_UP * previous))
     # some levels may see a pulse that others miss; a step that sees a jump applies it over its whole length
-    growing &= ~e.missed & ~((e.corner == 1.0) & (previous <= th.BLOWN_UP))
+    growing &= ~e.unseen & ~((e.corner == 1.0) & (previous <= th.BLOWN_UP))
     return e.failed, beyond, growing
 
 

@@ -79,11 +79,13 @@ def index(values: Floats, levels: Sequence[int], order: Floats, kinds: Codes) ->
         differences = -np.diff(values[..., -3:], axis=-1)
         observed = order_of_ratio(safe_ratio(differences[..., 0], differences[..., 1]), levels[-3:])
         regular = of_order(change, gap, observed, promised)
-        rough = _fitted(values, levels, promised) if n > 3 else _range(values)
+        if n == 3:
+            rough = np.asarray(th.GCI_CAUTIOUS * np.ptp(values, axis=-1))
+        else:
+            rough = _fitted(values, levels, promised)
+            agrees = _agrees(observed, promised)
+            regular = np.where(agrees, regular, np.fmax(regular, rough))
         exact = (kinds == ROUND_OFF) & (change == 0.0)
-        agrees = _agrees(observed, promised)
-        cautious = np.fmax(regular, rough) if n > 3 else regular
-        regular = np.where(agrees, regular, cautious)
         return np.where(exact, 0.0, np.where(observed > 0, regular, rough))
 
 
@@ -105,11 +107,6 @@ def relative(index: Floats, value: Floats, scale: Floats) -> Floats:
     size = np.abs(value)
     usable = (size > index) & (size > th.GCI_NEAR_ZERO * scale)
     return np.where(usable, safe_ratio(*np.broadcast_arrays(index, size)), np.nan)
-
-
-def _range(values: Floats) -> Floats:
-    recent = values[..., -th.GCI_FITTED :]
-    return np.asarray(th.GCI_CAUTIOUS * (np.max(recent, axis=-1) - np.min(recent, axis=-1)))
 
 
 def _fitted(values: Floats, levels: Sequence[int], promised: Floats) -> Floats:

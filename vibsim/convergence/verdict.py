@@ -219,7 +219,7 @@ def _cases(
     far = far_from_exact(e)
     still = at_rest(e) & (exact_promised | noise)
     # differences cannot show what no level sees; only an exact solution could show that it does not matter
-    blind = e.missed & (missed | ((exact | noise | exact_promised) & far) | np.isnan(e.error))
+    blind = e.unseen & (missed | ((exact | noise | exact_promised) & far) | np.isnan(e.error))
     # an implicit scheme with long steps keeps a velocity that has decayed, which is no fault of the scheme
     coarse = unresolved(e) & (exact | missed | low | high)
     return (
@@ -246,8 +246,8 @@ def _cases(
             (low & regular & (~corner_explains | deeper) & ~temporary, "order_low"),
             (corner_explains | temporary, "non_smooth"),
             (high & ~rough & ~hidden, "order_high"),
-            (e.missed & e.jumps, "non_smooth"),
-            (e.missed, "pre_asymptotic"),
+            (e.unseen & e.jumps, "non_smooth"),
+            (e.unseen, "pre_asymptotic"),
             (rough | limited, "non_smooth"),
         ],
         lower,

@@ -238,19 +238,19 @@ def _terms(stepper: Stepper, damping: float) -> _Terms:
     """Compute the coefficients in exact arithmetic, and round them once."""
     mode = principal_mode(stepper, damping)
     half = Fraction(repr(damping)) / 2
-    right = 1 - half * half
+    w_d_squared = 1 - half * half
     one, zero = mode.rate.lift(1.0), mode.rate.lift(0.0)
     # B = u_0 - i G/w_d with G = V + (g/2) u_0, and B~ = y(0) - i G~/w~
     position, slope = (np.array(pair, dtype=object) for pair in ((one, zero), (one * half, one)))
     slopes = mode.slope / mode.frequency
-    later = _form(mode.position, mode.position) + _form(slopes / right, slopes)
-    size = _form(position, position) + _form(slope / right, slope)
+    later = _form(mode.position, mode.position) + _form(slopes / w_d_squared, slopes)
+    size = _form(position, position) + _form(slope / w_d_squared, slope)
     faster = mode.frequency - 1.0
     rows = {
         "phase_rate": [faster],
         "amplitude_rate": [mode.rate + faster * half + half],
         "turned": _form(mode.position, slope) - _form(slopes, position),
-        "along": _form(mode.position, position) + _form(slopes / right, slope),
+        "along": _form(mode.position, position) + _form(slopes / w_d_squared, slope),
         "grown": later - size,
         "size": size,
         "parasitic": position - mode.position,
@@ -276,13 +276,13 @@ def _at_start(terms: _Terms, damping: float, start: Floats) -> tuple[Floats, Flo
     turned, along, grown = (
         forms @ rows / size for rows in (terms.turned, terms.along, terms.grown)
     )
-    frequency = 1.0 - 0.25 * damping * damping
+    w_d_squared = 1.0 - 0.25 * damping * damping
     ratio = np.zeros_like(turned)
     for k in range(ratio.shape[-1]):
         known = np.sum(ratio[..., :k] * along[..., k:0:-1], axis=-1)
         ratio[..., k] = (turned[..., k] - known) / along[..., 0]
     # phi = atan(x/w_d)/w_d with x the ratio, and alpha = log(1 + y)/2 + (g/2) phi
-    phase = _summed(ratio, lambda k: (-1.0) ** (k // 2) / (k * frequency ** ((k + 1) // 2)), 2)
+    phase = _summed(ratio, lambda k: (-1.0) ** (k // 2) / (k * w_d_squared ** ((k + 1) // 2)), 2)
     growth = _summed(grown, lambda k: 0.5 * (-1.0) ** (k - 1) / k, 1)
     return _order(phase), _order(growth + 0.5 * damping * phase)
 

@@ -389,14 +389,14 @@ TABLE: dict[str, tuple[list[np.ndarray], dict[str, Any], Any, dict[str, Any]]] =
         SECOND, {"failed": np.array([[False, True, False, False]])}, ("FAIL", "non_finite"), {"failed": RIGHT},
     ),
     "a jump that no level sees": (
-        SECOND, {"missed": YES, "jumps": YES}, ROUGH, {"missed": RIGHT, "jumps": UNDECIDED},
+        SECOND, {"unseen": YES, "jumps": YES}, ROUGH, {"unseen": RIGHT, "jumps": UNDECIDED},
     ),
-    "a pulse that no level sees": (SECOND, {"missed": YES}, UNDECIDED, {"missed": RIGHT}),
+    "a pulse that no level sees": (SECOND, {"unseen": YES}, UNDECIDED, {"unseen": RIGHT}),
     "a pulse that does not matter to the exact solution": (
-        SECOND, {"missed": YES, "jumps": YES, "exact": EXACT}, RIGHT, {"exact": ROUGH},
+        SECOND, {"unseen": YES, "jumps": YES, "exact": EXACT}, RIGHT, {"exact": ROUGH},
     ),
     "a pulse that matters to the exact solution": (
-        SECOND, {"missed": YES, "exact": EXACT + SMALL * C}, UNDECIDED, {"missed": WRONG_LIMIT},
+        SECOND, {"unseen": YES, "exact": EXACT + SMALL * C}, UNDECIDED, {"unseen": WRONG_LIMIT},
     ),
     "nothing moves, but the exact solution": (
         SAME, {"moved": one(0.0), "exact": EXACT + SMALL}, UNDECIDED, {"moved": WRONG_LIMIT, "exact": AT_REST},
@@ -463,10 +463,10 @@ TABLE: dict[str, tuple[list[np.ndarray], dict[str, Any], Any, dict[str, Any]]] =
         FOURTH, {"promised": one(2.0), "special": one(4.0)}, UNDECIDED, {"special": HIGH},
     ),
     "no order yet, and a jump that no level sees": (
-        UNSETTLED, {"missed": YES, "jumps": YES, "exact": EXACT}, ROUGH, {"jumps": UNDECIDED},
+        UNSETTLED, {"unseen": YES, "jumps": YES, "exact": EXACT}, ROUGH, {"jumps": UNDECIDED},
     ),
     "no order yet, a pulse that no level sees, and events": (
-        UNSETTLED, {"missed": YES, "exact": EXACT, "left_to_the_mesh": one(1.0)}, UNDECIDED, {"missed": ROUGH},
+        UNSETTLED, {"unseen": YES, "exact": EXACT, "left_to_the_mesh": one(1.0)}, UNDECIDED, {"unseen": ROUGH},
     ),
     "no order yet, and a corner that leaves less": (UNSETTLED, {"corner": one(1.0)}, ROUGH, {"corner": UNDECIDED}),
     "no order yet, and a corner that leaves the expected order": (UNSETTLED, {"corner": one(2.0)}, UNDECIDED, {}),

@@ -57,7 +57,7 @@ class Table:
     orthogonal_bounds: Floats | None = None
 
 
-class Promise(NamedTuple):
+class ExpectedOrder(NamedTuple):
     """The order that a user expects or that theory promises."""
 
     order: float
@@ -65,15 +65,13 @@ class Promise(NamedTuple):
 
 
 @lru_cache
-def two_powers(signs: tuple[float, ...], promise: Promise | None) -> Terms:
+def two_powers(signs: tuple[float, ...], expected: ExpectedOrder | None) -> Terms:
     """Return the hypotheses about powers: each of `POWERS` alone, and with each second power."""
-    order, by_theory = promise or (math.nan, False)
+    order, by_theory = expected or (math.nan, False)
     powers = sorted({*priors.POWERS, *(p for p in [order] if 0.0 < p < math.inf)})
     # a user may expect a fractional order, but few methods have one
-    promised_prior = (
-        priors.THEORY_PRIOR if by_theory else priors.EXPECTED_PRIOR * (order % 1.0 == 0.0)
-    )
-    promised_prior *= order in powers
+    own_prior = priors.THEORY_PRIOR if by_theory else priors.EXPECTED_PRIOR * (order % 1.0 == 0.0)
+    own_prior *= order in powers
 
     def relative_prior(p: float) -> float:
         return priors.FRACTIONAL_FACTOR if by_theory and (p - order) % 1.0 else 1.0
@@ -81,7 +79,7 @@ def two_powers(signs: tuple[float, ...], promise: Promise | None) -> Terms:
     total, entries = sum(map(relative_prior, powers)), []
     distances = {distance: relative_prior(order + distance) for distance in priors.DISTANCES}
     for p in powers:
-        prior = (1.0 - promised_prior) * relative_prior(p) / total + promised_prior * (p == order)
+        prior = (1.0 - own_prior) * relative_prior(p) / total + own_prior * (p == order)
         prior *= 1.0 - priors.ANY_POWER_PRIOR
         entries.append((p, p, 0.0, prior * priors.PURE_PRIOR))
         pair_prior = prior * (1.0 - priors.PURE_PRIOR) / sum(distances.values())
@@ -387,10 +385,10 @@ class Hypotheses(NamedTuple):
 
 
 @lru_cache(maxsize=48)
-def hypotheses_of(sizes: tuple[float, ...], promise: Promise | None) -> Hypotheses:
+def hypotheses_of(sizes: tuple[float, ...], expected: ExpectedOrder | None) -> Hypotheses:
     """Return the hypotheses for levels of these step sizes, relative to the finest one; 0 is the exact solution."""
     relative = np.array(sizes)
-    unsigned, signed = two_powers((1.0,), promise), two_powers((1.0, -1.0), promise)
+    unsigned, signed = two_powers((1.0,), expected), two_powers((1.0, -1.0), expected)
     return Hypotheses(
         _two_shapes(relative, unsigned),
         _one_shape(relative, unsigned),

@@ -10,7 +10,7 @@ import numpy as np
 from vibsim.convergence.differences import orders_of_steps, safe_ratio
 from vibsim.convergence.error_model import priors
 from vibsim.convergence.error_model.hypotheses import (
-    Promise,
+    ExpectedOrder,
     Table,
     hypotheses_of,
     level_differences,
@@ -142,9 +142,9 @@ Subset = slice | Integers
 class _Fit:
     """Accumulates the evidence of hypotheses, window by window."""
 
-    def __init__(self, ladder: Ladder, promise: Promise | None, left_out: float) -> None:
-        self.ladder, self.points, self.promise = ladder, ladder.points, promise
-        terms = two_powers((1.0,), promise)
+    def __init__(self, ladder: Ladder, expected: ExpectedOrder | None, left_out: float) -> None:
+        self.ladder, self.points, self.expected = ladder, ladder.points, expected
+        terms = two_powers((1.0,), expected)
         usual = np.concatenate([terms.lower, terms.higher])
         grid = np.unique(
             np.concatenate([usual, np.arange(priors.SPACING, priors.MAX_POWER, priors.SPACING)])
@@ -214,7 +214,7 @@ class _Fit:
             finer = self.finer_products(start, end)
         log_priors = [outside + x for x in finest_noise_log_priors(ladder.floor[:, end], smallest)]
         # rounding the sizes makes windows with equal ratios share their hypotheses
-        hypotheses = hypotheses_of(tuple(np.round(sizes, 12)), self.promise)
+        hypotheses = hypotheses_of(tuple(np.round(sizes, 12)), self.expected)
         tables = [(table, log_priors[i]) for i, table in enumerate(hypotheses.two_shapes)]
         # numbers have no shape
         has_shape = self.points > 1.0
@@ -307,9 +307,9 @@ class _Fit:
         order = np.clip(self.orders[:, end - 2, None], priors.POWERS[0], priors.MAX_POWER)
         falls = level_differences(on_arrays.power(sizes, order))
         norms = np.sqrt(np.diagonal(self.differences, axis1=1, axis2=2)[:, end - 1 :])
-        expected = np.maximum(norms[:, :1] * falls[:, 1:] / falls[:, :1], TINY)
+        remaining = np.maximum(norms[:, :1] * falls[:, 1:] / falls[:, :1], TINY)
         largest = np.max(norms[:, 1:], axis=-1, initial=0.0)
-        hidden = np.fmin(on_arrays.log(np.maximum(largest, floor[:, 0])[:, None] / expected), 0.0)
+        hidden = np.fmin(on_arrays.log(np.maximum(largest, floor[:, 0])[:, None] / remaining), 0.0)
         rows = self.differences[:, end:, end:]
         noise = noise_evidence(self.ladder.h[end:], rows, self.points, floor)
         return noise, self.points * np.sum(hidden, axis=-1)
@@ -396,7 +396,7 @@ class _Fit:
         values, total = self.values, self.total
         any_power = values.pop("any_power") / total[:, None]
         pairs, first, second = np.moveaxis(values.pop("pairs") / total[:, None, None], 1, 0)
-        terms = two_powers((1.0,), self.promise)
+        terms = two_powers((1.0,), self.expected)
         pair_powers = np.stack(
             [terms.lower[terms.first_of_pairs], terms.higher[terms.first_of_pairs]], axis=-1
         )
@@ -447,13 +447,13 @@ class _Fit:
 
 
 def posterior(
-    ladder: Ladder, promise: Promise | None = None, *, left_out: float = LEFT_OUT
+    ladder: Ladder, expected: ExpectedOrder | None = None, *, left_out: float = LEFT_OUT
 ) -> Posterior:
     """Return the posterior of ladders with at least three levels and finite data.
 
     Hypotheses are skipped that together hold at most the part `left_out` of all evidence.
     """
-    fit = _Fit(ladder, promise, left_out)
+    fit = _Fit(ladder, expected, left_out)
     fit.add_no_expansion()
     for index in range(len(fit.windows)):
         fit.add_window(index)

@@ -133,9 +133,7 @@ def _rounding(outcome: Outcome) -> tuple[str, ...]:
     if not outcome.rounded > ROUNDING_SAID * outcome.error_bound or outcome.exact_known:
         return ()
     if outcome.comes_in_steps:
-        return (
-            "Levels with the same value show that values come in steps, which the bounds include.",
-        )
+        return ("The bounds allow for values that come in steps.",)
     return ("The bounds include the rounding of the values to their last digit.",)
 
 

@@ -1,4 +1,4 @@
-"""Sentence and advice for every reason of a verdict on any ladder, made from facts."""
+"""Sentence and advice for every reason that a verdict on levels alone has, made from facts."""
 
 from __future__ import annotations
 
@@ -66,7 +66,6 @@ SENTENCES: Mapping[str, tuple[str, str]] = MappingProxyType(
             "The levels of {quantity} differ by {noise} only, so there is no order to measure.",
             "",
         ),
-        "match": ("{quantity} is as expected.", ""),
         "order_low": (
             "{quantity} converges more slowly than expected, with order {order} instead of {wanted}.",
             LOOK_FOR + ". If the method promises no more here, expect that order.",
@@ -75,15 +74,10 @@ SENTENCES: Mapping[str, tuple[str, str]] = MappingProxyType(
             "{quantity} converges faster than expected, with order {order} instead of {wanted}.",
             "Check the expected order. The leading error may vanish by symmetry here; other data would show it.",
         ),
-        "mismatch": ("{quantity} is not as expected.", "Compare the expectation with the levels."),
         "wrong_limit": (
             "The levels of {quantity} approach each other, but not the exact {value}.",
             "Check the solver's code, the equation, its parameters and conditions, and the exact {value}. Finer levels "
             "will not help.",
-        ),
-        "unstable": (
-            "{quantity} grows from level to level instead of approaching a limit.",
-            "Check whether the step sizes are within the stability limit of the method.",
         ),
         "non_finite": (
             "{quantity} is not finite at {not_finite}.",
@@ -117,17 +111,9 @@ SENTENCES: Mapping[str, tuple[str, str]] = MappingProxyType(
             "The differences of {quantity} change sign from level to level, so no order can be read from them.",
             "Add a finer level{such_as}, or judge another quantity.",
         ),
-        "non_smooth": (
-            "The differences of {quantity} follow no power of {size}{estimate}.",
-            "Compare where the solution is smooth, or expect the order that a kink or jump allows.",
-        ),
         "too_few_levels": (
             "{count} too few to judge the convergence of {quantity}. Three are needed, and four are better.",
             "Add a level{such_as}.",
-        ),
-        "not_applicable": (
-            "{quantity} has no order to judge.",
-            "Judge another quantity.",
         ),
         "interpolation": (
             "The order of {quantity} is hidden, because the {kind} interpolation to common points has order {own} "
@@ -136,8 +122,9 @@ SENTENCES: Mapping[str, tuple[str, str]] = MappingProxyType(
         ),
     }
 )
-"""Templates of sentence and advice by reason. ``interpolation`` is a case of ``not_applicable``; ``noisy`` and
-``contradicted`` are cases of ``pre_asymptotic``, and ``growing`` is one of this and of ``round_off``."""
+"""Templates of sentence and advice by the reasons that levels alone show. ``interpolation`` is the only case of
+``not_applicable``; ``noisy`` and ``contradicted`` are cases of ``pre_asymptotic``, and ``growing`` is one of this and
+of ``round_off``."""
 
 
 def describe(facts: LadderVerdict, setting: Setting) -> tuple[str, str]:

@@ -91,7 +91,7 @@ def note_potential(model: Model, parameters: Mapping[str, float], report: Report
         and is_symmetric[..., is_known].all()
         and is_nonzero[..., is_known].all(axis=-1).any()
     ):
-        rule = "is not that of the forces, so that the energy changes without damping"
+        rule = "does not give the forces, so the energy changes even without damping"
         hint = "leave it out, and vibsim finds it where it can; beside `acceleration` masses are 1"
         report.note(("model", "potential"), rule, hint)
 

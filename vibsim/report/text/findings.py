@@ -54,7 +54,7 @@ MISSED = {
     "value": "{Subject} is not as expected",
     "accurate": "{What} is not as accurate as asked",
     "stable": "{Schemes} {not_stability}",
-    "conserves": "The energy does not keep what is asked: that it {drift}",
+    "conserves": "The check that the energy {drift} fails",
     "equal": "{What} by {first} differs from {second}",
     "tolerance": "The error bound is beyond the tolerance",
 }
