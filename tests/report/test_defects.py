@@ -13,6 +13,7 @@ from vibsim import report
 from vibsim.report import choice, data, style, words
 from vibsim.report.data import Member
 from vibsim.report.figures import order, solution, time
+from vibsim.report.page import hero
 from vibsim.report.tables import levels as contents
 from vibsim.report.text import findings, setting
 
@@ -218,3 +219,23 @@ def test_the_set_up_names_parameters_as_the_equation_does():
     )
     rows = dict(setting.setup(exp, samples.record(exp)))
     assert rows["Parameters"] == "m = 1 kg, b = 0.1 kg s⁻¹ (damping.linear), k = 2"
+
+
+def test_an_undecided_verdict_states_no_order_anywhere():
+    box = {"kind": "sliding_box", "m": 1.0, "k": 1.0, "mu": 0.1, "alpha": 0.5, "g": 1.0}
+    exp = samples.experiment(
+        model=box, initial={"u": 1.0}, time={"end": 6.0}, levels=[6, 7, 8, 9, 10],
+        schemes=[{"kind": "rk2", "events": "mesh"}],
+        checks=[{"value": "event_count", "above": 0}],
+    )  # fmt: skip
+    record = samples.record(exp)
+    (member,) = data.all_members(record)
+    assert data.flags(record, "u_status").item() == "INCONCLUSIVE"
+    assert np.isfinite(record["u_order"]).any()
+    lead = choice.find_lead(exp, record, samples.summary(exp, record))
+    assert not [n for n in hero.numbers(exp, record, lead) if "order" in n["label"]]
+    counts = [row[-1] for row in contents.orders(record, "u", [member]).rows]
+    assert "yes" not in counts
+    # nothing can be extrapolated either
+    with style.applied():
+        assert "the finest solution" in solution.motion(exp, record, "u", member).caption

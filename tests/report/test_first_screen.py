@@ -492,7 +492,7 @@ def test_curves_of_the_first_screen_are_told_apart_without_colours_and_the_ring_
     looks = {(line.get_marker(), str(line._unscaled_dash_pattern)) for line in curves}
     assert len(looks) == len(curves) == 3
     assert [line.get_label() for line in curves] == [f"initial θ = {x}" for x in ("0.5", "1", "2")]
-    assert ax.get_title(loc="left").endswith("ring: the member that decides")
+    assert ax.get_title(loc="left").endswith("ring: hardest member")
 
 
 @pytest.mark.slow

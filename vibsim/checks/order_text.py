@@ -49,7 +49,7 @@ ON_TABLE = (
     "the speed) must be a whole multiple of the coarsest dt. At t = {table_corner:4} it is not."
 )
 
-UNSEEN = " No exact solution is known, so convergence to a wrong answer would go unnoticed."
+UNSEEN = " Without an exact solution, convergence to a wrong answer would go unnoticed."
 NOT_FINITE = "The calculation of {what} produced a number that is not finite{place}."
 PROMISED_LESS = " Scheme {scheme} promises no more than order {promised} here"
 NO_SYMMETRY = "Try other `initial:` values or another `time: end`, where nothing cancels by symmetry{or_expect}."

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibsim.apriori.roundoff_floor import norm_of_floor
-from vibsim.core.array_types import Floats
+from vibsim.core.array_types import Flags, Floats
 from vibsim.core.record import Record
 from vibsim.core.vocabulary import OF_LEVEL, TYPICAL_NORM
 from vibsim.report import words
@@ -284,6 +284,8 @@ def stated_order(
     record: Record, quantity: str, member: Member, norm: int
 ) -> tuple[float, float, float]:
     """Return the stated order and the ends of its interval; NaN if no order is stated."""
+    if is_undecided(record, quantity)[member.scheme, member.case]:
+        return math.nan, math.nan, math.nan
     order, low, high = (
         float(at(record, f"{quantity}_order{end}", member, norm=norm))
         for end in ("", "_low", "_high")
@@ -291,8 +293,16 @@ def stated_order(
     return order, low, high
 
 
+def is_undecided(record: Record, quantity: str) -> Flags:
+    """Return where the verdict on a quantity is INCONCLUSIVE, shape (scheme, case): an order is at most an estimate."""
+    name = f"{quantity}_status"
+    if name not in record:
+        return np.zeros((len(record["scheme"]), len(record["case"])), np.bool_)
+    return np.asarray(flags(record, name) == "INCONCLUSIVE")
+
+
 def window(record: Record, quantity: str, member: Member) -> tuple[int, int]:
-    """Return the first and the last level that the stated order rests on; -1 if no order is stated."""
+    """Return the first and the last level that the stated or estimated order rests on; -1 if there is none."""
     first, last = (int(at(record, f"{quantity}_window_{end}", member)) for end in ("first", "last"))
     return first, last
 

@@ -83,13 +83,22 @@ def norms(record: Record, quantity: str, member: Member) -> Floats:
 def orders(
     record: Record, quantity: str, norm: str = TYPICAL_NORM
 ) -> tuple[Floats, Floats, Floats]:
-    """Return the stated order of every scheme and member and the ends of its interval, shape (scheme, case)."""
+    """Return the order of every scheme and member, stated or estimated, and the ends of its interval."""
     order, low, high = (
         # a large sweep has orders only for the quantities of checks
         optional(record, f"{quantity}_order{end}", MEMBER, norm=norm_index(record, norm))
         for end in ("", "_low", "_high")
     )
     return order, low, high
+
+
+def stated_orders(
+    record: Record, quantity: str, norm: str = TYPICAL_NORM
+) -> tuple[Floats, Floats, Floats]:
+    """Return the stated order of every scheme and member and the ends of its interval, shape (scheme, case)."""
+    undecided = data.is_undecided(record, quantity)
+    order, low, high = orders(record, quantity, norm)
+    return np.where(undecided, np.nan, order), low, high
 
 
 def deviation(record: Record, quantity: str) -> Floats:

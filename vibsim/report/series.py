@@ -70,6 +70,11 @@ def exact(
     return _derived(experiment, record, quantity, member, states, t)
 
 
+def name_of_exact(experiment: Experiment) -> str:
+    """Return ``exact`` for a solution in closed form, ``reference`` for one that was computed."""
+    return "reference" if experiment.model.definition.exact is None else "exact"
+
+
 def exact_curve(
     experiment: Experiment, record: Record, quantity: str, member: Member, end: float = np.inf
 ) -> tuple[Floats, Floats]:

@@ -351,7 +351,7 @@ def beside(ax: Axes, **options: Any) -> None:
     """Put the legend to the right of the axes, where it hides no curve."""
     if ax.get_legend_handles_labels()[0]:
         ax.legend(**BESIDE, **options)
-    else:
+    elif not ax.texts:
         ax.text(0.5, 0.5, "no finite value", transform=ax.transAxes, ha="center", color=GREY)
 
 

@@ -154,10 +154,11 @@ def broken(summary: Mapping[str, Any]) -> int:
 
 
 ERRORS = {
+    "period_error": "relative error of the period",
     "error_linf": "largest error", "error_linf_interior": "largest error without the last point",
     "error_l1": "error in the L1 norm", "error_l2": "error in the L2 norm",
 }  # fmt: skip
-"""Words for the errors in a norm."""
+"""Words for errors whose names need more than their underscores replaced."""
 NORMS = {
     "l1": "L1 norm", "l2": "L2 norm", "linf": "largest value", "linf_interior": "largest value without the last point",
 }  # fmt: skip

@@ -81,6 +81,9 @@ def _draw_orders(
     if math.isfinite(expected):
         frame.allowed(ax, expected - check.tolerance, expected + check.tolerance)
         ax.axhline(expected, **frame.DASHED)
-    counts = [first <= triple and levels[i + 2] <= last for i, triple in enumerate(triples)]
+    is_stated = math.isfinite(data.stated_order(record, quantity, member, norm)[0])
+    counts = [
+        is_stated and first <= triple and levels[i + 2] <= last for i, triple in enumerate(triples)
+    ]
     frame.points(ax, triples, orders, counts)
     draw_stated(ax, record, quantity, member, norm, frame.COLOUR)

@@ -78,11 +78,19 @@ def _steps(run: _Run) -> str:
     p, limit = float(run.p[run.index]), run.limit
     if not 0.0 < limit < math.inf or not usable(run.p).size:
         return ""
-    ax = run.panel("w dt (limit dashed)")
-    frame.scale(ax, run.p, limit * np.array([0.5, 2.0]), is_log=True, margin=0.08)
-    frame.below(ax, limit)
-    run.points(ax, run.p)
     text, away = f"w dt = {words.number(p, 'step')} is", abs(p / limit - 1.0)
+    if away and np.all(np.abs(run.p / limit - 1.0) < NEAR_LIMIT):
+        # beside the limit itself no distance would be seen
+        ax = run.panel("w dt / limit − 1")
+        frame.scale(ax, run.p / limit - 1.0, np.array([-away, away]), margin=0.5)
+        frame.allowed(ax, -math.inf, 0.0)
+        ax.axhline(0.0, **frame.DASHED)
+        run.points(ax, run.p / limit - 1.0)
+    else:
+        ax = run.panel("w dt (limit dashed)")
+        frame.scale(ax, run.p, limit * np.array([0.5, 2.0]), is_log=True, margin=0.08)
+        frame.below(ax, limit)
+        run.points(ax, run.p)
     border = f"the limit {words.number(limit, 'step')}"
     if away <= LIMIT_ROUNDING:
         edge = "where a solution may keep its size or grow linearly with time"
@@ -92,8 +100,12 @@ def _steps(run: _Run) -> str:
 
 
 def _sizes(run: _Run, size: Floats, letter: str) -> str:
-    """Draw the largest size of the solution over the exact one; say whether refinement reduces it."""
-    if not usable(size).size:
+    """Draw the largest size of the solution over the exact one; say whether refinement reduces it.
+
+    Beyond the limit of w dt a size that is still small decides nothing, and is left out.
+    """
+    is_beyond = run.p[run.index] > run.limit * (1.0 + LIMIT_ROUNDING)
+    if not usable(size).size or (is_beyond and size[run.index] <= BLOWN_UP):
         return ""
     ax = run.panel(f"largest |{letter}| / exact")
     frame.scale(ax, size, np.array([1.0, BLOWN_UP]), is_log=True, margin=0.12)

@@ -38,6 +38,9 @@ def picture(
     values, title, number = row.values, style.label(_number_title(check), by_level[1]), words.number
     if not np.isfinite(values[row.counts]).any():
         return None
+    if values.size > 1 and np.all(values == check.equals):
+        # a picture of the same number on every level says no more than the number
+        return None
     bar = values[-1] + np.array([-row.bound, row.bound])
     if check.equals is None:
         return _beside_border(row, check, title, bar)

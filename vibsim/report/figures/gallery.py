@@ -151,8 +151,13 @@ def _general(
     position: str,
 ) -> Iterator[tuple[str, Drawn]]:
     """Draw the figures that belong to no quantity: estimated error, energy, phase and amplitude, and theory."""
-    if worst and data.whole(record, "pair"):
-        yield "estimated error", [solution.solution(record, position, worst[0])]
+    first = worst[0] if worst else None
+    if (
+        first
+        and data.whole(record, "pair")
+        and not data.is_undecided(record, position)[first.scheme, first.case]
+    ):
+        yield "estimated error", [solution.solution(record, position, first)]
     equation = experiment.model.definition
     if series:
         if equation.conservative:

@@ -132,13 +132,13 @@ def against_step(record: Record, lead: Lead) -> Picture | None:
     ax = _panel(RIGHT, style.label(f"{SIZES[lead.norm]} of {letter}", measure))
     ax.set_gid(style.STEP)
     drawn: list[Floats] = []
-    notes = dict[str, None]()
+    notes, slopes = dict[str, None](), set[float]()
     for s in [*others, lead.member.scheme]:
         member = Member(s, case, names[s])
         if not math.isfinite(data.formal_order(record, member, quantity)):
             continue
         estimate, true = (one / scale for one in _errors(record, quantity, member, lead.norm))
-        is_lead, alone = s == lead.member.scheme, len(names) == 1
+        is_lead, alone = s == lead.member.scheme, not others
         text = "estimated" if alone else style.entry(names[s])
         mark: dict[str, Any] = {"linestyle": "none", "gid": None if alone else text}
         mark |= {"color": style.COLOURS[s % style.MANY], "marker": style.MARKERS[s % style.MANY]}
@@ -153,10 +153,12 @@ def against_step(record: Record, lead: Lead) -> Picture | None:
             notes["Rings: the true error."] = None
         norm = data.norm_index(record, lead.norm)
         has_order = math.isfinite(data.stated_order(record, quantity, member, norm)[0])
-        if is_lead and (has_order or lead.is_on_order) and lead.result.get("reason") != "exact":
+        is_lead_on_order = is_lead and lead.is_on_order and lead.result.get("reason") != "exact"
+        order = data.formal_order(record, member, quantity)
+        if (has_order or is_lead_on_order) and order not in slopes:
+            slopes.add(order)
             error = np.where(np.isfinite(true), true, estimate)
-            due = data.basis_of_order(record, quantity)
-            _slope(ax, dt, error, data.formal_order(record, member, quantity), due)
+            _slope(ax, dt, error, order, data.basis_of_order(record, quantity))
     if sum(style.finite(part).size for part in drawn) < FEWEST_ERRORS:
         return None
     high = max(float(part[np.isfinite(part)].max()) for part in drawn)
@@ -165,12 +167,13 @@ def against_step(record: Record, lead: Lead) -> Picture | None:
     ax.set_ylim(top=min(2.5 * high, style.LARGEST))
     ax.set_xlabel(style.label("time step", data.time_unit(record, "dt")))
     _legend(ax, columns=2, size=7.5)
-    title, found = "The error at every step", findings.factor(lead)
+    title, found = "Error against time step", findings.factor(lead)
     if found is not None:
         due = words.fact(lead.result, "expected")
         is_other = lead.result["reason"] != "asymptotic" and due is not None
         missed = f", not by {2.0**due:.2g}" if is_other else ""
-        title = f"Each level divides the error by {found:.2g}{missed}"
+        title = f"Each level divides the error by {found:.3g}{missed}"
+        title = f"{lead.member.scheme_name}: {title[0].lower()}{title[1:]}" if others else title
     return Picture(
         "hero_error",
         title,
@@ -192,9 +195,9 @@ def solution(
         LEFT if is_left else RIGHT, style.label(letter, data.unit(record, f"{quantity}_finest"))
     )
     ax.set_gid(style.TIME)
-    has_exact = bool(np.isfinite(exact[1]).any())
+    has_exact, name = bool(np.isfinite(exact[1]).any()), series.name_of_exact(experiment)
     if has_exact:
-        ax.plot(*style.thin(*exact, 200), color=style.PALE, linewidth=4.5, label="exact")
+        ax.plot(*style.thin(*exact, 200), color=style.PALE, linewidth=4.5, label=name)
     text = f"{words.number(int(record['steps'][-1]), 'integer')} steps"
     ax.plot(*style.thin(t, values, 200), color=style.COLOURS[0], linewidth=1.4, label=text)
     panels.fit_values(ax, [values], exact[1])
@@ -203,7 +206,7 @@ def solution(
     ax.legend(loc="best", fontsize=8, handlelength=1.8)
     return Picture(
         "hero_solution", f"{letter}(t), {member.scheme_name}",
-        "The solution of the finest level." + " Wide and grey: the exact solution." * has_exact,
+        "The solution of the finest level." + f" Wide and grey: the {name} solution." * has_exact,
         f"{words.name(quantity)} against time for {member.title}", ax.get_figure(root=True),
     )  # fmt: skip
 
@@ -264,7 +267,7 @@ def response(experiment: Experiment, record: Record, lead: Lead) -> Picture | No
         f"{name[:1].upper()}{name[1:]} of {count} members",
         "Each member is one run of the sweep, at its finest level."
         + f" The others have no {name}." * (known < every)
-        + " The ring is the member that decides." * is_marked,
+        + " The ring is the hardest member." * is_marked,
         f"{name} of every member over the swept parameters",
         ax.get_figure(root=True),
     )
@@ -365,7 +368,7 @@ def _mark(ax: Axes, x: Floats, y: Floats, lead: Lead, *, on_map: bool = False) -
     """Draw a ring around the decisive member, and explain it above the axes, where it hides no curve."""
     case = lead.member.case
     if ring(ax, float(x[case]), float(y[case]), on_map=on_map):
-        _name(ax, f"{ax.get_title(loc='left')} · ring: the member that decides")
+        _name(ax, f"{ax.get_title(loc='left')} · ring: hardest member")
 
 
 @dataclass(frozen=True)
@@ -433,7 +436,8 @@ def orders(experiment: Experiment, record: Record, lead: Lead) -> Picture | None
     keys, quantity, scheme = sweep_layout.keys(record), lead.quantity, lead.member.scheme
     if not keys or not data.whole(record, "triple"):
         return None
-    order, low, high = (part[scheme] for part in finest_level.orders(record, quantity, lead.norm))
+    stated = finest_level.stated_orders(record, quantity, lead.norm)
+    order, low, high = (part[scheme] for part in stated)
     found = _Orders(
         order,
         low,

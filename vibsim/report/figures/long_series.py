@@ -69,7 +69,7 @@ def long_series(
     # thinning keeps two points of each group of neighbours
     width = max(style.THINNED_POINTS, MOST_POINTS // (4 * len(rows)))
     letter, measure = words.symbol(quantity), data.unit(record, f"{quantity}_finest")
-    against = "exact" if is_known else f"level {finest}"
+    against = series.name_of_exact(experiment) if is_known else f"level {finest}"
     gid = f"{style.LONG} {PERIODS * period:.6g}"
     axes = panels.stacked([*[TALL] * len(rows), STRIP], gid)
     look: dict[str, Any] = {"color": style.PALE, "linewidth": 3.5, "zorder": 1, "gid": "compared"}
@@ -94,7 +94,7 @@ def long_series(
     return Picture(
         f"long_{quantity}_{member.stem}",
         f"{words.title(quantity)}(t) over {span / period:.0f} periods, {member.case_words or f'a {each}'}",
-        f"A {each}, with the {'exact solution' if is_known else 'finest level'} in grey. "
+        f"A {each}, with the {f'{against} solution' if is_known else 'finest level'} in grey. "
         "The strip below has the error of the first panel over the whole time."
         + " Dots: the times that all levels share." * is_sparse
         + " Grey is a spline between them." * (is_sparse and not is_curve),

@@ -30,7 +30,7 @@ def motion(
     """Return a motion at times `t`, interpolated between the series of its states at the times `samples`."""
     states = {name: at_times(t, samples, x) for name, x in series.items()}
     if model.kind == "bouncing_ball":
-        states["h"] = _flight(t, samples, series, states["h"], float(parameters["g"]))
+        states["h"] = _flight(t, samples, series, float(parameters["g"]))
     return Motion(model, t, states, parameters, reach)
 
 
@@ -67,11 +67,8 @@ def at_times(times: Floats, t: Floats, x: Floats) -> Floats:
     return np.asarray(a + (b - a) * weight)
 
 
-def _flight(times: Floats, t: Floats, series: Mapping[str, Floats], h: Floats, g: float) -> Floats:
-    """Return the height of a ball with its impacts: it falls from one sample until it meets the rise to the next.
-
-    `h` is the height at `times` interpolated without impacts between the samples at `t`.
-    """
+def _flight(times: Floats, t: Floats, series: Mapping[str, Floats], g: float) -> Floats:
+    """Return the height of a ball with its impacts: it falls from one sample until it meets the rise to the next."""
     i = data.bin_of(t, times)
     height, v = series["h"], series["v"]
     falls, rises = (
@@ -80,4 +77,7 @@ def _flight(times: Floats, t: Floats, series: Mapping[str, Floats], h: Floats, g
     # after its last impact it lies still
     rises = np.where((height[i + 1] <= 0.0) & (v[i + 1] == 0.0), 0.0, rises)
     has_impact = (v[i] < 0.0) & (v[i + 1] >= 0.0)
-    return np.maximum(np.where(has_impact, np.maximum(falls, rises), h), 0.0)
+    # in flight both are the same but for the error of the scheme
+    part = (times - t[i]) / (t[i + 1] - t[i])
+    flight = falls + part * (rises - falls)
+    return np.maximum(np.where(has_impact, np.maximum(falls, rises), flight), 0.0)

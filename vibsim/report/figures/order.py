@@ -68,7 +68,8 @@ def _caption(kinds: set[str], is_stated: bool | None, many: bool, basis: str) ->
     return style.sentences(
         f"Left: {' and '.join(filter(None, [difference, true]))} against dt.",
         f"Parallel to a dashed line means that {basis} order." if "slope" in kinds else "",
-        "Points on the dotted line are round-off." if "floor" in kinds else "",
+        "Below the dotted line, the predicted bound of round-off, a difference may be noise."
+        * ("floor" in kinds),
         "" if is_stated is None else orders[many],
         "The bar is the stated order with its interval." if is_stated and not many else "",
     )

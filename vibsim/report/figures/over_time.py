@@ -89,14 +89,14 @@ def _picture(
             return None
     axes[-1].set_xlabel(data.time_label(record))
     letters = ", ".join(dict.fromkeys(words.symbol(panel.quantity) for panel in shown))
+    name_of_exact = series.name_of_exact(experiment)
     title = f"{letters} over time" + (f", {text}" if text else "")
-    is_known = experiment.model.definition.exact is not None
     return Picture(
         name,
         title,
         style.sentences(
-            f"Wide and grey: the exact solution{'' if is_known else ', or its reference'}, where it is known.",
-            f"Markers are steps. What grows beyond {LEAVES_FRAME:g} times the exact solution leaves the frame.",
+            f"Wide and grey: the {name_of_exact} solution, where it is known.",
+            f"Markers are steps. What grows beyond {LEAVES_FRAME:g} times its size leaves the frame.",
             f"At most {MOST} figures and {MOST} panels are drawn, and {style.MANY} runs in a panel."
             * _is_thinned(record, figure, members),
         ),
@@ -166,7 +166,7 @@ def _draw(
         fine, reference = series.exact_curve(experiment, record, panel.quantity, first, end)
         if np.isfinite(reference).any():
             wide: dict[str, Any] = {"color": style.PALE, "linewidth": 4.5, "zorder": 1}
-            ax.plot(*style.thin(fine, reference), label="exact", **wide)
+            ax.plot(*style.thin(fine, reference), label=series.name_of_exact(experiment), **wide)
             exact.append(reference)
     size = max(map(data.largest, exact), default=0.0)
     drawn, jumps = [], model.events is not None and model.events.jumps

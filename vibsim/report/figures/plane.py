@@ -17,6 +17,7 @@ from vibsim.models import Model
 from vibsim.report import data, style, words
 from vibsim.report.data import Member, state_at, unit, whole
 from vibsim.report.figures.panels import legend_above, rows_of
+from vibsim.report.series import name_of_exact
 from vibsim.report.style import Picture
 from vibsim.report.types import Axes, Experiment
 
@@ -149,6 +150,7 @@ def path(experiment: Experiment, record: Record, shown: list[Member]) -> Picture
         panels, curves = [panels[i] for i in distinct], [curves[i] for i in distinct]
     if all(_is_line(points) for paths in curves for points in paths):
         return None
+    name = name_of_exact(experiment)
     references = [_points(record, names, members[0], None) for _, members, _ in panels]
     is_known = [bool(np.isfinite(reference).all()) for reference in references]
     rows = zip(references, is_known, curves, strict=True)
@@ -169,7 +171,7 @@ def path(experiment: Experiment, record: Record, shown: list[Member]) -> Picture
             _draw_end(axes[i], (x, y), k, width, member.scheme_name)
         if is_known[i]:
             dashed = style.REFERENCE | {"zorder": 5, "linewidth": 0.8}
-            axes[i].plot(*references[i], **dashed, label="reference")
+            axes[i].plot(*references[i], **dashed, label=name)
         axes[i].set_title(title)
         axes[i].xaxis.set_major_locator(MaxNLocator(ticks, steps=[1, 2, 5, 10]))
         axes[i].set(xlim=frame[0], ylim=frame[1], aspect="equal", ylabel=labels[1])
@@ -178,9 +180,9 @@ def path(experiment: Experiment, record: Record, shown: list[Member]) -> Picture
     return Picture(
         name="path",
         title=f"Path: {names[1]} against {names[0]}",
-        caption="Both axes have the same scale. The marker is the end of the motion; black, dashed: the reference. "
-        "Levels that look like the finest one are left out.",
-        alt=f"{names[1]} against {names[0]} for each level or member, with the reference",
+        caption="Both axes have the same scale. The marker is the end of the motion; black, dashed: the "
+        f"{name} solution. Levels that look like the finest one are left out.",
+        alt=f"{names[1]} against {names[0]} for each level or member, with the {name} solution",
         figure=figure,
     )
 

@@ -108,6 +108,10 @@ def scene_of(model: Model) -> Callable[[Motion], Scene] | None:
     if model.kind in SCENES:
         return SCENES[model.kind]
     is_displacement = model.is_alone and model.states[0].unit in {"m", "1"}
+    # by its name it is an angle
+    is_displacement &= model.position != "theta"
+    # at an event that the drawing does not show, a body would turn in mid-air
+    is_displacement &= model.events is None or not model.events.jumps
     return spring_mass if is_displacement else None
 
 
@@ -225,7 +229,8 @@ def bouncing_ball(motion: Motion) -> Scene:
 def spring_mass(motion: Motion) -> Scene:
     """Draw a body on a spring that moves to and fro, with its dashpot and its driving force, if it has any."""
     half, model = 18.0, motion.model
-    parts = _on_spring(motion, "wheel", half)
+    # friction that holds a body is drawn without wheels
+    parts = _on_spring(motion, "wheel" if model.events is None else "", half)
     *_, middle = (part for part in parts if part.look == "body")
     x, y = middle.at[0], middle.at[1]
     if model.dissipation is not None:

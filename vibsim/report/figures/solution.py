@@ -140,21 +140,29 @@ def _draw_errors(
 
 
 def motion(experiment: Experiment, record: Record, quantity: str, member: Member) -> Picture:
-    """Draw a quantity on all levels, and their errors against the exact solution, or else the extrapolated one."""
+    """Draw a quantity on all levels, and their distance from the exact, else the extrapolated, else the finest one.
+
+    Nothing can be extrapolated where the verdict on the levels is open.
+    """
     t, letter = data.times(record, member.case), words.symbol(quantity)
     measure, levels = data.unit(record, f"{quantity}_finest"), data.whole(record, "level")
     exact = data.exact_series(record, quantity, member)
     is_known = bool(np.isfinite(exact).any())
-    name = f"{quantity}_richardson"
-    best = exact if is_known or name not in record else data.at(record, name, member)
+    finest = data.at(record, f"{quantity}_finest", member)
+    name, text, best = f"{quantity}_richardson", series.name_of_exact(experiment), exact
+    if not is_known:
+        is_open = (
+            name not in record or data.is_undecided(record, quantity)[member.scheme, member.case]
+        )
+        text, best = (
+            ("finest", finest) if is_open else ("extrapolated", data.at(record, name, member))
+        )
     chosen = style.spaced(len(levels), MOST)
     runs = {i: data.state_at(record, quantity, member, i) for i in chosen}
     has_errors = bool(np.isfinite(best).any()) and len(levels) > (0 if is_known else 1)
     axes = panels.stacked([2.3, *[1.7] * has_errors], style.TIME)
-    text = "exact" if is_known else "extrapolated"
     smooth = series.exact_curve(experiment, record, quantity, member) if is_known else (t, best)
-    finest = (t, data.at(record, f"{quantity}_finest", member))
-    turns = smooth if is_known else finest
+    turns = smooth if is_known else (t, finest)
     dotted = [i for i in chosen if moments.is_undersampled(int(record["steps"][i]), t, turns)]
     is_dotted = bool(dotted)
     if has_errors:
@@ -164,15 +172,17 @@ def motion(experiment: Experiment, record: Record, quantity: str, member: Member
         axes[0].plot(*style.thin(*smooth), **pale | dots)
     looks = {i: _look(k, record, i) | (DOTS if i in dotted else {}) for k, i in enumerate(chosen)}
     _draw_levels(axes[0], t, runs, looks, best)
-    title = f"{letter}(t){' at the stored times alone' if is_dotted else ''}"
+    title = f"{letter}(t){' at the stored times only' if is_dotted else ''}"
     axes[0].set(ylabel=style.label(letter, measure), title=title)
     if has_errors:
         errors = {i: values - best for i, values in runs.items()}
         exponent = _draw_level_errors(axes[1], t, errors, looks)
         axes[1].set_title(f"Each level minus the {text} solution", fontweight="normal", fontsize=9)
-        axes[1].set_ylabel(style.label(f"error of {letter}", measure, exponent))
+        what = "difference" if text == "finest" else "error"
+        axes[1].set_ylabel(style.label(f"{what} of {letter}", measure, exponent))
     axes[-1].set_xlabel(data.time_label(record))
-    told = " Dots: the stored samples, which are too few for lines between them." * is_dotted
+    told = " Not every level is drawn." * (len(chosen) < len(levels))
+    told += " Dots: the stored samples, which are too few for lines between them." * is_dotted
     guide = f"Wide and grey is the {text} solution, the lines are the levels; below it, how far each level is from it."
     return Picture(
         f"motion_{quantity}_{member.stem}",

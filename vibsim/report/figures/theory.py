@@ -18,6 +18,7 @@ from vibsim.report import choice, data, frame, style, words
 from vibsim.report.choice import position
 from vibsim.report.data import Member, omega_dt, optional
 from vibsim.report.figures.panels import stacked
+from vibsim.report.series import exact_curve, name_of_exact
 from vibsim.report.style import Picture
 from vibsim.report.tables.theory import predicted
 from vibsim.report.types import Axes, Experiment
@@ -213,7 +214,8 @@ def growing(experiment: Experiment, record: Record) -> Picture | None:
             dashed: dict[str, Any] = {"linestyle": (0, (4, 2)), "linewidth": 1.0}
             lower.plot(t[keep], 10.0 ** exponent[keep], color=colour, **dashed)
         if k == 0 and np.isfinite(exact).any():
-            upper.plot(*style.thin(t, exact), color="black", linestyle=(0, (1, 2)), zorder=5)
+            smooth = exact_curve(experiment, record, quantity, member)
+            upper.plot(*style.thin(*smooth), color="black", linestyle=(0, (1, 2)), zorder=5)
     if reference > 0.0:
         upper.set_ylim(-FULLY_DRAWN * reference, FULLY_DRAWN * reference)
     finite = style.finite(*sizes)
@@ -222,7 +224,8 @@ def growing(experiment: Experiment, record: Record) -> Picture | None:
     style.log_axis(lower, "y", least, 3.0 * float(finite.max()))
     upper.set_ylabel(style.label(letter, measure))
     lower.set_ylabel(style.label(f"|{letter}|", measure))
-    beside = "The slowest beside the exact solution (dotted)"
+    which = "The slowest run" if len(runs) > 1 else "The run"
+    beside = f"{which} beside the {name_of_exact(experiment)} solution (dotted)"
     upper.set_title(f"{beside}, up to {FULLY_DRAWN:g} times its size")
     lower.set_title("Size of the solution, and the predicted growth (dashed)")
     lower.set_xlabel(data.time_label(record))

@@ -21,6 +21,7 @@ from vibsim.report.choice import Lead, is_refutation, is_trap
 from vibsim.report.evidence import figure, frame
 from vibsim.report.figures import hero as drawn
 from vibsim.report.figures import solution
+from vibsim.report.series import name_of_exact
 from vibsim.report.style import Picture
 from vibsim.report.tables import published
 from vibsim.report.tables.best import error_size, rounded, used_levels
@@ -86,9 +87,13 @@ def _statements(
 def _traps(summary: Mapping[str, Any], lead: Lead) -> Iterator[str]:
     """Yield a sentence on the order that each trap found, unless the page is on this trap."""
     for check in summary["checks"]:
-        order = words.fact(check["results"][0], "order") if check["results"] else None
+        result: Mapping[str, Any] = next(iter(check["results"] or []), {})
+        # any other order is an estimate that may be an accident
+        order = (
+            words.fact(result, "order") if result.get("reason") in findings.WITH_AN_ORDER else None
+        )
         if words.badge(check) == words.TRAP and check is not lead.entry and order is not None:
-            scheme, letter = check["results"][0]["scheme"], words.title(check["quantity"])
+            scheme, letter = result["scheme"], words.title(check["quantity"])
             yield f"As the trap expects, {letter} has order {words.number(order, 'order')} with scheme {scheme}."
 
 
@@ -137,7 +142,8 @@ def _measured(experiment: Experiment, record: Record, lead: Lead) -> Iterator[Nu
     if number is None or not math.isfinite(number):
         return
     kind = check.kind if check else "tolerance"
-    unit, label, form = "", MEASURED.get(kind, ""), "brief"  # a size has two digits
+    # an error has two digits, a growth factor more: it is compared with 1
+    unit, label, form = "", MEASURED.get(kind, ""), "norm" if kind == "stable" else "brief"
     if check is not None and check.kind == "value":
         unit, form = data.pretty_unit(unit_of(experiment, record, check)), "step"
         label = words.PAGE.opening(assertions.subject(check, record))
@@ -175,11 +181,8 @@ def _order(experiment: Experiment, record: Record, lead: Lead) -> Iterator[Numbe
     else:
         norm = data.norm_index(record, lead.norm)
         order, low, high = data.stated_order(record, quantity, member, norm)
-    orders = finest_level.orders(record, quantity, lead.norm)[0][member.scheme]
+    orders = finest_level.stated_orders(record, quantity, lead.norm)[0][member.scheme]
     shown = about_members(record, lead.measured if lead.is_on_order else None)
-    if f"{quantity}_status" in record:
-        # undecided members have at most an estimate
-        shown &= data.flags(record, f"{quantity}_status")[member.scheme] != "INCONCLUSIVE"
     every = style.finite(orders[shown])
     if lead.is_on_order and lead.result.get("status") == "INCONCLUSIVE":
         order = None
@@ -205,7 +208,9 @@ def _error(experiment: Experiment, record: Record, lead: Lead) -> Iterator[Numbe
     quantity, member = lead.quantity, lead.member
     error, relative = lead.facts.get("error"), lead.facts.get("relative_error")
     true = float(finest_level.true_error(record, quantity)[member.scheme, member.case])
-    word = "true" if math.isfinite(true) else "estimated"
+    word = "estimated"
+    if math.isfinite(true):
+        word = "true" if name_of_exact(experiment) == "exact" else "against the reference"
     if error is None and math.isfinite(true):
         error = true
     if error is None or not math.isfinite(error):
@@ -219,7 +224,11 @@ def _error(experiment: Experiment, record: Record, lead: Lead) -> Iterator[Numbe
     size = f"{words.share(relative)} of its size, " if relative else ""
     note = f"{size}{word}, root mean square"
     if error == 0.0:
-        equal = "equal to the exact solution" if word == "true" else "the levels agree"
+        equal = (
+            "the levels agree"
+            if word == "estimated"
+            else f"equal to the {name_of_exact(experiment)} solution"
+        )
         note = f"{equal} in every digit"
     steps = words.number(int(record["steps"][-1]), "integer")
     yield {

@@ -53,6 +53,7 @@ def draw(experiment: Experiment, record: Record, lead: Lead, formats: Sequence[s
     content = {
         "figures": groups | {"belief": belief, "members": over_members},
         "reading": {name: _captions(group) for name, group in groups.items()}
+        | {"source": _readings(picture for picture, _ in groups["source"])}
         | {"belief": _captions(one for _, group in belief for one in group)}
         | {"members": _readings(view.picture for view in views)},
         "members": explorer.content(experiment, record, views),

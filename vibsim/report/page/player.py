@@ -73,6 +73,10 @@ def lanes(experiment: Experiment, record: Record) -> list[Lane]:
     first, _, states = chosen[0]
     samples = data.times(record, first.case)
     period = moments.period(samples, states[model.position])
+    has_few = samples.size * period < moments.FEWEST_SAMPLES * float(samples[-1] - samples[0])
+    if has_few and model.kind != "bouncing_ball":
+        # a smooth motion between few samples would be invented; that of a ball in flight is known
+        return []
     t = _times(samples, period, len(chosen))
     there = samples <= t[-1] * (1.0 + 1e-12)
     reach = {

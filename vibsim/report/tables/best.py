@@ -89,6 +89,9 @@ def _rows(
             bound = float(at(record, f"{name}_richardson_error", member))
             if not math.isfinite(value):
                 continue
+            if row.value in OF_A_PERIODIC_MOTION and abs(value) <= bound:
+                # its levels do not tell whether there is a period at all
+                continue
             index = float(at(record, f"{name}_gci", member)) if has_series else math.nan
             yield (
                 title,

@@ -104,7 +104,7 @@ def _notes(record: Record, quantity: str, member: Member, norm: int) -> list[str
     notes = []
     for i, level in enumerate(levels):
         positions, has_three = list(range(i, min(i + 3, len(levels)))), i + 2 < len(levels)
-        if has_three and first <= level and levels[i + 2] <= last:
+        if has_three and first <= level and levels[i + 2] <= last and math.isfinite(stated):
             notes.append("yes")
         elif 0 <= level < first:
             is_like = has_three and abs(local[i] - stated) <= ORDER_TOLERANCE

@@ -77,7 +77,7 @@ def _scheme(
     yield limit
     for quantity in quantities:
         formal = data.formal_orders(record, quantity)[s]
-        value, low, high = (part[s] for part in finest_level.orders(record, quantity))
+        value, low, high = (part[s] for part in finest_level.stated_orders(record, quantity))
         with np.errstate(invalid="ignore"):
             away = np.abs(value - formal)
         case = int(np.argmax(np.where(np.isfinite(away), away, -1.0)))

@@ -17,8 +17,7 @@ class Reason(NamedTuple):
 
 REASONS = {
     "asymptotic": Reason(
-        "The error shrinks from level to level with the expected order. The rescaled differences coincide, "
-        "more closely so on finer levels.",
+        "The error shrinks from level to level with the expected order.",
         "At least three levels, differences above round-off, and no likely explanation of them by another order. "
         "The levels named meet all three.",
     ),

@@ -159,7 +159,7 @@ class _Drawing:
         band = f"Grey: an order that is {data.basis_of_order(self.record, quantity)}, with the tolerance of its check."
         yield from self._view(
             f"sweep_order_{quantity}", f"order of {words.symbol(quantity)}", quantity,
-            finest_level.orders(self.record, quantity)[0],
+            finest_level.stated_orders(self.record, quantity)[0],
             f"Stated by each member's levels, with its interval. {band}",
             lambda ax: _draw_orders(ax, self.experiment, self.record, self.along, quantity), form="order",
         )  # fmt: skip
@@ -252,7 +252,7 @@ def _draw_orders(
         ax.axhspan(order - tolerance, order + tolerance, **style.ALLOWED)
         text = f"{data.basis_of_order(record, quantity)}, {order:g} ± {tolerance:g}"
         ax.axhline(order, **style.REFERENCE, label=text)
-    value, low, high = finest_level.orders(record, quantity)
+    value, low, high = finest_level.stated_orders(record, quantity)
     for curve in _curves(record, along):
         look = style.look(curve.number) | {"markersize": 4, "linewidth": 0.8}
         _interval(ax, curve.x, curve.of(low), curve.of(high), look["color"])
