@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from vibsim.convergence.differences import total
 from vibsim.convergence.evidence import Evidence, floor_of_pairs, pick
 from vibsim.convergence.thresholds import HALF_SPACING, HIDDEN_SHARE, HIGHER_POWERS
 from vibsim.core.array_types import Flags, Floats, Integers
@@ -55,7 +56,7 @@ def _largest_share(e: Evidence, rows: Flags, last: int, p: float, r: float) -> F
             powers = np.array([r, *(p + step * k for k in range(count))])
             weights = _weights(e.levels, last, powers)
             first = last + 1 - len(weights)
-            left = e.combined(rows, first, weights) + floor[:, first : last + 1] @ np.abs(weights)
+            left = e.combined(rows, first, weights) + total(floor[:, first : last + 1] * np.abs(weights))
             with np.errstate(divide="ignore", invalid="ignore"):
                 share = np.fmin(share, steeper * left / difference)
     return share
@@ -66,4 +67,10 @@ def _weights(levels: tuple[int, ...], last: int, powers: Floats) -> Floats:
     depth = np.array(levels[last - len(powers) + 1 : last + 2], dtype=np.float64)
     sizes = on_arrays.power(2.0, -powers[:, None] * (depth - depth[-1]))
     differences = sizes[:, :-1] - sizes[:, 1:]
-    return np.asarray(np.linalg.solve(differences / differences[:, -1:], np.eye(len(powers))[0]))
+    kept, *cancelled = differences / differences[:, -1:]
+    rows = np.eye(len(powers))
+    for parts in cancelled:
+        left = total(rows * parts)
+        rows = rows[1:] - (left[1:] / left[:-1])[:, None] * rows[:-1]
+    (weights,) = rows
+    return weights / total(weights * kept)
