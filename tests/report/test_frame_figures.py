@@ -133,7 +133,7 @@ def test_no_word_leaves_a_figure(case):
     with style.applied():
         decisive = choice.find_lead(exp, record, samples.summary(exp, record))
         below = gallery.pictures(exp, record, shown, decisive, [])
-        behind = [picture for tab in below.belief for picture in tab.pictures]
+        behind = [picture for _, tab in below.belief for picture in tab]
         behind += [view.picture for view in below.members]
         for picture in [*hero.pictures(exp, record, decisive), *below.motion, *behind]:
             FigureCanvasAgg(picture.figure)
@@ -314,5 +314,5 @@ def test_a_page_shows_periods_from_three_peaks_on(end, is_drawn):
     with style.applied():
         tabs = gallery.pictures(exp, record, shown, decisive, []).belief
         assert extrema.local(exp, record, shown) is not None
-    names = [picture.name for tab in tabs for picture in tab.pictures]
+    names = [picture.name for _, tab in tabs for picture in tab]
     assert ("extrema_0" in names) == is_drawn

@@ -136,5 +136,5 @@ def test_of_many_coordinates_the_one_that_decides_is_drawn_and_no_path():
         found = gallery.pictures(exp, record, shown, decisive, [])
     names = [picture.name for picture in found.motion]
     assert names == ["motion_z_0_rk4"]
-    estimated = next(tab for tab in found.belief if tab.label == "estimated error")
-    assert [picture.name for picture in estimated.pictures] == ["solution_z_0_rk4"]
+    estimated = dict(found.belief)["estimated error"]
+    assert [picture.name for picture in estimated] == ["solution_z_0_rk4"]

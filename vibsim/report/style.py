@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from contextlib import contextmanager
-from contextvars import ContextVar
 from dataclasses import dataclass
 from importlib import import_module
 from typing import Any
@@ -98,24 +97,14 @@ class Picture:
     figure: Figure | None  # None if a check has nothing to draw; the caption says why
 
 
-_IS_APPLIED = ContextVar("is_applied", default=False)
-
-
 @contextmanager
 def applied() -> Iterator[None]:
-    """Use the look of this module while figures are built and saved; nested uses have no effect."""
-    if _IS_APPLIED.get():
-        yield
-        return
+    """Use the look of this module while figures are built and saved."""
     import matplotlib
 
     _import_matplotlib()
-    token = _IS_APPLIED.set(True)
-    try:
-        with matplotlib.rc_context(_RC):
-            yield
-    finally:
-        _IS_APPLIED.reset(token)
+    with matplotlib.rc_context(_RC):
+        yield
 
 
 def _import_matplotlib() -> None:

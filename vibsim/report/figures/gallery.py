@@ -38,14 +38,8 @@ MOST_SHOWN = 6
 """Most schemes and members with figures of their own, half as many if there are more schemes; tables have them all."""
 
 Drawn = list[Picture | None]
-
-
-@dataclass(frozen=True)
-class Tab:
-    """Figures under one label."""
-
-    label: str
-    pictures: tuple[Picture, ...]
+Tab = tuple[str, tuple[Picture, ...]]
+"""Figures under one label."""
 
 
 @dataclass(frozen=True)
@@ -95,8 +89,8 @@ def _new(drawn: Drawn, first: Sequence[str]) -> tuple[Picture, ...]:
 
 def _tabs(labelled: Iterable[tuple[str, Drawn]], first: Sequence[str]) -> list[Tab]:
     """Return the figures under each label that the first screen does not have."""
-    tabs = (Tab(label, _new(drawn, first)) for label, drawn in labelled)
-    return [tab for tab in tabs if tab.pictures]
+    tabs = ((label, _new(drawn, first)) for label, drawn in labelled)
+    return [(label, pictures) for label, pictures in tabs if pictures]
 
 
 def _motion(

@@ -7,8 +7,6 @@ members. Source: pendulum lecture, section 2.5.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -22,7 +20,7 @@ from vibsim.report import choice, data, finest_level, series, style, sweep_layou
 from vibsim.report.choice import Lead
 from vibsim.report.data import Member
 from vibsim.report.figures import panels, time
-from vibsim.report.figures.sweeps.view import ring
+from vibsim.report.figures.sweeps.view import key_axis, ring
 from vibsim.report.style import Picture
 from vibsim.report.sweep_layout import Along, Grid
 from vibsim.report.text import findings
@@ -304,14 +302,10 @@ def _scaled(ax: Axes, values: Floats) -> None:
 
 
 def _across(ax: Axes, key: sweep_layout.Key) -> None:
-    """Give the horizontal axis the range, scale and words of a key."""
-    if key.is_log:
-        style.log_axis(ax, "x", *style.log_limits(key.distinct, margin=0.02), most=5)
-    else:
+    """Give the horizontal axis the range, scale, words and label of a key."""
+    if not key.is_log:
         ax.set_xlim(*style.limits(key.distinct, margin=0.02))
-    if key.words:
-        ax.set_xticks(key.distinct, key.words)
-    ax.set_xlabel(key.label)
+    key_axis(ax, key, 0.02, most=5)
 
 
 def _curves(lead: Lead, along: Along, values: Floats, text: str) -> Axes:
@@ -371,126 +365,69 @@ def _mark(ax: Axes, x: Floats, y: Floats, lead: Lead, *, on_map: bool = False) -
         _name(ax, f"{ax.get_title(loc='left')} · ring: hardest member")
 
 
-@dataclass(frozen=True)
-class _Orders:
-    """The stated orders of all members of a scheme, with the ends of their intervals; arrays of shape (case,)."""
-
-    order: Floats
-    low: Floats
-    high: Floats
-    promised: Floats
-    allowed: float
-    is_checked: Flags
-    """Members that the check judges."""
-
-    @cached_property
-    def known(self) -> Flags:
-        """Members with an order."""
-        return np.isfinite(self.order)
-
-    @cached_property
-    def due(self) -> Floats:
-        """The distinct promised orders."""
-        return np.unique(self.promised[np.isfinite(self.promised)])
-
-    @cached_property
-    def around(self) -> Floats:
-        """Orders that the picture shows in any case."""
-        if not self.due.size:
-            return self.order[self.known]
-        return np.concatenate([self.due - 2 * self.allowed, self.due + 2 * self.allowed])
-
-    def shown(self, orders: Floats) -> Floats:
-        """Clip orders far outside to the edge of the picture."""
-        return np.clip(orders, self.around.min() - 1.0, self.around.max() + 1.0)
-
-    @cached_property
-    def limits(self) -> tuple[float, float]:
-        """The ends of the axis of the order."""
-        return style.limits(self.shown(self.order)[self.known], self.around)
-
-    @cached_property
-    def inside(self) -> Flags:
-        """Members in the band; as in a verdict, the interval counts if there is one."""
-        low, high = np.fmin(self.order, self.low), np.fmax(self.order, self.high)
-        within = (low <= self.promised + self.allowed) & (high >= self.promised - self.allowed)
-        return np.asarray(self.known & within)
-
-    def title(self) -> str:
-        """Say how many members have their order."""
-        checked = self.is_checked
-        counts = (self.inside[checked].sum(), checked.sum(), np.sum(~checked))
-        within, of, others = (words.number(int(count), "integer") for count in counts)
-        if not checked.all():
-            return (
-                f"{within} of {of} members asked about are in the band; grey: the {others} others"
-            )
-        if not self.inside.all():
-            return f"{within} of {of} members have an order in the band"
-        measured = np.abs(self.order - self.promised) <= self.allowed
-        return "All members keep their order" if measured.all() else "All intervals reach the band"
-
-
 def orders(experiment: Experiment, record: Record, lead: Lead) -> Picture | None:
     """Draw the stated orders of all members: dots over the key with most values, or a histogram of many."""
     keys, quantity, scheme = sweep_layout.keys(record), lead.quantity, lead.member.scheme
     if not keys or not data.whole(record, "triple"):
         return None
-    stated = finest_level.stated_orders(record, quantity, lead.norm)
-    order, low, high = (part[scheme] for part in stated)
-    found = _Orders(
-        order,
-        low,
-        high,
-        promised=data.formal_orders(record, quantity)[scheme],
-        allowed=choice.tolerance(experiment, quantity, record.words("scheme")[scheme]),
-        is_checked=about_members(record, lead.measured if lead.is_on_order else None),
-    )
-    if not found.known.any():
+    order, low, high = (part[scheme] for part in finest_level.stated_orders(record, quantity, lead.norm))
+    known = np.isfinite(order)
+    if not known.any():
         return None
+    promised = data.formal_orders(record, quantity)[scheme]
+    allowed = choice.tolerance(experiment, quantity, record.words("scheme")[scheme])
+    checked = about_members(record, lead.measured if lead.is_on_order else None)
+    bands = [(x - allowed, x + allowed) for x in np.unique(promised[np.isfinite(promised)])]
+    # the picture shows twice the tolerance; orders far outside are drawn at its edge
+    around = np.array([(a - allowed, b + allowed) for a, b in bands]) if bands else order[known]
+    shown, bottom, top = np.clip([order, low, high], around.min() - 1.0, around.max() + 1.0)
+    limits = style.limits(shown[known], around.ravel())
     text = f"observed order of {words.symbol(quantity)}"
-    if found.order.size > FEW:
-        ax, bars = _histogram_of_orders(found, text), ""
+    if order.size > FEW:
+        ax, bars = _panel(RIGHT, "members (logarithmic)"), ""
+        borders = np.linspace(*limits, 41)
+        parts = [shown[known & checked], shown[known & ~checked]]
+        colours = [style.COLOURS[0], style.PALE]
+        ax.hist(parts, borders.tolist(), color=colours, stacked=True, zorder=2)
+        for band in bands:
+            ax.axvspan(*band, **style.ALLOWED)
+        most = float(np.histogram(shown[known], borders)[0].max())
+        style.log_axis(ax, "y", 0.7, 2.0 * most, most=5)
+        ax.set_xlabel(text)
     else:
-        ax = _orders_over(max(keys, key=lambda one: one.distinct.size), found, lead, text)
-        bars = "; the bars are the 95 % intervals of the orders"
-    missing = words.number(int(np.sum(~found.known)), "integer")
+        ax, bars = _panel(RIGHT, text), "; the bars are the 95 % intervals of the orders"
+        key = max(keys, key=lambda one: one.distinct.size)
+        for band in bands:
+            ax.axhspan(*band, **style.ALLOWED)
+        for part, colour in ((~checked, style.PALE), (checked, style.COLOURS[0])):
+            x = key.values[part]
+            ax.vlines(x, bottom[part], top[part], color=colour, linewidth=1.6, alpha=0.5)
+            ax.plot(x, shown[part], ".", color=colour, markersize=4)
+        _across(ax, key)
+        ax.set_ylim(*limits)
+        _mark(ax, key.values, shown, lead)
+    # as in a verdict, the interval counts if there is one
+    reaches = (np.fmin(order, low) <= promised + allowed) & (
+        np.fmax(order, high) >= promised - allowed
+    )
+    missing = words.number(int(np.sum(~known)), "integer")
     return Picture(
         "hero_orders",
-        found.title(),
+        _title_of_orders(known & reaches, np.abs(order - promised) <= allowed, checked),
         f"The band is what the tolerance allows around the promised order{bars}."
-        + f" {missing} members have no order and are left out." * (not found.known.all())
-        + " The check does not ask about the grey members." * (not found.is_checked.all()),
+        + f" {missing} members have no order and are left out." * (not known.all())
+        + " The check does not ask about the grey members." * (not checked.all()),
         f"Observed orders of {words.name(quantity)} of all members",
         ax.get_figure(root=True),
     )
 
 
-def _histogram_of_orders(found: _Orders, text: str) -> Axes:
-    ax = _panel(RIGHT, "members (logarithmic)")
-    shown, known, checked = found.shown(found.order), found.known, found.is_checked
-    borders = np.linspace(*found.limits, 41)
-    parts = [shown[known & checked], shown[known & ~checked]]
-    colours = [style.COLOURS[0], style.PALE]
-    ax.hist(parts, borders.tolist(), color=colours, stacked=True, zorder=2)
-    for value in found.due:
-        ax.axvspan(value - found.allowed, value + found.allowed, **style.ALLOWED)
-    most = float(np.histogram(shown[known], borders)[0].max())
-    style.log_axis(ax, "y", 0.7, 2.0 * most, most=5)
-    ax.set_xlabel(text)
-    return ax
-
-
-def _orders_over(key: sweep_layout.Key, found: _Orders, lead: Lead, text: str) -> Axes:
-    ax = _panel(RIGHT, text)
-    for value in found.due:
-        ax.axhspan(value - found.allowed, value + found.allowed, **style.ALLOWED)
-    order, low, high = map(found.shown, (found.order, found.low, found.high))
-    for part, colour in ((~found.is_checked, style.PALE), (found.is_checked, style.COLOURS[0])):
-        x = key.values[part]
-        ax.vlines(x, low[part], high[part], color=colour, linewidth=1.6, alpha=0.5)
-        ax.plot(x, order[part], ".", color=colour, markersize=4)
-    _across(ax, key)
-    ax.set_ylim(*found.limits)
-    _mark(ax, key.values, order, lead)
-    return ax
+def _title_of_orders(inside: Flags, measured: Flags, checked: Flags) -> str:
+    """Say how many members have an order or an interval in the band; `measured` are those with the order itself."""
+    counts = (inside[checked].sum(), checked.sum(), np.sum(~checked))
+    within, of, others = (words.number(int(count), "integer") for count in counts)
+    if not checked.all():
+        return f"{within} of {of} members asked about are in the band; grey: the {others} others"
+    if not inside.all():
+        return f"{within} of {of} members have an order in the band"
+    return "All members keep their order" if measured.all() else "All intervals reach the band"

@@ -236,7 +236,7 @@ def spring_mass(motion: Motion) -> Scene:
     if model.dissipation is not None:
         spring = next(part for part in parts if part.shape == "spring")
         parts[parts.index(spring)] = Part("spring", "wire", (22.0, y - 9.0, x - half, y - 9.0))
-        parts += _dashpot(22.0, x - half, y + 9.0)
+        parts += _dashpot(x - half, y + 9.0)
     legend = []
     if model.driving is not None:
         # the driving power is the force times the velocity plus higher powers of it from damping
@@ -249,9 +249,9 @@ def spring_mass(motion: Motion) -> Scene:
     return Scene(tuple(parts), tuple(legend))
 
 
-def _dashpot(x0: float, x1: Floats | float, y: Floats | float) -> list[Part]:
-    """Return a cylinder held at `x0` and its piston, held by the body at `x1`."""
-    gap = x1 - x0
+def _dashpot(x1: Floats | float, y: Floats | float) -> list[Part]:
+    """Return a cylinder held by the wall and its piston, held by the body at `x1`."""
+    x0, gap = 22.0, x1 - 22.0
     cylinder, piston = x0 + 0.5 * gap, x0 + 0.55 * gap
     half = 0.5 * CYLINDER
     return [

@@ -128,7 +128,7 @@ def _stage(figure: Any, film: Film, i: int, scene: Scene, below: float) -> Calla
         figure.text((i + 0.5) / count, below + 0.05 * room, film.runs[i].title, **look)
     drawn = []
     for part in scene.parts:
-        patch = PathPatch(Path(np.zeros((0, 2))), **(LINE | LOOKS.get(part.look, {})))
+        patch = PathPatch(Path.make_compound_path(), **(LINE | LOOKS.get(part.look, {})))
         patch.set(capstyle="round", joinstyle="round", clip_on=True)
         ax.add_patch(patch)
         label = _label(ax, part) if part.label else None
@@ -141,7 +141,7 @@ def _stage(figure: Any, film: Film, i: int, scene: Scene, below: float) -> Calla
                 lines = [outline - (values[0], 0.0)]
             else:
                 lines = [np.array(line) for line in scenes.strokes(part.shape, values)]
-            patch.set_path(_path(lines))
+            patch.set_path(Path.make_compound_path(*map(Path, lines)))
             if label is not None:
                 place = scenes.place_of_label(part.shape, values)
                 label.set_visible(place is not None)
@@ -160,14 +160,6 @@ def _label(ax: Axes, part: Part) -> Any:
 def _outline(part: Part) -> Floats:
     """Return the points of a fixed outline, shape (point, 2)."""
     return np.array([point.split(" ") for point in part.outline[1:].split("L")], dtype=np.float64)
-
-
-def _path(lines: list[Floats]) -> Any:
-    from matplotlib.path import Path
-
-    if not lines:
-        return Path(np.zeros((0, 2)))
-    return Path.make_compound_path(*(Path(line) for line in lines))
 
 
 def _legend(figure: Any, scene: Scene) -> None:

@@ -69,23 +69,23 @@ def write(
         raise VibsimError(f"figure format '{unknown[0]}': {nearest(unknown[0], FIGURE_FORMATS)}")
     experiment = plan.experiment
     lead = choice.find_lead(experiment, convergence, summary)
-    figures = page_figures.draw(experiment, convergence, lead, formats)
-    replace_files(directory / "figures", figures.files)
-    texts, tables = page_tables.collect(experiment, convergence, summary, lead, figures.of_source)
+    files, sources, figures = page_figures.draw(experiment, convergence, lead, formats)
+    replace_files(directory / "figures", files)
+    texts, tables = page_tables.collect(experiment, convergence, summary, lead, sources)
     _write_tables(directory / "tables", texts, experiment, convergence)
     played = player.element(experiment, convergence)
     page = environment().get_template("report.html").render(
         hero.context(experiment, convergence, summary, lead)
-        | figures.content
+        | figures
         | tables
-        | _checks(experiment, convergence, summary, lead, has_picture="hero_evidence" in figures.above)
+        | _checks(experiment, convergence, summary, lead, has_picture="hero_evidence.svg" in files)
         | _setup(experiment, convergence)
         | {
             "collection": experiment.collection,
             "name": experiment.name,
             "title": experiment.title,
             "status": summary["status"],
-            "undrawn": of_source.undrawn(figures.of_source, has_player=bool(played)),
+            "undrawn": of_source.undrawn(sources, has_player=bool(played)),
             "player_source": of_source.of_player(experiment),
             "player": markup(played),
             "provenance": list(cards.provenance_rows(provenance)),

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 from vibsim.core.record import Record
 from vibsim.experiment.schema.figures import FigureOfSource
 from vibsim.report.choice import Lead
 from vibsim.report.figures import drawing, gallery, of_source, thumbnail
-from vibsim.report.figures.sweeps.view import View
 from vibsim.report.page import explorer, hero
 from vibsim.report.page.templates import markup
 from vibsim.report.style import Picture
@@ -21,22 +21,17 @@ FIGURES = 6  # most figures under the tabs of a section
 
 Shown = tuple[Picture, str]
 """A picture with its markup."""
+Sources = list[tuple[FigureOfSource, list[Picture]]]
+"""The figures of the source with their pictures."""
 
 
-@dataclass(frozen=True)
-class PageFigures:
-    """The figures of a page."""
+def draw(
+    experiment: Experiment, record: Record, lead: Lead, formats: Sequence[str]
+) -> tuple[dict[str, bytes], Sources, dict[str, Any]]:
+    """Draw the figures of a page from its first screen down, none of them twice.
 
-    files: dict[str, bytes]
-    above: list[str]
-    """Names of the figures above the section on the motion."""
-    of_source: list[tuple[FigureOfSource, list[Picture]]]
-    content: dict[str, Any]
-    """The content of the page, by the names that its template uses."""
-
-
-def draw(experiment: Experiment, record: Record, lead: Lead, formats: Sequence[str]) -> PageFigures:
-    """Draw the figures of a page from its first screen down, none of them twice."""
+    Return their files, the figures of the source, and the content of the page by the names that its template uses.
+    """
     drawn = _Drawn(formats)
     sources = of_source.pictures(experiment, record, lead)
     groups = {
@@ -47,7 +42,10 @@ def draw(experiment: Experiment, record: Record, lead: Lead, formats: Sequence[s
     shown, left_out = gallery.choose(experiment, record, lead.member)
     below = gallery.pictures(experiment, record, shown, lead, above)
     groups["motion"] = [drawn.add(picture) for picture in below.motion]
-    belief, over_members = drawn.tabs(below.belief), drawn.views(below.members)
+    belief = drawn.fitting(below.belief, FIGURES)
+    named = {view.picture.name: view for view in below.members}
+    single = drawn.fitting((view.picture.title, [view.picture]) for view in below.members)
+    over_members = [(named[picture.name], text) for _, [(picture, text)] in single]
     views = [view for view, _ in over_members]
     small = thumbnail.thumbnail(experiment, record, shown[0])
     content = {
@@ -62,7 +60,7 @@ def draw(experiment: Experiment, record: Record, lead: Lead, formats: Sequence[s
         "shown": left_out,
         "more_figures": ", ".join(drawn.left_out),
     }
-    return PageFigures({**drawn.files, "thumbnail.svg": small.encode()}, above, sources, content)
+    return {**drawn.files, "thumbnail.svg": small.encode()}, sources, content
 
 
 class _Drawn:
@@ -73,7 +71,7 @@ class _Drawn:
         self.files: dict[str, bytes] = {}
         self.room = BYTES
         self.left_out: list[str] = []
-        """Labels of tabs that are files only."""
+        """Labels of pictures that are files only."""
 
     def add(self, picture: Picture) -> Shown:
         """Return a picture with its markup, and keep its files."""
@@ -82,29 +80,19 @@ class _Drawn:
         text = files[f"{picture.name}.svg"].decode()
         return picture, markup(drawing.inline(text, picture.alt))
 
-    def tabs(self, tabs: Sequence[gallery.Tab]) -> list[tuple[str, list[Shown]]]:
-        """Return the tabs with their pictures as long as the page has room; further ones are files only."""
-        found, most = [], FIGURES
-        for tab in tabs:
-            added = [self.add(picture) for picture in tab.pictures]
+    def fitting(
+        self, labelled: Iterable[tuple[str, Sequence[Picture]]], most: float = math.inf
+    ) -> list[tuple[str, list[Shown]]]:
+        """Return pictures by their label, at most so many and as long as the page has room; further ones are files."""
+        found = []
+        for label, pictures in labelled:
+            added = [self.add(picture) for picture in pictures]
             most -= len(added)
             self.room -= sum(len(text) for _, text in added)
             if most >= 0 and self.room >= 0:
-                found.append((tab.label, added))
+                found.append((label, added))
             else:
-                self.left_out.append(tab.label)
-        return found
-
-    def views(self, views: Sequence[View]) -> list[tuple[View, str]]:
-        """Return the views of members with their markup as long as the page has room; further ones are files only."""
-        found = []
-        for view in views:
-            picture, text = self.add(view.picture)
-            self.room -= len(text)
-            if self.room >= 0:
-                found.append((view, text))
-            else:
-                self.left_out.append(picture.title)
+                self.left_out.append(label)
         return found
 
 

@@ -59,7 +59,11 @@ def collect(
         "failures": broken and cut(broken),
         "unlisted": f"{failures} runs broke down; the first {count} are listed." * (failures > count),
         "numbers_shown": [cut(table) for table in listed],
-        "tables": {table.name: _copied(texts[table.name]) for table in (*printed, *listed)},
+        # for the copy buttons, which a very long table does not have
+        "tables": {
+            table.name: texts[table.name] if max(map(len, texts[table.name].values())) <= COPIED else {}
+            for table in (*printed, *listed)
+        },
         "scales": scales,
         "printed": printed,
         "printed_sentence": published.sentence(printed),
@@ -134,8 +138,3 @@ def files_of(written: Mapping[str, Mapping[str, str]]) -> dict[str, bytes]:
         found[f"{name}.csv"] = texts["CSV"].encode()
         found[f"{name}.tex"] = texts["LaTeX"].encode()
     return found
-
-
-def _copied(texts: Mapping[str, str]) -> Mapping[str, str]:
-    """Return the texts of a table for its copy buttons; empty for a very long one."""
-    return texts if max(map(len, texts.values())) <= COPIED else {}

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
-
 import numpy as np
 
+from vibsim.apriori.formal_orders import columns_of
 from vibsim.core.record import Record
 from vibsim.models.shared.scales import dimensionless, scales
 from vibsim.report import data
@@ -21,8 +19,14 @@ def table(experiment: Experiment, record: Record) -> Table | None:
     if model.scales is None:
         return None
     if scaling is None:
-        parameters = _members("model", experiment.model.parameters, record)
-        initial = _members("initial", experiment.initial, record)
+        swept = columns_of(record)
+        parameters, initial = (
+            {key: swept.get(f"{section}.{key}", value) for key, value in values.items()}
+            for section, values in (
+                ("model", experiment.model.parameters),
+                ("initial", experiment.initial),
+            )
+        )
     else:
         parameters, initial = dict(scaling.parameters), dict(scaling.initial)
     sizes, numbers = scales(model, parameters, initial), dimensionless(model, parameters, initial)
@@ -46,12 +50,3 @@ def table(experiment: Experiment, record: Record) -> Table | None:
     if scaling is not None:
         caption += "; the run uses these scales, and its numbers times them are those of the file"
     return Table("scales", caption, columns, tuple(rows))
-
-
-def _members(section: str, values: Mapping[str, float], record: Record) -> dict[str, Any]:
-    """Return values by key, swept ones as arrays of shape (case,)."""
-    names = {str(record.coords[name].attrs["sweep_key"]): name for name in data.swept(record)}
-    return {
-        key: record[names[f"{section}.{key}"]] if f"{section}.{key}" in names else value
-        for key, value in values.items()
-    }

@@ -140,9 +140,12 @@ def _predictions(
         noise = step * sizes.get(kind, np.fmax(np.abs(from_theory), 1.0))
         less = float(kind == "growth")
         filled += [
-            (Column(f"{text}: predicted", measure, "close"), _written(from_theory - less, noise)),
-            (Column("measured", measure, "close"), _written(measured - less, noise)),
-            (Column("difference", measure, "brief"), _beyond(measured - from_theory, noise)),
+            (Column(f"{text}: predicted", measure, "close"), _cells(from_theory - less, noise)),
+            (Column("measured", measure, "close"), _cells(measured - less, noise)),
+            (
+                Column("difference", measure, "brief"),
+                _cells(measured - from_theory, noise, hide=True),
+            ),
         ]
     caption = f"Theory beside measurement: {caption}"
     included, name = np.isfinite(optional(record, "theory_growth", OF_LEVEL)), f"theory_{stem}"
@@ -152,24 +155,15 @@ def _predictions(
     return short if short.columns == table.columns else replace(short, caption=caption + agree)
 
 
-def _beyond(values: Floats, noise: Floats) -> Fill:
-    """Return a function that fills a column with numbers, except those within the noise."""
-
-    def cell(member: Member, i: int) -> Cell:
-        value = float(values[member.scheme, member.case, i])
-        return None if abs(value) <= noise[member.scheme, member.case, i] else value
-
-    return cell
-
-
-def _written(values: Floats, noise: Floats) -> Fill:
-    """Return a function that fills a column with numbers, with two digits for those within the noise."""
+def _cells(values: Floats, noise: Floats, *, hide: bool = False) -> Fill:
+    """Return a function that fills a column with numbers; those within the noise have two digits, or none (`hide`)."""
 
     def cell(member: Member, i: int) -> Cell:
         place = member.scheme, member.case, i
         value = float(values[place])
-        is_noise = 0.0 < abs(value) <= noise[place]
-        return Written(value, words.number(value, "brief")) if is_noise else value
+        if not abs(value) <= noise[place]:
+            return value
+        return None if hide else Written(value, words.number(value, "brief"))
 
     return cell
 

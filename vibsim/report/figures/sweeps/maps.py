@@ -43,8 +43,6 @@ class Map:
     """Meaning of the colours, with the unit."""
     unit: str = ""
     caption: str = ""
-    badness: Floats | None = None
-    """A cell with several members shows the one of largest badness; without it the largest value."""
     kind: str = "size"
     """``size`` (dark to light), ``distance`` (around 0, pale within `tolerance`), ``factor`` (around 1), ``code``."""
     tolerance: float = 0.0
@@ -84,7 +82,7 @@ def _maps(experiment: Experiment, record: Record, names: list[str], scheme: int)
     for name, check in view.value_checks(experiment):
         values = view.of_check(record, name, check)[scheme]
         yield Map(
-            f"check_{name}", name, position(experiment), values, view.check_words(check), badness=np.abs(values),
+            f"check_{name}", name, position(experiment), values, view.check_words(check),
             caption="The number that the check of this name asks for.",
         )  # fmt: skip
 
@@ -136,8 +134,8 @@ def _order(experiment: Experiment, record: Record, quantity: str, scheme: int) -
     away = order - data.formal_orders(record, quantity)[scheme]
     yield Map(
         f"{quantity}_order", f"order of {letter}", quantity, away,
-        f"order of {letter} − {data.promised_text(record, quantity, scheme)}", badness=np.abs(away), kind="distance",
-        tolerance=allowed, number=order, shared=view.shared(f"order of {letter}", np.round(order, 3), form="order"),
+        f"order of {letter} − {data.promised_text(record, quantity, scheme)}", kind="distance",
+        tolerance=allowed, number=order, shared=view.shared(f"order of {letter}", order, form="order"),
         caption=f"Pale colours are orders within ± {allowed:g} of the {data.basis_of_order(record, quantity)} one, "
         "where the scale jumps.",
     )  # fmt: skip
@@ -162,7 +160,7 @@ def _errors(record: Record, quantity: str, scheme: int) -> Iterator[Map]:
             ratio = style.positive(estimate / error.true[scheme])
             yield Map(
                 f"{quantity}_trust", f"estimated over true error of {letter}", quantity, ratio,
-                "estimated / true error", badness=np.abs(np.log(ratio)), kind="factor",
+                "estimated / true error", kind="factor",
                 caption="Where it is pale, two levels alone tell the error.",
             )  # fmt: skip
             return
@@ -220,7 +218,9 @@ def _window(record: Record, quantity: str, scheme: int) -> Map:
 
 def _view(record: Record, grid: Grid, shown: Map, scheme: int, worst: int) -> View:
     """Draw a map; the caption explains grey cells, dots and blocks, if there are any."""
-    table = grid.worst(shown.values, shown.badness)
+    # of several members a cell shows the one that is farthest from 0, or from the factor 1
+    size = np.log(shown.values) if shown.kind == "factor" else shown.values
+    table = grid.worst(shown.values, np.abs(size))
     figure = draw(grid, shown, table)
     ax, several = figure.axes[0], data.of_several(record, scheme)
     is_ringed = view.ring(ax, float(grid.x.values[worst]), float(grid.y.values[worst]), on_map=True)

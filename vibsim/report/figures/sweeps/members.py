@@ -5,8 +5,9 @@ Few members are points; many are counted in cells, which limits the size of the 
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -153,20 +154,21 @@ class _Projection:
         away = finest_level.deviation(record, quantity)[self.scheme]
         if not np.isfinite(away).any():
             return
-        if text := shared(name, np.round(order[self.scheme], 3), form="order"):
+        if text := shared(name, order[self.scheme], form="order"):
             yield f"{text}{of_several(record, self.scheme)}"
             return
-        axes = self._axes()
-        for ax, key in zip(axes, self.keys, strict=False):
+
+        def draw(ax: Axes, key: Key) -> None:
             ax.axhspan(-allowed, allowed, **style.ALLOWED)
             _draw_members(ax, key, away, self.masks, (-ORDER_FRAME, ORDER_FRAME))
+
         label = f"{name} − {promised_text(record, quantity, self.scheme)}"
         edge_note = "Orders beyond the frame are drawn at its edge, members without an order at the lower edge."
         leaves = not np.all(np.abs(away) < ORDER_FRAME)
         band = f"Grey: the tolerance around the {data.basis_of_order(record, quantity)} order."
         places = np.clip(np.nan_to_num(away, nan=-ORDER_FRAME), -ORDER_FRAME, ORDER_FRAME)
         explanation = style.sentences(band, edge_note * leaves)
-        yield self._view("order", name, label, axes, explanation, order, places)
+        yield self._view("order", name, label, draw, explanation, order, places)
 
     def error(self) -> Iterator[View | str]:
         """Yield the error of the finest level."""
@@ -178,40 +180,38 @@ class _Projection:
         size = np.log10(style.positive(error.best[self.scheme]))
         if not np.isfinite(size).any():
             return
-        axes = self._axes()
-        for ax, key in zip(axes, self.keys, strict=False):
+
+        def draw(ax: Axes, key: Key) -> None:
             _draw_members(ax, key, size, self.masks, None)
             # the axis shows logarithms
             ax.yaxis.set_major_locator(MaxNLocator(5, integer=True))
             ax.yaxis.set_major_formatter(FuncFormatter(lambda y, _: power(round(y))))
+
         explanation = f"Of level {whole(self.record, 'level')[-1]}."
         label = style.label(f"{error.kind} {name}", unit)
-        yield self._view("error", name, label, axes, explanation, error.best, size, unit)
+        yield self._view("error", name, label, draw, explanation, error.best, size, unit)
 
     def shares(self) -> View:
         """Return the shares of the verdicts among the members near each value of a key."""
-        axes = self._axes()
-        for ax, key in zip(axes, self.keys, strict=False):
-            _draw_shares(ax, key, self.masks)
         explanation = (
             "Shares of the verdicts near a value. A key whose shares do not vary does not matter."
         )
         name = f"verdict on {words.symbol(self.quantity)}"
-        return self._view("verdict", name, "share", axes, explanation, None, None)
-
-    def _axes(self) -> list[Axes]:
-        columns = [(0.72 + 2.9 * i, 2.35) for i in range(3)]
-        return rows_of(min(len(self.keys), MOST_PANELS), columns, 1.9, 0.3, 0.5)[1]
+        return self._view(
+            "verdict", name, "share", partial(_draw_shares, masks=self.masks), explanation, None, None
+        )  # fmt: skip
 
     def _view(
-        self, kind: str, name: str, label: str, axes: list[Axes], explanation: str, values: Floats | None,
-        place: Floats | None, unit: str = "",
+        self, kind: str, name: str, label: str, draw: Callable[[Axes, Key], None], explanation: str,
+        values: Floats | None, place: Floats | None, unit: str = "",
     ) -> View:  # fmt: skip
-        """Finish the axes of a view, and mark the worst member."""
+        """Draw a panel for each key, and mark the worst member."""
         record, rings = self.record, []
+        columns = [(0.72 + 2.9 * i, 2.35) for i in range(3)]
+        axes = rows_of(min(len(self.keys), MOST_PANELS), columns, 1.9, 0.3, 0.5)[1]
         for i, (ax, key) in enumerate(zip(axes, self.keys, strict=False)):
-            key_axis(ax, key, 0.02)
-            ax.set_xlabel(key.label, fontsize=8.5, labelpad=2)
+            draw(ax, key)
+            key_axis(ax, key, 0.02, fontsize=8.5, labelpad=2)
             ax.tick_params(labelsize=7.5)
             if i == 0:
                 texts = {word: word for word, chosen in self.masks.items() if chosen.any()}

@@ -20,7 +20,7 @@ from vibsim.report.figures.sweeps import separatrix, view
 from vibsim.report.figures.sweeps.view import View, Worst
 from vibsim.report.finest_level import Measured
 from vibsim.report.style import Picture
-from vibsim.report.sweep_layout import Along, Key
+from vibsim.report.sweep_layout import Along
 from vibsim.report.types import Axes, Experiment, ValueCheck
 
 TALL, ENTRY = 3.0, 0.18  # least height of a panel, height of a legend entry [inch]
@@ -71,9 +71,7 @@ class _Drawing:
 
         `draw` draws them and returns a sentence if they leave the frame, else an empty text.
         """
-        # orders are compared to three decimals
-        compared = np.round(values, 3) if form == "order" else values
-        if text := view.shared(name, compared, unit, form):
+        if text := view.shared(name, values, unit, form):
             yield text
         elif np.isfinite(values).any():
             tall = max(TALL, ENTRY * len(self.record["scheme"]) * len(self.along.lines))
@@ -87,7 +85,11 @@ class _Drawing:
     ) -> View:  # fmt: skip
         """Finish the axes of a view, and mark the worst member."""
         key, worst = self.along.key, self.worst(quantity)
-        marked = _finish(ax, key, self.on_separatrix)
+        view.key_axis(ax, key, 0.03)
+        for x in self.on_separatrix:
+            ax.axvline(x, color="black", linestyle=(0, (1, 2)), linewidth=1.0, zorder=1)
+        dotted = "Dotted: the separatrix, where the exact period is infinite."
+        marked = dotted * bool(self.on_separatrix)
         ax.set_gid(style.MEMBER)
         is_ringed = view.ring(
             ax, float(key.values[worst.case]), float(places[worst.scheme, worst.case])
@@ -137,48 +139,124 @@ class _Drawing:
         # values beyond the frame have no error bar across it
         barred = bounded & frame.is_bounded(amplitude.error, size)
         value = np.where(bounded, amplitude.value, np.nan)
-        within = replace(amplitude, value=value, error=np.where(barred, amplitude.error, np.nan))
+        error = np.where(barred, amplitude.error, np.nan)
+
+        def draw(ax: Axes) -> str:
+            move_label_left(ax)
+            _draw_numbers(ax, record, along, replace(amplitude, error=error), None)
+            finite = style.finite(value)
+            is_wide = finite.size > 0 and float(finite.max()) > LOG_RATIO * float(np.median(finite))
+            if explosive([value.ravel()]) or (is_wide and explosive([amplitude.value.ravel()])):
+                # decades of a motion that a scheme damps away would fill the frame
+                least = np.nanmin(np.append(size, np.nanmax(value))) / frame.UNBOUNDED
+                style.fit_log_axis(ax, "y", np.maximum(value, least), room=2.0)
+            else:
+                ax.set_ylim(*_room(replace(amplitude, value=value, error=error), None))
+            return _leaving(ax, along, amplitude.value)
+
         explanation = (
             "Half the height between the last peak and the last trough, on the finest level."
         )
         turns = bool(self.experiment.model.definition.turn)
         explanation += " Members that go over the top have none." * turns
         yield from self._view(
-            "amplitude", "amplitude", quantity, amplitude.value, explanation,
-            lambda ax: _draw_amplitudes(ax, record, along, amplitude, within, size), amplitude.unit,
+            "amplitude", "amplitude", quantity, amplitude.value, explanation, draw, amplitude.unit
+        )
+        if not data.whole(record, "pair"):
+            return
+
+        def draw_error(ax: Axes) -> str:
+            for curve in _curves(record, along):
+                look = style.look(curve.number) | {"markersize": 4}
+                text = curve.text or style.entry(record.words("scheme")[curve.scheme])
+                _line(ax, curve.x, style.no_zeros(curve.of(amplitude.error)), **look, label=text)
+            # as a motion is damped away, its error falls without limit
+            held = error if np.isfinite(error).any() else amplitude.error
+            style.fit_log_axis(ax, "y", held, least=DEEP, room=2.0)
+            ax.set_ylabel(style.label("estimated error", amplitude.unit))
+            if len(along.lines) > 1 and not style.crowded(record):
+                _beside(ax, along, fontsize=8)
+            return _leaving(ax, along, amplitude.error)
+
+        yield from self._view(
+            "amplitude_error", "error bar of the amplitude", quantity, amplitude.error,
+            "Estimated from the two finest levels.", draw_error, amplitude.unit, "norm",
         )  # fmt: skip
-        if data.whole(record, "pair"):
-            yield from self._view(
-                "amplitude_error", "error bar of the amplitude", quantity, amplitude.error,
-                "Estimated from the two finest levels.",
-                lambda ax: _draw_error_bars(ax, record, along, amplitude, within.error), amplitude.unit, "norm",
-            )  # fmt: skip
 
     def order(self, quantity: str) -> Iterator[View | str]:
         """Yield the stated order of every member with its interval."""
-        band = f"Grey: an order that is {data.basis_of_order(self.record, quantity)}, with the tolerance of its check."
+        record, along, letter = self.record, self.along, words.symbol(quantity)
+        value, low, high = finest_level.stated_orders(record, quantity)
+        basis = data.basis_of_order(record, quantity)
+
+        def draw(ax: Axes) -> str:
+            promised = promises(self.experiment, record, quantity)
+            for order, tolerance in promised:
+                ax.axhspan(order - tolerance, order + tolerance, **style.ALLOWED)
+                ax.axhline(order, **style.REFERENCE, label=f"{basis}, {order:g} ± {tolerance:g}")
+            for curve in _curves(record, along):
+                look = style.look(curve.number) | {"markersize": 4, "linewidth": 0.8}
+                _interval(ax, curve.x, curve.of(low), curve.of(high), look["color"])
+                label = curve.text or style.entry(record.words("scheme")[curve.scheme])
+                _line(ax, curve.x, curve.of(value), label=label, **look)
+            if promised:
+                least, most = promised[0][0], promised[-1][0]
+                bottom, top = style.limits(value, np.array([least - 0.25, most + 0.25]))
+                ax.set_ylim(max(bottom, least - 3), min(top, most + 2))
+            ax.set_ylabel(f"order of {letter} ({words.USUAL_NORM})")
+            _beside(ax, along, fontsize=7.5 if style.crowded(record) else 8.5)
+            return ""
+
         yield from self._view(
-            f"sweep_order_{quantity}", f"order of {words.symbol(quantity)}", quantity,
-            finest_level.stated_orders(self.record, quantity)[0],
-            f"Stated by each member's levels, with its interval. {band}",
-            lambda ax: _draw_orders(ax, self.experiment, self.record, self.along, quantity), form="order",
+            f"sweep_order_{quantity}", f"order of {letter}", quantity, value,
+            "Stated by each member's levels, with its interval. "
+            f"Grey: an order that is {basis}, with the tolerance of its check.", draw, form="order",
         )  # fmt: skip
 
     def error(self, quantity: str) -> Iterator[View | str]:
         """Yield the error of every member at the finest level."""
-        error = finest_level.error(self.record, quantity)
+        record, along, name = self.record, self.along, f"error of {words.symbol(quantity)}"
+        error, unit = finest_level.error(record, quantity), data.norm_unit(record, quantity)
+
+        def draw(ax: Axes) -> str:
+            both = np.stack([error.true, error.estimate])
+            bounded = np.where(frame.is_bounded(both, frame.sizes(record, quantity)), both, np.nan)
+            true, estimate = map(style.no_zeros, (error.true, error.estimate))
+            # values beyond the frame have no error bar across it
+            low, high = (
+                np.where(np.isfinite(bounded[1]), style.no_zeros(end), np.nan)
+                for end in (error.low, error.high)
+            )
+            for curve in _curves(record, along):
+                x, look = curve.x, style.look(curve.number)
+                _interval(ax, x, curve.of(low), curve.of(high), look["color"])
+                plain = {"color": look["color"], "linestyle": look["linestyle"], "linewidth": 1.0}
+                _line(ax, x, curve.of(estimate), **plain, label=curve.text or "estimated")
+                if np.isfinite(curve.of(true)).any():
+                    has_entry = curve.text and np.isfinite(curve.of(estimate)).any()
+                    text = f"_true, {curve.text}" if has_entry else curve.text or "true"
+                    dots = look | {"linestyle": "none", "markersize": 4, "markerfacecolor": "white"}
+                    _line(ax, x, curve.of(true), label=text, **dots)
+            ax.set_ylabel(style.label(f"{name} ({words.USUAL_NORM})", unit))
+            if not style.crowded(record):
+                _beside(ax, along)
+            # without bounded values all of them set the range
+            fitted = any(
+                style.fit_log_axis(ax, "y", np.ravel(values), below=0.005, least=DEEP)
+                for values in (bounded, both)
+            )
+            return _leaving(ax, along, error.best) if fitted else ""
+
         explanation = "At the finest level, estimated from two levels"
         if error.kind == "true":
             explanation = (
                 "At the finest level: true (dots), and what two levels alone say of it (lines)"
             )
-        has_pairs = bool(data.whole(self.record, "pair"))
+        has_pairs = bool(data.whole(record, "pair"))
         explanation = f"{explanation}, with the interval of the order." if has_pairs else "True."
-        unit = data.norm_unit(self.record, quantity)
         yield from self._view(
-            f"sweep_error_{quantity}", f"error of {words.symbol(quantity)}", quantity, error.best, explanation,
-            lambda ax: _draw_errors(ax, self.record, self.along, quantity), unit, "norm",
-        )  # fmt: skip
+            f"sweep_error_{quantity}", name, quantity, error.best, explanation, draw, unit, "norm"
+        )
 
     def verdict(self, quantity: str) -> Iterator[View | str]:
         """Yield the verdict on every member's order, one row per scheme."""
@@ -207,15 +285,6 @@ class _Drawing:
         )  # fmt: skip
 
 
-def _finish(ax: Axes, key: Key, positions: list[float]) -> str:
-    """Give the axis of the key its scale, label and separatrix; return the sentence on the latter."""
-    view.key_axis(ax, key, 0.03)
-    ax.set_xlabel(key.label)
-    for x in positions:
-        ax.axvline(x, color="black", linestyle=(0, (1, 2)), linewidth=1.0, zorder=1)
-    return "Dotted: the separatrix, where the exact period is infinite." if positions else ""
-
-
 @dataclass(frozen=True)
 class _Curve:
     """The members of a scheme on one line, in ascending order of the key."""
@@ -241,62 +310,6 @@ def _curves(record: Record, along: Along, *, by_line: bool = False) -> list[_Cur
         for k, (line, at) in enumerate(along.lines):
             curves.append(_Curve(s, s * count + k, along.key.values[at], at, _text(scheme, line)))
     return sorted(curves, key=lambda curve: curve.number % count) if by_line else curves
-
-
-def _draw_orders(
-    ax: Axes, experiment: Experiment, record: Record, along: Along, quantity: str
-) -> str:
-    """Draw the stated orders with their intervals."""
-    promised = promises(experiment, record, quantity)
-    for order, tolerance in promised:
-        ax.axhspan(order - tolerance, order + tolerance, **style.ALLOWED)
-        text = f"{data.basis_of_order(record, quantity)}, {order:g} ± {tolerance:g}"
-        ax.axhline(order, **style.REFERENCE, label=text)
-    value, low, high = finest_level.stated_orders(record, quantity)
-    for curve in _curves(record, along):
-        look = style.look(curve.number) | {"markersize": 4, "linewidth": 0.8}
-        _interval(ax, curve.x, curve.of(low), curve.of(high), look["color"])
-        label = curve.text or style.entry(record.words("scheme")[curve.scheme])
-        _line(ax, curve.x, curve.of(value), label=label, **look)
-    if promised:
-        least, most = promised[0][0], promised[-1][0]
-        bottom, top = style.limits(value, np.array([least - 0.25, most + 0.25]))
-        ax.set_ylim(max(bottom, least - 3), min(top, most + 2))
-    ax.set_ylabel(f"order of {words.symbol(quantity)} ({words.USUAL_NORM})")
-    _beside(ax, along, fontsize=7.5 if style.crowded(record) else 8.5)
-    return ""
-
-
-def _draw_errors(ax: Axes, record: Record, along: Along, quantity: str) -> str:
-    """Draw the error of the finest level; return the sentence on values that leave the frame."""
-    error, size = finest_level.error(record, quantity), frame.sizes(record, quantity)
-    both = np.stack([error.true, error.estimate])
-    bounded = np.where(frame.is_bounded(both, size), both, np.nan)
-    true, estimate, low, high = map(
-        style.no_zeros, (error.true, error.estimate, error.low, error.high)
-    )
-    # values beyond the frame have no error bar across it
-    low, high = (np.where(np.isfinite(bounded[1]), end, np.nan) for end in (low, high))
-    for curve in _curves(record, along):
-        x, look = curve.x, style.look(curve.number)
-        _interval(ax, x, curve.of(low), curve.of(high), look["color"])
-        plain = {"color": look["color"], "linestyle": look["linestyle"], "linewidth": 1.0}
-        _line(ax, x, curve.of(estimate), **plain, label=curve.text or "estimated")
-        if np.isfinite(curve.of(true)).any():
-            has_entry = curve.text and np.isfinite(curve.of(estimate)).any()
-            text = f"_true, {curve.text}" if has_entry else curve.text or "true"
-            dots = look | {"linestyle": "none", "markersize": 4, "markerfacecolor": "white"}
-            _line(ax, x, curve.of(true), label=text, **dots)
-    text = f"error of {words.symbol(quantity)} ({words.USUAL_NORM})"
-    ax.set_ylabel(style.label(text, data.norm_unit(record, quantity)))
-    if not style.crowded(record):
-        _beside(ax, along)
-    # without bounded values all of them set the range
-    fitted = any(
-        style.fit_log_axis(ax, "y", np.ravel(values), below=0.005, least=DEEP)
-        for values in (bounded, both)
-    )
-    return _leaving(ax, along, error.best) if fitted else ""
 
 
 def _draw_verdicts(ax: Axes, along: Along, status: NDArray[Any], schemes: list[str]) -> None:
@@ -350,23 +363,6 @@ def _draw_numbers(
     return ""
 
 
-def _draw_amplitudes(
-    ax: Axes, record: Record, along: Along, amplitude: Measured, within: Measured, size: Floats
-) -> str:
-    """Draw amplitudes in a frame that holds those in `within`; `size` is the size of the motion, shape (case,)."""
-    move_label_left(ax)
-    _draw_numbers(ax, record, along, replace(amplitude, error=within.error), None)
-    value, finite = within.value, style.finite(within.value)
-    is_wide = finite.size > 0 and float(finite.max()) > LOG_RATIO * float(np.median(finite))
-    if explosive([value.ravel()]) or (is_wide and explosive([amplitude.value.ravel()])):
-        # decades of a motion that a scheme damps away would fill the frame
-        least = np.nanmin(np.append(size, np.nanmax(value))) / frame.UNBOUNDED
-        style.fit_log_axis(ax, "y", np.maximum(value, least), room=2.0)
-    else:
-        ax.set_ylim(*_room(within, None))
-    return _leaving(ax, along, amplitude.value)
-
-
 def _room(number: Measured, exact: Floats | None) -> tuple[float, float]:
     """Return limits that hold all values and their error bars, these up to the spread of the values."""
     values = style.finite(number.value)
@@ -401,21 +397,6 @@ def _draw_period_errors(ax: Axes, record: Record, along: Along, period: Measured
     if not style.crowded(record):
         _beside(ax, along, fontsize=8)
     return ""
-
-
-def _draw_error_bars(ax: Axes, record: Record, along: Along, number: Measured, held: Floats) -> str:
-    """Draw the estimated error of a number of the finest level, in a frame that holds the errors `held`."""
-    for curve in _curves(record, along):
-        look = style.look(curve.number) | {"markersize": 4}
-        text = curve.text or style.entry(record.words("scheme")[curve.scheme])
-        _line(ax, curve.x, style.no_zeros(curve.of(number.error)), **look, label=text)
-    # as a motion is damped away, its error falls without limit
-    shown = held if np.isfinite(held).any() else number.error
-    style.fit_log_axis(ax, "y", shown, least=DEEP, room=2.0)
-    ax.set_ylabel(style.label("estimated error", number.unit))
-    if len(along.lines) > 1 and not style.crowded(record):
-        _beside(ax, along, fontsize=8)
-    return _leaving(ax, along, number.error)
 
 
 def _leaving(ax: Axes, along: Along, values: Floats) -> str:

@@ -88,9 +88,12 @@ def shared_verdict(record: Record, quantity: str, scheme: int | None = None) -> 
 
 
 def shared(name: str, values: Floats, unit: str = "", form: str = "step") -> str:
-    """Say which finite value all members share, such as ``period 6.283 s``; empty if there is none."""
-    finite = style.finite(values)
-    if not finite.size or finest_level.varies(values):
+    """Say which finite value all members share, such as ``period 6.283 s``; empty if there is none.
+
+    Orders are compared to three decimals.
+    """
+    finite = style.finite(np.round(values, 3) if form == "order" else values)
+    if not finite.size or finest_level.varies(finite):
         return ""
     number = words.number(float(finite[0]), form)
     is_partial = finite.size < values.size
@@ -98,16 +101,16 @@ def shared(name: str, values: Floats, unit: str = "", form: str = "step") -> str
     return f"{name} {number} {unit}".rstrip() + count
 
 
-def key_axis(ax: Axes, key: Key, part: float) -> None:
-    """Give the horizontal axis the scale and the words of a key.
+def key_axis(ax: Axes, key: Key, margin: float, most: int = 7, **look: Any) -> None:
+    """Give the horizontal axis the scale, the words and the label of a key.
 
-    A logarithmic axis is extended at both ends by the fraction `part` of the decades that the key spans.
+    A logarithmic axis is extended at both ends by the fraction `margin` of the decades that the key spans.
     """
     if key.is_log:
-        room = (key.distinct[-1] / key.distinct[0]) ** part
-        style.log_axis(ax, "x", float(key.distinct[0] / room), float(key.distinct[-1] * room))
+        style.log_axis(ax, "x", *style.log_limits(key.distinct, margin=margin), most=most)
     if key.words:
         ax.set_xticks(key.distinct, key.words)
+    ax.set_xlabel(key.label, **look)
 
 
 def ring(ax: Axes, x: float, y: float, *, on_map: bool = False) -> bool:
