@@ -149,7 +149,7 @@ def test_the_size_of_a_shard_knows_nothing_of_the_number_of_members(plan_of: Pla
 @pytest.mark.parametrize("schemes", [1, 3])
 @pytest.mark.parametrize("samples", [17, 1025, 2**20])
 def test_a_shard_is_some_seconds_in_bounded_memory(level: int, schemes: int, samples: int) -> None:
-    load = cost.LevelCost(schemes, 2**level, samples, 6)
+    load = cost.LevelCost(schemes, 2**level, samples, 6, work=schemes)
     members = load.shard
     assert members & (members - 1) == 0
     work = members * schemes * 2**level * cost.MANY_SECONDS

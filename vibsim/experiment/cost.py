@@ -136,8 +136,8 @@ class LevelCost:
     """Stored series per scheme and member."""
     exact: int = 0
     """Stored series per member independent of the schemes: the states of the exact solution."""
-    work: float | None = None
-    """Work of a step, summed over the explicit schemes (first number of `work`); None for 1 per scheme."""
+    work: float = 1.0
+    """Work of a step, summed over the explicit schemes (first number of `work`)."""
     iterated: float = 0.0
     """Work of a step, summed over the implicit schemes (second number of `work`), which are not vectorised."""
     extrema: int = 0
@@ -221,8 +221,7 @@ class LevelCost:
 
     def _step(self, explicit: float, iterated: float) -> float:
         """Return the time of a step of all schemes, given that of a unit of each kind of work [s]."""
-        units = self.schemes if self.work is None else self.work
-        return units * explicit + self.iterated * iterated
+        return self.work * explicit + self.iterated * iterated
 
     def _is_plain(self, members: int) -> bool:
         return members * self.steps <= PLAIN_MEMBER_STEPS * self.chain

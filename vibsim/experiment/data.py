@@ -301,6 +301,16 @@ class ReadExperiment(Section):
         is_whole = self.name == file.stem
         return word if is_whole else f"{word}@{self.name.removeprefix(f'{file.stem}_case_')}"
 
+    def refused(self, key: str, value: str, rule: str, hint: str = "") -> InputError:
+        """Return the error of a value of the file that breaks a rule only when it is used."""
+        return InputError([Fault(str(self._file or self.name), 0, key, value, rule, hint)])
+
+    def check_member(self, case: int, members: int) -> None:
+        """Raise `InputError` if there is no member number `case` among `members`."""
+        if not 0 <= case < members:
+            there = "there is 1 member" if members == 1 else f"there are {members} members"
+            raise self.refused("", str(case), f"a case must be from 0 to {members - 1}", there)
+
     def command_of(self, case: int) -> str:
         """Return the shell command that runs only member `case` of the sweep."""
         return command_to_run(f"{self.word}@{case}", self.settings)
@@ -399,14 +409,6 @@ class ExperimentSpec(ReadExperiment):
 
 AnyExperiment = TypeVar("AnyExperiment", bound=ExperimentSpec)
 """Class of an experiment, kept by functions that derive one experiment from another."""
-
-
-def check_member(case: int, members: int, name: str) -> None:
-    """Raise `InputError` if the experiment, read from file `name`, has no member number `case`."""
-    if not 0 <= case < members:
-        there = "there is 1 member" if members == 1 else f"there are {members} members"
-        rule = f"a case must be from 0 to {members - 1}"
-        raise InputError([Fault(name, 0, "", str(case), rule, there)])
 
 
 def schemes_of(experiment: ExperimentSpec, check: Check) -> tuple[int, ...]:

@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any, TypeVar
 
-from vibsim.core.errors import Fault, InputError
-from vibsim.experiment.data import AnyExperiment, ExperimentSpec, SchemeSpec, Sweep, check_member
+from vibsim.experiment.data import AnyExperiment, ExperimentSpec, SchemeSpec, Sweep
 from vibsim.experiment.faults import Report
 from vibsim.experiment.rules import size_limits
 from vibsim.experiment.rules.checks import check_published, finish_checks
@@ -39,11 +38,11 @@ def alone(experiment: AnyExperiment, case: int) -> AnyExperiment:
 
     Raises `InputError` if there is no such member, or if it starts from the final state of another one.
     """
-    check_member(case, experiment.members, str(experiment.file or experiment.name))
+    experiment.check_member(case, experiment.members)
     if case % experiment.chain:
-        name, rule = str(experiment.file or experiment.name), "starts where the member before ends"
+        rule = "starts where the member before ends"
         hint = f"run the sweep, or @{case - case % experiment.chain}, which starts as the file says"
-        raise InputError([Fault(name, 0, "sweep.follow", str(case), rule, hint)])
+        raise experiment.refused("sweep.follow", str(case), rule, hint)
     member_values = columns(experiment, case, case + 1)
     swept = {key: column[0].item() for key, column in member_values.items()}
     parameters = _filled(swept, "model", experiment.model.parameters)

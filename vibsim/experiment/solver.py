@@ -15,7 +15,7 @@ from typing import Annotated, Any
 
 from pydantic import AfterValidator
 
-from vibsim.experiment.data import ReadExperiment, Sweep, check_member
+from vibsim.experiment.data import ReadExperiment, Sweep
 from vibsim.experiment.schema.checks import as_data, without_kind
 from vibsim.experiment.schema.fields import FrozenDict, Section, Text
 from vibsim.experiment.schema.solver import (
@@ -116,7 +116,7 @@ class SolverExperiment(ReadExperiment):
 
         Raises `InputError` if there is no such member.
         """
-        check_member(member, self.members, str(self.file or self.name))
+        self.check_member(member, self.members)
         update = {
             "name": f"{self.name}_case_{member}",
             "sweep": None,

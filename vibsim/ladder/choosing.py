@@ -29,7 +29,7 @@ from vibsim.comparison.extrapolate_members import (
 )
 from vibsim.convergence.state_extrapolation import Pair
 from vibsim.core.array_types import Floats, Integers
-from vibsim.core.errors import Fault, InputError, VibsimError
+from vibsim.core.errors import InputError, VibsimError
 from vibsim.experiment import storage, sweep_columns
 from vibsim.experiment.schema.fields import MAX_LEVEL
 from vibsim.ladder.solving import climb
@@ -268,5 +268,4 @@ def _refused(experiment: Experiment, best: _Trial | None, reason: str) -> InputE
             f"(scheme {best.scheme}, member {best.case})"
         )
     rule = f"no ladder reaches it: {reason}"
-    name = str(experiment.file or experiment.name)
-    return InputError([Fault(name, 0, "tolerance", f"{experiment.tolerance:g}", rule, hint)])
+    return experiment.refused("tolerance", f"{experiment.tolerance:g}", rule, hint)

@@ -13,7 +13,6 @@ from functools import partial
 from typing import Any
 
 from vibsim.core import regular_files
-from vibsim.core.errors import Fault, InputError
 from vibsim.core.vocabulary import FORMAT
 from vibsim.experiment.solver import SolverExperiment
 from vibsim.plan import code_digest
@@ -116,7 +115,7 @@ def _digest(experiment: SolverExperiment, name: str) -> str:
         return regular_files.digest(experiment.folder / name)
     except (OSError, ValueError) as error:
         rule = f"cannot be read ({getattr(error, 'strerror', None) or error})"
-        raise _refusal(experiment, name, rule) from None
+        raise experiment.refused(f"solver.{experiment.solver.kind}", name, rule) from None
 
 
 def _code(experiment: SolverExperiment, module: str) -> str:
@@ -124,10 +123,5 @@ def _code(experiment: SolverExperiment, module: str) -> str:
     digest = code_digest.of_module(module, experiment.folder)
     if not digest:
         rule = "cannot be found: no installed package and no module beside the file has this name"
-        raise _refusal(experiment, module.partition(".")[0], rule)
+        raise experiment.refused("solver.python", module.partition(".")[0], rule)
     return digest
-
-
-def _refusal(experiment: SolverExperiment, value: str, rule: str) -> InputError:
-    key = f"solver.{experiment.solver.kind}"
-    return InputError([Fault(str(experiment.file), 0, key, value, rule)])

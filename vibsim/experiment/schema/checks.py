@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Mapping
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self, get_args
 
-from pydantic import BeforeValidator, ConfigDict, Discriminator, Field, StrictBool, WithJsonSchema
+from pydantic import BeforeValidator, ConfigDict, Field, StrictBool, WithJsonSchema
 from pydantic_core import PydanticCustomError
 
 from vibsim.core.errors import likely
@@ -24,10 +24,9 @@ from vibsim.experiment.schema.fields import (
     Positive,
     Section,
     Text,
+    by_form,
     number,
     refused,
-    tag,
-    tagged,
     whole,
 )
 from vibsim.experiment.value_names import MOST_EVENTS, VALUES, Take, Value
@@ -426,26 +425,11 @@ def without_kind(data: Mapping[str, Any]) -> dict[str, Any]:
     return fields | ({"that": without_kind(fields["that"])} if "that" in fields else {})
 
 
-def by_key(kinds: Iterable[str]) -> Callable[[Any], str | None]:
-    """Return a function that gives the tag of a check, found by its leading key among `kinds`."""
-
-    def discriminate(value: Any) -> str | None:
-        if isinstance(value, ClaimCheck | MeasuringCheck):
-            kind: str = value.kind
-            return tag(kind)
-        keys = value if isinstance(value, dict) else ()
-        return next((tag(key) for key in kinds if key in keys), None)
-
-    return discriminate
-
-
-def one_of(members: Mapping[str, type[Section]], discriminate: Callable[[Any], str | None]) -> Any:
-    """Return the tagged union of checks; `discriminate` gives the tag (`by_key`)."""
-    *first, last = members
-    rule = f"must be a mapping with the key {', '.join(first)} or {last}"
-    return tagged(
-        members, Discriminator(discriminate, custom_error_type="check", custom_error_message=rule)
-    )
+def one_of(members: Mapping[str, type[Section]]) -> Any:
+    """Return the union of kinds of checks by their leading key; a claim has others as well."""
+    *others, last = members
+    rule = f"must be a mapping with the key {', '.join(others)} or {last}"
+    return by_form(members, rule, "check", first="claim")
 
 
 Measurement = (
@@ -455,12 +439,10 @@ MEASURED: Mapping[str, type[Section]] = MappingProxyType(
     {check.kind: check for check in get_args(Measurement)}
 )
 """The checks that measure something, by leading key."""
-KINDS = ("claim", *MEASURED)
-"""Leading keys, in the order in which they are tried."""
 if TYPE_CHECKING:
     Measured = Measurement
 else:
-    Measured = one_of(MEASURED, by_key(KINDS))
+    Measured = one_of(MEASURED)
 
 
 class ClaimCheck(Section):
@@ -490,4 +472,4 @@ class ClaimCheck(Section):
 if TYPE_CHECKING:
     Check = Measurement | ClaimCheck
 else:
-    Check = one_of({**MEASURED, "claim": ClaimCheck}, by_key(KINDS))
+    Check = one_of({**MEASURED, "claim": ClaimCheck})

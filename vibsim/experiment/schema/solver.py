@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, get_args
 from pydantic import BeforeValidator, ConfigDict, Field
 
 from vibsim.core.vocabulary import Restriction
-from vibsim.experiment.schema.checks import Accuracy, Expect, MeasuringCheck, by_key, one_of
+from vibsim.experiment.schema.checks import Accuracy, Expect, MeasuringCheck, one_of
 from vibsim.experiment.schema.citation import Citation
 from vibsim.experiment.schema.document import Levels, json_schema
 from vibsim.experiment.schema.fields import (
@@ -135,7 +135,7 @@ CHECKS: Mapping[str, type[Section]] = MappingProxyType(
 if TYPE_CHECKING:
     SolverCheck = SolverConvergesCheck | SolverAccurateCheck
 else:
-    SolverCheck = one_of(CHECKS, by_key(CHECKS))
+    SolverCheck = one_of(CHECKS)
 
 
 class ResourcesSection(Section):

@@ -14,7 +14,7 @@ import numpy as np
 
 from vibsim.core import netcdf
 from vibsim.core.array_types import Floats
-from vibsim.core.errors import Fault, InputError, nearest
+from vibsim.core.errors import nearest
 from vibsim.experiment.data import ExperimentSpec
 from vibsim.experiment.schema.fields import TABLE
 from vibsim.experiment.tables import csv_text
@@ -200,6 +200,6 @@ def attach(experiment: ExperimentSpec) -> None:
                 rule = "has other numbers than when the experiment was read"
                 raise TableError(rule, "run the experiment again")
         except TableError as error:
-            file, key = str(experiment.file or experiment.name), f"model.{name}.{TABLE}"
-            raise InputError([Fault(file, 0, key, spec.file, error.rule, error.hint)]) from None
+            key = f"model.{name}.{TABLE}"
+            raise experiment.refused(key, spec.file, error.rule, error.hint) from None
         spec.hold(table, content)
