@@ -271,6 +271,20 @@ def test_linear_interpolation_that_may_hide_an_order_is_named() -> None:
     assert (cubic.status, cubic.advice) == ("PASS", "")
 
 
+@pytest.mark.parametrize(("kind", "counts"), [("f8", (4000, 8000, 16000)), ("f4", (90, 180, 360))])
+def test_times_summed_step_by_step_are_the_same_on_all_levels(
+    kind: str, counts: tuple[int, ...]
+) -> None:
+    """After n sums of t + dt a time is off by up to n units of its last digit."""
+    levels = []
+    for n in counts:
+        t = np.cumsum(np.array([0.0, *[10.0 / n] * n], dtype=kind), dtype=kind)
+        u = np.sin(np.linspace(0.0, 3.0, n + 1)) * (1 + n**-2.0)
+        levels.append(xarray.DataArray(u, {"t": t}, ["t"], name="u"))
+    verdict = judge([1 / n for n in counts], levels, order=2)
+    assert "in common" not in verdict.sentence
+
+
 @pytest.mark.parametrize("times", [(0.0, 0.3, 0.6), (0.3,)])
 @pytest.mark.parametrize("dims", [None, ["x"]])
 def test_an_exact_function_is_averaged_only_where_the_levels_are(

@@ -356,6 +356,14 @@ def test_a_value_that_is_not_finite_counts_wherever_it_is(bad: float) -> None:
     assert [one.reason for one in found] == ["asymptotic", "non_finite"]
 
 
+def test_masked_cells_are_not_advised_to_be_left_out_with_all_levels() -> None:
+    levels = [u.where(abs(u.x - 0.5) > 0.2) for u in on_grids([10, 20, 40], 2.0)]
+    verdict = judge(H[:3], levels, order=2)
+    assert verdict.reason == "non_finite"
+    assert "leave masked points out" in verdict.advice
+    assert "leave these levels out" in judge(H[:3], [math.nan] * 3).advice
+
+
 @pytest.mark.parametrize("off", [1e-2, 1.0, -1.0])
 @pytest.mark.parametrize("shape", [1.0, np.linspace(0.5, 1.0, 6)])
 @pytest.mark.parametrize("known", [False, True])

@@ -125,11 +125,15 @@ def same_points(dim: str, coordinates: Sequence[Coordinate], lengths: Sequence[i
 
 
 def spacing_tolerance(points: NDArray[Any], epsilon: float) -> float:
-    """Return the largest distance of equal points: a part of the spacing plus rounding."""
+    """Return the largest distance of equal points: a part of the spacing plus rounding.
+
+    Points may be summed step by step, each with a rounding error; that counts up to a visible part of the spacing.
+    """
     size = float(np.max(np.abs(points)))
     gaps = np.abs(np.diff(np.sort(points)))
     spacing = float(np.min(gaps)) if gaps.size else size
-    return EQUAL * spacing + 8.0 * epsilon * size
+    rounding = epsilon * size
+    return EQUAL * spacing + max(8.0 * rounding, min(len(points) * rounding, CENTRED * spacing))
 
 
 def _all_points(coordinate: Coordinate, levels: int, length: int) -> Common:

@@ -187,6 +187,9 @@ def _phrases(facts: LadderVerdict, setting: Setting) -> dict[str, Any]:
     # sizes near the limits of double precision may have no finer one
     such_as = f", such as {facts.size_name} = {finer}" if 0.0 < float(finer) < h[-1] else ""
     not_finite = [level.h for level in facts.levels if level.value is None]
+    these = "this level" if len(not_finite) == 1 else "these levels"
+    if len(not_finite) == count and not facts.is_number:
+        these = "masked points"
     if facts.expected is not None:
         wanted, as_expected = f"{facts.expected:g}", ", as expected"
     elif facts.at_least is not None:
@@ -205,7 +208,7 @@ def _phrases(facts: LadderVerdict, setting: Setting) -> dict[str, Any]:
         "noise": "the stated noise" if setting.noise else "round-off",
         "floor": "the stated noise" if setting.noise else "round-off or other noise",
         "not_finite": f"{facts.size_name} = {listed(not_finite)}",
-        "these": "this level" if len(not_finite) == 1 else "these levels",
+        "these": these,
         "estimate": f" (the last estimate is {number(round(facts.order, 3) + 0.0, 3)})"
         if facts.order is not None
         else "",
