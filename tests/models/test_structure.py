@@ -12,6 +12,7 @@ from scipy.io import mmwrite
 from scipy.linalg import expm
 from scipy.sparse import coo_array
 
+from vibsim import analyse, verdicts
 from vibsim.core.errors import InputError
 from vibsim.experiment import Experiment
 from vibsim.experiment.tables.content import TableError
@@ -337,6 +338,25 @@ def test_a_beam_of_a_thousand_degrees_of_freedom_is_of_second_order(tmp_path: Pa
     orders = np.log2(np.array(errors[:-1]) / errors[1:])
     np.testing.assert_allclose(orders, 2.0, atol=0.05)
     assert time.monotonic() - begin < 60.0
+
+
+def test_a_node_of_the_shape_of_a_mode_is_at_rest():
+    """Its start is the rounding of the others, which differed from the exact one: levels did not belong together."""
+    stiffness = 2 * np.eye(5) - np.eye(5, k=1) - np.eye(5, k=-1)
+    start = {"displacement": {"mode": 2, "size": 0.005}}
+    model = {"kind": "structure", "stiffness": stiffness.tolist(), "start": start}
+    end = {
+        "value": "end",
+        "quantity": "u1",
+        "at": {"level": "best"},
+        "equals": 0.005 * np.cos(30),
+        "atol": 1e-5,
+    }
+    rest = {"value": "max_abs", "quantity": "u3", "at": {"level": "best"}, "below": 1e-15}
+    # the second frequency is 1
+    own = of(model, time={"end": 30, "base_steps": 60}, levels=[1, 2, 3, 4], checks=[end, rest])
+    levels = [simulate(own, level) for level in own.levels]
+    assert [verdict.status for verdict in verdicts(own, analyse(own, levels))] == ["PASS", "PASS"]
 
 
 def test_one_degree_of_freedom_is_counted_like_several():

@@ -16,6 +16,9 @@ import numpy as np
 # Largest difference of the initial values of levels, relative to the state: above the rounding of an exact solution.
 # [convention]
 SAME_START = 1e-9
+# The same relative to the largest state: rounding of a state that is at rest beside others.
+# [convention]
+ROUNDED_START = 2.0**-40
 
 # ---- The size of a motion
 

@@ -266,8 +266,11 @@ def _check_reduction(check: ValueCheck, scope: Scope) -> None:
     axes = scope.setting.sweep.axes
     keys = [key for axis in axes for key in axis.keys if not key.startswith("schemes.")]
     if check.over not in keys:
+        rule = "is not a swept key with numbers"
         hint = nearest(check.over, keys) if keys else "there is no sweep of numbers"
-        scope.at("over").refuse("is not a swept key with numbers", hint, check.over)
+        if check.over == "cases" and keys:
+            rule, hint = "stands for the only swept key", f"choose from {', '.join(keys)}"
+        scope.at("over").refuse(rule, hint, check.over)
         return
     if check.at.case is not None or check.over in check.at.swept:
         scope.at("over").refuse("is fixed by `at:`", "leave one of them out", check.over)
