@@ -165,7 +165,7 @@ def against_step(record: Record, lead: Lead) -> Picture | None:
     style.fit_log_axis(ax, "y", *drawn, least=1e-18, room=2.5, most=5)
     style.log_axis(ax, "x", float(dt.min()) / 1.4, float(dt.max()) * 1.4, most=4)
     ax.set_ylim(top=min(2.5 * high, style.LARGEST))
-    ax.set_xlabel(style.label("time step", data.time_unit(record, "dt")))
+    ax.set_xlabel(style.label("time step dt", data.time_unit(record, "dt")))
     _legend(ax, columns=2, size=7.5)
     title, found = "Error against time step", findings.factor(lead)
     if found is not None:
@@ -251,8 +251,11 @@ def response(experiment: Experiment, record: Record, lead: Lead) -> Picture | No
         return None
     name, text, values = found
     layout = sweep_layout.layout_of(experiment, record)
+    hollow = np.zeros(values.shape, np.bool_)
     if isinstance(layout, Along):
-        ax = _curves(lead, layout, values, text)
+        if name == "amplitude":
+            hollow = finest_level.unsettled(record, choice.position(experiment))[lead.member.scheme]
+        ax = _curves(lead, layout, values, text, hollow)
     elif isinstance(layout, Grid):
         ax = _map(lead, layout, values, text)
     else:
@@ -267,6 +270,7 @@ def response(experiment: Experiment, record: Record, lead: Lead) -> Picture | No
         f"{name[:1].upper()}{name[1:]} of {count} members",
         "Each member is one run of the sweep, at its finest level."
         + f" The others have no {name}." * (known < every)
+        + f" Hollow: not settled; {finest_level.SWINGS}." * bool(hollow.any())
         + " The ring is the hardest member." * is_marked,
         f"{name} of every member over the swept parameters",
         ax.get_figure(root=True),
@@ -314,13 +318,18 @@ def _across(ax: Axes, key: sweep_layout.Key) -> None:
     ax.set_xlabel(key.label)
 
 
-def _curves(lead: Lead, along: Along, values: Floats, text: str) -> Axes:
+def _curves(lead: Lead, along: Along, values: Floats, text: str, hollow: Flags) -> Axes:
+    """Draw curves over the key, with `hollow` markers for some members; few values are not joined."""
     ax = _panel(LEFT, text)
     for i, (name, cases) in enumerate(along.lines):
         x, y = along.key.values[cases], values[cases]
         few: dict[str, Any] = {"markersize": 3.5} if x.size <= 40 else {"marker": ""}
-        look = style.look(i) | few
-        ax.plot(x, y, **look, linewidth=1.6, label=name or None)
+        look = style.look(i) | few | {"linewidth": 1.6}
+        if along.key.distinct.size < sweep_layout.FEWEST_OF_A_LINE:
+            look |= {"linestyle": "none", "markersize": 5}
+        ax.plot(x, y, **look, label=name or None)
+        shown = hollow[cases]
+        ax.plot(x[shown], y[shown], **look | {"linestyle": "none", "markerfacecolor": "white"})
     _across(ax, along.key)
     _scaled(ax, values)
     _mark(ax, along.key.values, values, lead)
@@ -427,8 +436,15 @@ class _Orders:
             )
         if not self.inside.all():
             return f"{within} of {of} members have an order in the band"
-        measured = np.abs(self.order - self.promised) <= self.allowed
-        return "All members keep their order" if measured.all() else "All intervals reach the band"
+        beyond = int(np.sum(np.abs(self.order - self.promised) > self.allowed))
+        if not beyond:
+            return "All members keep their order"
+        verb, whose = (
+            ("lies", "its interval reaches") if beyond == 1 else ("lie", "their intervals reach")
+        )
+        return (
+            f"{words.number(beyond, 'integer')} of {of} orders {verb} outside the band; {whose} in"
+        )
 
 
 def orders(experiment: Experiment, record: Record, lead: Lead) -> Picture | None:
