@@ -21,7 +21,7 @@ from vibsim.core.vocabulary import SECONDS_OF_NORM
 from vibsim.report import choice, data, finest_level, series, style, sweep_layout, words
 from vibsim.report.choice import Lead
 from vibsim.report.data import Member
-from vibsim.report.figures import panels, time
+from vibsim.report.figures import moments, panels, time
 from vibsim.report.figures.sweeps.view import ring
 from vibsim.report.style import Picture
 from vibsim.report.sweep_layout import Along, Grid
@@ -199,7 +199,15 @@ def solution(
     if has_exact:
         ax.plot(*style.thin(*exact, 200), color=style.PALE, linewidth=4.5, label=name)
     text = f"{words.number(int(record['steps'][-1]), 'integer')} steps"
-    ax.plot(*style.thin(t, values, 200), color=style.COLOURS[0], linewidth=1.4, label=text)
+    # as in the figure of the motion, lines between too few samples would cut off its extremes
+    turns = exact if has_exact else (t, values)
+    is_dotted = moments.is_undersampled(int(record["steps"][-1]), t, turns)
+    look: dict[str, Any] = (
+        {"linestyle": "none", "marker": ".", "markersize": 3.0} if is_dotted else {}
+    )
+    ax.plot(
+        *style.thin(t, values, 200), color=style.COLOURS[0], label=text, **{"linewidth": 1.4} | look
+    )
     panels.fit_values(ax, [values], exact[1])
     panels.stop_at_breakdown(ax, t, [values])
     ax.set_xlabel(data.time_label(record))

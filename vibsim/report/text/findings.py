@@ -7,6 +7,8 @@ import re
 from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 
+import numpy as np
+
 from vibsim.checks.order_context import COINCIDE
 from vibsim.checks.order_text import UNSEEN
 from vibsim.checks.outcome import about_members
@@ -15,6 +17,7 @@ from vibsim.core.record import Record
 from vibsim.core.vocabulary import plain_name
 from vibsim.report import data, words
 from vibsim.report.choice import Lead, is_refutation, is_trap
+from vibsim.report.series import name_of_exact
 from vibsim.report.text import assertions, reasons
 from vibsim.report.types import Experiment, Measurement
 
@@ -70,6 +73,8 @@ OPEN = {
     "tolerance": "It is undecided whether the tolerance is reached",
 }
 """Kind of an undecided check to the title of a page on it."""
+GROWN = 2.0
+"""Ratio of the finest error to the smallest one from which a page says that refinement does harm."""
 NO_CHECK = "The motion was computed, and nothing was asked of it"
 BROKE_DOWN = "The run breaks down before its end"
 CLAIMS = {
@@ -92,7 +97,7 @@ TRUSTED = (
     "The rescaled differences of the levels coincide, so the estimate of the error can be trusted."
 )
 ROUGH = "The rescaled differences of the levels do not coincide yet, so the estimate of the error is rough."
-BESIDE = " The true error is known here, and the estimate is within {part} % of it."
+BESIDE = " The estimate is within {part} % of the error against the {name} solution."
 
 
 def title(experiment: Experiment, record: Record, lead: Lead, printed: Collection[str]) -> str:
@@ -345,7 +350,9 @@ def paragraph(experiment: Experiment, record: Record, lead: Lead, levels: int) -
             factor=f"{ratio:.3g}",
             due=due,
             trust=ROUGH if is_rough else TRUSTED,
-            beside="" if deviation is None else BESIDE.format(part=percent),
+            beside=""
+            if deviation is None
+            else BESIDE.format(part=percent, name=name_of_exact(experiment)),
             unseen=UNSEEN if deviation is None else "",
         )
     if is_refutation(lead.asserted) and lead.entry["reason"] == "match":
@@ -356,7 +363,20 @@ def paragraph(experiment: Experiment, record: Record, lead: Lead, levels: int) -
         return ""
     word = lead.result.get("reason") if lead.is_on_order else lead.entry["reason"]
     is_promised = keeps_promise(record, lead.measured, lead.entry)
-    return reasons.reason(word, kind, levels=levels, is_promised=is_promised).meaning
+    meaning = reasons.reason(word, kind, levels=levels, is_promised=is_promised).meaning
+    return meaning + (_growing_error(record, lead) if word == "round_off" else "")
+
+
+def _growing_error(record: Record, lead: Lead) -> str:
+    """Say from which level on finer ones have a larger true error; empty if none do, or it is unknown."""
+    norm, member = data.norm_index(record, lead.norm), lead.member
+    name = f"{lead.quantity}_error_norm"
+    error = data.at(record, name, member, norm=norm) if name in record else np.empty(0)
+    if not error.size or not np.isfinite(error).all() or error[-1] < GROWN * error.min():
+        return ""
+    level = data.whole(record, "level")[int(np.argmin(error))]
+    times = words.number(float(error[-1] / error.min()), "brief")
+    return f" The error is smallest at level {level}; at the finest level it is {times} times as large."
 
 
 def asked_of(record: Record, lead: Lead) -> str:
