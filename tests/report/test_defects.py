@@ -10,9 +10,9 @@ import pytest
 import samples
 
 from vibsim import report
-from vibsim.report import choice, data, style, words
+from vibsim.report import choice, data, finest_level, style, words
 from vibsim.report.data import Member
-from vibsim.report.figures import order, solution, time
+from vibsim.report.figures import order, scenes, solution, time
 from vibsim.report.page import hero
 from vibsim.report.tables import levels as contents
 from vibsim.report.text import findings, setting
@@ -239,3 +239,41 @@ def test_an_undecided_verdict_states_no_order_anywhere():
     # nothing can be extrapolated either
     with style.applied():
         assert "the finest solution" in solution.motion(exp, record, "u", member).caption
+
+
+def test_an_amplitude_of_a_motion_that_still_changes_is_not_settled():
+    oscillator = {"kind": "oscillator", "m": 1.0, "spring": "u"}
+    found = [
+        finest_level.unsettled(
+            samples.record(
+                samples.experiment(
+                    model=oscillator | damping, initial={"u": 1.0, "v": 0.0}, levels=[8, 9],
+                    time={"end": 60.0}, checks=[], sweep={"initial.u": [1.0, 2.0]},
+                )
+            ),
+            "u",
+        ).tolist()
+        for damping in ({}, {"damping": {"linear": 0.1}})
+    ]  # fmt: skip
+    assert found == [[[False, False]], [[True, True]]]
+
+
+def test_an_empty_panel_has_one_remark():
+    with style.applied():
+        ax = style.canvas(1.0).add_subplot()
+        style.remark(ax, "nothing to divide")
+        style.beside(ax)
+    assert [text.get_text() for text in ax.texts] == ["nothing to divide"]
+
+
+@pytest.mark.parametrize(
+    "model",
+    [
+        {"kind": "system", "coordinates": ["theta"], "acceleration": {"theta": "-sin(theta)"}},
+        {"kind": "oscillator", "spring": "u", "stop": "u < -3"},
+    ],
+)
+def test_no_body_on_a_spring_is_drawn_for_an_angle_or_before_a_stop(model):
+    position = "theta" if model["kind"] == "system" else "u"
+    exp = samples.experiment(model=model, initial={position: 1.0}, checks=[])
+    assert scenes.scene_of(exp.model.definition) is None

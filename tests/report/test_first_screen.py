@@ -62,14 +62,16 @@ def test_every_reason_and_every_kind_of_check_has_a_title():
         ({"checks": [{"equal": ["central", "exact"], "quantity": "theta", "atol": 1.0}, {"stable": True}]},
          "Scheme central is stable, as expected"),
         ({"checks": [{"claim": "so", "that": {"value": "period", "above": 1.0}, "holds": False}]},
-         "Not refuted: So"),
+         "Not shown to be false: So"),
         ({"checks": [{"claim": "so", "that": {"value": "period", "below": 1.0}}]}, "Not confirmed: So"),
-        ({"checks": [{"claim": "s" * 120, "that": {"stable": False}, "holds": False}]}, f"Refuted: S{'s' * 108}…"),
+        ({"checks": [{"claim": "s" * 120, "that": {"stable": False}, "holds": False}]},
+         f"Shown to be false: S{'s' * 108}…"),
         ({"checks": [{"accurate": "theta", "relative": 1e-9, "expect": {"status": "FAIL"}}]},
          "The angle θ is not as accurate as asked: the trap is caught"),
         ({"checks": [{"accurate": "theta", "relative": 0.5, "expect": {"status": "FAIL"}}]},
          "The angle θ is as accurate as asked, against what the check expects"),
-        ({"checks": [{"claim": "so", "that": {"value": "period", "below": 1.0}, "holds": False}]}, "Refuted: So"),
+        ({"checks": [{"claim": "so", "that": {"value": "period", "below": 1.0}, "holds": False}]},
+         "Shown to be false: So"),
         ({"schemes": [*WRONG, {"kind": "central", "label": "sound"}],
           "checks": [{"converges": "theta", "order": 2, "schemes": ["sound"]},
                      {"converges": "theta", "order": 2, "schemes": ["central"], "expect": {"status": "FAIL"}}]},
@@ -176,10 +178,10 @@ def test_badges_tell_a_claim_and_a_trap_from_a_check_that_passed():
     exp = samples.experiment(checks=checks)
     record, summary, _ = found(exp)
     assert [card["badge"] for card in cards.cards(exp, record, summary)] == [
-        "passed", "as claimed", "refuted", "trap caught", "failed",
+        "passed", "as claimed", "shown to be false", "trap caught", "failed",
     ]  # fmt: skip
     # the index says the same words of the same checks
-    assert words.marks(summary["checks"]) == [("trap caught", 1), ("refuted", 1)]
+    assert words.marks(summary["checks"]) == [("trap caught", 1), ("shown to be false", 1)]
 
 
 @pytest.mark.parametrize("norm", ["l1", "l2", "linf", "linf_interior"])
@@ -244,7 +246,7 @@ def test_the_title_of_a_ladder_with_a_least_order_names_the_measured_one():
 def test_an_estimate_is_no_observed_order():
     shown = first(samples.experiment(levels=[2, 3, 4], time={"end": 20.0}))
     orders = [n for n in shown["numbers"] if n["label"].startswith("Observed order")]
-    assert [n["value"] for n in orders] == ["not known"]
+    assert [n["value"] for n in orders] == ["not measurable"]
 
 
 def test_an_equation_becomes_markup():
@@ -345,7 +347,7 @@ def test_an_order_beside_the_band_whose_interval_reaches_it_is_told_as_such(monk
     record, _, decisive = found(exp)
     for order, low, title in (
         (2.05, 2.0, "All members keep"),
-        (2.3, 2.05, "All intervals reach the band"),
+        (2.3, 2.05, "1 of 2 orders lies outside the band; its interval reaches in"),
         (2.3, 2.15, "1 of 2 members have"),
     ):
         ends = (np.array([row]) for row in ([2.0, order], [2.0, low], [2.0, order]))
@@ -533,7 +535,9 @@ def test_one_exact_scheme_of_several_does_not_give_the_title():
         levels={"from": 4, "to": 8}, schemes=["crank_nicolson", "central"],
         checks=[{"converges": "energy_deviation", "order": "scheme"}],
     )  # fmt: skip
-    title = "The energy deviation ΔE = E(t) − E(0) converges at the order that both schemes promise"
+    title = (
+        "The energy deviation ΔE = E(t) − E(0) tends to zero at the order that both schemes promise"
+    )
     assert first(exp)["finding"] == title
 
 

@@ -111,6 +111,8 @@ def describe(f: MemberFacts, check: EqualCheck) -> Description:
     both = f"{what} of scheme {check.first} and {other}"
     distance_text = f"at most {number(distance, 4)} apart"
     brief = f"{distance_text}; {number(allowed, 4)} is allowed"
+    if distance == 0.0:
+        brief = "identical in every digit"
     enough = f"above {round_outward(distance, 2):.2g} if that is close enough"
     match f.reason:
         case "match":

@@ -56,7 +56,9 @@ def _largest_share(e: Evidence, rows: Flags, last: int, p: float, r: float) -> F
             powers = np.array([r, *(p + step * k for k in range(count))])
             weights = _weights(e.levels, last, powers)
             first = last + 1 - len(weights)
-            left = e.combined(rows, first, weights) + total(floor[:, first : last + 1] * np.abs(weights))
+            left = e.combined(rows, first, weights) + total(
+                floor[:, first : last + 1] * np.abs(weights)
+            )
             with np.errstate(divide="ignore", invalid="ignore"):
                 share = np.fmin(share, steeper * left / difference)
     return share

@@ -10,13 +10,18 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vibsim.core.array_types import Floats
+from vibsim.core.array_types import Flags, Floats
 from vibsim.core.record import Record
 from vibsim.core.vocabulary import MEMBER, TYPICAL_NORM
 from vibsim.report import data
 from vibsim.report.data import Member, formal_orders, norm_index, optional, whole
 from vibsim.report.style import finite, no_zeros
 
+LAST_PART = 4
+"""A settled motion swings no further than its amplitude in the last one of so many parts of the time."""
+SETTLED = 0.1
+"""Largest relative excess of the swing of a settled motion over its amplitude."""
+SWINGS = "the motion swings further in the last quarter of the time"
 VARIES = 1e-6
 """Relative spread below which members share a number."""
 
@@ -122,6 +127,19 @@ def measured(record: Record, name: str, position: str) -> Measured:
         coarser = np.abs(optional(record, name, MEMBER, level=-2))
         error = np.abs(value - coarser) * _error_fraction(record, formal_orders(record, position))
     return Measured(name, data.unit(record, name), value, error)
+
+
+def unsettled(record: Record, position: str) -> Flags:
+    """Return which members still swing further than their amplitude says, shape (scheme, case).
+
+    Their motion has several frequencies, or has not yet decayed. Without stored series nothing is known.
+    """
+    size = np.abs(optional(record, "amplitude", MEMBER, level=-1))
+    if f"{position}_finest" not in record:
+        return np.zeros(size.shape, np.bool_)
+    series = np.asarray(record[f"{position}_finest"], dtype=np.float64)
+    late = series[..., -(series.shape[-1] // LAST_PART) :]
+    return np.asarray(0.5 * np.ptp(late, axis=-1) > (1.0 + SETTLED) * size)
 
 
 def varies(values: Floats) -> bool:

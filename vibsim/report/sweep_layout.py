@@ -129,6 +129,10 @@ class Grid:
         return table
 
 
+FEWEST_OF_A_LINE = 5
+"""Swept values from which a curve may join members; between fewer it would invent a course."""
+
+
 def grid_of(keys: list[Key]) -> Grid | None:
     """Return the map of members that differ in two `keys`; None if they differ in one key, or in more.
 

@@ -118,12 +118,12 @@ def passed(statuses: Sequence[str], one: str = "check", many: str = "checks") ->
 
 
 BADGES = {"PASS": "passed", "INCONCLUSIVE": "undecided", "FAIL": "failed"}
-TRAP, REFUTED, CLAIMED = "trap caught", "refuted", "as claimed"
+TRAP, REFUTED, CLAIMED = "trap caught", "shown to be false", "as claimed"
 """Badges of a check that expected a failure and got it, and of a claim that is false or true as expected."""
 
 
 def badge(check: Mapping[str, Any]) -> str:
-    """Return the badge of a check in a summary: passed, as claimed, trap caught, refuted, undecided or failed."""
+    """Return the badge of a check in a summary: one of `BADGES`, or of `TRAP`, `REFUTED` and `CLAIMED`."""
     if check["status"] != "PASS":
         return BADGES.get(check["status"], str(check["status"]))
     if check["kind"] == "claim":

@@ -19,7 +19,7 @@ from vibsim.core.vocabulary import SECONDS_OF_NORM
 from vibsim.report import choice, data, finest_level, series, style, sweep_layout, words
 from vibsim.report.choice import Lead
 from vibsim.report.data import Member
-from vibsim.report.figures import panels, time
+from vibsim.report.figures import moments, panels, time
 from vibsim.report.figures.sweeps.view import key_axis, ring
 from vibsim.report.style import Picture
 from vibsim.report.sweep_layout import Along, Grid
@@ -163,7 +163,7 @@ def against_step(record: Record, lead: Lead) -> Picture | None:
     style.fit_log_axis(ax, "y", *drawn, least=1e-18, room=2.5, most=5)
     style.log_axis(ax, "x", float(dt.min()) / 1.4, float(dt.max()) * 1.4, most=4)
     ax.set_ylim(top=min(2.5 * high, style.LARGEST))
-    ax.set_xlabel(style.label("time step", data.time_unit(record, "dt")))
+    ax.set_xlabel(style.label("time step dt", data.time_unit(record, "dt")))
     _legend(ax, columns=2, size=7.5)
     title, found = "Error against time step", findings.factor(lead)
     if found is not None:
@@ -197,7 +197,15 @@ def solution(
     if has_exact:
         ax.plot(*style.thin(*exact, 200), color=style.PALE, linewidth=4.5, label=name)
     text = f"{words.number(int(record['steps'][-1]), 'integer')} steps"
-    ax.plot(*style.thin(t, values, 200), color=style.COLOURS[0], linewidth=1.4, label=text)
+    # as in the figure of the motion, lines between too few samples would cut off its extremes
+    turns = exact if has_exact else (t, values)
+    is_dotted = moments.is_undersampled(int(record["steps"][-1]), t, turns)
+    look: dict[str, Any] = (
+        {"linestyle": "none", "marker": ".", "markersize": 3.0} if is_dotted else {}
+    )
+    ax.plot(
+        *style.thin(t, values, 200), color=style.COLOURS[0], label=text, **{"linewidth": 1.4} | look
+    )
     panels.fit_values(ax, [values], exact[1])
     panels.stop_at_breakdown(ax, t, [values])
     ax.set_xlabel(data.time_label(record))
@@ -249,8 +257,11 @@ def response(experiment: Experiment, record: Record, lead: Lead) -> Picture | No
         return None
     name, text, values = found
     layout = sweep_layout.layout_of(experiment, record)
+    hollow = np.zeros(values.shape, np.bool_)
     if isinstance(layout, Along):
-        ax = _curves(lead, layout, values, text)
+        if name == "amplitude":
+            hollow = finest_level.unsettled(record, choice.position(experiment))[lead.member.scheme]
+        ax = _curves(lead, layout, values, text, hollow)
     elif isinstance(layout, Grid):
         ax = _map(lead, layout, values, text)
     else:
@@ -265,6 +276,7 @@ def response(experiment: Experiment, record: Record, lead: Lead) -> Picture | No
         f"{name[:1].upper()}{name[1:]} of {count} members",
         "Each member is one run of the sweep, at its finest level."
         + f" The others have no {name}." * (known < every)
+        + f" Hollow: not settled; {finest_level.SWINGS}." * bool(hollow.any())
         + " The ring is the hardest member." * is_marked,
         f"{name} of every member over the swept parameters",
         ax.get_figure(root=True),
@@ -308,13 +320,18 @@ def _across(ax: Axes, key: sweep_layout.Key) -> None:
     key_axis(ax, key, 0.02, most=5)
 
 
-def _curves(lead: Lead, along: Along, values: Floats, text: str) -> Axes:
+def _curves(lead: Lead, along: Along, values: Floats, text: str, hollow: Flags) -> Axes:
+    """Draw curves over the key, with `hollow` markers for some members; few values are not joined."""
     ax = _panel(LEFT, text)
     for i, (name, cases) in enumerate(along.lines):
         x, y = along.key.values[cases], values[cases]
         few: dict[str, Any] = {"markersize": 3.5} if x.size <= 40 else {"marker": ""}
-        look = style.look(i) | few
-        ax.plot(x, y, **look, linewidth=1.6, label=name or None)
+        look = style.look(i) | few | {"linewidth": 1.6}
+        if along.key.distinct.size < sweep_layout.FEWEST_OF_A_LINE:
+            look |= {"linestyle": "none", "markersize": 5}
+        ax.plot(x, y, **look, label=name or None)
+        shown = hollow[cases]
+        ax.plot(x[shown], y[shown], **look | {"linestyle": "none", "markerfacecolor": "white"})
     _across(ax, along.key)
     _scaled(ax, values)
     _mark(ax, along.key.values, values, lead)
@@ -370,7 +387,9 @@ def orders(experiment: Experiment, record: Record, lead: Lead) -> Picture | None
     keys, quantity, scheme = sweep_layout.keys(record), lead.quantity, lead.member.scheme
     if not keys or not data.whole(record, "triple"):
         return None
-    order, low, high = (part[scheme] for part in finest_level.stated_orders(record, quantity, lead.norm))
+    order, low, high = (
+        part[scheme] for part in finest_level.stated_orders(record, quantity, lead.norm)
+    )
     known = np.isfinite(order)
     if not known.any():
         return None
@@ -430,4 +449,10 @@ def _title_of_orders(inside: Flags, measured: Flags, checked: Flags) -> str:
         return f"{within} of {of} members asked about are in the band; grey: the {others} others"
     if not inside.all():
         return f"{within} of {of} members have an order in the band"
-    return "All members keep their order" if measured.all() else "All intervals reach the band"
+    beyond = int(np.sum(~measured))
+    if not beyond:
+        return "All members keep their order"
+    verb, whose = (
+        ("lies", "its interval reaches") if beyond == 1 else ("lie", "their intervals reach")
+    )
+    return f"{words.number(beyond, 'integer')} of {of} orders {verb} outside the band; {whose} in"

@@ -122,7 +122,7 @@ def _draw_norms(
     for kind, (text, mark) in KINDS.items():
         if kind in visible:
             ax.plot([], [], color=style.GREY, **mark, label=text)
-    ax.set_xlabel(style.label("dt", data.time_unit(record, "dt")))
+    ax.set_xlabel(style.label("time step dt", data.time_unit(record, "dt")))
     measure = data.norm_unit(record, quantity)
     ax.set_ylabel(style.label(f"{words.USUAL_NORM}, {words.symbol(quantity)}", measure))
     _level_axis(ax, dt, data.whole(record, "level"))

@@ -99,7 +99,7 @@ def card(experiment: Experiment, record: Record, check: Mapping[str, Any]) -> di
         "badge": words.badge(check),
         "what": assertions.about(asserted, record),
         "source": assertions.source(asserted, record),
-        "wanted": f"not: {wanted}" if is_refutation(asserted) else wanted,
+        "wanted": f"false (the statement: {wanted})" if is_refutation(asserted) else wanted,
         "got": words.swept(_got(check, wording, result)),
         "note": getattr(asserted, "note", None) or "",
         "reason": check["reason"] or "–",
@@ -157,7 +157,7 @@ def _got(check: Mapping[str, Any], wording: Wording, result: Result) -> str:
         order, bounds = words.fact(decisive, "order"), words.interval_of(decisive)
         return f"order {words.with_interval(order, bounds)}"
     if check["kind"] == "converges" or "order" in (decisive.get("facts") or {}):
-        return str(result.reason).replace("_", " ")
+        return reasons.OUTCOMES.get(result.reason, str(result.reason))
     return wording.brief(result)
 
 

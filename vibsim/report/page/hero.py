@@ -106,7 +106,7 @@ def _facts(experiment: Experiment, record: Record) -> Iterator[str]:
         yield f"{words.number(len(record['case']), 'integer')} members"
     steps = [words.number(int(n), "integer") for n in record["steps"]]
     ends = np.unique(data.ends_of(record))
-    over = f" over {data.time_text(record, ends[0])}"
+    over = f" up to t = {data.time_text(record, ends[0])}"
     span = steps[0] if len(steps) == 1 else f"{steps[0]} to {steps[-1]}"
     yield f"{span} steps{over if ends.size == 1 else ''}"
     yield experiment.source or ""
@@ -175,7 +175,7 @@ def _order(experiment: Experiment, record: Record, lead: Lead) -> Iterator[Numbe
     promised = data.promised_text(record, quantity, member.scheme)
     of = data.basis_of_order(record, quantity)
     due = f"the scheme promises {promised}" if of == "promised" else f"{promised} is expected"
-    due = f"what is {of} depends on the member" if promised == of else due
+    due = "" if promised == of else due
     if lead.is_on_order:
         order, low, high = (lead.facts.get(f"order{end}") for end in ("", "_low", "_high"))
     else:
@@ -191,13 +191,17 @@ def _order(experiment: Experiment, record: Record, lead: Lead) -> Iterator[Numbe
         value = ends[0] if ends[0] == ends[1] else " to ".join(ends)
         known, total = (words.number(n, "integer") for n in (every.size, len(record["case"])))
         known = known if known == total else f"{known} of the {total}"
-        yield {"label": label, "value": value, "note": f"of {known} members; {due}"}
+        yield {
+            "label": label,
+            "value": value,
+            "note": "; ".join(filter(None, [f"of {known} members", due])),
+        }
     elif lead.is_on_order and lead.result.get("reason") == "exact":
         yield {"label": label, "value": "exact", "note": "the levels differ by round-off only"}
     elif order is None or not math.isfinite(order):
         # a missing order is shown only if no other number decides
         if lead.is_on_order or lead.entry is None:
-            yield {"label": label, "value": "not known", "note": due}
+            yield {"label": label, "value": "not measurable", "note": due}
     else:
         note = "; ".join(filter(None, [words.likely((low, high)), due]))
         yield {"label": label, "value": words.number(float(order), "order"), "note": note}
@@ -221,8 +225,8 @@ def _error(experiment: Experiment, record: Record, lead: Lead) -> Iterator[Numbe
     mean = error / math.sqrt(data.ends_of(record)[member.case])
     unit = data.norm_unit(record, quantity, "linf")
     what = findings.short(experiment, quantity)
-    size = f"{words.share(relative)} of its size, " if relative else ""
-    note = f"{size}{word}, root mean square"
+    size = f"; {words.share(relative)} of that of {words.symbol(quantity)}" if relative else ""
+    note = f"root mean square, {word}{size}"
     if error == 0.0:
         equal = (
             "the levels agree"
@@ -275,13 +279,13 @@ def _levels_of_best(record: Record, name: str, lead: Lead) -> str:
         return "extrapolated over the levels"
     first, last = used_levels(record, record.words("scalar").index(name), lead.member)
     if first == last:
-        return f"level {last} as it is"
+        return f"level {last}, not extrapolated"
     return f"extrapolated over levels {words.levels((first, last))}"
 
 
 def _of_member(record: Record, lead: Lead) -> str:
     """Name the member of a number; empty without a sweep."""
-    return f", of {lead.member.case_words}" if data.swept(record) else ""
+    return f"; member {lead.member.case_words}" if data.swept(record) else ""
 
 
 def pictures(experiment: Experiment, record: Record, lead: Lead) -> list[Picture]:

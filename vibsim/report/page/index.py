@@ -28,7 +28,7 @@ FILTERS = (
     ("FAIL", "failed"),
     ("UNREADABLE", "damaged or missing"),
     (words.TRAP, "with a trap caught"),
-    (words.REFUTED, "with a statement refuted"),
+    (words.REFUTED, "with a statement shown to be false"),
 )
 """Filters of the cards, with their words."""
 HEADERS = (

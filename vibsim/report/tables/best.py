@@ -21,8 +21,8 @@ CLASSES = {
     "unknown": "–",
     "monotone": "monotone",
     "oscillating": "oscillating",
-    "monotone_divergence": "moving apart",
-    "oscillating_divergence": "swinging apart",
+    "monotone_divergence": "diverging",
+    "oscillating_divergence": "diverging, alternating",
     "round_off": "round-off",
 }
 """Kind of convergence over the levels to its words."""
@@ -58,7 +58,7 @@ def table(
     )
     if "scalar" in record:
         text += (
-            "; “as it is” where no extrapolation can be trusted. The grid convergence index (GCI) is the usual error "
+            "; “not extrapolated” where that cannot be trusted. The grid convergence index (GCI) is the usual error "
             "bar of the finest level's value, not of the best one; relative to it where it is not near zero"
         )
     missing = ["true error", *(() if "scalar" in record else PER_NUMBER)]
@@ -147,7 +147,7 @@ def used_levels(record: Record, k: int, member: Member) -> tuple[int, int]:
 def _approach(record: Record, k: int, member: Member) -> tuple[Cell, Cell, Cell]:
     """Return the observed order, the levels used, and the kind of convergence."""
     first, last = used_levels(record, k, member)
-    used = words.levels((first, last)) if first < last else f"{last} as it is"
+    used = words.levels((first, last)) if first < last else f"{last}, not extrapolated"
     order = float(at(record, "scalar_order", member, scalar=k))
     kind = str(flags(record, "scalar_convergence")[k, member.scheme, member.case])
     return order if math.isfinite(order) else None, used, CLASSES[kind]

@@ -26,7 +26,7 @@
   if (entries.length) {
     const last = Math.max(...entries.map(([, entry]) => entry.made));
     const count = changes ? changes.children.length : 0;
-    const text = isFirst ? "" : count ? `. Changed by the last run: ${count}` : ". The last run changed no verdict";
+    const text = isFirst ? "" : count ? `. Changed by the last run: ${count}${count > 7 ? " (the list scrolls)" : ""}` : ". The last run changed no verdict";
     document.querySelector("#last").textContent = `Last results ${day(last, { dateStyle: "medium", timeStyle: "short" })}${text}`;
   }
   if (!search) return;

@@ -11,6 +11,7 @@ from vibsim.checks.verdict_text import expectation, expected_verdict
 from vibsim.core.record import Record
 from vibsim.core.vocabulary import TYPICAL_NORM
 from vibsim.report import data, words
+from vibsim.report.text.reasons import OUTCOMES
 from vibsim.report.types import Check, Experiment, Measurement
 
 PLACES = ("t", "step", "level", "scheme", "case")  # keys that locate a number
@@ -52,7 +53,8 @@ def wanted(experiment: Experiment, check: Measurement | None, promised: float | 
         return words.labelled(expectation(experiment, check, words.PAGE), None)
     order = words.number(promised, "step") if check.order == "scheme" else f"{check.order:g}"
     if check.expect.status != "PASS":
-        return f"{expected_verdict(check.expect)} against order {order}"
+        outcome = OUTCOMES.get(check.expect.reason or "", expected_verdict(check.expect))
+        return f"{outcome}, instead of order {order}"
     return f"order {order} ± {check.tolerance:g}{', promised' * (check.order == 'scheme')}"
 
 

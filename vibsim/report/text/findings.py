@@ -7,24 +7,29 @@ import re
 from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 
+import numpy as np
+
 from vibsim.checks.order_context import COINCIDE
 from vibsim.checks.order_text import UNSEEN
 from vibsim.checks.outcome import about_members
 from vibsim.convergence import LadderVerdict
 from vibsim.core.record import Record
+from vibsim.core.vocabulary import plain_name
 from vibsim.report import data, words
 from vibsim.report.choice import Lead, is_refutation, is_trap
+from vibsim.report.series import name_of_exact
 from vibsim.report.text import assertions, reasons
 from vibsim.report.types import Experiment, Measurement
 
 ORDINALS = {1: "first", 2: "second", 3: "third", 4: "fourth", 5: "fifth", 6: "sixth", 8: "eighth"}
+NUMERALS = dict(enumerate(("three", "four", "five", "six", "seven", "eight", "nine"), 3))
 WITH_AN_ORDER = ("asymptotic", "order_low", "order_high")
 """Reasons of results with a settled order; any other order is an estimate that may be an accident."""
 NEAR = 0.15
 """An order within this distance of an integer is called by its ordinal."""
 
 ON_ORDER = {
-    "asymptotic": "{What} converges {at}{everywhere}",
+    "asymptotic": "{What} {converges} {at}{everywhere}",
     "exact": "{What} is exact{everywhere}: the levels differ by round-off only",
     "match": "{What} behaves as the check expects{everywhere}",
     "order_low": "{What} converges {at_measured}, not {expected_order}",
@@ -34,7 +39,7 @@ ON_ORDER = {
     "unstable": "The run is unstable, so {what} shows no order",
     "non_finite": "The run breaks down before its end",
     "pre_asymptotic": "The levels are too coarse to show the order of {what}",
-    "round_off": "{What} has reached round-off, so it shows no order",
+    "round_off": "The differences of {what} are round-off, so no order can be measured",
     "oscillating": "The error of {what} changes its sign from level to level",
     "non_smooth": "{What} has no regular order, because the problem is not smooth",
     "too_few_levels": "There are too few levels to judge {what}",
@@ -68,13 +73,15 @@ OPEN = {
     "tolerance": "It is undecided whether the tolerance is reached",
 }
 """Kind of an undecided check to the title of a page on it."""
+GROWN = 2.0
+"""Ratio of the finest error to the smallest one from which a page says that refinement does harm."""
 NO_CHECK = "The motion was computed, and nothing was asked of it"
 BROKE_DOWN = "The run breaks down before its end"
 CLAIMS = {
     ("PASS", False): "",
-    ("PASS", True): "Refuted: ",
+    ("PASS", True): "Shown to be false: ",
     ("FAIL", False): "Not confirmed: ",
-    ("FAIL", True): "Not refuted: ",
+    ("FAIL", True): "Not shown to be false: ",
     ("INCONCLUSIVE", False): "Undecided: ",
 }
 """Status of a claim, and whether it is expected to be false, to the prefix of its title."""
@@ -85,12 +92,12 @@ NOTHING_ASKED = (
     "Without a check there is no verdict. Add `checks:` to the experiment, such as `- {{converges: {position}}}`, and "
     "three levels at least."
 )
-CONVERGES = "Halving the step divides the error by about {factor}. {trust}{beside}{unseen}"
+CONVERGES = "Halving the step divides the error by {factor}{due}. {trust}{beside}{unseen}"
 TRUSTED = (
     "The rescaled differences of the levels coincide, so the estimate of the error can be trusted."
 )
 ROUGH = "The rescaled differences of the levels do not coincide yet, so the estimate of the error is rough."
-BESIDE = " The true error is known here, and the estimate is within {part} % of it."
+BESIDE = " The estimate is within {part} % of the error against the {name} solution."
 
 
 def title(experiment: Experiment, record: Record, lead: Lead, printed: Collection[str]) -> str:
@@ -188,6 +195,7 @@ def _phrases(experiment: Experiment, record: Record, lead: Lead) -> dict[str, st
     judged = _named_schemes(record, lead)
     filled = {
         "what": what, "What": _capitalized(what), "everywhere": _everywhere(record, lead),
+        "converges": "tends to zero" if plain_name(lead.quantity) == "energy_deviation" else "converges",
         "at": _at(expected, order), **_contrast(order, expected),
         "Schemes": f"Scheme {judged[0]}" if len(judged) == 1 else "The schemes",
         "first": "", "second": "", "drift": "", "stability": "", "not_stability": "", "subject": "", "Subject": "",
@@ -285,8 +293,9 @@ def _everywhere(record: Record, lead: Lead) -> str:
         )
         return f" in {count} {noun}{subset}{by}"
     if total == len(schemes) == 2:
-        return " by both schemes"
-    return f" by {'all' if total == len(schemes) else f'{total} of'} {len(schemes)} schemes"
+        return " with both schemes"
+    count = NUMERALS.get(len(schemes), str(len(schemes)))
+    return f" with {'all' if total == len(schemes) else f'{total} of'} {count} schemes"
 
 
 def _at(*orders: float | None) -> str:
@@ -308,7 +317,7 @@ def _capitalized(text: str) -> str:
 def of_ladder(verdict: LadderVerdict) -> str:
     """Return the finding on a ladder of another solver in one line."""
     filled = {
-        "what": verdict.quantity, "What": verdict.quantity, "everywhere": "",
+        "what": verdict.quantity, "What": verdict.quantity, "everywhere": "", "converges": "converges",
         "at": _at(verdict.expected, verdict.order), **_contrast(verdict.order, verdict.expected),
     }  # fmt: skip
     if verdict.expected is None and verdict.at_least is not None:
@@ -335,19 +344,39 @@ def paragraph(experiment: Experiment, record: Record, lead: Lead, levels: int) -
         distance = data.coincidence(record, lead.quantity, lead.member)
         is_rough = distance > COINCIDE or (deviation is not None and deviation > COINCIDE)
         percent = "" if deviation is None else words.number(max(100.0 * deviation, 0.1), "brief")
+        order = words.fact(lead.result, "expected")
+        due = f" (order {order:g} predicts {2.0**order:.3g})" if order else ""
         return CONVERGES.format(
-            factor=f"{ratio:.2g}",
+            factor=f"{ratio:.3g}",
+            due=due,
             trust=ROUGH if is_rough else TRUSTED,
-            beside="" if deviation is None else BESIDE.format(part=percent),
+            beside=""
+            if deviation is None
+            else BESIDE.format(part=percent, name=name_of_exact(experiment)),
             unseen=UNSEEN if deviation is None else "",
         )
     if is_refutation(lead.asserted) and lead.entry["reason"] == "match":
         return reasons.REFUTED
     kind = lead.measured.kind if lead.measured else lead.entry["kind"]
-    value = getattr(lead.measured, "value", "") if kind == "value" else ""
+    if kind == "value" and lead.entry["reason"] == "match":
+        # the number stands above, with what is asked for
+        return ""
     word = lead.result.get("reason") if lead.is_on_order else lead.entry["reason"]
     is_promised = keeps_promise(record, lead.measured, lead.entry)
-    return reasons.reason(word, kind, value, levels, is_promised).meaning
+    meaning = reasons.reason(word, kind, levels=levels, is_promised=is_promised).meaning
+    return meaning + (_growing_error(record, lead) if word == "round_off" else "")
+
+
+def _growing_error(record: Record, lead: Lead) -> str:
+    """Say from which level on finer ones have a larger true error; empty if none do, or it is unknown."""
+    norm, member = data.norm_index(record, lead.norm), lead.member
+    name = f"{lead.quantity}_error_norm"
+    error = data.at(record, name, member, norm=norm) if name in record else np.empty(0)
+    if not error.size or not np.isfinite(error).all() or error[-1] < GROWN * error.min():
+        return ""
+    level = data.whole(record, "level")[int(np.argmin(error))]
+    times = words.number(float(error[-1] / error.min()), "brief")
+    return f" The error is smallest at level {level}; at the finest level it is {times} times as large."
 
 
 def asked_of(record: Record, lead: Lead) -> str:

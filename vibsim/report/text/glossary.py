@@ -7,8 +7,8 @@ from typing import Any
 
 GLOSSARY = {
     "observed order": "The power p with which the error shrinks from level to level: error = C dt^p.",
-    "95 % interval": "It contains the true order with a probability of 95 %, and the measured one. It often ends at a "
-    "whole power, such as the promised order.",
+    "95 % interval": "It contains the true order with a probability of 95 % or more. It extends from the measured one "
+    "to the powers of dt that explain the levels, often a whole one: with these the measured order is compatible.",
     "asymptotic": "The steps are so small that one power of dt makes up nearly all of the error.",
     "rescaled differences": "Differences between successive levels, multiplied so that they coincide where the error "
     "has the promised order.",
@@ -25,7 +25,7 @@ GLOSSARY = {
     "dimensionless": "Without a unit, because it is a ratio of quantities of the same kind.",
     "trap caught": "A check that expects a failure, which occurred.",
     "as claimed": "A statement of a text that holds in this measurement.",
-    "refuted": "A statement that does not hold, as the experiment expects.",
+    "shown to be false": "A statement that does not hold, as the experiment expects.",
 }  # fmt: skip
 """Term in lower case to its meaning."""
 _TERMS = re.compile(

@@ -84,6 +84,16 @@ REASONS = {
     ),
 }
 
+OUTCOMES = {
+    "exact": "no error but round-off", "order_low": "a lower order", "order_high": "a higher order",
+    "mismatch": "another outcome", "wrong_limit": "a wrong limit", "unstable": "an unstable run",
+    "non_finite": "a run that breaks down", "pre_asymptotic": "no order: the step is too coarse",
+    "round_off": "no order: round-off", "oscillating": "no order: the error changes its sign",
+    "non_smooth": "no regular order: not smooth", "too_few_levels": "no order: too few levels",
+    "not_applicable": "nothing to judge",
+}  # fmt: skip
+"""Reason to the outcome of an order in a few words."""
+
 _NUMBERS = {
     "several": "A number on which finer levels agree, and which is not close to its limit. The tables show both.",
     "one": "More levels. One level alone does not show the error of the step.",

@@ -15,6 +15,7 @@ from vibsim.report.text import structure
 from vibsim.report.types import Axis, Experiment, SchemeSpec
 
 LISTED = 8  # most values of a key in a list
+MOST_LISTED = 16  # parameters or initial values in a list
 NO_LETTERS: Mapping[str, str] = {}
 
 
@@ -114,8 +115,11 @@ def _listing(
     letters: Mapping[str, str] = NO_LETTERS,
 ) -> str:  # fmt: skip
     """List values by their letters in the equation, with the key if it differs, or by the key alone."""
-    parts = []
+    parts = list[str]()
+    rest = len(values) - MOST_LISTED
     for key, value in values.items():
+        if len(parts) == MOST_LISTED and rest > 1:
+            return f"{', '.join(parts)}, and {rest} more, as the file below gives them"
         name = letters.get(key, key)
         value_text = (
             "swept" if f"{section}.{key}" in swept else f"= {_plain(value)} {units.get(key, '')}"

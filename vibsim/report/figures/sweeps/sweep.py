@@ -20,7 +20,7 @@ from vibsim.report.figures.sweeps import separatrix, view
 from vibsim.report.figures.sweeps.view import View, Worst
 from vibsim.report.finest_level import Measured
 from vibsim.report.style import Picture
-from vibsim.report.sweep_layout import Along
+from vibsim.report.sweep_layout import FEWEST_OF_A_LINE, Along
 from vibsim.report.types import Axes, Experiment, ValueCheck
 
 TALL, ENTRY = 3.0, 0.18  # least height of a panel, height of a legend entry [inch]
@@ -159,6 +159,10 @@ class _Drawing:
         )
         turns = bool(self.experiment.model.definition.turn)
         explanation += " Members that go over the top have none." * turns
+        open_members = finest_level.unsettled(record, quantity)
+        if count := int(open_members.sum()):
+            runs = f"{words.number(count, 'integer')} of {open_members.size} runs"
+            explanation += f" {runs} are not settled: {finest_level.SWINGS}."
         yield from self._view(
             "amplitude", "amplitude", quantity, amplitude.value, explanation, draw, amplitude.unit
         )
@@ -418,6 +422,8 @@ def _line(ax: Axes, x: Floats, y: Floats, **look: Any) -> None:
     """Draw a number of members in the order of `x`, thinned; with markers if they are few."""
     if x.size > MOST_MARKERS:
         look["marker"] = "," if look.get("linestyle") == "none" else ""
+    elif look.get("marker") and np.unique(x).size < FEWEST_OF_A_LINE:
+        look["linestyle"] = "none"
     ax.plot(*style.thin(x, y), **look)
 
 
