@@ -287,7 +287,7 @@ def test_texts_are_no_quantities() -> None:
     fault = only_fault(model=spring, initial={"u": 1})
     assert (fault.key, fault.hint) == (
         "model.spring",
-        "a formula has no units: declare 3 m under `parameters:`",
+        "a formula has no units: declare the number under `parameters:`",
     )
     assert build(title="4.9 m").title == "4.9 m"
     fault = only_fault(sweep={"schemes.central.start": ["3 m"]})
