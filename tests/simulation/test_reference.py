@@ -100,7 +100,7 @@ def test_the_reference_knows_its_error_between_the_ends_of_its_steps(mu, u, v, e
 
 
 def test_a_slow_iteration_is_not_taken_for_round_off():
-    """The force of a Maxwell element, here the velocity vz, decays: changes of the stages shrink by less than a half."""
+    """The force of a Maxwell element, the velocity vz, decays: changes of the stages fall by less than a half."""
     equations = {"acceleration.u": "-50*u - vz/2", "acceleration.z": "60*vu - 5*vz"}
     model = written(("u", "z"), equations, ())
     start = {"u": 0.05, "z": 0.0, "vu": 0.0, "vz": 3.0}
