@@ -199,3 +199,10 @@ def test_a_stop_that_holds_at_the_start_of_one_member_names_it() -> None:
             assert only_fault(**changes).key == "model.stop"
         else:
             build(**changes)
+
+
+def test_a_faulty_event_beside_the_model_has_one_fault() -> None:
+    """The equation was made of it all the same, with a second fault at a key that no file has."""
+    model = {"kind": "system", "acceleration": "-u"}
+    fault = only_fault(model=model, initial={}, schemes=["rk4"], events=[{"when": "3 mm"}])
+    assert fault.key == "events[0].when"

@@ -287,9 +287,11 @@ def test_texts_are_no_quantities() -> None:
     fault = only_fault(model=spring, initial={"u": 1})
     assert (fault.key, fault.hint) == (
         "model.spring",
-        "a formula has no units: declare 3 m under `parameters:`",
+        "a formula has no units: declare the number under `parameters:`",
     )
     assert build(title="4.9 m").title == "4.9 m"
+    structure = {"kind": "structure", "stiffness": "frame 2 m.csv"}
+    assert only_fault(model=structure, initial=None).rule.startswith("there is no such file")
     fault = only_fault(sweep={"schemes.central.start": ["3 m"]})
     assert fault.rule == "unknown choice"
 

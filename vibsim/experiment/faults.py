@@ -224,8 +224,9 @@ class Report:
 
     @property
     def has_faulty_model(self) -> bool:
-        """Whether the section ``model`` has a fault."""
-        return any(fault.key.split(".")[0] == "model" for fault in self.faults)
+        """Whether the section ``model`` has a fault, or the events beside it."""
+        sections = (re.split(r"[.\[]", fault.key)[0] for fault in self.faults)
+        return not {"model", "events", "stop"}.isdisjoint(sections)
 
     def formula(
         self, path: Path_, text: str, names: Sequence[str], more: str = "", hint: str = ""
@@ -241,7 +242,7 @@ class Report:
             suffix = more if error.rule.startswith("unknown name") else ""
             hint = hint or error.hint
             if not hint and error.rule.startswith("expected") and split(text):
-                hint = f"a formula has no units: declare {text} under `parameters:`"
+                hint = "a formula has no units: declare the number under `parameters:`"
             self.add(path, f"{error.rule}{place}{suffix}", hint, text)
             return None
 

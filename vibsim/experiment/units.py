@@ -34,6 +34,8 @@ _ANY = ""
 """Marks a key that accepts any unit; the value is converted to SI base units."""
 _UNKNOWN = "?"
 """Marks a key that does not exist, which is reported elsewhere."""
+_FILES = (".mtx", ".npy", ".csv", ".nc")
+"""How names of files end in the section of a structure."""
 _STAND_IN = 1.0
 """Temporary placeholder for a refused value; valid everywhere."""
 
@@ -104,7 +106,8 @@ class Units:
         is_any = is_declared or (self._is_structure and key.startswith("model."))
         wanted = self.units.get(key, _ANY if is_any else _UNKNOWN)
         halves = split(text)
-        if halves is None:
+        # names of files may look like one, such as frame 2 m.csv
+        if halves is None or (is_any and text.endswith(_FILES)):
             return text
         try:
             if wanted == _UNKNOWN:
