@@ -38,6 +38,7 @@ SIZES = {
     "linf_interior": "largest error without the last point",
 }  # fmt: skip
 """Norm to its name after division by the power of the duration that makes it an average."""
+DECADES = 100.0  # ratio of numbers from which their axis is logarithmic; of fewer decades a peak looks flat
 STRIP = 0.097  # height of a legend row as a part of that of the axes
 LONG = 24  # characters of a label from which it is smaller
 
@@ -309,7 +310,7 @@ def _number(experiment: Experiment, record: Record, lead: Lead) -> tuple[str, st
 
 def _scaled(ax: Axes, values: Floats) -> None:
     """Fit the vertical axis, logarithmic if positive values span decades."""
-    if style.spans_decades(values):
+    if style.spans_decades(values, DECADES):
         style.log_axis(ax, "y", *style.log_limits(values), most=5)
     else:
         ax.set_ylim(*style.limits(values))
