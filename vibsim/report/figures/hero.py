@@ -173,8 +173,8 @@ def against_step(record: Record, lead: Lead) -> Picture | None:
         due = words.fact(lead.result, "expected")
         is_other = lead.result["reason"] != "asymptotic" and due is not None
         missed = f", not by {2.0**due:.2g}" if is_other else ""
-        title = f"Each level divides the error by {found:.3g}{missed}"
-        title = f"{lead.member.scheme_name}: {title[0].lower()}{title[1:]}" if others else title
+        of = f" of {lead.member.scheme_name}" if others else ""
+        title = f"Each level divides the error{of} by {found:.3g}{missed}"
     return Picture(
         "hero_error",
         title,
