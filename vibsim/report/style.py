@@ -217,10 +217,10 @@ def no_zeros(values: Floats) -> Floats:
     return np.where(values == 0.0, np.nan, np.abs(values))
 
 
-def spans_decades(values: Floats) -> bool:
+def spans_decades(values: Floats, ratio: float = LOG_RATIO) -> bool:
     """Return whether values are positive and spread so much that a logarithmic axis shows them better."""
     known = finite(values)
-    return bool(known.min() > 0.0 and known.max() > LOG_RATIO * known.min())
+    return bool(known.min() > 0.0 and known.max() > ratio * known.min())
 
 
 def of_level(level: int) -> str:

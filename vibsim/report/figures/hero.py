@@ -36,6 +36,7 @@ SIZES = {
     "linf_interior": "largest error without the last point",
 }  # fmt: skip
 """Norm to its name after division by the power of the duration that makes it an average."""
+DECADES = 100.0  # ratio of numbers from which their axis is logarithmic; of fewer decades a peak looks flat
 STRIP = 0.097  # height of a legend row as a part of that of the axes
 LONG = 24  # characters of a label from which it is smaller
 
@@ -170,8 +171,8 @@ def against_step(record: Record, lead: Lead) -> Picture | None:
         due = words.fact(lead.result, "expected")
         is_other = lead.result["reason"] != "asymptotic" and due is not None
         missed = f", not by {2.0**due:.2g}" if is_other else ""
-        title = f"Each level divides the error by {found:.3g}{missed}"
-        title = f"{lead.member.scheme_name}: {title[0].lower()}{title[1:]}" if others else title
+        of = f" of {lead.member.scheme_name}" if others else ""
+        title = f"Each level divides the error{of} by {found:.3g}{missed}"
     return Picture(
         "hero_error",
         title,
@@ -307,7 +308,7 @@ def _number(experiment: Experiment, record: Record, lead: Lead) -> tuple[str, st
 
 def _scaled(ax: Axes, values: Floats) -> None:
     """Fit the vertical axis, logarithmic if positive values span decades."""
-    if style.spans_decades(values):
+    if style.spans_decades(values, DECADES):
         style.log_axis(ax, "y", *style.log_limits(values), most=5)
     else:
         ax.set_ylim(*style.limits(values))

@@ -126,11 +126,9 @@ def _is_said(asserted: Check | None, check: Mapping[str, Any]) -> bool:
     if check["status"] != "PASS" or asserted is None:
         return False
     result = check["results"][0]
-    order, low, wanted = (words.fact(result, name) for name in ("order", "order_low", "expected"))
-    allowed = getattr(asserted.measured, "tolerance", math.inf)
+    order, low = (words.fact(result, name) for name in ("order", "order_low"))
     is_doubtful = order is not None and low is not None and order - low > WIDE
-    # the order itself misses the expected one, but its interval reaches it
-    is_doubtful |= None not in (order, wanted) and abs(order - wanted) > allowed
+    is_doubtful |= _is_beside(asserted, check)
     if asserted.measured.kind == "value":
         number, bound = (words.fact(result, name) for name in ("value", "error_bound"))
         is_doubtful |= None not in (number, bound) and not is_proved(
@@ -138,6 +136,16 @@ def _is_said(asserted: Check | None, check: Mapping[str, Any]) -> bool:
         )
     is_plain = asserted.measured.kind in SAID_BY_THE_LINE and not is_trap(asserted)
     return is_plain and not is_doubtful
+
+
+def _is_beside(asserted: Check | None, check: Mapping[str, Any]) -> bool:
+    """Return whether a check passed whose order misses the expected one, because its interval reaches that."""
+    order, wanted = (words.fact(check["results"][0], name) for name in ("order", "expected"))
+    if asserted is None or check["status"] != "PASS" or None in (order, wanted):
+        return False
+    return abs(order - wanted) > getattr(asserted.measured, "tolerance", math.inf) and not is_trap(
+        asserted
+    )
 
 
 def _hardest(record: Record, check: Mapping[str, Any]) -> str:
@@ -155,7 +163,8 @@ def _got(check: Mapping[str, Any], wording: Wording, result: Result) -> str:
     decisive = check["results"][0]
     if words.fact(decisive, "order") is not None and result.status != "INCONCLUSIVE":
         order, bounds = words.fact(decisive, "order"), words.interval_of(decisive)
-        return f"order {words.with_interval(order, bounds)}"
+        text = f"order {words.with_interval(order, bounds)}"
+        return f"{text}: its interval meets the band" if _is_beside(wording.check, check) else text
     if check["kind"] == "converges" or "order" in (decisive.get("facts") or {}):
         return reasons.OUTCOMES.get(result.reason, str(result.reason))
     return wording.brief(result)

@@ -31,8 +31,8 @@ def table(experiment: Experiment, record: Record) -> Table | None:
         parameters, initial = dict(scaling.parameters), dict(scaling.initial)
     sizes, numbers = scales(model, parameters, initial), dimensionless(model, parameters, initial)
     if scaling is None and all(np.all(np.asarray(row.value) == 1.0) for row in sizes):
-        # the numbers of the file are dimensionless already
-        sizes = ()
+        # the numbers of the file are dimensionless already, and the scaled initial values are those of the file
+        sizes, numbers = (), tuple(row for row in numbers if not row.name.endswith("(0)"))
     listed = [(f"{row.name}_c", f"scale of the {row.words}", row) for row in sizes]
     listed += [(row.name, row.words, row) for row in numbers]
     if not listed:
