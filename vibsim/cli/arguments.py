@@ -15,155 +15,13 @@ import vibsim
 from vibsim.core.errors import nearest
 from vibsim.core.vocabulary import RESTRICTIONS
 
+_NAMES = "experiment (name or collection/name), one member of its sweep (NAME@CASE), collection, or FILE.yaml"
 LISTS = ("models", "schemes", "checks", "experiments", "schema")
 SHELLS = ("bash", "zsh", "fish", "words")
-Row = tuple[tuple[str, ...], dict[str, Any]]
+_Row = tuple[tuple[str, ...], dict[str, Any]]
 """Names of an option or of a positional argument, and its keyword arguments for `argparse`."""
-Command = tuple[str, str, str, Sequence[Row]]
+Command = tuple[str, str, str, Sequence[_Row]]
 """Name of a command, module of its function, description, and options."""
-
-_SHARED = """
-experiments FILE + | experiment (name or collection/name), one member of its sweep (NAME@CASE), collection, or \
-FILE.yaml
-experiment EXPERIMENT | experiment or FILE.yaml
---results DIR | results folder (default: results/ of the checkout, or where vibsim is installed ./results)
---set KEY=VALUE | replace a value of the file, such as model.g=1.62; may be repeated
---cores N | jobs at once (default: all cores)
---allow-commands | run commands and functions that experiment files name (`solver:`); trust the files first
---threads N | threads to use (default: 1); no number depends on it
--v --verbose | show every check, also those that passed
--q --quiet | print errors only; the exit status has the result
---digest SHA256 | refuse to run unless the experiment and the code have this digest
---discard | delete a damaged or outdated input, so that the next run makes it again
-"""
-"""Options of several commands, in the notation of `_COMMANDS`."""
-_COMMANDS = """
-> run | run.command | Run experiments and show every verdict.
---results
-experiments EXPERIMENT * | experiment (name or collection/name), one member of its sweep (NAME@CASE), collection, or \
-FILE.yaml
---set --cores
---executor NAME | where jobs run: an executor plug-in of Snakemake
---jobs N | limit on the jobs that an executor has at once
---profile DIR | a profile of Snakemake: slurm, generic, or a folder
---dry-run | show what would run and why
---verify | compare every result with its digest, even if size, time and inode are unchanged
---allow-commands
---json | print the outcome as JSON
---junit FILE | write the verdicts as a JUnit report (XML)
---verbose --quiet
-> verify | commands.verify | Compare every file with the manifest of its run; recompute, and compare bit for bit.
---results
-experiments EXPERIMENT * | experiment, collection or FILE.yaml (default: compare the files of all, recompute none)
---set
---files | compare files with the manifest, and recompute nothing
---cores --allow-commands
-> watch | commands.watch | Run an experiment file, and again whenever it is saved.
---results
-file FILE | experiment file
---set --cores --allow-commands --verbose --quiet
-> check | commands.plan | Validate experiment files, without running them.
-experiments --set
-> plan | commands.plan | Show members, jobs, steps, memory, disk space and time of experiments before they run.
---results experiments --set
---json | print the plans as JSON
-> show | commands.show | Show verdicts, and the solution of the finest level as a text plot.
---results --set
-what EXPERIMENT | experiment, one member of its sweep (NAME@CASE), FILE.yaml, or a level file (FILE.nc)
---quantity NAME | what to draw (default: the first position)
---scheme NAME | scheme to draw (default: the first)
---level L | level to draw (default: the finest that was made)
---case K | member of a sweep to draw (default: 0)
---rows N | lines of the plot (default: 40)
---from T | time at which the plot begins
---no-plot | show the verdicts alone
-> judge | commands.judge | Judge whether the results of any solver converge.
-files FILE + | a table (CSV or TSV) with a row for each level, or a netCDF file for each level
---h NAME required | step size: a column of the table; an attribute or variable of each netCDF file, or h1,h2,... in \
-their order
---quantity NAME + | columns (default: all others) or netCDF variables to judge
---restrict | how netCDF fields are restricted to common points (default: subset)
---order P | the expected order
---at-least P | the lowest acceptable order
---exact QUANTITY=VALUE | the exact value of a quantity, if known; may be repeated
---noise X | noise of the values of each level (root mean square; default: round-off)
---report DIR | write report.html and verdict.json to this folder
---json | print the verdicts as JSON, and nothing else
-> list | commands.listing | List models, schemes, checks or experiments, or print the JSON Schema of experiment files.
-what |
-name NAME ? | one entry, in full
-> new | commands.new | Write a commented experiment file to begin with, and the JSON Schema for editors.
-file FILE | new experiment file; an existing one is kept
---model KIND | kind of the model (default: pendulum)
---like EXPERIMENT | begin with the text of a shipped experiment
-> diff | commands.diff | Show which settings, verdicts and numbers of two experiments or two results differ.
---results
-first A | experiment, FILE.yaml, or a folder of results
-second B | experiment, FILE.yaml, or a folder of results
-> explain | commands.explain | Explain the reason of a verdict: what it means and what would settle the question.
-reason REASON ? | the reason of a verdict, such as order_low (default: list all of them)
-> theory | commands.theory | Print the theory of a scheme on u'' + w^2 u = 0 as formulas in w dt.
-scheme SCHEME | scheme, such as rk4
-options NAME=VALUE * | option of the scheme, such as beta=1/6
---terms N | terms of each series (default: 4)
---latex | write the formulas as LaTeX
-> open | commands.open | Open a report in the browser; print its path if there is no browser.
---results
-experiment EXPERIMENT ? | experiment whose report is opened (default: the index over all results)
-> movie | commands.movie | Write the movie of an experiment that has been run: MP4, WebM or GIF, or numbered PNG frames.
---results --set
-experiment EXPERIMENT | experiment, one member of its sweep (NAME@CASE), or FILE.yaml
---output FILE | movie to write: .mp4, .webm or .gif (default: the name of the experiment, .mp4)
---frames-to DIR | folder for the frames, as frame_0000.png and so on; no movie is written unless --output names one
---scheme NAME + | one scheme, or two side by side (default: the first, and another that differs visibly)
---level L + | one level, or two side by side (default: the finest, and the coarsest beside it)
---case K | member of a sweep (default: 0)
---quantity NAME | quantity over time (default: the first position)
---from T | time at which the movie begins
---to T | time at which the movie ends
---window PERIODS | periods in the moving window (default: 6 of a run of more than 9)
---fps N | frames a second (default: 25, of a GIF 10)
---frames N | number of frames over the whole time (default: what the motion needs, up to 1500)
-> completion | commands.completion | Print the script with which a shell completes commands, options and names.
-shell | the shell; `words` is for its script
-words WORD * | the command line so far
-> simulate | jobs.simulate | Simulate levels of an experiment.
-experiment --threads --results --set --digest --discard
---level L + required | one level, or several, written to the paths in the plan
---shard K | number of the shard, a range of members (from 0)
---out FILE | netCDF file to write (default: the path in the plan, unless that file is up to date)
---allow-commands
-> analyse | jobs.analyse | Compare the levels of an experiment: convergence.nc and summary.json.
-experiment --threads --results --set --digest --discard
---out DIR | folder to write to
-> extrapolate | jobs.extrapolate | Extrapolate the solution of an experiment over all its levels: best.nc.
-experiment --results --set --digest --discard
---out FILE | netCDF file to write
-> report | commands.report | Write the report of an experiment; without one, the index over all results.
---results --set --digest --discard
-experiment EXPERIMENT ? | experiment or FILE.yaml
---out DIR | folder to write to
---formats LIST | formats of the figure files: svg, png, pdf; several with commas (default: svg)
---publish DIR | copy pages, data, experiment file and metadata (RO-Crate) to a new folder
---license TEXT | licence of the published files: address or sentence
-"""
-"""All commands, those of the workflow last: after ``>`` name, module and description, and then the options.
-
-A line of an option holds its names, its metavar, a count as in `argparse` or ``required``, and its meaning, whose
-``(default: N)`` is the default. A line without a meaning lists options of `_SHARED`.
-"""
-_CHOICES = {"what": LISTS, "shell": SHELLS, "--restrict": RESTRICTIONS}
-"""Values of the arguments that have neither a metavar nor are flags."""
-_MORE: dict[str, dict[str, Any]] = {
-    "--set": {"dest": "settings", "action": "append", "default": []},
-    "--exact": {"action": "append"},
-    "--verbose": {"action": "store_const", "const": "full", "dest": "detail"},
-    "--quiet": {"action": "store_const", "const": "quiet", "dest": "detail"},
-    "--from": {"dest": "start"},
-    "--to": {"dest": "end"},
-    "--shard": {"default": 0},
-}
-"""Further keyword arguments for `argparse`, by name."""
 
 
 def parser() -> argparse.ArgumentParser:
@@ -230,6 +88,12 @@ def _whole(least: int) -> Callable[[str], int]:
     return read
 
 
+_finite = _number("", -math.inf)
+_from_zero = _number("from 0", 0.0)
+_above_zero = _number("above 0", math.ulp(0.0))
+_index, _positive = _whole(0), _whole(1)
+
+
 def _path(text: str) -> Path:
     """Return a path; an empty text is refused, since it would mean the current folder."""
     return Path(_word(text))
@@ -241,45 +105,230 @@ def _word(text: str) -> str:
     return text
 
 
-_TYPES: dict[str, Callable[[str], Any]] = {
-    **dict.fromkeys(("DIR", "FILE"), _path),
-    **dict.fromkeys(("K", "L"), _whole(0)),
-    **dict.fromkeys(("P", "PERIODS", "--fps"), _number("above 0", math.ulp(0.0))),
-    **{"N": _whole(1), "T": _number("", -math.inf), "X": _number("from 0", 0.0)},
-    **{"experiments": _word, "words": str},
-}
-"""What reads a value, by name or metavar; any other value is a text that is not empty."""
+def _row(name: str, kind: Callable[[str], Any], metavar: str, text: str, **more: Any) -> _Row:
+    return (name,), {"type": kind, "metavar": metavar, "help": text, **more}
 
 
-def _row(line: str) -> Row:
-    """Return the option or positional argument that a line of `_COMMANDS` describes."""
-    head, text = line.split(" |", 1)
-    words = head.split()
-    count = 2 if words[1:] and words[1].startswith("-") else 1
-    names, marks = tuple(words[:count]), words[count:]
-    name, settings = names[-1], {"help": text.strip(), **_MORE.get(names[-1], {})}
-    if not marks and name in _CHOICES:
-        settings["choices"] = _CHOICES[name]
-    elif not marks:
-        settings.setdefault("action", "store_true")
-    else:
-        settings |= {"metavar": marks[0], "type": _TYPES.get(name) or _TYPES.get(marks[0], _word)}
-    for mark in marks[1:]:
-        settings |= {"required": True} if mark == "required" else {"nargs": mark}
-    if "+" in marks and name.startswith("-"):
-        settings["action"] = "extend"
-    if default := re.search(r"\(default: (\d+)\)", text):
-        settings["default"] = int(default[1])
-    return names, settings
+def _flag(name: str, text: str) -> _Row:
+    return (name,), {"action": "store_true", "help": text}
+
+
+RESULTS = _row(
+    "--results",
+    _path,
+    "DIR",
+    "results folder (default: results/ of the checkout, or where vibsim is installed ./results)",
+)
+SETTINGS = _row(
+    "--set",
+    _word,
+    "KEY=VALUE",
+    "replace a value of the file, such as model.g=1.62; may be repeated",
+    dest="settings",
+    action="append",
+    default=[],
+)
+FILES = _row("experiments", _word, "FILE", _NAMES, nargs="+")
+CORES = _row("--cores", _positive, "N", "jobs at once (default: all cores)")
+ALLOW = _flag(
+    "--allow-commands",
+    "run commands and functions that experiment files name (`solver:`); trust the files first",
+)
+THREADS = _row(
+    "--threads", _positive, "N", "threads to use (default: 1); no number depends on it", default=1
+)
+ONE = _row("experiment", _word, "EXPERIMENT", "experiment or FILE.yaml")
+FOLDER = _row("--out", _path, "DIR", "folder to write to")
+_CHANGED = "refuse to run unless the experiment and the code have this digest"
+_DISCARDED = "delete a damaged or outdated input, so that the next run makes it again"
+JOB_OPTIONS = (
+    *(RESULTS, SETTINGS),
+    *(_row("--digest", _word, "SHA256", _CHANGED), _flag("--discard", _DISCARDED)),
+)
+"""Options of every job of the workflow."""
 
 
 def commands() -> Iterator[Command]:
     """Yield all commands: those for users, and then the jobs of the workflow."""
-    shared = {row[0][-1]: row for row in map(_row, _SHARED.strip().splitlines())}
-    for section in _COMMANDS.split("\n> ")[1:]:
-        head, *lines = section.strip().splitlines()
-        name, module, text = head.split(" | ")
-        rows: list[Row] = []
-        for line in lines:
-            rows += [_row(line)] if "|" in line else [shared[known] for known in line.split()]
-        yield name, module, text, rows
+    yield "run", "run.command", "Run experiments and show every verdict.", tuple(_run())
+    text = "Compare every file with the manifest of its run; recompute, and compare bit for bit."
+    yield "verify", "commands.verify", text, tuple(_verify())
+    text = "Run an experiment file, and again whenever it is saved."
+    file = _row("file", _path, "FILE", "experiment file")
+    yield "watch", "commands.watch", text, (RESULTS, file, SETTINGS, CORES, ALLOW, *_detail())
+    text = "Validate experiment files, without running them."
+    yield "check", "commands.plan", text, (FILES, SETTINGS)
+    text = "Show members, jobs, steps, memory, disk space and time of experiments before they run."
+    as_json = _flag("--json", "print the plans as JSON")
+    yield "plan", "commands.plan", text, (RESULTS, FILES, SETTINGS, as_json)
+    text = "Show verdicts, and the solution of the finest level as a text plot."
+    yield "show", "commands.show", text, (RESULTS, SETTINGS, *_show())
+    text = "Judge whether the results of any solver converge."
+    yield "judge", "commands.judge", text, tuple(_judge())
+    text = (
+        "List models, schemes, checks or experiments, or print the JSON Schema of experiment files."
+    )
+    name = _row("name", _word, "NAME", "one entry, in full", nargs="?")
+    yield "list", "commands.listing", text, ((("what",), {"choices": LISTS}), name)
+    text = "Write a commented experiment file to begin with, and the JSON Schema for editors."
+    yield "new", "commands.new", text, tuple(_new())
+    text = "Show which settings, verdicts and numbers of two experiments or two results differ."
+    what = "experiment, FILE.yaml, or a folder of results"
+    sides = [_row(*side, what) for side in (("first", _word, "A"), ("second", _word, "B"))]
+    yield "diff", "commands.diff", text, (RESULTS, *sides)
+    text = "Explain the reason of a verdict: what it means and what would settle the question."
+    what = "the reason of a verdict, such as order_low (default: list all of them)"
+    reason = _row("reason", _word, "REASON", what, nargs="?")
+    yield "explain", "commands.explain", text, (reason,)
+    text = "Print the theory of a scheme on u'' + w^2 u = 0 as formulas in w dt."
+    yield "theory", "commands.theory", text, tuple(_theory())
+    text = "Open a report in the browser; print its path if there is no browser."
+    what = "experiment whose report is opened (default: the index over all results)"
+    page = _row("experiment", _word, "EXPERIMENT", what, nargs="?")
+    yield "open", "commands.open", text, (RESULTS, page)
+    text = "Write the movie of an experiment that has been run: MP4, WebM or GIF, or numbered PNG frames."
+    yield "movie", "commands.movie", text, (RESULTS, SETTINGS, *_movie())
+    text = "Print the script with which a shell completes commands, options and names."
+    what = "the shell; `words` is for its script"
+    words = _row("words", str, "WORD", "the command line so far", nargs="*")
+    shell = ("shell",), {"choices": SHELLS, "help": what}
+    yield "completion", "commands.completion", text, (shell, words)
+    text = "Simulate levels of an experiment."
+    yield "simulate", "jobs.simulate", text, (ONE, THREADS, *JOB_OPTIONS, *_simulate(), ALLOW)
+    text = "Compare the levels of an experiment: convergence.nc and summary.json."
+    yield "analyse", "jobs.analyse", text, (ONE, THREADS, *JOB_OPTIONS, FOLDER)
+    text = "Extrapolate the solution of an experiment over all its levels: best.nc."
+    best = _row("--out", _path, "FILE", "netCDF file to write")
+    yield "extrapolate", "jobs.extrapolate", text, (ONE, *JOB_OPTIONS, best)
+    text = "Write the report of an experiment; without one, the index over all results."
+    yield "report", "commands.report", text, (*JOB_OPTIONS, *_report())
+
+
+def _run() -> Iterator[_Row]:
+    """Yield the options of ``vibsim run``."""
+    yield RESULTS
+    yield _row("experiments", _word, "EXPERIMENT", _NAMES, nargs="*")
+    yield from (SETTINGS, CORES)
+    yield _row("--executor", _word, "NAME", "where jobs run: an executor plug-in of Snakemake")
+    yield _row("--jobs", _positive, "N", "limit on the jobs that an executor has at once")
+    yield _row("--profile", _path, "DIR", "a profile of Snakemake: slurm, generic, or a folder")
+    yield _flag("--dry-run", "show what would run and why")
+    text = "compare every result with its digest, even if size, time and inode are unchanged"
+    yield _flag("--verify", text)
+    yield ALLOW
+    yield _flag("--json", "print the outcome as JSON")
+    yield _row("--junit", _path, "FILE", "write the verdicts as a JUnit report (XML)")
+    yield from _detail()
+
+
+def _verify() -> Iterator[_Row]:
+    """Yield the options of ``vibsim verify``."""
+    yield RESULTS
+    text = "experiment, collection or FILE.yaml (default: compare the files of all, recompute none)"
+    yield _row("experiments", _word, "EXPERIMENT", text, nargs="*")
+    yield SETTINGS
+    yield _flag("--files", "compare files with the manifest, and recompute nothing")
+    yield from (CORES, ALLOW)
+
+
+def _simulate() -> Iterator[_Row]:
+    """Yield the options of ``vibsim simulate``."""
+    text = "one level, or several, written to the paths in the plan"
+    yield _row("--level", _index, "L", text, nargs="+", required=True)
+    yield _row(
+        "--shard", _index, "K", "number of the shard, a range of members (from 0)", default=0
+    )
+    text = "netCDF file to write (default: the path in the plan, unless that file is up to date)"
+    yield _row("--out", _path, "FILE", text)
+
+
+def _report() -> Iterator[_Row]:
+    """Yield the options of ``vibsim report``."""
+    yield _row("experiment", _word, "EXPERIMENT", "experiment or FILE.yaml", nargs="?")
+    yield FOLDER
+    text = "formats of the figure files: svg, png, pdf; several with commas (default: svg)"
+    yield _row("--formats", _word, "LIST", text)
+    text = "copy pages, data, experiment file and metadata (RO-Crate) to a new folder"
+    yield _row("--publish", _path, "DIR", text)
+    yield _row("--license", _word, "TEXT", "licence of the published files: address or sentence")
+
+
+def _detail() -> Iterator[_Row]:
+    """Yield the options for the amount of output; the last one on the command line counts."""
+    for names, value, text in (
+        (("-v", "--verbose"), "full", "show every check, also those that passed"),
+        (("-q", "--quiet"), "quiet", "print errors only; the exit status has the result"),
+    ):
+        yield names, {"action": "store_const", "const": value, "dest": "detail", "help": text}
+
+
+def _new() -> Iterator[_Row]:
+    """Yield the options of ``vibsim new``."""
+    yield _row("file", _path, "FILE", "new experiment file; an existing one is kept")
+    yield _row("--model", _word, "KIND", "kind of the model (default: pendulum)")
+    yield _row("--like", _word, "EXPERIMENT", "begin with the text of a shipped experiment")
+
+
+def _theory() -> Iterator[_Row]:
+    """Yield the options of ``vibsim theory``."""
+    yield _row("scheme", _word, "SCHEME", "scheme, such as rk4")
+    text = "option of the scheme, such as beta=1/6"
+    yield _row("options", _word, "NAME=VALUE", text, nargs="*")
+    yield _row("--terms", _positive, "N", "terms of each series (default: 4)", default=4)
+    yield _flag("--latex", "write the formulas as LaTeX")
+
+
+def _show() -> Iterator[_Row]:
+    """Yield the options of ``vibsim show``."""
+    text = "experiment, one member of its sweep (NAME@CASE), FILE.yaml, or a level file (FILE.nc)"
+    yield _row("what", _word, "EXPERIMENT", text)
+    yield _row("--quantity", _word, "NAME", "what to draw (default: the first position)")
+    yield _row("--scheme", _word, "NAME", "scheme to draw (default: the first)")
+    yield _row("--level", _index, "L", "level to draw (default: the finest that was made)")
+    yield _row("--case", _index, "K", "member of a sweep to draw (default: 0)", default=0)
+    yield _row("--rows", _positive, "N", "lines of the plot (default: 40)", default=40)
+    yield _row("--from", _finite, "T", "time at which the plot begins", dest="start")
+    yield _flag("--no-plot", "show the verdicts alone")
+
+
+def _movie() -> Iterator[_Row]:
+    """Yield the options of ``vibsim movie``."""
+    text = "experiment, one member of its sweep (NAME@CASE), or FILE.yaml"
+    yield _row("experiment", _word, "EXPERIMENT", text)
+    text = "movie to write: .mp4, .webm or .gif (default: the name of the experiment, .mp4)"
+    yield _row("--output", _path, "FILE", text)
+    text = "folder for the frames, as frame_0000.png and so on; no movie is written unless --output names one"
+    yield _row("--frames-to", _path, "DIR", text)
+    text = "one scheme, or two side by side (default: the first, and another that differs visibly)"
+    yield _row("--scheme", _word, "NAME", text, nargs="+", action="extend")
+    text = "one level, or two side by side (default: the finest, and the coarsest beside it)"
+    yield _row("--level", _index, "L", text, nargs="+", action="extend")
+    yield _row("--case", _index, "K", "member of a sweep (default: 0)", default=0)
+    yield _row("--quantity", _word, "NAME", "quantity over time (default: the first position)")
+    yield _row("--from", _finite, "T", "time at which the movie begins", dest="start")
+    yield _row("--to", _finite, "T", "time at which the movie ends", dest="end")
+    text = "periods in the moving window (default: 6 of a run of more than 9)"
+    yield _row("--window", _above_zero, "PERIODS", text)
+    yield _row("--fps", _above_zero, "N", "frames a second (default: 25, of a GIF 10)")
+    text = "number of frames over the whole time (default: what the motion needs, up to 1500)"
+    yield _row("--frames", _positive, "N", text)
+
+
+def _judge() -> Iterator[_Row]:
+    """Yield the options of ``vibsim judge``."""
+    text = "a table (CSV or TSV) with a row for each level, or a netCDF file for each level"
+    yield _row("files", _path, "FILE", text, nargs="+")
+    text = "step size: a column of the table; an attribute or variable of each netCDF file, or h1,h2,... in their order"
+    yield _row("--h", _word, "NAME", text, required=True)
+    text = "columns (default: all others) or netCDF variables to judge"
+    yield _row("--quantity", _word, "NAME", text, nargs="+", action="extend")
+    text = "how netCDF fields are restricted to common points (default: subset)"
+    yield ("--restrict",), {"choices": RESTRICTIONS, "help": text}
+    yield _row("--order", _above_zero, "P", "the expected order")
+    yield _row("--at-least", _above_zero, "P", "the lowest acceptable order")
+    text = "the exact value of a quantity, if known; may be repeated"
+    yield _row("--exact", _word, "QUANTITY=VALUE", text, action="append")
+    text = "noise of the values of each level (root mean square; default: round-off)"
+    yield _row("--noise", _from_zero, "X", text)
+    yield _row("--report", _path, "DIR", "write report.html and verdict.json to this folder")
+    yield _flag("--json", "print the verdicts as JSON, and nothing else")
