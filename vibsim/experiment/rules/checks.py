@@ -34,8 +34,9 @@ from vibsim.models.shared.free import why_not_free
 from vibsim.models.structure import MOST_MODES
 
 ENERGIES = ("energy", "energy_deviation")
-AT_BEST = " at `level: best`"
 """The energies that are known exactly if energy is conserved."""
+AT_BEST = " at `level: best`"
+"""What is added to the name of a value that exists at single levels only."""
 
 
 def check_published(
