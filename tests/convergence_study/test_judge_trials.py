@@ -358,7 +358,7 @@ def test_masked_cells_are_not_advised_to_be_left_out_with_all_levels() -> None:
     levels = [u.where(abs(u.x - 0.5) > 0.2) for u in on_grids([10, 20, 40], 2.0)]
     verdict = judge(H[:3], levels, order=2)
     assert verdict.reason == "non_finite"
-    assert "leave masked points out" in verdict.advice
+    assert "leave these points out" in verdict.advice
     assert "leave these levels out" in judge(H[:3], [math.nan] * 3).advice
 
 
@@ -474,7 +474,7 @@ def test_levels_that_move_apart_miss_no_limit() -> None:
 @pytest.mark.parametrize("kind", ["subset", "cubic"])
 def test_coordinates_that_number_the_points_are_told_of(kind: str) -> None:
     """Point 3 of 32 is no place of its own: the levels of a method of order 2 agree at point 0 alone."""
-    counts, told = [8, 16, 32, 64], "equally close on all levels"
+    counts, told = [8, 16, 32, 64], "have the same spacing on all levels"
     placed = on_grids(counts, 2.0)
     numbered = [u.assign_coords(x=np.arange(u.size)) for u in placed]
     h = [1 / n for n in counts]

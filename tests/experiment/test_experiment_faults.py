@@ -386,7 +386,7 @@ CASES: list[tuple[dict[str, Any], str, str, str]] = [
         value(value="energy_deviation"),
         "checks[0].value",
         "unknown value",
-        "write `value: end, quantity: energy_deviation` for that at the end",
+        "for its value at the end write `value: end, quantity: energy_deviation`",
     ),
     (
         value(value="end", quantity="wire_force", at={"level": "best"}),

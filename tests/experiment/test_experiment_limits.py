@@ -18,7 +18,14 @@ from vibsim.experiment.sweep_columns import line
 from vibsim.plan.build import build as build_plan
 
 ALL = LevelCost(
-    schemes=1, steps=2**28, samples=2**28 + 1, series=8, exact=2, extrema=MOST_EXTREMA, d2t=True
+    schemes=1,
+    steps=2**28,
+    samples=2**28 + 1,
+    series=8,
+    exact=2,
+    work=1.0,
+    extrema=MOST_EXTREMA,
+    d2t=True,
 )
 MEMORY = ALL.memory(1)
 DISK = replace(ALL, steps=2**12, samples=2**12 + 1, extrema=FEWEST_EXTREMA).disk(10**7)

@@ -169,7 +169,7 @@ def test_more_evaluations_take_more_time_and_so_smaller_shards() -> None:
         assert one.seconds(1) < other.seconds(1)
         assert one.seconds(2**16) < other.seconds(2**16)
         assert one.shard >= other.shard
-    assert loads[0].shard == cost.LevelCost(1, 2**10, 17, 3).shard
+    assert loads[0].shard == cost.LevelCost(1, 2**10, 17, 3, work=1.0).shard
     assert loads[0].shard > loads[-1].shard
 
 

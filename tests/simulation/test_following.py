@@ -80,7 +80,7 @@ def test_a_chain_is_made_as_a_whole() -> None:
     np.testing.assert_array_equal(part["u"], whole["u"][:, 4:])
     for chain in (1, 3, 25, 1000):
         for steps in (100, 10**5, 10**9):
-            load = LevelCost(schemes=1, steps=steps, samples=100, series=7, chain=chain)
+            load = LevelCost(schemes=1, steps=steps, samples=100, series=7, work=1.0, chain=chain)
             assert load.shard % chain == 0
             assert load.shard & (load.shard - 1) == 0 or chain > 1
     more = {**DUFFING["sweep"], "model.gamma": [1.0 / n for n in range(1, 50)]}

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -136,7 +136,7 @@ class LevelCost:
     """Stored series per scheme and member."""
     exact: int = 0
     """Stored series per member independent of the schemes: the states of the exact solution."""
-    work: float = 1.0
+    work: float = field(kw_only=True)
     """Work of a step, summed over the explicit schemes (first number of `work`)."""
     iterated: float = 0.0
     """Work of a step, summed over the implicit schemes (second number of `work`), which are not vectorised."""

@@ -158,12 +158,12 @@ def _faults(experiment: Experiment, level: int, record: Record, other: Record) -
         yield f"it ends at {record['t'][-1]:g}, the finest level at {other['t'][-1]:g}"
     # in a chain the initial values depend on the level, except those of the first member
     starts = np.asarray(record["case"]) % experiment.chain == 0
-    # a place that does not move in the shape of a mode has the rounding of those that do
-    largest = max(
-        np.nanmax(np.abs(record[state.name][..., 0]), initial=0.0) for state in model.states
-    )
-    for state in model.states:
-        yield from _start(record, other, state.name, starts, ROUNDED_START * largest)
+    for group in (model.positions, model.velocities):
+        sizes = np.stack([np.abs(record[name][:, starts, 0]) for name in group])
+        # a place that does not move in the shape of a mode has the rounding of those that do
+        rounding = ROUNDED_START * np.fmax.reduce(sizes, axis=(0, 1))
+        for name in group:
+            yield from _start(record, other, name, starts, rounding)
 
 
 def _equal(a: NDArray[Any], b: NDArray[Any]) -> bool:
@@ -171,7 +171,7 @@ def _equal(a: NDArray[Any], b: NDArray[Any]) -> bool:
 
 
 def _start(
-    record: Record, other: Record, name: str, starts: Flags, rounding: float
+    record: Record, other: Record, name: str, starts: Flags, rounding: Floats
 ) -> Iterator[str]:
     compared = [(name, other, "the finest level's")]
     if f"{name}_exact" in record:

@@ -21,7 +21,9 @@ LAST_PART = 4
 """A settled motion swings no further than its amplitude in the last one of so many parts of the time."""
 SETTLED = 0.1
 """Largest relative excess of the swing of a settled motion over its amplitude."""
-SWINGS = "the motion swings further in the last quarter of the time"
+SWINGS = (
+    "in the last quarter of the run the motion still swings over 10 % further than this amplitude"
+)
 VARIES = 1e-6
 """Relative spread below which members share a number."""
 
@@ -108,7 +110,7 @@ def stated_orders(
 
 def deviation(record: Record, quantity: str) -> Floats:
     """Return the stated order minus the formal one, shape (scheme, case)."""
-    return np.asarray(orders(record, quantity)[0] - formal_orders(record, quantity))
+    return np.asarray(stated_orders(record, quantity)[0] - formal_orders(record, quantity))
 
 
 def _error_fraction(record: Record, order: Floats) -> Floats:

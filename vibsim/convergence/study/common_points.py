@@ -129,7 +129,7 @@ def exact_values(exact: Any, common: CommonValues, *, members: bool = False) -> 
 
     `exact` is a number, an array, an xarray object, or a function of the coordinates. The function gets arrays that can
     be broadcast: by name if its parameters have the names of the dimensions, otherwise in the order of the dimensions.
-    Along dimensions whose cells are averaged, so is it. With `members` the first dimension is not an argument.
+    It is averaged along the dimensions whose cells are. With `members` the first dimension is not an argument.
 
     Raises
     ------

@@ -81,7 +81,7 @@ def judge(
         The exact result, if it is known: a number, or a `decimal.Decimal` of the digits as they are written; an array
         or xarray object at the compared points; or a function of the coordinates. If its parameters have the names of
         the dimensions, they may come in any order; otherwise it gets the coordinates in the order of the dimensions.
-        Where cells are averaged, so is the function.
+        It is averaged along the dimensions whose cells are.
     noise
         Root mean square of the noise of each level (from an iteration that stops early, or from printed digits).
         Without it the levels are assumed to be exact up to rounding.

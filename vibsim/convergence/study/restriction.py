@@ -241,13 +241,13 @@ def _subset(dim: str, coordinates: Sequence[Coordinate], lengths: Sequence[int])
 
 
 def _numbered(dim: str, points: Sequence[NDArray[Any]]) -> str:
-    """Doubt coordinates that are equally close on all levels: they may number the points."""
+    """Doubt coordinates that have the same spacing on all levels: they may number the points."""
     spacings = [float(np.ptp(p)) / max(len(p) - 1, 1) for p in points]
     if np.ptp(spacings) > EQUAL * max(spacings):
         return ""
     return (
-        f"The points along {dim} are equally close on all levels. If its coordinates number the points or cells, give "
-        "their positions."
+        f"The coordinates along {dim} have the same spacing on all levels. If they only number the points or cells, "
+        "give their positions."
     )
 
 

@@ -189,7 +189,7 @@ def _phrases(facts: LadderVerdict, setting: Setting) -> dict[str, Any]:
     not_finite = [level.h for level in facts.levels if level.value is None]
     these = "this level" if len(not_finite) == 1 else "these levels"
     if len(not_finite) == count and not facts.is_number:
-        these = "masked points"
+        these = "these points"
     if facts.expected is not None:
         wanted, as_expected = f"{facts.expected:g}", ", as expected"
     elif facts.at_least is not None:

@@ -35,8 +35,6 @@ from vibsim.models.structure import MOST_MODES
 
 ENERGIES = ("energy", "energy_deviation")
 """The energies that are known exactly if energy is conserved."""
-AT_BEST = " at `level: best`"
-"""What is added to the name of a value that exists at single levels only."""
 
 
 def check_published(
@@ -322,8 +320,13 @@ def _check_equal(check: EqualCheck, scope: Scope) -> None:
         first.refuse("chooses its own steps, for which theory knows no solution", value=check.first)
 
 
-def _is_quantity(name: str, choices: tuple[str, ...], scope: Scope, what: str = "") -> bool:
-    """Tell whether a quantity is one of `choices`, those of `what`; report a fault otherwise."""
+def _is_quantity(
+    name: str, choices: tuple[str, ...], scope: Scope, what: str = "", *, is_at_best: bool = False
+) -> bool:
+    """Tell whether a quantity is one of `choices`, those of `what`; report a fault otherwise.
+
+    With `is_at_best` the value exists at single levels, but not in their limit.
+    """
     model = scope.setting.model
     if not choices or name in choices:
         return True
@@ -334,11 +337,12 @@ def _is_quantity(name: str, choices: tuple[str, ...], scope: Scope, what: str = 
         scope.refuse(rule, f"ask for {plain_name(name)}", name)
         return False
     known = name in scope.setting.quantities
-    rule = f"{what} is not defined for this quantity" if known else "unknown quantity"
-    hint = "choose from " + ", ".join(choices) if known else nearest(name, choices)
-    if what.endswith(AT_BEST) and scope.setting.levels:
-        hint += f", or take one level: `at: {{level: {max(scope.setting.levels)}}}`"
-    scope.refuse(rule, hint, name)
+    where = " at `level: best`" if is_at_best else ""
+    rule = f"{what}{where} is not defined for this quantity" if known else "unknown quantity"
+    hints = ["choose from " + ", ".join(choices) if known else nearest(name, choices)]
+    if is_at_best and scope.setting.levels:
+        hints.append(f"or take one level: `at: {{level: {max(scope.setting.levels)}}}`")
+    scope.refuse(rule, ", ".join(filter(None, hints)), name)
     return False
 
 
@@ -357,7 +361,9 @@ def _value_named(name: str, scope: Scope) -> Value | None:
     row = VALUES.get(name)
     if row is None:
         is_quantity = name in scope.setting.quantities
-        hint = f"write `value: end, quantity: {name}` for that at the end" if is_quantity else ""
+        hint = (
+            f"for its value at the end write `value: end, quantity: {name}`" if is_quantity else ""
+        )
         scope.refuse("unknown value", hint or nearest(name, list(VALUES)), name)
     return row
 
@@ -378,8 +384,7 @@ def _check_value(row: Value, quantity: str | None, best: bool, scope: Scope) -> 
         place.refuse(rule, "choose from " + ", ".join(choices))
     else:
         only_there = best and quantity in _allowed(row, scope.setting, False)
-        what = row.name + (AT_BEST if only_there else "")
-        _is_quantity(quantity, choices, place, what)
+        _is_quantity(quantity, choices, place, row.name, is_at_best=only_there)
     _check_support(row, quantity, scope.at("value"))
 
 

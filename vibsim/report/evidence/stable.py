@@ -79,7 +79,7 @@ def _steps(run: _Run) -> str:
     if not 0.0 < limit < math.inf or not usable(run.p).size:
         return ""
     text, away = f"w dt = {words.number(p, 'step')} is", abs(p / limit - 1.0)
-    if away and np.all(np.abs(run.p / limit - 1.0) < NEAR_LIMIT):
+    if away > LIMIT_ROUNDING and np.all(np.abs(run.p / limit - 1.0) < NEAR_LIMIT):
         # beside the limit itself no distance would be seen
         ax = run.panel("w dt / limit − 1")
         frame.scale(ax, run.p / limit - 1.0, np.array([-away, away]), margin=0.5)

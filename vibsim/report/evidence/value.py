@@ -27,7 +27,10 @@ from vibsim.report.types import AccurateCheck, Axes, Experiment, ValueCheck
 def picture(
     experiment: Experiment, record: Record, check: ValueCheck, name: str, member: Member
 ) -> Picture | None:
-    """Draw a number by level, or its distance from the one that it should equal; None if no level has it."""
+    """Draw a number by level, or its distance from the one that it should equal.
+
+    None if no level has it, or all have the number expected.
+    """
     if check.take not in OF_ONE_MEMBER:
         # the check is not on a number of a single member
         return None

@@ -36,7 +36,8 @@ SIZES = {
     "linf_interior": "largest error without the last point",
 }  # fmt: skip
 """Norm to its name after division by the power of the duration that makes it an average."""
-DECADES = 100.0  # ratio of numbers from which their axis is logarithmic; of fewer decades a peak looks flat
+WIDE_RATIO = 100.0
+"""Ratio of numbers from which their axis is logarithmic; with a smaller one a peak would look flat."""
 STRIP = 0.097  # height of a legend row as a part of that of the axes
 LONG = 24  # characters of a label from which it is smaller
 
@@ -170,7 +171,7 @@ def against_step(record: Record, lead: Lead) -> Picture | None:
     if found is not None:
         due = words.fact(lead.result, "expected")
         is_other = lead.result["reason"] != "asymptotic" and due is not None
-        missed = f", not by {2.0**due:.2g}" if is_other else ""
+        missed = f", not by {2.0**due:.3g}" if is_other else ""
         of = f" of {lead.member.scheme_name}" if others else ""
         title = f"Each level divides the error{of} by {found:.3g}{missed}"
     return Picture(
@@ -231,7 +232,8 @@ def _errors(record: Record, quantity: str, member: Member, name: str) -> tuple[F
     estimate = np.full(len(levels), np.nan)
     if data.whole(record, "pair"):
         gap = data.at(record, f"{quantity}_difference_norm", member, norm=norm)
-        order, *_ = data.stated_order(record, quantity, member, norm)
+        # stated or estimated: both give the estimate that the tables have
+        order = float(data.at(record, f"{quantity}_order", member, norm=norm))
         order = order if math.isfinite(order) else data.formal_order(record, member, quantity)
         if math.isfinite(order) and order > 0.0:
             rest = 2.0 ** (order * np.diff(levels)) - 1.0
@@ -308,7 +310,7 @@ def _number(experiment: Experiment, record: Record, lead: Lead) -> tuple[str, st
 
 def _scaled(ax: Axes, values: Floats) -> None:
     """Fit the vertical axis, logarithmic if positive values span decades."""
-    if style.spans_decades(values, DECADES):
+    if style.spans_decades(values, WIDE_RATIO):
         style.log_axis(ax, "y", *style.log_limits(values), most=5)
     else:
         ax.set_ylim(*style.limits(values))
@@ -332,7 +334,8 @@ def _curves(lead: Lead, along: Along, values: Floats, text: str, hollow: Flags) 
             look |= {"linestyle": "none", "markersize": 5}
         ax.plot(x, y, **look, label=name or None)
         shown = hollow[cases]
-        ax.plot(x[shown], y[shown], **look | {"linestyle": "none", "markerfacecolor": "white"})
+        ring_look = style.look(i) | {"linestyle": "none", "markersize": 3.5}
+        ax.plot(x[shown], y[shown], **ring_look | {"markerfacecolor": "white"})
     _across(ax, along.key)
     _scaled(ax, values)
     _mark(ax, along.key.values, values, lead)
@@ -456,4 +459,6 @@ def _title_of_orders(inside: Flags, measured: Flags, checked: Flags) -> str:
     verb, whose = (
         ("lies", "its interval reaches") if beyond == 1 else ("lie", "their intervals reach")
     )
-    return f"{words.number(beyond, 'integer')} of {of} orders {verb} outside the band; {whose} in"
+    return (
+        f"{words.number(beyond, 'integer')} of {of} orders {verb} outside the band; {whose} into it"
+    )

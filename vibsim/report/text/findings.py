@@ -59,7 +59,7 @@ MISSED = {
     "value": "{Subject} is not as expected",
     "accurate": "{What} is not as accurate as asked",
     "stable": "{Schemes} {not_stability}",
-    "conserves": "The check that the energy {drift} fails",
+    "conserves": "Not as asked: that the energy {drift}",
     "equal": "{What} by {first} differs from {second}",
     "tolerance": "The error bound is beyond the tolerance",
 }
@@ -373,6 +373,8 @@ def _growing_error(record: Record, lead: Lead) -> str:
     name = f"{lead.quantity}_error_norm"
     error = data.at(record, name, member, norm=norm) if name in record else np.empty(0)
     if not error.size or not np.isfinite(error).all() or error[-1] < GROWN * error.min():
+        return ""
+    if error.min() == 0.0:
         return ""
     level = data.whole(record, "level")[int(np.argmin(error))]
     times = words.number(float(error[-1] / error.min()), "brief")
