@@ -99,7 +99,7 @@ TOLD = {
     ),
     "hertz": (
         {"model": wave("f*t + 0.1"), "initial": {}},
-        "model.parameters.f: the formulas take it for 50 rad/s",
+        "model.parameters.f: the formulas take it for an angular frequency",
     ),
     "of a claim": (
         {"checks": [{"claim": "it is so", "that": {"value": "period", "equals": 6.71}}]},

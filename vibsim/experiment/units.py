@@ -21,6 +21,7 @@ from typing import Any
 from vibsim.core.errors import nearest
 from vibsim.experiment.faults import Report
 from vibsim.experiment.schema.fields import AT, DECLARED, FORMULA_NOTE, MAX_FORMULAS, TABLE
+from vibsim.experiment.schema.structure import LoadTable
 from vibsim.experiment.schema.unit_text import NAME, UnitError, factors, split
 from vibsim.experiment.yaml.parse import Path_
 from vibsim.formula import CONSTANTS, FUNCTIONS, ExpressionError, constant
@@ -32,10 +33,10 @@ MAX_POWER = 99
 """Largest exponent of a base unit."""
 _ANY = ""
 """Marks a key that accepts any unit; the value is converted to SI base units."""
+FILE_ENDINGS = (".csv", ".mtx", ".nc", ".npy")
+"""Endings of the files that a structure may name."""
 _UNKNOWN = "?"
 """Marks a key that does not exist, which is reported elsewhere."""
-_FILES = (".mtx", ".npy", ".csv", ".nc")
-"""How names of files end in the section of a structure."""
 _STAND_IN = 1.0
 """Temporary placeholder for a refused value; valid everywhere."""
 
@@ -106,8 +107,7 @@ class Units:
         is_any = is_declared or (self._is_structure and key.startswith("model."))
         wanted = self.units.get(key, _ANY if is_any else _UNKNOWN)
         halves = split(text)
-        # names of files may look like one, such as frame 2 m.csv
-        if halves is None or (is_any and text.endswith(_FILES)):
+        if halves is None or (self._is_structure and _is_name_or_formula(path, text, halves[1])):
             return text
         try:
             if wanted == _UNKNOWN:
@@ -163,6 +163,22 @@ def _check_name(name: str) -> None:
         is_taken = True
     if is_taken:
         raise UnitError(f"'{name}' is a unit already", "choose another name")
+
+
+def _is_name_or_formula(path: Path_, text: str, after_number: str) -> bool:
+    """Tell whether a text of a structure that begins like a number with a unit is a name or a formula of the time t.
+
+    Names are those of files, such as ``frame 2 m.csv``, and of the columns of a load table.
+    """
+    if text.lower().endswith(FILE_ENDINGS) or (
+        len(path) > 3 and path[-1] in LoadTable.model_fields
+    ):
+        return True
+    try:
+        has_time = any(factor.name == "t" for factor in factors(after_number))
+    except UnitError:
+        has_time = True
+    return path[:2] == ("model", "load") and has_time
 
 
 def _constant(value: Any) -> float:

@@ -36,6 +36,7 @@ from vibsim.formula import (
     FUNCTIONS,
     ZERO,
     Binary,
+    Call,
     Expression,
     Name,
     Negate,
@@ -62,6 +63,7 @@ from vibsim.models.base import (
     State,
     declared_parameters,
     speeds,
+    tree,
 )
 from vibsim.models.events import Crossings
 from vibsim.models.shared.crossings import crossings, described
@@ -398,6 +400,17 @@ def _of_first_order(stiffness: Floats, turning: Floats, known: Flags) -> Floats:
     is_one = (rates.imag > 1e-6 * largest) & (np.abs(rates.real) <= 1e-9 * largest)
     found = np.sort(np.where(is_one, rates.imag, np.nan), axis=-1)
     return np.asarray(found[..., : stiffness.shape[-1]])
+
+
+def angles(model: Model) -> Iterator[str]:
+    """Yield the coordinates whose sine or cosine, or that of a sum of two, is in the equation: angles."""
+    for formula in model.accelerations:
+        for node in walk(tree(model, formula)):
+            if isinstance(node, Call) and node.function in ("sin", "cos"):
+                (angle,) = node.arguments
+                is_sum = isinstance(angle, Binary) and angle.operator in "+-"
+                sides = angle.operands if is_sum else (angle,)
+                yield from (side.name for side in sides if isinstance(side, Name))
 
 
 def terms_of(node: Expression) -> Iterator[Expression]:

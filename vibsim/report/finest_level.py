@@ -109,8 +109,8 @@ def stated_orders(
 
 
 def deviation(record: Record, quantity: str) -> Floats:
-    """Return the stated order minus the formal one, shape (scheme, case)."""
-    return np.asarray(stated_orders(record, quantity)[0] - formal_orders(record, quantity))
+    """Return the order, stated or estimated, minus the formal one, shape (scheme, case)."""
+    return np.asarray(orders(record, quantity)[0] - formal_orders(record, quantity))
 
 
 def _error_fraction(record: Record, order: Floats) -> Floats:

@@ -17,7 +17,7 @@ from vibsim.experiment.value_names import OF_THE_SAME_KIND, VALUES
 from vibsim.experiment.yaml.parse import Path_
 from vibsim.formula import Binary, Call, Name, walk
 from vibsim.models import Model, tree
-from vibsim.models.system import terms_of
+from vibsim.models.system import angles, terms_of
 
 TURN = 2.0 * math.pi
 EXACT_DIGITS = 9
@@ -58,9 +58,9 @@ def _warn_angles(setting: Setting, report: Report) -> None:
     model = setting.model
     if model is None:
         return
-    angles = set(_angle_coordinates(model)) if model.dimensionless else set()
+    of_equation = set(angles(model)) if model.dimensionless else set()
     for state in model.states:
-        if state.unit != "rad" and state.name not in angles:
+        if state.unit != "rad" and state.name not in of_equation:
             continue
         for path, values in _unitless_starts(report.source.data, state.name):
             largest = max(map(abs, values), default=0.0)
@@ -75,11 +75,11 @@ def _warn_hertz(setting: Setting, report: Report) -> None:
     if model is None or not isinstance(declared, Mapping):
         return
     for name in sorted(_rates(model) & set(declared)):
-        halves = split(declared[name]) if isinstance(declared[name], str) else None
+        text = declared[name]
+        halves = split(text) if isinstance(text, str) else None
         if halves and halves[1].endswith(("Hz", "hertz")):
-            rule = f"the formulas take it for {halves[0]} rad/s: 1 Hz is 1/s, in which they do not turn by 2 pi"
-            hint = f"write 2*pi*{name}*t there, or its value as `2*pi*{halves[0]} rad/s`"
-            report.note(("model", DECLARED, name), rule, hint)
+            rule = f"the formulas take it for an angular frequency, but {text} is a number of turns per second"
+            report.note(("model", DECLARED, name), rule, f"write 2*pi*{name}*t there")
 
 
 def _rates(model: Model) -> set[str]:
@@ -124,18 +124,6 @@ def _warn_set_and_swept(report: Report) -> None:
         if key in keys:
             hint = f"leave the sweep out by `--set sweep=`, or set `sweep.{key}`"
             report.note(tuple(key.split(".")), "has no effect, because it is swept", hint)
-
-
-def _angle_coordinates(model: Model) -> Iterator[str]:
-    """Yield the coordinates whose sine or cosine (or that of a sum of two) occurs: angles in a model without units."""
-    for formula in model.accelerations:
-        for node in walk(tree(model, formula)):
-            if isinstance(node, Call) and node.function in ("sin", "cos"):
-                (angle,) = node.arguments
-                sides = (
-                    angle.operands if isinstance(angle, Binary) and angle.operator in "+-" else ()
-                )
-                yield from (side.name for side in sides or (angle,) if isinstance(side, Name))
 
 
 def _at_path(content: Any, path: Path_) -> Any:

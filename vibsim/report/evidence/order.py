@@ -81,7 +81,9 @@ def _draw_orders(
     if math.isfinite(expected):
         frame.allowed(ax, expected - check.tolerance, expected + check.tolerance)
         ax.axhline(expected, **frame.DASHED)
-    is_stated = math.isfinite(data.stated_order(record, quantity, member, norm)[0])
+    # the data have the verdict on the scheme's order; an order of its own has another one
+    stated = math.isfinite(data.stated_order(record, quantity, member, norm)[0])
+    is_stated = stated or check.order != "scheme"
     counts = [
         is_stated and first <= triple and levels[i + 2] <= last for i, triple in enumerate(triples)
     ]

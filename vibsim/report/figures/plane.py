@@ -61,7 +61,8 @@ def phase(experiment: Experiment, record: Record, shown: list[Member]) -> Pictur
     # a closed orbit is drawn once, any other for the times of the levels
     closes = math.isfinite(exact)
     orbit = t <= 1.02 * period if closes else np.any([keep for keep, _ in parts], axis=0)
-    size = _draw_orbit(axes, record, model, case, w, orbit)
+    name = name_of_exact(experiment)
+    size = _draw_orbit(axes, record, model, case, w, orbit, name)
     largest = 0.0
     for ax, i in zip(axes, chosen, strict=True):
         for k, member in enumerate(members):
@@ -90,17 +91,17 @@ def phase(experiment: Experiment, record: Record, shown: list[Member]) -> Pictur
         title="Phase plane: velocity against position",
         caption=drawn_text
         * is_long
-        + "Black, dashed: the exact orbit. The marker is the end of the motion. A spiral outwards gains energy, one "
-        "inwards loses it; an orbit that closes beside the exact one conserves an energy of its own.",
-        alt="Velocity over the natural frequency against position for each level, with the exact orbit",
+        + f"Black, dashed: the {name} orbit. The marker is the end of the motion. A spiral outwards gains energy, one "
+        "inwards loses it; an orbit that closes beside it conserves an energy of its own.",
+        alt="Velocity over the natural frequency against position for each level",
         figure=figure,
     )
 
 
 def _draw_orbit(
-    axes: list[Axes], record: Record, model: Model, case: int, w: float, drawn: Flags
+    axes: list[Axes], record: Record, model: Model, case: int, w: float, drawn: Flags, label: str
 ) -> float:
-    """Draw the exact orbit and return its size; 0 if it is unknown."""
+    """Draw the exact orbit or that of the reference, and return its size; 0 if it is unknown."""
     names = f"{model.position}_exact", f"{model.velocity}_exact"
     if any(name not in record for name in names):
         return 0.0
@@ -111,7 +112,7 @@ def _draw_orbit(
         radius = float(np.hypot(u[0], v[0] / w))
         u, v = radius * np.cos(angle), radius * w * np.sin(angle)
     for ax in axes:
-        ax.plot(u, v / w, **style.REFERENCE | {"zorder": 5}, label="exact")
+        ax.plot(u, v / w, **style.REFERENCE | {"zorder": 5}, label=label)
     return float(np.nanmax(np.hypot(u, v / w)))
 
 

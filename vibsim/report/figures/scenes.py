@@ -21,6 +21,7 @@ from vibsim.core.array_types import Floats
 from vibsim.formula import derivative, parse, values
 from vibsim.models import Model, tree
 from vibsim.models.base import Formula, looked_up
+from vibsim.models.system import angles
 
 WIDTH, HEIGHT = 320.0, 220.0
 WEIGHT = 0.45  # length of the arrow of the weight over that of the wire
@@ -108,8 +109,7 @@ def scene_of(model: Model) -> Callable[[Motion], Scene] | None:
     if model.kind in SCENES:
         return SCENES[model.kind]
     is_displacement = model.is_alone and model.states[0].unit in {"m", "1"}
-    # by its name it is an angle
-    is_displacement &= model.position != "theta"
+    is_displacement &= not (model.dimensionless and model.position in angles(model))
     # at an event that the drawing does not show, a body would turn in mid-air
     is_displacement &= model.events is None or not model.events.jumps
     return spring_mass if is_displacement else None

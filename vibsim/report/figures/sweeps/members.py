@@ -42,7 +42,11 @@ def histograms(experiment: Experiment, record: Record, quantity: str) -> Picture
     if len(record["case"]) < FEWEST_MEMBERS:
         return None
     schemes, letter = record.words("scheme")[:MOST_ROWS], words.symbol(quantity)
-    error, away = finest_level.error(record, quantity), finest_level.deviation(record, quantity)
+    error, order = (
+        finest_level.error(record, quantity),
+        finest_level.stated_orders(record, quantity)[0],
+    )
+    away = order - data.formal_orders(record, quantity)
     period = finest_level.period_error(record, -1)
     has_period = quantity == position(experiment) and bool(np.isfinite(period).any())
     size = style.label(f"{error.kind} error", norm_unit(record, quantity))
@@ -150,8 +154,8 @@ class _Projection:
         """Yield the stated order minus the formal one."""
         record, quantity = self.record, self.quantity
         name = f"order of {words.symbol(quantity)}"
-        order = finest_level.orders(record, quantity)[0]
-        away = finest_level.deviation(record, quantity)[self.scheme]
+        order = finest_level.stated_orders(record, quantity)[0]
+        away = (order - data.formal_orders(record, quantity))[self.scheme]
         if not np.isfinite(away).any():
             return
         if text := shared(name, order[self.scheme], form="order"):

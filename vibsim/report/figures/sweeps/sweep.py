@@ -422,8 +422,8 @@ def _line(ax: Axes, x: Floats, y: Floats, **look: Any) -> None:
     """Draw a number of members in the order of `x`, thinned; with markers if they are few."""
     if x.size > MOST_MARKERS:
         look["marker"] = "," if look.get("linestyle") == "none" else ""
-    elif look.get("marker") and np.unique(x).size < FEWEST_OF_A_LINE:
-        look["linestyle"] = "none"
+    elif np.unique(x).size < FEWEST_OF_A_LINE:
+        look = {"marker": "_"} | look | {"linestyle": "none"}
     ax.plot(*style.thin(x, y), **look)
 
 
