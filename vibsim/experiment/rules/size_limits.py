@@ -114,7 +114,7 @@ def check_costs(experiment: ExperimentSpec, report: Report) -> None:
     hint = "store fewer samples, or begin at a lower level"
     # the smallest job makes one member, or one chain of members
     smallest = experiment.chain
-    memory = max(cost.memory(smallest) for cost in costs)
+    memory = max((cost.memory(smallest) for cost in costs), default=0)
     disk = sum(cost.disk(experiment.members) for cost in costs)
     files = [cost.shards(experiment.members) for cost in costs]
     if memory > MAX_MEMORY:

@@ -426,10 +426,11 @@ def without_kind(data: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def one_of(members: Mapping[str, type[Section]]) -> Any:
-    """Return the union of kinds of checks by their leading key; a claim has others as well."""
+    """Return the union of kinds of checks by their leading key."""
     *others, last = members
-    rule = f"must be a mapping with the key {', '.join(others)} or {last}"
-    return by_form(members, rule, "check", first="claim")
+    return by_form(
+        members, f"must be a mapping with the key {', '.join(others)} or {last}", "check"
+    )
 
 
 Measurement = (

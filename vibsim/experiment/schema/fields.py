@@ -107,21 +107,18 @@ def tagged(members: Mapping[str, Any], discriminator: Discriminator) -> Any:
 _FORMS = ("mapping", "text", "number", "list", "rows", "row", "other")
 
 
-def by_form(
-    members: Mapping[str, Any], rule: str = "", error: str = "form", first: str = ""
-) -> Any:
+def by_form(members: Mapping[str, Any], rule: str = "", error: str = "form") -> Any:
     """Return a union of types selected by the YAML form of the value; any other form breaks `rule`, an `error`.
 
-    A member is named after a key that its mapping must have (of several the `first` one counts), or is ``mapping``,
-    ``text``, ``number``, ``list``, ``rows`` (a list of lists), ``row`` (any other list), or ``other`` for all remaining
-    forms.
+    A member is named after a key that its mapping must have (the first one in `members` that is there), or is
+    ``mapping``, ``text``, ``number``, ``list``, ``rows`` (a list of lists), ``row`` (any other list), or ``other`` for
+    all remaining forms.
     """
 
     def form(value: Any) -> str:
         if isinstance(value, Mapping | Section):
             keys = value if isinstance(value, Mapping) else type(value).model_fields
-            named = (name for name in (first, *members) if name in keys and name not in _FORMS)
-            forms = [*named, "mapping"]
+            forms = [*(name for name in members if name in keys and name not in _FORMS), "mapping"]
         elif isinstance(value, list | tuple):
             forms = ["list", "rows" if value and isinstance(value[0], list | tuple) else "row"]
         else:

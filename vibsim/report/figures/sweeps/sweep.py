@@ -423,7 +423,7 @@ def _line(ax: Axes, x: Floats, y: Floats, **look: Any) -> None:
     if x.size > MOST_MARKERS:
         look["marker"] = "," if look.get("linestyle") == "none" else ""
     elif np.unique(x).size < FEWEST_OF_A_LINE:
-        look = {"marker": "_"} | look | {"linestyle": "none"}
+        look |= {"linestyle": "none", "marker": look.get("marker") or "_"}
     ax.plot(*style.thin(x, y), **look)
 
 
