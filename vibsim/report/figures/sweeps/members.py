@@ -42,11 +42,7 @@ def histograms(experiment: Experiment, record: Record, quantity: str) -> Picture
     if len(record["case"]) < FEWEST_MEMBERS:
         return None
     schemes, letter = record.words("scheme")[:MOST_ROWS], words.symbol(quantity)
-    error, order = (
-        finest_level.error(record, quantity),
-        finest_level.stated_orders(record, quantity)[0],
-    )
-    away = order - data.formal_orders(record, quantity)
+    error, away = finest_level.error(record, quantity), finest_level.deviation(record, quantity)
     period = finest_level.period_error(record, -1)
     has_period = quantity == position(experiment) and bool(np.isfinite(period).any())
     size = style.label(f"{error.kind} error", norm_unit(record, quantity))
@@ -58,9 +54,9 @@ def histograms(experiment: Experiment, record: Record, quantity: str) -> Picture
     level = whole(record, "level")[-1]
     for s, scheme in enumerate(schemes):
         allowed, several = tolerance(experiment, quantity, scheme), of_several(record, s)
-        stated = f"stated order − {promised_text(record, quantity, s)}"
+        axis_label = f"order − {promised_text(record, quantity, s)}"
         drawn = (
-            (f"Order of {letter}{several}", stated, away[s], (-allowed, allowed)),
+            (f"Order of {letter}{several}", axis_label, away[s], (-allowed, allowed)),
             (f"Error of {letter}, level {level}", size, error.best[s], None),
             ("Error of the period", "|period / exact − 1|", period[s], None),
         )
@@ -151,11 +147,11 @@ class _Projection:
         return {word: status == word for word in SEVERITY}
 
     def order(self, allowed: float) -> Iterator[View | str]:
-        """Yield the stated order minus the formal one."""
+        """Yield the order, stated or estimated, minus the formal one."""
         record, quantity = self.record, self.quantity
         name = f"order of {words.symbol(quantity)}"
-        order = finest_level.stated_orders(record, quantity)[0]
-        away = (order - data.formal_orders(record, quantity))[self.scheme]
+        order = finest_level.orders(record, quantity)[0]
+        away = finest_level.deviation(record, quantity)[self.scheme]
         if not np.isfinite(away).any():
             return
         if text := shared(name, order[self.scheme], form="order"):
