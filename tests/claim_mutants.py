@@ -100,6 +100,6 @@ def survivors(experiment: Experiment) -> list[str]:
 def judged(
     experiment: Experiment, checks: tuple[Any, ...], levels: dict[int, Record]
 ) -> list[Verdict]:
-    """Judge an experiment by these checks in place of its own."""
-    other = experiment.model_copy(update={"checks": checks, "tolerance": None})
+    """Judge an experiment by these checks in place of its own, and without its printed tables."""
+    other = experiment.model_copy(update={"checks": checks, "published": (), "tolerance": None})
     return verdicts(other, analyse_records(other, levels))
