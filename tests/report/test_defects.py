@@ -168,7 +168,7 @@ def test_a_run_that_grows_is_cut_off_or_drawn_by_its_size():
     for rec, case in [(record, 0), (grown, 2), (grown, 8)]:
         member = Member(0, case, "central", role="worst")
         with style.applied():
-            top = solution.solution(rec, "theta", member).figure.axes[0]
+            top = solution.solution(exp, rec, "theta", member).figure.axes[0]
             curves = time.overlay(rec, "theta", member).figure.axes[0]
         size = np.abs(rec["theta_exact"][case]).max()
         assert max(np.abs(top.get_ylim())) <= 3.0 * size * (1 + 1e-12)
@@ -182,8 +182,10 @@ def test_time_ends_with_the_breakdown_and_the_panel_says_so():
     record = samples.record(exp)
     t, member = data.times(record, 2), Member(0, 2, "central", role="worst")
     with style.applied():
-        pages = [draw(record, "theta", member) for draw in
-                 (solution.solution, time.overlay)]  # fmt: skip
+        pages = [
+            solution.solution(exp, record, "theta", member),
+            time.overlay(record, "theta", member),
+        ]
     for page in pages:
         top = page.figure.axes[0]
         assert t[0] < top.get_xlim()[1] < t[-1] / 2

@@ -23,6 +23,7 @@ from vibsim.experiment.faults import Report
 from vibsim.experiment.schema.fields import AT, DECLARED, FORMULA_NOTE, MAX_FORMULAS, TABLE
 from vibsim.experiment.schema.structure import LoadTable
 from vibsim.experiment.schema.unit_text import NAME, UnitError, factors, split
+from vibsim.experiment.tables import file, matrix
 from vibsim.experiment.yaml.parse import Path_
 from vibsim.formula import CONSTANTS, FUNCTIONS, ExpressionError, constant
 from vibsim.models import Model
@@ -33,7 +34,7 @@ MAX_POWER = 99
 """Largest exponent of a base unit."""
 _ANY = ""
 """Marks a key that accepts any unit; the value is converted to SI base units."""
-FILE_ENDINGS = (".csv", ".mtx", ".nc", ".npy")
+FILE_ENDINGS = (*matrix.ENDINGS, *file.ENDINGS)
 """Endings of the files that a structure may name."""
 _UNKNOWN = "?"
 """Marks a key that does not exist, which is reported elsewhere."""

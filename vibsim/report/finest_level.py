@@ -22,7 +22,8 @@ LAST_PART = 4
 SETTLED = 0.1
 """Largest relative excess of the swing of a settled motion over its amplitude."""
 SWINGS = (
-    "in the last quarter of the run the motion still swings over 10 % further than this amplitude"
+    f"in the last quarter of the run the motion still swings over {100 * SETTLED:g} % further "
+    "than this amplitude"
 )
 VARIES = 1e-6
 """Relative spread below which members share a number."""

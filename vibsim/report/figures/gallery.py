@@ -151,7 +151,7 @@ def _general(
         and data.whole(record, "pair")
         and not data.is_undecided(record, position)[first.scheme, first.case]
     ):
-        yield "estimated error", [solution.solution(record, position, first)]
+        yield "estimated error", [solution.solution(experiment, record, position, first)]
     equation = experiment.model.definition
     if series:
         if equation.conservative:

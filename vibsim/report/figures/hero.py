@@ -20,6 +20,7 @@ from vibsim.report import choice, data, finest_level, series, style, sweep_layou
 from vibsim.report.choice import Lead
 from vibsim.report.data import Member
 from vibsim.report.figures import moments, panels, time
+from vibsim.report.figures.solution import DOTS
 from vibsim.report.figures.sweeps.view import key_axis, ring
 from vibsim.report.style import Picture
 from vibsim.report.sweep_layout import Along, Grid
@@ -202,12 +203,8 @@ def solution(
     # as in the figure of the motion, lines between too few samples would cut off its extremes
     turns = exact if has_exact else (t, values)
     is_dotted = moments.is_undersampled(int(record["steps"][-1]), t, turns)
-    look: dict[str, Any] = (
-        {"linestyle": "none", "marker": ".", "markersize": 3.0} if is_dotted else {}
-    )
-    ax.plot(
-        *style.thin(t, values, 200), color=style.COLOURS[0], label=text, **{"linewidth": 1.4} | look
-    )
+    look: dict[str, Any] = DOTS if is_dotted else {"linewidth": 1.4}
+    ax.plot(*style.thin(t, values, 200), color=style.COLOURS[0], label=text, **look)
     panels.fit_values(ax, [values], exact[1])
     panels.stop_at_breakdown(ax, t, [values])
     ax.set_xlabel(data.time_label(record))

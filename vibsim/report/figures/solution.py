@@ -30,7 +30,7 @@ DOTS: Look = {"linestyle": "none", "marker": ".", "markersize": 3.0}
 """Replaces a line if the samples are too few for one."""
 
 
-def solution(record: Record, quantity: str, member: Member) -> Picture:
+def solution(experiment: Experiment, record: Record, quantity: str, member: Member) -> Picture:
     """Draw the solution and, below it on a logarithmic scale, its estimated and its true error."""
     t, letter = data.times(record, member.case), words.symbol(quantity)
     measure = data.unit(record, f"{quantity}_finest")
@@ -39,7 +39,8 @@ def solution(record: Record, quantity: str, member: Member) -> Picture:
     is_known = bool(np.isfinite(exact).any())
     axes = panels.stacked([2.3, 2.5], style.TIME)
     finest = data.at(record, f"{quantity}_finest", member)
-    _draw_solution(axes[0], t, finest, best, exact, data.whole(record, "level")[-1])
+    name = series.name_of_exact(experiment)
+    _draw_solution(axes[0], t, finest, best, exact, name, data.whole(record, "level")[-1])
     axes[0].set(ylabel=style.label(letter, measure), title=f"Solution {letter}(t)")
     thickness = _draw_band(axes[0], t, best, bound, measure)
     _draw_errors(axes[1], t, record, quantity, member, bound, exact - best)
@@ -73,7 +74,7 @@ def _draw_band(ax: Axes, t: Floats, centre: Floats, bound: Floats, measure: str)
 
 
 def _draw_solution(
-    ax: Axes, t: Floats, finest: Floats, best: Floats, exact: Floats, level: int
+    ax: Axes, t: Floats, finest: Floats, best: Floats, exact: Floats, name: str, level: int
 ) -> None:
     pale: dict[str, Any] = {"color": BAND, "linewidth": 4.5, "alpha": 0.7}
     solid: dict[str, Any] = {"color": "#0072B2", "linewidth": 1.4, "gid": style.of_level(level)}
@@ -81,7 +82,7 @@ def _draw_solution(
     rows = [
         (best, "extrapolated (Richardson)", pale),
         (finest, f"level {level}", solid),
-        (exact, "exact", dotted),
+        (exact, name, dotted),
     ]
     rows = [row for row in rows if np.isfinite(row[0]).any()]
     for y, text, look in rows:
@@ -93,7 +94,7 @@ def _draw_solution(
     size = data.largest(exact) if np.isfinite(exact).all() else 0.0
     if 0.0 < size < max(map(data.largest, drawn)) / CUT:
         ax.set_ylim(-CUT * size, CUT * size)
-        panels.note(ax, f"cut off at {CUT:g} times the exact solution", 0.11)
+        panels.note(ax, f"cut off at {CUT:g} times the {name} solution", 0.11)
     else:
         panels.fit_values(ax, finite)
     style.beside(ax)

@@ -372,9 +372,7 @@ def _growing_error(record: Record, lead: Lead) -> str:
     norm, member = data.norm_index(record, lead.norm), lead.member
     name = f"{lead.quantity}_error_norm"
     error = data.at(record, name, member, norm=norm) if name in record else np.empty(0)
-    if not error.size or not np.isfinite(error).all() or error[-1] < GROWN * error.min():
-        return ""
-    if error.min() == 0.0:
+    if not error.size or not np.isfinite(error).all() or not 0.0 < GROWN * error.min() <= error[-1]:
         return ""
     level = data.whole(record, "level")[int(np.argmin(error))]
     times = words.number(float(error[-1] / error.min()), "brief")
