@@ -13,7 +13,7 @@ from vibsim.analysis import Verdict, analyse_parts, analyse_records, join_parts,
 from vibsim.comparison.best_solution import best_record
 from vibsim.comparison.best_values import scalars
 from vibsim.comparison.largest_between_samples import largest_between_samples
-from vibsim.convergence.gci import CLASSES
+from vibsim.convergence.extrapolation.gci import CLASSES
 from vibsim.core.record import Record
 from vibsim.experiment import Experiment
 from vibsim.experiment.value_names import VALUES

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from vibsim.comparison.best_solution import best_record
 from vibsim.comparison.extrapolate_members import Extrapolated, Method, Start, extrapolate_members
-from vibsim.convergence.state_extrapolation import FLOATS, Circumstances, best_entry, tableau
+from vibsim.convergence.extrapolation.states import FLOATS, Circumstances, best_entry, tableau
 from vibsim.core.record import Record, Variable
 from vibsim.engine import integrate
 from vibsim.experiment import Experiment

@@ -34,11 +34,11 @@ from vibsim.comparison.parting import parting
 from vibsim.comparison.quantity_comparison import Compared, Comparison
 from vibsim.convergence.differences import largest, safe_ratio
 from vibsim.convergence.evidence import pick
+from vibsim.convergence.extrapolation.thresholds import ORDER_ABOVE_ROUND_OFF
 from vibsim.convergence.reasons import code
 from vibsim.convergence.thresholds import (
     HALF_SPACING,
     LOWEST_ORDER,
-    ORDER_ABOVE_ROUND_OFF,
     ORDINARY_ORDER,
     SUPERCONVERGENCE,
 )

@@ -18,7 +18,7 @@ from vibsim.comparison.extrapolate_members import (
     join_members,
     noise_of,
 )
-from vibsim.convergence.state_extrapolation import Pair
+from vibsim.convergence.extrapolation.states import Pair
 from vibsim.core.array_types import Floats, Integers
 from vibsim.core.record import Attribute, Record, Variable, flags
 from vibsim.core.vocabulary import MEMBER, SERIES

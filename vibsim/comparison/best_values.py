@@ -22,11 +22,11 @@ from vibsim.comparison.comparison_variables import Table
 from vibsim.comparison.extremum_of_levels import extremum_of_levels
 from vibsim.comparison.quantity_comparison import Compared
 from vibsim.comparison.thresholds import ERROR_OF_LINE, IRREGULAR, ORDER_OF_GRID, ORDER_OF_PARABOLA
-from vibsim.convergence import gci
 from vibsim.convergence.differences import safe_ratio
+from vibsim.convergence.extrapolation import gci
+from vibsim.convergence.extrapolation.numbers import Limit, limit, observed_order
+from vibsim.convergence.extrapolation.thresholds import NUMBER_SAFETY_ALONE
 from vibsim.convergence.ladder_blocks import batches
-from vibsim.convergence.number_extrapolation import Limit, limit, observed_order
-from vibsim.convergence.thresholds import NUMBER_SAFETY_ALONE
 from vibsim.core.array_types import Flags, Floats
 from vibsim.core.record import Variable, flags
 from vibsim.core.vocabulary import LEVELS_OF_AN_ORDER, MEMBER

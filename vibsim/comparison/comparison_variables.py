@@ -10,11 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibsim.apriori.formal_orders import is_promised, orders_vary
+from vibsim.comparison.local_order import local_order, window_points
 from vibsim.comparison.quantity_comparison import Comparison
+from vibsim.comparison.rescaled_differences import local_scale, masked_ratio, proportionality
 from vibsim.comparison.thresholds import ORDER_WINDOW
 from vibsim.convergence import differences
-from vibsim.convergence.gci import of_order
-from vibsim.convergence.local_order import local_order, window_points
+from vibsim.convergence.extrapolation.gci import of_order
 from vibsim.convergence.thresholds import ORDINARY_ORDER
 from vibsim.core.array_types import Floats
 from vibsim.core.record import Record, Variable
@@ -152,7 +153,7 @@ def _pairs(q: Comparison, add: Add) -> None:
     rescaled = [x * differences.rescaling(p, levels[: i + 2]) for i, x in enumerate(d)]
     errors = unknown if q.errors is None else q.errors[:-1]
     # the error need not cross zero where the difference does
-    local_size = np.where(np.isfinite(d[-1]), differences.local_scale(d[-1]), np.nan)
+    local_size = np.where(np.isfinite(d[-1]), local_scale(d[-1]), np.nan)
     words = "grid convergence index of the finest level"
     add("gci", SERIES, _index(q, TYPICAL_NORM, local_size), words)
     add("difference", dims, np.stack(d, 2), "level minus next level")
@@ -177,8 +178,8 @@ def _triples(q: Comparison, add: Add) -> None:
     floor = [q.floor[..., i] + q.floor[..., i + 1] for i in range(len(q.differences))]
     ratios, factors, orders = [], [], []
     for i, (a, b) in enumerate(pairwise(q.differences)):
-        ratios.append(differences.masked_ratio(a, b, floor[i + 1][..., None]))
-        factors.append(differences.proportionality(a, b))
+        ratios.append(masked_ratio(a, b, floor[i + 1][..., None]))
+        factors.append(proportionality(a, b))
         triple, floors = grid.levels[i : i + 3], (floor[i], floor[i + 1])
         orders.append(local_order(a, b, triple, floors, counts, grid.end_included))
     add("ratio", dims, np.stack(ratios, 2), "ratio of successive differences", "1")

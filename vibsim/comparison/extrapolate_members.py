@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibsim.comparison.thresholds import LONG_RUN, RECENT, RESOLVED_STEP
-from vibsim.convergence.state_extrapolation import (
+from vibsim.convergence.extrapolation.states import (
     Best,
     Circumstances,
     Pair,
@@ -25,7 +25,7 @@ from vibsim.convergence.state_extrapolation import (
     best_entry,
     tableau,
 )
-from vibsim.convergence.thresholds import KNOWN_DIGIT
+from vibsim.convergence.extrapolation.thresholds import KNOWN_DIGIT
 from vibsim.core.array_types import Floats, Integers
 from vibsim.engine import integrate
 from vibsim.models import Model

@@ -12,7 +12,7 @@ from vibsim.comparison.largest_between_samples import (
 )
 from vibsim.comparison.thresholds import ERROR_OF_LINE
 from vibsim.convergence.differences import error_factor
-from vibsim.convergence.thresholds import ORDER_ABOVE_ROUND_OFF
+from vibsim.convergence.extrapolation.thresholds import ORDER_ABOVE_ROUND_OFF
 from vibsim.core.array_types import Flags, Floats
 from vibsim.observe.member_block import MemberBlock
 

@@ -11,8 +11,9 @@ import numpy as np
 
 from vibsim.apriori.formal_orders import even_powers, special_orders
 from vibsim.comparison import thresholds as th
+from vibsim.comparison.rescaled_differences import coincidence
 from vibsim.convergence import differences
-from vibsim.convergence.extrapolation import extrapolate_series
+from vibsim.convergence.extrapolation.series import extrapolate_series
 from vibsim.convergence.thresholds import ROUND_OFF_SAFETY
 from vibsim.convergence.verdict import Judgement
 from vibsim.core.array_types import Flags, Floats
@@ -155,7 +156,7 @@ class Comparison:
             differences.target_ratio(order, levels[i : i + 3]) for i in range(len(levels) - 2)
         ]
         pairs = zip(pairwise(self.differences), ratios, strict=True)
-        return by_level([differences.coincidence(a, b, ratio) for (a, b), ratio in pairs])
+        return by_level([coincidence(a, b, ratio) for (a, b), ratio in pairs])
 
     def ratios(self, kind: str) -> Floats:
         """Return the ratio of successive differences in a norm, shape (scheme, case, triple)."""

@@ -15,7 +15,14 @@ SHAPELESS_POINTS = 2  # series that differ at no more points have no shape [deri
 # Order that extrapolates a quantity promised to be exact: the finest level then stays as it is. [convention]
 EXACT_ORDER = 16.0
 STRAIGHT = 1e-3  # largest second difference of a straight line, over its total change [convention]
+
+# ---- Series over time
+
 ORDER_WINDOW = 0.5  # length of the window of a local order, in periods [derived]
+ZERO_CROSSING = 0.1  # a denominator below this part of its local scale crosses zero [convention]
+LEAST_WINDOW = 3  # points of the shortest window of a local order [convention]
+# The last point is compared alone if its differences are at least this part of those in the last window. [convention]
+LAST_POINT_ALONE = 0.5
 
 # ---- Causes of an order
 

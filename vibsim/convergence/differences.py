@@ -1,4 +1,4 @@
-r"""Formulas for series: norms, differences of levels, ratios, orders, coincidence.
+r"""Formulas for series: norms, differences of levels, ratios, orders, angles.
 
 With ``u_l = u - h_l^p e_p + ...`` and ``h_l = 2^-l``, two levels differ by ``d = u_l - u_next = -(1 - 1/R) h_l^p e_p``,
 ``R = 2^(p (next - l))``. So ``-R/(R - 1) d`` estimates the error ``exact - u_l`` (-4/3 for neighbours and p = 2), and
@@ -14,7 +14,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from vibsim.convergence.thresholds import PEAKS, ROUND_OFF_SAFETY, STEEPEST, ZERO_CROSSING
+from vibsim.convergence.thresholds import PEAKS, STEEPEST
 from vibsim.core.array_types import Floats
 from vibsim.elementary import on_arrays
 from vibsim.elementary.exact import whole_power
@@ -165,64 +165,15 @@ def safe_ratio(top: Floats, bottom: Floats) -> Floats:
         return np.asarray(np.where(usable, top, np.nan) / np.where(usable, bottom, 1.0))
 
 
-def local_scale(series: Floats) -> Floats:
-    """Return the size of a series around each point, shape (..., t).
-
-    This is the smaller of the largest value up to the point and the largest value from it on. It follows growing and
-    decaying errors, and does not vanish at a zero crossing between two humps.
-    """
-    size = np.nan_to_num(np.abs(series), nan=0.0, posinf=0.0)
-    before = np.maximum.accumulate(size, axis=-1)
-    after = np.maximum.accumulate(size[..., ::-1], axis=-1)[..., ::-1]
-    return np.asarray(np.minimum(before, after))
-
-
-def masked_ratio(first: Floats, second: Floats, floor: Floats | float = 0.0) -> Floats:
-    """Return the ratio of successive differences as a function of time.
-
-    It is NaN at zero crossings of either difference, where it is below `ZERO_CROSSING` times its `local_scale` or
-    changes its sign, and where the finer difference is below `ROUND_OFF_SAFETY` times its `floor`, of shape (..., 1).
-    """
-    keep = np.abs(second) > ROUND_OFF_SAFETY * np.asarray(floor)
-    for series in (first, second):
-        keep &= np.abs(series) > ZERO_CROSSING * local_scale(series)
-        crossing = np.sign(series[..., 1:]) * np.sign(series[..., :-1]) < 0
-        keep[..., 1:] &= ~crossing
-        keep[..., :-1] &= ~crossing
-    return np.where(keep, safe_ratio(first, second), np.nan)
-
-
-def _length(series: Floats) -> Floats:
+def length(series: Floats) -> Floats:
     """Return the root of the sum of squares, shape (...)."""
     return norm(series, "l2", np.ones(1))
 
 
-def unit(series: Floats, length: Floats) -> Floats:
-    """Return a series divided by its length; NaN if that is zero or not finite."""
-    usable = np.isfinite(length) & (length != 0)
-    return np.asarray(series / np.where(usable, length, np.nan)[..., None])
-
-
-def inner(first: Floats, second: Floats) -> Floats:
-    """Return the cosine of the angle between two series, shape (...); NaN if one of them vanishes."""
-    units = [unit(series, _length(series)) for series in (first, second)]
-    return total(units[0] * units[1])
-
-
-def proportionality(first: Floats, second: Floats) -> Floats:
-    """Return the least-squares factor ``r = <d, d'>/<d', d'>`` of ``d = r d'``, shape (...)."""
-    return inner(first, second) * safe_ratio(_length(first), _length(second))
-
-
-def coincidence(first: Floats, second: Floats, ratio: Floats) -> Floats:
-    """Return ``||d - R d'|| / ||d||`` in the L2 norm, shape (...): 0 if the rescaled curves coincide.
-
-    R is the `target_ratio` of the order. The result is 0 if both differences vanish, and NaN if only d does.
-    """
-    size = _length(first)
-    with np.errstate(over="ignore", invalid="ignore"):
-        residual = _length(first - np.asarray(ratio)[..., None] * second)
-    return np.where((size == 0) & (residual == 0), 0.0, safe_ratio(residual, size))
+def unit(series: Floats, size: Floats) -> Floats:
+    """Return a series divided by its size; NaN if that is zero or not finite."""
+    usable = np.isfinite(size) & (size != 0)
+    return np.asarray(series / np.where(usable, size, np.nan)[..., None])
 
 
 def cosines(rows: Sequence[Floats], kind: str, end_included: bool = True) -> Floats:
@@ -237,7 +188,7 @@ def cosines(rows: Sequence[Floats], kind: str, end_included: bool = True) -> Flo
         sizes = [np.abs(np.nan_to_num(unit(series, largest(series)))) for series in rows]
         weight = whole_power(np.maximum.reduce(sizes), PEAKS)
         rows = [np.nan_to_num(unit(series, largest(series))) * weight for series in rows]
-    units = [np.nan_to_num(unit(series, _length(series))) for series in rows]
+    units = [np.nan_to_num(unit(series, length(series))) for series in rows]
     result = np.empty((*units[0].shape[:-1], len(units), len(units)))
     for i, first in enumerate(units):
         for j, second in enumerate(units[: i + 1]):

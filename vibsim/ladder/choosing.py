@@ -27,7 +27,7 @@ from vibsim.comparison.extrapolate_members import (
     level_at,
     noise_of,
 )
-from vibsim.convergence.state_extrapolation import Pair
+from vibsim.convergence.extrapolation.states import Pair
 from vibsim.core.array_types import Floats, Integers
 from vibsim.core.errors import InputError, VibsimError
 from vibsim.experiment import storage, sweep_columns

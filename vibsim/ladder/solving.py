@@ -18,8 +18,8 @@ from vibsim.comparison.extrapolate_members import (
     noise_of,
     rate_of,
 )
-from vibsim.convergence.state_extrapolation import FLOATS, Circumstances, Pair, best_entry
-from vibsim.convergence.thresholds import KNOWN_DIGIT
+from vibsim.convergence.extrapolation.states import FLOATS, Circumstances, Pair, best_entry
+from vibsim.convergence.extrapolation.thresholds import KNOWN_DIGIT
 from vibsim.core.array_types import Floats
 
 LEAST_TIMES = 16

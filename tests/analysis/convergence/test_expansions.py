@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from vibsim.comparison.rescaled_differences import coincidence, masked_ratio, proportionality
 from vibsim.convergence import differences
 from vibsim.core.vocabulary import NORMS
 
@@ -94,7 +95,7 @@ def test_norm_of_nan_is_nan_and_of_zero_is_zero(kind: str) -> None:
 
 def test_ratio_is_masked_at_zero_crossings_and_right_elsewhere() -> None:
     d = [computed(level) - computed(level + 1) for level in (9, 10)]
-    ratio = differences.masked_ratio(*d)[0]
+    ratio = masked_ratio(*d)[0]
     assert np.nanmax(np.abs(ratio - 4.0)) < 0.01
     crossing = (np.abs(E2) < 0.05 * np.max(np.abs(E2))) & (T < 2.5)
     assert np.any(crossing)
@@ -104,36 +105,36 @@ def test_ratio_is_masked_at_zero_crossings_and_right_elsewhere() -> None:
 
 def test_ratio_follows_a_growing_error_from_its_start() -> None:
     growing = (np.exp(4 * T) * np.sin(9 * T))[None]
-    ratio = differences.masked_ratio(4 * growing, growing)
+    ratio = masked_ratio(4 * growing, growing)
     assert np.mean(np.isfinite(ratio[0, 1:10])) > 0.5
     assert np.nanmax(np.abs(ratio - 4)) < 1e-12
 
 
 def test_ratio_of_nothing_is_nan_without_a_warning() -> None:
     zero = np.zeros((2, 5))
-    assert np.all(np.isnan(differences.masked_ratio(zero, zero)))
+    assert np.all(np.isnan(masked_ratio(zero, zero)))
     nan = np.full((2, 5), np.nan)
-    assert np.all(np.isnan(differences.masked_ratio(nan, np.ones((2, 5)))))
-    assert np.all(np.isnan(differences.masked_ratio(np.full((1, 3), np.inf), np.ones((1, 3)))))
+    assert np.all(np.isnan(masked_ratio(nan, np.ones((2, 5)))))
+    assert np.all(np.isnan(masked_ratio(np.full((1, 3), np.inf), np.ones((1, 3)))))
 
 
 def test_ratio_is_masked_under_the_floor() -> None:
     d = np.full((1, 4), 5e-13)
-    assert np.all(np.isnan(differences.masked_ratio(4 * d, d, floor=1e-13)))
-    assert np.all(differences.masked_ratio(4 * d, d, floor=1e-14) == 4.0)
+    assert np.all(np.isnan(masked_ratio(4 * d, d, floor=1e-13)))
+    assert np.all(masked_ratio(4 * d, d, floor=1e-14) == 4.0)
 
 
 def test_coincidence_and_proportionality() -> None:
     d = E2[None]
-    assert differences.coincidence(4 * d, d, np.array([4.0])) == pytest.approx([0.0], abs=1e-15)
-    assert differences.coincidence(2 * d, d, np.array([4.0])) == pytest.approx([1.0])
-    assert differences.proportionality(-3 * d, d) == pytest.approx([-3.0])
+    assert coincidence(4 * d, d, np.array([4.0])) == pytest.approx([0.0], abs=1e-15)
+    assert coincidence(2 * d, d, np.array([4.0])) == pytest.approx([1.0])
+    assert proportionality(-3 * d, d) == pytest.approx([-3.0])
     mixed = 2 * E2 + 0.1 * E4
     expected = np.sum(mixed * E2) / np.sum(E2 * E2)
-    assert differences.proportionality(mixed[None], d) == pytest.approx([expected])
-    assert differences.coincidence(0 * d, 0 * d, np.array([4.0])) == [0.0]
-    assert np.isnan(differences.coincidence(0 * d, d, np.array([4.0])))[0]
-    assert np.isnan(differences.proportionality(d, 0 * d))[0]
+    assert proportionality(mixed[None], d) == pytest.approx([expected])
+    assert coincidence(0 * d, 0 * d, np.array([4.0])) == [0.0]
+    assert np.isnan(coincidence(0 * d, d, np.array([4.0])))[0]
+    assert np.isnan(proportionality(d, 0 * d))[0]
 
 
 def test_cosines_measure_the_angle_in_their_own_norm() -> None:

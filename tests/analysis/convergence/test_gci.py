@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from vibsim.analysis import analyse_records
-from vibsim.convergence.gci import CLASSES, classify, index, of_order, relative
+from vibsim.convergence.extrapolation.gci import CLASSES, classify, index, of_order, relative
 from vibsim.experiment import Experiment
 from vibsim.simulation import simulate_record
 

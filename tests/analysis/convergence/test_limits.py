@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from synthetic import FAMILIES, groups
 
-from vibsim.convergence.number_extrapolation import limit, observed_order
+from vibsim.convergence.extrapolation.numbers import limit, observed_order
 
 HELD_OUT = 2
 TUNED = (1, 3)

@@ -10,7 +10,7 @@ import pytest
 from spring_runs import spring
 
 from vibsim.analysis import analyse_records
-from vibsim.convergence.local_order import box_sum, local_order, window_points
+from vibsim.comparison.local_order import box_sum, local_order, window_points
 from vibsim.experiment import Experiment
 from vibsim.simulation import simulate_record
 

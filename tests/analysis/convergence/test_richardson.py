@@ -7,7 +7,7 @@ import pytest
 from ladders import random_truth, shape_in_time
 from reference_pendulum import pendulum
 
-from vibsim.convergence.extrapolation import extrapolate_series
+from vibsim.convergence.extrapolation.series import extrapolate_series
 
 T = np.linspace(0.0, 20.0, 65)
 LADDERS = [(3, 4, 5), (3, 5, 6), (2, 5, 6), (3, 4, 5, 6), (3, 5, 6, 9), (2, 4, 5, 6, 8)]

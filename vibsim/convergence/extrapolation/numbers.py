@@ -23,15 +23,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vibsim.convergence import thresholds as th
 from vibsim.convergence.differences import order_of_ratio, safe_ratio, target_ratio
-from vibsim.convergence.extrapolation import (
+from vibsim.convergence.extrapolation import thresholds as th
+from vibsim.convergence.extrapolation.triangular_scheme import (
     Scheme,
     error_left,
     next_row,
     steps_of,
     triangular_scheme,
 )
+from vibsim.convergence.thresholds import ORDINARY_ORDER, ROUND_OFF_SAFETY
 from vibsim.core.array_types import Flags, Floats, Integers
 
 
@@ -111,7 +112,7 @@ def _leading(values: Floats, levels: Sequence[int], promised: Floats, floor: Flo
 
     One triple may show any order, where an error changes its sign or the levels are not yet asymptotic.
     """
-    p = np.where(np.isfinite(promised), promised, th.ORDINARY_ORDER)
+    p = np.where(np.isfinite(promised), promised, ORDINARY_ORDER)
     measured = observed_order(values, levels, floor)
     earlier = observed_order(values[..., :-1], levels[:-1], floor[..., :-1])
     rounded = np.clip(np.round(2.0 * measured) / 2, 0.5, th.HIGHEST_ORDER)
@@ -127,7 +128,7 @@ def _bound_of_finest(values: Floats, levels: Sequence[int], floor: Floats) -> Fl
     if n == 1:
         return np.full(values.shape[:-1], np.nan)
     change = np.abs(np.diff(values, axis=-1))
-    noise = th.ROUND_OFF_SAFETY * floor[..., -1]
+    noise = ROUND_OFF_SAFETY * floor[..., -1]
     if n == 2:
         return np.asarray(th.SPREAD_OF_TWO * change[..., 0] + noise)
     recent = values[..., -3:]
@@ -220,7 +221,7 @@ class _Rows:
                 believed = believed & self._has_ratio(j - 1, i)
                 floors = [self.floor[..., k] for k in range(i - j, i + 1)]
                 noise = self.scheme[i][j - 1].round_off(floors)
-                bound = self._error(j, i) + th.ROUND_OFF_SAFETY * noise
+                bound = self._error(j, i) + ROUND_OFF_SAFETY * noise
                 take = believed & (bound < best.bound)
                 best = Limit(
                     np.where(take, self.entries[i][j], best.value),

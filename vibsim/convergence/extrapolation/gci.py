@@ -1,5 +1,4 @@
-r"""The grid convergence index: the established error bar, next to the bound of
-`vibsim.convergence.number_extrapolation`.
+"""The grid convergence index: the established error bar, next to the bound of `numbers`.
 
 For the finest two levels, ``GCI = F |u_fine - u_coarse|/(r^p - 1)`` with the refinement ratio r (P. J. Roache,
 Perspective: a method for uniform reporting of grid refinement studies, J. Fluids Eng. 116, 1994). It belongs to the
@@ -21,10 +20,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from vibsim.convergence import thresholds as th
 from vibsim.convergence.differences import gap_ratio, order_of_ratio, safe_ratio
-from vibsim.convergence.extrapolation import error_left
-from vibsim.convergence.number_extrapolation import triple_at
+from vibsim.convergence.extrapolation import thresholds as th
+from vibsim.convergence.extrapolation.numbers import triple_at
+from vibsim.convergence.extrapolation.triangular_scheme import error_left
+from vibsim.convergence.thresholds import ORDINARY_ORDER
 from vibsim.core.array_types import Codes, Flags, Floats
 from vibsim.core.vocabulary import LEVELS_OF_AN_ORDER
 from vibsim.elementary import on_arrays
@@ -42,7 +42,7 @@ UNKNOWN, MONOTONE, OSCILLATING, DIVERGING, SWINGING, ROUND_OFF = range(len(CLASS
 
 
 def classify(values: Floats, levels: Sequence[int], floor: Floats) -> Codes:
-    """Return how numbers converge, as indices into `CLASSES`; arguments as for `number_extrapolation.limit`.
+    """Return how numbers converge, as indices into `CLASSES`; arguments as for `numbers.limit`.
 
     ``R`` is the last difference over the previous one: monotone in (0, 1), oscillating in (-1, 0), else diverging.
     """
@@ -65,12 +65,12 @@ def index(values: Floats, levels: Sequence[int], order: Floats, kinds: Codes) ->
     """Return the grid convergence index of the finest level, shape (...), in the unit of the numbers.
 
     It is NaN for one level, and where a number does not exist. `kinds` is the result of `classify`; the other arguments
-    are those of `number_extrapolation.limit`.
+    are those of `numbers.limit`.
     """
     n = len(levels)
     if n == 1:
         return np.full(values.shape[:-1], np.nan)
-    promised = np.where(np.isfinite(order), order, th.ORDINARY_ORDER)
+    promised = np.where(np.isfinite(order), order, ORDINARY_ORDER)
     with np.errstate(all="ignore"):
         change = np.abs(values[..., -1] - values[..., -2])
         gap = levels[-1] - levels[-2]

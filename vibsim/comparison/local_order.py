@@ -26,8 +26,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from vibsim.comparison.thresholds import LAST_POINT_ALONE, LEAST_WINDOW
 from vibsim.convergence.differences import largest, order_of_ratio, safe_ratio
-from vibsim.convergence.thresholds import LAST_POINT_ALONE, LEAST_WINDOW, ROUND_OFF_SAFETY
+from vibsim.convergence.thresholds import ROUND_OFF_SAFETY
 from vibsim.core.array_types import Floats, Integers
 
 

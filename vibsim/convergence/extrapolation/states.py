@@ -28,8 +28,14 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from vibsim.convergence import thresholds as th
-from vibsim.convergence.extrapolation import Entry, error_left, next_row, triangular_scheme
+from vibsim.convergence.extrapolation import thresholds as th
+from vibsim.convergence.extrapolation.triangular_scheme import (
+    Entry,
+    error_left,
+    next_row,
+    triangular_scheme,
+)
+from vibsim.convergence.thresholds import ROUND_OFF_SAFETY
 from vibsim.elementary.exponential import power
 
 LASTING = 2.0**-52
@@ -165,7 +171,7 @@ def best_entry(
                 ((i - 1) * len(levels) + j, (row.position[j], row.velocity[j]), bound + floor)
             )
         response = ops.larger(table.amplification[i] * facts.response * finer.changes[0], response)
-        noise = ops.larger(response / facts.spread, facts.noise) * th.ROUND_OFF_SAFETY
+        noise = ops.larger(response / facts.spread, facts.noise) * ROUND_OFF_SAFETY
         lasting = LASTING * (facts.size * (1.0 + facts.phase) + response)
         row = finer
     last = len(levels) - 1
