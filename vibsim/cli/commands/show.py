@@ -64,7 +64,9 @@ def _decisive(plan: Plan, summary: Mapping[str, Any] | None) -> tuple[int, str |
     if summary is None or level_member.are_outdated(plan, summary):
         return 0, None
     check = outcome_text.decisive(summary["checks"])
-    result = check["results"][0] if check and check["results"] else {"case": 0, "scheme": None}
+    if check is None or not check["results"]:
+        return 0, None
+    result = check["results"][0]
     return result["case"], result["scheme"]
 
 
