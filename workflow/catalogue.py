@@ -42,7 +42,7 @@ measured numbers, and `results/index.html` has those of every statement whose ex
 | badge | meaning |
 |---|---|
 | CONFIRMED | an experiment shows it: the check that is named behind it decides, or else all checks of the experiment |
-| CORRECTED | the text is wrong, or leaves a condition out. `Correct:` and italics are right, `Refuted:` is not |
+| CORRECTED | the text is wrong, or leaves a condition out. `Correct:` and italics are right, `Shown to be false:` is not |
 | OPEN | something is missing, and the row says what |
 | PROVIDED | a command or a page does what the text asks for; nothing is measured |
 
@@ -136,7 +136,7 @@ def rows(listed: dict[str, Any], known: dict[str, Experiment]) -> Iterator[Row]:
             decides = assertions.measured(check.that)
             badge, told = CONFIRMED, decides
             if not check.holds:
-                badge, told = CORRECTED, f"Correct: {check.note}. Refuted: {decides}"
+                badge, told = CORRECTED, f"Correct: {check.note}. Shown to be false: {decides}"
             elif source != check.source:
                 badge, told = CORRECTED, f"Correct: {decides}"
             is_ours = badge == CORRECTED and check.holds

@@ -85,12 +85,31 @@ def test_a_constant_and_a_start_behind_the_end_are_drawn() -> None:
 def test_the_plot_is_followed_by_the_verdicts(made: Made, capsys: Capture) -> None:
     assert made.vibsim("show", made.file, "--rows", 5) == 0
     lines = capsys.readouterr().out.splitlines()
-    assert lines[0] == "adhoc/small, level 8, scheme central: + theta, o exact, * both"
+    assert lines[0] == "adhoc/small, level 8, scheme rk4: + theta, o exact, * both"
     assert lines[1].split()[-1] == "periods"
     assert lines[2].endswith("0.00")
     assert lines[7].startswith("  to t = 1.25 of 20; see more with --from 1.25")
     assert lines[9] == "adhoc/small  FAIL"
     assert lines[10].startswith("  PASS  asymptotic  order  Both results passed.")
+
+
+def test_of_a_sweep_the_member_that_decides_is_drawn_on_what_the_screen_has_room_for(
+    made: Made, capsys: Capture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    made.change("linear_pendulum", "pendulum")
+    made.change("checks:", "sweep: {model.drag: [0.3, 0.0]}\nchecks:")
+    made.make()
+    monkeypatch.setattr("sys.stdout.isatty", lambda: True, raising=False)
+    monkeypatch.setenv("COLUMNS", "100")
+    monkeypatch.setenv("LINES", "30")
+    capsys.readouterr()
+    assert made.vibsim("show", made.file) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[0].startswith("adhoc/small, level 8, member 1 (model.drag = 0), scheme rk4: ")
+    # a computed solution is not called exact
+    assert lines[0].endswith("o reference, * both")
+    assert len(lines) < 30
+    assert "case 1 (model.drag = 0)" in " ".join(map(str.strip, lines[-8:]))
 
 
 def test_what_is_drawn_can_be_chosen(made: Made, capsys: Capture) -> None:

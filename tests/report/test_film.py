@@ -54,3 +54,9 @@ def test_a_run_that_breaks_down_and_a_system_without_a_drawing_have_the_window_a
     broken = shown(end=1e7, level=5, initial={"u": 1.0}, frames=3)
     assert broken.scenes == ()
     assert np.isfinite(broken.t).all()
+
+
+def test_a_computed_solution_is_not_called_exact():
+    pendulum = {"kind": "pendulum", "drag": 0.1}
+    assert shown(model=pendulum, initial={"theta": 1.0}).name_of_exact == "reference"
+    assert shown().name_of_exact == "exact"

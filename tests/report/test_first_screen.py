@@ -347,7 +347,7 @@ def test_an_order_beside_the_band_whose_interval_reaches_it_is_told_as_such(monk
     record, _, decisive = found(exp)
     for order, low, title in (
         (2.05, 2.0, "All members keep"),
-        (2.3, 2.05, "1 of 2 orders lies outside the band; its interval reaches into it"),
+        (2.3, 2.05, "1 of 2 orders is outside the band, but its interval overlaps it"),
         (2.3, 2.15, "1 of 2 members have"),
     ):
         ends = (np.array([row]) for row in ([2.0, order], [2.0, low], [2.0, order]))

@@ -283,10 +283,14 @@ def _show() -> Iterator[_Row]:
     text = "experiment, one member of its sweep (NAME@CASE), FILE.yaml, or a level file (FILE.nc)"
     yield _row("what", _word, "EXPERIMENT", text)
     yield _row("--quantity", _word, "NAME", "what to draw (default: the first position)")
-    yield _row("--scheme", _word, "NAME", "scheme to draw (default: the first)")
+    yield _row("--scheme", _word, "NAME", "scheme to draw (default: that of the verdict)")
     yield _row("--level", _index, "L", "level to draw (default: the finest that was made)")
-    yield _row("--case", _index, "K", "member of a sweep to draw (default: 0)", default=0)
-    yield _row("--rows", _positive, "N", "lines of the plot (default: 40)", default=40)
+    yield _row(
+        "--case", _index, "K", "member to draw (default: the hardest, which the verdict names)"
+    )
+    yield _row(
+        "--rows", _positive, "N", "lines of the plot (default: as many as the screen has room for)"
+    )
     yield _row("--from", _finite, "T", "time at which the plot begins", dest="start")
     yield _flag("--no-plot", "show the verdicts alone")
 

@@ -31,9 +31,10 @@ class Series(NamedTuple):
     values: Floats
     """The numerical solution at these times; not finite where it broke down."""
     exact: Floats | None
-    """The exact solution at these times; None if unknown."""
+    """The exact solution at these times, or a reference; None if unknown."""
     period: float
     """Period in s; not finite if there is none."""
+    name_of_exact: str = "exact"
 
 
 class Drawing(NamedTuple):
@@ -103,4 +104,4 @@ def _lines(series: Series, shown: range, low: float, high: float, width: int) ->
 def legend(series: Series) -> str:
     """Return the legend of the symbols."""
     text = f"{NUMERICAL} {series.name}"
-    return text if series.exact is None else f"{text}, {EXACT} exact, {BOTH} both"
+    return text if series.exact is None else f"{text}, {EXACT} {series.name_of_exact}, {BOTH} both"

@@ -80,19 +80,30 @@ def checks(rows: Sequence[Entry], columns: int) -> Iterator[str]:
             yield textwrap.indent(filled, " " * 6)
 
 
+def decisive(rows: Sequence[Entry]) -> Entry | None:
+    """Return the worst check; if all passed, one with an order, and sooner one that is meant to pass; None of none."""
+    if not rows:
+        return None
+    worst = max(rows, key=lambda row: SEVERITY[row["status"]])
+    if worst["status"] != "PASS":
+        return worst
+    # checks that are meant to pass tell more than checks that are meant to fail
+    plain = [row for row in rows if row["expected"] == "PASS"] or rows
+    return next(filter(numbers, plain), plain[0])
+
+
 def headline(entry: Entry, columns: int) -> str:
     """Return the result of an experiment in at most `columns` characters: order and error, or why it did not pass."""
     rows: Sequence[Entry] = entry["checks"]
-    missed = [row for row in rows if row["status"] != "PASS"]
-    candidates = [str(entry.get("error") or (rows[0]["text"] if rows else "no checks"))]
-    if missed:
-        first = max(missed, key=lambda row: SEVERITY[row["status"]])
-        candidates = [f"{first['reason']} ({len(missed)} of {len(rows)} checks did not pass)"]
-        candidates.append(str(first["reason"]))
+    first = decisive(rows)
+    if first is None:
+        candidates = [str(entry.get("error") or "no checks")]
+    elif first["status"] == "PASS":
+        candidates = numbers(first) or [str(first["text"])]
     else:
-        # checks that are meant to pass tell more than checks that are meant to fail
-        plain = [row for row in rows if row["expected"] == "PASS"] or rows
-        candidates = next(filter(None, map(numbers, plain)), candidates)
+        missed = sum(row["status"] != "PASS" for row in rows)
+        reason = str(first["reason"])
+        candidates = [f"{reason} ({missed} of {len(rows)} checks did not pass)", reason]
     fitting = next((text for text in candidates if len(text) <= columns), candidates[-1])
     return textwrap.shorten(clean(fitting), columns, placeholder=" ...")
 

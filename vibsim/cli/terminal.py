@@ -13,12 +13,21 @@ from typing import TextIO
 
 UNCUT = 10_000
 """Width of output that goes to a file, so that it is never cut."""
+FRAME = 6
+"""Lines around a plot: its title, its heads, what it leaves out, empty lines and the prompt."""
 _COLOURS = {"PASS": "32", "FAIL": "31", "INCONCLUSIVE": "33", "faint": "2", "bold": "1"}
 
 
 def columns() -> int:
     """Return the width of a line of the output [characters]."""
     return shutil.get_terminal_size().columns if sys.stdout.isatty() else UNCUT
+
+
+def rows(taken: int = 0) -> int:
+    """Return how many lines of a plot fit on the screen beside its frame and `taken` other lines; 40 in a file."""
+    if not sys.stdout.isatty():
+        return 40
+    return max(shutil.get_terminal_size().lines - taken - FRAME, 10)
 
 
 def has_colours(stream: TextIO) -> bool:

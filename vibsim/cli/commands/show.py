@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import math
 from argparse import Namespace
+from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from vibsim.cli import level_member, outcome_text, terminal
 from vibsim.cli.chosen_plans import one_plan_of
@@ -22,13 +23,22 @@ if TYPE_CHECKING:
 
 
 def show(options: Namespace) -> int:
-    """Draw the finest existing level, and print the verdicts below it, where the user sees them last."""
+    """Draw the finest existing level, and print the verdicts below it, where the user sees them last.
+
+    In a terminal both fit on the screen. Of a sweep, and of several schemes, the plot shows what decides the verdict.
+    """
     if options.what.endswith(".nc"):
-        _draw(level_member.read(Path(options.what), options.case), options, options.what)
+        options.rows = options.rows or terminal.rows()
+        _draw(level_member.read(Path(options.what), options.case or 0), options, options.what)
         return 0
     plan = one_plan_of(options.what, options.settings)
     results = chosen_results(options)
-    case = options.case
+    summary = _summary(plan, results)
+    case, scheme = _decisive(plan, summary)
+    case = case if options.case is None else options.case
+    options.scheme = options.scheme or scheme
+    verdicts = "\n".join(_verdicts(plan, results, summary))
+    options.rows = options.rows or terminal.rows(taken=verdicts.count("\n"))
     levels, made = level_member.made(plan, results, case, options.what)
     if options.level is not None:
         level_member.check_level(options.level, levels)
@@ -40,23 +50,37 @@ def show(options: Namespace) -> int:
         is_one = len(made) == 1
         text = f"level{'' if is_one else 's'} {shown(made)} {'is' if is_one else 'are'} there"
         print(f"{text}, of levels {shown(levels)}; the others are not made yet")
-    _verdicts(plan, results)
+    print(verdicts)
     return 0
 
 
-def _verdicts(plan: Plan, results: Path) -> None:
-    """Print every verdict, with a note if the experiment has changed since."""
+def _summary(plan: Plan, results: Path) -> Mapping[str, Any] | None:
     path = results / plan.summary
-    if not path.exists():
-        print(f"{plan.key}: there are no verdicts yet")
+    return read_json(path, name=plan.key) if path.exists() else None
+
+
+def _decisive(plan: Plan, summary: Mapping[str, Any] | None) -> tuple[int, str | None]:
+    """Return the member and the scheme that decide the verdict; the first ones without a verdict on this file."""
+    if summary is None or level_member.are_outdated(plan, summary):
+        return 0, None
+    check = outcome_text.decisive(summary["checks"])
+    if check is None or not check["results"]:
+        return 0, None
+    result = check["results"][0]
+    return result["case"], result["scheme"]
+
+
+def _verdicts(plan: Plan, results: Path, summary: Mapping[str, Any] | None) -> Iterator[str]:
+    """Yield every verdict, with a note if the experiment has changed since."""
+    if summary is None:
+        yield f"{plan.key}: there are no verdicts yet"
         return
-    summary = read_json(path, name=plan.key)
     if level_member.are_outdated(plan, summary):
-        print(level_member.OUTDATED)
-    print(*outcome_text.in_full([summary], terminal.columns()), sep="\n")
+        yield level_member.OUTDATED
+    yield from outcome_text.in_full([summary], terminal.columns())
     page = results / plan.page
     if page.is_file():
-        print(f"report: {page}")
+        yield f"report: {page}"
 
 
 def _draw(record: Record, options: Namespace, title: str) -> None:
@@ -102,7 +126,10 @@ def _series(record: Record, quantity: str, scheme: int) -> Series:
     # where members have different end times, t is the fraction of the end
     times = record["t"] * (float(record["end"][0]) if "end" in record.coords else 1.0)
     unit = str(row.attrs.get("units", ""))
-    return Series(quantity, unit, times, row.values[scheme, 0], exact, _period(record, scheme))
+    # only a computed reference has a bound of its error
+    word = "reference" if f"{name}_error" in record else "exact"
+    period = _period(record, scheme)
+    return Series(quantity, unit, times, row.values[scheme, 0], exact, period, word)
 
 
 def _period(record: Record, scheme: int) -> float:

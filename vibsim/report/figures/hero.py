@@ -453,9 +453,7 @@ def _title_of_orders(inside: Flags, measured: Flags, checked: Flags) -> str:
     beyond = int(np.sum(~measured))
     if not beyond:
         return "All members keep their order"
-    verb, whose = (
-        ("lies", "its interval reaches") if beyond == 1 else ("lie", "their intervals reach")
-    )
-    return (
-        f"{words.number(beyond, 'integer')} of {of} orders {verb} outside the band; {whose} into it"
-    )
+    outside = f"{words.number(beyond, 'integer')} of {of} orders"
+    if beyond == 1:
+        return f"{outside} is outside the band, but its interval overlaps it"
+    return f"{outside} are outside the band, but their intervals overlap it"

@@ -18,7 +18,7 @@ from vibsim.core.record import Record
 from vibsim.report import data, style, words
 from vibsim.report.figures import moments, scenes
 from vibsim.report.figures.scenes import Scene
-from vibsim.report.series import parameters_of
+from vibsim.report.series import name_of_exact, parameters_of
 from vibsim.report.types import Experiment
 
 MOST_FRAMES = 1500
@@ -63,6 +63,8 @@ class Film:
     time_unit: str
     end: float
     """Last time requested; the movie may show only the beginning."""
+    name_of_exact: str = "exact"
+    """Name of `Run.exact` in the legend."""
 
     @property
     def is_cut(self) -> bool:
@@ -146,6 +148,7 @@ def film(
         label=style.label(words.symbol(quantity), data.unit(record, quantity)),
         time_unit=data.time_unit(record),
         end=last,
+        name_of_exact=name_of_exact(experiment),
     )
 
 
