@@ -73,7 +73,7 @@ def compared(names: Sequence[str]) -> tuple[list[str], dict[str, float]]:
     header = ["experiment"]
     for key in ("CPU [s]", "clock [s]", "memory of a job [MB]", "disk [MB]"):
         header += [f"{key}, planned", "measured"]
-    caption = "On one core. Disk is planned before compression, as a bound."
+    caption = "On one core. Disk is planned before compression."
     figures = {f"plans.{key}": float(count) for key, count in agree.items()}
     return table(caption, header, rows), figures
 

@@ -1,8 +1,7 @@
-"""The ends of the range: a billion steps of one member, a million members, and round-off at level 24."""
+"""Long runs: a billion steps of one member, and round-off at level 24."""
 
 from __future__ import annotations
 
-import shutil
 import sys
 import tempfile
 from functools import partial
@@ -10,12 +9,12 @@ from pathlib import Path
 
 import numpy as np
 
-from bench import ours, workflow
+from bench import ours
 from bench.page import Section, gather, table
 from bench.timing import process
 
 TITLE = "Large runs"
-ANSWER = "A billion steps of one member take {0[deep.wall]:.0f} s, 10^6 members on four levels {0[million.wall]:.0f} s."
+ANSWER = "A billion steps of one member take {0[deep.wall]:.0f} s."
 ROOT = Path(__file__).resolve().parents[1]
 CONFIGS = ROOT / "configs" / "scale"
 Measured = tuple[list[str], dict[str, float]]
@@ -28,7 +27,6 @@ def run(small: bool) -> Section:
         return gather(
             {
                 "level 30": partial(level_30, folder, small),
-                "a million members": partial(million, folder, small),
                 "round-off": partial(round_off, 16 if small else 24),
             }
         )
@@ -56,26 +54,6 @@ def level_30(folder: Path, small: bool) -> Measured:
     caption = "`configs/scale/level_30.yaml`, one job at its finest level, compensated, one run."
     header = ["job", "wall s", "ns per step, all told", "peak MiB"]
     return table(caption, header, rows), {"deep.wall": cost.wall, "deep.peak_mib": cost.peak_mib}
-
-
-def million(folder: Path, small: bool) -> Measured:
-    """The sweep that comes with vibsim, without its page."""
-    source = CONFIGS / "million_members.yaml"
-    file = folder / source.name
-    text = source.read_text()
-    file.write_text(text.replace("1000]", "10]") if small else text)
-    results = folder / "results"
-    cost = workflow.compare(file, "adhoc", results)
-    size = sum(path.stat().st_size for path in results.rglob("*.nc")) / 2**20
-    shutil.rmtree(results)
-    rows: list[list[object]] = [["simulate and analyse", cost.wall, cost.cpu, cost.peak_mib, size]]
-    caption = (
-        f"`configs/scale/million_members.yaml`, {workflow.CORES} cores, one run, kernels from the cache; peak of the "
-        "largest process."
-    )
-    header = ["what", "wall s", "CPU s", "peak MiB", "netCDF MiB"]
-    figures = {"million.wall": cost.wall, "million.peak_mib": cost.peak_mib}
-    return table(caption, header, rows), figures
 
 
 def round_off(level: int) -> Measured:
