@@ -2,7 +2,7 @@
 
 Each member has a number x and a bound e of its error. For the number of one level e is 0; for a limit it is the error
 bound of the levels. If that is unknown, all finer levels together are assumed to change x by at most three times its
-last change (`vibsim.checks.value.STILL_TO_CHANGE`); without any change e is infinite. The true number lies between
+last change (`STILL_TO_CHANGE`); without any change e is infinite. The true number lies between
 x - e and x + e. So the reduced number lies between `low` and `high`, the least and the largest value that numbers in
 these intervals can give. The check matches if all values between them match, and fails if none does. Otherwise the
 levels do not decide, and the members that could change the outcome are named.
@@ -192,9 +192,10 @@ def _reduced(
     """Return the reduced number of these members of a scheme."""
     assert check.take is not None
     numbers = np.asarray(measured["value"], dtype=np.float64)[scheme, members]
-    error = np.zeros(len(members))
-    if check.number.has_limit(check.at.level):
-        error = np.asarray(measured["error_bound"], dtype=np.float64)[scheme, members]
+    error = np.asarray(measured["error_bound"], dtype=np.float64)[scheme, members]
+    if not check.number.has_limit(check.at.level):
+        error = np.where(np.isinf(error), error, 0.0)
+    else:
         is_open = np.isnan(error)
         if check.number.is_angle:
             # beyond pi it goes on at the other end of all angles

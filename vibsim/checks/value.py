@@ -24,7 +24,9 @@ from vibsim.checks.phase_amplitude_text import NO_PART, PART_ADVICE
 from vibsim.checks.sentences import NOT_FINITE, Description, MemberFacts, add_levels, cost_in_words
 from vibsim.comparison import best_values, value_numbers
 from vibsim.comparison.quantity_comparison import Compared
+from vibsim.convergence.differences import last_change
 from vibsim.convergence.reasons import first_reason
+from vibsim.convergence.thresholds import STILL_TO_CHANGE
 from vibsim.core.array_types import Flags, Floats
 from vibsim.core.record import Record
 from vibsim.core.vocabulary import LEVELS_OF_AN_ORDER, is_error_part
@@ -59,8 +61,6 @@ DIRECTION_ASKED = {1.0: "rising", -1.0: "falling", 0.0: "neither rising nor fall
 """Expected directions in words, by their numbers."""
 UNKNOWN, SETTLED, MOVING = -1, 0, 1
 """Whether finer levels may bring a number to its target: unknown, they change it too little, perhaps."""
-STILL_TO_CHANGE = 3.0
-"""All finer levels together change a number by at most this multiple of its last change (2.4 for an order of 1/2)."""
 FINER, MOST_FINER = 2, 12
 """Number of finer levels that advice suggests if the needed number is unknown, and at most."""
 UNPROVED = (
@@ -98,7 +98,7 @@ def measure(block: MemberBlock, compared: Compared, check: ValueCheck) -> Measur
         numbers = _by_level(name, place)
     if check.take is not None and row.has_limit(at.level):
         # a reduced number needs a bound for each member
-        bound = np.where(np.isnan(bound), STILL_TO_CHANGE * _last_change(numbers) + missed, bound)
+        bound = np.where(np.isnan(bound), STILL_TO_CHANGE * last_change(numbers) + missed, bound)
     own_levels = row.own_levels(levels) or tuple(levels)
     level = place.level if place.level in own_levels else own_levels[-1]
     unseen = np.where(is_open, missed, 0.0)
@@ -130,19 +130,6 @@ def _by_level(name: str, place: value_numbers.Place) -> Floats:
     return np.stack([value_numbers.value(name, row) for row in rows], axis=-1)
 
 
-def _last_change(numbers: Floats) -> Floats:
-    """Return by how much the finest levels still change a number, shape (scheme, case); NaN for one level.
-
-    It is at least half of the previous change, since one change may be small by chance.
-    """
-    if numbers.shape[-1] < 2:
-        return np.full(numbers.shape[:-1], np.nan)
-    with np.errstate(all="ignore"):
-        change = np.abs(np.diff(numbers[..., -3:], axis=-1))
-        change[..., :-1] *= 0.5
-        return np.asarray(np.max(change, axis=-1))
-
-
 def _prospects(
     check: ValueCheck,
     numbers: Floats,
@@ -164,7 +151,7 @@ def _prospects(
     code = np.full(fulfilled.shape, UNKNOWN)
     if len(levels) > 1:
         with np.errstate(all="ignore"):
-            last = _last_change(numbers)
+            last = last_change(numbers)
             change = np.abs(np.diff(numbers[..., -3:], axis=-1))
             shrinks = change[..., -1] <= STILL_TO_CHANGE / (1.0 + STILL_TO_CHANGE) * change[..., 0]
             reach = np.where(is_open & ~shrinks, MOST_FINER, STILL_TO_CHANGE) * last + unseen
@@ -191,12 +178,16 @@ def judge(experiment: Experiment, record: Record, check: ValueCheck, facts: Meas
     # a stability limit may be infinite; an infinite exact period means that there is none, as on the separatrix
     does_not_exist = np.isnan(number) | (np.isinf(number) & (name == "exact_period"))
     infinite = np.isinf(number) & (name != "stability_limit") & ~does_not_exist
-    may_be_right = ~(np.minimum(away, _to_the_cut(check, number)) > bound) & is_limit
+    may_be_right = ~(np.minimum(away, _to_the_cut(check, number)) > bound) & (
+        is_limit | np.isinf(bound)
+    )
     # an uncertain time agrees by chance, perhaps that of another event; an inequality must hold within the whole bound
     is_strict = row.needs_events or check.equals is None
     is_unknown = np.isnan(bound) & (row.needs_events | (facts["levels_needed"] == MOVING))
     is_wide = np.isinf(bound) | ((bound > _room(check, number)) & is_strict)
-    holds &= ~((is_unknown | is_wide) & is_limit)
+    # a number that depends on an event at the end has no bound at any level
+    is_bounded = is_limit | np.isinf(bound)
+    holds &= ~((is_unknown | is_wide) & is_bounded)
     cases = [
         ((_failed(record, check) & ~survives) | infinite, "non_finite"),
         (
@@ -403,7 +394,7 @@ def _measured(f: MemberFacts, check: ValueCheck, digits: int = MOST_DIGITS) -> s
     phrase = f"{f.notation.number(value, digits)} {unit_of(f.experiment, f.record, check)}".rstrip()
     if check.value == "stability_limit" and value == 0.0:
         phrase += " (it grows at every step)"
-    if not check.number.has_limit(check.at.level):
+    if not (check.number.has_limit(check.at.level) or math.isinf(bound)):
         return phrase
     if not math.isfinite(bound):
         phrase += f", with an unknown error{_why_unknown(f, check)}"
@@ -437,6 +428,8 @@ def _why_unknown(f: MemberFacts, check: ValueCheck) -> str:
         return f", because the run has fewer than {LEAST_PERIODS} periods of the force"
     if check.value == "peak_frequency" and math.isinf(f.fact("error_bound")):
         return ", because the lines around the highest one are not those of a cosine"
+    if is_of_events_at_end(f, check):
+        return ", because no level tells whether an event happens before the end of the run"
     numbers = _by_level_of(f)
     if len(numbers) >= LEVELS_OF_AN_ORDER and np.all(np.isfinite(numbers)):
         return ", because its changes do not shrink steadily from level to level"
@@ -455,6 +448,11 @@ def _is_on_the_mesh(f: MemberFacts, check: ValueCheck) -> bool:
     return check.number.needs_events and is_on_the_mesh(options)
 
 
+def is_of_events_at_end(f: MemberFacts, check: ValueCheck) -> bool:
+    """Say whether a number depends on an event that cannot be told from one behind the end."""
+    return math.isinf(f.fact("error_bound")) and f.experiment.model.definition.events is not None
+
+
 def advice_on_bound(f: MemberFacts, check: ValueCheck) -> str:
     """Say what to change if no finer level can bound the error of a number; empty otherwise."""
     if _is_on_the_mesh(f, check):
@@ -463,11 +461,13 @@ def advice_on_bound(f: MemberFacts, check: ValueCheck) -> str:
         return "Use steps shorter than the pulse, or write a wider pulse of the same impulse."
     if _has_few_periods(f, check):
         return f"Give {LEAST_PERIODS} or more `periods:`."
+    if is_of_events_at_end(f, check):
+        return "Let the run end a little earlier or later (`time: end`)."
     numbers = np.array(_by_level_of(f))
     bound = f.fact("error_bound")
     # without a bound, use the distance from the target
     away = bound if np.isfinite(bound) else _room(check, f.fact("value"))
-    if check.number.rests_on_run and STILL_TO_CHANGE * _last_change(numbers) < away:
+    if check.number.rests_on_run and STILL_TO_CHANGE * last_change(numbers) < away:
         key = "periods" if f.experiment.time.periods is not None else "end"
         return f"Make the run longer (`time: {key}`): finer levels do not shrink the error bound."
     return ""

@@ -60,7 +60,8 @@ def value(name: str, place: value_numbers.Place) -> tuple[Floats, Floats, Floats
     infinite if no levels can give one.
     """
     if not VALUES[name].has_limit(place.level):
-        return value_numbers.value(name, place), place.missing, np.zeros(place.block.shape)
+        bound = np.where(place.is_open(name), np.inf, np.nan)
+        return value_numbers.value(name, place), bound, np.zeros(place.block.shape)
     ladder = _ladder(name, place)
     best = ladder.limit()
     # an absolute value has no negative limit
@@ -134,7 +135,7 @@ def _ladder(name: str, place: value_numbers.Place) -> _Ladder:
     if row.needs_events:
         # how late an event on the mesh is depends on the mesh by accident
         missed = np.where(np.isnan(block.left_to_the_mesh), missed, np.inf)
-    missed = np.where(np.isfinite(block.missed.time), np.inf, missed)
+    missed = np.where(np.isfinite(block.missed.time) | place.is_open(name), np.inf, missed)
     of_series = np.full((*size.shape, 2), np.nan)
     if row.is_sample and len(place.levels) >= LEVELS_OF_AN_ORDER:
         of_series = value_numbers.sample_of_series(place)

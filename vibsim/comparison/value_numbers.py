@@ -15,12 +15,14 @@ from vibsim.comparison.comparison_variables import estimates
 from vibsim.comparison.quantity_comparison import Compared, Comparison
 from vibsim.comparison.solution_distance import discrete_error, exact_series
 from vibsim.convergence.differences import largest, safe_ratio
-from vibsim.core.array_types import Floats
+from vibsim.core.array_types import Flags, Floats
 from vibsim.core.record import Record
 from vibsim.core.vocabulary import LEVELS_OF_AN_ORDER
 from vibsim.elementary import on_arrays
+from vibsim.experiment.value_names import VALUES
 from vibsim.observe import oscillation, predicted_oscillation, spectrum, steady_state
 from vibsim.observe.common_grid import whole
+from vibsim.observe.event_at_end import may_jump
 from vibsim.observe.member_block import MemberBlock, energy_at_start, stored_or_nan
 
 
@@ -64,6 +66,18 @@ class Place:
     def of_quantity(self, which: str) -> Floats:
         """Return a number of the quantity that was gathered over all steps."""
         return self.gathered(f"{self.quantity}_{which}")
+
+    def is_open(self, name: str) -> Flags:
+        """Tell where the number `name` depends on an event that may be behind the end, shape (scheme, case)."""
+        grid, model = self.block.grid, self.block.model
+        if VALUES[name].is_sample:
+            level = grid.levels.index(self.levels[0] if self.at_level is None else self.at_level)
+            last = (None, float(grid.t[-1])), (None, grid.steps[level])
+            is_last = grid.end_included and self.t in last[0] and self.step in last[1]
+            depends = is_last and may_jump(model, self.quantity)
+        else:
+            depends = name in ("event_count", "last_event_time")
+        return self.block.event_at_end & depends
 
     def comparison(self) -> Comparison | None:
         """Return the comparison of the quantity between levels, or None."""

@@ -165,6 +165,19 @@ def safe_ratio(top: Floats, bottom: Floats) -> Floats:
         return np.asarray(np.where(usable, top, np.nan) / np.where(usable, bottom, 1.0))
 
 
+def last_change(numbers: Floats) -> Floats:
+    """Return by how much the finest levels still change a number, shape (...); NaN for one level.
+
+    It is at least half of the previous change, since one change may be small by chance.
+    """
+    if numbers.shape[-1] < 2:
+        return np.full(numbers.shape[:-1], np.nan)
+    with np.errstate(all="ignore"):
+        change = np.abs(np.diff(numbers[..., -3:], axis=-1))
+        change[..., :-1] *= 0.5
+        return np.asarray(np.max(change, axis=-1))
+
+
 def length(series: Floats) -> Floats:
     """Return the root of the sum of squares, shape (...)."""
     return norm(series, "l2", np.ones(1))

@@ -23,6 +23,7 @@ from vibsim.core.record import Record
 from vibsim.core.vocabulary import CENTRED, HIGHEST, NORMS, TYPICAL_NORM, plain_name
 from vibsim.experiment import Experiment
 from vibsim.models import BUDGET, ENERGIES, Model
+from vibsim.observe import event_at_end
 from vibsim.observe.common_grid import Grid, check_belonging, common_grid, take
 from vibsim.observe.missed_pulses import Missed, missed_pulses
 from vibsim.observe.sensitivity import sensitivity
@@ -57,6 +58,9 @@ class MemberBlock:
     missed: Missed  # pulses of the force between the points of every level
     growth: Floats  # largest position over the largest exact one, shape (s, c, l); NaN if not known
     eventless: Flags  # whether a model with events met none on the finest level, shape (s, c)
+    event_at_end: (
+        Flags  # whether no level tells if an event happens before the end of the run, shape (s, c)
+    )
 
     @property
     def model(self) -> Model:
@@ -193,6 +197,7 @@ def block_of(experiment: Experiment, records: Mapping[int, Record]) -> MemberBlo
     motion = Motion(model, grid, finest, group, exact)
     corners = corners_of(model, finest, group, grid.dt[0])
     left = left_to_the_mesh(experiment, columns, corners.of_tables)
+    relative_floor = relative_floors(experiment, grid.steps, columns)
     return MemberBlock(
         experiment=experiment,
         records=records,
@@ -202,7 +207,7 @@ def block_of(experiment: Experiment, records: Mapping[int, Record]) -> MemberBlo
         columns=columns,
         exact=exact,
         magnified=sensitivity(experiment, t, group, exact if lean else None),
-        relative_floor=relative_floors(experiment, grid.steps, columns),
+        relative_floor=relative_floor,
         stored_floor=stored_floor(records, grid.levels, states),
         omega_dt=by_level([row["omega_dt"] for row in rows]),
         fastest=_fastest(motion, rows),
@@ -216,6 +221,7 @@ def block_of(experiment: Experiment, records: Mapping[int, Record]) -> MemberBlo
         missed=missed_pulses(model, finest, group),
         growth=_growth(model, rows, grid, exact),
         eventless=eventless,
+        event_at_end=event_at_end.is_at_end(model, records, grid, group, relative_floor[..., -1]),
     )
 
 

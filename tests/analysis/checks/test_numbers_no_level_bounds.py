@@ -41,6 +41,18 @@ BOUNCES = {
     "levels": [5, 6, 7, 8],
     "schemes": [{"kind": "rk4", "events": "mesh"}],
 }
+IMPACT_AT_THE_END = {
+    **BOUNCES,
+    "time": {"end": "pi/2"},
+    "schemes": ["rk4", "velocity_verlet", "gauss4"],
+}
+DROP_TO_THE_END = {
+    "model": {"kind": "bouncing_ball", "g": 9.81},
+    "initial": {"h": 1.0},
+    "time": {"end": math.sqrt(2.0 / 9.81)},
+    "levels": [5, 6, 7, 8],
+    "schemes": ["rk4", "velocity_verlet", "gauss4"],
+}
 
 
 def run(content: dict[str, Any], *checks: dict[str, Any]) -> Run:
@@ -75,6 +87,9 @@ LARGEST_TIME = {
             "an unknown error",
             "`events: located`",
         ),
+        (IMPACT_AT_THE_END, {"value": "end", **BEST, "quantity": "v", "below": 0}, "end of the run", "later"),
+        (IMPACT_AT_THE_END, {"value": "event_count", "equals": 1}, "end of the run", "later"),
+        (DROP_TO_THE_END, {"value": "end", "quantity": "v", "above": 0}, "end of the run", "later"),
     ],
 )  # fmt: skip
 def test_what_no_level_shows_is_not_decided(
