@@ -39,7 +39,7 @@ def lean(record, times):
 @pytest.mark.parametrize(
     ("sweep", "figures"),
     thinned([
-        (ACROSS, {"map_theta_order_0", "map_theta_error_0", "map_period_0", "spread_theta"}),
+        (ACROSS, {"map_theta_order_0", "map_theta_error_0", "map_period_0"}),
         ({"initial.theta": {"linspace": [0.1, 3.1, 12]}}, {"period", "amplitude", "sweep_order_theta"}),
         ({"initial.theta": [0.5, 3.0], "model.g": [1.0, 400.0, 1e6]}, {"sweep_error_theta", "period"}),
     ], 3),

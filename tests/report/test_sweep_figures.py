@@ -250,28 +250,10 @@ def test_a_sample_of_three_keys_is_shown_against_each(cloud):
     assert sweep_layout.along_of(sweep_layout.keys(record)) is None
     assert sweep_layout.grid_of(sweep_layout.keys(record)) is None
     views, _ = samples.views(exp, record, "theta")
-    assert list(views) == [
-        *(f"projections_theta_{kind}_0" for kind in ("order", "error", "verdict")),
-        "spread_theta",
-    ]
-    for view in list(views.values())[:3]:
+    assert list(views) == [f"projections_theta_{kind}_0" for kind in ("order", "error")]
+    for view in views.values():
         labels = [ax.get_xlabel() for ax in view.picture.figure.axes]
         assert labels == ["initial θ [rad]", "g [m s⁻²]", "L [m]"]
-
-
-@pytest.mark.slow
-def test_shares_add_up_to_one_and_count_every_member(cloud, monkeypatch):
-    exp, record = cloud
-    monkeypatch.setattr(members, "SHARES", 4)
-    views, _ = samples.views(exp, record, "theta")
-    for ax in views["projections_theta_verdict_0"].picture.figure.axes:
-        ends = {}
-        for bar in ax.patches:
-            low, high = bar.get_y(), bar.get_y() + bar.get_height()
-            # each bar begins where the one below it ends
-            assert abs(low - ends.get(bar.get_x(), 0.0)) < 1e-12
-            ends[bar.get_x()] = high
-        np.testing.assert_allclose(list(ends.values()), 1.0)
 
 
 def test_many_members_are_counted_in_cells(cloud, monkeypatch):
@@ -289,17 +271,6 @@ def test_many_members_are_counted_in_cells(cloud, monkeypatch):
     up = images[0].get_coordinates()[:, 0, 1]
     np.testing.assert_array_equal(found, np.histogram(inside, up)[0])
     assert "Darker cells" in drawn[0].caption
-
-
-def test_a_histogram_counts_every_member_that_has_the_number(cloud):
-    exp, record = cloud
-    with style.applied():
-        picture = members.histograms(exp, record, "theta")
-    error = finest_level.error(record, "theta").best[0]
-    ax = picture.figure.axes[1]
-    drawn = sum(float(np.sum(p.get_data().values - p.get_data().baseline)) for p in ax.patches)
-    assert drawn == np.isfinite(error).sum()
-    assert members.histograms(exp, samples.record(samples.plain()), "theta") is None
 
 
 def test_words_that_are_swept_are_written_on_their_axis():
@@ -432,7 +403,6 @@ def test_what_is_the_same_for_all_members_is_not_drawn():
     ]  # fmt: skip
     assert told == [
         "amplitude 1 rad",
-        "error bar of the amplitude 0 rad",
         "verdict on θ PASS (asymptotic)",
     ]
 
@@ -447,7 +417,6 @@ def test_a_sweep_of_few_values_is_curves_and_of_more_a_map():
     for sweep, is_map in ((few, False), (ACROSS, True)):
         exp = samples.experiment(sweep=sweep)
         views, _ = samples.views(exp, samples.record(exp), "theta")
-        views.pop("spread_theta", None)
         assert {name.startswith("map_") for name in views} == {is_map}
         # one panel each; a map has a scale beside it
         for view in views.values():
@@ -457,7 +426,7 @@ def test_a_sweep_of_few_values_is_curves_and_of_more_a_map():
 def test_curves_of_a_family_are_told_apart():
     exp = samples.experiment(sweep={"initial.theta": [0.5, 1.0, 2.0], "model.g": [1.0, 4.0]})
     views, _ = samples.views(exp, samples.record(exp), "theta")
-    for name in ("sweep_order_theta", "sweep_error_theta", "period", "amplitude_error"):
+    for name in ("sweep_order_theta", "sweep_error_theta", "period", "amplitude"):
         legend = views[name].picture.figure.axes[0].get_legend()
         assert [text.get_text() for text in legend.get_texts()][-2:] == ["1", "4"], name
         assert legend.get_title().get_text() == "g"
@@ -576,7 +545,7 @@ def test_both_ways_of_a_followed_path_are_in_the_legends():
             *(v.picture for v in samples.views(exp, record, "u")[0].values()),
         ]
         for picture in drawn:
-            if "verdict" not in picture.name and "histogram" not in picture.name:
+            if "verdict" not in picture.name:
                 legend = picture.figure.axes[0].get_legend()
                 texts = [text.get_text() for text in legend.get_texts()]
                 assert {sweep_layout.UP, sweep_layout.DOWN} <= set(texts), picture.name

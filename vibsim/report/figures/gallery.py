@@ -189,11 +189,6 @@ def over_members(
     shown = list(drawn)
     views = [item for item in shown if isinstance(item, View)]
     notes = [item for item in shown if isinstance(item, str)]
-    for quantity in quantities if data.whole(record, "pair") else ():
-        # their colours are the verdicts on the order, which need pairs of levels
-        picture = members.histograms(experiment, record, quantity)
-        if picture is not None:
-            views.append(View(f"histograms of {words.symbol(quantity)}", picture, panels=()))
     return views, notes
 
 

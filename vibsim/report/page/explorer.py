@@ -52,15 +52,14 @@ def _around(experiment: Experiment) -> tuple[str, str]:
 
 
 def content(experiment: Experiment, record: Record, views: Sequence[View]) -> dict[str, Any] | None:
-    """Return the data for the script of a page; None without a view that shows members."""
-    shown = [view for view in views if view.panels]
-    if not shown:
+    """Return the data for the script of a page; None without a view."""
+    if not views:
         return None
     keys = sweep_layout.keys(record)
-    most = POINTS // max(len(view.schemes) for view in shown)
-    marked = [view.worst for view in shown if view.worst is not None]
+    most = POINTS // max(len(view.schemes) for view in views)
+    marked = [view.worst for view in views if view.worst is not None]
     cases = listed(keys, len(record["case"]), most, marked)
-    quantities = dict.fromkeys(view.quantity for view in shown)
+    quantities = dict.fromkeys(view.quantity for view in views)
     return {
         "command": _around(experiment),
         "count": len(record["case"]),
@@ -71,7 +70,7 @@ def content(experiment: Experiment, record: Record, views: Sequence[View]) -> di
         ],
         "schemes": record.words("scheme"),
         "verdicts": {name: found for name in quantities if (found := _verdicts(record, name, cases))},
-        "views": {view.picture.name: _view(view, cases) for view in shown},
+        "views": {view.picture.name: _view(view, cases) for view in views},
     }  # fmt: skip
 
 
@@ -100,7 +99,7 @@ def _view(view: View, cases: NDArray[np.intp]) -> dict[str, Any]:
 
     position = None if view.worst is None else int(np.searchsorted(cases, view.worst))
     return {
-        "name": view.name, "unit": view.unit, "texts": view.texts, "quantity": view.quantity,
+        "name": view.name, "unit": view.unit, "quantity": view.quantity,
         "schemes": view.schemes, "panels": view.panels, "values": of(view.values), "places": of(view.places),
         "worst": position,
     }  # fmt: skip

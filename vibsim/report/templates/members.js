@@ -54,7 +54,7 @@ function tell({ view, scheme, i }) {
   const rows = data.keys.map((key) => `${key.name} = ${valueOf(key, i)}`);
   const value = view.values?.[view.schemes.indexOf(scheme)][i];
   if (view.values) {
-    const text = value === null ? "none" : view.texts.length ? view.texts[value] : `${written(value)} ${view.unit}`.trim();
+    const text = value === null ? "none" : `${written(value)} ${view.unit}`.trim();
     rows.push(`${view.name}: ${text}`);
   }
   const verdicts = data.verdicts[view.quantity];

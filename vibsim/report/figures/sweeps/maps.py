@@ -48,7 +48,6 @@ class Map:
     tolerance: float = 0.0
     spread: float = LOG_SPREAD
     codes: tuple[tuple[str, str], ...] = ()  # of kind ``code``: text and colour of every number
-    texts: tuple[str, ...] = ()  # meaning of the numbers, unless the verdict tells it
     number: Floats | None = None
     """The number itself, if the map shows its distance from another one."""
     shared: str | None = None
@@ -123,7 +122,7 @@ def _amplitude(quantity: str, record: Record, scheme: int) -> Iterator[Map]:
 
 
 def _order(experiment: Experiment, record: Record, quantity: str, scheme: int) -> Iterator[Map]:
-    """Yield the verdict on a quantity, its order, the width of the interval, and the levels that it rests on."""
+    """Yield the verdict on a quantity, its order, and the width of the interval."""
     letter = words.symbol(quantity)
     if f"{quantity}_reason" in record:
         yield _reasons(record, quantity, scheme)
@@ -141,7 +140,6 @@ def _order(experiment: Experiment, record: Record, quantity: str, scheme: int) -
     )  # fmt: skip
     text = "width of the interval"
     yield Map(f"{quantity}_bar", f"error bar of the order of {letter}", quantity, high - low, text)
-    yield _window(record, quantity, scheme)
 
 
 def _errors(record: Record, quantity: str, scheme: int) -> Iterator[Map]:
@@ -169,18 +167,6 @@ def _errors(record: Record, quantity: str, scheme: int) -> Iterator[Map]:
     yield Map(f"{quantity}_error_bar", name, quantity, width, "relative width")
 
 
-def _coded(
-    stem: str, name: str, quantity: str, values: Floats, codes: list[tuple[int, str, str]], **fields: Any
-) -> Map:  # fmt: skip
-    """Return a map of codes. Each has a text, to which its count is added, and a colour; the last code is the worst."""
-    positions, texts = np.full(values.shape, np.nan), []
-    for i, (code, text, colour) in enumerate(codes):
-        positions[values == code] = i
-        count = words.number(int(np.sum(values == code)), "integer")
-        texts.append((f"{text} ({count})", colour))
-    return Map(stem, name, quantity, positions, kind="code", codes=tuple(texts), **fields)
-
-
 def _reasons(record: Record, quantity: str, scheme: int) -> Map:
     """Return the map of the reasons of the verdicts; a cell shows its worst member."""
     reason = data.pick(record, f"{quantity}_reason", scheme=scheme)
@@ -189,31 +175,15 @@ def _reasons(record: Record, quantity: str, scheme: int) -> Map:
     named = [(code, meanings[code], count) for code, count in zip(found, counts, strict=True)]
     # by severity, then the rarer last
     named.sort(key=lambda row: (SEVERITY[REASONS[row[1]]], -row[2]))
-    codes = [
-        (code, f"{REASONS[word]}: {word}", style.REASON_COLOURS[word]) for code, word, _ in named
-    ]
-    name = f"verdict on {words.symbol(quantity)}"
-    shared = view.shared_verdict(record, quantity, scheme)
-    return _coded(f"{quantity}_verdict", name, quantity, reason, codes, shared=shared)
-
-
-def _window(record: Record, quantity: str, scheme: int) -> Map:
-    """Return the map of the coarsest level that the stated order rests on."""
-    from matplotlib import colormaps
-    from matplotlib.colors import to_hex
-
-    first = data.pick(record, f"{quantity}_window_first", scheme=scheme)
-    levels = data.whole(record, "level")
-    shades = colormaps["viridis"](np.linspace(1.0, 0.0, len(levels)))
-    codes = [
-        (level, f"from level {level} on", to_hex(shade))
-        for level, shade in zip(levels, shades, strict=True)
-        if np.any(first == level)
-    ]
-    name = f"levels used for the order of {words.symbol(quantity)}"
-    shared = f"{name} {codes[0][1]}" if codes and np.all(first == codes[0][0]) else ""
-    texts = tuple(text for _, text, _ in codes)
-    return _coded(f"{quantity}_levels", name, quantity, first, codes, shared=shared, texts=texts)
+    positions, codes = np.full(reason.shape, np.nan), []
+    for i, (code, word, number) in enumerate(named):
+        positions[reason == code] = i
+        text = f"{REASONS[word]}: {word} ({words.number(number, 'integer')})"
+        codes.append((text, style.REASON_COLOURS[word]))
+    return Map(
+        f"{quantity}_verdict", f"verdict on {words.symbol(quantity)}", quantity, positions, kind="code",
+        codes=tuple(codes), shared=view.shared_verdict(record, quantity, scheme),
+    )  # fmt: skip
 
 
 def _view(record: Record, grid: Grid, shown: Map, scheme: int, worst: int) -> View:
@@ -233,10 +203,10 @@ def _view(record: Record, grid: Grid, shown: Map, scheme: int, worst: int) -> Vi
         grid.note,
     )
     number, is_number = shown.values if shown.number is None else shown.number, shown.kind != "code"
-    values = view.by_scheme(record, scheme, number) if is_number or shown.texts else None
+    values = view.by_scheme(record, scheme, number) if is_number else None
     return View(
         shown.name, Picture(f"map_{shown.stem}_{scheme}", title, text, f"{title} over two swept parameters", figure),
-        shown.quantity, values, None, shown.unit, shown.texts, (scheme,), several.removeprefix(", "), ((0, 1),),
+        shown.quantity, values, None, shown.unit, (scheme,), several.removeprefix(", "), ((0, 1),),
         worst if is_ringed else None,
     )  # fmt: skip
 

@@ -127,7 +127,7 @@ class _Drawing:
         )  # fmt: skip
 
     def amplitude(self) -> Iterator[View | str]:
-        """Yield the amplitude with its error bar, and the error bar alone."""
+        """Yield the amplitude with its error bar."""
         record, along, quantity = self.record, self.along, position(self.experiment)
         amplitude = finest_level.measured(record, "amplitude", quantity)
         if not np.isfinite(amplitude.value).any():
@@ -166,26 +166,6 @@ class _Drawing:
         yield from self._view(
             "amplitude", "amplitude", quantity, amplitude.value, explanation, draw, amplitude.unit
         )
-        if not data.whole(record, "pair"):
-            return
-
-        def draw_error(ax: Axes) -> str:
-            for curve in _curves(record, along):
-                look = style.look(curve.number) | {"markersize": 4}
-                text = curve.text or style.entry(record.words("scheme")[curve.scheme])
-                _line(ax, curve.x, style.no_zeros(curve.of(amplitude.error)), **look, label=text)
-            # as a motion is damped away, its error falls without limit
-            held = error if np.isfinite(error).any() else amplitude.error
-            style.fit_log_axis(ax, "y", held, least=DEEP, room=2.0)
-            ax.set_ylabel(style.label("estimated error", amplitude.unit))
-            if len(along.lines) > 1 and not style.crowded(record):
-                _beside(ax, along, fontsize=8)
-            return _leaving(ax, along, amplitude.error)
-
-        yield from self._view(
-            "amplitude_error", "error bar of the amplitude", quantity, amplitude.error,
-            "Estimated from the two finest levels.", draw_error, amplitude.unit, "norm",
-        )  # fmt: skip
 
     def order(self, quantity: str) -> Iterator[View | str]:
         """Yield the stated order of every member with its interval."""

@@ -38,8 +38,6 @@ class View:
     places: Floats | None = None
     """Vertical positions of the members, of the same shape, if they differ from the values."""
     unit: str = ""
-    texts: tuple[str, ...] = ()
-    """Meaning of the values, if they are numbers of texts."""
     schemes: tuple[int, ...] = ()  # those drawn
     of: str = ""
     """The scheme, if each has its own view."""
