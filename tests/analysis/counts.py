@@ -22,9 +22,9 @@ from judged import ORDERS, findings
 from synthetic import TOLERANCE, Group, groups
 from synthetic import Ladder as Truth
 
-from vibsim.comparison import order_evidence
+from vibsim.comparison import order_verdict
 from vibsim.convergence.assessment import Question, assess
-from vibsim.convergence.error_model.posterior import Ladder
+from vibsim.convergence.error_model.ladder import Ladder
 from vibsim.core.vocabulary import REASON_NAMES, REASONS
 
 HEAD = """\
@@ -72,7 +72,7 @@ class Read:
 @contextmanager
 def reading() -> Iterator[Read]:
     """Keep what the pipeline reads of u."""
-    read, collect = Read(), order_evidence.evidence
+    read, collect = Read(), order_verdict.facts_of
 
     def kept(q: Any, norm: str, order: Any, tolerance: float) -> Any:
         found = collect(q, norm, order, tolerance)
@@ -80,20 +80,20 @@ def reading() -> Iterator[Read]:
             read.found.append((q, found))
         return found
 
-    with patch.object(order_evidence, "evidence", kept):
+    with patch.object(order_verdict, "facts_of", kept):
         yield read
 
 
 def ladder_of(group: Group, read: Read) -> Ladder:
     """Return the ladders of a group as the error model reads them, with the noise that the rules know of."""
-    q, evidence = read.found[0]
+    q, facts = read.found[0]
     rows = [d[0] for d in q.differences]
     if group.known:
         rows.append(-q.errors[-1][0])
     x = np.stack(rows, axis=1)
     gram = x @ np.swapaxes(x, 1, 2) * q.block.grid.spacing[0]
     h = 2.0 ** -np.array(group.levels)
-    return Ladder(h, gram, evidence.floor[0], evidence.numbers[0], group.known)
+    return Ladder(h, gram, facts.floor[0], facts.numbers[0], group.known)
 
 
 def tally(seed: int, folder: Path, number: int = 42, size: int = 55) -> tuple[Counts, Counts]:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from vibsim.apriori.roundoff_floor import norm_of_floor
 from vibsim.convergence import differences
-from vibsim.convergence.evidence import Evidence
+from vibsim.convergence.ladder_facts import LadderFacts
 from vibsim.core.vocabulary import ORDER_TOLERANCE
 
 Floats = NDArray[np.float64]
@@ -38,7 +38,7 @@ class Truth:
     """Number of levels before the noise."""
 
 
-def evidence_of(
+def facts_of(
     fields: list[Floats],
     levels: tuple[int, ...],
     *,
@@ -48,8 +48,8 @@ def evidence_of(
     exact: Floats | None = None,
     tolerance: float = 0.1,
     **more: Any,
-) -> Evidence:
-    """Return the evidence of one ladder: arrays of shape (1, ...)."""
+) -> LadderFacts:
+    """Return the facts about one ladder: arrays of shape (1, ...)."""
     d = [(coarse - fine)[None] for coarse, fine in itertools.pairwise(fields)]
     size = np.max(np.abs(fields[-1]))
     floors = np.broadcast_to(np.asarray(floor, dtype=float), (1, len(levels)))
@@ -61,12 +61,12 @@ def evidence_of(
     cosines = np.zeros((1, len(levels), len(levels)))
     if rows:
         cosines[:, : len(rows), : len(rows)] = differences.cosines(rows, norm)
-    return evidence_with(
+    return facts_with(
         levels=levels,
         difference=measure(d) if d else np.empty((1, 0)),
         cosines=cosines,
         floor=norm_of_floor(floors, norm, len(T), SPACING),
-        order=np.array([order]),
+        expected=np.array([order]),
         omega_dt=T[-1] * 2.0 ** -np.array([levels], dtype=float),
         relative_floor=floors[:, 0] / (size or 1.0),
         tolerance=tolerance,
@@ -76,10 +76,10 @@ def evidence_of(
     )
 
 
-def evidence_with(**known: Any) -> Evidence:
-    """Return the evidence of a ladder; what is not given is what says nothing."""
-    order, n = known["order"], len(known["levels"])
-    shape = order.shape
+def facts_with(**known: Any) -> LadderFacts:
+    """Return the facts about a ladder; what is not given is what says nothing."""
+    expected, n = known["expected"], len(known["levels"])
+    shape = expected.shape
     unknown, no = np.full(shape, np.nan), np.zeros(shape, dtype=bool)
     neutral = {
         "tolerance": ORDER_TOLERANCE,
@@ -87,8 +87,8 @@ def evidence_with(**known: Any) -> Evidence:
         "error": unknown,
         "blur": np.zeros((*shape, n)),
         "scale": np.full(shape, np.inf),
-        "promised": order,
-        "special": order,
+        "promised": expected,
+        "special": expected,
         "combined": lambda rows, first, weights: np.full(np.count_nonzero(rows), np.nan),
         "numbers": no,
         "failed": np.zeros((*shape, n), dtype=bool),
@@ -106,7 +106,7 @@ def evidence_with(**known: Any) -> Evidence:
         "decay": np.zeros(shape),
         "growth": np.full((*shape, n), np.nan),
     }
-    return Evidence(**{**neutral, **known})
+    return LadderFacts(**{**neutral, **known})
 
 
 def shape_in_time(rng: np.random.Generator) -> Floats:

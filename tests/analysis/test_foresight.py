@@ -11,7 +11,7 @@ from spring_runs import spring
 
 from vibsim.analysis import Verdict, analyse_records, verdicts
 from vibsim.checks.sentences import cost_in_words
-from vibsim.comparison.order_evidence import CAUSES
+from vibsim.comparison.order_verdict import CAUSES
 from vibsim.core.record import Record
 from vibsim.experiment import Experiment
 from vibsim.experiment.cost import level_cost

@@ -9,7 +9,7 @@ import pytest
 
 from vibsim import judge
 from vibsim.convergence.assessment import Assessment
-from vibsim.convergence.error_model.posterior import Ladder
+from vibsim.convergence.error_model.ladder import Ladder
 from vibsim.convergence.study import outcomes
 from vibsim.convergence.study.sentences import SENTENCES
 from vibsim.core.vocabulary import REASON_NAMES, REASONS

@@ -16,7 +16,7 @@ from vibsim.checks.order import phase_at_start
 from vibsim.comparison import best_values
 from vibsim.comparison.compare_quantities import comparisons
 from vibsim.comparison.comparison_variables import Table, in_precision, numbers, over_time
-from vibsim.comparison.order_evidence import judge_orders, judgement, order_in
+from vibsim.comparison.order_verdict import judge_orders, judgement, order_in
 from vibsim.comparison.quantity_comparison import Comparison
 from vibsim.comparison.work_precision import work_precision
 from vibsim.convergence import differences

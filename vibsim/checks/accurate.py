@@ -26,7 +26,7 @@ from vibsim.checks.sentences import (
 )
 from vibsim.checks.value import FINER, unit_of_quantity
 from vibsim.comparison.finest_error import FinestError, error_of_finest
-from vibsim.comparison.order_evidence import judgement
+from vibsim.comparison.order_verdict import judgement
 from vibsim.comparison.quantity_comparison import Compared, Comparison
 from vibsim.convergence.reasons import code, first_reason, is_one_of, is_open
 from vibsim.convergence.verdict import Judgement

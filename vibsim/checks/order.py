@@ -22,10 +22,10 @@ from vibsim.apriori.formal_orders import even_powers, orders_in, relative_floors
 from vibsim.checks.accurate import ERROR, MOST_MORE_LEVELS, known_error
 from vibsim.checks.fields import REASON, STATUS, Field, Measured
 from vibsim.checks.outcome import Judged, as_expected
-from vibsim.comparison.order_evidence import (
+from vibsim.comparison.order_verdict import (
     CAUSES,
     causes,
-    evidence,
+    facts_of,
     judge_check,
     judgement,
     order_of,
@@ -33,8 +33,8 @@ from vibsim.comparison.order_evidence import (
 from vibsim.comparison.parting import parting
 from vibsim.comparison.quantity_comparison import Compared, Comparison
 from vibsim.convergence.differences import largest, safe_ratio
-from vibsim.convergence.evidence import pick
 from vibsim.convergence.extrapolation.thresholds import ORDER_ABOVE_ROUND_OFF
+from vibsim.convergence.ladder_facts import pick
 from vibsim.convergence.reasons import code
 from vibsim.convergence.thresholds import (
     HALF_SPACING,
@@ -220,7 +220,7 @@ def _clean_difference(q: Comparison, norm: str, p: Floats) -> tuple[Floats, Floa
     If none is above round-off, the coarsest difference is used, which is noise; the result is then too optimistic.
     """
     levels = np.array(q.block.grid.levels)
-    e = evidence(q, norm, q.order, ORDINARY_ORDER)
+    e = facts_of(q, norm, q.order, ORDINARY_ORDER)
     clean = e.difference >= ORDER_ABOVE_ROUND_OFF * (e.floor[..., :-1] + e.floor[..., 1:])
     index = np.max(np.where(clean, np.arange(len(levels) - 1), 0), axis=-1)
     size = pick(e.difference, index)
@@ -235,7 +235,7 @@ def _clean_difference(q: Comparison, norm: str, p: Floats) -> tuple[Floats, Floa
 
 def _noise(q: Comparison, norm: str, arithmetic: str | None) -> Callable[[int], Floats]:
     """Return a function that predicts the round-off of a level in a norm, shape (scheme, case)."""
-    block, floor = q.block, evidence(q, norm, q.order, ORDINARY_ORDER).floor[..., -1]
+    block, floor = q.block, facts_of(q, norm, q.order, ORDINARY_ORDER).floor[..., -1]
     if block.stored_floor[-1] > 0.0:
         # the rounding of stored values is the same at all levels, in any arithmetic
         return lambda level: floor

@@ -57,7 +57,7 @@ class OrderContext:
         self.is_position = quantity in f.model.positions
         self.notation, self.reason = f.notation, f.reason
         self.cause = f.word("cause")
-        """Why the order differs from the expected one: one of `vibsim.comparison.order_evidence.CAUSES`."""
+        """Why the order differs from the expected one: one of `vibsim.comparison.order_verdict.CAUSES`."""
         order = float(f.fact("order"))
         self.order = order if math.isfinite(order) else math.nan
         self.low, self.high = float(f.fact("order_low")), float(f.fact("order_high"))

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vibsim.apriori.roundoff_floor import norm_of_floor
-from vibsim.comparison.order_evidence import judgement
+from vibsim.comparison.order_verdict import judgement
 from vibsim.comparison.quantity_comparison import Comparison
 from vibsim.convergence import differences
 from vibsim.convergence.reasons import is_one_of

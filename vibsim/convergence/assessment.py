@@ -39,7 +39,8 @@ import numpy as np
 
 from vibsim.convergence.best_value import best_value, is_missed, norm
 from vibsim.convergence.error_model.hypotheses import ExpectedOrder
-from vibsim.convergence.error_model.posterior import LEFT_OUT, Ladder, Posterior, posterior
+from vibsim.convergence.error_model.ladder import Ladder
+from vibsim.convergence.error_model.posterior import LEFT_OUT, Posterior, posterior
 from vibsim.convergence.error_model.priors import GROWTHS
 from vibsim.convergence.ladder_blocks import in_blocks
 from vibsim.convergence.likely_powers import (

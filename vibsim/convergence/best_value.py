@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from vibsim.convergence.error_model.hypotheses import matvec
-from vibsim.convergence.error_model.posterior import Ladder, Posterior
+from vibsim.convergence.error_model.ladder import Ladder
+from vibsim.convergence.error_model.matrices import matvec
+from vibsim.convergence.error_model.posterior import Posterior
 from vibsim.convergence.thresholds import BEST_BOUND, MISSED, MISSED_SHARE
 from vibsim.core.array_types import Flags, Floats
 from vibsim.elementary import on_arrays

@@ -15,13 +15,13 @@ from __future__ import annotations
 import numpy as np
 
 from vibsim.convergence.differences import total
-from vibsim.convergence.evidence import Evidence, floor_of_pairs, pick
+from vibsim.convergence.ladder_facts import LadderFacts, floor_of_pairs, pick
 from vibsim.convergence.thresholds import HALF_SPACING, HIDDEN_SHARE, HIGHER_POWERS
 from vibsim.core.array_types import Flags, Floats, Integers
 from vibsim.elementary import on_arrays
 
 
-def is_promise_hidden(e: Evidence, order: Floats, last: Integers) -> Flags:
+def is_promise_hidden(e: LadderFacts, order: Floats, last: Integers) -> Flags:
     """Say where levels show a higher order than the promised one, which may be present with a small coefficient.
 
     Parameters
@@ -43,7 +43,7 @@ def is_promise_hidden(e: Evidence, order: Floats, last: Integers) -> Flags:
     return hidden
 
 
-def _largest_share(e: Evidence, rows: Flags, last: int, p: float, r: float) -> Floats:
+def _largest_share(e: LadderFacts, rows: Flags, last: int, p: float, r: float) -> Floats:
     """Return an upper bound of the part of h^r in an error of h^p at the finer level of difference `last`."""
     difference = pick(e.difference[rows], np.full(np.count_nonzero(rows), last))
     floor = floor_of_pairs(e)[rows]

@@ -12,7 +12,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from vibsim.convergence.error_model.posterior import Ladder
+from vibsim.convergence.error_model.ladder import Ladder
 from vibsim.convergence.reasons import code
 from vibsim.core.array_types import Floats, Integers
 from vibsim.core.vocabulary import LEVELS_OF_AN_ORDER

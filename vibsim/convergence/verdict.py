@@ -1,37 +1,11 @@
-r"""The verdict: does a ladder of levels show the expected order?
+"""The verdict: does a ladder of levels show the expected order?
 
-A pure function of the data of a ladder, for any number of ladders at once. Leading dimensions ``...`` are ladders
+A pure function of the facts about a ladder, for any number of ladders at once. Leading dimensions ``...`` are ladders
 (scheme, case); n is the number of levels.
 
 The error model decides on the order (`vibsim.convergence.assessment`). Facts that levels cannot show precede it or
-limit it. The first row that applies decides:
-
-| condition | status and reason |
-|---|---|
-| the quantity does not exist, or the scheme has no levels | ``not_applicable`` |
-| w dt exceeds the stability limit, or refinement does not remove growth | ``unstable`` |
-| a level broke down | ``non_finite`` |
-| fewer than three levels | ``too_few_levels`` |
-| no level sees a pulse of the force, and no exact solution shows that it does not matter | ``non_smooth`` for a jump, \
-else ``pre_asymptotic`` |
-| nothing moves where levels are compared | ``not_applicable``; ``pre_asymptotic`` if the exact solution moves |
-| a velocity decays within a step of every level, and the order is not the expected one | ``pre_asymptotic`` |
-| all differences are round-off, but an ordinary error would show | ``exact``; ``wrong_limit`` away from the exact \
-solution |
-| exactness is promised, but a difference exceeds round-off | ``order_low`` |
-| the finest differences may be round-off, and the error model decides no order | ``round_off`` |
-| the error model finds alternating errors | ``oscillating`` |
-| ... another limit than the exact solution | ``wrong_limit`` |
-| ... the expected order, and it hides no promised power | ``asymptotic`` |
-| ... a lower order that no corner of the force within a step explains | ``order_low`` |
-| such a corner explains an order below the expected one, or one power less next to a point of all levels | \
-``non_smooth`` |
-| the error model finds a higher order, and it hides no promised power | ``order_high`` |
-| events are left to the mesh, or a corner leaves less than the expected order | ``non_smooth`` |
-| otherwise | ``pre_asymptotic`` |
-
-If levels differ by more than the solution, the error model decides nothing. If events are left to the mesh, or corners
-to a table, only the power that they leave counts.
+limit it. The first case that applies decides: those of `judge` for any ladder, then those of `_cases`; without any it
+is ``pre_asymptotic``. ``docs/method.md`` has them as a table.
 """
 
 from __future__ import annotations
@@ -39,15 +13,16 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 
-from vibsim.convergence import thresholds as th
 from vibsim.convergence.assessment import Decision, Question, decide
 from vibsim.convergence.differences import local_orders, safe_ratio
-from vibsim.convergence.error_model.posterior import Ladder
-from vibsim.convergence.evidence import (
-    Evidence,
+from vibsim.convergence.error_model.ladder import Ladder
+from vibsim.convergence.hidden_order import is_promise_hidden
+from vibsim.convergence.ladder_facts import (
+    LadderFacts,
     at_rest,
     at_round_off,
     breakdown,
@@ -59,11 +34,13 @@ from vibsim.convergence.evidence import (
     truly_exact,
     unresolved,
 )
-from vibsim.convergence.hidden_order import is_promise_hidden
 from vibsim.convergence.reasons import STATUS_OF, code, first_reason, is_one_of, is_open
+from vibsim.convergence.thresholds import HALF_SPACING, ORDINARY_ORDER
 from vibsim.core.array_types import Codes, Flags, Floats, Integers
 from vibsim.core.vocabulary import LEVELS_OF_AN_ORDER
 from vibsim.elementary import on_arrays
+
+Cases = list[tuple[Flags, str]]
 
 
 @dataclass(frozen=True)
@@ -81,8 +58,32 @@ class Judgement:
     orders: Floats = field(repr=False)  # local order of each triple, shape (..., n-2)
 
 
-def judge(e: Evidence) -> Judgement:
-    """Return the verdicts on ladders by the table in the docstring of this module."""
+class _Found(NamedTuple):
+    """What the error model finds, as far as facts from outside the ladder permit; flags of shape (...)."""
+
+    noise: Flags  # the finest differences may be noise, and no order is decided
+    exact: Flags  # all differences are round-off, though an ordinary error would show
+    right: Flags  # the expected order
+    low: Flags  # a lower order
+    high: Flags  # a higher order
+    missed: Flags  # another limit than the exact solution
+    alternating: Flags  # errors that alternate from level to level
+    hides_promise: Flags  # an order behind which the promised one may hide
+
+
+class _Rough(NamedTuple):
+    """What events and corners of the force that lie between grid points do to an order; flags of shape (...)."""
+
+    on_mesh: Flags  # events are left to the mesh, or corners to a table
+    is_regular: Flags  # the order is the one that these leave, if there are any
+    explained: Flags  # a corner explains that the expected order does not show
+    too_low: Flags  # the order is lower than the corner leaves
+    one_less: Flags  # the corner is near a point of all levels, and takes one power more until steps are as short
+    limited: Flags  # finer levels will show the power of the corner, not the expected one
+
+
+def judge(e: LadderFacts) -> Judgement:
+    """Return the verdicts on ladders."""
     shape, levels = e.difference.shape[:-1], np.array(e.levels, dtype=np.int64)
     orders = local_orders(safe_ratio(e.difference[..., :-1], e.difference[..., 1:]), e.levels)
     broken, beyond, growing = breakdown(e)
@@ -90,7 +91,7 @@ def judge(e: Evidence) -> Judgement:
     fails = np.any(culprits, axis=-1)
     undefined = ~np.all(np.isfinite(e.difference), axis=-1)
     undefined |= ~np.all(np.isfinite(e.floor), axis=-1)
-    cases = [
+    cases: Cases = [
         (~e.applicable, "not_applicable"),
         (np.any(beyond, axis=-1) | growing, "unstable"),
         (np.any(broken, axis=-1) | undefined, "non_finite"),
@@ -102,12 +103,14 @@ def judge(e: Evidence) -> Judgement:
     else:
         judged = e.applicable & ~undefined & ~fails & ~growing
         decision = _decisions(e, judged)
-        decided, lower, noise = _cases(e, decision, orders)
-        cases += decided
+        found = _found(e, decision)
+        cases += _cases(e, found, _rough(e, decision, found, orders))
         # noise has no order
-        stated = judged & ~noise & ~(np.isinf(e.order) & at_round_off(e))
+        stated = judged & ~found.noise & ~(np.isinf(e.expected) & at_round_off(e))
+        # the interval extends to a promised power that may hide
+        lowest = np.where(found.hides_promise, np.minimum(decision.low, e.promised), decision.low)
         order, low, high = (
-            np.where(stated, x, np.nan) for x in (decision.order, lower, decision.high)
+            np.where(stated, x, np.nan) for x in (decision.order, lowest, decision.high)
         )
         first, last = (np.where(stated, levels[x], -1) for x in (decision.first, decision.last))
     reason = first_reason(cases, "pre_asymptotic")
@@ -126,7 +129,7 @@ def judge(e: Evidence) -> Judgement:
     )
 
 
-def _decisions(e: Evidence, judged: Flags) -> Decision:
+def _decisions(e: LadderFacts, judged: Flags) -> Decision:
     """Return the decisions of the error model on the ladders to be judged; all others count as noise."""
     shape, n = judged.shape, len(e.levels)
     decision = Decision(
@@ -139,7 +142,7 @@ def _decisions(e: Evidence, judged: Flags) -> Decision:
         contradicted=np.zeros(shape, dtype=bool),
     )
     rows = np.concatenate([e.difference, e.error[..., None]], axis=-1)
-    keys = np.stack([np.isfinite(e.error), _expected(e), _is_theory(e)], axis=-1)
+    keys = np.stack([np.isfinite(e.error), _finite_order(e), _is_theory(e)], axis=-1)
     # differences that all vanish have no scale
     judged = judged & np.any(e.difference > 0.0, axis=-1)
     for key in np.unique(keys[judged].astype(np.float64), axis=0):
@@ -169,94 +172,99 @@ def _decisions(e: Evidence, judged: Flags) -> Decision:
     return decision
 
 
-def _expected(e: Evidence) -> Floats:
+def _finite_order(e: LadderFacts) -> Floats:
     """Return the expected order; if exactness is expected, the order of an ordinary error."""
-    return np.where(np.isinf(e.order), th.ORDINARY_ORDER, e.order)
+    return np.where(np.isinf(e.expected), ORDINARY_ORDER, e.expected)
 
 
-def _is_theory(e: Evidence) -> Flags:
+def _is_theory(e: LadderFacts) -> Flags:
     """Say where theory promises the expected order, and no event or corner within a step leaves a lower one."""
-    rough = np.fmin(e.left_to_the_mesh, e.corner) < e.order - e.tolerance
-    return np.asarray((e.order == e.promised) & ~rough)
+    rough = np.fmin(e.left_to_the_mesh, e.corner) < e.expected - e.tolerance
+    return np.asarray((e.expected == e.promised) & ~rough)
 
 
-def _cases(
-    e: Evidence, decision: Decision, orders: Floats
-) -> tuple[list[tuple[Flags, str]], Floats, Flags]:
-    """Return the cases of ladders with at least three levels, in the order of the table.
-
-    Also return the lower end of the interval, extended to a promised power that may hide, and where all is noise.
-    """
+def _found(e: LadderFacts, decision: Decision) -> _Found:
+    """Return what the error model finds on ladders with at least three levels."""
     has = partial(is_one_of, decision.reason)
-    exact_promised, tol, p = np.isinf(e.order), e.tolerance, _expected(e)
-    noise = has("exact") | (has("round_off", "pre_asymptotic") & is_noise(e))
-    exact = (exact_promised | noise) & truly_exact(e)
+    noise = has("round_off", "pre_asymptotic") & is_noise(e)
     # levels that differ by more than the solution are not near it yet
     near = pick(e.difference, decision.last - 1) <= e.scale
-    right, low, high, missed = (
-        has(reason) & near for reason in ("asymptotic", "order_low", "order_high", "wrong_limit")
-    )
-    alternating = has("oscillating")
     # the levels show a higher order, but do not exclude the promised power
-    may_hide = is_promise_hidden(e, np.where(noise, np.nan, decision.order), decision.last)
-    lower = np.where(may_hide, np.minimum(decision.low, e.promised), decision.low)
-    hidden = may_hide & (p >= e.promised - tol)
-    # another power results by accident from where events or corners lie between grid points
-    mesh_power, rough = e.left_to_the_mesh, ~np.isnan(e.left_to_the_mesh)
-    regular = ~rough | (np.abs(decision.order - mesh_power) <= tol)
+    hides_promise = is_promise_hidden(e, np.where(noise, np.nan, decision.order), decision.last)
     # in these cases levels may be near each other and yet away from the exact solution
-    missed &= ~(rough | ~np.isnan(e.corner) | may_hide) | errors_stay(e)
+    by_accident = ~np.isnan(e.left_to_the_mesh) | ~np.isnan(e.corner) | hides_promise
+    return _Found(
+        noise=noise,
+        exact=(np.isinf(e.expected) | noise) & truly_exact(e),
+        right=has("asymptotic") & near,
+        low=has("order_low") & near,
+        high=has("order_high") & near,
+        missed=has("wrong_limit") & near & (~by_accident | errors_stay(e)),
+        alternating=has("oscillating"),
+        hides_promise=hides_promise,
+    )
+
+
+def _rough(e: LadderFacts, decision: Decision, found: _Found, orders: Floats) -> _Rough:
+    """Return what events and corners between grid points explain; `orders` are the local ones, shape (..., n-2)."""
+    p, order, tolerance = _finite_order(e), decision.order, e.tolerance
+    apart = np.maximum(tolerance, HALF_SPACING)
+    on_mesh, has_corner = ~np.isnan(e.left_to_the_mesh), ~np.isnan(e.corner)
     # a corner leaves all powers below its own intact: a lower order has another cause
-    below = (decision.order < p - tol) | np.any(orders[..., -2:] < (p - tol)[..., None], axis=-1)
-    corner_explains = ~np.isnan(e.corner) & (p >= e.corner) & (below | alternating | noise)
-    # three levels next to a corner may have any order: use the interval
-    deeper = decision.high < e.corner - np.maximum(tol, th.HALF_SPACING)
-    # next to a point of all levels a corner leaves one power less, until steps are shorter than its distance
-    one_less = np.abs(decision.order - (e.corner - 1.0)) <= np.maximum(tol, th.HALF_SPACING)
-    temporary = e.near_a_point & one_less & (e.promised >= e.corner)
-    # finer levels would show the power of the corner, not p
-    limited = e.corner < p - tol
-    far = far_from_exact(e)
+    below = order < p - tolerance
+    below |= np.any(orders[..., -2:] < (p - tolerance)[..., None], axis=-1)
+    return _Rough(
+        on_mesh=on_mesh,
+        # another power results by accident from where events or corners lie between grid points
+        is_regular=~on_mesh | (np.abs(order - e.left_to_the_mesh) <= tolerance),
+        explained=has_corner & (p >= e.corner) & (below | found.alternating | found.noise),
+        # three levels next to a corner may have any order: use the interval
+        too_low=decision.high < e.corner - apart,
+        one_less=(
+            e.near_a_point & (np.abs(order - (e.corner - 1.0)) <= apart) & (e.promised >= e.corner)
+        ),
+        limited=e.corner < p - tolerance,
+    )
+
+
+def _cases(e: LadderFacts, found: _Found, rough: _Rough) -> Cases:
+    """Return the cases of ladders with at least three levels; the first that applies decides."""
+    noise, exact, right, low, high, missed, alternating, hides_promise = found
+    on_mesh, regular, explained, too_low, one_less, limited = rough
+    exact_promised, far = np.isinf(e.expected), far_from_exact(e)
+    hidden = hides_promise & (_finite_order(e) >= e.promised - e.tolerance)
     still = at_rest(e) & (exact_promised | noise)
     # differences cannot show what no level sees; only an exact solution could show that it does not matter
     blind = e.unseen & (missed | ((exact | noise | exact_promised) & far) | np.isnan(e.error))
-    # an implicit scheme with long steps keeps a velocity that has decayed, which is no fault of the scheme
-    coarse = unresolved(e) & (exact | missed | low | high)
-    return (
-        [
-            (blind & e.jumps, "non_smooth"),
-            (blind, "pre_asymptotic"),
-            # at rest on every level, but the exact solution moves: the steps are too long to see it
-            (still & far, "pre_asymptotic"),
-            (still, "not_applicable"),
-            (coarse, "pre_asymptotic"),
-            # levels may locate their events at the same wrong points
-            (exact & far & rough, "non_smooth"),
-            (exact & far, "wrong_limit"),
-            (exact, "exact"),
-            (exact_promised & ~at_round_off(e), "order_low"),
-            (noise & (e.moved == 0.0) & far, "pre_asymptotic"),
-            (
-                exact_promised | (noise & (at_round_off(e) | ~(rough | corner_explains))),
-                "round_off",
-            ),
-            (alternating & ~rough & ~corner_explains, "oscillating"),
-            (missed, "wrong_limit"),
-            (right & regular & ~hidden & ~temporary, "asymptotic"),
-            (low & regular & (~corner_explains | deeper) & ~temporary, "order_low"),
-            (corner_explains | temporary, "non_smooth"),
-            (high & ~rough & ~hidden, "order_high"),
-            (e.unseen & e.jumps, "non_smooth"),
-            (e.unseen, "pre_asymptotic"),
-            (rough | limited, "non_smooth"),
-        ],
-        lower,
-        noise,
-    )
+    return [
+        (blind & e.jumps, "non_smooth"),
+        (blind, "pre_asymptotic"),
+        # at rest on every level, but the exact solution moves: the steps are too long to see it
+        (still & far, "pre_asymptotic"),
+        (still, "not_applicable"),
+        # an implicit scheme with long steps keeps a velocity that has decayed, which is no fault of the scheme
+        (unresolved(e) & (exact | missed | low | high), "pre_asymptotic"),
+        # levels may locate their events at the same wrong points
+        (exact & far & on_mesh, "non_smooth"),
+        (exact & far, "wrong_limit"),
+        (exact, "exact"),
+        (exact_promised & ~at_round_off(e), "order_low"),
+        (noise & (e.moved == 0.0) & far, "pre_asymptotic"),
+        (exact_promised | (noise & (at_round_off(e) | ~(on_mesh | explained))), "round_off"),
+        (alternating & ~on_mesh & ~explained, "oscillating"),
+        (missed, "wrong_limit"),
+        (right & regular & ~hidden & ~one_less, "asymptotic"),
+        (low & regular & (~explained | too_low) & ~one_less, "order_low"),
+        (explained | one_less, "non_smooth"),
+        (high & ~on_mesh & ~hidden, "order_high"),
+        (e.unseen & e.jumps, "non_smooth"),
+        (e.unseen, "pre_asymptotic"),
+        (on_mesh | limited, "non_smooth"),
+    ]
 
 
-def judge_together(rows: Sequence[Evidence]) -> list[Judgement]:
-    """Judge several sets of ladders with the same shape, levels and tolerance at once; see `batches`."""
+def judge_together(rows: Sequence[LadderFacts]) -> list[Judgement]:
+    """Judge several sets of ladders with the same shape, levels and tolerance at once."""
     fields = vars(judge(stacked(rows)))
     # copies, so that keeping one set does not keep all in memory
     parts = [{name: values[i].copy() for name, values in fields.items()} for i in range(len(rows))]

@@ -22,7 +22,7 @@ from vibsim.checks.fields import name_of
 from vibsim.checks.notation import PLAIN
 from vibsim.checks.order_context import Corner
 from vibsim.checks.order_text import _Phrases, in_words
-from vibsim.comparison.order_evidence import CAUSES
+from vibsim.comparison.order_verdict import CAUSES
 from vibsim.core.record import Record, Variable
 from vibsim.core.vocabulary import DRIFTS, REASON_NAMES, REASONS, STATUSES
 from vibsim.experiment.schema.checks import MEASURED

@@ -13,7 +13,7 @@ from spring_runs import spring
 from vibsim.analysis import Verdict, analyse_records, summarise, verdicts
 from vibsim.comparison import value_numbers as values
 from vibsim.comparison.compare_quantities import comparisons
-from vibsim.comparison.order_evidence import evidence
+from vibsim.comparison.order_verdict import facts_of
 from vibsim.experiment.value_names import VALUES
 from vibsim.observe.member_block import block_of
 
@@ -398,7 +398,7 @@ def test_the_floor_is_measured_in_the_norm_of_the_check() -> None:
     assert np.all(at_a_point >= 2.2e-16)
     factor = {"linf": 1.0, "linf_interior": 1.0, "l2": np.sqrt(0.5 * 17), "l1": 0.5 * 17}
     for norm, expected in factor.items():
-        found = evidence(theta, norm, np.array([[2.0]]), 0.1)
+        found = facts_of(theta, norm, np.array([[2.0]]), 0.1)
         assert found.floor[0, 0] == pytest.approx(expected * at_a_point, rel=1e-12, abs=0)
 
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from ladders import T, evidence_of
+from ladders import T, facts_of
 from spring_runs import PERIODS, STEPS, judged, registered, spring
 
 from vibsim.comparison import solution_distance
@@ -315,8 +315,8 @@ LADDER = (0, 1, 2, 3)
 def test_what_is_exact_may_differ_smoothly_within_round_off(size: float, reason: str) -> None:
     wrong = [size * 4.0**-k * np.sin(T) for k in range(4)]
     exact = np.cos(T)
-    evidence = evidence_of([exact - e for e in wrong], (3, 4, 5, 6), order=np.inf, exact=exact)
-    found = judge(evidence)
+    facts = facts_of([exact - e for e in wrong], (3, 4, 5, 6), order=np.inf, exact=exact)
+    found = judge(facts)
     assert REASON_NAMES[int(found.reason[0])] == reason
     assert np.isnan(found.order[0]) == (reason == "exact")
 

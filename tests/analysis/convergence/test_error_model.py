@@ -17,22 +17,17 @@ from thinned import thinned
 from vibsim.convergence import assessment, likely_powers
 from vibsim.convergence.assessment import Assessment, Decision, Question, assess, decide
 from vibsim.convergence.error_model import kernel, likelihood, priors
-from vibsim.convergence.error_model.hypotheses import (
-    ExpectedOrder,
+from vibsim.convergence.error_model.hypotheses import ExpectedOrder, hypotheses_of
+from vibsim.convergence.error_model.ladder import Ladder
+from vibsim.convergence.error_model.matrices import (
     form,
-    hypotheses_of,
     inverse,
     level_differences,
     noise_of_rows,
     outer,
     packed,
 )
-from vibsim.convergence.error_model.posterior import (
-    MOST_HYPOTHESES,
-    MOST_TABLES,
-    Ladder,
-    posterior,
-)
+from vibsim.convergence.error_model.posterior import MOST_HYPOTHESES, MOST_TABLES, posterior
 from vibsim.core.array_types import Floats
 from vibsim.core.vocabulary import REASON_NAMES, REASONS
 

@@ -7,12 +7,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-from ladders import T, Truth, evidence_of, evidence_with, random_truth, shape_in_time
+from ladders import T, Truth, facts_of, facts_with, random_truth, shape_in_time
 
 from vibsim.convergence import verdict
-from vibsim.convergence.evidence import Evidence
 from vibsim.convergence.hidden_order import is_promise_hidden
 from vibsim.convergence.ladder_blocks import STACKED_LADDERS, batches
+from vibsim.convergence.ladder_facts import LadderFacts
 from vibsim.convergence.verdict import judge, judge_together
 from vibsim.core.vocabulary import NORMS, REASON_NAMES, STATUSES
 
@@ -32,7 +32,7 @@ def ladder(levels: tuple[int, ...], *terms: tuple[float, float, Any]) -> list[np
 
 
 def decide(fields: list[np.ndarray], levels: tuple[int, ...], **more: Any) -> tuple[str, str]:
-    found = judge(evidence_of(fields, levels, **more))
+    found = judge(facts_of(fields, levels, **more))
     return STATUSES[int(found.status[0])], REASON_NAMES[int(found.reason[0])]
 
 
@@ -45,7 +45,7 @@ def test_right_order_passes_and_wrong_order_is_named(levels: tuple[int, ...]) ->
     asked = [(0.0, "asymptotic"), (1.0, "order_low"), (-0.5, "order_high")]
     cases = [(p, norm, *one) for p in (1.0, 2.0, 4.0) for norm in NORMS for one in asked]
     rows = [
-        evidence_of(
+        facts_of(
             ladder(levels, (SMALL, p, A), (0.02 * SMALL, p + 1, B)),
             levels,
             order=p + more,
@@ -131,13 +131,13 @@ def test_a_floor_in_the_ladder_leaves_the_window_before_it(growth: float) -> Non
     floor = np.array([1e-8 * 2 ** (growth * (level - 12)) for level in levels])
     fields = ladder(levels, (SMALL, 2, A), (0.02 * SMALL, 4, B))
     fields = [u + noise_like(f, i) for i, (u, f) in enumerate(zip(fields, floor, strict=True))]
-    evidence = evidence_of(fields, levels, floor=floor, exact=EXACT)
-    found = judge(evidence)
+    facts = facts_of(fields, levels, floor=floor, exact=EXACT)
+    found = judge(facts)
     assert REASON_NAMES[int(found.reason[0])] == "asymptotic"
     assert found.last[0] < levels[-1]
     assert np.any(np.abs(found.orders[0] - 2) > 0.5)
     # where nothing predicts it, the data show the floor as well: the window is the same, or a level shorter
-    unknown = judge(evidence_of(fields, levels, floor=1e-15, exact=EXACT))
+    unknown = judge(facts_of(fields, levels, floor=1e-15, exact=EXACT))
     assert REASON_NAMES[int(unknown.reason[0])] == "asymptotic"
     assert 0 <= found.last[0] - unknown.last[0] <= 1
 
@@ -153,7 +153,7 @@ def test_a_floor_that_does_not_grow_is_no_other_order(predicted: float, known: b
     ]
     exact = EXACT if known else None
     for order, wrong in ((2.0, "FAIL"), (1.0, "PASS")):
-        rows = [evidence_of(u, levels, order=order, floor=predicted, exact=exact) for u in noisy]
+        rows = [facts_of(u, levels, order=order, floor=predicted, exact=exact) for u in noisy]
         found = judge(stacked(rows, (len(rows),)))
         assert wrong not in {STATUSES[code] for code in found.status}
 
@@ -215,7 +215,7 @@ def test_breakdown() -> None:
     small = {**common, "stability_limit": np.array([0.2])}
     # w dt = 20/64 = 0.31 at level 6, 0.16 at level 7
     assert decide(fields, FOUR, failed=none, **small) == ("FAIL", "unstable")
-    assert judge(evidence_of(fields, FOUR, failed=none, **small)).culprit[0] == 6
+    assert judge(facts_of(fields, FOUR, failed=none, **small)).culprit[0] == 6
     at_limit = {**common, "stability_limit": np.array([20 / 64])}
     assert decide(fields, FOUR, failed=none, **at_limit) == ("PASS", "asymptotic")
     assert decide(fields, FOUR, failed=broken, **small) == ("FAIL", "unstable")
@@ -244,24 +244,24 @@ def test_a_number_that_is_not_finite_never_passes(bad: float, where: int) -> Non
     fields[where] = fields[where].copy()
     fields[where][10] = bad
     with np.errstate(invalid="ignore"):
-        evidence = evidence_of(fields, FOUR, exact=EXACT)
-    found = judge(evidence)
+        facts = facts_of(fields, FOUR, exact=EXACT)
+    found = judge(facts)
     assert REASON_NAMES[int(found.reason[0])] == "non_finite"
     assert np.isnan(found.order[0])
     assert found.first[0] == found.last[0] == -1
 
 
-@pytest.mark.parametrize("place", ["difference", "cosines", "floor", "order"])
-def test_no_nan_among_the_evidence_passes(place: str) -> None:
-    evidence = evidence_of(ladder(FOUR, (SMALL, 2, A)), FOUR, exact=EXACT)
-    values = np.array(getattr(evidence, place), dtype=float)
+@pytest.mark.parametrize("place", ["difference", "cosines", "floor", "expected"])
+def test_no_nan_among_the_facts_passes(place: str) -> None:
+    facts = facts_of(ladder(FOUR, (SMALL, 2, A)), FOUR, exact=EXACT)
+    values = np.array(getattr(facts, place), dtype=float)
     values[..., -1] = np.nan
-    fields = {**vars(evidence), place: values}
-    assert STATUSES[int(judge(Evidence(**fields)).status[0])] != "PASS"
+    fields = {**vars(facts), place: values}
+    assert STATUSES[int(judge(LadderFacts(**fields)).status[0])] != "PASS"
 
 
-def stacked(rows: list[Evidence], shape: tuple[int, ...]) -> Evidence:
-    """Return the evidence of many ladders of the same levels."""
+def stacked(rows: list[LadderFacts], shape: tuple[int, ...]) -> LadderFacts:
+    """Return the facts about many ladders of the same levels."""
     arrays = {
         name: np.concatenate([getattr(row, name) for row in rows]).reshape(*shape, *one.shape[1:])
         for name, one in vars(rows[0]).items()
@@ -277,7 +277,7 @@ def test_many_ladders_at_once_are_judged_as_one_by_one() -> None:
     while len(rows) < 12:
         truth = random_truth(rng)
         if len(truth.levels) == 5:
-            rows.append(evidence_of(truth.fields, FIVE, floor=truth.floor, exact=truth.exact))
+            rows.append(facts_of(truth.fields, FIVE, floor=truth.floor, exact=truth.exact))
     together = judge(stacked(rows, (3, 4)))
     alone = [judge(row) for row in rows]
     assert together.reason.shape == (3, 4)
@@ -289,7 +289,7 @@ def test_many_ladders_at_once_are_judged_as_one_by_one() -> None:
 def test_random_ladders_have_no_false_pass() -> None:
     rng = np.random.default_rng(2026)
     false_pass, hidden, false_fail, right, passed, widths = [], [], [], 0, 0, []
-    of_levels: dict[tuple[int, ...], list[tuple[Truth, float, Evidence]]] = {}
+    of_levels: dict[tuple[int, ...], list[tuple[Truth, float, LadderFacts]]] = {}
     for _ in range(700):
         truth = random_truth(rng)
         p, q = truth.orders
@@ -298,7 +298,7 @@ def test_random_ladders_have_no_false_pass() -> None:
             (
                 truth,
                 formal,
-                evidence_of(
+                facts_of(
                     truth.fields,
                     truth.levels,
                     order=formal,
@@ -310,7 +310,7 @@ def test_random_ladders_have_no_false_pass() -> None:
             for norm in ("l2", "linf")
         )
     for group in of_levels.values():
-        found = judge(stacked([evidence for *_, evidence in group], (len(group),)))
+        found = judge(stacked([facts for *_, facts in group], (len(group),)))
         for i, (truth, formal, _) in enumerate(group):
             p, q = truth.orders
             status, reason = STATUSES[int(found.status[i])], REASON_NAMES[int(found.reason[i])]
@@ -502,9 +502,9 @@ def test_no_line_of_the_table_of_cases_can_go(monkeypatch: pytest.MonkeyPatch) -
 
     def without(line: int) -> Any:
         def shorter(*given: Any) -> Any:
-            found, *others = cases(*given)
+            found = cases(*given)
             lines.append(len(found))
-            return [found[:line] + found[line + 1 :], *others]
+            return found[:line] + found[line + 1 :]
 
         return shorter
 
@@ -547,7 +547,7 @@ def test_ladders_judged_together_are_judged_as_alone() -> None:
         for i, truth in enumerate(truths):
             # of every second one the promised order may be hidden: each is to be asked for its own combinations
             part = np.inf if i % 2 else 0.0
-            own = evidence_of(
+            own = facts_of(
                 truth.fields,
                 levels,
                 order=float(rng.integers(1, 4)),
@@ -592,12 +592,12 @@ def test_a_hidden_part_is_bounded_whatever_the_gaps_between_levels(levels: tuple
 
     def is_hidden(part: float) -> bool:
         d = -np.diff(h**2 + part * h[-1] * h)
-        e = evidence_with(
+        e = facts_with(
             levels=levels,
             difference=d[None],
             cosines=np.ones((1, len(levels), len(levels))),
             floor=np.zeros((1, len(levels))),
-            order=one(2.0),
+            expected=one(2.0),
             promised=one(1.0),
             special=one(2.0),
             omega_dt=h[None],

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from ladders import evidence_of
+from ladders import facts_of
 from reference_pendulum import pendulum
 
 from vibsim.convergence.verdict import judge
@@ -19,7 +19,7 @@ THETA_AT_20 = {6: 0.9996677748139638, 7: 0.9971663759228251, 8: 0.99616663008040
 def decide(levels: range, quantity: str, **more: Any) -> tuple[str, str, float]:
     norm, floor = more.pop("norm", "l2"), more.pop("floor", 1e-15)
     fields = pendulum(levels, quantity, **more)
-    found = judge(evidence_of(fields, tuple(levels), norm=norm, floor=floor))
+    found = judge(facts_of(fields, tuple(levels), norm=norm, floor=floor))
     return (
         STATUSES[int(found.status[0])],
         REASON_NAMES[int(found.reason[0])],

@@ -28,11 +28,12 @@ evidence is a power of one ratio (see `hypotheses.Table`). Six kinds of hypothes
 
 Rows coarser than the window have not reached the expansion: each has an unrelated size, at the cost
 `FREE_PENALTY`. Rows finer than the window are noise that grows as the steps shrink. Noise of the predicted size
-costs least, and noise below what the expansion would leave there is improbable (`posterior._Fit.finer_rows`).
+costs least, and noise below what the expansion would leave there is improbable (`rows.Rows.outside`).
 
 Hypotheses with provably negligible evidence are skipped: whole tables by the size of the last row, and groups of
 hypotheses by one quadratic form: if C exceeds all their covariances K, ``tr(K^-1 G) >= tr(C^-1 G)``.
 
-`hypotheses` builds tables of the matrices of all hypotheses, `kernel` loops over ladders and hypotheses, `likelihood`
-turns the results into log evidence, `posterior` sums over the windows, and `priors` holds the constants.
+In the order of reading: `ladder` is the data, `priors` holds the constants, `posterior` sums over the windows, `rows`
+has the evidence of what lies outside a window, `hypotheses` builds tables of the matrices of all hypotheses inside it,
+`likelihood` turns them into log evidence, `kernel` loops over ladders and hypotheses, and `matrices` inverts.
 """

@@ -1,8 +1,4 @@
-"""The loop over ladders and hypotheses, in the subset of Python that `vibsim.native` compiles.
-
-A *packed* symmetric matrix is the list of its entries (i, j) with i <= j, row by row. A *form* is a packed matrix with
-doubled off-diagonal entries, so ``tr(M G)`` is the dot product of the form of M and the packed G.
-"""
+"""The loop over ladders and hypotheses, in the subset of Python that `vibsim.native` compiles; see also `matrices`."""
 
 from __future__ import annotations
 

@@ -10,8 +10,9 @@ from typing import NamedTuple
 import numpy as np
 
 from vibsim.convergence.error_model import priors
-from vibsim.convergence.error_model.hypotheses import Table, outer, packed
+from vibsim.convergence.error_model.hypotheses import Table
 from vibsim.convergence.error_model.kernel import compiled_kernel
+from vibsim.convergence.error_model.matrices import outer, packed
 from vibsim.core.array_types import Floats, Integers
 from vibsim.elementary import on_arrays
 

@@ -2,35 +2,32 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
-from vibsim.convergence.differences import orders_of_steps, safe_ratio
 from vibsim.convergence.error_model import priors
 from vibsim.convergence.error_model.hypotheses import (
     ExpectedOrder,
     Table,
+    Terms,
     hypotheses_of,
-    level_differences,
-    matvec,
-    noise_of_rows,
     two_powers,
 )
+from vibsim.convergence.error_model.ladder import Ladder
 from vibsim.convergence.error_model.likelihood import (
     TINY,
     WindowRows,
     finest_noise_log_priors,
-    free_row_evidence,
     log_bound,
     log_sum_exp,
-    noise_evidence,
     scale_free,
     single_power,
     weigh_table,
     window_rows,
 )
+from vibsim.convergence.error_model.matrices import matvec
+from vibsim.convergence.error_model.rows import Rows
 from vibsim.core.array_types import Flags, Floats, Integers
 from vibsim.elementary import on_arrays
 
@@ -42,34 +39,6 @@ LARGEST_LOG = 600.0
 """Log evidence relative to that of no expansion is clipped here, against overflow."""
 LIKELY = 1e-3
 """A window contributes to the limit if its probability, relative to the most probable window, exceeds this."""
-
-
-@dataclass(frozen=True)
-class Ladder:
-    """The data of ladders with n levels and m rows."""
-
-    h: Floats  # step sizes, decreasing, shape (n,)
-    # inner products (means over the points) of the n-1 differences and, if the exact solution is known, of the finest
-    # level minus the exact solution, shape (ladder, m, m)
-    gram: Floats
-    floor: Floats  # predicted noise of each level in the same norm, shape (ladder, n)
-    numbers: Flags  # whether the values are single numbers, shape (ladder,)
-    exact_known: bool
-
-    @property
-    def points(self) -> Floats:
-        """Number of independent points, shape (ladder,)."""
-        return np.where(self.numbers, 1.0, priors.POINTS)
-
-    def some(self, subset: Integers) -> Ladder:
-        """Return a subset of the ladders."""
-        parts = {name: getattr(self, name)[subset] for name in ("gram", "floor", "numbers")}
-        return replace(self, **parts)
-
-    def without_exact(self) -> Ladder:
-        """Return the ladders without the known exact solution."""
-        m = len(self.h) - 1
-        return replace(self, gram=self.gram[:, :m, :m], exact_known=False)
 
 
 @dataclass
@@ -123,42 +92,46 @@ class Posterior:
         return [field.name for field in fields(self) if field.name not in shared]
 
 
-def orders_of(ladder: Ladder) -> Floats:
-    """Return the order of each three successive levels, shape (ladder, n-2); NaN where there is none.
-
-    It solves ``(h_0^p - h_1^p)/(h_1^p - h_2^p) = d_0/d_1``. Successive differences of opposite sign have none.
-    """
-    n = len(ladder.h)
-    sizes = np.sqrt(np.diagonal(ladder.gram, axis1=1, axis2=2))[:, : n - 1]
-    same_sign = np.diagonal(ladder.gram, 1, 1, 2)[:, : n - 2] > 0.0
-    ratios = np.where(same_sign, safe_ratio(sizes[:, :-1], sizes[:, 1:]), np.nan)
-    return orders_of_steps(ratios, ladder.h)
-
-
 Subset = slice | Integers
 """Index of some ladders, or of all."""
 
 
-class _Fit:
-    """Accumulates the evidence of hypotheses, window by window."""
+class _Grid:
+    """The powers that probabilities are counted at: those of expansions, and others next to measured orders."""
 
-    def __init__(self, ladder: Ladder, expected: ExpectedOrder | None, left_out: float) -> None:
-        self.ladder, self.points, self.expected = ladder, ladder.points, expected
-        terms = two_powers((1.0,), expected)
+    def __init__(self, orders: Floats, terms: Terms) -> None:
         usual = np.concatenate([terms.lower, terms.higher])
         grid = np.unique(
             np.concatenate([usual, np.arange(priors.SPACING, priors.MAX_POWER, priors.SPACING)])
         )
-        self.orders = orders_of(ladder)
         # of the other powers of the grid, only those nearest to a measured order are used
-        nearest = np.searchsorted(0.5 * (grid[1:] + grid[:-1]), self.orders)
+        nearest = np.searchsorted(0.5 * (grid[1:] + grid[:-1]), orders)
         # and both ends, which are the interval of an unknown order
         ends = np.array([0, len(grid) - 1])
         used = np.unique(np.concatenate([np.searchsorted(grid, usual), nearest.ravel(), ends]))
-        self.grid, self.powers, self.nearest = grid, grid[used], np.searchsorted(used, nearest)
         neighbours = np.stack([np.append(grid[0], grid[:-1]), np.append(grid[1:], grid[-1])])
+        self.grid, self.powers = grid, grid[used]
         self.reach = np.where(np.isin(grid, usual), grid, neighbours)[:, used]
-        count, n = len(ladder.gram), len(ladder.h)
+        self.nearest = np.searchsorted(used, nearest)
+        """Index in `powers` of each measured order, shape (ladder, n-2)."""
+
+    def sum_by_power(self, values: Floats, powers: Floats) -> Floats:
+        """Sum values of pairs, shape (ladder, pair), by the given power of each pair; shape (ladder, power)."""
+        order = np.argsort(powers, kind="stable")
+        distinct, start = np.unique(powers[order], return_index=True)
+        sums = np.zeros((len(values), len(self.powers)))
+        columns = np.searchsorted(self.powers, distinct)
+        sums[:, columns] = np.add.reduceat(values[:, order], start, axis=1)
+        return sums
+
+
+class _Sum:
+    """The sum of the evidence of all hypotheses on ladders, relative to that of rows with unrelated sizes."""
+
+    def __init__(self, ladder: Ladder, expected: ExpectedOrder | None, left_out: float) -> None:
+        self.rows, self.expected, self.exact_known = Rows(ladder), expected, ladder.exact_known
+        self.terms, count, n = two_powers((1.0,), expected), len(ladder.gram), len(ladder.h)
+        self.grid = _Grid(self.rows.orders, self.terms)
         self.windows = [
             (last - length, last)
             for last in range(n - 1, 1, -1)
@@ -169,74 +142,53 @@ class _Fit:
         self.log_table, self.log_single = (
             on_arrays.log(share / x) for x in (MOST_TABLES, MOST_HYPOTHESES)
         )
-        # rounding of a level is relative to the largest difference at this and finer levels
-        squares = np.diagonal(ladder.gram, axis1=1, axis2=2)[:, : n - 1]
-        largest = np.maximum.accumulate(squares[:, ::-1], axis=-1)[:, ::-1]
-        largest = np.concatenate([largest, largest[:, -1:]], axis=-1)
-        # it is added to the Gram matrix, so that no difference is smaller
-        self.rounding = priors.ROUNDING * (ladder.floor**2 + priors.EPSILON**2 * largest + TINY)
-        self.differences = self.gram(0, n - 1)
-        self.free_rows = free_row_evidence(self.differences, self.points) - priors.FREE_PENALTY
-        # all evidence is relative to that of differences with unrelated sizes
-        self.log_unit = np.sum(self.free_rows, axis=-1)
-        if ladder.exact_known:
-            # the true error of the coarsest level may have any size, too
-            squared = np.maximum(self.gram(0, 0, with_exact=True)[:, 0, 0], TINY)
-            evidence = scale_free(squared, 0.0, self.points, 1)
-            self.log_unit = self.log_unit + (evidence - priors.FREE_PENALTY)
-        self.finer_by_end = {end: self.finer_rows(end) for end in range(2, n)}
-        self.total, self.index = np.ones(count), np.arange(count)
-        pairs, windows = len(terms.first_of_pairs), len(self.windows)
-        shapes: dict[str, tuple[int, ...]] = {
-            **dict.fromkeys(("alternating", "noise"), ()),
-            "pairs": (3, pairs),
-            **dict.fromkeys(("window", "limit_square"), (windows,)),
-            "any_power": (len(self.powers),),
-            "limit_weights": (windows, n - 1),
-        }
-        self.values = {name: np.zeros((count, *shape)) for name, shape in shapes.items()}
+        self.log_unit, self.total, self.index = (
+            self.rows.unrelated(),
+            np.ones(count),
+            np.arange(count),
+        )
+        # the parts of the total that the fields of a `Posterior` are made of
+        pairs, windows = len(self.terms.first_of_pairs), len(self.windows)
+        self.noise, self.alternating = np.zeros(count), np.zeros(count)
+        self.pairs, self.any_power = (
+            np.zeros((count, 3, pairs)),
+            np.zeros((count, len(self.grid.powers))),
+        )
+        self.window, self.limit_square = np.zeros((2, count, windows))
+        self.limit_weights = np.zeros((count, windows, n - 1))
+
+    def add_no_expansion(self) -> None:
+        """Add the hypotheses that all rows from some level on are noise, and coarser rows have unrelated sizes."""
+        for level in range(len(self.rows.ladder.h) - 1):
+            self.noise += self.add(slice(None), self.rows.noise_from(level))
 
     def add_window(self, index: int) -> None:
         """Add the hypotheses that the expansion holds on the levels of this window and on no others."""
-        start, end = self.windows[index]
-        ladder = self.ladder
-        outside = np.sum(self.free_rows[:, :start], axis=-1)
-        for evidence in self.finer_by_end[end]:
-            outside += evidence
-        smallest = self.differences[:, end - 1, end - 1]
+        (start, end), rows, ladder = self.windows[index], self.rows, self.rows.ladder
+        smallest = rows.differences[:, end - 1, end - 1]
         sizes = ladder.h[start : end + 1] / ladder.h[end]
-        gram, finer = self.gram(start, end), np.empty((len(outside), 0))
-        if ladder.exact_known:
-            gram = self.gram(start, end, with_exact=True)
+        gram, finer = (
+            rows.gram(start, end, with_exact=self.exact_known),
+            np.empty((len(smallest), 0)),
+        )
+        if self.exact_known:
             smallest = np.minimum(smallest, gram[:, -1, -1])
             sizes = np.append(sizes, 0.0)
         else:
-            finer = self.finer_products(start, end)
+            finer = rows.finer_products(start, end)
+        outside = rows.outside(start, end)
         log_priors = [outside + x for x in finest_noise_log_priors(ladder.floor[:, end], smallest)]
         # rounding the sizes makes windows with equal ratios share their hypotheses
         hypotheses = hypotheses_of(tuple(np.round(sizes, 12)), self.expected)
-        tables = [(table, log_priors[i]) for i, table in enumerate(hypotheses.two_shapes)]
-        # numbers have no shape
-        has_shape = self.points > 1.0
-        own_shape = np.where(has_shape, priors.OWN_SHAPE_PRIOR, 0.0)
-        with np.errstate(divide="ignore"):
-            multiple, with_shape = (
-                log_priors[0] + on_arrays.log(priors.JITTER_PRIOR * x)
-                for x in (1.0 - own_shape, own_shape)
-            )
-            one_shape = log_priors[0] + on_arrays.log(priors.ONE_SHAPE_PRIOR * has_shape)
-        tables += [
-            (table, multiple + on_arrays.log(p))
-            for table, p in zip(hypotheses.factors, priors.JITTER_PRIORS, strict=True)
-        ]
-        tables += [(hypotheses.factors_with_shape, with_shape), (hypotheses.one_shape, one_shape)]
-        data = [window_rows(gram, self.points, split=x) for x in (False, True)]
-        for table, prior in tables:
-            self.add_table(index, table, prior, data, finer)
+        whole, split = (window_rows(gram, rows.points, split=x) for x in (False, True))
+        for table, log_prior in zip(hypotheses.two_shapes, log_priors, strict=True):
+            self.add_table(index, table, log_prior, whole, finer)
+        for table, log_prior in hypotheses.of_one_shape(rows.points, log_priors[0]):
+            self.add_table(index, table, log_prior, split, finer)
         self.add_any_power(index, sizes, gram, finer, log_priors[0], hypotheses.any_power_log_bound)
-        for i, table in enumerate(hypotheses.alternating):
-            prior = log_priors[i] + on_arrays.log(priors.ALTERNATING_PRIOR)
-            self.add_table(index, table, prior, data, finer[:, :0], name="alternating")
+        for table, log_prior in zip(hypotheses.alternating, log_priors, strict=True):
+            prior = log_prior + on_arrays.log(priors.ALTERNATING_PRIOR)
+            self.add_table(None, table, prior, whole, finer[:, :0])
 
     def relevant(self, bound: Floats) -> tuple[Subset, Floats]:
         """Return the ladders for which evidence up to this bound matters, and the least that a hypothesis needs."""
@@ -246,17 +198,9 @@ class _Fit:
         return subset, total + self.log_single
 
     def add_table(
-        self,
-        index: int,
-        table: Table,
-        prior: Floats,
-        data: list[WindowRows],
-        finer: Floats,
-        *,
-        name: str = "window",
+        self, index: int | None, table: Table, prior: Floats, rows: WindowRows, finer: Floats
     ) -> None:
-        """Add the hypotheses of a table on the rows of a window."""
-        rows = data[table.orthogonal_forms is not None]
+        """Add the hypotheses of a table on the rows of a window; no window stands for alternating errors."""
         subset, least = self.relevant(prior + log_bound(table, rows))
         part = rows if isinstance(subset, slice) else WindowRows._make(x[subset] for x in rows)
         if not len(part.last_square):
@@ -266,79 +210,11 @@ class _Fit:
         )
         if not np.any(np.isfinite(log)):
             return
-        if name == "window":
-            weight = self.add_to_window(index, subset, log + prior[subset], limit, squared)
-            self.values["pairs"][subset] += weight[:, None, None] * pairs
+        if index is None:
+            self.alternating[subset] += self.add(subset, log + prior[subset])
         else:
-            self.values[name][subset] += self.add_to_total(subset, log + prior[subset])
-
-    def add_to_total(self, subset: Subset, log: Floats) -> Floats:
-        """Add log evidence of some ladders to their totals, and return it relative to that of no expansion."""
-        weight = on_arrays.exp(np.minimum(log - self.log_unit[subset], LARGEST_LOG))
-        self.total[subset] += weight
-        return np.asarray(weight)
-
-    def gram(self, start: int, end: int, *, with_exact: bool = False) -> Floats:
-        """Return the Gram matrix of the rows from level `start` to level `end`, and of the true error of the latter."""
-        gram = self.ladder.gram
-        noise = noise_of_rows(self.rounding[:, start : end + 1])
-        if not with_exact:
-            return np.asarray(gram[:, start:end, start:end] + noise)
-        count = end - start
-        result = np.zeros((len(gram), count + 1, count + 1))
-        result[:, :count, :count] = gram[:, start:end, start:end] + noise
-        # the error of a level is the sum of all finer differences and of the error of the finest level
-        with_error = np.sum(gram[:, :, end:], axis=-1)
-        result[:, :count, count] = result[:, count, :count] = with_error[:, start:end]
-        result[:, count, count] = np.sum(with_error[:, end:], axis=-1) + self.rounding[:, end]
-        if count:
-            result[:, count - 1, count] -= self.rounding[:, end]
-            result[:, count, count - 1] -= self.rounding[:, end]
-        return result
-
-    def finer_rows(self, end: int) -> tuple[Floats, Floats]:
-        """Return the log evidence that all rows finer than level `end` are noise, and a log probability.
-
-        That is the probability that noise hides the expansion there. Noise of size s < D hides a difference D with the
-        probability ``(s/D)^N``. D falls by the order of the finest levels of the window; if there is no such order,
-        nothing needs to be hidden.
-        """
-        sizes, floor = self.ladder.h[end - 1 :] / self.ladder.h[end], self.ladder.floor[:, end:]
-        order = np.clip(self.orders[:, end - 2, None], priors.POWERS[0], priors.MAX_POWER)
-        falls = level_differences(on_arrays.power(sizes, order))
-        norms = np.sqrt(np.diagonal(self.differences, axis1=1, axis2=2)[:, end - 1 :])
-        remaining = np.maximum(norms[:, :1] * falls[:, 1:] / falls[:, :1], TINY)
-        largest = np.max(norms[:, 1:], axis=-1, initial=0.0)
-        hidden = np.fmin(on_arrays.log(np.maximum(largest, floor[:, 0])[:, None] / remaining), 0.0)
-        rows = self.differences[:, end:, end:]
-        noise = noise_evidence(self.ladder.h[end:], rows, self.points, floor)
-        return noise, self.points * np.sum(hidden, axis=-1)
-
-    def finer_products(self, start: int, end: int) -> Floats:
-        """Return the argument `finer` of `kernel` for this window."""
-        with_finer = np.sum(self.differences[:, :, end:], axis=-1)
-        square = np.sum(with_finer[:, end:], axis=-1, keepdims=True)
-        last = np.maximum(self.differences[:, end - 1, end - 1], TINY)
-        products = np.concatenate([with_finer[:, start:end], square], axis=-1)
-        return np.asarray(products / last[:, None])
-
-    def add_to_window(
-        self, index: int, subset: Subset, log: Floats, limit: Floats, squared: Floats
-    ) -> Floats:
-        """Add the log evidence and the limit of an expansion in a window, and return the weights."""
-        weight = self.add_to_total(subset, log)
-        self.values["window"][subset, index] += weight
-        if not self.ladder.exact_known:
-            (start, end), n = self.windows[index], len(self.ladder.h)
-            limit_weights = np.zeros((len(limit), n - 1))
-            limit_weights[:, start:end] = limit
-            limit_weights[:, end:] = 1.0
-            # the noise of finer levels limits how well the limit is known
-            if end < n - 1:
-                squared = squared + self.differences[subset, end, end]
-            self.values["limit_weights"][subset, index] += weight[:, None] * limit_weights
-            self.values["limit_square"][subset, index] += weight * squared
-        return weight
+            weight = self.add_to_window(index, subset, log + prior[subset], limit, squared)
+            self.pairs[subset] += weight[:, None, None] * pairs
 
     def add_any_power(
         self,
@@ -351,24 +227,24 @@ class _Fit:
     ) -> None:
         """Add the hypotheses of one power of any value, close to the order of the finest rows of the window."""
         w = len(sizes) - 1
-        order = self.orders[:, self.windows[index][1] - 2]
+        triple = self.windows[index][1] - 2
+        order, points = self.rows.orders[:, triple], self.rows.points
         usable = (order > 0.0) & (order < priors.MAX_POWER)
         last = np.maximum(gram[:, -1, -1], TINY)
-        most = prior + scale_free(last, 0.0, self.points, w)
-        most += np.where(self.points > 1.0, *bound[::-1])
+        most = prior + scale_free(last, 0.0, points, w)
+        most += np.where(points > 1.0, *bound[::-1])
         subset, _ = self.relevant(np.where(usable, most, -np.inf))
-        order, points, gram = order[subset], self.points[subset, None], gram[subset]
+        order, gram = order[subset], gram[subset]
         if not len(gram):
             return
-        log, gains, squares = single_power(
-            sizes, np.maximum(order[:, None] + priors.OFFSETS, TINY), gram, points
-        )
+        powers = np.maximum(order[:, None] + priors.OFFSETS, TINY)
+        log, gains, squares = single_power(sizes, powers, gram, points[subset, None])
         log += on_arrays.log(
             priors.ANY_POWER_PRIOR / priors.MAX_POWER * np.gradient(priors.OFFSETS)
         )
         total = log_sum_exp(log)
         limit, squared = np.zeros((len(order), w)), np.zeros(len(order))
-        if not self.ladder.exact_known:
+        if not self.exact_known:
             weight = on_arrays.exp(log - total[:, None])
             products = finer[subset] * gram[:, -1:, -1]
             limit = -np.sum(weight[..., None] * gains, axis=1)
@@ -379,71 +255,69 @@ class _Fit:
             squares += ((distance > 0.5 * priors.SPACING) * drift)[:, None]
             squared = np.sum(weight * squares, axis=-1)
         weight = self.add_to_window(index, subset, total + prior[subset], limit, squared)
-        nearest = self.nearest[subset, self.windows[index][1] - 2]
-        self.values["any_power"][self.index[subset], nearest] += weight
+        self.any_power[self.index[subset], self.grid.nearest[subset, triple]] += weight
 
-    def add_no_expansion(self) -> None:
-        """Add the hypotheses that all rows from some level on are noise, and coarser rows have unrelated sizes."""
-        ladder, n = self.ladder, len(self.ladder.h)
-        for k in range(n - 1):
-            log = np.sum(self.free_rows[:, :k], axis=-1)
-            gram = self.gram(k, n - 1, with_exact=ladder.exact_known)
-            log += noise_evidence(ladder.h[k:], gram, self.points, ladder.floor[:, k:])
-            self.values["noise"] += self.add_to_total(slice(None), log)
+    def add_to_window(
+        self, index: int, subset: Subset, log: Floats, limit: Floats, squared: Floats
+    ) -> Floats:
+        """Add the log evidence and the limit of an expansion in a window, and return the weights."""
+        weight = self.add(subset, log)
+        self.window[subset, index] += weight
+        if not self.exact_known:
+            (start, end), differences = self.windows[index], self.rows.differences
+            limit_weights = np.zeros((len(limit), differences.shape[-1]))
+            limit_weights[:, start:end] = limit
+            limit_weights[:, end:] = 1.0
+            # the noise of finer levels limits how well the limit is known
+            if end < differences.shape[-1]:
+                squared = squared + differences[subset, end, end]
+            self.limit_weights[subset, index] += weight[:, None] * limit_weights
+            self.limit_square[subset, index] += weight * squared
+        return weight
+
+    def add(self, subset: Subset, log: Floats) -> Floats:
+        """Add log evidence of some ladders to their totals, and return it relative to that of unrelated sizes."""
+        weight = on_arrays.exp(np.minimum(log - self.log_unit[subset], LARGEST_LOG))
+        self.total[subset] += weight
+        return np.asarray(weight)
 
     def posterior(self) -> Posterior:
         """Return the normalised probabilities, after all hypotheses were added."""
-        values, total = self.values, self.total
-        any_power = values.pop("any_power") / total[:, None]
-        pairs, first, second = np.moveaxis(values.pop("pairs") / total[:, None, None], 1, 0)
-        terms = two_powers((1.0,), self.expected)
-        pair_powers = np.stack(
-            [terms.lower[terms.first_of_pairs], terms.higher[terms.first_of_pairs]], axis=-1
-        )
-        lower, higher = (self.sum_by_power(p) for p in pair_powers.T)
-        if self.ladder.exact_known:
-            values["limit_weights"] = np.full_like(self.free_rows, np.nan)
-            values["limit_square"] = np.full_like(total, np.nan)
-        else:
-            # improbable windows may have limits far away
-            window = values["window"]
-            likely = window > LIKELY * np.max(window, axis=-1, keepdims=True)
-            expansion = np.maximum(np.sum(window * likely, axis=-1), TINY)
-            limit = np.sum(values["limit_weights"] * likely[..., None], axis=1)
-            values["limit_weights"] = limit / expansion[:, None]
-            values["limit_square"] = np.sum(values["limit_square"] * likely, axis=1) / expansion
-        for name in ("alternating", "noise"):
-            values[name] = values[name] / total
-        values["window"] = values["window"] / total[:, None]
+        grid, total, first_of_pairs = self.grid, self.total, self.terms.first_of_pairs
+        pairs, first, second = np.moveaxis(self.pairs / total[:, None, None], 1, 0)
+        lower, higher = self.terms.lower[first_of_pairs], self.terms.higher[first_of_pairs]
         mixed = pairs - first - second
-        dominant = any_power + lower(first) + higher(second)
+        dominant = self.any_power / total[:, None]
+        dominant = dominant + grid.sum_by_power(first, lower) + grid.sum_by_power(second, higher)
+        limit_weights, limit_square = self._limit()
         return Posterior(
-            powers=self.powers,
-            grid=self.grid,
-            reach=self.reach,
-            orders=self.orders,
+            powers=grid.powers,
+            grid=grid.grid,
+            reach=grid.reach,
+            orders=self.rows.orders,
             windows=self.windows,
             dominant=dominant,
             mixed=mixed,
-            pairs=pair_powers,
-            lowest=dominant + lower(mixed),
-            highest=dominant + higher(mixed),
+            pairs=np.stack([lower, higher], axis=-1),
+            lowest=dominant + grid.sum_by_power(mixed, lower),
+            highest=dominant + grid.sum_by_power(mixed, higher),
+            window=self.window / total[:, None],
+            alternating=self.alternating / total,
             scattered=1.0 / total,
-            **values,
+            noise=self.noise / total,
+            limit_weights=limit_weights,
+            limit_square=limit_square,
         )
 
-    def sum_by_power(self, powers: Floats) -> Callable[[Floats], Floats]:
-        """Return a function that sums values of pairs by the given power of each pair, shape (ladder, power)."""
-        order = np.argsort(powers, kind="stable")
-        distinct, start = np.unique(powers[order], return_index=True)
-        columns = np.searchsorted(self.powers, distinct)
-
-        def summed(values: Floats) -> Floats:
-            sums = np.zeros((len(values), len(self.powers)))
-            sums[:, columns] = np.add.reduceat(values[:, order], start, axis=1)
-            return sums
-
-        return summed
+    def _limit(self) -> tuple[Floats, Floats]:
+        """Return `limit_weights` and `limit_square` of the `Posterior`."""
+        if self.exact_known:
+            return np.full_like(self.rows.free, np.nan), np.full_like(self.total, np.nan)
+        # improbable windows may have limits far away
+        likely = self.window > LIKELY * np.max(self.window, axis=-1, keepdims=True)
+        expansion = np.maximum(np.sum(self.window * likely, axis=-1), TINY)
+        weights = np.sum(self.limit_weights * likely[..., None], axis=1) / expansion[:, None]
+        return weights, np.sum(self.limit_square * likely, axis=1) / expansion
 
 
 def posterior(
@@ -453,8 +327,8 @@ def posterior(
 
     Hypotheses are skipped that together hold at most the part `left_out` of all evidence.
     """
-    fit = _Fit(ladder, expected, left_out)
-    fit.add_no_expansion()
-    for index in range(len(fit.windows)):
-        fit.add_window(index)
-    return fit.posterior()
+    evidence = _Sum(ladder, expected, left_out)
+    evidence.add_no_expansion()
+    for index in range(len(evidence.windows)):
+        evidence.add_window(index)
+    return evidence.posterior()

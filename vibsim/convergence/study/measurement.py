@@ -8,7 +8,7 @@ from decimal import Decimal
 
 import numpy as np
 
-from vibsim.convergence.error_model.posterior import Ladder
+from vibsim.convergence.error_model.ladder import Ladder
 from vibsim.core.array_types import Flags, Floats
 
 SINGLE = float(np.finfo(np.float32).eps)

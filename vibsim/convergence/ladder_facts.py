@@ -1,4 +1,4 @@
-"""The data that a verdict rests on, and the facts that they show before any order is measured.
+"""The facts about a ladder that a verdict rests on, and what they show before any order is measured.
 
 Leading dimensions ``...`` are ladders (scheme, case); n is the number of levels.
 """
@@ -17,12 +17,12 @@ from vibsim.elementary import on_arrays
 
 
 @dataclass(frozen=True)
-class Evidence:
-    """The data of ladders, of shape (...) unless another shape is given. All norms are of one kind."""
+class LadderFacts:
+    """Facts about ladders, of shape (...) unless another shape is given. All norms are of one kind."""
 
     levels: tuple[int, ...]  # the n levels, strictly increasing
-    order: Floats  # expected order p; infinite if exactness is expected
-    tolerance: float  # largest distance of an order from p
+    expected: Floats  # expected order; infinite if exactness is expected
+    tolerance: float  # largest distance of an order from the expected one
     difference: Floats  # norms of the differences, shape (..., n-1)
     # cosines of the angles between the differences, and the finest level minus the exact solution; shape (..., n, n)
     cosines: Floats
@@ -55,7 +55,7 @@ class Evidence:
     growth: Floats  # largest position over the largest exact one, shape (..., n); NaN if unknown
 
 
-def stacked(rows: Sequence[Evidence]) -> Evidence:
+def stacked(rows: Sequence[LadderFacts]) -> LadderFacts:
     """Stack sets of ladders with the same shape, levels and tolerance along a new first axis.
 
     No number depends on it: each ladder is judged independently.
@@ -75,7 +75,7 @@ def stacked(rows: Sequence[Evidence]) -> Evidence:
     return replace(template, **arrays, combined=combined)
 
 
-def breakdown(e: Evidence) -> tuple[Flags, Flags, Flags]:
+def breakdown(e: LadderFacts) -> tuple[Flags, Flags, Flags]:
     """Return which levels broke down, which exceed the stability limit, and which ladders grow without bound."""
     # a scheme may be stable at the limit itself, and w dt is rounded
     beyond = e.omega_dt > e.stability_limit[..., None] * (1.0 + th.LIMIT_ROUNDING)
@@ -88,24 +88,24 @@ def breakdown(e: Evidence) -> tuple[Flags, Flags, Flags]:
     return e.failed, beyond, growing
 
 
-def floor_of_pairs(e: Evidence) -> Floats:
+def floor_of_pairs(e: LadderFacts) -> Floats:
     """Return the predicted round-off of each difference, shape (..., n-1)."""
     return np.asarray(e.floor[..., :-1] + e.floor[..., 1:])
 
 
-def at_round_off(e: Evidence) -> Flags:
+def at_round_off(e: LadderFacts) -> Flags:
     """Say where all differences may be round-off."""
     return np.asarray(np.all(e.difference <= th.ABOVE_ROUND_OFF * floor_of_pairs(e), axis=-1))
 
 
-def is_noise(e: Evidence) -> Flags:
+def is_noise(e: LadderFacts) -> Flags:
     """Say where the finest differences may be noise: near the predicted round-off, or not falling below the ceiling."""
     last, previous = e.difference[..., -1], e.difference[..., -2:][..., 0]
     small = last <= th.ABOVE_ROUND_OFF * floor_of_pairs(e)[..., -1]
     return np.asarray(small | ((last > th.FLOOR_DECLINE * previous) & (last <= e.ceiling)))
 
 
-def errors_stay(e: Evidence) -> Flags:
+def errors_stay(e: LadderFacts) -> Flags:
     """Say where the error of the finest level is hardly smaller than that of the coarsest one.
 
     Errors that a single step can make do not count: they stay if an event or a corner is next to a point of all levels.
@@ -121,27 +121,27 @@ def errors_stay(e: Evidence) -> Flags:
         return np.asarray(stays & ~(e.error <= one_step_error))
 
 
-def truly_exact(e: Evidence) -> Flags:
+def truly_exact(e: LadderFacts) -> Flags:
     """Say where all differences are round-off and tiny, although an ordinary error would be visible."""
     measurement = th.MEASUREMENT_FACTOR * (e.blur[..., :-1] + e.blur[..., 1:])
     tiny = np.all(e.difference <= th.EXACT_DIFFERENCE * e.size[..., None] + measurement, axis=-1)
     return np.asarray(at_round_off(e) & tiny & _would_show(e, _motion(e)))
 
 
-def at_rest(e: Evidence) -> Flags:
+def at_rest(e: LadderFacts) -> Flags:
     """Say where all differences are round-off, and the solution moves too little for an error to be visible."""
     moved = _motion(e)
     hidden = _would_show(e, np.ones(moved.shape)) & ~_would_show(e, moved)
     return np.asarray(at_round_off(e) & (hidden | (moved == 0.0)))
 
 
-def _motion(e: Evidence) -> Floats:
+def _motion(e: LadderFacts) -> Floats:
     return np.asarray(np.minimum(np.nan_to_num(e.moved, nan=0.0), 1.0))
 
 
-def _would_show(e: Evidence, moved: Floats) -> Flags:
+def _would_show(e: LadderFacts, moved: Floats) -> Flags:
     """Say where an ordinary error would be visible if the solution changes by `moved`, relative to its size."""
-    exponent = np.where(np.isinf(e.order), th.ORDINARY_ORDER, e.order)
+    exponent = np.where(np.isinf(e.expected), th.ORDINARY_ORDER, e.expected)
     # a scheme of higher order than expected has smaller errors
     exponent = np.where(np.isinf(e.promised), exponent, np.fmax(exponent, e.promised))
     w_dt = e.omega_dt[..., 0]
@@ -160,12 +160,12 @@ def _would_show(e: Evidence, moved: Floats) -> Flags:
     return np.asarray(is_large & visible)
 
 
-def unresolved(e: Evidence) -> Flags:
+def unresolved(e: LadderFacts) -> Flags:
     """Say where a velocity decays within one step of the finest level, so that no level resolves it."""
     return np.asarray(e.decay > th.RESOLVED_DECAY)
 
 
-def far_from_exact(e: Evidence) -> Flags:
+def far_from_exact(e: LadderFacts) -> Flags:
     """Say where the finest level differs from the exact solution by more than the accuracy of both."""
     accuracy = th.ABOVE_ROUND_OFF * e.floor[..., -1] + th.EXACT_ACCURACY * e.size
     return np.asarray(np.nan_to_num(e.error, nan=0.0) > accuracy)

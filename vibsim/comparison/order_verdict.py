@@ -1,4 +1,4 @@
-"""The evidence of a verdict on an order, the verdict, and why the order differs from the expected one.
+"""The facts that a verdict on an order rests on, the verdict, and why the order differs from the expected one.
 
 If the order is too low: is it at one time (the last point, which may have a special formula), in one quantity, or
 everywhere? If it is too high: is it that of the whole solution, or is the leading error hidden, at times where it
@@ -21,8 +21,14 @@ from vibsim.comparison.parting import FAR
 from vibsim.comparison.quantity_comparison import Compared, Comparison
 from vibsim.comparison.thresholds import STRAIGHT, THEORY_ROUNDING, VANISHING_RATE
 from vibsim.convergence.differences import largest, safe_ratio
-from vibsim.convergence.evidence import Evidence, at_rest, floor_of_pairs, pick, unresolved
 from vibsim.convergence.ladder_blocks import batches
+from vibsim.convergence.ladder_facts import (
+    LadderFacts,
+    at_rest,
+    floor_of_pairs,
+    pick,
+    unresolved,
+)
 from vibsim.convergence.reasons import is_one_of
 from vibsim.convergence.thresholds import ABOVE_ROUND_OFF, HALF_SPACING, ROUND_OFF_SAFETY
 from vibsim.convergence.verdict import Judgement, judge, judge_together
@@ -65,7 +71,7 @@ def judge_orders(
     ladders = math.prod(quantities[due[0][0]].block.shape) if due else 0
     for batch in batches(due, ladders):
         rows = [
-            evidence(quantities[name], norm, order_of(quantities[name], order), ORDER_TOLERANCE)
+            facts_of(quantities[name], norm, order_of(quantities[name], order), ORDER_TOLERANCE)
             for name, order, norm in batch
         ]
         for (name, order, norm), judged in zip(batch, judge_together(rows), strict=True):
@@ -75,7 +81,7 @@ def judge_orders(
 def judgement(q: Comparison, norm: str, order: float | str = "scheme") -> Judgement:
     """Judge a quantity by the order that its scheme promises, or by another one."""
     if (norm, order) not in q.judged:
-        judged = judge(evidence(q, norm, order_of(q, order), ORDER_TOLERANCE))
+        judged = judge(facts_of(q, norm, order_of(q, order), ORDER_TOLERANCE))
         q.judged[norm, order] = judged
     return q.judged[norm, order]
 
@@ -83,7 +89,7 @@ def judgement(q: Comparison, norm: str, order: float | str = "scheme") -> Judgem
 def judge_check(q: Comparison, check: ConvergesCheck) -> Judgement:
     """Judge a quantity by the order that a check expects."""
     if not _is_usual(check):
-        return judge(evidence(q, check.norm, order_of(q, check.order), check.tolerance))
+        return judge(facts_of(q, check.norm, order_of(q, check.order), check.tolerance))
     return judgement(q, check.norm, _expected(q, check))
 
 
@@ -118,8 +124,8 @@ def order_of(q: Comparison, order: float | str) -> Floats:
     return q.order if order == "scheme" else np.full((1, 1), float(order))
 
 
-def evidence(q: Comparison, norm: str, order: Floats, tolerance: float) -> Evidence:
-    """Return the evidence on a quantity in a norm for the expected order, shape (scheme, 1 or case)."""
+def facts_of(q: Comparison, norm: str, order: Floats, tolerance: float) -> LadderFacts:
+    """Return the facts about a quantity in a norm for the expected order, shape (scheme, 1 or case)."""
     block = q.block
     grid, shape = block.grid, block.shape
     size, exists = largest(q.values[-1]), np.ones(shape, dtype=bool)
@@ -146,9 +152,9 @@ def evidence(q: Comparison, norm: str, order: Floats, tolerance: float) -> Evide
     unknown_rows = len(grid.levels) - cosines.shape[-1]
     # norm of noise of size 1 at each point
     weight = norm_of_floor(np.ones(1), norm, len(grid.t), grid.spacing)
-    return Evidence(
+    return LadderFacts(
         levels=grid.levels,
-        order=all_cases(order),
+        expected=all_cases(order),
         tolerance=tolerance,
         difference=measured.difference,
         cosines=np.pad(cosines, [(0, 0), (0, 0), (0, unknown_rows), (0, unknown_rows)]),
@@ -266,7 +272,7 @@ def _causes_unseen(
     has = partial(is_one_of, judged.reason)
     lost, is_still, is_coarse = has("round_off"), has(*UNSEEN), has("pre_asymptotic")
     if np.any(lost | is_still | is_coarse):
-        e = evidence(q, norm, order, tolerance)
+        e = facts_of(q, norm, order, tolerance)
         noisy = e.difference[..., -1] > ABOVE_ROUND_OFF * floor_of_pairs(e)[..., -1]
         result[lost & noisy] = NOISE
         if q.block.stored_floor[-1] > 0.0:
