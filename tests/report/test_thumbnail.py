@@ -122,8 +122,10 @@ def test_of_a_long_run_the_last_periods_are_drawn_unless_its_size_changes():
 def test_two_coordinates_that_move_together_are_drawn_over_time():
     """Their path was a straight line."""
     exp = samples.experiment(
-        model={"kind": "system", "coordinates": ["x", "y"], "acceleration": {"x": "-x", "y": "-y"}}, initial={"x": 1.0, "y": 0.5}, checks=[],
-    )  # fmt: skip
+        model={"kind": "system", "coordinates": ["x", "y"], "acceleration": {"x": "-x", "y": "-y"}},
+        initial={"x": 1.0, "y": 0.5},
+        checks=[],
+    )
     _, curves = drawn(exp)
     assert all(np.all(np.diff(curve[:, 0]) > 0.0) for curve in curves)
 

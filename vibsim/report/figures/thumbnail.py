@@ -27,10 +27,7 @@ CURVES = 3  # most curves in one picture
 CELLS = 48, 24  # most cells of a map across and up
 SHADES = 7  # colours of a map
 FLAT = 1e-2  # smallest relative variation of a number that is drawn as curve or map
-FEWEST_VALUES = 8  # swept values of a response curve; with fewer, solutions are drawn
 STRAIGHT = 0.99  # share of the variation of a path along one line from which it counts as straight
-MOST_PERIODS = 20.0  # periods that can be told apart in a picture
-STEADY = 0.8  # smallest ratio of the sizes of the first and the last third of a motion that stays the same
 WIDE = 1e3  # ratio of largest value to median above which the scale is logarithmic
 BEYOND = 1.5
 """Solutions beyond this multiple of the smallest of them are cut off."""
@@ -96,7 +93,7 @@ def _solutions(record: Record, position: str, member: Member, layout: Along | Gr
         size = float(known[of[i % len(of)].case])
         most = BEYOND * (size if np.isfinite(size) else min(largest, default=np.inf))
         lines.append((t, np.where(np.abs(values) <= most, values, np.nan)))
-    first = _first_shown(t, lines[-1][1])
+    first = moments.first_shown(t, lines[-1][1])
     return [(t[first:], values[first:]) for _, values in lines]
 
 
@@ -108,26 +105,10 @@ def _is_straight(x: Floats, y: Floats) -> bool:
     return bool(both * both > STRAIGHT * np.sum(across * across) * np.sum(up * up))
 
 
-def _first_shown(t: Floats, values: Floats) -> int:
-    """Return the first sample that is drawn: of a long run whose size stays the same, that of its last periods.
-
-    All periods of such a run would be a block of colour. Those of one that grows or decays show how it does.
-    """
-    if not np.isfinite(values).all():
-        return 0
-    third = values.size // 3
-    sizes = [_reach(part) for part in (values[:third], values[-third:])]
-    period = moments.period(t, values)
-    is_long = float(t[-1] - t[0]) > MOST_PERIODS * period
-    if not is_long or min(sizes) < STEADY * max(sizes):
-        return 0
-    return int(np.searchsorted(t, t[-1] - moments.WINDOW_PERIODS * period))
-
-
 def _response(record: Record, along: Along, names: Sequence[str]) -> Lines:
     """Return a number over the swept key, one curve for each line of members; empty if no number varies."""
     key = along.key
-    if key.distinct.size < FEWEST_VALUES:
+    if key.distinct.size < sweep_layout.FEWEST_VALUES:
         return []
     for name in names:
         values = np.abs(data.optional(record, name, MEMBER, level=-1)[0])
