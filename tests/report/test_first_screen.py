@@ -64,8 +64,8 @@ def test_every_reason_and_every_kind_of_check_has_a_title():
         ({"checks": [{"claim": "so", "that": {"value": "period", "above": 1.0}, "holds": False}]},
          "Not shown to be false: So"),
         ({"checks": [{"claim": "so", "that": {"value": "period", "below": 1.0}}]}, "Not confirmed: So"),
-        ({"checks": [{"claim": "s" * 120, "that": {"stable": False}, "holds": False}]},
-         f"Shown to be false: S{'s' * 108}…"),
+        ({"checks": [{"claim": "s" * 150, "that": {"stable": False}, "holds": False}]},
+         f"Shown to be false: S{'s' * 138}…"),
         ({"checks": [{"accurate": "theta", "relative": 1e-9, "expect": {"status": "FAIL"}}]},
          "The angle θ is not as accurate as asked: the trap is caught"),
         ({"checks": [{"accurate": "theta", "relative": 0.5, "expect": {"status": "FAIL"}}]},
@@ -354,6 +354,38 @@ def test_an_order_beside_the_band_whose_interval_reaches_it_is_told_as_such(monk
         monkeypatch.setattr(drawn.finest_level, "orders", lambda *_, ends=tuple(ends): ends)
         with style.applied():
             assert drawn.orders(exp, record, decisive).title.startswith(title)
+
+
+@pytest.mark.parametrize(
+    ("check", "pictures"),
+    [
+        ({"converges": "theta"}, ["hero_differences", "hero_orders"]),
+        (
+            {"value": "end", "quantity": "theta", "at": {"level": 7, "case": 1}, "below": 9},
+            ["hero_evidence", "hero_error"],
+        ),
+    ],
+)
+def test_few_members_are_no_response_and_a_check_on_one_is_shown_on_that(check, pictures):
+    """The first screen showed two dots, of an amplitude that nobody had asked for."""
+    exp = samples.experiment(sweep={"initial.theta": [0.5, 1.0]}, checks=[check])
+    record, _, decisive = found(exp)
+    with style.applied():
+        shown = hero.pictures(exp, record, decisive)
+        assert [picture.name for picture in shown] == pictures
+
+
+def test_of_a_long_run_the_last_periods_are_shown():
+    """All periods were a block of colour."""
+    exp = samples.experiment(
+        model={"kind": "linear_pendulum"}, time={"end": 400.0}, levels=[11, 12], checks=[]
+    )
+    record, _, decisive = found(exp)
+    with style.applied():
+        shown = drawn.solution(exp, record, "theta", decisive.member, is_left=True)
+    assert shown.title.endswith("last 6 periods")
+    low, high = shown.figure.axes[0].dataLim.intervalx
+    assert high - low == pytest.approx(12 * np.pi, rel=0.02)
 
 
 def test_the_interval_of_an_order_says_what_it_is():

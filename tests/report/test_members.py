@@ -11,6 +11,7 @@ import pytest
 import samples
 
 from vibsim.core.record import Record, Variable
+from vibsim.report import data
 from vibsim.report.tables import members
 
 SWEEP = {"initial.theta": [0.1, 1.0, 3.0], "model.g": [1.0, 1000.0]}
@@ -40,6 +41,19 @@ def test_every_member_of_every_scheme_has_a_row_with_every_digit(tmp_path, recor
         assert row["order of θ"] == ("" if np.isnan(order) else repr(float(order)))
         assert row["exact period [s]"] == repr(float(record["exact_period"][case]))
     assert any(row["order of θ"] == "" for row in found)
+
+
+def test_no_order_is_written_where_the_verdict_is_undecided(tmp_path, record, monkeypatch):
+    """Pages state none there: an order is at most an estimate."""
+    undecided = np.zeros((3, 6), np.bool_)
+    undecided[0, 0] = True
+    members.write_csv(tmp_path / "m.csv", record, "theta")
+    monkeypatch.setattr(data, "is_undecided", lambda *_: undecided)
+    members.write_csv(tmp_path / "n.csv", record, "theta")
+    (before, *others), (after, *same) = rows(tmp_path / "m.csv"), rows(tmp_path / "n.csv")
+    assert same == others
+    names = ("order of θ", "order, low", "order, high")
+    assert [after[name] for name in names] == ["", "", ""] != [before[name] for name in names]
 
 
 def test_long_files_have_nine_digits_of_what_was_measured(tmp_path, record, monkeypatch):

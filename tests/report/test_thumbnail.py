@@ -106,6 +106,30 @@ def test_every_scheme_has_a_curve_and_what_leaves_the_motion_is_cut():
     assert np.ptp(curves[1][:, 1]) > 0.5 * thumbnail.HEIGHT
 
 
+def test_of_a_long_run_the_last_periods_are_drawn_unless_its_size_changes():
+    """The index had blocks of colour."""
+    spring = {"model": {"kind": "spring", "w": 1.0}, "initial": {"u": 1.0}, "levels": [9, 10]}
+    end = {"time": {"end": 60 * np.pi}, "checks": []}
+    damped = {"model": {"kind": "oscillator", "damping": "0.05*v", "spring": "u"}}
+    turns = []
+    for exp in (spring, spring | damped):
+        _, curves = drawn(samples.experiment(**exp | end))
+        turns.append(np.sum(np.diff(np.sign(np.diff(curves[-1][:, 1]))) != 0))
+    assert turns[0] == pytest.approx(12, abs=1)
+    assert turns[1] > 50
+
+
+def test_two_coordinates_that_move_together_are_drawn_over_time():
+    """Their path was a straight line."""
+    exp = samples.experiment(
+        model={"kind": "system", "coordinates": ["x", "y"], "acceleration": {"x": "-x", "y": "-y"}},
+        initial={"x": 1.0, "y": 0.5},
+        checks=[],
+    )
+    _, curves = drawn(exp)
+    assert all(np.all(np.diff(curve[:, 0]) > 0.0) for curve in curves)
+
+
 @pytest.mark.parametrize("value", [np.nan, np.inf, 0.0])
 def test_what_is_not_finite_or_flat_makes_a_picture_too(value):
     exp = samples.plain()

@@ -103,10 +103,15 @@ def orders(
 def stated_orders(
     record: Record, quantity: str, norm: str = TYPICAL_NORM
 ) -> tuple[Floats, Floats, Floats]:
-    """Return the stated order of every scheme and member and the ends of its interval, shape (scheme, case)."""
+    """Return the stated order of every scheme and member and the ends of its interval, shape (scheme, case).
+
+    All are NaN where the verdict is undecided, as in `data.stated_order`.
+    """
     undecided = data.is_undecided(record, quantity)
-    order, low, high = orders(record, quantity, norm)
-    return np.where(undecided, np.nan, order), low, high
+    order, low, high = (
+        np.where(undecided, np.nan, part) for part in orders(record, quantity, norm)
+    )
+    return order, low, high
 
 
 def deviation(record: Record, quantity: str) -> Floats:

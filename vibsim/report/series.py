@@ -76,16 +76,17 @@ def name_of_exact(experiment: Experiment) -> str:
 
 
 def exact_curve(
-    experiment: Experiment, record: Record, quantity: str, member: Member, end: float = np.inf
-) -> tuple[Floats, Floats]:
-    """Return times and values of the exact solution up to a time, on a finer grid if the common times are few.
+    experiment: Experiment, record: Record, quantity: str, member: Member, end: float = np.inf, start: float = 0.0
+) -> tuple[Floats, Floats]:  # fmt: skip
+    """Return times and values of the exact solution between two times, on a finer grid if the common times are few.
 
     So the curve is smooth even if a level has few points in a period. It has a gap where an impact makes a velocity
     jump. If only a reference is known, its times are the common ones.
     """
     t = data.times(record, member.case)
-    there = t <= end * (1.0 + 1e-12)
-    fine = t[there] if t.size > SMOOTH else np.linspace(t[0], min(end, t[-1]), SMOOTH)
+    there = (t >= start) & (t <= end * (1.0 + 1e-12))
+    is_fine = int(there.sum()) > SMOOTH
+    fine = t[there] if is_fine else np.linspace(max(start, t[0]), min(end, t[-1]), SMOOTH)
     best = exact(experiment, record, quantity, member, fine)
     if best is None or not np.isfinite(best).any():
         return t[there], data.exact_series(record, quantity, member)[there]

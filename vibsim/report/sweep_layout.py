@@ -129,6 +129,8 @@ class Grid:
         return table
 
 
+FEWEST_VALUES = 8
+"""Values of a key from which a response over it is telling; with fewer the motion of a member tells more."""
 FEWEST_OF_A_LINE = 5
 """Swept values from which a curve may join members; between fewer it would invent a course."""
 

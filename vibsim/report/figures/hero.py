@@ -111,7 +111,9 @@ def differences(record: Record, lead: Lead) -> Picture | None:
 def _title_of_differences(record: Record, lead: Lead, count: int) -> str:
     """Say whether the curves coincide, and how well."""
     last = data.coincidence(record, lead.quantity, lead.member)
-    of = f" ({lead.member.scheme_name})" if len(record["scheme"]) > 1 else ""
+    several = lead.member.scheme_name if len(record["scheme"]) > 1 else ""
+    named = ", ".join(filter(None, [several, lead.member.case_words]))
+    of = f" ({named})" if named else ""
     if lead.result.get("reason") in ("exact", "round_off"):
         return f"What is left is round-off{of}"
     if count < 2 or not math.isfinite(last):
@@ -197,20 +199,26 @@ def solution(
     )
     ax.set_gid(style.TIME)
     has_exact, name = bool(np.isfinite(exact[1]).any()), series.name_of_exact(experiment)
-    if has_exact:
-        ax.plot(*style.thin(*exact, 200), color=style.PALE, linewidth=4.5, label=name)
-    text = f"{words.number(int(record['steps'][-1]), 'integer')} steps"
+    first = moments.first_shown(t, values)
+    start, title = float(t[first]), f"{letter}(t), {member.scheme_name}"
     # as in the figure of the motion, lines between too few samples would cut off its extremes
     turns = exact if has_exact else (t, values)
     is_dotted = moments.is_undersampled(int(record["steps"][-1]), t, turns)
+    if first:
+        title += f", last {moments.WINDOW_PERIODS:g} periods"
+        exact = series.exact_curve(experiment, record, quantity, member, start=start)
+        t, values = t[first:], values[first:]
+    if has_exact:
+        ax.plot(*style.thin(*exact, 200), color=style.PALE, linewidth=4.5, label=name)
+    text = f"{words.number(int(record['steps'][-1]), 'integer')} steps"
     look: dict[str, Any] = DOTS if is_dotted else {"linewidth": 1.4}
     ax.plot(*style.thin(t, values, 200), color=style.COLOURS[0], label=text, **look)
     panels.fit_values(ax, [values], exact[1])
     panels.stop_at_breakdown(ax, t, [values])
     ax.set_xlabel(data.time_label(record))
-    ax.legend(loc="best", fontsize=8, handlelength=1.8)
+    _legend(ax, columns=2, size=8.0)
     return Picture(
-        "hero_solution", f"{letter}(t), {member.scheme_name}",
+        "hero_solution", title,
         "The solution of the finest level." + f" Wide and grey: the {name} solution." * has_exact,
         f"{words.name(quantity)} against time for {member.title}", ax.get_figure(root=True),
     )  # fmt: skip

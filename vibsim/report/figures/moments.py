@@ -16,6 +16,8 @@ SECONDS_A_PERIOD = 2.0  # at speed 1
 WINDOW_PERIODS = 6.0  # width of a moving window; up to 1.5 times as many periods are shown at once
 VISIBLE = 0.03  # smallest visible difference of two motions, relative to the size of the motion
 FEWEST_SAMPLES = 6.0  # a period; straight lines between fewer cut off over a tenth of its extremes
+MOST_PERIODS = 20.0  # that can be told apart in a small picture
+STEADY = 0.8  # smallest ratio of the sizes of the first and the last third of a motion that stays the same
 UNBOUNDED = 3.0  # motions larger than this multiple of the finest one are not drawn
 
 
@@ -45,6 +47,19 @@ def period(t: Floats, u: Floats) -> float:
     step = step[np.abs(step) > 1e-9 * data.largest(u)]
     turns = int(np.sum(np.signbit(step[1:]) != np.signbit(step[:-1])))
     return float(t[-1] - t[0]) / max(1.0, 0.5 * turns)
+
+
+def first_shown(t: Floats, u: Floats) -> int:
+    """Return the first sample that a small picture shows: of a long run of steady size, that of its last periods.
+
+    All periods of such a run would be a block of colour. Those of one that grows or decays show how it does.
+    """
+    third, last = u.size // 3, float(t[-1])
+    if not np.isfinite(u).all() or last - float(t[0]) <= MOST_PERIODS * period(t, u):
+        return 0
+    sizes = [float(np.ptp(part)) for part in (u[:third], u[-third:])]
+    is_steady = min(sizes) >= STEADY * max(sizes)
+    return int(np.searchsorted(t, last - WINDOW_PERIODS * period(t, u))) if is_steady else 0
 
 
 def is_undersampled(steps: int, t: Floats, curve: tuple[Floats, Floats]) -> bool:

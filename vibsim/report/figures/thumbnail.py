@@ -17,6 +17,7 @@ from vibsim.core.record import Record
 from vibsim.core.vocabulary import MEMBER
 from vibsim.report import data, finest_level, frame, style, sweep_layout
 from vibsim.report.data import Member
+from vibsim.report.figures import moments
 from vibsim.report.sweep_layout import Along, Grid
 from vibsim.report.types import Experiment
 
@@ -26,7 +27,7 @@ CURVES = 3  # most curves in one picture
 CELLS = 48, 24  # most cells of a map across and up
 SHADES = 7  # colours of a map
 FLAT = 1e-2  # smallest relative variation of a number that is drawn as curve or map
-FEWEST_VALUES = 8  # swept values of a response curve; with fewer, solutions are drawn
+STRAIGHT = 0.99  # share of the variation of a path along one line from which it counts as straight
 WIDE = 1e3  # ratio of largest value to median above which the scale is logarithmic
 BEYOND = 1.5
 """Solutions beyond this multiple of the smallest of them are cut off."""
@@ -60,7 +61,7 @@ def thumbnail(experiment: Experiment, record: Record, member: Member) -> str:
     series = [data.at(record, f"{row.name}_finest", member) for row in positions]
     reach = [_reach(values) for values in series]
     widest = int(np.argmax(reach))
-    if len(series) == 2 and min(reach) > FLAT * reach[widest]:
+    if len(series) == 2 and min(reach) > FLAT * reach[widest] and not _is_straight(*series):
         return document([(series[0], series[1])], is_equal=True)
     return document(_solutions(record, positions[widest].name, member, layout))
 
@@ -76,7 +77,9 @@ def _solutions(record: Record, position: str, member: Member, layout: Along | Gr
     t = data.times(record, member.case)
     of = data.of_case(record, member.case)[:CURVES]
     if isinstance(layout, Along):
-        of = [Member(member.scheme, case, "") for case in layout.lines[0][1][:CURVES].tolist()]
+        cases = layout.lines[0][1]
+        shown = cases[style.spaced(cases.size, CURVES)].tolist()
+        of = [Member(member.scheme, case, "") for case in shown]
     of.reverse()
     if len(of) > 1:
         series = [data.at(record, f"{position}_finest", one) for one in of]
@@ -90,13 +93,22 @@ def _solutions(record: Record, position: str, member: Member, layout: Along | Gr
         size = float(known[of[i % len(of)].case])
         most = BEYOND * (size if np.isfinite(size) else min(largest, default=np.inf))
         lines.append((t, np.where(np.abs(values) <= most, values, np.nan)))
-    return lines
+    first = moments.first_shown(t, lines[-1][1])
+    return [(t[first:], values[first:]) for _, values in lines]
+
+
+def _is_straight(x: Floats, y: Floats) -> bool:
+    """Return whether a path in the plane is almost a straight line, which shows no motion."""
+    known = np.isfinite(x) & np.isfinite(y)
+    across, up = (values[known] - values[known].mean() for values in (x, y))
+    both = np.sum(across * up)
+    return bool(both * both > STRAIGHT * np.sum(across * across) * np.sum(up * up))
 
 
 def _response(record: Record, along: Along, names: Sequence[str]) -> Lines:
     """Return a number over the swept key, one curve for each line of members; empty if no number varies."""
     key = along.key
-    if key.distinct.size < FEWEST_VALUES:
+    if key.distinct.size < sweep_layout.FEWEST_VALUES:
         return []
     for name in names:
         values = np.abs(data.optional(record, name, MEMBER, level=-1)[0])

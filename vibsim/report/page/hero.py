@@ -16,11 +16,10 @@ from vibsim.comparison.best_values import WORDS
 from vibsim.core.home import called
 from vibsim.core.record import Record
 from vibsim.core.vocabulary import decisive_number
-from vibsim.report import choice, data, finest_level, style, words
+from vibsim.report import choice, data, finest_level, style, sweep_layout, words
 from vibsim.report.choice import Lead, is_refutation, is_trap
 from vibsim.report.evidence import figure, frame
 from vibsim.report.figures import hero as drawn
-from vibsim.report.figures import solution
 from vibsim.report.series import name_of_exact
 from vibsim.report.style import Picture
 from vibsim.report.tables import published
@@ -292,21 +291,25 @@ def pictures(experiment: Experiment, record: Record, lead: Lead) -> list[Picture
     """Return the one or two pictures of the first screen, the decisive one first."""
     left = right = None
     has_order = f"{lead.quantity}_order" in record
-    if data.swept(record):
+    values = [key.distinct.size for key in sweep_layout.keys(record)]
+    has_response = max(values, default=1) >= sweep_layout.FEWEST_VALUES
+    if has_response:
         left = drawn.response(experiment, record, lead)
-        right = drawn.orders(experiment, record, lead) if has_order else None
+    elif lead.entry is not None and not lead.is_on_order:
+        left = _evidence(experiment, record, lead, drawn.LEFT)
+    elif has_order:
+        left = drawn.differences(record, lead)
+    if has_order:
+        is_of_one = lead.entry is not None and sum(lead.entry["counts"].values()) < 2
+        alone = not data.swept(record) or (is_of_one and not has_response)
+        right = (
+            drawn.against_step(record, lead) if alone else drawn.orders(experiment, record, lead)
+        )
+    if has_response:
         right = right or _evidence(experiment, record, lead, drawn.RIGHT)
-    else:
-        right = drawn.against_step(record, lead) if has_order else None
-        if lead.entry is not None and not lead.is_on_order:
-            left = _evidence(experiment, record, lead, drawn.LEFT)
-        elif has_order:
-            left = drawn.differences(record, lead)
     found = [picture for picture in (left, right) if picture is not None]
     if data.is_lean(record) or len(found) == 2:
         return found
-    if not found:
-        return [solution.motion(experiment, record, choice.position(experiment), lead.member)]
     of = choice.position(experiment), lead.member
     moving = drawn.solution(experiment, record, *of, is_left=left is None)
     return [moving, *found] if left is None else [*found, moving]

@@ -30,12 +30,15 @@ Field = tuple[Column, NDArray[Any]]
 
 
 def fields(record: Record, quantity: str) -> list[Field]:
-    """Return the fields of every member: index and swept values first, then the measured ones."""
+    """Return the fields of every member: index and swept values first, then the measured ones.
+
+    A member whose order is undecided has none.
+    """
     error, error_unit = finest_level.error(record, quantity), norm_unit(record, quantity)
     time, size = (finest_level.measured(record, name, quantity) for name in ("period", "amplitude"))
     level = whole(record, "level")[-1]
     names = [f"order of {words.symbol(quantity)}", "order, low", "order, high"]
-    orders = zip(names, finest_level.orders(record, quantity), strict=True)
+    orders = zip(names, finest_level.stated_orders(record, quantity), strict=True)
     listed: list[Field] = [
         (Column("case", form="integer"), np.asarray(record["case"])),
         *((Column(*swept_label(record, name), "step"), record[name]) for name in swept(record)),

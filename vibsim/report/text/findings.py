@@ -87,7 +87,7 @@ CLAIMS = {
 """Status of a claim, and whether it is expected to be false, to the prefix of its title."""
 _FORMULA = re.compile(r"\S+ *[=<>≤≥]|\w dt\b|\w+[(^]")
 """Beginning of a claim that opens with a formula, which is not capitalized."""
-LONG_CLAIM = 110  # most characters of a claim in a title
+LONG_CLAIM = 140  # most characters of a claim in a title
 NOTHING_ASKED = (
     "Without a check there is no verdict. Add `checks:` to the experiment, such as `- {{converges: {position}}}`, and "
     "three levels at least."
