@@ -70,6 +70,34 @@ def test_dates_that_xarray_writes_are_compared_through_stored_levels(tmp_path: P
 
 
 @pytest.mark.parametrize(
+    ("calendar", "date", "days"),
+    [
+        ("noleap", "2000-3-1", 59),
+        ("365_day", "2000-03-01 00:00:00 UTC", 59),
+        ("360_day", "2000-02-30T00:00:00Z", 59),
+        ("gregorian", "2000-03-01 02:00:00 +02:00", 60),
+    ],
+)
+def test_dates_count_in_their_calendar(
+    recwarn: pytest.WarningsRecorder, calendar: str, date: str, days: int
+) -> None:
+    levels = [level(dt, "days since 2000-01-01", 86400.0) for dt in STEPS]
+    levels[1:] = [level(dt, f"days since {date}", 86400.0, days * 86400.0) for dt in STEPS[1:]]
+    for one in levels:
+        one.t.attrs["calendar"] = calendar
+    found = judge(STEPS, levels, order=1)
+    assert len(found.coords["t"]) == 121
+    assert found.error == pytest.approx(error_at_all_points(STEPS[-1]), rel=0.02)
+    assert not recwarn.list
+    levels[0].t.attrs["calendar"] = "julian"
+    rule = (
+        rf"\(calendar {calendar}\), the coarsest level has days since 2000-01-01 \(calendar julian"
+    )
+    with pytest.raises(InputError, match=rule):
+        judge(STEPS, levels)
+
+
+@pytest.mark.parametrize(
     ("first", "second"),
     [
         ("km", "m"),
@@ -80,8 +108,9 @@ def test_dates_that_xarray_writes_are_compared_through_stored_levels(tmp_path: P
 )
 def test_other_units_are_refused(first: str, second: str) -> None:
     levels = [level(dt, first if dt == STEPS[0] else second, 1.0) for dt in STEPS]
-    rule = f"t: has the unit {second}, the coarsest level has {first}"
-    with pytest.raises(InputError, match=rule):
+    with pytest.raises(
+        InputError, match=f"t: has the unit {second}.*, the coarsest level has {first}"
+    ):
         judge(STEPS, levels)
 
 

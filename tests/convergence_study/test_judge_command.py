@@ -405,6 +405,18 @@ def test_fields_are_brought_to_common_points(tmp_path: Path, capsys: Capture) ->
     assert (verdict["status"], verdict["reason"]) == ("INCONCLUSIVE", "not_applicable")
 
 
+def test_step_sizes_in_different_units_are_refused(tmp_path: Path, capsys: Capture) -> None:
+    files = [write(tmp_path / f"run_{n}.nc", n) for n in COUNTS]
+    for file, unit in zip(files[1:], ("s", "s", "ms"), strict=True):
+        with netCDF4.Dataset(file, "a") as dataset:
+            dataset["dt"].units = unit
+    assert main(["judge", *files[:3], "--h", "dt", "--quantity", "T", "--order", "2"]) == 0
+    capsys.readouterr()
+    assert main(["judge", *files, "--h", "dt", "--quantity", "T"]) == 2
+    told = f"{files[3]}: dt: has the unit ms, in {files[1]} it has s: give all levels the same"
+    assert told in capsys.readouterr().err
+
+
 def test_files_that_do_not_fit_are_refused(tmp_path: Path, capsys: Capture) -> None:
     files = [write(tmp_path / f"run_{n}.nc", n) for n in (10, 20, 40)]
     other = tmp_path / "table.csv"

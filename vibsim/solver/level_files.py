@@ -56,13 +56,20 @@ def read(paths: Sequence[Path], size: str, quantities: Sequence[str]) -> list[St
         rule = f"has {len(listed)} step sizes for {len(paths)} files"
         _refuse("vibsim judge", "--h", size, rule)
     chosen = list(dict.fromkeys(quantities))
-    h: list[float] = []
+    h, units = list[float](), dict[str, Path]()
     values: dict[str, list[GridValues]] = {name: [] for name in chosen}
     for i, path in enumerate(paths):
         with opened(path) as dataset:
-            h.append(listed[i] if listed is not None else _step_size(str(path), dataset, size))
+            step, unit = (listed[i], "") if listed else _step_size(str(path), dataset, size)
+            h.append(step)
+            if unit:
+                units.setdefault(unit, path)
             for name in chosen:
                 values[name].append(grid_values(str(path), dataset, name, key="--quantity"))
+    if len(units) > 1:
+        (first, file), (other, path) = list(units.items())[:2]
+        rule = f"has the unit {other}, in {file} it has {first}"
+        _refuse(str(path), size, "", rule, "give all levels the same units")
     files = [str(path) for path in paths]
     check_sizes(((file, 0) for file in files), size if listed is None else "h", h)
     key = "h" if listed is not None else size.rpartition("/")[2]
@@ -101,13 +108,14 @@ def _variable(dataset: Any, name: str) -> Any | None:
     return dataset.variables.get(last)
 
 
-def _step_size(file: str, dataset: Any, name: str) -> float:
-    """Return the step size of a file, from an attribute or a variable with one value."""
-    variable = _variable(dataset, name)
+def _step_size(file: str, dataset: Any, name: str) -> tuple[float, str]:
+    """Return the step size of a file, from an attribute or a variable with one value, and the unit of the variable."""
+    variable, unit = _variable(dataset, name), ""
     if name in dataset.ncattrs():
         value = np.asarray(dataset.getncattr(name))
     elif variable is not None:
         value = np.ma.filled(np.ma.asarray(variable[...], dtype=np.float64), np.nan)
+        unit = units_in(_attributes(variable))[0]
     else:
         single = [n for n, v, group in netcdf.variables(dataset) if v.size == 1 and not group]
         hint = nearest(name, [*dataset.ncattrs(), *single])
@@ -115,7 +123,7 @@ def _step_size(file: str, dataset: Any, name: str) -> float:
     if value.size != 1:
         _refuse(file, "--h", name, f"has {value.size} values, and must have one")
     try:
-        return float(value.reshape(())[()])
+        return float(value.reshape(())[()]), unit
     except ValueError:
         _refuse(file, name, str(value), "must be a number")
 

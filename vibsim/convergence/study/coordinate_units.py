@@ -24,6 +24,10 @@ SECONDS: Mapping[str, float] = MappingProxyType(
     }
 )
 """Length of units of time [s], by their names in CF conventions and xarray."""
+_ALIASES: Mapping[str, str] = MappingProxyType(
+    {"gregorian": "standard", "365_day": "noleap", "366_day": "all_leap"}
+)
+"""Other names of calendars in CF conventions."""
 SINCE = " since "
 """Separates the unit of a date from its reference date."""
 
@@ -47,7 +51,7 @@ def in_common_units(levels: Sequence[GridValues]) -> list[GridValues]:
                 continue
             change = _change(unit, common_unit)
             if change is None:
-                raise _other_units(i, dim, unit[0], common_unit[0])
+                raise _other_units(i, dim, *map(_described, (unit, common_unit)))
             factor, shift = change
             coords[dim] = np.asarray(coords[dim], dtype=np.float64) * factor + shift
         converted.append(replace(level, coords=coords))
@@ -60,24 +64,35 @@ def _change(unit: tuple[str, str], other: tuple[str, str]) -> tuple[float, float
         text.partition(SINCE) for text, _ in (unit, other)
     )
     seconds, other_seconds = (SECONDS.get(text.strip().lower()) for text in (length, other_length))
-    later = _seconds_between(other_date.strip(), date.strip())
-    if seconds is None or other_seconds is None or later is None or unit[1] != other[1]:
+    calendar, other_calendar = (
+        _ALIASES.get(name, name) for name in (unit[1].lower(), other[1].lower())
+    )
+    if seconds is None or other_seconds is None or calendar != other_calendar:
         return None
-    return seconds / other_seconds, later / other_seconds
+    later = _seconds_between(other_date.strip(), date.strip(), calendar)
+    return None if later is None else (seconds / other_seconds, later / other_seconds)
 
 
-def _seconds_between(first: str, second: str) -> float | None:
-    """Return the second date minus the first [s]; None if one of them is not a date."""
+def _seconds_between(first: str, second: str, calendar: str) -> float | None:
+    """Return the second date minus the first [s]; None if one of them is not a date of the calendar."""
     if first == second:
         return 0.0
     if not (first and second):
         return None
+    import cftime
+
     try:
-        return float(
-            (np.datetime64(second, "us") - np.datetime64(first, "us")) / np.timedelta64(1, "s")
+        begin, end = (
+            cftime.num2date(0, f"seconds{SINCE}{date}", calendar) for date in (first, second)
         )
-    except ValueError:
+    except (KeyError, OverflowError, ValueError):
         return None
+    return float((end - begin).total_seconds())
+
+
+def _described(unit: tuple[str, str]) -> str:
+    """Return a unit, that of dates with its calendar."""
+    return f"{unit[0]} (calendar {unit[1]})" if SINCE in unit[0] else unit[0]
 
 
 def _other_units(level: int, name: str, units: str, coarsest: str) -> Exception:
