@@ -482,3 +482,21 @@ def test_a_largest_size_is_not_negative() -> None:
     about = {"value": "max_abs", "quantity": "energy_deviation", "at": {"level": "best"}}
     [found] = judged(about | {"below": 1e-3}, **content)
     assert 0.0 <= found.results[0].value < 1e-4
+
+
+def test_the_bound_of_an_energy_error_covers_a_crest_between_points() -> None:
+    """All levels may have the same point nearest to it: their numbers then agree to 1e-6 and are wrong by 1e-4."""
+    content = {
+        "model": {"kind": "oscillator", "spring": "u", "force": "cos(2*t)/2"},
+        "initial": {"u": 1.0},
+        **{"time": {"end": 5.0}, "sweep": {"time.end": [6.0, 8.0, 15.0]}},
+        **{"levels": [5, 6, 7, 8], "schemes": ["gauss4"]},
+    }
+    _, record = analysed(**content)
+    t = np.linspace(0.0, 6.0, 10**6)
+    u, v = (7 * np.cos(t) - np.cos(2 * t)) / 6, (2 * np.sin(2 * t) - 7 * np.sin(t)) / 6
+    exact = np.max(np.abs(u**2 + v**2 - 1.0))
+    away = np.abs(record["relative_energy_error_richardson"][0] - exact)
+    bound = record["relative_energy_error_richardson_error"][0]
+    assert np.all(away <= bound)
+    assert np.all(bound < 1e-4)

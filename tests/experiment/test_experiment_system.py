@@ -387,3 +387,21 @@ def test_a_formula_that_a_comma_ends_is_told_how_to_be_written(tmp_path):
 def test_a_swept_parameter_is_found_by_its_own_name():
     (fault,) = refused(PAIR, sweep={"model.k": [1.0, 2.0]})
     assert fault.endswith("cannot be swept: did you mean 'model.parameters.k'?")
+
+
+@pytest.mark.parametrize(
+    ("changed", "rule"),
+    [
+        ({"force": [1, 2]}, "must be a formula, or a mapping of coordinates to formulas"),
+        ({"potential": {"x": "x**2/2"}}, "must be a formula, or a list of terms"),
+        ({"outputs": "y - x"}, "e.g. {stretch: y - x}"),
+    ],
+)
+def test_a_value_of_another_form_is_told_which_forms_there_are(changed, rule):
+    [fault] = refused(PUSHED | changed)
+    assert rule in fault
+
+
+def test_an_initial_value_that_names_a_parameter_is_told_what_to_write():
+    [fault] = refused({"acceleration": "-a*u", "parameters": {"a": 2}}, initial={"u": "2*a"})
+    assert "cannot name a: write the number" in fault

@@ -33,7 +33,7 @@ from vibsim.core.vocabulary import LEVELS_OF_AN_ORDER, MEMBER
 from vibsim.experiment.value_names import VALUES
 from vibsim.models import Model
 from vibsim.observe import oscillation, spectrum, steady_state
-from vibsim.observe.member_block import MemberBlock
+from vibsim.observe.member_block import MemberBlock, energy_at_start
 from vibsim.schemes.orders import depends_on_velocity, is_autonomous
 
 FROM_PEAK_TIMES = (
@@ -65,7 +65,7 @@ def value(name: str, place: value_numbers.Place) -> tuple[Floats, Floats, Floats
     ladder = _ladder(name, place)
     best = ladder.limit()
     # an absolute value has no negative limit
-    least = 0.0 if name == "max_abs" else -np.inf
+    least = 0.0 if name in ("max_abs", "relative_energy_error") else -np.inf
     return np.maximum(best.value, least), best.bound, ladder.missed
 
 
@@ -82,6 +82,15 @@ class _Ladder:
     missed: Floats  # error that no level shows: of an extremum between points, of a corner of the force; or infinite
     safety: Floats  # factor on the bound
     of_series: Floats  # value and bound of a sample in the extrapolated series, (..., 2); NaN for other numbers
+
+    def over(self, unit: Floats) -> _Ladder:
+        """Return the ladder of the number over a unit, shape (scheme, case)."""
+        known = np.where(unit > 0.0, unit, np.nan)
+        divided = {
+            **{name: getattr(self, name) / known for name in ("size", "missed")},
+            **{name: getattr(self, name) / known[..., None] for name in ("values", "floor")},
+        }
+        return replace(self, **divided)
 
     def limit(self) -> Limit:
         """Return the limit, with a bound that includes `missed`; or that of the series, if closer."""
@@ -101,6 +110,9 @@ class _Ladder:
 
 
 def _ladder(name: str, place: value_numbers.Place) -> _Ladder:
+    if name == "relative_energy_error":
+        largest = _ladder("max_abs", replace(place, quantity="energy_deviation"))
+        return largest.over(np.abs(energy_at_start(place.block.finest)))
     block, comparison, row = place.block, place.comparison(), VALUES[name]
     if row.is_sample:
         rows = value_numbers.samples(place)
@@ -180,14 +192,10 @@ def _promised(name: str, place: value_numbers.Place) -> tuple[Floats, Flags]:
     """Return the promised order of a number, and whether its powers are even, shape (scheme, case)."""
     block, experiment = place.block, place.block.experiment
     quantity = place.quantity or block.model.position
-    if name == "relative_energy_error":
-        quantity = "energy_deviation"
     order = formal_orders(experiment, quantity, block.columns, block.eventless)
     even = even_powers(experiment, quantity, block.columns)
     if VALUES[name].measured_by == "parabola":
         order, even = np.minimum(order, ORDER_OF_PARABOLA), np.zeros_like(even)
-    elif name == "relative_energy_error":
-        order, even = np.minimum(order, ORDER_OF_GRID), np.zeros_like(even)
     return np.broadcast_to(order, block.shape), np.broadcast_to(even, block.shape)
 
 
@@ -198,8 +206,9 @@ def _size(name: str, place: value_numbers.Place, values: Floats) -> Floats:
         q = place.comparison()
         if q is not None:
             return q.scale
-        rows = [np.abs(value_numbers.value(which, finest)) for which in ("min", "max")]
-        return np.asarray(np.maximum(*rows))
+        ends = (name,) if name == "max_abs" else ("min", "max")
+        rows = [np.abs(value_numbers.value(end, finest)) for end in ends]
+        return np.asarray(np.maximum.reduce(rows))
     if row.has_own_size:
         return np.abs(values[..., -1])
     if name == "phase_error_per_period":

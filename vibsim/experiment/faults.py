@@ -47,6 +47,12 @@ _FORMS = {
 _EXAMPLES: Mapping[object, str] = {
     ("levels",): "e.g. [6, 7, 8, 9], or {from: 6, to: 9}",
     ("time",): "e.g. {end: 10.0}",
+    ("model", "start"): "e.g. {displacement: [0, 1]}",
+    ("model", "input"): "e.g. {table: road.csv, at: speed*t}",
+    ("model", "outputs"): "e.g. {stretch: y - x}",
+    ("model", "parameters"): "e.g. {k: 2.0}",
+    ("model", "equation"): "e.g. u'' + u = 0",
+    ("initial",): "e.g. {u: 1.0}",
     ("model", "rayleigh"): "e.g. {alpha: 0.1, beta: 0.001}",
     ("model", "observe"): "e.g. {tip: 10, stretch: {1: -1, 2: 1}}",
     ("checks",): "begin each one with `- `",
@@ -150,10 +156,7 @@ class Report:
             rule, hint = "unknown key", nearest(written, list(_FORMS) if is_rule else known)
             if "take" in known and path[-1] in _PLACES:
                 hint = f"write at: {{{_PLACES[str(path[-1])]}: ...}}"
-            declared = (
-                self.source.data["model"].get("parameters") if path[:-1] == ("model",) else ()
-            )
-            if isinstance(declared, Mapping) and path[-1] in declared:
+            if path[:-1] == ("model",) and path[-1] in self._declared:
                 hint = f"the parameter of this name is `model.parameters.{path[-1]}`"
             if value is None and str(path[-1])[0:1].isdigit():
                 hint = "between braces a comma ends a value: write numbers with a decimal point"
@@ -188,9 +191,19 @@ class Report:
             hint = next(filter(None, (likely(key, known) for key in value)), "")
         if kind == "tuple_type" and isinstance(value, str | int):
             hint = f"write [{value}]"
+        if path[0] == "initial" and isinstance(value, str):
+            named = [name for name in self._declared if re.search(rf"\b{re.escape(name)}\b", value)]
+            if named:
+                hint = f"an initial value cannot name {named[0]}: write the number; zip of a sweep varies both"
         if kind == "literal_error":
             hint = nearest(value, re.findall(r"'([^']*)'", context["expected"]))
-        if kind in ("tuple_type", "dict_type", "model_type", "model_attributes_type"):
+        if kind in (
+            "tuple_type",
+            "dict_type",
+            "model_type",
+            "model_attributes_type",
+            "string_type",
+        ):
             hint = _EXAMPLES.get(path) or _EXAMPLES.get(path[-1], hint)
         if kind in ("missing", "too_long", "tuple_type"):
             path, rule = _whole_list(path, rule)
@@ -212,6 +225,13 @@ class Report:
         if path == ("model",) and (experiment := _shipped(str(kind))):
             hint = f"`vibsim new FILE --like {experiment}` begins with a shipped experiment of this name"
         self.add((*path, "kind"), rule, hint, kind)
+
+    @property
+    def _declared(self) -> list[str]:
+        """The names under `parameters` of the model."""
+        model = self.source.data.get("model")
+        declared = model.get("parameters") if isinstance(model, Mapping) else None
+        return [str(name) for name in declared] if isinstance(declared, Mapping) else []
 
     @property
     def note_lines(self) -> tuple[tuple[int, str], ...]:

@@ -112,7 +112,7 @@ def by_form(members: Mapping[str, Any], rule: str = "", error: str = "form") -> 
 
     A member is named after a key that its mapping must have (the first one in `members` that is there), or is
     ``mapping``, ``text``, ``number``, ``list``, ``rows`` (a list of lists), ``row`` (any other list), or ``other`` for
-    all remaining forms.
+    all remaining forms, beside a `rule` for those of single values.
     """
 
     def form(value: Any) -> str:
@@ -123,7 +123,9 @@ def by_form(members: Mapping[str, Any], rule: str = "", error: str = "form") -> 
             forms = ["list", "rows" if value and isinstance(value[0], list | tuple) else "row"]
         else:
             forms = ["text" if isinstance(value, str) else "number"]
-        return tag(next((name for name in (*forms, "other") if name in members), forms[0]))
+        if not (rule and isinstance(value, Mapping | Section | list | tuple)):
+            forms.append("other")
+        return tag(next((name for name in forms if name in members), forms[0]))
 
     more: Any = {"custom_error_type": error, "custom_error_message": rule} if rule else {}
     return tagged(members, Discriminator(form, **more))

@@ -152,13 +152,19 @@ def _formula_type(model: Model, field: FormulaField) -> Any:
     if field.of:
         if field.of == "term":
             terms = Annotated[tuple[FormulaText, ...], Field(min_length=1), short(MOST_TERMS)]
-            return by_form({"other": FormulaText, "list": terms})
+            return by_form(
+                {"other": FormulaText, "list": terms}, "must be a formula, or a list of terms"
+            )
         mapping: Any = _formulas(FormulaText)
         if field.paired:
-            mapping = _formulas(by_form({"mapping": mapping, "other": FormulaText}))
+            row = {"mapping": mapping, "other": FormulaText}
+            mapping = _formulas(
+                by_form(row, "must be a formula, or a row such as {x: 2, y: cos(x)}")
+            )
         if field.of == "output":
             return mapping
-        return by_form({"mapping": mapping, "other": FormulaText})
+        rule = "must be a formula, or a mapping of coordinates to formulas"
+        return by_form({"mapping": mapping, "other": FormulaText}, rule)
     name = f"{_class_name(model.kind)}{_class_name(field.name)}"
     fields: dict[str, Any] = {}
     if field.table is not None:
@@ -180,7 +186,8 @@ def _formula_type(model: Model, field: FormulaField) -> Any:
     section = create_model(name, __base__=Section, **fields)
     if field.tabled:
         return section
-    return by_form({"mapping": section, "other": FormulaText})
+    rule = f"must be a formula, or a mapping such as {{{next(iter(fields))}: ...}}"
+    return by_form({"mapping": section, "other": FormulaText}, rule)
 
 
 def _coefficient(field: FormulaField, word: str) -> Callable[[Any], Any]:

@@ -80,7 +80,9 @@ class LoadTable(Section):
     """name of the column of loads in the table, or of the variable"""
 
 
-Factor: Any = by_form({"mapping": LoadTable, "other": FormulaText})
+Factor: Any = by_form(
+    {"mapping": LoadTable, "other": FormulaText}, "must be a formula, or {table: quake.csv}"
+)
 
 
 class ShapedLoad(Section):
@@ -97,8 +99,13 @@ Load: Any = by_form(
     "must be formulas by degree of freedom such as {2: cos(t)}, or {shape: ..., times: ...}",
 )
 _Ratios = Annotated[tuple[NonNegative, ...], Field(min_length=1), short(MOST_ROWS)]
-RatiosText: Any = by_form({"other": NonNegative, "row": _Ratios})
-Observed: Any = by_form({"other": Annotated[Index, Field(ge=1)], "mapping": Entries})
+RatiosText: Any = by_form(
+    {"other": NonNegative, "row": _Ratios}, "must be a number, or a list such as [0.02, 0.05]"
+)
+Observed: Any = by_form(
+    {"other": Annotated[Index, Field(ge=1)], "mapping": Entries},
+    "must be a degree of freedom, or factors of several such as {1: -1, 2: 1}",
+)
 
 
 class StructureSection(Section):
