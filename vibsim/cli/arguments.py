@@ -275,7 +275,6 @@ def _theory() -> Iterator[_Row]:
     text = "option of the scheme, such as beta=1/6"
     yield _row("options", _word, "NAME=VALUE", text, nargs="*")
     yield _row("--terms", _positive, "N", "terms of each series (default: 4)", default=4)
-    yield _flag("--latex", "write the formulas as LaTeX")
 
 
 def _show() -> Iterator[_Row]:
