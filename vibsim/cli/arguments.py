@@ -168,7 +168,7 @@ def commands() -> Iterator[Command]:
     text = (
         "List models, schemes, checks or experiments, or print the JSON Schema of experiment files."
     )
-    name = _row("name", _word, "NAME", "one entry, in full", nargs="?")
+    name = _row("name", _word, "NAME", "a model or a scheme, in full", nargs="?")
     yield "list", "commands.listing", text, ((("what",), {"choices": LISTS}), name)
     text = "Write a commented experiment file to begin with, and the JSON Schema for editors."
     yield "new", "commands.new", text, tuple(_new())
