@@ -87,7 +87,7 @@ def theory() -> Lines:
     for kind, scheme in SCHEMES.items():
         if not scheme.adaptive:
             yield f"## {kind}"
-            yield from labelled(theory_rows(scheme, scheme.defaults(), 4, latex=False))
+            yield from labelled(theory_rows(scheme, scheme.defaults(), 4))
 
 
 def checks() -> Lines:

@@ -181,7 +181,7 @@ def test_a_scheme_of_another_equation_is_told_by_its_samples() -> None:
         return (u + dt * ahead, ahead), v
 
     wrong = replace(SCHEMES["forward_euler"], stepper=lambda options: Stepper(start, step))
-    found = dict(theory_rows(wrong, {}, 3, latex=False))
+    found = dict(theory_rows(wrong, {}, 3))
     assert found["series"].startswith("not written: the numerical frequency does not tend to w")
     assert found["without v"] == "u^(n+1) = (2 - 3 p^2/2) u^n - u^(n-1)"
     assert found["with v"] == "[D_t- u = v]^(n+1), [D_t+ v = -(3/2) w^2 u]^n"
@@ -210,14 +210,6 @@ def test_the_documents_have_the_equations_of_the_schemes_of_the_text(
     without, _, at_one = found["without v"].partition(" with all at one time: ")
     row = f"| `{kind}` | {found['with v']} | {without[without.index('[') :]} | {at_one} |"
     assert row in (home() / "docs/schemes.md").read_text()
-
-
-def test_formulas_are_written_as_latex(capsys: Capture) -> None:
-    found = rows(["central", "--latex", "--terms", "2"], capsys)
-    assert found["frequency"] == r"w~/w = 1 + \frac{p^{2}}{24} + O(p^{4})"
-    assert "[D_{t} D_{t} u = -w^{2} u]^{n}" in found["without v"]
-    assert r"[D_{t} v = -w^{2} \mathrm{mean}\, u]^{n+1/2}" in found["with v"]
-    assert "[D_{t}^{+} u]^{n} = (u^{n+1} - u^n)/dt" in found["operators"]
 
 
 def test_a_scheme_with_parasitic_roots_has_no_written_solution(capsys: Capture) -> None:

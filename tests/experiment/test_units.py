@@ -204,7 +204,7 @@ def test_every_coefficient_has_a_unit(model: Model) -> None:
         (pendulum(L="4 metres2 foo"), "model.L", "unknown unit 'foo'", "choose from m, km"),
         (pendulum(L="4 metr"), "model.L", "unknown unit 'metr'", "did you mean 'metre'?"),
         (pendulum(m="4 Kg"), "model.m", "unknown unit 'Kg'", "did you mean 'kg'?"),
-        (pendulum(L="20 degC"), "model.L", "'degC' is measured from a zero of its own", "write K"),
+        (pendulum(L="20 degC"), "model.L", "unknown unit 'degC'", ""),
         (pendulum(L="1 m + 2 m"), "model.L", "not of '+'", ""),
         (pendulum(L="4 m m3 os.system"), "model.L", "not of '.'", ""),
         (pendulum(L="4 m __import__('os')"), "model.L", "not of '_'", ""),
@@ -326,7 +326,6 @@ def test_units_of_a_file() -> None:
         ("kg", "3 s", "'kg' is a unit already"),
         ("mm", "3 s", "'mm' is a unit already"),
         ("seconds", "3 s", "'seconds' is a unit already"),
-        ("degC", "3 K", "'degC' is a unit already"),
         ("rod2", "3 m", "must consist of letters and _"),
         ("a b", "3 m", "must consist of letters and _"),
         ("lambda", "3 m", "must consist of letters and _"),
@@ -388,7 +387,7 @@ def test_any_unit_is_read_or_refused(text: str) -> None:
 
 
 PIECES = ("3", "1e9", "-", "m", "s", "kg", "rod", "deg", "^", "**", "/", "*", " ", "2", "-2", "(", ")",
-          "pi", "sqrt", ".", "_", "%", "\u00b0", "os.system", "degC", "9" * 400, "\u00e9", "lambda")  # fmt: skip
+          "pi", "sqrt", ".", "_", "%", "\u00b0", "os.system", "9" * 400, "\u00e9", "lambda")  # fmt: skip
 QUANTITY = st.one_of(
     st.text(max_size=12), st.lists(st.sampled_from(PIECES), max_size=8).map("".join)
 )

@@ -168,7 +168,7 @@ def commands() -> Iterator[Command]:
     text = (
         "List models, schemes, checks or experiments, or print the JSON Schema of experiment files."
     )
-    name = _row("name", _word, "NAME", "one entry, in full", nargs="?")
+    name = _row("name", _word, "NAME", "a model or a scheme, in full", nargs="?")
     yield "list", "commands.listing", text, ((("what",), {"choices": LISTS}), name)
     text = "Write a commented experiment file to begin with, and the JSON Schema for editors."
     yield "new", "commands.new", text, tuple(_new())
@@ -275,7 +275,6 @@ def _theory() -> Iterator[_Row]:
     text = "option of the scheme, such as beta=1/6"
     yield _row("options", _word, "NAME=VALUE", text, nargs="*")
     yield _row("--terms", _positive, "N", "terms of each series (default: 4)", default=4)
-    yield _flag("--latex", "write the formulas as LaTeX")
 
 
 def _show() -> Iterator[_Row]:

@@ -158,11 +158,7 @@ def _check_name(name: str) -> None:
     if name in CONSTANTS or name in FUNCTIONS:
         what = "constant" if name in CONSTANTS else "function"
         raise UnitError(f"'{name}' is a {what} of formulas", "choose another name")
-    try:
-        is_taken = unit_named(name) is not None
-    except UnitError:
-        is_taken = True
-    if is_taken:
+    if unit_named(name) is not None:
         raise UnitError(f"'{name}' is a unit already", "choose another name")
 
 
@@ -256,8 +252,6 @@ farad = coulomb / volt = F
 henry = volt * second / ampere = H
 tonne = 1000000 * gram = t
 percent = 0.01 = %
-degree_Celsius = kelvin; offset: 273.15 = degC = celsius
-degree_Fahrenheit = 5 / 9 * kelvin; offset: 255.372222 = degF = fahrenheit
 """
 """Definitions of units, in the notation of pint."""
 _OFFERED = """
@@ -277,8 +271,6 @@ K: a temperature
 _DIMENSIONS = ("[angle]", "[mass]", "[length]", "[time]", "[current]", "[temperature]")
 _SYMBOLS = dict(zip(_DIMENSIONS, ("rad", "kg", "m", "s", "A", "K"), strict=True))
 """The base unit of every dimension, in the order of messages."""
-_OFFSET = ("degree_Celsius", "degree_Fahrenheit")
-"""Units with an offset."""
 
 
 @dataclass(frozen=True)
@@ -337,17 +329,11 @@ def registry() -> Any:
 
 @cache
 def unit_named(name: str) -> Unit | None:
-    """Return the unit of a name, with or without a prefix; None if there is none.
-
-    Raises `UnitError` for a unit with an offset, which cannot be a factor.
-    """
+    """Return the unit of a name, with or without a prefix; None if there is none."""
     found = registry().parse_unit_name(name)
     if not found:
         return None
     prefix, base, _ = found[0]
-    if base in _OFFSET:
-        rule = f"'{name}' is measured from a zero of its own, and cannot be part of a unit"
-        raise UnitError(rule, "write K")
     factor, _ = registry().get_root_units(prefix + base)
     dimensions = registry().get_dimensionality(prefix + base)
     powers = {_SYMBOLS[name]: int(power) for name, power in dimensions.items()}

@@ -42,7 +42,6 @@ _NAMES = {
     "REASON": ("vibsim.core.vocabulary", "REASONS"),
     **dict.fromkeys(("model", "models"), ("vibsim.models", "MODELS")),
     **dict.fromkeys(("scheme", "schemes"), ("vibsim.schemes", "SCHEMES")),
-    "checks": ("vibsim.experiment.value_names", "VALUES"),
 }
 """Module and attribute with the valid names of an option or a positional argument, by its name or metavar."""
 
@@ -111,7 +110,7 @@ def _values(settings: dict[str, object], name: str, before: Sequence[str]) -> It
     metavar = str(settings.get("metavar"))
     # the argument before NAME says which list the name is from
     kind = before[0] if name == "name" and before else name
-    if metavar in ("EXPERIMENT", "A", "B") or kind in ("experiments", "like"):
+    if metavar in ("EXPERIMENT", "A", "B") or name in ("experiments", "like"):
         return _experiments()
     module, names = _NAMES.get(metavar) or _NAMES.get(kind, ("", ""))
     return list(getattr(import_module(module), names)) if module else []

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from vibsim.cli.jobs.common import refusal
 from vibsim.cli.list_entry import choices, facts, in_full
-from vibsim.core.errors import Fault, InputError, nearest
+from vibsim.core.errors import Fault, InputError
 
 if TYPE_CHECKING:
     from vibsim.models import Model
@@ -24,7 +24,10 @@ def list_(options: Namespace) -> int:
         After the list, where the offer of a package cannot be loaded.
     """
     if options.name is not None:
-        return _one(options.what, options.name)
+        if options.what not in ("models", "schemes"):
+            raise refusal("NAME", options.name, "only models and schemes have more to show")
+        print(*in_full(options.what, options.name), sep="\n")
+        return 0
     if options.what == "schema":
         import json
 
@@ -51,24 +54,6 @@ def list_(options: Namespace) -> int:
         print(f"{name.ljust(width)}  {text}".rstrip())
     if faults:
         raise InputError(faults)
-    return 0
-
-
-def _one(what: str, name: str) -> int:
-    """Print one entry: all properties of a model or a scheme, or the line of another list."""
-    if what in ("models", "schemes"):
-        print(*in_full(what, name), sep="\n")
-        return 0
-    if what == "schema":
-        raise refusal("NAME", name, "the JSON Schema has no entries")
-    rows = [(key.strip(), text) for key, text in (checks() if what == "checks" else _experiments())]
-    matches = [row for row in rows if name in (row[0], row[0].rpartition("/")[2])]
-    if not matches:
-        known = [key for key, _ in rows]
-        names = [*known, *(key.rpartition("/")[2] for key in known if "/" in key)]
-        raise refusal("NAME", name, f"is not in the list of {what}", nearest(name, names))
-    for key, text in matches:
-        print(f"{key}: {text}")
     return 0
 
 

@@ -7,13 +7,10 @@ Source: vibration text (B), sections 4.1, 4.3 and 5.6, exercises 7 and 17; the f
 from __future__ import annotations
 
 import math
-import re
 from argparse import Namespace
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
 from fractions import Fraction
-from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from vibsim.cli.jobs.common import refusal
@@ -44,66 +41,63 @@ def theory(options: Namespace) -> int:
         rule = "chooses its own steps: there is no theory in w dt"
         raise refusal("SCHEME", scheme.kind, rule)
     chosen = _options(scheme, options.options)
-    print(*laid_out(theory_rows(scheme, chosen, options.terms, latex=options.latex)), sep="\n")
+    print(*laid_out(theory_rows(scheme, chosen, options.terms)), sep="\n")
     return 0
 
 
-def theory_rows(scheme: Scheme, options: Options, terms: int, *, latex: bool) -> Iterator[Row]:
+def theory_rows(scheme: Scheme, options: Options, terms: int) -> Iterator[Row]:
     """Yield the theory of a scheme with constant steps; each series has `terms` terms."""
     from vibsim.theory import operators, symbolic
 
-    stepper, notation = scheme.stepper(options), _Notation(latex)
-    write = notation.number
+    stepper = scheme.stepper(options)
     changed = (f"{k} = {v}" for k, v in options.items() if v != scheme.defaults()[k])
     yield "scheme", "; ".join((f"{scheme.kind}: {scheme.title}", *changed))
     yield "problem", "u'' + w^2 u = 0, u(0) = I, u'(0) = V; p = w dt"
     yield "stability limit", stable_until(scheme, options)
-    yield "roots", f"{_characteristic(operators.recurrence(stepper), notation)} = 0"
+    yield "roots", f"{_characteristic(operators.recurrence(stepper))} = 0"
     try:
-        yield from [*_series_rows(scheme, options, terms, notation)]
+        yield from [*_series_rows(scheme, options, terms)]
     except ValueError:
         reason = "the numerical frequency does not tend to w as dt tends to 0"
         yield "series", f"not written: {reason}, so the scheme is not one for this equation"
-    yield from _in_operators(stepper, notation)
+    yield from _in_operators(stepper)
     try:
         parts = symbolic.two_roots(stepper)
     except ValueError as reason:
         yield "solution", f"not written: {reason}"
         return
     yield "solution", "u_n = r^n (I cos(n th) + (u_1/r - I cos(th)) sin(n th)/sin(th)), with"
-    yield "", f"r = {write(parts.growth)}"
-    yield "", f"cos(th) = {write(parts.cosine)}"
-    yield "", f"u_1 = {notation.sum(zip(parts.first, ('I', 'V dt'), strict=True))}"
+    yield "", f"r = {_number(parts.growth)}"
+    yield "", f"cos(th) = {_number(parts.cosine)}"
+    yield "", f"u_1 = {_sum(zip(parts.first, ('I', 'V dt'), strict=True))}"
 
 
-def _series_rows(
-    scheme: Scheme, options: Options, terms: int, notation: _Notation
-) -> Iterator[Row]:
+def _series_rows(scheme: Scheme, options: Options, terms: int) -> Iterator[Row]:
     """Yield the results that are series in p; raise ValueError where the frequency does not tend to w."""
     from vibsim.theory import operators, symbolic
 
-    stepper, write = scheme.stepper(options), notation.number
+    stepper = scheme.stepper(options)
 
     def series(formula: Any) -> str:
-        return f"{write(formula)} + O({write(symbolic.symbol('p') ** (2 * terms))})"
+        return f"{_number(formula)} + O({_number(symbolic.symbol('p') ** (2 * terms))})"
 
     growth = series(symbolic.growth_series(stepper, terms))
     yield "amplitude", f"changes by the factor r = {growth} in each step"
     yield "frequency", f"w~/w = {series(symbolic.frequency_series(stepper, terms))}"
     early = series(symbolic.phase_error_series(stepper, terms))
     yield "phase", f"peaks come early by 1 - w/w~ = {early} of a period, in each period"
-    error, following = map(write, symbolic.error_series(stepper))
+    error, following = map(_number, symbolic.error_series(stepper))
     has_parasites = len(operators.recurrence(stepper)) > 3
     late = ", once parasitic roots have died out" if has_parasites else ""
     yield "error", f"u(t) - u_n = I ({error}) + O({following}) at a time t, for V = 0{late}"
-    yield "limits", _limits(scheme, options, stepper, notation)
+    yield "limits", _limits(scheme, options, stepper)
 
 
-def _limits(scheme: Scheme, options: Options, stepper: Stepper, notation: _Notation) -> str:
+def _limits(scheme: Scheme, options: Options, stepper: Stepper) -> str:
     """Return the limits of the numerical frequency for small steps and at the stability limit."""
     from vibsim.theory import roots, stability_limit, symbolic
 
-    small = f"w~/w -> {notation.number(symbolic.frequency_series(stepper, 1))} as p -> 0"
+    small = f"w~/w -> {_number(symbolic.frequency_series(stepper, 1))} as p -> 0"
     limit = stability_limit(scheme, options)
     if not 0.0 < limit < math.inf:
         return small
@@ -114,111 +108,86 @@ def _limits(scheme: Scheme, options: Options, stepper: Stepper, notation: _Notat
     return f"{small}; w~ dt -> {turned} and w~/w -> {angle / limit:.6g} as p -> {limit:.6g}"
 
 
-def _characteristic(factors: Sequence[Any], notation: _Notation) -> str:
+def _characteristic(factors: Sequence[Any]) -> str:
     """Return the characteristic polynomial in powers of x, without its zero roots."""
     from vibsim.theory.symbolic import symbol
 
     powers = [symbol("x") ** k for k in reversed(range(len(factors)))]
-    return notation.sum(zip(factors, [*map(notation.number, powers[:-1]), ""], strict=True))
+    return _sum(zip(factors, [*map(_number, powers[:-1]), ""], strict=True))
 
 
-def _in_operators(stepper: Stepper, notation: _Notation) -> Iterator[Row]:
+def _in_operators(stepper: Stepper) -> Iterator[Row]:
     """Yield the scheme in operator notation, without and with its velocity, and the definitions of the operators."""
     from vibsim.theory import operators
 
-    equation = notation.equation
     first, *others = operators.recurrence(stepper)
-    times = [notation.at("u", Fraction(1 - k)) for k in range(len(others) + 1)]
-    right = notation.sum(zip((-factor for factor in others), times[1:], strict=True))
-    yield "without v", f"{notation.sum([(first, times[0])])} = {right}"
-    rows = [equation(operators.without_velocity(stepper))]
+    times = [_at("u", Fraction(1 - k)) for k in range(len(others) + 1)]
+    right = _sum(zip((-factor for factor in others), times[1:], strict=True))
+    yield "without v", f"{_sum([(first, times[0])])} = {right}"
+    rows = [_equation(operators.without_velocity(stepper))]
     with suppress(ValueError):
-        rows.append(f"with all at one time: {equation(operators.at_one_time(stepper))}")
+        rows.append(f"with all at one time: {_equation(operators.at_one_time(stepper))}")
     yield from (("", row) for row in rows)
     with suppress(ValueError):
-        rows.append(", ".join(map(equation, operators.with_velocity(stepper))))
+        rows.append(", ".join(map(_equation, operators.with_velocity(stepper))))
         yield "with v", rows[-1]
-    definitions = {notation.operator(name): means for name, means in operators.NOTATION.items()}
-    if notation.is_latex:
-        braces = partial(re.sub, r"\^\(([^)]*)\)", r"^{\1}")
-        definitions = {name: braces(means) for name, means in definitions.items()}
-    used = [name for name in definitions if any(f"{name} " in row for row in rows)]
-    texts = (f"{notation.at(f'[{x} u]', Fraction(0))} = {definitions[x]}" for x in used)
+    used = [name for name in operators.NOTATION if any(f"{name} " in row for row in rows)]
+    texts = (f"[{name} u]^n = {operators.NOTATION[name]}" for name in used)
     yield "operators", "; ".join(texts)
 
 
-@dataclass(frozen=True)
-class _Notation:
-    """Formats formulas as plain text or as LaTeX."""
+def _number(formula: Any) -> str:
+    """Return a formula or a number as text."""
+    from sympy import sstr
 
-    is_latex: bool
+    written = str(sstr(_short(formula), order="rev-lex", full_prec=False))
+    return written.replace("**", "^").replace("*", " ")
 
-    def number(self, formula: Any) -> str:
-        """Return a formula or a number as text."""
-        from sympy import latex, sstr
 
-        write = latex if self.is_latex else sstr
-        written = str(write(_short(formula), order="rev-lex", full_prec=False))
-        return written if self.is_latex else written.replace("**", "^").replace("*", " ")
+def _sum(terms: Iterable[tuple[Any, str]]) -> str:
+    """Return a sum of terms, each a coefficient and a possibly empty factor; zero terms are left out."""
+    written = ""
+    for coefficient, factor in terms:
+        if coefficient == 0:
+            continue
+        number = _number(coefficient)
+        is_negative = number.startswith("-")
+        if is_negative:
+            number = _number(-coefficient)
+        if factor and number == "1":
+            number = ""
+        elif factor and not number.isalnum():
+            number = f"({number})"
+        sign = "-" if is_negative else "+"
+        written += f" {sign} " if written else sign.strip("+")
+        written += f"{number} {factor}".strip()
+    return written
 
-    def sum(self, terms: Iterable[tuple[Any, str]]) -> str:
-        """Return a sum of terms, each a coefficient and a possibly empty factor; zero terms are left out."""
-        written = ""
-        for coefficient, factor in terms:
-            if coefficient == 0:
-                continue
-            number = self.number(coefficient)
-            is_negative = number.startswith("-")
-            if is_negative:
-                number = self.number(-coefficient)
-            if factor and number == "1":
-                number = ""
-            elif factor and not number.isalnum():
-                number = f"({number})"
-            sign = "-" if is_negative else "+"
-            written += f" {sign} " if written else sign.strip("+")
-            written += f"{number} {factor}".strip()
-        return written
 
-    def at(self, quantity: str, shift: Fraction) -> str:
-        """Return a quantity at the time ``n + shift``."""
-        time = "n" + (f"{'+' if shift > 0 else '-'}{abs(shift)}" if shift else "")
-        if self.is_latex:
-            return f"{quantity}^{{{time}}}"
-        return f"{quantity}^{time if shift == 0 else f'({time})'}"
+def _at(quantity: str, shift: Fraction) -> str:
+    """Return a quantity at the time ``n + shift``."""
+    time = f"(n{'+' if shift > 0 else '-'}{abs(shift)})" if shift else "n"
+    return f"{quantity}^{time}"
 
-    def operator(self, name: str) -> str:
-        """Return the name of an operator."""
-        if not self.is_latex:
-            return name
-        head, _, index = name.partition("_")
-        if not index:
-            return rf"\mathrm{{{name}}}\,"
-        below = index.rstrip("+-")
-        above = index.removeprefix(below)
-        return f"{head}_{{{below}}}" + (f"^{{{above}}}" if above else "")
 
-    def equation(self, equation: Equation) -> str:
-        """Return an equation with operators, in one pair of brackets if all terms are at the same time."""
-        from vibsim.theory.symbolic import symbol
+def _equation(equation: Equation) -> str:
+    """Return an equation with operators, in one pair of brackets if all terms are at the same time."""
+    from vibsim.theory.symbolic import symbol
 
-        places = {term.place for side in equation for term in side}
+    places = {term.place for side in equation for term in side}
 
-        def text(term: Term) -> str:
-            names = [self.operator(name) for name in term.operators]
-            powers = (("w", term.powers[0]), ("dt", term.powers[1]))
-            scale = [self.number(symbol(name) ** power) for name, power in powers if power]
-            operand = " ".join((*names, term.of))
-            if len(places) > 1:
-                operand = self.at(f"[{operand}]" if names else term.of, term.place)
-            return " ".join((*scale, operand))
-
-        left, right = (
-            self.sum((term.factor, text(term)) for term in side) or "0" for side in equation
-        )
+    def text(term: Term) -> str:
+        powers = (("w", term.powers[0]), ("dt", term.powers[1]))
+        scale = [_number(symbol(name) ** power) for name, power in powers if power]
+        operand = " ".join((*term.operators, term.of))
         if len(places) > 1:
-            return f"{left} = {right}"
-        return self.at(f"[{left} = {right}]", places.pop())
+            operand = _at(f"[{operand}]" if term.operators else term.of, term.place)
+        return " ".join((*scale, operand))
+
+    left, right = (_sum((term.factor, text(term)) for term in side) or "0" for side in equation)
+    if len(places) > 1:
+        return f"{left} = {right}"
+    return _at(f"[{left} = {right}]", places.pop())
 
 
 def _short(formula: Any) -> Any:
