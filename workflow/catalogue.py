@@ -42,7 +42,7 @@ measured numbers, and `results/index.html` has those of every statement whose ex
 | badge | meaning |
 |---|---|
 | CONFIRMED | an experiment shows it: the check that is named behind it decides, or else all checks of the experiment |
-| CORRECTED | the text is wrong, or leaves a condition out. `Correct:` and italics are right, `Shown to be false:` is not |
+| CORRECTED | the text is wrong, or lacks a condition. `Correct:` and italics are right, `Shown to be false:` is not |
 | OPEN | something is missing, and the row says what |
 | PROVIDED | a command or a page does what the text asks for; nothing is measured |
 
