@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from contextlib import suppress
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self, get_args
 
@@ -234,9 +235,12 @@ def _order(value: Any) -> Any:
 
 
 def _level(value: Any) -> Any:
-    if value != "best" and not 0 <= whole(value) <= MAX_LEVEL:
-        raise refused(f"must be a level from 0 to {MAX_LEVEL}, or best")
-    return value if value == "best" else whole(value)
+    if value == "best":
+        return value
+    with suppress(PydanticCustomError):
+        if 0 <= whole(value) <= MAX_LEVEL:
+            return whole(value)
+    raise refused(f"must be a level from 0 to {MAX_LEVEL}, or best", likely(value, ["best"]))
 
 
 Order = Annotated[
