@@ -374,8 +374,8 @@ class ValueCheck(MeasuringCheck):
     at: At = At()
     """The scheme, member, level and time of the number."""
     over: Text | None = None
-    """The swept key over which the numbers of all members are reduced to one (see `take`), or `cases` if it is the only
-    one."""
+    """The swept key over which the numbers of all members are reduced to one (see `take`), or `cases`: the only one, or
+    all members."""
     take: Take | None = None
     """The reduction: the `largest`, the `smallest`, the `mean`, the value of the key `where_largest` (or `where`) or
     `where_smallest` occurs, or `monotone`: 1 if the numbers rise with the key, -1 if they fall, else 0."""

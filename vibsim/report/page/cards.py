@@ -164,7 +164,9 @@ def _got(check: Mapping[str, Any], wording: Wording, result: Result) -> str:
     if words.fact(decisive, "order") is not None and result.status != "INCONCLUSIVE":
         order, bounds = words.fact(decisive, "order"), words.interval_of(decisive)
         text = f"order {words.with_interval(order, bounds)}"
-        return f"{text}: its interval overlaps the band" if _is_beside(wording.check, check) else text
+        return (
+            f"{text}: its interval overlaps the band" if _is_beside(wording.check, check) else text
+        )
     if check["kind"] == "converges" or "order" in (decisive.get("facts") or {}):
         return reasons.OUTCOMES.get(result.reason, str(result.reason))
     return wording.brief(result)
