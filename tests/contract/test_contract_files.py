@@ -259,6 +259,7 @@ def test_summary_json_has_the_checks_in_the_order_of_the_file(runs: Runs) -> Non
     (result,) = found["checks"][0]["results"]
     assert (result["scheme"], result["case"]) == ("crank_nicolson", 0)
     assert fact(result, "order") == pytest.approx(2, abs=0.05)
+    assert fact(result, "promised") == 2
     assert list(fact(result, "levels")) == [6, 8]
     low, high = interval(result) or (0.0, 0.0)
     assert 1.9 < low <= fact(result, "order") <= high < 2.1

@@ -195,3 +195,28 @@ def test_a_ball_bounces_when_it_should() -> None:
     assert found.values(0) == [2.0]
     assert found.values(1)[0] == pytest.approx(first, rel=1e-12)
     assert found.values(2)[0] == pytest.approx(second, rel=1e-12)
+
+
+def test_the_cases_of_a_grid_have_one_number_together() -> None:
+    """A pendulum of small swings has the period 2 pi sqrt(L/g); a grid varies both."""
+    lengths, weights = [0.5, 2.0, 1.0], [1.0, 4.0]
+    periods = [2 * math.pi * math.sqrt(length / g) for length in lengths for g in weights]
+    row = {"value": "period", "over": "cases", "rtol": 1e-3}
+    content: Content = {
+        "model": {"kind": "linear_pendulum"},
+        "initial": {"theta": 0.1},
+        "time": {"end": 20.0},
+        "levels": [8, 9, 10],
+        "schemes": ["rk4"],
+        "sweep": {"model.L": lengths, "model.g": weights},
+        "checks": [
+            {**row, "take": "largest", "equals": max(periods)},
+            {**row, "take": "smallest", "equals": min(periods)},
+            {**row, "take": "mean", "equals": sum(periods) / 6},
+            {**row, "take": "largest", "at": {"model.g": 4.0}, "equals": max(periods[1::2])},
+        ],
+    }
+    found = outcome(content)
+    assert found.reasons() == [("PASS", "match")] * 4
+    assert "model.L = 2, model.g = 1" in found.verdicts[0].text
+    assert [verdict.results[0].case for verdict in found.verdicts[:2]] == [2, 1]

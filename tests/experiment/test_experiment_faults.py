@@ -424,7 +424,7 @@ CASES: list[tuple[dict[str, Any], str, str, str]] = [
     (check(value="period", equals=6, rtol=-1), "checks[0].rtol", "must be at least 0", ""),
     (value(below=float("nan")), "checks[0].below", "finite", ""),
     (value(at={"level": 10}), "checks[0].at.level", "not a level of this", "nearest is 9"),
-    (value(at={"level": "top"}), "checks[0].at.level", "must be a whole number", ""),
+    (value(at={"level": "bset"}), "checks[0].at.level", "from 0 to 40, or best", "'best'"),
     (value(at={"level": 41}), "checks[0].at.level", "from 0 to 40", ""),
     (
         value(value="max_abs_interior", quantity="energy_deviation", at={"level": "best"}),

@@ -228,8 +228,8 @@ def test_an_unknown_name_of_an_equation_is_told_the_nearest_or_where_its_value_b
         ),
         (
             "model: {kind: pendulum}\ninitial: {theta: 1}\nsweep: {model.L: [1, 2], model.g: [1, 2]}\n"
-            "checks: [{value: period, over: cases, take: largest, below: 20}]",
-            "checks[0].over: cases: stands for the only swept key: choose from model.L, model.g",
+            "checks: [{value: period, over: cases, take: monotone, equals: 1}]",
+            "checks[0].over: cases: needs a swept key with this `take`: choose from model.L, model.g",
         ),
     ],
 )  # fmt: skip

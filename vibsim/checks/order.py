@@ -79,7 +79,7 @@ FIELDS = {
     **ERROR,
 }
 OTHER_FACTS = {
-    "expected": Field("order that is expected; none where the quantity is to be exact"),
+    "promised": Field("order that is expected; none where the quantity is to be exact"),
     "best": Field("the number extrapolated over the levels; none of a series"),
     "best_bound": Field("bound of its error"),
 }
@@ -122,7 +122,7 @@ def judge(experiment: Experiment, record: Record, check: ConvergesCheck, facts: 
     """Compare the verdict on a quantity with the expected verdict, for each scheme and member."""
     reason, order = facts["reason"], expected_order(experiment, record, check)
     unknown = np.full((1, 1), np.nan)
-    others: dict[str, Floats] = {"expected": order, "best": unknown, "best_bound": unknown}
+    others: dict[str, Floats] = {"promised": order, "best": unknown, "best_bound": unknown}
     return Judged(
         reason,
         # an exact quantity has no distance from an order

@@ -28,7 +28,7 @@ from vibsim.core.record import Record
 from vibsim.core.vocabulary import LEVELS_OF_AN_ORDER
 from vibsim.experiment import Experiment
 from vibsim.experiment.schema.checks import ValueCheck
-from vibsim.experiment.value_names import OF_ONE_MEMBER
+from vibsim.experiment.value_names import CASES, OF_ONE_MEMBER
 
 FACTS: Mapping[str, Field] = {
     "low": Field("least value that the reduced number can have"),
@@ -210,7 +210,9 @@ def _reduced(
 
 
 def _key(record: Record, check: ValueCheck) -> Floats:
-    """Return the swept values over which the numbers are taken, shape (case,)."""
+    """Return the swept values over which the numbers are taken, shape (case,); NaN over all members."""
+    if check.over == CASES:
+        return np.full(len(record["case"]), np.nan)
     return np.asarray(columns_of(record)[str(check.over)], dtype=np.float64)
 
 
@@ -251,6 +253,12 @@ def describe(f: MemberFacts, check: ValueCheck) -> Description:
 
 def _at(f: MemberFacts, check: ValueCheck, case: int) -> str:
     """Name a member by its swept value and, on a curve that goes up and down, by its branch."""
+    if check.over == CASES:
+        swept = ((name, values[case]) for name, values in columns_of(f.record).items())
+        return ", ".join(
+            f"{name} = {f.notation.number(x, 8) if isinstance(x, float) else x}"
+            for name, x in swept
+        )
     key = _key(f.record, check)
     here = f"{check.over} = {f.notation.number(float(key[case]), 8)}"
     sweep = f.experiment.sweep

@@ -4,7 +4,8 @@
 - ``coordinates`` with their formulas, ``{x: {mass: 2, force: -x}}``, become a list and the formulas by name;
 - ``stop`` and ``events`` outside of the section ``model`` move into it;
 - ``M``, ``C`` and ``K`` of a structure become ``mass``, ``damping`` and ``stiffness``;
-- ``over: cases`` of a check becomes the only swept key, and ``take: where`` becomes ``where_largest``.
+- ``over: cases`` of a check becomes the only swept key, if only one varies, and ``take: where`` becomes
+  ``where_largest``.
 """
 
 from __future__ import annotations
@@ -157,12 +158,14 @@ def _with_swept_key(check: Any, sweep: Any) -> Any:
         result["take"] = "where_largest"
     if check.get("over") == "cases" and isinstance(sweep, Mapping):
         fixed = check["at"] if isinstance(check.get("at"), Mapping) else {}
-        zipped = sweep.get("zip")
+        zipped, sample = sweep.get("zip"), sweep.get("sample")
         keys = [key for key in sweep if "." in str(key) and key not in fixed]
+        if isinstance(sample, Mapping) and isinstance(sample.get("over"), Mapping):
+            keys += list(sample["over"])
         if isinstance(zipped, Mapping) and not zipped.keys() & fixed.keys():
             # keys that vary together count as one
             keys += list(zipped)[:1]
-        if len(keys) == 1:
+        if len(keys) == 1 and not str(keys[0]).startswith("schemes."):
             result["over"] = keys[0]
     return result
 

@@ -16,6 +16,8 @@ OF_ONE_MEMBER = (None, "largest", "smallest")
 """Reductions that pick the number of one member."""
 OF_THE_SAME_KIND = (*OF_ONE_MEMBER, "mean")
 """Reductions with the unit of a member's number. The others give swept values or directions."""
+CASES = "cases"
+"""What a number is taken over that needs no swept key: all members."""
 MOST_EVENTS = 512
 """Largest number of event times stored per scheme and member."""
 

@@ -181,7 +181,7 @@ def test_what_meets_no_event_has_the_order_of_a_smooth_motion(events: str) -> No
     for order in ("scheme", 2):
         (first,) = (row for row in asked[order] if row.case == 0)
         assert (first.status, first.reason) == ("PASS", "asymptotic")
-    expected = {row.case: row.facts["expected"] for row in asked["scheme"]}
+    expected = {row.case: row.facts["promised"] for row in asked["scheme"]}
     assert expected == {0: 2.0, 1: 1.0}
 
 

@@ -25,7 +25,7 @@ from vibsim.experiment.schema.checks import (
     ValueCheck,
 )
 from vibsim.experiment.schema.published import row_at, row_id
-from vibsim.experiment.value_names import VALUES, Value
+from vibsim.experiment.value_names import CASES, OF_THE_SAME_KIND, VALUES, Value
 from vibsim.experiment.yaml.parse import Path_
 from vibsim.models import BUDGET, centred, has_budget, has_solution
 from vibsim.models.base import Model, error_parts, has_error_parts
@@ -264,17 +264,18 @@ def _check_reduction(check: ValueCheck, scope: Scope) -> None:
         return
     axes = scope.setting.sweep.axes
     keys = [key for axis in axes for key in axis.keys if not key.startswith("schemes.")]
-    if check.over not in keys:
+    is_of_all = check.over == CASES and check.take in OF_THE_SAME_KIND and bool(axes)
+    if check.over not in keys and not is_of_all:
         rule = "is not a swept key with numbers"
         hint = nearest(check.over, keys) if keys else "there is no sweep of numbers"
-        if check.over == "cases" and keys:
-            rule, hint = "stands for the only swept key", f"choose from {', '.join(keys)}"
+        if check.over == CASES and keys:
+            rule, hint = "needs a swept key with this `take`", f"choose from {', '.join(keys)}"
         scope.at("over").refuse(rule, hint, check.over)
         return
     if check.at.case is not None or check.over in check.at.swept:
         scope.at("over").refuse("is fixed by `at:`", "leave one of them out", check.over)
         return
-    for axis in axes:
+    for axis in () if is_of_all else axes:
         fixed = set(axis.keys) & set(check.at.swept)
         if check.over in axis.keys:
             if fixed:

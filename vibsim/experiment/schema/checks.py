@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from contextlib import suppress
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self, get_args
 
@@ -234,9 +235,12 @@ def _order(value: Any) -> Any:
 
 
 def _level(value: Any) -> Any:
-    if value != "best" and not 0 <= whole(value) <= MAX_LEVEL:
-        raise refused(f"must be a level from 0 to {MAX_LEVEL}, or best")
-    return value if value == "best" else whole(value)
+    if value == "best":
+        return value
+    with suppress(PydanticCustomError):
+        if 0 <= whole(value) <= MAX_LEVEL:
+            return whole(value)
+    raise refused(f"must be a level from 0 to {MAX_LEVEL}, or best", likely(value, ["best"]))
 
 
 Order = Annotated[
@@ -370,8 +374,8 @@ class ValueCheck(MeasuringCheck):
     at: At = At()
     """The scheme, member, level and time of the number."""
     over: Text | None = None
-    """The swept key over which the numbers of all members are reduced to one (see `take`), or `cases` if it is the only
-    one."""
+    """The swept key over which the numbers of all members are reduced to one (see `take`), or `cases`: the only one, or
+    all members."""
     take: Take | None = None
     """The reduction: the `largest`, the `smallest`, the `mean`, the value of the key `where_largest` (or `where`) or
     `where_smallest` occurs, or `monotone`: 1 if the numbers rise with the key, -1 if they fall, else 0."""

@@ -172,7 +172,7 @@ def against_step(record: Record, lead: Lead) -> Picture | None:
     _legend(ax, columns=2, size=7.5)
     title, found = "Error against time step", findings.factor(lead)
     if found is not None:
-        due = words.fact(lead.result, "expected")
+        due = words.fact(lead.result, "promised")
         is_other = lead.result["reason"] != "asymptotic" and due is not None
         missed = f", not by {2.0**due:.3g}" if is_other else ""
         of = f" of {lead.member.scheme_name}" if others else ""

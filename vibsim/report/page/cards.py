@@ -90,7 +90,7 @@ def card(experiment: Experiment, record: Record, check: Mapping[str, Any]) -> di
     text = words.swept(wording.text(result, counts, check["where"]))
     if _is_said(asserted, check):
         text = _hardest(record, check)
-    wanted = assertions.wanted(experiment, measured, words.fact(decisive, "expected"))
+    wanted = assertions.wanted(experiment, measured, words.fact(decisive, "promised"))
     results, more = _results(record, check, unit)
     return {
         "id": check["id"],
@@ -140,7 +140,7 @@ def _is_said(asserted: Check | None, check: Mapping[str, Any]) -> bool:
 
 def _is_beside(asserted: Check | None, check: Mapping[str, Any]) -> bool:
     """Return whether a check passed whose order misses the expected one, because its interval reaches that."""
-    order, wanted = (words.fact(check["results"][0], name) for name in ("order", "expected"))
+    order, wanted = (words.fact(check["results"][0], name) for name in ("order", "promised"))
     if asserted is None or check["status"] != "PASS" or None in (order, wanted):
         return False
     return abs(order - wanted) > getattr(asserted.measured, "tolerance", math.inf) and not is_trap(

@@ -10,6 +10,7 @@ from vibsim.checks.value import what
 from vibsim.checks.verdict_text import expectation, expected_verdict
 from vibsim.core.record import Record
 from vibsim.core.vocabulary import TYPICAL_NORM
+from vibsim.experiment.value_names import CASES
 from vibsim.report import data, words
 from vibsim.report.text.reasons import OUTCOMES
 from vibsim.report.types import Check, Experiment, Measurement
@@ -121,7 +122,7 @@ def subject(check: Measurement, record: Record | None = None) -> str:
     parts = [_place(record, key, value) for key, value in places if value is not None]
     where = words.swept(", ".join([*parts, *swept_values(check)]))
     if check.take is not None:
-        statement = f"{IN_WORDS[check.take]} {statement} over {check.over}"
+        statement = f"{IN_WORDS[check.take]} {statement} over {'all members' if check.over == CASES else check.over}"
     statement = f"{statement}{(f' ({where})' if is_sampled else f' at {where}') if where else ''}"
     return statement.replace("level best", "the limit of the levels")
 

@@ -191,7 +191,7 @@ def _check_title(experiment: Experiment, record: Record, lead: Lead) -> str:
 def _phrases(experiment: Experiment, record: Record, lead: Lead) -> dict[str, str]:
     """Return the words that fill the template of a title."""
     measured, what = lead.measured, _in_words(experiment, lead.quantity)
-    order, expected = lead.facts.get("order"), lead.facts.get("expected")
+    order, expected = lead.facts.get("order"), lead.facts.get("promised")
     judged = _named_schemes(record, lead)
     filled = {
         "what": what, "What": _capitalized(what), "everywhere": _everywhere(record, lead),
@@ -344,7 +344,7 @@ def paragraph(experiment: Experiment, record: Record, lead: Lead, levels: int) -
         distance = data.coincidence(record, lead.quantity, lead.member)
         is_rough = distance > COINCIDE or (deviation is not None and deviation > COINCIDE)
         percent = "" if deviation is None else words.number(max(100.0 * deviation, 0.1), "brief")
-        order = words.fact(lead.result, "expected")
+        order = words.fact(lead.result, "promised")
         due = f" (order {order:g} predicts {2.0**order:.3g})" if order else ""
         return CONVERGES.format(
             factor=f"{ratio:.3g}",
