@@ -23,8 +23,9 @@ from synthetic import TOLERANCE, Group, groups
 from synthetic import Ladder as Truth
 
 from vibsim.comparison import order_verdict
-from vibsim.convergence.assessment import Question, assess
+from vibsim.convergence.assessment import assess
 from vibsim.convergence.error_model.ladder import Ladder
+from vibsim.convergence.question import Question
 from vibsim.core.vocabulary import REASON_NAMES, REASONS
 
 HEAD = """\

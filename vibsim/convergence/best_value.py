@@ -13,12 +13,12 @@ from vibsim.elementary import on_arrays
 
 
 def best_value(
-    ladder: Ladder, posterior: Posterior, exact: Flags, factors: Floats
+    ladder: Ladder, posterior: Posterior, only_noise: Flags, factors: Floats
 ) -> dict[str, Floats]:
     """Return the best value and the error of the finest level, with bounds; see `assessment.Assessment`.
 
     Three levels are extrapolated by their own order; more levels have the mean over likely expansions. Where levels
-    differ by noise alone (`exact`), the finest level is the best value.
+    differ by noise alone, the finest level is the best value. `factors` are those of `ladder_blocks`.
     """
     n = len(ladder.h)
     limit = posterior.limit_weights
@@ -32,8 +32,8 @@ def best_value(
         shift = np.stack([np.zeros_like(step), step], axis=-1) - limit
         variance = variance + _square(shift, differences)
         limit = limit + shift
-    limit = np.where(exact[:, None], 0.0, limit)
-    variance = np.where(exact, differences[:, -1, -1], variance)
+    limit = np.where(only_noise[:, None], 0.0, limit)
+    variance = np.where(only_noise, differences[:, -1, -1], variance)
     weights = np.zeros((len(limit), n))
     weights[:, -1] = 1.0
     weights[:, :-1] += limit * factors

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from vibsim.convergence.error_model.posterior import Posterior
+from vibsim.convergence.question import Question
 from vibsim.convergence.thresholds import ORDER_INTERVAL, THREE_DECIDE
 from vibsim.core.array_types import Flags, Floats, Integers
 from vibsim.core.vocabulary import ORDER_TOLERANCE
@@ -13,15 +14,13 @@ OUTSIDE = 0.5 * (1.0 - ORDER_INTERVAL)
 """Probability that the order lies below its interval, and that it lies above."""
 
 
-def sides(
-    p: Posterior, expected: float | None, at_least: float | None, tolerance: float
-) -> tuple[Floats, Floats, Floats]:
+def sides(p: Posterior, question: Question) -> tuple[Floats, Floats, Floats]:
     """Return the probabilities that a lower, an expected and a higher power dominates."""
-    margin = tolerance + 1e-9
-    if expected is not None:
-        least, most = expected - margin, expected + margin
-    elif at_least is not None:
-        least, most = at_least - margin, np.inf
+    margin = question.tolerance + 1e-9
+    if question.expected is not None:
+        least, most = question.expected - margin, question.expected + margin
+    elif question.at_least is not None:
+        least, most = question.at_least - margin, np.inf
     else:
         # any order will do: take the most probable neighbourhood
         right = np.max(_sums_near(p.dominant, p, margin), axis=-1)
@@ -33,7 +32,7 @@ def sides(
     first, second = p.pairs.T
     lower = lower + np.sum(p.mixed[:, second < least], axis=-1)
     higher = higher + np.sum(p.mixed[:, first > most], axis=-1)
-    if expected is None:
+    if question.expected is None:
         right = right + np.sum(p.mixed[:, first >= least], axis=-1)
     return lower, right, higher
 

@@ -17,7 +17,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vibsim.convergence.assessment import Decision, Question, decide
+from vibsim.convergence.assessment import Decision, decide
 from vibsim.convergence.differences import local_orders, safe_ratio
 from vibsim.convergence.error_model.ladder import Ladder
 from vibsim.convergence.hidden_order import is_promise_hidden
@@ -34,6 +34,7 @@ from vibsim.convergence.ladder_facts import (
     truly_exact,
     unresolved,
 )
+from vibsim.convergence.question import Question
 from vibsim.convergence.reasons import STATUS_OF, code, first_reason, is_one_of, is_open
 from vibsim.convergence.thresholds import HALF_SPACING, ORDINARY_ORDER
 from vibsim.core.array_types import Codes, Flags, Floats, Integers

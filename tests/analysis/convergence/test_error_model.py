@@ -15,7 +15,7 @@ from synthetic import EPSILON, TOLERANCE, Group, groups
 from thinned import thinned
 
 from vibsim.convergence import assessment, likely_powers
-from vibsim.convergence.assessment import Assessment, Decision, Question, assess, decide
+from vibsim.convergence.assessment import Assessment, Decision, assess, decide
 from vibsim.convergence.error_model import kernel, likelihood, priors
 from vibsim.convergence.error_model.hypotheses import ExpectedOrder, hypotheses_of
 from vibsim.convergence.error_model.ladder import Ladder
@@ -28,6 +28,7 @@ from vibsim.convergence.error_model.matrices import (
     packed,
 )
 from vibsim.convergence.error_model.posterior import MOST_HYPOTHESES, MOST_TABLES, posterior
+from vibsim.convergence.question import Question
 from vibsim.core.array_types import Floats
 from vibsim.core.vocabulary import REASON_NAMES, REASONS
 

@@ -8,8 +8,9 @@ from decimal import Decimal
 
 import numpy as np
 
-from vibsim.convergence.assessment import DECIDED, Assessment, Question, assess
+from vibsim.convergence.assessment import DECIDED, Assessment, assess
 from vibsim.convergence.differences import orders_of_steps
+from vibsim.convergence.question import Question
 from vibsim.convergence.reasons import is_one_of
 from vibsim.convergence.study.measurement import (
     SINGLE,
@@ -242,9 +243,7 @@ def _with_finite(
         )
     assessment = None
     if len(finite) >= LEVELS_OF_AN_ORDER:
-        question = Question(request.order, request.at_least)
-        if request.noise:
-            question = question.with_stated_noise
+        question = Question(request.order, request.at_least, is_noise_stated=bool(request.noise))
         assessment = assess(judged_measured.ladder, question)
         if not request.noise:
             half = np.array([request.halves(rows, finite[judged]) for rows in judged_values])
@@ -283,7 +282,7 @@ def _allow_for_rounding(
     # rounding errors are uniformly distributed within half a unit
     rounding = (half / math.sqrt(3.0) / measured.scale[:, None])[rows]
     ladder = replace(ladder, floor=np.maximum(ladder.floor, rounding))
-    rounded = assess(ladder, question.with_stated_noise)
+    rounded = assess(ladder, replace(question, is_noise_stated=True))
     agrees = rounded.reason == assessment.reason[rows]
     assessment.low[rows] = np.fmin(assessment.low[rows], rounded.low)
     assessment.high[rows] = np.fmax(assessment.high[rows], rounded.high)
