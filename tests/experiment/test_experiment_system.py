@@ -102,8 +102,16 @@ JOINED = {"coordinates": ["x", "y"], "force": {"x": "2*y - 3*x + cos(t)", "y": "
 TURNED = {"coordinates": ["x", "y"], "force": {"x": "-x - 0.3*y", "y": "-y + 0.3*x"}}
 
 
+UNEQUAL = {"coordinates": ["x", "y"], "acceleration": {"x": "(y - 3*x)/2", "y": "x - y - vy"}}
+
+
 @pytest.mark.parametrize(
-    ("model", "potential"), [(HELD, "k*u**2/2"), (JOINED, "3*(x**2 + y**2)/2")]
+    ("model", "potential"),
+    [
+        (HELD, "k*u**2/2"),
+        (JOINED, "3*(x**2 + y**2)/2"),
+        (UNEQUAL, "x**2 + (y - x)**2/2"),
+    ],
 )
 def test_a_potential_that_is_not_that_of_the_forces_is_noted(model, potential):
     ((_, note),) = read({**model, "potential": potential}, initial={}).notes

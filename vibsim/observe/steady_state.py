@@ -8,7 +8,9 @@ With n + 1 samples ``u_j`` of the period, at ``t_j = T - P + j P/n``, and half t
 
 where the end T is a whole number of periods P = 2 pi/w, so that ``w t_j = 2 pi j/n`` modulo 2 pi. For a periodic motion
 the sum is exact apart from the harmonics n - 1, n + 1, ..., which are smaller than any power of the sampling step.
-Every level uses all its samples: with the few common ones these harmonics would not be negligible.
+Every level uses all its samples, but no more than a finer level has: with the few common ones these harmonics would not
+be negligible, and what is left of the start adds an error of second order in the sampling step, which must fall from
+level to level.
 
 Source: A. H. Nayfeh, D. T. Mook, Nonlinear Oscillations (Wiley, 1979), section 4.1, for the response of driven
 oscillators; L. N. Trefethen, J. A. C. Weideman, The exponentially convergent trapezoidal rule, SIAM Review 56 (2014)
@@ -48,8 +50,9 @@ def harmonic(block: MemberBlock, level: int, quantity: str, back: int = 0) -> Co
     record, n = block.records[level], samples_a_period(block)
     if quantity not in record or n == 0 or len(block.grid.t) - back * n <= n:
         return np.full(block.shape, np.nan, dtype=np.complex128)
-    n *= block.grid.strides[block.grid.levels.index(level)]
-    series = take_all(block.grid, record, quantity)
+    strides = block.grid.strides[block.grid.levels.index(level) :]
+    n *= min(strides)
+    series = take_all(block.grid, record, quantity)[..., :: strides[0] // min(strides)]
     stop = series.shape[-1] - back * n
     samples = series[..., stop - n - 1 : stop]
     angle = 2.0 * np.pi / n * np.arange(n + 1)

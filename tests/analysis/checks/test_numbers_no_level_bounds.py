@@ -282,3 +282,24 @@ def test_a_number_rests_on_the_levels_behind_one_that_broke_down() -> None:
     ).verdicts
     assert (best.status, coarsest.reason) == ("PASS", "non_finite")
     assert "from the levels finer than 2, which broke down" in best.text
+
+
+def test_levels_that_store_fewer_samples_leave_a_bound_of_a_steady_motion() -> None:
+    """The finest level stores the times of the coarsest one, and the other one all of its own."""
+    content = {
+        **DRIVEN,
+        "time": {"periods": 8, "steps_per_period": 64, "frequency": "model.parameters.w"},
+        "levels": [1, 2, 3],
+        "sweep": {"model.parameters.w": {"linspace": [0.5, 3.0, 60]}},
+    }
+    checks = [
+        {"id": name, "value": f"steady_{name}", "quantity": "u", "below": 1e9, **BEST}
+        for name in ("amplitude", "phase")
+    ]
+    record = run(content, *checks).record
+    w = np.asarray(record["model_parameters_w"])
+    exact = 1.0 / (1.0 - w**2 + 0.1j * w)
+    for name, number in (("amplitude", np.abs(exact)), ("phase", -np.angle(exact))):
+        away = np.abs(record[f"check_{name}_value"][0] - number)
+        away = np.minimum(away, 2 * np.pi - away) if name == "phase" else away
+        assert np.all(away <= record[f"check_{name}_error_bound"][0])

@@ -64,7 +64,8 @@ def note_potential(model: Model, parameters: Mapping[str, float], report: Report
 
     At rest the derivative of the power dE/dt with respect to the velocities is grad V - F. If its Jacobian with respect
     to the positions is symmetric and not 0, the remaining forces have a potential, which V lacks. Damping, driving,
-    constant forces, and forces without a potential do not satisfy this.
+    constant forces, and forces without a potential do not satisfy this. Nor do accelerations of unequal masses with the
+    potential of their forces: there every row of grad V is a multiple of that of -F.
     """
     x, v = model.positions, model.velocities
     energy = tree(model, model.potential_energy)
@@ -86,13 +87,18 @@ def note_potential(model: Model, parameters: Mapping[str, float], report: Report
     with np.errstate(invalid="ignore"):
         is_symmetric = np.abs(remaining - np.swapaxes(remaining, 0, 1)) <= AGREE * size
         is_nonzero = np.abs(remaining) > AGREE * size
+        stiffness = (curvature - remaining)[..., is_known]
+        squares = np.sum(stiffness**2, axis=(1, 2), keepdims=True)
+        mass = np.sum(curvature[..., is_known] * stiffness, axis=(1, 2), keepdims=True) / squares
+        away = np.abs(curvature[..., is_known] - np.where(squares > 0.0, mass * stiffness, 0.0))
+        is_of_masses = np.all(away <= AGREE * size[is_known]) and np.all(mass[squares > 0.0] > 0.0)
     if (
         is_known.any()
-        and is_symmetric[..., is_known].all()
+        and (is_symmetric[..., is_known].all() or is_of_masses)
         and is_nonzero[..., is_known].all(axis=-1).any()
     ):
         rule = "does not give the forces, so the energy changes even without damping"
-        hint = "leave it out, and vibsim finds it where it can; beside `acceleration` masses are 1"
+        hint = "beside `acceleration` masses are 1: write `force` and `mass`, and vibsim finds it where it can"
         report.note(("model", "potential"), rule, hint)
 
 
