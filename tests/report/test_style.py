@@ -16,7 +16,7 @@ from vibsim import report
 from vibsim.report import style
 from vibsim.report.data import Member
 from vibsim.report.evidence import frame
-from vibsim.report.figures import drawing, time
+from vibsim.report.figures import drawing, panels, time
 from vibsim.report.page.templates import TEMPLATES
 
 VALUES = st.lists(
@@ -243,3 +243,14 @@ def test_no_two_ticks_of_an_axis_read_alike(low, wide, most):
         frame.scale(ax, np.array([low, high]))
         formatter, places = ax.yaxis.get_major_formatter(), ax.get_yticks()
         assert len(set(formatter.format_ticks(places))) == len(places)
+
+
+def test_what_rises_from_nothing_and_fades_has_no_axis_over_sixty_decades():
+    t = np.linspace(0.0, 20.0, 401)
+    bump = np.exp(-20.0 * (t - 3.0) ** 2) + 1e-9
+    bump[:10] = 1e-68
+    low, high = panels.decades([bump])
+    assert low > 1e-13 * high
+    # what grows without bound begins at its initial size
+    low, high = panels.decades([np.exp(20.0 * t)])
+    assert (low, high) == pytest.approx((np.exp(20.0 * t[1]) / 2, 2 * np.exp(400.0)))

@@ -549,3 +549,13 @@ def test_both_ways_of_a_followed_path_are_in_the_legends():
                 legend = picture.figure.axes[0].get_legend()
                 texts = [text.get_text() for text in legend.get_texts()]
                 assert {sweep_layout.UP, sweep_layout.DOWN} <= set(texts), picture.name
+
+
+def test_a_tiny_number_has_its_power_of_ten_in_the_label():
+    """It stood over the title."""
+    exp = samples.experiment(sweep={"initial.theta": [1e-9, 2e-9]})
+    views, _ = samples.views(exp, samples.record(exp), "theta")
+    ax = views["amplitude"].picture.figure.axes[0]
+    ax.figure.draw_without_rendering()
+    assert ax.get_ylabel() == "amplitude [10⁻⁹ rad]"
+    assert ax.yaxis.get_major_formatter().get_offset() == ""

@@ -14,6 +14,10 @@ from vibsim.report.types import Axes, Figure
 
 LOG_RATIO = 1e6
 """Curves whose largest value exceeds this multiple of the median are drawn on a logarithmic scale."""
+STILL_GROWS = 0.9  # part of the time after which a largest value means that values still grow
+DEEPEST = (
+    1e-12  # smallest part of the largest value on a logarithmic axis of values that do not grow
+)
 LOG_SPREAD = 8.0  # ratio of largest to smallest spread above which their scale is logarithmic
 LONG_LABEL = 36  # characters; longer labels have the unit on a second line
 LEGEND_COLUMNS = 7  # most columns of a legend above panels
@@ -190,10 +194,15 @@ def explosive(series: list[Floats]) -> bool:
 
 
 def decades(series: list[Floats]) -> tuple[float, float]:
-    """Return limits of a logarithmic axis over growing values, from their initial size."""
+    """Return limits of a logarithmic axis over growing values, from their initial size.
+
+    Values that are largest before the end did not grow from their initial size, which may be of any smallness.
+    """
     sizes = _sizes(series)
     high = min(max(float(s.max()) for s in sizes), style.LARGEST)
     low = min(float(s[:2].max()) for s in sizes)
+    if all(np.argmax(s) < STILL_GROWS * s.size for s in sizes):
+        low = max(low, DEEPEST * high)
     return max(min(low, high) / 2, style.TINIEST), 2 * high
 
 

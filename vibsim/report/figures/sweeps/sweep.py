@@ -340,8 +340,13 @@ def _draw_numbers(
         dashes = "none" if has_dots else style.look(curve.number)["linestyle"]
         text = curve.text or f"level {level}"
         _line(ax, curve.x, value, linestyle=dashes, linewidth=1.0, label=text, **look)
-    ax.set_ylim(*_room(number, exact))
-    ax.set_ylabel(style.label(number.name, number.unit))
+    low, high = _room(number, exact)
+    ax.set_ylim(low, high)
+    # in the label, since matplotlib would write a power of ten over the title
+    exponent = style.scale(np.array([low, high]))
+    if exponent:
+        ax.yaxis.set_major_formatter(lambda x, _: words.number(x / 10.0**exponent, "step"))
+    ax.set_ylabel(style.label(number.name, number.unit, exponent))
     ax.set_title(title or f"{number.name.capitalize()}, level {level}")
     _beside(ax, along, fontsize=7.5 if style.crowded(record) else 8)
     return ""
