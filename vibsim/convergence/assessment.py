@@ -23,7 +23,7 @@ levels finer than the window contradict it (`_is_contradicted`).
 the probability must exceed ``1 - RISK_OF_THREE`` for a FAIL, and for a PASS that no exact solution confirms: three
 levels may fall like a power by accident. *Measured* means that the order of the finest levels is nearer to the expected
 one than to the next order of an expansion: levels may by accident fit two powers, the weaker of which shifts the
-measured order by more than that.
+measured order by more than that. If no order is expected, it must be that near to the most probable power.
 
 Noise that is predicted to grow may not do so. If predicted noise ends the window, and the finest differences show that
 it may be far smaller, the ladder is also judged with less noise (`_with_less_noise`). A verdict is then sure if it is
@@ -46,6 +46,7 @@ from vibsim.convergence.likely_powers import (
     OUTSIDE,
     finest_order,
     interval,
+    likely_power,
     likely_window,
     most_near_a_power,
     rests_on_three,
@@ -101,15 +102,17 @@ class Question:
     may_be_exact: bool = True
     """Whether levels that differ by noise only are exact; otherwise the caller decides that."""
 
-    def is_met_by(self, order: Floats) -> Flags:
+    def is_met_by(self, order: Floats, likely: Floats) -> Flags:
         """Say which measured orders are nearer to the expected one than to the next order of an expansion.
 
-        Orders of expansions are 0.5 apart, those that theory promises are 1 apart.
+        Orders of expansions are 0.5 apart, those that theory promises are 1 apart. Where any order will do, the most
+        probable power, `likely`, counts as the expected one.
         """
         margin = max(self.tolerance, (2.0 if self.by_theory else 1.0) * HALF_SPACING)
-        if self.expected is not None:
-            return np.asarray(np.abs(order - self.expected) <= margin)
-        return np.asarray(order >= (self.at_least or -np.inf) - margin)
+        if self.expected is None and self.at_least is not None:
+            return np.asarray(order >= self.at_least - margin)
+        target = likely if self.expected is None else self.expected
+        return np.asarray(np.abs(order - target) <= margin)
 
     @property
     def with_stated_noise(self) -> Question:
@@ -387,7 +390,7 @@ def _reasons(e: _Evaluation, missed: Flags) -> Codes:
         (e.only_noise, "exact"),
         (
             (right > 1.0 - (RISK if e.exact_known else risk))
-            & e.question.is_met_by(e.order)
+            & e.question.is_met_by(e.order, likely_power(p))
             & decidable,
             "asymptotic",
         ),
