@@ -83,6 +83,22 @@ def test_a_finest_level_copied_from_the_one_before_does_not_pass(
     assert (same in verdict.sentence) == (rounding == 0.0)
 
 
+@pytest.mark.parametrize("power", [1, 2])
+def test_an_order_far_from_the_measured_one_does_not_pass_either_if_none_is_expected(
+    power: int,
+) -> None:
+    """The finest level ran with another step than the one stated: order 1 passed with a measured order of 0.38."""
+    x, true = np.linspace(0.0, 1.0, 21), [0.1 * 0.5**k for k in range(5)]
+    shape, other = np.sin(2.0 * x), np.cos(4.0 * x)
+    values = [np.cos(x) + shape * k**power + 0.02 * other * k ** (power + 1) for k in true]
+    assert judge(true, values).status == "PASS"
+    stated = [*true[:-1], 1.3 * true[-1]]
+    verdict = judge(stated, values)
+    assert verdict.order is not None
+    assert verdict.order < power - 0.4
+    assert (verdict.status, verdict.reason) == ("INCONCLUSIVE", "pre_asymptotic")
+
+
 def test_an_order_says_behind_which_level_it_is_not_seen() -> None:
     h = [0.1 * 0.5**k for k in range(6)]
     values = [np.sin(np.arange(9.0)) * (1.0 + x**2) for x in h]

@@ -26,6 +26,7 @@ from vibsim.convergence.ladder_blocks import in_blocks
 from vibsim.convergence.likely_powers import (
     finest_order,
     interval,
+    likely_power,
     likely_window,
     most_near_a_power,
     rests_on_three,
@@ -153,7 +154,8 @@ def _reasons(e: Evaluation, missed: Flags) -> Codes:
     # order 1/2
     decidable = (e.order >= LEAST_WITH_LIMIT) & ~(e.cut_short | e.contradicted)
     # levels may by accident fit two powers, the weaker of which moves the measured order
-    is_met = (right > 1.0 - (RISK if e.exact_known else risk)) & e.question.is_met_by(e.order)
+    is_met = e.question.is_met_by(e.order, likely_power(p))
+    is_met &= right > 1.0 - (RISK if e.exact_known else risk)
     other_order = (lower + higher > 1.0 - risk) & (right < risk) & decidable
     if np.any(other_order):
         other_order &= most_near_a_power(p) > DEFINITE

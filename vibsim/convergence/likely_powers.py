@@ -72,6 +72,11 @@ def _cumulative(values: Floats) -> Floats:
     return sums
 
 
+def likely_power(p: Posterior) -> Floats:
+    """Return the power that most probably dominates each ladder."""
+    return np.asarray(p.powers[np.argmax(p.dominant, axis=-1)])
+
+
 def likely_window(p: Posterior) -> tuple[Integers, Integers]:
     """Return the coarsest and the finest level of the most probable window of each ladder."""
     first, last = np.array(p.windows)[np.argmax(p.window, axis=-1)].T

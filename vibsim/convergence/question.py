@@ -34,15 +34,17 @@ class Question:
     may_be_exact: bool = True
     """Whether levels that differ by noise only are exact; otherwise the caller decides that."""
 
-    def is_met_by(self, order: Floats) -> Flags:
+    def is_met_by(self, order: Floats, likely: Floats) -> Flags:
         """Say which measured orders are nearer to the expected one than to the next order of an expansion.
 
-        Orders of expansions are 0.5 apart, those that theory promises are 1 apart.
+        Orders of expansions are 0.5 apart, those that theory promises are 1 apart. Where any order will do, the most
+        probable power, `likely`, counts as the expected one.
         """
         margin = max(self.tolerance, (2.0 if self.by_theory else 1.0) * HALF_SPACING)
-        if self.expected is not None:
-            return np.asarray(np.abs(order - self.expected) <= margin)
-        return np.asarray(order >= (self.at_least or -np.inf) - margin)
+        if self.expected is None and self.at_least is not None:
+            return np.asarray(order >= self.at_least - margin)
+        target = likely if self.expected is None else self.expected
+        return np.asarray(np.abs(order - target) <= margin)
 
     @property
     def noise_factor(self) -> float:

@@ -251,7 +251,8 @@ def test_an_order_that_two_powers_only_explain_passes_when_it_is_measured() -> N
 
 def test_orders_of_a_theory_are_one_apart() -> None:
     orders = np.array([1.4, 1.6, 1.8, 2.4, 2.6, np.nan])
-    assert Question(2.0, by_theory=True).is_met_by(orders).tolist() == [
+    likely = np.full(6, 2.0)
+    assert Question(2.0, by_theory=True).is_met_by(orders, likely).tolist() == [
         False,
         True,
         True,
@@ -259,8 +260,15 @@ def test_orders_of_a_theory_are_one_apart() -> None:
         False,
         False,
     ]
-    assert Question(2.0).is_met_by(orders).tolist() == [False, False, True, False, False, False]
-    assert Question(at_least=2.0).is_met_by(orders).tolist() == [
+    assert Question(2.0).is_met_by(orders, likely).tolist() == [
+        False,
+        False,
+        True,
+        False,
+        False,
+        False,
+    ]
+    assert Question(at_least=2.0).is_met_by(orders, likely).tolist() == [
         False,
         False,
         True,
@@ -268,7 +276,14 @@ def test_orders_of_a_theory_are_one_apart() -> None:
         True,
         False,
     ]
-    assert Question().is_met_by(orders).tolist() == [True, True, True, True, True, False]
+    assert Question().is_met_by(orders, likely).tolist() == [
+        False,
+        False,
+        True,
+        False,
+        False,
+        False,
+    ]
 
 
 def test_levels_without_a_measured_order_do_not_pass() -> None:
