@@ -20,7 +20,7 @@ from thinned import thinned
 
 import vibsim
 from vibsim import InputError, judge
-from vibsim.convergence.study import judgement
+from vibsim.convergence.study import judge as judge_module
 from vibsim.core.vocabulary import REASONS
 
 KEYS = [
@@ -36,7 +36,7 @@ def numbers(order: float, h: list[float] = H, limit: float = 3.0) -> list[float]
 
 
 def test_the_worked_examples_are_true() -> None:
-    found = doctest.testmod(judgement)
+    found = doctest.testmod(judge_module)
     assert found.attempted > 15
     assert found.failed == 0
 

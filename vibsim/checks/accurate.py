@@ -17,6 +17,8 @@ from vibsim.checks.fields import LEVEL, Field, Measured
 from vibsim.checks.notation import PLAIN, Notation, beside
 from vibsim.checks.outcome import Judged, as_expected
 from vibsim.checks.sentences import (
+    FINER,
+    MOST_FINER,
     NOT_FINITE,
     WRONG_LIMIT_ADVICE,
     Description,
@@ -24,7 +26,7 @@ from vibsim.checks.sentences import (
     add_levels,
     cost_in_words,
 )
-from vibsim.checks.value import FINER, unit_of_quantity
+from vibsim.checks.value import unit_of_quantity
 from vibsim.comparison.finest_error import FinestError, error_of_finest
 from vibsim.comparison.order_verdict import judgement
 from vibsim.comparison.quantity_comparison import Compared, Comparison
@@ -62,8 +64,6 @@ FIELDS = {
 }
 ORDER_KNOWN = "asymptotic", "exact", "order_low", "order_high"
 """Reasons of verdicts that state an order."""
-MOST_MORE_LEVELS = 12
-"""Largest number of additional levels that is predicted."""
 
 
 def measure(block: MemberBlock, compared: Compared, check: AccurateCheck) -> Measured:
@@ -135,7 +135,7 @@ def _level_needed(last: int, finest: FinestError, judged: Judgement, check: Accu
         allowed = check.accuracy * (finest.size if check.is_relative else 1.0)
         steps = np.ceil(on_arrays.log2(finest.bound / allowed) / judged.order)
         # round-off and a wrong limit do not vanish with the step
-        known = (judged.order > 0.0) & (steps >= 1.0) & (steps <= MOST_MORE_LEVELS)
+        known = (judged.order > 0.0) & (steps >= 1.0) & (steps <= MOST_FINER)
         known &= (finest.round_off < allowed) & (judged.reason != code("wrong_limit"))
     return np.where(known, last + np.where(known, steps, 0.0), -1.0).astype(np.int16)
 

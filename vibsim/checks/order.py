@@ -19,9 +19,10 @@ from collections.abc import Callable
 import numpy as np
 
 from vibsim.apriori.formal_orders import even_powers, orders_in, relative_floors
-from vibsim.checks.accurate import ERROR, MOST_MORE_LEVELS, known_error
+from vibsim.checks.accurate import ERROR, known_error
 from vibsim.checks.fields import REASON, STATUS, Field, Measured
 from vibsim.checks.outcome import Judged, as_expected
+from vibsim.checks.sentences import MOST_FINER
 from vibsim.comparison.order_verdict import (
     CAUSES,
     causes,
@@ -185,7 +186,7 @@ def _levels_needed(q: Comparison, judged: Judgement, order: Floats, tolerance: f
         is_known = is_coarse & np.isfinite(steps) & (last <= target + SUPERCONVERGENCE)
         # orders do not show how small a promised power is that a higher one hides
         is_known &= ~((last > q.order + HALF_SPACING) & (q.special > q.order + HALF_SPACING))
-    is_known &= (factor <= SLOWEST_APPROACH) & (steps <= MOST_MORE_LEVELS)
+    is_known &= (factor <= SLOWEST_APPROACH) & (steps <= MOST_FINER)
     needed[is_known] = np.maximum(steps[is_known], 1).astype(np.int8)
     return needed
 

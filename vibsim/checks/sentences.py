@@ -22,6 +22,8 @@ from vibsim.models.base import Model
 
 LONG = 120.0
 """Times above this [s] are written in minutes, and above sixty times this in hours."""
+FINER, MOST_FINER = 2, 12
+"""Number of finer levels that advice suggests if the needed number is unknown, and at most."""
 
 NOT_FINITE = (
     "{} has no meaning here, because the calculation produced a number that is not finite.",

@@ -21,7 +21,15 @@ from vibsim.checks.fields import Field, Measured, name_of
 from vibsim.checks.notation import PLAIN, ROUND_OFF, Notation
 from vibsim.checks.outcome import Judged
 from vibsim.checks.phase_amplitude_text import NO_PART, PART_ADVICE
-from vibsim.checks.sentences import NOT_FINITE, Description, MemberFacts, add_levels, cost_in_words
+from vibsim.checks.sentences import (
+    FINER,
+    MOST_FINER,
+    NOT_FINITE,
+    Description,
+    MemberFacts,
+    add_levels,
+    cost_in_words,
+)
 from vibsim.comparison import best_values, value_numbers
 from vibsim.comparison.quantity_comparison import Compared
 from vibsim.convergence.differences import last_change
@@ -61,8 +69,6 @@ DIRECTION_ASKED = {1.0: "rising", -1.0: "falling", 0.0: "neither rising nor fall
 """Expected directions in words, by their numbers."""
 UNKNOWN, SETTLED, MOVING = -1, 0, 1
 """Whether finer levels may bring a number to its target: unknown, they change it too little, perhaps."""
-FINER, MOST_FINER = 2, 12
-"""Number of finer levels that advice suggests if the needed number is unknown, and at most."""
 UNPROVED = (
     " The levels agree with it, but do not prove it: the error bound is wider than what is asked."
 )

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from vibsim.apriori.formal_orders import even_powers, formal_orders
 from vibsim.comparison import value_numbers
+from vibsim.comparison.batches import batches
 from vibsim.comparison.comparison_variables import Table
 from vibsim.comparison.extremum_of_levels import extremum_of_levels
 from vibsim.comparison.quantity_comparison import Compared
@@ -26,7 +27,6 @@ from vibsim.convergence.differences import safe_ratio
 from vibsim.convergence.extrapolation import gci
 from vibsim.convergence.extrapolation.numbers import Limit, limit, observed_order
 from vibsim.convergence.extrapolation.thresholds import NUMBER_SAFETY_ALONE
-from vibsim.convergence.ladder_blocks import batches
 from vibsim.core.array_types import Flags, Floats
 from vibsim.core.record import Variable, flags
 from vibsim.core.vocabulary import LEVELS_OF_AN_ORDER, MEMBER

@@ -12,9 +12,14 @@ from numpy.typing import NDArray
 from vibsim.apriori.formal_orders import is_promised, orders_vary
 from vibsim.comparison.local_order import local_order, window_points
 from vibsim.comparison.quantity_comparison import Comparison
-from vibsim.comparison.rescaled_differences import local_scale, masked_ratio, proportionality
+from vibsim.comparison.rescaled_differences import (
+    error_factor,
+    local_scale,
+    masked_ratio,
+    proportionality,
+    rescaling,
+)
 from vibsim.comparison.thresholds import ORDER_WINDOW
-from vibsim.convergence import differences
 from vibsim.convergence.extrapolation.gci import of_order
 from vibsim.convergence.thresholds import ORDINARY_ORDER
 from vibsim.core.array_types import Floats
@@ -150,7 +155,7 @@ def _pairs(q: Comparison, add: Add) -> None:
     dims = (*MEMBER, "pair", "t")
     levels, d, p = q.block.grid.levels, q.differences, q.power[..., None]
     unknown = [np.full_like(x, np.nan) for x in d]
-    rescaled = [x * differences.rescaling(p, levels[: i + 2]) for i, x in enumerate(d)]
+    rescaled = [x * rescaling(p, levels[: i + 2]) for i, x in enumerate(d)]
     errors = unknown if q.errors is None else q.errors[:-1]
     # the error need not cross zero where the difference does
     local_size = np.where(np.isfinite(d[-1]), local_scale(d[-1]), np.nan)
@@ -165,10 +170,7 @@ def _pairs(q: Comparison, add: Add) -> None:
 def estimates(q: Comparison) -> list[Floats]:
     """Return the estimated error of each level but the finest, each of shape (scheme, case, t)."""
     levels, p = q.block.grid.levels, q.order[..., None]
-    return [
-        x * differences.error_factor(p, levels[i + 1] - levels[i])
-        for i, x in enumerate(q.differences)
-    ]
+    return [x * error_factor(p, levels[i + 1] - levels[i]) for i, x in enumerate(q.differences)]
 
 
 def _triples(q: Comparison, add: Add) -> None:

@@ -10,8 +10,8 @@ from vibsim.comparison.largest_between_samples import (
     largest_between_samples,
     rise_of_other_crests,
 )
+from vibsim.comparison.rescaled_differences import error_factor
 from vibsim.comparison.thresholds import ERROR_OF_LINE
-from vibsim.convergence.differences import error_factor
 from vibsim.convergence.extrapolation.thresholds import ORDER_ABOVE_ROUND_OFF
 from vibsim.core.array_types import Flags, Floats
 from vibsim.observe.member_block import MemberBlock

@@ -17,11 +17,11 @@ from functools import partial
 import numpy as np
 
 from vibsim.apriori.roundoff_floor import SPACING_AT_ONE, norm_of_floor
+from vibsim.comparison.batches import batches
 from vibsim.comparison.parting import FAR
 from vibsim.comparison.quantity_comparison import Compared, Comparison
 from vibsim.comparison.thresholds import STRAIGHT, THEORY_ROUNDING, VANISHING_RATE
 from vibsim.convergence.differences import largest, safe_ratio
-from vibsim.convergence.ladder_blocks import batches
 from vibsim.convergence.ladder_facts import (
     LadderFacts,
     at_rest,

@@ -1,13 +1,34 @@
-"""How far two successive differences, rescaled, coincide, at each time and as a whole."""
+"""Differences as estimates of errors: rescaled by the powers of an order, and how far they then coincide."""
 
 from __future__ import annotations
+
+from collections.abc import Sequence
 
 import numpy as np
 
 from vibsim.comparison.thresholds import ZERO_CROSSING
-from vibsim.convergence.differences import length, safe_ratio, total, unit
+from vibsim.convergence.differences import length, safe_ratio, target_ratio, total, unit
 from vibsim.convergence.thresholds import ROUND_OFF_SAFETY
 from vibsim.core.array_types import Floats
+from vibsim.elementary import on_arrays
+
+
+def error_factor(order: Floats | float, gap: int) -> Floats:
+    """Return ``-R/(R - 1)``, the ratio of the error of the coarser level to the difference."""
+    return np.asarray(
+        1.0 / on_arrays.expm1(-np.asarray(order, dtype=np.float64) * gap * on_arrays.LN_2)
+    )
+
+
+def rescaling(order: Floats | float, levels: Sequence[int]) -> Floats:
+    """Return the ratio of the first to the last difference of `levels`, for an error of one power.
+
+    It is ``(2^p)^k`` for successive levels (A, section 2.5), and the product of the target ratios in general.
+    """
+    factor = np.ones_like(np.asarray(order, dtype=np.float64))
+    for i in range(len(levels) - 2):
+        factor = factor * target_ratio(order, levels[i : i + 3])
+    return factor
 
 
 def local_scale(series: Floats) -> Floats:

@@ -90,13 +90,6 @@ def gap_ratio(order: Floats | float, gap: int) -> Floats:
     return np.asarray(on_arrays.power(2.0, np.asarray(order, dtype=np.float64) * gap))
 
 
-def error_factor(order: Floats | float, gap: int) -> Floats:
-    """Return ``-R/(R - 1)``, the ratio of the error of the coarser level to the difference."""
-    return np.asarray(
-        1.0 / on_arrays.expm1(-np.asarray(order, dtype=np.float64) * gap * on_arrays.LN_2)
-    )
-
-
 def target_ratio(order: Floats | float, levels: Sequence[float]) -> Floats:
     """Return the ratio of the two differences of three levels, for an error of one power.
 
@@ -108,17 +101,6 @@ def target_ratio(order: Floats | float, levels: Sequence[float]) -> Floats:
     safe = np.where(flat, 1.0, p)
     ratio = on_arrays.expm1(safe * (second - first)) / -on_arrays.expm1(-safe * (third - second))
     return np.asarray(np.where(flat, (second - first) / (third - second), ratio))
-
-
-def rescaling(order: Floats | float, levels: Sequence[int]) -> Floats:
-    """Return the ratio of the first to the last difference of `levels`, for an error of one power.
-
-    It is ``(2^p)^k`` for successive levels (A, section 2.5), and the product of the target ratios in general.
-    """
-    factor = np.ones_like(np.asarray(order, dtype=np.float64))
-    for i in range(len(levels) - 2):
-        factor = factor * target_ratio(order, levels[i : i + 3])
-    return factor
 
 
 def order_of_ratio(ratio: Floats, levels: Sequence[float]) -> Floats:

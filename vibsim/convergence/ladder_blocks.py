@@ -1,14 +1,12 @@
-"""Batches of ladders: small sets are stacked, large ones are judged in blocks, each ladder scaled to its own size.
+"""Blocks of ladders that are judged at once, each ladder scaled to its own size.
 
-A call of an array operation costs as much as hundreds of numbers, so the few ladders of a small experiment are stacked.
-Arrays of many more would exceed the cache of a core. No result depends on this.
+Arrays of many more ladders would exceed the cache of a core. No result depends on the blocks.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable
 from dataclasses import replace
-from typing import TypeVar
 
 import numpy as np
 
@@ -17,21 +15,10 @@ from vibsim.convergence.reasons import code
 from vibsim.core.array_types import Floats, Integers
 from vibsim.core.vocabulary import LEVELS_OF_AN_ORDER
 
-STACKED_LADDERS = 4096
-"""Largest number of ladders that are stacked; a single set of more is processed alone."""
 BLOCK_LADDERS = 1024
 """Largest number of ladders that are judged at once."""
 LARGEST_RATIO = 1e60
 """Limit of the ratio of a difference to the largest finer one, and of noise to the largest difference."""
-
-Row = TypeVar("Row")
-
-
-def batches(rows: Sequence[Row], ladders: int) -> Iterator[Sequence[Row]]:
-    """Yield groups of rows to be stacked; each row has this number of ladders."""
-    size = max(STACKED_LADDERS // max(ladders, 1), 1)
-    for start in range(0, len(rows), size):
-        yield rows[start : start + size]
 
 
 def in_blocks(

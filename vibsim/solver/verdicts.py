@@ -16,7 +16,7 @@ from vibsim.convergence import LadderVerdict
 from vibsim.convergence.reasons import code
 from vibsim.convergence.study.common_points import common_values
 from vibsim.convergence.study.grid_values import GridValues
-from vibsim.convergence.study.judgement import verdicts
+from vibsim.convergence.study.judge import verdicts
 from vibsim.convergence.study.notation import at_most, number
 from vibsim.core.array_types import Floats
 from vibsim.core.errors import InputError, VibsimError

@@ -5,7 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from vibsim.comparison.rescaled_differences import coincidence, masked_ratio, proportionality
+from vibsim.comparison.rescaled_differences import (
+    coincidence,
+    error_factor,
+    masked_ratio,
+    proportionality,
+)
 from vibsim.convergence import differences
 from vibsim.core.vocabulary import NORMS
 
@@ -25,7 +30,7 @@ def computed(level: int, p: float = 2.0) -> np.ndarray:
 def test_estimate_is_the_error_up_to_the_next_power(p: float, gap: int) -> None:
     level = 6
     error = 0.7 - computed(level, p)
-    estimate = differences.error_factor(p, gap) * (computed(level, p) - computed(level + gap, p))
+    estimate = error_factor(p, gap) * (computed(level, p) - computed(level + gap, p))
     leading = 2.0 ** (-level * p) * np.max(np.abs(E2))
     defect = np.max(np.abs(estimate - error))
     # with h^2 e4 beside e2: |defect| = h^(p+2) |e4| (1 - 2^-(2 gap)) 2^(-p gap) / (1 - 2^(-p gap))
@@ -36,8 +41,8 @@ def test_estimate_is_the_error_up_to_the_next_power(p: float, gap: int) -> None:
 
 
 def test_error_factor_is_minus_four_thirds_for_order_two() -> None:
-    assert differences.error_factor(2.0, 1) == pytest.approx(-4 / 3, rel=1e-15)
-    assert differences.error_factor(np.array([1.0, 4.0]), 1) == pytest.approx([-2.0, -16 / 15])
+    assert error_factor(2.0, 1) == pytest.approx(-4 / 3, rel=1e-15)
+    assert error_factor(np.array([1.0, 4.0]), 1) == pytest.approx([-2.0, -16 / 15])
 
 
 def test_difference_has_the_sign_of_the_lecture() -> None:

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from ladders import T, Truth, facts_of, facts_with, random_truth, shape_in_time
 
+from vibsim.comparison.batches import STACKED_LADDERS, batches
 from vibsim.convergence import verdict
 from vibsim.convergence.hidden_order import is_promise_hidden
-from vibsim.convergence.ladder_blocks import STACKED_LADDERS, batches
 from vibsim.convergence.ladder_facts import LadderFacts
 from vibsim.convergence.verdict import judge, judge_together
 from vibsim.core.vocabulary import NORMS, REASON_NAMES, STATUSES

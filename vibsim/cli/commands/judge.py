@@ -100,7 +100,7 @@ def _exact(entries: Sequence[str] | None, known: Sequence[str]) -> Mapping[str, 
 
 
 def _judged(study: Study, options: Namespace, exact: Decimal | None) -> LadderVerdict:
-    from vibsim.convergence.study.judgement import verdicts
+    from vibsim.convergence.study.judge import verdicts
 
     try:
         (verdict,) = verdicts(

@@ -16,6 +16,15 @@ if TYPE_CHECKING:
 
 NEGLIGIBLE = 1e-9
 """Hypotheses with less than this fraction of the largest weight are skipped."""
+FIRST_LEFT, SECOND_LEFT, LIMIT_LEFT, LIMIT = 2, 3, 4, 5
+"""Columns of `Table.columns` after the roots: posterior variances of powers and limit, and the weights of the limit."""
+RATIO, WEIGHT, SQUARE, MEAN = 0, 1, 2, 3
+"""Columns of `result`; those of the pairs of powers follow the w columns from `MEAN` on."""
+_CONSTANTS = (
+    *("DOMINATES", "LEAST_SIGNAL", "NEGLIGIBLE"),
+    *("FIRST_LEFT", "SECOND_LEFT", "LIMIT_LEFT", "LIMIT"),
+    *("RATIO", "WEIGHT", "SQUARE", "MEAN"),
+)
 KINDS = "f2 f2 i1 i2 f1 f2 f2 f3 f2 f2 f2 i1 i1 f2 i i1 f1 f1 f1 f2"
 """Argument types of `kernel`, in the notation of `vibsim.native.machine.machine_code`."""
 
@@ -26,7 +35,7 @@ def compiled_kernel() -> Kernel:
     from vibsim.native.kernel_cache import load
 
     parts = ["import math"]
-    parts += [f"{name} = {globals()[name]}" for name in ("DOMINATES", "LEAST_SIGNAL", "NEGLIGIBLE")]
+    parts += [f"{name} = {globals()[name]}" for name in _CONSTANTS]
     for mark, function in (("called", largest), ("called", times_half_power), ("entry", kernel)):
         tree = ast.parse(getsource(function)).body[0]
         assert isinstance(tree, ast.FunctionDef)
@@ -110,13 +119,13 @@ def kernel(
     selected, traces, base, weights
         Work space, one entry for each hypothesis.
     result
-        Output, shape (ladder, 3 + w + 3 pair_count): the largest ``root/tr(K^-1 G)``; the sum of the weights, relative
-        to that of this ratio; the weighted sums of the squared distance from the finest level to the limit and of the
-        limit as weights of the rows; and for each pair of powers its weight, its weight where the first power
+        Output, shape (ladder, `MEAN` + w + 3 pair_count): the largest ``root/tr(K^-1 G)``; the sum of the weights,
+        relative to that of this ratio; the weighted sums of the squared distance from the finest level to the limit and
+        of the limit as weights of the rows; and for each pair of powers its weight, its weight where the first power
         dominates, and its weight where the second one does.
     """
     packed = forms.shape[2]
-    w = columns.shape[1] - 5
+    w = columns.shape[1] - LIMIT
     for ladder in range(gram.shape[0]):
         n = points[ladder]
         for g in range(bounds.shape[1]):
@@ -161,7 +170,7 @@ def kernel(
                 base[i] = 1.0 / max(student, 1.0)
             times_half_power(weights, base, exponents[ladder, 1], count)
         largest_weight = largest(weights, count)
-        result[ladder, 0] = largest_ratio
+        result[ladder, RATIO] = largest_ratio
         for i in range(1, result.shape[1]):
             result[ladder, i] = 0.0
         for entry in range(count):
@@ -170,24 +179,24 @@ def kernel(
                 h = selected[entry]
                 trace = traces[entry]
                 # posterior mean square of each power: its variance plus the square of its mean
-                first = trace / w * columns[h, 2]
-                second = trace / w * columns[h, 3]
+                first = trace / w * columns[h, FIRST_LEFT]
+                second = trace / w * columns[h, SECOND_LEFT]
                 for k in range(packed):
                     first += gram[ladder, k] * forms[h, 1, k]
                     second += gram[ladder, k] * forms[h, 2, k]
                 if first + second > LEAST_SIGNAL * trace / w:
-                    position = 3 + w + pair[h]
+                    position = MEAN + w + pair[h]
                     result[ladder, position] += weight
                     if second < DOMINATES * DOMINATES * first:
                         result[ladder, position + pair_count] += weight
                     if second * DOMINATES * DOMINATES > first:
                         result[ladder, position + 2 * pair_count] += weight
-                    result[ladder, 1] += weight
+                    result[ladder, WEIGHT] += weight
                     if finer.shape[1] > 0:
-                        square = trace / w * columns[h, 4] + finer[ladder, w]
+                        square = trace / w * columns[h, LIMIT_LEFT] + finer[ladder, w]
                         for k in range(packed):
                             square += gram[ladder, k] * forms[h, 3, k]
                         for i in range(w):
-                            square += 2.0 * columns[h, 5 + i] * finer[ladder, i]
-                            result[ladder, 3 + i] += weight * columns[h, 5 + i]
-                        result[ladder, 2] += weight * square
+                            square += 2.0 * columns[h, LIMIT + i] * finer[ladder, i]
+                            result[ladder, MEAN + i] += weight * columns[h, LIMIT + i]
+                        result[ladder, SQUARE] += weight * square

@@ -11,7 +11,14 @@ import numpy as np
 
 from vibsim.convergence.error_model import priors
 from vibsim.convergence.error_model.hypotheses import Table
-from vibsim.convergence.error_model.kernel import compiled_kernel
+from vibsim.convergence.error_model.kernel import (
+    LIMIT,
+    MEAN,
+    RATIO,
+    SQUARE,
+    WEIGHT,
+    compiled_kernel,
+)
 from vibsim.convergence.error_model.matrices import outer, packed
 from vibsim.core.array_types import Floats, Integers
 from vibsim.elementary import on_arrays
@@ -127,11 +134,15 @@ def weigh_table(
         probabilities of pairs of powers, shape (ladder, 3, pair); the limit as weights of the rows, shape (ladder, w);
         the squared distance to the limit, shape (ladder,).
     """
-    count, w, half = len(rows.last_square), table.columns.shape[1] - 5, 0.5 * rows.exponents[:, 0]
+    count, w, half = (
+        len(rows.last_square),
+        table.columns.shape[1] - LIMIT,
+        0.5 * rows.exponents[:, 0],
+    )
     optional = table.orthogonal_forms, table.orthogonal_bounds
     orthogonal_forms, bounds = (_NONE if x is None else x for x in optional)
     pairs, size = int(table.pair[-1]) + 1, len(table.pair)
-    result = np.empty((count, 3 + w + 3 * pairs))
+    result = np.empty((count, MEAN + w + 3 * pairs))
     threshold = on_arrays.exp(np.clip((least - rows.log_scale) / half, -600.0, 600.0))
     compiled_kernel()(
         rows.gram, rows.evidence_gram, rows.points, rows.exponents, threshold, rows.orthogonal, finer,
@@ -139,14 +150,14 @@ def weigh_table(
         np.empty(size, dtype=np.int64), *np.empty((3, size)), result,
     )  # fmt: skip
     # rows far from every hypothesis have zero weight
-    empty = result[:, 1] <= 0.0
-    largest, total = np.where(empty, 1.0, result[:, 0]), np.where(empty, 1.0, result[:, 1])
+    empty = result[:, WEIGHT] <= 0.0
+    largest, total = (np.where(empty, 1.0, result[:, x]) for x in (RATIO, WEIGHT))
     log = np.where(
         empty, -np.inf, rows.log_scale + half * on_arrays.log(largest) + on_arrays.log(total)
     )
-    result[:, 2:] /= total[:, None]
-    pair_weights = result[:, 3 + w :].reshape(count, 3, pairs)
-    return log, pair_weights, result[:, 3 : 3 + w], result[:, 2] * rows.last_square
+    result[:, SQUARE:] /= total[:, None]
+    pair_weights = result[:, MEAN + w :].reshape(count, 3, pairs)
+    return log, pair_weights, result[:, MEAN : MEAN + w], result[:, SQUARE] * rows.last_square
 
 
 def single_power(

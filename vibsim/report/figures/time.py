@@ -10,7 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from vibsim.convergence.differences import gap_ratio, rescaling, target_ratio
+from vibsim.comparison.rescaled_differences import rescaling
+from vibsim.convergence.differences import gap_ratio, target_ratio
 from vibsim.core.array_types import Floats
 from vibsim.core.record import Record
 from vibsim.report import data, frame, style, words
