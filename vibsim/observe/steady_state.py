@@ -26,11 +26,17 @@ import numpy as np
 from vibsim.convergence.differences import safe_ratio
 from vibsim.core.array_types import Complexes, Floats
 from vibsim.elementary import on_arrays
+from vibsim.formula import values_of
+from vibsim.models import Model, tree
 from vibsim.observe.common_grid import take, take_all
 from vibsim.observe.member_block import MemberBlock
+from vibsim.simulation.members import Members
 
 SAME_STATE = 1e-3
 """Distance at which a state counts as repeated, relative to its largest value."""
+TURN = 2.0 * np.pi
+TESTS, SAME_AFTER_A_TURN = 16, 1e-9
+"""Number of random states at which accelerations are compared after a turn, and the tolerance of the comparison."""
 LEAST_PERIODS = 4
 """Number of periods whose changes give the remaining transient."""
 REST_SAFETY = 2.0
@@ -71,18 +77,43 @@ def section(block: MemberBlock, level: int, quantity: str) -> Floats:
     return take(block.grid, block.records[level], quantity)[..., ::n]
 
 
+def is_angle(model: Model, group: Members, position: str) -> bool:
+    """Tell whether a position matters, and the accelerations of the first member are the same a turn further."""
+    accelerations = [tree(model, formula) for formula in model.accelerations]
+    matters = any(position in formula.names for formula in accelerations)
+    if position not in model.positions or not matters or model.lookup is not None:
+        return False
+    rng = np.random.default_rng(21)
+    numbers = {
+        name: rng.uniform(-1.0, 1.0, TESTS) for name in (*model.positions, *model.velocities, "t")
+    }
+    numbers |= {name: value[0] for name, value in group.by_name(model).items()}
+    found, moved = (
+        np.stack([np.broadcast_to(x, TESTS) for x in values_of(accelerations, changed)])
+        for changed in (numbers, {**numbers, position: numbers[position] + TURN})
+    )
+    return bool(np.all(np.abs(moved - found) <= SAME_AFTER_A_TURN * (1.0 + np.abs(found))))
+
+
 def section_period(block: MemberBlock, level: int) -> Floats:
     """Return the period of the Poincare section in periods of the force, shape (scheme, case).
 
-    It is taken from the second half of the run, in which every state must repeat to `SAME_STATE`. 0 if there is no
-    period of at most half that time: the motion is chaotic, or not yet steady.
+    It is taken from the second half of the run, in which every state must repeat to `SAME_STATE`, an angle up to whole
+    turns. 0 if there is no period of at most half that time: the motion is chaotic, or not yet steady.
     """
-    rows = np.stack([section(block, level, state.name) for state in block.model.states])
+    states = [state.name for state in block.model.states]
+    rows = np.stack([section(block, level, name) for name in states])
     rows = rows[..., rows.shape[-1] // 2 :]
     period = np.zeros(block.shape)
     size = np.max(np.abs(rows), axis=-1, initial=0.0)
+    turn = np.array([TURN if is_angle(block.model, block.group, x) else np.inf for x in states])
+    turn = turn[:, None, None, None]
+    size = np.minimum(size, 0.5 * turn[..., 0])
     for k in range(rows.shape[-1] // 2, 0, -1):
-        distance = np.max(np.abs(rows[..., k:] - rows[..., :-k]), axis=-1)
+        change = rows[..., k:] - rows[..., :-k]
+        with np.errstate(invalid="ignore"):
+            whole = np.where(np.isinf(turn), 0.0, turn * np.round(change / turn))
+        distance = np.max(np.abs(change - whole), axis=-1)
         period = np.where((distance <= SAME_STATE * size).all(axis=0), float(k), period)
     return np.where(np.isfinite(rows).all(axis=(0, -1)) & (rows.shape[-1] >= 2), period, np.nan)
 

@@ -199,3 +199,32 @@ def test_a_section_needs_the_period_of_a_force() -> None:
     for sections_ in ({"figures": figures}, {"checks": [{"value": "section_period", "equals": 1}]}):
         with pytest.raises(InputError, match="time names no frequency"):
             Experiment.from_dict({**data, **sections_})
+
+
+def test_the_section_of_a_pendulum_that_turns_over_repeats_up_to_whole_turns() -> None:
+    """It goes over the top once in each period of its force; SciPy shows the same."""
+    w, periods = 2.0 / 3.0, 60
+    found = solve_ivp(
+        lambda t, y: [y[1], -math.sin(y[0]) - 0.5 * y[1] + 1.4 * math.cos(w * t)],
+        (0.0, 2.0 * math.pi * periods / w), [0.2, 0.0], method="DOP853", rtol=1e-10, atol=1e-10,
+        t_eval=2.0 * math.pi / w * np.arange(periods // 2, periods + 1),
+    )  # fmt: skip
+    assert np.abs(np.diff(found.y[0])) == pytest.approx(2.0 * math.pi, abs=1e-3)
+    pendulum = {
+        "kind": "system",
+        "acceleration": "-sin(u) - v/2 + 1.4*cos(w*t)",
+        "parameters": {"w": w},
+    }
+    experiment = Experiment.from_dict(
+        {
+            **{"title": "x", "model": pendulum, "initial": {"u": 0.2}, "schemes": ["rk4"]},
+            "time": {
+                "periods": periods, "steps_per_period": 32, "frequency": "model.parameters.w"
+            },
+            "levels": [1, 2],
+            "checks": [{"value": "section_period", "equals": 1}],
+        }
+    )  # fmt: skip
+    levels = [simulate(experiment, level) for level in experiment.levels]
+    [verdict] = verdicts(experiment, analyse(experiment, levels))
+    assert verdict.status == "PASS"

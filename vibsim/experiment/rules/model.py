@@ -143,7 +143,9 @@ def _equation_of_formulas(section: Any, model: Model, folder: Path, report: Repo
             report.add(("model", *exact.split(".")), rule, value=texts.get(exact))
             return Equation(None)
     if equipped.misses_potential:
-        hint = "energies are kinetic alone; write `potential`, if there is one, or unequal masses by `force` and `mass`"
+        hint = "energies are kinetic alone; write `potential`, if the forces have one"
+        if equipped.coordinates > 1 and any(name.startswith("acceleration.") for name in texts):
+            hint += ", and unequal masses by `force` and `mass`"
         report.note(("model",), NOT_FOUND, hint)
     if any(row.name == "spring" for row in model.formulas):
         check_potential(equipped, parameters, texts, report)
