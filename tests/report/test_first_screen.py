@@ -348,12 +348,22 @@ def test_an_order_beside_the_band_whose_interval_reaches_it_is_told_as_such(monk
     for order, low, title in (
         (2.05, 2.0, "All members keep"),
         (2.3, 2.05, "1 of 2 orders is outside the band, but its interval overlaps it"),
-        (2.3, 2.15, "1 of 2 members have"),
+        (2.3, 2.15, "1 of 2 members has"),
     ):
         ends = (np.array([row]) for row in ([2.0, order], [2.0, low], [2.0, order]))
         monkeypatch.setattr(drawn.finest_level, "orders", lambda *_, ends=tuple(ends): ends)
         with style.applied():
             assert drawn.orders(exp, record, decisive).title.startswith(title)
+
+
+def test_a_row_of_checks_says_of_how_many_results_it_shows_one():
+    """It hid that there are others."""
+    checks = [{"converges": "theta", "order": order} for order in (2, 3)]
+    exp = samples.experiment(sweep={"initial.theta": [0.5, 1.0]}, checks=checks)
+    record, summary, _ = found(exp)
+    passed, failed = (card["got"] for card in cards.cards(exp, record, summary))
+    assert passed.endswith(", the hardest of 2")
+    assert failed.endswith("; 2 of 2 failed")
 
 
 @pytest.mark.parametrize(

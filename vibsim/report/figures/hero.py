@@ -200,7 +200,7 @@ def solution(
     ax.set_gid(style.TIME)
     has_exact, name = bool(np.isfinite(exact[1]).any()), series.name_of_exact(experiment)
     first = moments.first_shown(t, values)
-    start, title = float(t[first]), f"{letter}(t), {member.scheme_name}"
+    start, title = float(t[first]), f"{letter}(t), {member.title}"
     # as in the figure of the motion, lines between too few samples would cut off its extremes
     turns = exact if has_exact else (t, values)
     is_dotted = moments.is_undersampled(int(record["steps"][-1]), t, turns)
@@ -457,7 +457,7 @@ def _title_of_orders(inside: Flags, measured: Flags, checked: Flags) -> str:
     if not checked.all():
         return f"{within} of {of} members asked about are in the band; grey: the {others} others"
     if not inside.all():
-        return f"{within} of {of} members have an order in the band"
+        return f"{within} of {of} members {'has' if within == '1' else 'have'} an order in the band"
     beyond = int(np.sum(~measured))
     if not beyond:
         return "All members keep their order"

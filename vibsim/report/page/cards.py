@@ -100,7 +100,7 @@ def card(experiment: Experiment, record: Record, check: Mapping[str, Any]) -> di
         "what": assertions.about(asserted, record),
         "source": assertions.source(asserted, record),
         "wanted": f"false (the statement: {wanted})" if is_refutation(asserted) else wanted,
-        "got": words.swept(_got(check, wording, result)),
+        "got": words.swept(_got(check, wording, result)) + _of_all(check),
         "note": getattr(asserted, "note", None) or "",
         "reason": check["reason"] or "–",
         "meaning": reasons.REFUTED if is_refuted else explained.meaning,
@@ -170,6 +170,17 @@ def _got(check: Mapping[str, Any], wording: Wording, result: Result) -> str:
     if check["kind"] == "converges" or "order" in (decisive.get("facts") or {}):
         return reasons.OUTCOMES.get(result.reason, str(result.reason))
     return wording.brief(result)
+
+
+def _of_all(check: Mapping[str, Any]) -> str:
+    """Say of how many results the decisive one is shown; empty for a single result."""
+    status, counts = check["status"], check["counts"]
+    total, count = (words.number(n, "integer") for n in (sum(counts.values()), counts[status]))
+    if sum(counts.values()) < 2:
+        return ""
+    if status == "PASS":
+        return f", the hardest of {total}"
+    return f"; {count} of {total} {words.BADGES[status]}"
 
 
 def _results(record: Record, check: Mapping[str, Any], unit: str) -> tuple[Any, str]:
