@@ -135,7 +135,7 @@ def test_whole_series_of_textbook_methods_have_their_order(
     counts = [128, 256, 512, 1024]
     values = [solver(n) for n in counts]
     h = [4.0 / n for n in counts]
-    verdict = judge(h, values, order=order, dims=["axis 0"])
+    verdict = judge(h, values, order=order, dims=[0])
     assert (verdict.status, verdict.reason) == ("PASS", "asymptotic")
     assert judge(h, values, order=order + 1).reason == "order_low"
     angle, velocity = judge(h, [np.moveaxis(v, 1, 0) for v in values], order=order, members=True)

@@ -56,6 +56,12 @@ PLACES = {
         "[central",
         "[{kind: central, start: first_order}",
     ),
+    "scheme by its word": (
+        "schemes.central.start=first_order",
+        "[central",
+        "[{kind: central, start: first_order}",
+    ),
+    "scheme by its kind": ("schemes.rk4.label=a", "{kind: rk4}", "{kind: rk4, label: a}"),
     "entry of a mapping in a list": ("checks[0].order=1", "order: 2", "order: 1"),
     "key with a dot": ("sweep.model.L=[3, 4]", "{linspace: [1, 2, 3]}", "[3, 4]"),
     "within a key with a dot": ("sweep.model.L.linspace[2]=5", "2, 3]", "2, 5]"),

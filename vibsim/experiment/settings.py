@@ -6,7 +6,7 @@ The value is YAML, as in a file. All other content keeps its lines, and faults n
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -79,10 +79,8 @@ def _path(top: Node, key: str) -> Path_:
     node: Node | None = top
     tail = key
     while tail:
-        if index := _INDEX.match(tail):
-            place = int(index[1])
-            _check_index(node, path, place)
-            path, tail = (*path, place), tail[index.end() :]
+        if entry := _entry(node, path, tail):
+            path, tail = (*path, entry[0]), entry[1]
         else:
             name = _name(node, path, tail)
             if not name:
@@ -91,6 +89,21 @@ def _path(top: Node, key: str) -> Path_:
             path, tail = (*path, name), tail.removeprefix(name).removeprefix(".")
         node = (node.children or {}).get(path[-1]) if node else None
     return path
+
+
+def _entry(node: Node | None, path: Path_, tail: str) -> tuple[int, str] | None:
+    """Return the place of the entry of a list that `tail` begins with, by its number or its name, and what follows."""
+    if index := _INDEX.match(tail):
+        place = int(index[1])
+        _check_index(node, path, place)
+        return place, tail[index.end() :]
+    entries = node.value if node is not None and isinstance(node.value, list) else ()
+    for place, entry in enumerate(entries):
+        names = map(entry.get, ("id", "label", "kind")) if isinstance(entry, Mapping) else (entry,)
+        name = next(filter(None, names), None)
+        if tail == name or tail.startswith(f"{name}."):
+            return place, tail[len(str(name)) + 1 :]
+    return None
 
 
 def _name(node: Node | None, path: Path_, tail: str) -> str:

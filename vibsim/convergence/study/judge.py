@@ -32,7 +32,7 @@ def judge(
     exact: Exact | None = None,
     noise: float | None = None,
     restrict: str = "subset",
-    dims: Sequence[str] | None = None,
+    dims: Sequence[str | int] | None = None,
     members: Literal[False] = False,
 ) -> LadderVerdict: ...
 
@@ -47,7 +47,7 @@ def judge(
     exact: Exact | None = None,
     noise: float | None = None,
     restrict: str = "subset",
-    dims: Sequence[str] | None = None,
+    dims: Sequence[str | int] | None = None,
     members: Literal[True],
 ) -> list[LadderVerdict]: ...
 
@@ -61,7 +61,7 @@ def judge(
     exact: Exact | None = None,
     noise: float | None = None,
     restrict: str = "subset",
-    dims: Sequence[str] | None = None,
+    dims: Sequence[str | int] | None = None,
     members: bool = False,
 ) -> LadderVerdict | list[LadderVerdict]:
     """Judge whether results at several step sizes converge, with which order, and how large their error is.
@@ -91,8 +91,8 @@ def judge(
         periodic grid. ``mean`` takes averages over the cells of the coarsest level. ``linear`` and ``cubic``
         interpolate with an error of order 2 or 4, so orders from there on cannot be shown.
     dims
-        Names of the refined dimensions (``"axis 0"``, ``"axis 1"`` of numpy arrays), all by default. The others must
-        be the same on each level.
+        Names of the refined dimensions (of numpy arrays their numbers, from 0), all by default. The others must be the
+        same on each level.
     members
         Whether the first dimension of each result counts members, each with its own verdict.
 
@@ -185,7 +185,7 @@ def verdicts(
     exact: Exact | None = None,
     noise: float | None = None,
     restrict: str = "subset",
-    dims: Sequence[str] | None = None,
+    dims: Sequence[str | int] | None = None,
     members: bool = False,
 ) -> list[LadderVerdict]:
     """Return the verdict on each member, or on the only ladder; `quantity` is its name in sentences. See `judge`."""
@@ -198,10 +198,11 @@ def verdicts(
     levels = _levels(values, members)
     steps = refinement(h, len(levels))
     levels = [levels[i] for i in steps.positions]
-    if isinstance(dims, str):
+    if isinstance(dims, str | int):
         dims = [dims]
+    names = None if dims is None else [d if isinstance(d, str) else f"axis {d}" for d in dims]
     fixed = levels[0].dims[:1] if members else ()
-    common = common_values(levels, kind, dims, fixed)
+    common = common_values(levels, kind, names, fixed)
     half = half_written(exact) if isinstance(exact, Decimal) else None
     written = tuple(level.written for level in levels if level.written is not None)
     request = Request(
