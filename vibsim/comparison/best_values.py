@@ -30,7 +30,6 @@ from vibsim.convergence.extrapolation.thresholds import NUMBER_SAFETY_ALONE
 from vibsim.core.array_types import Flags, Floats
 from vibsim.core.record import Variable, flags
 from vibsim.core.vocabulary import LEVELS_OF_AN_ORDER, MEMBER
-from vibsim.elementary import on_arrays
 from vibsim.experiment.value_names import VALUES
 from vibsim.models import Model
 from vibsim.observe import oscillation, spectrum, steady_state
@@ -186,11 +185,7 @@ def _of_run(name: str, place: value_numbers.Place) -> Floats:
     if name == "peak_frequency":
         return spectrum.error_by_other_lines(*at)
     left = steady_state.distance(*at)
-    if name == "steady_amplitude":
-        return left
-    part = safe_ratio(left, steady_state.amplitude(*at))
-    # a vector that may be 0 has any angle
-    return np.where(part < 1.0, on_arrays.asin(np.minimum(part, 1.0)), np.pi)
+    return left if name == "steady_amplitude" else safe_ratio(left, steady_state.amplitude(*at))
 
 
 def _promised(name: str, place: value_numbers.Place) -> tuple[Floats, Flags]:
