@@ -40,7 +40,7 @@ SIZES = {
 WIDE_RATIO = 100.0
 """Ratio of numbers from which their axis is logarithmic; with a smaller one a peak would look flat."""
 STRIP = 0.097  # height of a legend row as a part of that of the axes
-LONG = 24  # characters of a label from which it is smaller
+LONG = 24  # characters of a label from which it is smaller, and of a member from which a title leaves it out
 
 
 def _panel(width: float, title: str, right: float = 0.14) -> Axes:
@@ -112,7 +112,10 @@ def _title_of_differences(record: Record, lead: Lead, count: int) -> str:
     """Say whether the curves coincide, and how well."""
     last = data.coincidence(record, lead.quantity, lead.member)
     several = lead.member.scheme_name if len(record["scheme"]) > 1 else ""
-    named = ", ".join(filter(None, [several, lead.member.case_words]))
+    case = lead.member.case_words
+    # a long name would take several lines, and stands among the large numbers
+    member = case if len(case) < LONG else "hardest member"
+    named = ", ".join(filter(None, [several, member]))
     of = f" ({named})" if named else ""
     if lead.result.get("reason") in ("exact", "round_off"):
         return f"What is left is round-off{of}"
