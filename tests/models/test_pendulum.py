@@ -179,7 +179,7 @@ def test_the_periods_of_the_centred_scheme_are_those_of_its_modified_energy(clai
     file = Path(__file__).parents[2] / "configs/vibration_text/frequency_error_of_swings.yaml"
     experiment = Experiment.from_yaml(file)
     (check,) = (check for check in experiment.checks if check.id == claim)
-    theta = (3.0, 2.0, 1.0, 0.1)[check.that.at.case]
+    theta = check.that.at.swept["initial.theta"]
     steps = 2**check.that.at.level
 
     def period(dt2):

@@ -86,11 +86,14 @@ class _Ladder:
     def over(self, unit: Floats) -> _Ladder:
         """Return the ladder of the number over a unit, shape (scheme, case)."""
         known = np.where(unit > 0.0, unit, np.nan)
-        divided = {
-            **{name: getattr(self, name) / known for name in ("size", "missed")},
-            **{name: getattr(self, name) / known[..., None] for name in ("values", "floor")},
-        }
-        return replace(self, **divided)
+        with np.errstate(invalid="ignore"):  # an energy that overflows
+            return replace(
+                self,
+                size=self.size / known,
+                missed=self.missed / known,
+                values=self.values / known[..., None],
+                floor=self.floor / known[..., None],
+            )
 
     def limit(self) -> Limit:
         """Return the limit, with a bound that includes `missed`; or that of the series, if closer."""

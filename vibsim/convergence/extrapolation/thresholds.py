@@ -22,10 +22,8 @@ SERIES_SAFETY = 1.25  # as in grid convergence indices (P. J. Roache, 1994) [con
 MOST_COLUMNS = 5  # largest number of powers that are eliminated [convention]
 # Relative distance of a ratio of changes from theory: of the last ratio, the previous one, a single one. [calibrated]
 RATIO_TOLERANCE, PREVIOUS_RATIO_TOLERANCE, SINGLE_RATIO_TOLERANCE = 0.3, 0.6, 0.2
-NUMBER_SAFETY, NUMBER_SAFETY_ALONE = (
-    2.0,
-    4.0,
-)  # on a change, if two ratios agree or one [calibrated]
+# Factors on a change if two ratios agree with theory, and if one does. [calibrated]
+NUMBER_SAFETY, NUMBER_SAFETY_ALONE = 2.0, 4.0
 # With one change only, at least this part of the last correction is the error. [calibrated]
 LEAST_SHARE = 0.01
 # `SINGLE_RATIO_TOLERANCE`, `NUMBER_SAFETY_ALONE` and `LEAST_SHARE` for three levels, whose only ratio may be an
