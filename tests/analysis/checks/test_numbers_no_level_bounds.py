@@ -102,6 +102,27 @@ def test_what_no_level_shows_is_not_decided(
     assert advice in text
 
 
+@pytest.mark.parametrize(
+    ("end", "event", "count"),
+    [
+        # the guard has an extremum, so that its rate has any sign
+        ("2*pi", {"when": "u", "then": {"v": "0.9*v"}}, 2),
+        # it rises to 0, but the event is where it falls
+        ("3*pi/2", {"when": "u", "falling": True, "then": {"v": "0.9*v"}}, 1),
+    ],
+)
+def test_a_run_may_end_at_an_extremum_or_where_a_guard_comes_back(
+    end: str, event: dict[str, Any], count: int
+) -> None:
+    content = {
+        **{**BOUNCES, "schemes": ["rk4", "velocity_verlet", "gauss4"], "time": {"end": end}},
+        "model": {"kind": "oscillator", "spring": "u", "events": [event]},
+    }
+    checks = {"value": "event_count", "equals": count}, {"value": "end", **BEST, "quantity": "v"}
+    found = run(content, checks[0], {**checks[1], "below": 1.0}).verdicts
+    assert [one.status for one in found] == ["PASS", "PASS"]
+
+
 def test_a_frequency_is_that_of_the_samples_of_its_own_level() -> None:
     """At the coarsest level a period has 1.7 steps, at the finest one 53."""
     content = {
