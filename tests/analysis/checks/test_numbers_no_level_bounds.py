@@ -89,6 +89,12 @@ LARGEST_TIME = {
         ),
         (IMPACT_AT_THE_END, {"value": "end", **BEST, "quantity": "v", "below": 0}, "end of the run", "later"),
         (IMPACT_AT_THE_END, {"value": "event_count", "equals": 1}, "end of the run", "later"),
+        (
+            {**IMPACT_AT_THE_END, "sweep": {"initial.u": [1.0, 2.0]}},
+            {"value": "event_count", "over": "initial.u", "take": "largest", "equals": 1},
+            "an unknown error",
+            "later",
+        ),
         (DROP_TO_THE_END, {"value": "end", "quantity": "v", "above": 0}, "end of the run", "later"),
     ],
 )  # fmt: skip
