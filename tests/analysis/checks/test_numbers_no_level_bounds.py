@@ -89,6 +89,13 @@ LARGEST_TIME = {
         ),
         (IMPACT_AT_THE_END, {"value": "end", **BEST, "quantity": "v", "below": 0}, "end of the run", "later"),
         (IMPACT_AT_THE_END, {"value": "event_count", "equals": 1}, "end of the run", "later"),
+        # 25 steps of pi/50 are not pi/2
+        (
+            {**IMPACT_AT_THE_END, "time": {"end": "pi/2", "base_steps": 25}, "levels": [0, 1, 2, 3]},
+            {"value": "end", "at": {"t": math.pi / 2, "level": "best"}, "quantity": "v", "below": 0},
+            "end of the run",
+            "later",
+        ),
         (
             {**IMPACT_AT_THE_END, "sweep": {"initial.u": [1.0, 2.0]}},
             {"value": "event_count", "over": "initial.u", "take": "largest", "equals": 1},
