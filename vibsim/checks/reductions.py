@@ -299,8 +299,8 @@ def _finding(f: MemberFacts, check: ValueCheck, r: Reduced, members: Any) -> str
     error = max(r.high - r.value, r.value - r.low)
     finding = f"The {take} {what} over {count} members is {number(r.value, 10)} {unit}".rstrip()
     finding += f", at {place}" if take in OF_ONE_MEMBER else ""
-    if not check.number.has_limit(check.at.level):
-        return finding
     if math.isinf(error):
         return f"{finding}, with an unknown error"
+    if not check.number.has_limit(check.at.level):
+        return finding
     return f"{finding}, with an error of at most {number(error, 2)}"

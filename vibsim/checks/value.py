@@ -184,15 +184,13 @@ def judge(experiment: Experiment, record: Record, check: ValueCheck, facts: Meas
     # a stability limit may be infinite; an infinite exact period means that there is none, as on the separatrix
     does_not_exist = np.isnan(number) | (np.isinf(number) & (name == "exact_period"))
     infinite = np.isinf(number) & (name != "stability_limit") & ~does_not_exist
-    may_be_right = ~(np.minimum(away, _to_the_cut(check, number)) > bound) & (
-        is_limit | np.isinf(bound)
-    )
+    # a number that depends on an event at the end has no bound at any level
+    is_bounded = is_limit | np.isinf(bound)
+    may_be_right = ~(np.minimum(away, _to_the_cut(check, number)) > bound) & is_bounded
     # an uncertain time agrees by chance, perhaps that of another event; an inequality must hold within the whole bound
     is_strict = row.needs_events or check.equals is None
     is_unknown = np.isnan(bound) & (row.needs_events | (facts["levels_needed"] == MOVING))
     is_wide = np.isinf(bound) | ((bound > _room(check, number)) & is_strict)
-    # a number that depends on an event at the end has no bound at any level
-    is_bounded = is_limit | np.isinf(bound)
     holds &= ~((is_unknown | is_wide) & is_bounded)
     cases = [
         ((_failed(record, check) & ~survives) | infinite, "non_finite"),
@@ -434,7 +432,7 @@ def _why_unknown(f: MemberFacts, check: ValueCheck) -> str:
         return f", because the run has fewer than {LEAST_PERIODS} periods of the force"
     if check.value == "peak_frequency" and math.isinf(f.fact("error_bound")):
         return ", because the lines around the highest one are not those of a cosine"
-    if is_of_events_at_end(f, check):
+    if _is_of_events_at_end(f, check):
         return ", because no level tells whether an event happens before the end of the run"
     numbers = _by_level_of(f)
     if len(numbers) >= LEVELS_OF_AN_ORDER and np.all(np.isfinite(numbers)):
@@ -454,9 +452,11 @@ def _is_on_the_mesh(f: MemberFacts, check: ValueCheck) -> bool:
     return check.number.needs_events and is_on_the_mesh(options)
 
 
-def is_of_events_at_end(f: MemberFacts, check: ValueCheck) -> bool:
+def _is_of_events_at_end(f: MemberFacts, check: ValueCheck) -> bool:
     """Say whether a number depends on an event that cannot be told from one behind the end."""
-    return math.isinf(f.fact("error_bound")) and f.experiment.model.definition.events is not None
+    may_depend = check.number.is_sample or check.number.needs_events
+    has_events = f.experiment.model.definition.events is not None
+    return may_depend and has_events and math.isinf(f.fact("error_bound"))
 
 
 def advice_on_bound(f: MemberFacts, check: ValueCheck) -> str:
@@ -467,7 +467,7 @@ def advice_on_bound(f: MemberFacts, check: ValueCheck) -> str:
         return "Use steps shorter than the pulse, or write a wider pulse of the same impulse."
     if _has_few_periods(f, check):
         return f"Give {LEAST_PERIODS} or more `periods:`."
-    if is_of_events_at_end(f, check):
+    if _is_of_events_at_end(f, check):
         return "Let the run end a little earlier or later (`time: end`)."
     numbers = np.array(_by_level_of(f))
     bound = f.fact("error_bound")

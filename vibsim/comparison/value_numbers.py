@@ -71,9 +71,9 @@ class Place:
         """Tell where the number `name` depends on an event that may be behind the end, shape (scheme, case)."""
         grid, model = self.block.grid, self.block.model
         if VALUES[name].is_sample:
-            level = grid.levels.index(self.levels[0] if self.at_level is None else self.at_level)
-            last = (None, float(grid.t[-1])), (None, grid.steps[level])
-            is_last = grid.end_included and self.t in last[0] and self.step in last[1]
+            data = self.data()
+            t, every = (grid.t, grid.stride) if data is None else (data["t"], whole(data, "every"))
+            is_last = grid.end_included and _index(self, t, every) == len(t) - 1
             depends = is_last and may_jump(model, self.quantity)
         else:
             depends = name in ("event_count", "last_event_time")

@@ -1,8 +1,7 @@
 """Members of which no level can tell whether an event happens before the end of the run.
 
-A guard g is 0 at an event (`vibsim.models.events`). The event nearest to the end is about ``g/g'`` away from it, with g
-and its rate g' at the end; or the last event is known. If the levels change this distance by about as much as it is,
-errors of the scheme or rounding decide on which side of the end the event lies.
+A guard g is 0 at an event (`vibsim.models.events`). If the levels change g at the end, or how long before it the last
+event was, by about as much as it is, errors of the scheme or rounding decide on which side of the end the event lies.
 """
 
 from __future__ import annotations
@@ -11,7 +10,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from vibsim.convergence.differences import last_change, safe_ratio
+from vibsim.convergence.differences import last_change
 from vibsim.convergence.thresholds import ROUND_OFF_SAFETY, STILL_TO_CHANGE
 from vibsim.core.array_types import Flags, Floats
 from vibsim.core.record import Record
@@ -53,37 +52,49 @@ def is_at_end(
     found = np.zeros(np.shape(rows[-1]["status"]), dtype=bool)
     if model.events is None:
         return found
-    guards = _guards(model)
-    distances = [
-        np.stack([_distance(model, row, group, guard) for row in rows], axis=-1) for guard in guards
-    ]
+    round_off = ROUND_OFF_SAFETY * floor * group.end
+    since_rest, since_last = (
+        np.stack([group.end - row[name] for row in rows], axis=-1)
+        for name in ("rest_time", "last_event_time")
+    )
+    moves = np.isnan(since_rest[..., -1])
     counts = np.stack([row["event_count"] for row in rows[-3:]], axis=-1)
-    last = np.stack([group.end - row["last_event_time"] for row in rows], axis=-1)
-    distances.append(np.where(np.all(counts == counts[..., :1], axis=-1)[..., None], last, np.nan))
-    with np.errstate(invalid="ignore"):
-        for distance in distances:
-            error = STILL_TO_CHANGE * last_change(distance) + ROUND_OFF_SAFETY * floor * group.end
-            found |= np.abs(distance[..., -1]) <= error
+    same_event = np.all(counts == counts[..., :1], axis=-1)
+    with np.errstate(all="ignore"):
+        found |= same_event & _may_be_zero(since_last, round_off)
+        found |= ~moves & _may_be_zero(np.nan_to_num(since_rest), round_off)
+        for direction, guard in _guards(model):
+            numbers = [_at_end(model, row, group, guard) for row in rows]
+            value, rate = (np.stack(x, axis=-1) for x in zip(*numbers, strict=True))
+            comes = np.any(direction * rate >= 0.0, axis=-1)
+            found |= moves & comes & _may_be_zero(value, round_off * np.abs(rate[..., -1]))
     return found
 
 
-def _guards(model: Model) -> list[Expression]:
-    """Return the formulas that vanish where the state may jump or the motion may end."""
+def _may_be_zero(numbers: Floats, round_off: Floats) -> Flags:
+    """Tell whether finer levels may bring a number to 0, from its values on all levels, shape (..., level)."""
+    error = STILL_TO_CHANGE * last_change(numbers) + round_off
+    return np.asarray(np.abs(numbers[..., -1]) <= error)
+
+
+def _guards(model: Model) -> list[tuple[int, Expression]]:
+    """Return the formulas that vanish where the state may jump or the motion may end, with directions of `Crossing`."""
     match model.events:
         case Crossings(rows):
-            return [tree(model, row.guard) for row in rows]
+            return [(row.direction, tree(model, row.guard)) for row in rows]
         case Impact():
-            return [Name(model.position)]
+            return [(-1, Name(model.position))]
     return []
 
 
-def _distance(model: Model, record: Record, group: Members, guard: Expression) -> Floats:
-    """Return how far from the end a guard vanishes, or since when the member is at rest, shape (scheme, case)."""
-    numbers = {row.name: np.asarray(record[row.name])[..., -1] for row in model.states}
+def _at_end(
+    model: Model, record: Record, group: Members, guard: Expression
+) -> tuple[Floats, Floats]:
+    """Return a guard at the end of the run and its rate there, shape (scheme, case)."""
+    states = {row.name: np.asarray(record[row.name])[..., -1] for row in model.states}
     parameters = {name: value[:, 0] for name, value in group.by_name(model).items()}
-    value, change = values_of(
-        [guard, rate(model, guard)], {**parameters, **numbers, "t": group.end}
+    value, change = (
+        np.broadcast_to(x, np.shape(record["status"]))
+        for x in values_of([guard, rate(model, guard)], {**parameters, **states, "t": group.end})
     )
-    rest, shape = np.asarray(record["rest_time"]), np.shape(record["status"])
-    distance = safe_ratio(*(np.broadcast_to(x, shape) for x in (value, change)))
-    return np.where(np.isnan(rest), distance, group.end - rest)
+    return value, change

@@ -58,9 +58,7 @@ class MemberBlock:
     missed: Missed  # pulses of the force between the points of every level
     growth: Floats  # largest position over the largest exact one, shape (s, c, l); NaN if not known
     eventless: Flags  # whether a model with events met none on the finest level, shape (s, c)
-    event_at_end: (
-        Flags  # whether no level tells if an event happens before the end of the run, shape (s, c)
-    )
+    event_at_end: Flags  # whether an event may be on either side of the end, shape (s, c)
 
     @property
     def model(self) -> Model:

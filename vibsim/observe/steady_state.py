@@ -24,7 +24,7 @@ import itertools
 import numpy as np
 
 from vibsim.convergence.differences import safe_ratio
-from vibsim.core.array_types import Complexes, Floats
+from vibsim.core.array_types import Complexes, Flags, Floats
 from vibsim.elementary import on_arrays
 from vibsim.formula import values_of
 from vibsim.models import Model, tree
@@ -77,22 +77,23 @@ def section(block: MemberBlock, level: int, quantity: str) -> Floats:
     return take(block.grid, block.records[level], quantity)[..., ::n]
 
 
-def is_angle(model: Model, group: Members, position: str) -> bool:
-    """Tell whether a position matters, and the accelerations of the first member are the same a turn further."""
+def is_angle(model: Model, group: Members, position: str) -> Flags:
+    """Tell where a position matters, and accelerations are the same a turn further, shape (case,)."""
     accelerations = [tree(model, formula) for formula in model.accelerations]
     matters = any(position in formula.names for formula in accelerations)
     if position not in model.positions or not matters or model.lookup is not None:
-        return False
-    rng = np.random.default_rng(21)
+        return np.zeros(len(group.end), dtype=bool)
+    rng, shape = np.random.default_rng(21), (len(group.end), TESTS)
     numbers = {
         name: rng.uniform(-1.0, 1.0, TESTS) for name in (*model.positions, *model.velocities, "t")
     }
-    numbers |= {name: value[0] for name, value in group.by_name(model).items()}
+    numbers |= group.by_name(model)
     found, moved = (
-        np.stack([np.broadcast_to(x, TESTS) for x in values_of(accelerations, changed)])
+        np.stack([np.broadcast_to(x, shape) for x in values_of(accelerations, changed)])
         for changed in (numbers, {**numbers, position: numbers[position] + TURN})
     )
-    return bool(np.all(np.abs(moved - found) <= SAME_AFTER_A_TURN * (1.0 + np.abs(found))))
+    same = np.abs(moved - found) <= SAME_AFTER_A_TURN * (1.0 + np.abs(found))
+    return np.asarray(np.all(same, axis=(0, -1)))
 
 
 def section_period(block: MemberBlock, level: int) -> Floats:
@@ -106,8 +107,8 @@ def section_period(block: MemberBlock, level: int) -> Floats:
     rows = rows[..., rows.shape[-1] // 2 :]
     period = np.zeros(block.shape)
     size = np.max(np.abs(rows), axis=-1, initial=0.0)
-    turn = np.array([TURN if is_angle(block.model, block.group, x) else np.inf for x in states])
-    turn = turn[:, None, None, None]
+    is_turned = np.stack([is_angle(block.model, block.group, name) for name in states])
+    turn = np.where(is_turned, TURN, np.inf)[:, None, :, None]
     size = np.minimum(size, 0.5 * turn[..., 0])
     for k in range(rows.shape[-1] // 2, 0, -1):
         change = rows[..., k:] - rows[..., :-k]

@@ -89,6 +89,19 @@ LARGEST_TIME = {
         ),
         (IMPACT_AT_THE_END, {"value": "end", **BEST, "quantity": "v", "below": 0}, "end of the run", "later"),
         (IMPACT_AT_THE_END, {"value": "event_count", "equals": 1}, "end of the run", "later"),
+        # 25 steps of pi/50 are not pi/2
+        (
+            {**IMPACT_AT_THE_END, "time": {"end": "pi/2", "base_steps": 25}, "levels": [0, 1, 2, 3]},
+            {"value": "end", "at": {"t": math.pi / 2, "level": "best"}, "quantity": "v", "below": 0},
+            "end of the run",
+            "later",
+        ),
+        (
+            {**IMPACT_AT_THE_END, "sweep": {"initial.u": [1.0, 2.0]}},
+            {"value": "event_count", "over": "initial.u", "take": "largest", "equals": 1},
+            "an unknown error",
+            "later",
+        ),
         (DROP_TO_THE_END, {"value": "end", "quantity": "v", "above": 0}, "end of the run", "later"),
     ],
 )  # fmt: skip
@@ -100,6 +113,27 @@ def test_what_no_level_shows_is_not_decided(
     text = json.dumps(found)
     assert why in text
     assert advice in text
+
+
+@pytest.mark.parametrize(
+    ("end", "event", "count"),
+    [
+        # the guard has an extremum, so that its rate has any sign
+        ("2*pi", {"when": "u", "then": {"v": "0.9*v"}}, 2),
+        # it rises to 0, but the event is where it falls
+        ("3*pi/2", {"when": "u", "falling": True, "then": {"v": "0.9*v"}}, 1),
+    ],
+)
+def test_a_run_may_end_at_an_extremum_or_where_a_guard_comes_back(
+    end: str, event: dict[str, Any], count: int
+) -> None:
+    content = {
+        **{**BOUNCES, "schemes": ["rk4", "velocity_verlet", "gauss4"], "time": {"end": end}},
+        "model": {"kind": "oscillator", "spring": "u", "events": [event]},
+    }
+    checks = {"value": "event_count", "equals": count}, {"value": "end", **BEST, "quantity": "v"}
+    found = run(content, checks[0], {**checks[1], "below": 1.0}).verdicts
+    assert [one.status for one in found] == ["PASS", "PASS"]
 
 
 def test_a_frequency_is_that_of_the_samples_of_its_own_level() -> None:

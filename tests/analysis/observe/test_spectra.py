@@ -13,6 +13,8 @@ from vibsim import Experiment, analyse, simulate, verdicts
 from vibsim.core.errors import InputError
 from vibsim.core.home import home
 from vibsim.observe import spectrum
+from vibsim.observe.steady_state import is_angle
+from vibsim.simulation.members import members
 
 FILE = home() / "configs" / "showcase" / "duffing_periods.yaml"
 
@@ -228,3 +230,17 @@ def test_the_section_of_a_pendulum_that_turns_over_repeats_up_to_whole_turns() -
     levels = [simulate(experiment, level) for level in experiment.levels]
     [verdict] = verdicts(experiment, analyse(experiment, levels))
     assert verdict.status == "PASS"
+
+
+def test_what_is_an_angle_of_one_member_need_not_be_one_of_another() -> None:
+    """Each member is asked by itself, so that no number depends on how members are divided into files."""
+    system = {"kind": "system", "acceleration": "-sin(u) - c*u", "parameters": {"c": 0.0}}
+    experiment = Experiment.from_dict(
+        {
+            **{"title": "x", "model": system, "initial": {"u": 0.2}, "schemes": ["rk4"]},
+            **{"time": {"end": 1.0}, "levels": [1, 2]},
+            "sweep": {"model.parameters.c": [0.0, 0.1, 0.0]},
+        }
+    )
+    found = is_angle(experiment.model.definition, members(experiment, 0, 3), "u")
+    assert found.tolist() == [True, False, True]
