@@ -1,9 +1,9 @@
 """The most accurate value of each number of a ladder: extrapolated, with a bound of its error.
 
 The numbers are those that a ``value`` check may use at ``level: best``. Each is computed at all levels
-(`vibsim.comparison.value_numbers`) and then extrapolated (`vibsim.convergence.number_extrapolation`), since the peaks
+(`vibsim.comparison.value_numbers`) and then extrapolated (`vibsim.convergence.extrapolation.numbers`), since the peaks
 of an extrapolated solution are meaningless. The grid convergence index of the finest level is added
-(`vibsim.convergence.gci`).
+(`vibsim.convergence.extrapolation.gci`).
 """
 
 from __future__ import annotations

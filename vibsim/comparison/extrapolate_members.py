@@ -1,6 +1,6 @@
 """Members extrapolated over the levels of a ladder, and the facts about them that the tableau needs.
 
-`vibsim.convergence.state_extrapolation` needs the powers in which the errors of a scheme expand, and the round-off of
+`vibsim.convergence.extrapolation.states` needs the powers in which the errors of a scheme expand, and the round-off of
 the levels. Schemes predict round-off relative to the solution, from the arithmetic and the number of steps, but a
 motion may amplify it a millionfold, as near the separatrix of the pendulum. So it is measured: the coarsest level runs
 once more in another arithmetic, which is the same method with other rounding errors, which shows the amplification.

@@ -1,6 +1,6 @@
 """Figures over time: the rescaled differences of levels, their ratios, and the local order.
 
-Source: pendulum lecture, sections 2.5 and 2.6; `vibsim.convergence.local_order` for the order in windows.
+Source: pendulum lecture, sections 2.5 and 2.6; `vibsim.comparison.local_order` for the order in windows.
 """
 
 from __future__ import annotations

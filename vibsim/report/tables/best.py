@@ -1,7 +1,7 @@
 """The table of the most accurate values of the ladder, each with two error bars.
 
-One is a calibrated bound for the extrapolated value (`vibsim.convergence.number_extrapolation`), the other the grid
-convergence index of the value of the finest level (`vibsim.convergence.gci`).
+One is a calibrated bound for the extrapolated value (`vibsim.convergence.extrapolation.numbers`), the other the grid
+convergence index of the value of the finest level (`vibsim.convergence.extrapolation.gci`).
 """
 
 from __future__ import annotations
