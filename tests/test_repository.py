@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import pkgutil
 import re
 import subprocess
 import sys
@@ -56,6 +57,32 @@ def test_no_text_cites_a_document_that_is_not_here() -> None:
     cites = re.compile(r"design(\.md)?, section|[Tt]he design['.,]|errata\.md")
     found = [f"{path.name}: {cites.search(text)}" for path, text in texts() if cites.search(text)]
     assert found == []
+
+
+def exists(name: str) -> bool:
+    """Tell whether a module, or what it holds, has this name; fields of classes have no value."""
+    owner, _, last = name.rpartition(".")
+    try:
+        pkgutil.resolve_name(name)
+    except (AttributeError, ImportError):
+        return (
+            owner != ""
+            and exists(owner)
+            and last in vars(pkgutil.resolve_name(owner)).get("__annotations__", {})
+        )
+    return True
+
+
+def test_what_docstrings_name_exists() -> None:
+    """Four files named modules by the places where these had been before."""
+    named = {
+        (path.name, name)
+        for path, text in texts()
+        if path.suffix == ".py"
+        for name in re.findall(r"`(vibsim(?:\.\w+)+)`", text)
+    }
+    assert len(named) > 50
+    assert [one for one in sorted(named) if not exists(one[1])] == []
 
 
 def blocks(path: Path, language: str) -> list[str]:

@@ -113,7 +113,6 @@ def test_a_model_in_full_has_every_state_and_every_key(
         assert f"default {parameter.default:g}" in text
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     ("words", "told"),
     [
