@@ -70,6 +70,10 @@ TOLD = {
         },
         "sweep.sample.over.initial.theta: 90 rad are",
     ),
+    "decimal commas": (
+        {"sweep": {"initial.theta": [0, 1, 0, 2]}},
+        "sweep.initial.theta: has 0 more than once: a number with a decimal comma becomes two",
+    ),
     "relative": (
         {"checks": [{"accurate": "theta", "relative": 5}]},
         "checks[0].relative: is 5 times the size of theta",
@@ -116,6 +120,15 @@ MEANT = {
     "degrees": {"initial": {"theta": "60 degree"}},
     "swept degrees": {"sweep": {"initial.theta": ["10 degree", "90 degree"]}},
     "count of a rule": {"sweep": {"initial.theta": {"linspace": [0.1, 3, 50]}}},
+    "the same length beside two angles": {
+        "sweep": {"zip": {"initial.theta": [1, 2], "model.L": [3, 3]}}
+    },
+    "up and down again": {
+        "model": {"kind": "duffing", "gamma": 1},
+        "initial": {"u": 1},
+        "time": {"periods": 4, "steps_per_period": 4, "frequency": "model.omega"},
+        "sweep": {"follow": "model.omega", "model.omega": [1, 2, 1]},
+    },
     "velocity": {"initial": {"omega": 60}},
     "displacement": {"model": {"kind": "spring"}, "initial": {"u": 60}},
     "hertz": {"model": wave("t*f*2*pi"), "initial": {}},

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from decimal import Decimal
 from typing import Any
@@ -27,6 +28,7 @@ def note_unlikely(checks: Sequence[Check | None], setting: Setting, report: Repo
     """Warn about probable mistakes; `checks` are those of the file, None for a malformed one."""
     _warn_angles(setting, report)
     _warn_hertz(setting, report)
+    _warn_repeated(report)
     _warn_set_and_swept(report)
     for i, check in enumerate(checks):
         if check is None:
@@ -95,6 +97,20 @@ def _rates(model: Model) -> set[str]:
         for name in both - {Name("t")}
         if isinstance(name, Name)
     }
+
+
+def _warn_repeated(report: Report) -> None:
+    """Warn about a repeated value in the list of a swept key: equal members, or a decimal comma."""
+    section = report.source.data.get("sweep")
+    if not isinstance(section, Mapping) or "follow" in section:
+        # with `follow`, members with equal values differ in their start
+        return
+    for key, values in section.items():
+        listed = values if isinstance(values, list) else []
+        numbers = Counter(x for x in listed if type(x) in (int, float))
+        if twice := [x for x, count in numbers.items() if count > 1]:
+            hint = "a number with a decimal comma becomes two: write 0.5"
+            report.note(("sweep", key), f"has {twice[0]} more than once", hint)
 
 
 def _warn_set_and_swept(report: Report) -> None:
