@@ -103,6 +103,7 @@ FAULTS = {
     "index": ("schemes[2]=rk4", "schemes has no entry [2]: choose from [0] to [1]"),
     "no list": ("model[0]=1", "model is not a list"),
     "list": ("levels.to=3", "levels is a list: name an entry by its number, e.g. levels[0]"),
+    "name in a list": ("schemes.rk5.label=a", "schemes is a list: did you mean 'rk4'?"),
     "no keys": ("model.g.x=3", "model.g is a value and has no keys"),
     "no value": ("model.g", "must be KEY=VALUE, e.g. model.g=1.62"),
     "no key": ("=1", "must be KEY=VALUE"),

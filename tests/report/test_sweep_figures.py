@@ -551,11 +551,25 @@ def test_both_ways_of_a_followed_path_are_in_the_legends():
                 assert {sweep_layout.UP, sweep_layout.DOWN} <= set(texts), picture.name
 
 
-def test_a_tiny_number_has_its_power_of_ten_in_the_label():
-    """It stood over the title."""
-    exp = samples.experiment(sweep={"initial.theta": [1e-9, 2e-9]})
+@pytest.mark.parametrize("other", [2e-9, 1.00001e-9])
+def test_a_tiny_number_has_its_power_of_ten_in_the_label(other):
+    """It stood over the title. Labels of ticks differ, however near the values are."""
+    exp = samples.experiment(sweep={"initial.theta": [1e-9, other]})
     views, _ = samples.views(exp, samples.record(exp), "theta")
     ax = views["amplitude"].picture.figure.axes[0]
     ax.figure.draw_without_rendering()
     assert ax.get_ylabel() == "amplitude [10⁻⁹ rad]"
     assert ax.yaxis.get_major_formatter().get_offset() == ""
+    ticks = [text.get_text() for text in ax.get_yticklabels()]
+    assert len(set(ticks)) == len(ticks)
+
+
+def test_the_power_of_ten_is_that_of_the_values_within_the_frame():
+    """One member blows up to 10^26, and leaves the frame."""
+    exp = samples.experiment(
+        name="u",
+        **{"model": {"kind": "spring"}, "initial": {"u": 1.0}, "sweep": {"model.w": [1.0, 1.1, 1.2, 1.3, 8.0]}},
+        **{"schemes": ["forward_euler"], "levels": [4, 5, 6]},
+    )  # fmt: skip
+    views, _ = samples.views(exp, samples.record(exp), "u")
+    assert views["amplitude"].picture.figure.axes[0].get_ylabel() == "amplitude [m]"

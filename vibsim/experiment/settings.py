@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
-from vibsim.core.errors import Fault, InputError
+from vibsim.core.errors import Fault, InputError, nearest
 from vibsim.core.set_option import set_in
 from vibsim.experiment.faults import shorten
 from vibsim.experiment.yaml.parse import Node, Path_, Source, dotted, parse
@@ -85,7 +85,7 @@ def _path(top: Node, key: str) -> Path_:
             name = _name(node, path, tail)
             if not name:
                 raise _SettingError(FORM)
-            _check_name(node, path)
+            _check_name(node, path, name)
             path, tail = (*path, name), tail.removeprefix(name).removeprefix(".")
         node = (node.children or {}).get(path[-1]) if node else None
     return path
@@ -99,11 +99,16 @@ def _entry(node: Node | None, path: Path_, tail: str) -> tuple[int, str] | None:
         return place, tail[index.end() :]
     entries = node.value if node is not None and isinstance(node.value, list) else ()
     for place, entry in enumerate(entries):
-        names = map(entry.get, ("id", "label", "kind")) if isinstance(entry, Mapping) else (entry,)
-        name = next(filter(None, names), None)
-        if tail == name or tail.startswith(f"{name}."):
-            return place, tail[len(str(name)) + 1 :]
+        name = _name_of(entry)
+        if name and (tail == name or tail.startswith(f"{name}.")):
+            return place, tail[len(name) + 1 :]
     return None
+
+
+def _name_of(entry: object) -> str:
+    """Return the name of an entry of a list: its id, label or kind, or the word itself; empty if it has none."""
+    names = map(entry.get, ("id", "label", "kind")) if isinstance(entry, Mapping) else (entry,)
+    return next((name for name in names if isinstance(name, str)), "")
 
 
 def _name(node: Node | None, path: Path_, tail: str) -> str:
@@ -125,12 +130,14 @@ def _check_index(node: Node | None, path: Path_, place: int) -> None:
         raise _SettingError(f"{where} has no entry [{place}]", there)
 
 
-def _check_name(node: Node | None, path: Path_) -> None:
+def _check_name(node: Node | None, path: Path_, name: str) -> None:
     where = dotted(path)
     if node is None or node.value is None or node.keys is not None or _is_scheme(path, node):
         return
     if isinstance(node.value, list):
-        raise _SettingError(f"{where} is a list", f"name an entry by its number, e.g. {where}[0]")
+        names = [*filter(None, map(_name_of, node.value))]
+        by_number = f"name an entry by its number, e.g. {where}[0]"
+        raise _SettingError(f"{where} is a list", nearest(name, names) if names else by_number)
     raise _SettingError(f"{where} is a value and has no keys")
 
 

@@ -17,7 +17,7 @@ from vibsim.core.record import Record
 from vibsim.formula import Expression, Name, values_of
 from vibsim.models import Model
 from vibsim.models.base import rate, tree
-from vibsim.models.events import Crossings, Impact
+from vibsim.models.events import Crossings, Friction, Impact
 from vibsim.observe.common_grid import Grid
 from vibsim.simulation.members import Members
 
@@ -65,9 +65,9 @@ def is_at_end(
         found |= ~moves & _may_be_zero(np.nan_to_num(since_rest), round_off)
         for direction, guard in _guards(model):
             numbers = [_at_end(model, row, group, guard) for row in rows]
-            value, rate = (np.stack(x, axis=-1) for x in zip(*numbers, strict=True))
-            comes = np.any(direction * rate >= 0.0, axis=-1)
-            found |= moves & comes & _may_be_zero(value, round_off * np.abs(rate[..., -1]))
+            value, slope = (np.stack(x, axis=-1) for x in zip(*numbers, strict=True))
+            comes = np.any(direction * slope >= 0.0, axis=-1)
+            found |= moves & comes & _may_be_zero(value, round_off * np.abs(slope[..., -1]))
     return found
 
 
@@ -78,12 +78,14 @@ def _may_be_zero(numbers: Floats, round_off: Floats) -> Flags:
 
 
 def _guards(model: Model) -> list[tuple[int, Expression]]:
-    """Return the formulas that vanish where the state may jump or the motion may end, with directions of `Crossing`."""
+    """Return the formulas that vanish at events, with the directions of `Crossing`; friction holds where v is 0."""
     match model.events:
         case Crossings(rows):
             return [(row.direction, tree(model, row.guard)) for row in rows]
         case Impact():
             return [(-1, Name(model.position))]
+        case Friction():
+            return [(0, Name(model.velocity))]
     return []
 
 

@@ -18,7 +18,7 @@ import numpy as np
 from vibsim.core.array_types import Floats
 from vibsim.core.record import Record
 from vibsim.report.types import Axes, Figure
-from vibsim.report.words import power
+from vibsim.report.words import number, power
 
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
 DASHES: tuple[Any, ...] = (
@@ -250,6 +250,14 @@ def scale(*series: Floats) -> int:
     largest = float(np.abs(finite(*series)).max(initial=0.0))
     exponent = math.floor(math.log10(largest)) if largest else 0
     return 0 if -1 <= exponent <= 3 else exponent
+
+
+def label_values(ax: Axes, text: str, unit: str) -> None:
+    """Label a vertical axis with final limits; a power of ten, which would stand over the title, is in the label."""
+    exponent = scale(np.array(ax.get_ylim())) if ax.get_yscale() == "linear" else 0
+    if exponent:
+        ax.yaxis.set_major_formatter(lambda x, _: number(x / 10.0**exponent, "value"))
+    ax.set_ylabel(label(text, unit, exponent))
 
 
 def limits(*series: Floats, margin: float = 0.08) -> tuple[float, float]:

@@ -46,6 +46,10 @@ IMPACT_AT_THE_END = {
     "time": {"end": "pi/2"},
     "schemes": ["rk4", "velocity_verlet", "gauss4"],
 }
+FRICTION = {
+    **{**BOUNCES, "schemes": ["rk4", "velocity_verlet"], "time": {"end": "pi"}},
+    "model": {"kind": "oscillator", "spring": "u", "damping": {"coulomb": 0.1}},
+}
 DROP_TO_THE_END = {
     "model": {"kind": "bouncing_ball", "g": 9.81},
     "initial": {"h": 1.0},
@@ -89,6 +93,7 @@ LARGEST_TIME = {
         ),
         (IMPACT_AT_THE_END, {"value": "end", **BEST, "quantity": "v", "below": 0}, "end of the run", "later"),
         (IMPACT_AT_THE_END, {"value": "event_count", "equals": 1}, "end of the run", "later"),
+        (FRICTION, {"value": "event_count", "equals": 1}, "end of the run", "later"),
         # 25 steps of pi/50 are not pi/2
         (
             {**IMPACT_AT_THE_END, "time": {"end": "pi/2", "base_steps": 25}, "levels": [0, 1, 2, 3]},

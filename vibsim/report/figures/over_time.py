@@ -194,12 +194,7 @@ def _draw(
     panels.fit_values(ax, drawn, *exact)
     ax.set_xlim(float(t[0]), end if end > t[0] else float(t[0]) + 1.0)
     unit = series.unit_of(experiment, record, panel.quantity)
-    exponent = style.scale(np.array(ax.get_ylim())) if ax.get_yscale() == "linear" else 0
-    if exponent:
-        ax.yaxis.set_major_formatter(
-            lambda value, _: f"{value / 10.0**exponent:g}".replace("-", "−")
-        )
-    ax.set_ylabel(style.label(words.symbol(panel.quantity), unit, exponent))
+    style.label_values(ax, words.symbol(panel.quantity), unit)
     panels.move_label_left(ax)
     ax.set_title(panel.title)
     style.beside(ax)

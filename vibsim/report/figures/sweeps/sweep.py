@@ -143,7 +143,7 @@ class _Drawing:
 
         def draw(ax: Axes) -> str:
             move_label_left(ax)
-            _draw_numbers(ax, record, along, replace(amplitude, error=error), None)
+            _draw_bars(ax, record, along, replace(amplitude, error=error), None)
             finite = style.finite(value)
             is_wide = finite.size > 0 and float(finite.max()) > LOG_RATIO * float(np.median(finite))
             if explosive([value.ravel()]) or (is_wide and explosive([amplitude.value.ravel()])):
@@ -152,6 +152,7 @@ class _Drawing:
                 style.fit_log_axis(ax, "y", np.maximum(value, least), room=2.0)
             else:
                 ax.set_ylim(*_room(replace(amplitude, value=value, error=error), None))
+            style.label_values(ax, amplitude.name, amplitude.unit)
             return _leaving(ax, along, amplitude.value)
 
         explanation = (
@@ -326,6 +327,16 @@ def _draw_numbers(
     ax: Axes, record: Record, along: Along, number: Measured, exact: Floats | None, title: str = ""
 ) -> str:
     """Draw a number of the finest level with its error bars, and the exact number if it is known."""
+    _draw_bars(ax, record, along, number, exact, title)
+    ax.set_ylim(*_room(number, exact))
+    style.label_values(ax, number.name, number.unit)
+    return ""
+
+
+def _draw_bars(
+    ax: Axes, record: Record, along: Along, number: Measured, exact: Floats | None, title: str = ""
+) -> None:
+    """Draw the same without limits and label of the vertical axis."""
     count, level = len(record["scheme"]), data.whole(record, "level")[-1]
     for curve in _curves(record, along, by_line=True):
         if exact is not None and curve.scheme == 0:
@@ -340,16 +351,8 @@ def _draw_numbers(
         dashes = "none" if has_dots else style.look(curve.number)["linestyle"]
         text = curve.text or f"level {level}"
         _line(ax, curve.x, value, linestyle=dashes, linewidth=1.0, label=text, **look)
-    low, high = _room(number, exact)
-    ax.set_ylim(low, high)
-    # in the label, since matplotlib would write a power of ten over the title
-    exponent = style.scale(np.array([low, high]))
-    if exponent:
-        ax.yaxis.set_major_formatter(lambda x, _: words.number(x / 10.0**exponent, "step"))
-    ax.set_ylabel(style.label(number.name, number.unit, exponent))
     ax.set_title(title or f"{number.name.capitalize()}, level {level}")
     _beside(ax, along, fontsize=7.5 if style.crowded(record) else 8)
-    return ""
 
 
 def _room(number: Measured, exact: Floats | None) -> tuple[float, float]:
