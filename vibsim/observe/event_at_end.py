@@ -22,19 +22,15 @@ from vibsim.observe.common_grid import Grid
 from vibsim.simulation.members import Members
 
 
-def changed_at_events(model: Model) -> frozenset[str]:
-    """Return the states that jump at events."""
-    match model.events:
-        case Crossings(rows):
-            return frozenset(name for row in rows for name, _ in row.then)
-        case Impact():
-            return frozenset(model.velocities)
-    return frozenset()
-
-
 def may_jump(model: Model, quantity: str) -> bool:
     """Tell whether a quantity may jump at an event: all but the states that none changes."""
-    changed = changed_at_events(model)
+    match model.events:
+        case Crossings(rows):
+            changed = {name for row in rows for name, _ in row.then}
+        case Impact():
+            changed = set(model.velocities)
+        case _:
+            changed = set()
     return bool(changed) and quantity not in {row.name for row in model.states} - changed
 
 

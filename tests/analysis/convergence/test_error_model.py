@@ -249,41 +249,18 @@ def test_an_order_that_two_powers_only_explain_passes_when_it_is_measured() -> N
     assert found(assess(ladder(h, values), Question(2.5))) == ("PASS", "asymptotic")
 
 
-def test_orders_of_a_theory_are_one_apart() -> None:
+@pytest.mark.parametrize(
+    ("question", "met"),
+    [
+        (Question(2.0, by_theory=True), [1.6, 1.8, 2.4]),
+        (Question(2.0), [1.8]),
+        (Question(at_least=2.0), [1.8, 2.4, 2.6]),
+        (Question(), [1.8]),
+    ],
+)
+def test_orders_of_a_theory_are_one_apart(question: Question, met: list[float]) -> None:
     orders = np.array([1.4, 1.6, 1.8, 2.4, 2.6, np.nan])
-    likely = np.full(6, 2.0)
-    assert Question(2.0, by_theory=True).is_met_by(orders, likely).tolist() == [
-        False,
-        True,
-        True,
-        True,
-        False,
-        False,
-    ]
-    assert Question(2.0).is_met_by(orders, likely).tolist() == [
-        False,
-        False,
-        True,
-        False,
-        False,
-        False,
-    ]
-    assert Question(at_least=2.0).is_met_by(orders, likely).tolist() == [
-        False,
-        False,
-        True,
-        True,
-        True,
-        False,
-    ]
-    assert Question().is_met_by(orders, likely).tolist() == [
-        False,
-        False,
-        True,
-        False,
-        False,
-        False,
-    ]
+    assert orders[question.is_met_by(orders, np.full(6, 2.0))].tolist() == met
 
 
 def test_levels_without_a_measured_order_do_not_pass() -> None:
