@@ -17,7 +17,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from vibsim.apriori.formal_orders import columns_of
 from vibsim.checks import value
 from vibsim.checks.fields import Field, Measured, field_values
 from vibsim.checks.outcome import Judged, about_members
@@ -28,6 +27,7 @@ from vibsim.core.record import Record
 from vibsim.core.vocabulary import LEVELS_OF_AN_ORDER
 from vibsim.experiment import Experiment
 from vibsim.experiment.schema.checks import ValueCheck
+from vibsim.experiment.sweep_columns import recorded_columns
 from vibsim.experiment.value_names import CASES, OF_ONE_MEMBER
 
 FACTS: Mapping[str, Field] = {
@@ -213,7 +213,7 @@ def _key(record: Record, check: ValueCheck) -> Floats:
     """Return the swept values over which the numbers are taken, shape (case,); NaN over all members."""
     if check.over == CASES:
         return np.full(len(record["case"]), np.nan)
-    return np.asarray(columns_of(record)[str(check.over)], dtype=np.float64)
+    return np.asarray(recorded_columns(record)[str(check.over)], dtype=np.float64)
 
 
 def describe(f: MemberFacts, check: ValueCheck) -> Description:
@@ -254,7 +254,7 @@ def describe(f: MemberFacts, check: ValueCheck) -> Description:
 def _at(f: MemberFacts, check: ValueCheck, case: int) -> str:
     """Name a member by its swept value and, on a curve that goes up and down, by its branch."""
     if check.over == CASES:
-        swept = ((name, values[case]) for name, values in columns_of(f.record).items())
+        swept = ((name, values[case]) for name, values in recorded_columns(f.record).items())
         return ", ".join(
             f"{name} = {f.notation.number(x, 8) if isinstance(x, float) else x}"
             for name, x in swept

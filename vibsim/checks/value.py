@@ -16,7 +16,6 @@ from typing import Any
 
 import numpy as np
 
-from vibsim.apriori.formal_orders import columns_of, options_of
 from vibsim.checks.fields import Field, Measured, name_of
 from vibsim.checks.notation import PLAIN, ROUND_OFF, Notation
 from vibsim.checks.outcome import Judged
@@ -41,6 +40,7 @@ from vibsim.core.vocabulary import LEVELS_OF_AN_ORDER, is_error_part
 from vibsim.elementary import on_arrays
 from vibsim.experiment import Experiment
 from vibsim.experiment.schema.checks import ValueCheck
+from vibsim.experiment.sweep_columns import options_of, recorded_columns
 from vibsim.experiment.value_names import OF_THE_SAME_KIND, VALUES
 from vibsim.observe.member_block import MemberBlock
 from vibsim.observe.steady_state import LEAST_PERIODS
@@ -448,7 +448,7 @@ def _by_level_of(f: MemberFacts) -> list[float]:
 
 def _is_on_the_mesh(f: MemberFacts, check: ValueCheck) -> bool:
     """Say whether a number depends on events that are left to the mesh."""
-    options = options_of(f.experiment, columns_of(f.record), f.scheme, f.case)
+    options = options_of(f.experiment, recorded_columns(f.record), f.scheme, f.case)
     return check.number.needs_events and is_on_the_mesh(options)
 
 

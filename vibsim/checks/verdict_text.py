@@ -10,7 +10,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from vibsim.apriori.formal_orders import columns_of
 from vibsim.checks import accurate, equal, experiment_tolerance, value
 from vibsim.checks.kinds import KINDS
 from vibsim.checks.notation import PLAIN, Notation
@@ -20,6 +19,7 @@ from vibsim.core.record import Record
 from vibsim.core.vocabulary import BY_TOLERANCE, worst
 from vibsim.experiment import Experiment
 from vibsim.experiment.schema.checks import Check, Expect, Measurement
+from vibsim.experiment.sweep_columns import recorded_columns
 
 CORRECT = "Correct `expect:`, or find out why the outcome differs."
 
@@ -149,7 +149,7 @@ class Wording:
     def _place(self, result: Result, brackets: bool = False) -> str:
         """Name the scheme and, in a sweep, the member with its swept values."""
         head, place = f"scheme {result.scheme}", self.record.place("case", result.case)
-        listed = self._listed({key: x[place] for key, x in columns_of(self.record).items()})
+        listed = self._listed({key: x[place] for key, x in recorded_columns(self.record).items()})
         if not listed:
             return head
         return f"{head}, case {result.case}{f' ({listed})' if brackets else f', {listed}'}"
