@@ -33,7 +33,6 @@ from vibsim.formula import (
 )
 from vibsim.models import FormulaField, Model, tree
 from vibsim.models.base import rate
-from vibsim.models.events import Crossings
 from vibsim.models.shared.crossings import STOP
 from vibsim.models.shared.inertia import MASS, inertia
 from vibsim.models.table import Lookup
@@ -263,7 +262,7 @@ def check_starts(members: MemberNumbers, formulas: Mapping[str, str], report: Re
                 report.add(path, rule.format(f" (where {who})" if who else ""), hint)
                 return
 
-    rows = model.events.rows if isinstance(model.events, Crossings) else ()
+    rows = model.events.rows if model.events else ()
     for guard in (tree(model, row.guard) for row in rows if row.ends):
         slope = rate(model, guard)
 
