@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from vibsim.checks import value
+from vibsim.checks import number_units, value, value_text
 from vibsim.checks.fields import Field, Measured, field_values
 from vibsim.checks.outcome import Judged, about_members
 from vibsim.checks.sentences import Description, MemberFacts
@@ -219,13 +219,13 @@ def _key(record: Record, check: ValueCheck) -> Floats:
 def describe(f: MemberFacts, check: ValueCheck) -> Description:
     """Describe the number of a member, or the reduced number of all members."""
     if check.take is None:
-        return value.describe(f, check)
+        return value_text.describe(f, check)
     members = np.flatnonzero(about_members(f.record, check))
-    subject = f"{value.what(check, f.notation)} over {len(members)} members"
+    subject = f"{value_text.what(check, f.notation)} over {len(members)} members"
     if f.reason not in ("match", "mismatch", "pre_asymptotic") and not (
         f.reason == "too_few_levels" and np.isfinite(f.fact("value"))
     ):
-        description = value.describe(f, check)
+        description = value_text.describe(f, check)
         finding = description.sentence.removesuffix(".")
         place = _at(f, check, f.case)
         rule = f"{f.notation.opening(subject)} cannot be taken together: at {place}, {finding}."
@@ -246,8 +246,10 @@ def describe(f: MemberFacts, check: ValueCheck) -> Description:
     which = f" ({_at(f, check, int(places[0]))}{more})" if len(places) else ""
     verb = "is" if len(places) == 1 else "are"
     left = f"{len(places)} of {len(members)} members {verb} not resolved well enough{which}"
-    causes = (value.advice_on_bound(replace(f, case=int(place)), check) for place in places)
-    advice = next(filter(None, causes), "") or f"A{value.finer_levels(f)} to shrink the errors."
+    causes = (value_text.advice_on_bound(replace(f, case=int(place)), check) for place in places)
+    advice = (
+        next(filter(None, causes), "") or f"A{value_text.finer_levels(f)} to shrink the errors."
+    )
     return Description(f"{finding}{doubted}, because {left}.", advice, finding)
 
 
@@ -279,15 +281,15 @@ def _asked(f: MemberFacts, check: ValueCheck) -> tuple[str, str, str]:
     if check.take == "monotone":
         way = DIRECTIONS[float(check.equals or 0.0)]
         return ", as asked", f"; it may or may not be that it {way}", f"; asked is that it {way}"
-    rule = value.rule(check, f.notation)
+    rule = value_text.rule(check, f.notation)
     return f"; it is {rule}", f"; it may or may not be {rule}", f"; it is not {rule}"
 
 
 def _finding(f: MemberFacts, check: ValueCheck, r: Reduced, members: Any) -> str:
     """State the reduced number with its error."""
-    what, take, count = value.what(check, f.notation), str(check.take), len(members)
+    what, take, count = value_text.what(check, f.notation), str(check.take), len(members)
     place = _at(f, check, int(members[r.member]))
-    number, unit = f.notation.number, value.unit_of(f.experiment, f.record, check)
+    number, unit = f.notation.number, number_units.unit_of(f.experiment, f.record, check)
     if take == "monotone":
         turn = "" if r.value != NEITHER else f"; it turns at {place}"
         return f"{f.notation.opening(what)} {DIRECTIONS[r.value]} with {check.over} over {count} members{turn}"

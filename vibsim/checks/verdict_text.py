@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from vibsim.checks import accurate, equal, experiment_tolerance, value
+from vibsim.checks import accurate, equal, experiment_tolerance, value_text
 from vibsim.checks.kinds import KINDS
 from vibsim.checks.notation import PLAIN, Notation
 from vibsim.checks.outcome import Result, compared_reason, truth
@@ -38,7 +38,7 @@ def expectation(experiment: Experiment, check: Check | None, notation: Notation 
         case "accurate":
             return accurate.rule(check, notation)
         case "value":
-            return value.rule(check, notation)
+            return value_text.rule(check, notation)
         case "stable":
             return "stable" if check.stable else "unstable"
         case "conserves":

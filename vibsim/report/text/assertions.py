@@ -6,7 +6,7 @@ from typing import Any
 
 from vibsim.checks.accurate import rule
 from vibsim.checks.reductions import IN_WORDS
-from vibsim.checks.value import what
+from vibsim.checks.value_text import what
 from vibsim.checks.verdict_text import expectation, expected_verdict
 from vibsim.core.record import Record
 from vibsim.core.vocabulary import TYPICAL_NORM
