@@ -20,9 +20,9 @@ from vibsim.formula import ExpressionError, derivative, parts_of
 from vibsim.models import FormulaField, Model, tree
 from vibsim.models.base import rate
 from vibsim.models.oscillator import COULOMB
+from vibsim.models.shared.coordinates import coordinate_faults
 from vibsim.models.shared.crossings import is_crossing
 from vibsim.models.structure import RAYLEIGH
-from vibsim.models.system import coordinate_faults
 
 EVENTS = "events or a stop"
 STICTION = "coulomb friction, which may hold the body elsewhere"
