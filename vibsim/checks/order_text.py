@@ -14,7 +14,8 @@ from vibsim.checks.sentences import Description, MemberFacts, Template, add_leve
 from vibsim.comparison.parting import levels_to_the_end
 from vibsim.convergence.study.sentences import higher_part, opposite_part
 from vibsim.convergence.thresholds import HALF_SPACING
-from vibsim.core.vocabulary import is_error_part, order_interval
+from vibsim.core.decimals import order_interval
+from vibsim.core.vocabulary import is_error_part
 from vibsim.experiment.schema.checks import ConvergesCheck
 from vibsim.experiment.schema.fields import MAX_LEVEL
 from vibsim.schemes.base import is_on_the_mesh

@@ -43,17 +43,6 @@ RISES, FALLS, NEITHER = 1.0, -1.0, 0.0
 DIRECTIONS = {RISES: "rises", FALLS: "falls", NEITHER: "neither rises nor falls throughout"}
 
 
-IN_WORDS: Mapping[str, str] = {
-    "largest": "largest",
-    "smallest": "smallest",
-    "mean": "mean",
-    "where_largest": "place of the largest",
-    "where_smallest": "place of the smallest",
-    "monotone": "direction of",
-}
-"""First words of the names of reduced numbers."""
-
-
 class Reduced(NamedTuple):
     """A number of several members."""
 
