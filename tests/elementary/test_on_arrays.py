@@ -28,7 +28,7 @@ OF_LIBRARIES = frozenset(
 )
 ALLOWED = {
     # digits that are shown, and advice on levels: whole numbers
-    *("checks/order_text.py", "checks/value.py"),
+    *("checks/order_text.py", "checks/value_text.py"),
     *("convergence/study/figure.py", "convergence/study/notation.py"),
     "convergence/study/terminal.py",
     # a border between verdicts

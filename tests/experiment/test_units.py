@@ -17,8 +17,9 @@ from hypothesis import strategies as st
 from test_fuzz import QUIET, attempt
 
 from vibsim.experiment import Experiment, sweep_columns
+from vibsim.experiment.known_units import DEFINITIONS, finite, meaning, registry, unit_named
 from vibsim.experiment.schema.unit_text import MAX_EXPONENT, MAX_UNIT, UnitError, factors, split
-from vibsim.experiment.units import DEFINITIONS, MAX_OWN, finite, meaning, registry, unit_named
+from vibsim.experiment.units import MAX_OWN
 from vibsim.models import MODELS, Model
 
 OSCILLATOR = {"kind": "oscillator", "spring": "k*u", "damping": {"linear": 0.1}}

@@ -11,7 +11,8 @@ from vibsim import Experiment, analyse, simulate
 from vibsim.engine import integrate
 from vibsim.formula import evaluate, parse, values
 from vibsim.models import tree
-from vibsim.models.system import MOST, coordinate_faults, name_fault, written
+from vibsim.models.shared.coordinates import MOST, coordinate_faults, name_fault
+from vibsim.models.system import written
 from vibsim.schemes import FIXED_STEP, SCHEMES
 from vibsim.schemes.base import MOST_UNKNOWNS
 

@@ -18,8 +18,8 @@ import numpy as np
 
 from vibsim.analysis.compare_levels import analyse_records
 from vibsim.checks.experiment_tolerance import is_bound
+from vibsim.checks.number_units import UNITS, units_in
 from vibsim.checks.order import is_of_parts
-from vibsim.checks.value import UNITS, units_in
 from vibsim.comparison.comparison_variables import known_errors
 from vibsim.core.errors import VibsimError
 from vibsim.core.processes import as_worker_of

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from vibsim.analysis.check_verdicts import Verdict
-from vibsim.apriori.formal_orders import columns_of
 from vibsim.checks.verdict_text import Wording
 from vibsim.core.record import Record
 from vibsim.core.vocabulary import FORMAT, jsonable, worst
 from vibsim.experiment import citation
+from vibsim.experiment.sweep_columns import recorded_columns
 
 if TYPE_CHECKING:
     import xarray
@@ -86,7 +86,7 @@ def _member(experiment: Experiment, record: Record, case: int) -> dict[str, Any]
     if experiment.sweep is None:
         return {}
     at = record.place("case", case)
-    fields = {"values": {key: values[at] for key, values in columns_of(record).items()}}
+    fields = {"values": {key: values[at] for key, values in recorded_columns(record).items()}}
     if case % experiment.chain:
         return fields
     return fields | {"command": experiment.command_of(case)}

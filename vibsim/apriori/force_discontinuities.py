@@ -26,7 +26,6 @@ from vibsim.core.vocabulary import MEMBER
 from vibsim.elementary import on_arrays
 from vibsim.formula import Name, Switch, to_formula
 from vibsim.models import Model
-from vibsim.models.events import Friction
 from vibsim.simulation.members import Members
 from vibsim.simulation.reference.one_sided_forces import TABLE, Sides, sides
 
@@ -110,7 +109,8 @@ def may_have_corners(model: Model) -> bool:
 
 def _is_inside_steps(model: Model, switch: Switch) -> bool:
     """Tell whether steps cross a switch: not the reversal of friction, which is an event (`Model.events`)."""
-    is_event = isinstance(model.events, Friction) and switch.quantity == Name(model.velocity)
+    reverses = model.events is not None and model.events.reverses
+    is_event = reverses and switch.quantity == Name(model.velocity)
     return switch.mode != TABLE and not is_event
 
 

@@ -1,24 +1,22 @@
-"""What schemes promise for each member: order, powers of dt, round-off and stability limit.
+"""The orders and powers of dt that schemes promise for each member.
 
-These depend on the options of the scheme, which may be swept; the order of some schemes also depends on how the motion
-begins (`vibsim.schemes.orders`).
+They depend on the options of the scheme, which may be swept, and those of some schemes on how the motion begins
+(`vibsim.schemes.orders`).
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
-from typing import Any, get_args
+from typing import get_args
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
 
 from vibsim import theory
-from vibsim.apriori.roundoff_floor import SPACING_AT_ONE
 from vibsim.core.array_types import Flags, Floats, Integers
 from vibsim.core.record import Record
 from vibsim.core.vocabulary import PHASE, is_error_part, whole_of
-from vibsim.experiment import Experiment, sweep_columns
+from vibsim.experiment import Experiment
+from vibsim.experiment.sweep_columns import Columns, by_options, option_groups, recorded_columns
 from vibsim.formula import values
 from vibsim.models import tree
 from vibsim.models.shared.free import free_oscillation, why_not_free
@@ -30,28 +28,11 @@ from vibsim.simulation.members import numbers_of
 BALANCED = 1e-12
 """A force that changes the velocity by less than this fraction within a radian counts as zero. [convention]"""
 BEGINNINGS: tuple[Beginning, ...] = get_args(Beginning)
-Columns = Mapping[str, NDArray[Any]]
-"""Swept values by dotted key, each of shape (case,)."""
-
-
-def columns_of(record: Record) -> Columns:
-    """Return the swept values, which a Record holds as coordinates."""
-    return {
-        str(variable.attrs["sweep_key"]): variable.values
-        for variable in record.coords.values()
-        if "sweep_key" in variable.attrs
-    }
 
 
 def options_swept(experiment: Experiment) -> bool:
     """Tell whether an option of a scheme is swept."""
     return _sweeps(experiment, "schemes.")
-
-
-def options_of(experiment: Experiment, columns: Columns, scheme: int, case: int) -> Options:
-    """Return the options of scheme number `scheme` for member number `case`."""
-    single = {key: values[case : case + 1] for key, values in columns.items()}
-    return sweep_columns.option_groups(experiment, scheme, single)[0][0]
 
 
 def depends_on_beginning(experiment: Experiment) -> bool:
@@ -120,7 +101,7 @@ def formal_orders(
     model, name = experiment.model.definition, whole_of(quantity)
 
     def promised(beginning: Beginning, meets_events: bool = True) -> Floats:
-        return _each(
+        return by_options(
             experiment,
             columns,
             lambda s, o: float(
@@ -143,7 +124,7 @@ def orders_in(experiment: Experiment, record: Record, quantity: str) -> Floats:
     """
     name = f"{quantity}_formal_order"
     if name not in record:
-        return formal_orders(experiment, quantity, columns_of(record))
+        return formal_orders(experiment, quantity, recorded_columns(record))
     variable = record.variable(name)
     orders = np.asarray(variable.values, dtype=np.float64)
     return orders if "case" in variable.dims else orders[:, None]
@@ -167,7 +148,7 @@ def part_orders(experiment: Experiment, quantity: str, columns: Columns) -> Floa
     for s, spec in enumerate(experiment.schemes):
         if spec.adaptive:
             continue
-        for options, cases in sweep_columns.option_groups(experiment, s, columns):
+        for options, cases in option_groups(experiment, s, columns):
             stepper = spec.method.stepper_for(model, options)
             damping = motion.damping[cases]
             for value in np.unique(damping[np.isfinite(damping)]).tolist():
@@ -195,7 +176,7 @@ def special_orders(experiment: Experiment, quantity: str, columns: Columns) -> F
         has_mesh = model.events is not None and is_on_the_mesh(options)
         return math.nan if has_mesh else scheme.special_order(options)
 
-    return _each(experiment, columns, special)
+    return by_options(experiment, columns, special)
 
 
 def orders_vary(experiment: Experiment, quantity: str) -> bool:
@@ -208,7 +189,7 @@ def orders_vary(experiment: Experiment, quantity: str) -> bool:
 def even_powers(experiment: Experiment, quantity: str, columns: Columns) -> Flags:
     """Tell whether the error expansion of a quantity has only every second power of dt, shape (scheme, case)."""
     model, whole = experiment.model.definition, whole_of(quantity)
-    even = _each(experiment, columns, lambda s, o: float(s.has_even_powers(whole, model, o)))
+    even = by_options(experiment, columns, lambda s, o: float(s.has_even_powers(whole, model, o)))
     return np.asarray(even != 0)
 
 
@@ -229,56 +210,7 @@ def left_to_the_mesh(experiment: Experiment, columns: Columns, has_corners: Flag
         return ORDER_AT_CORNERS if order >= ORDER_AT_CORNERS else math.nan
 
     if model.events is not None:
-        return _each(experiment, columns, left)
+        return by_options(experiment, columns, left)
     if not has_corners.any():
         return np.full((len(experiment.schemes), 1), np.nan)
-    return np.where(has_corners, _each(experiment, columns, left), np.nan)
-
-
-def relative_floors(
-    experiment: Experiment, steps: tuple[int, ...], columns: Columns, arithmetic: str | None = None
-) -> Floats:
-    """Return the predicted round-off relative to the solution, shape (scheme, case, level).
-
-    `steps` are the numbers of steps of the levels; `arithmetic` replaces the option of this name, unless it is None.
-    """
-    loaded = experiment.model.definition.loaded
-    least = SPACING_AT_ONE if loaded is None else max(SPACING_AT_ONE, loaded.rounding)
-
-    def floor(scheme: Scheme, options: Options) -> list[float]:
-        if arithmetic is not None and "arithmetic" in options:
-            options = {**options, "arithmetic": arithmetic}
-        return [max(scheme.round_off(options, n), least) for n in steps]
-
-    return _each(experiment, columns, floor)
-
-
-def stability_limits(experiment: Experiment, columns: Columns) -> Floats:
-    """Return the largest stable w dt of every scheme, infinite if there is no limit, shape (scheme, case).
-
-    It is also infinite for a scheme that chooses its own steps, and for one that grows at every step: its growth
-    vanishes with dt, so it is no instability.
-    """
-    limits = _each(experiment, columns, limit_of)
-    return np.where(limits > 0.0, limits, np.inf)
-
-
-def limit_of(scheme: Scheme, options: Options) -> float:
-    """Return the largest stable w dt of a scheme: infinite without a limit, 0 if every step grows, NaN if adaptive."""
-    return math.nan if scheme.adaptive else theory.stability_limit(scheme, options)
-
-
-def _each(
-    experiment: Experiment, columns: Columns, promise: Callable[[Scheme, Options], ArrayLike]
-) -> Floats:
-    """Return `promise` for every scheme and for the options of each member, shape (scheme, 1 or case, ...)."""
-    rows = []
-    for i, scheme in enumerate(experiment.schemes):
-        groups = sweep_columns.option_groups(experiment, i, columns)
-        values = [np.asarray(promise(scheme.method, o), dtype=float) for o, _ in groups]
-        count = sum(len(cases) for _, cases in groups) if len(groups) > 1 else 1
-        row = np.empty((count, *values[0].shape))
-        for value, (_, cases) in zip(values, groups, strict=True):
-            row[cases if count > 1 else slice(None)] = value
-        rows.append(row)
-    return np.stack(np.broadcast_arrays(*rows))
+    return np.where(has_corners, by_options(experiment, columns, left), np.nan)

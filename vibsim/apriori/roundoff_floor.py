@@ -13,6 +13,9 @@ import numpy as np
 from vibsim.convergence.differences import largest
 from vibsim.core.array_types import Floats
 from vibsim.core.record import Record
+from vibsim.experiment import Experiment
+from vibsim.experiment.sweep_columns import Columns, by_options
+from vibsim.schemes import Options, Scheme
 
 SPACING_AT_ONE = float(np.finfo(np.float64).eps)
 """Distance from 1 to the next number, 2^-52: twice the unit round-off.
@@ -21,6 +24,24 @@ No stored number is known better than this, relative to its size.
 """
 STORED = 1.0 / 7.0
 """Root mean square of the rounding error of stored numbers from 1/2 to 1, in epsilon: 1/2 over sqrt(12). [derived]"""
+
+
+def relative_floors(
+    experiment: Experiment, steps: tuple[int, ...], columns: Columns, arithmetic: str | None = None
+) -> Floats:
+    """Return the predicted round-off relative to the solution, shape (scheme, case, level).
+
+    `steps` are the numbers of steps of the levels; `arithmetic` replaces the option of this name, unless it is None.
+    """
+    loaded = experiment.model.definition.loaded
+    least = SPACING_AT_ONE if loaded is None else max(SPACING_AT_ONE, loaded.rounding)
+
+    def floor(scheme: Scheme, options: Options) -> list[float]:
+        if arithmetic is not None and "arithmetic" in options:
+            options = {**options, "arithmetic": arithmetic}
+        return [max(scheme.round_off(options, n), least) for n in steps]
+
+    return by_options(experiment, columns, floor)
 
 
 def stored_floor(

@@ -15,6 +15,7 @@ import numpy as np
 
 from vibsim.checks.fields import LEVEL, Field, Measured
 from vibsim.checks.notation import PLAIN, Notation, beside
+from vibsim.checks.number_units import unit_of_quantity
 from vibsim.checks.outcome import Judged, as_expected
 from vibsim.checks.sentences import (
     FINER,
@@ -26,7 +27,6 @@ from vibsim.checks.sentences import (
     add_levels,
     cost_in_words,
 )
-from vibsim.checks.value import unit_of_quantity
 from vibsim.comparison.finest_error import FinestError, error_of_finest
 from vibsim.comparison.order_verdict import judgement
 from vibsim.comparison.quantity_comparison import Compared, Comparison

@@ -7,7 +7,7 @@ from typing import get_args
 
 import numpy as np
 
-from vibsim.apriori.formal_orders import columns_of, formal_orders
+from vibsim.apriori.formal_orders import formal_orders
 from vibsim.checks.fields import LEVEL, MOTION, Field, Measured
 from vibsim.checks.outcome import Judged
 from vibsim.checks.sentences import MOVE, NOT_FINITE, NOTHING_MOVES, Description, MemberFacts
@@ -19,6 +19,7 @@ from vibsim.core.record import Record
 from vibsim.core.vocabulary import DRIFTS
 from vibsim.experiment import Experiment
 from vibsim.experiment.schema.checks import ConservesCheck, Drift
+from vibsim.experiment.sweep_columns import recorded_columns
 from vibsim.observe.energy_drift import drift_at
 from vibsim.observe.member_block import MemberBlock
 from vibsim.observe.thresholds import LEAST_PERIODS, LEAST_SAMPLES
@@ -101,7 +102,7 @@ def judge(experiment: Experiment, record: Record, check: ConservesCheck, facts: 
         # a conserved energy is bounded, too
         is_expected |= is_none
     # an error hidden by round-off may grow in any way, unless theory says that there is none
-    has_error = np.isfinite(formal_orders(experiment, check.about or "", columns_of(record)))
+    has_error = np.isfinite(formal_orders(experiment, check.about or "", recorded_columns(record)))
     cases = [
         (broken, "non_finite"),
         (np.isnan(largest) & unclear, "not_applicable"),

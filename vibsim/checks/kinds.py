@@ -6,7 +6,17 @@ import json
 from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
-from vibsim.checks import accurate, energy, equal, order, order_text, reductions, stable, value
+from vibsim.checks import (
+    accurate,
+    energy,
+    equal,
+    number_units,
+    order,
+    order_text,
+    reductions,
+    stable,
+    value,
+)
 from vibsim.checks.fields import Field, Measured, field_values, result_fields, variables
 from vibsim.checks.outcome import Judged, Outcome, outcome_of
 from vibsim.checks.sentences import Description
@@ -57,7 +67,7 @@ def _units(block: MemberBlock, compared: Compared, check: Measurement) -> dict[s
     if check.kind == "value":
         position = block.model.position
         # UDUNITS has no roots, so an L2 norm is stored with the unit of its quantity
-        unit = value.unit_of_number(check, known, position, "s").removesuffix(" sqrt(s)")
+        unit = number_units.unit_of_number(check, known, position, "s").removesuffix(" sqrt(s)")
         return {"number": unit}
     return {"quantity": known.get(getattr(check, "quantity", ""), "")}
 

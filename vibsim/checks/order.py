@@ -18,7 +18,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from vibsim.apriori.formal_orders import even_powers, orders_in, relative_floors
+from vibsim.apriori.formal_orders import even_powers, orders_in
+from vibsim.apriori.roundoff_floor import relative_floors
 from vibsim.checks.accurate import ERROR, known_error
 from vibsim.checks.fields import REASON, STATUS, Field, Measured
 from vibsim.checks.outcome import Judged, as_expected

@@ -10,14 +10,8 @@ import numpy as np
 
 from vibsim import theory
 from vibsim.apriori.force_discontinuities import words_of
-from vibsim.apriori.formal_orders import (
-    columns_of,
-    is_promised,
-    options_of,
-    orders_in,
-    special_orders,
-    stability_limits,
-)
+from vibsim.apriori.formal_orders import is_promised, orders_in, special_orders
+from vibsim.apriori.stability_limits import stability_limits
 from vibsim.apriori.table_corners import is_on_a_point
 from vibsim.checks.accurate import error_in_words
 from vibsim.checks.phase_amplitude_text import parts_in_words
@@ -27,6 +21,7 @@ from vibsim.comparison.comparison_variables import has_exact
 from vibsim.core.record import Record
 from vibsim.core.vocabulary import is_error_part, whole_of
 from vibsim.experiment.schema.checks import ConvergesCheck
+from vibsim.experiment.sweep_columns import options_of, recorded_columns
 from vibsim.observe.member_block import fastest
 from vibsim.schemes.base import LOW_STARTS, Scheme
 
@@ -52,7 +47,7 @@ class OrderContext:
     def __init__(self, f: MemberFacts, check: ConvergesCheck) -> None:
         experiment, record, scheme, case = f.experiment, f.record, f.scheme, f.case
         quantity = check.converges
-        self._facts, self._columns = f, columns_of(record)
+        self._facts, self._columns = f, recorded_columns(record)
         self.quantity, self.norm, self.tolerance = quantity, check.norm, check.tolerance
         self.is_position = quantity in f.model.positions
         self.notation, self.reason = f.notation, f.reason

@@ -11,7 +11,6 @@ from typing import Any, NamedTuple, overload
 import numpy as np
 from numpy.typing import NDArray
 
-from vibsim.apriori.formal_orders import columns_of
 from vibsim.checks.fields import Facts, facts_of
 from vibsim.convergence.reasons import FAIL, INCONCLUSIVE, PASS, STATUS_OF, code, is_open
 from vibsim.core.array_types import Codes, Flags, Floats, Integers
@@ -20,7 +19,7 @@ from vibsim.core.vocabulary import REASON_NAMES, SEVERITY, STATUSES, decisive_nu
 from vibsim.experiment import Experiment
 from vibsim.experiment.data import schemes_of
 from vibsim.experiment.schema.checks import ClaimCheck, Expect, Measurement, MeasuringCheck
-from vibsim.experiment.sweep_columns import members_with
+from vibsim.experiment.sweep_columns import members_with, recorded_columns
 
 
 @dataclass(frozen=True)
@@ -144,7 +143,7 @@ def about_members(record: Record, check: Measurement | None) -> Flags:
     cases = np.asarray(record["case"])
     if check is None:
         return np.ones(len(cases), dtype=np.bool_)
-    is_swept = members_with(columns_of(record), check.swept, len(cases))
+    is_swept = members_with(recorded_columns(record), check.swept, len(cases))
     return is_swept if check.member is None else is_swept & (cases == check.member)
 
 

@@ -17,8 +17,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from vibsim.apriori.formal_orders import columns_of
-from vibsim.checks import value
+from vibsim.checks import number_units, value, value_text
 from vibsim.checks.fields import Field, Measured, field_values
 from vibsim.checks.outcome import Judged, about_members
 from vibsim.checks.sentences import Description, MemberFacts
@@ -28,6 +27,7 @@ from vibsim.core.record import Record
 from vibsim.core.vocabulary import LEVELS_OF_AN_ORDER
 from vibsim.experiment import Experiment
 from vibsim.experiment.schema.checks import ValueCheck
+from vibsim.experiment.sweep_columns import recorded_columns
 from vibsim.experiment.value_names import CASES, OF_ONE_MEMBER
 
 FACTS: Mapping[str, Field] = {
@@ -41,17 +41,6 @@ FACTS: Mapping[str, Field] = {
 RISES, FALLS, NEITHER = 1.0, -1.0, 0.0
 """The numbers of `monotone`."""
 DIRECTIONS = {RISES: "rises", FALLS: "falls", NEITHER: "neither rises nor falls throughout"}
-
-
-IN_WORDS: Mapping[str, str] = {
-    "largest": "largest",
-    "smallest": "smallest",
-    "mean": "mean",
-    "where_largest": "place of the largest",
-    "where_smallest": "place of the smallest",
-    "monotone": "direction of",
-}
-"""First words of the names of reduced numbers."""
 
 
 class Reduced(NamedTuple):
@@ -213,19 +202,19 @@ def _key(record: Record, check: ValueCheck) -> Floats:
     """Return the swept values over which the numbers are taken, shape (case,); NaN over all members."""
     if check.over == CASES:
         return np.full(len(record["case"]), np.nan)
-    return np.asarray(columns_of(record)[str(check.over)], dtype=np.float64)
+    return np.asarray(recorded_columns(record)[str(check.over)], dtype=np.float64)
 
 
 def describe(f: MemberFacts, check: ValueCheck) -> Description:
     """Describe the number of a member, or the reduced number of all members."""
     if check.take is None:
-        return value.describe(f, check)
+        return value_text.describe(f, check)
     members = np.flatnonzero(about_members(f.record, check))
-    subject = f"{value.what(check, f.notation)} over {len(members)} members"
+    subject = f"{value_text.what(check, f.notation)} over {len(members)} members"
     if f.reason not in ("match", "mismatch", "pre_asymptotic") and not (
         f.reason == "too_few_levels" and np.isfinite(f.fact("value"))
     ):
-        description = value.describe(f, check)
+        description = value_text.describe(f, check)
         finding = description.sentence.removesuffix(".")
         place = _at(f, check, f.case)
         rule = f"{f.notation.opening(subject)} cannot be taken together: at {place}, {finding}."
@@ -246,15 +235,17 @@ def describe(f: MemberFacts, check: ValueCheck) -> Description:
     which = f" ({_at(f, check, int(places[0]))}{more})" if len(places) else ""
     verb = "is" if len(places) == 1 else "are"
     left = f"{len(places)} of {len(members)} members {verb} not resolved well enough{which}"
-    causes = (value.advice_on_bound(replace(f, case=int(place)), check) for place in places)
-    advice = next(filter(None, causes), "") or f"A{value.finer_levels(f)} to shrink the errors."
+    causes = (value_text.advice_on_bound(replace(f, case=int(place)), check) for place in places)
+    advice = (
+        next(filter(None, causes), "") or f"A{value_text.finer_levels(f)} to shrink the errors."
+    )
     return Description(f"{finding}{doubted}, because {left}.", advice, finding)
 
 
 def _at(f: MemberFacts, check: ValueCheck, case: int) -> str:
     """Name a member by its swept value and, on a curve that goes up and down, by its branch."""
     if check.over == CASES:
-        swept = ((name, values[case]) for name, values in columns_of(f.record).items())
+        swept = ((name, values[case]) for name, values in recorded_columns(f.record).items())
         return ", ".join(
             f"{name} = {f.notation.number(x, 8) if isinstance(x, float) else x}"
             for name, x in swept
@@ -279,15 +270,15 @@ def _asked(f: MemberFacts, check: ValueCheck) -> tuple[str, str, str]:
     if check.take == "monotone":
         way = DIRECTIONS[float(check.equals or 0.0)]
         return ", as asked", f"; it may or may not be that it {way}", f"; asked is that it {way}"
-    rule = value.rule(check, f.notation)
+    rule = value_text.rule(check, f.notation)
     return f"; it is {rule}", f"; it may or may not be {rule}", f"; it is not {rule}"
 
 
 def _finding(f: MemberFacts, check: ValueCheck, r: Reduced, members: Any) -> str:
     """State the reduced number with its error."""
-    what, take, count = value.what(check, f.notation), str(check.take), len(members)
+    what, take, count = value_text.what(check, f.notation), str(check.take), len(members)
     place = _at(f, check, int(members[r.member]))
-    number, unit = f.notation.number, value.unit_of(f.experiment, f.record, check)
+    number, unit = f.notation.number, number_units.unit_of(f.experiment, f.record, check)
     if take == "monotone":
         turn = "" if r.value != NEITHER else f"; it turns at {place}"
         return f"{f.notation.opening(what)} {DIRECTIONS[r.value]} with {check.over} over {count} members{turn}"

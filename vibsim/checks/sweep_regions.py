@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from vibsim.apriori.formal_orders import columns_of
 from vibsim.checks.notation import PLAIN
 from vibsim.checks.outcome import Outcome
 from vibsim.convergence.reasons import PASS
@@ -17,6 +16,7 @@ from vibsim.core.array_types import Integers
 from vibsim.core.decimals import round_outward
 from vibsim.core.record import Record
 from vibsim.core.vocabulary import STATUSES
+from vibsim.experiment.sweep_columns import recorded_columns
 
 Column = NDArray[Any]
 
@@ -43,7 +43,7 @@ def sweep_regions(record: Record, outcome: Outcome) -> dict[str, Any]:
     """
     if outcome.is_of_all or outcome.total == 1:
         return {}
-    columns = {key: values[outcome.case_index] for key, values in columns_of(record).items()}
+    columns = {key: values[outcome.case_index] for key, values in recorded_columns(record).items()}
     if not columns:
         return {}
     bins = {key: _bins(values) for key, values in columns.items()}

@@ -10,8 +10,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from vibsim.apriori.formal_orders import columns_of
-from vibsim.checks import accurate, equal, experiment_tolerance, value
+from vibsim.checks import accurate, equal, experiment_tolerance, value_text
 from vibsim.checks.kinds import KINDS
 from vibsim.checks.notation import PLAIN, Notation
 from vibsim.checks.outcome import Result, compared_reason, truth
@@ -20,6 +19,7 @@ from vibsim.core.record import Record
 from vibsim.core.vocabulary import BY_TOLERANCE, worst
 from vibsim.experiment import Experiment
 from vibsim.experiment.schema.checks import Check, Expect, Measurement
+from vibsim.experiment.sweep_columns import recorded_columns
 
 CORRECT = "Correct `expect:`, or find out why the outcome differs."
 
@@ -38,7 +38,7 @@ def expectation(experiment: Experiment, check: Check | None, notation: Notation 
         case "accurate":
             return accurate.rule(check, notation)
         case "value":
-            return value.rule(check, notation)
+            return value_text.rule(check, notation)
         case "stable":
             return "stable" if check.stable else "unstable"
         case "conserves":
@@ -149,7 +149,7 @@ class Wording:
     def _place(self, result: Result, brackets: bool = False) -> str:
         """Name the scheme and, in a sweep, the member with its swept values."""
         head, place = f"scheme {result.scheme}", self.record.place("case", result.case)
-        listed = self._listed({key: x[place] for key, x in columns_of(self.record).items()})
+        listed = self._listed({key: x[place] for key, x in recorded_columns(self.record).items()})
         if not listed:
             return head
         return f"{head}, case {result.case}{f' ({listed})' if brackets else f', {listed}'}"

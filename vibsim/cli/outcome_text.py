@@ -7,8 +7,9 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from vibsim.cli.terminal import clean, painted
+from vibsim.core.decimals import order_interval
 from vibsim.core.set_option import set_options
-from vibsim.core.vocabulary import SEVERITY, order_interval
+from vibsim.core.vocabulary import SEVERITY
 
 Entry = Mapping[str, Any]
 """The summary of an experiment, or an entry with an ``error`` in its place; or one of its checks; or a failed job."""

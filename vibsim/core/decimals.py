@@ -1,4 +1,4 @@
-"""Directed rounding to a number of decimal digits."""
+"""Numbers in decimal digits: rounded outward, and as the ends of an interval."""
 
 from __future__ import annotations
 
@@ -12,3 +12,12 @@ def round_outward(value: float, digits: int, *, up: bool = True) -> float:
     """
     context = Context(prec=digits, rounding=ROUND_CEILING if up else ROUND_FLOOR)
     return float(context.create_decimal(str(float(value))))
+
+
+def order_interval(low: float, high: float) -> tuple[str, ...]:
+    """Return the ends of an order's interval as text, with the 3 to 6 decimals that differ; one text if none do."""
+    for decimals in range(3, 7):
+        ends = f"{low:.{decimals}f}", f"{high:.{decimals}f}"
+        if ends[0] != ends[1]:
+            return ends
+    return (f"{low:.3f}",)

@@ -76,15 +76,6 @@ def decisive_number(facts: Mapping[str, Any]) -> float | None:
     return None if DECISIVE["converges"] in facts else number
 
 
-def order_interval(low: float, high: float) -> tuple[str, ...]:
-    """Return the ends of an order's interval as text, with the 3 to 6 decimals that differ; one text if none do."""
-    for decimals in range(3, 7):
-        ends = f"{low:.{decimals}f}", f"{high:.{decimals}f}"
-        if ends[0] != ends[1]:
-            return ends
-    return (f"{low:.3f}",)
-
-
 FORMAT = 2
 """Version of the file format, ``vibsim_format`` in every file."""
 

@@ -26,8 +26,8 @@ from vibsim.engine.kernel_stubs import P, unbound
 from vibsim.engine.text import Module, collect
 from vibsim.formula import Binary, Expression, Name, Number, derivative
 from vibsim.models import Model
-from vibsim.models.base import tree
-from vibsim.models.events import Crossings
+from vibsim.models.base import Formula, rate, tree
+from vibsim.models.events import Crossing, Crossings
 
 # bound by the kernel (`vibsim.engine.kernel_stubs`)
 contact_with = contacts_after = contacts_of = crossed = energies = first_crossed = unbound
@@ -41,13 +41,60 @@ AT_ONCE = 2.0**-50
 """Events closer than this, relative to the time, are simultaneous."""
 LEAST_HEIGHT = 32.0
 """Twice the height of the lowest resolved flight over a guard, in units of the guard's rounding error."""
+FREE = "_free_"
+"""Prefix of the index of a coordinate, in the name of a number that is 0 while it rests on a stop and 1 otherwise."""
+
+
+def accelerations(model: Model, events: Crossings) -> list[Expression]:
+    """Return the accelerations, which vanish while a coordinate rests on a stop."""
+    stopped = coordinates_with_stops(model, events.rows)
+    formulas = [tree(model, formula) for formula in model.accelerations]
+    return [
+        Binary("*", formula, Name(f"{FREE}{i}")) if i in stopped else formula
+        for i, formula in enumerate(formulas)
+    ]
+
+
+def formulas(model: Model, events: Crossings) -> dict[str, dict[str, Formula]]:
+    """Return the formulas of the functions of the model, by function and result."""
+    guards = [tree(model, row.guard) for row in events.rows]
+    rates = [rate(model, guard) for guard in guards]
+    functions: dict[str, dict[str, Formula]] = {
+        "guards": {f"_guard_{k}": guard for k, guard in enumerate(guards)},
+        "guard_rates": {f"_rate_{k}": slope for k, slope in enumerate(rates)},
+        "guard_curvatures": {
+            f"_curvature_{k}": bend for k, bend in enumerate(_curvatures(model, events, rates))
+        },
+    }
+    for name, place in _places(model, events.rows).items():
+        functions[name] = {"_place": place}
+    for k, row in enumerate(events.rows):
+        new = dict(row.then)
+        functions[f"crossed_{k}"] = {
+            f"_new_{state.name}": new.get(state.name, state.name) for state in model.states
+        }
+    return functions
+
+
+def _curvatures(model: Model, events: Crossings, rates: Sequence[Expression]) -> list[Expression]:
+    """Return the second time derivatives of the guards; for guards of stops, as if no coordinate rested on them.
+
+    For a guard that depends on velocities it would need derivatives of the forces, and is set to 0.
+    """
+    held, stops = accelerations(model, events), fixed_stops(model, events.rows)
+    curvatures: list[Expression] = []
+    for k, (row, speed) in enumerate(zip(events.rows, rates, strict=True)):
+        is_of_positions = not set(model.velocities) & set(tree(model, row.guard).names)
+        curvature = rate(model, speed, None if k in stops else held)
+        curvatures.append(curvature if is_of_positions else Number(0.0))
+    return curvatures
 
 
 @cache
-def fixed_stops(model: Model, events: Crossings) -> dict[int, int]:
+def fixed_stops(model: Model, rows: tuple[Crossing, ...]) -> dict[int, int]:
     """Return rows that are fixed stops, with their coordinates: the guard is a place, only the velocity changes."""
     stops, moving = {}, {*model.positions, *model.velocities, "t"}
-    for k, row in enumerate(events.rows):
+    for k, row in enumerate(rows):
         used = moving & set(tree(model, row.guard).names)
         for i, names in enumerate(zip(model.positions, model.velocities, strict=True)):
             if (used, [name for name, _ in row.then]) == ({names[0]}, [names[1]]):
@@ -55,25 +102,25 @@ def fixed_stops(model: Model, events: Crossings) -> dict[int, int]:
     return stops
 
 
-def coordinates_with_stops(model: Model, events: Crossings) -> list[int]:
+def coordinates_with_stops(model: Model, rows: tuple[Crossing, ...]) -> list[int]:
     """Return the coordinates that may rest on a fixed stop."""
-    return sorted(set(fixed_stops(model, events).values()))
+    return sorted(set(fixed_stops(model, rows).values()))
 
 
-def put_free(module: Module, model: Model, events: Crossings) -> None:
+def put_free(module: Module, model: Model, rows: tuple[Crossing, ...]) -> None:
     """Write for each coordinate with stops a function that returns 0 while it rests on one, otherwise 1."""
-    stops, count = fixed_stops(model, events), len(events.rows)
+    stops, count = fixed_stops(model, rows), len(rows)
     collect(module, is_in_contact, is_in_contact.__name__, {})
-    for i in coordinates_with_stops(model, events):
+    for i in coordinates_with_stops(model, rows):
         touching = [f"is_in_contact(mode, {_contact(k, count)})" for k in stops if stops[k] == i]
         module.define(f"free_{i}(mode)", f"return 0.0 if {' or '.join(touching)} else 1.0")
 
 
-def places(model: Model, events: Crossings) -> dict[str, Expression]:
+def _places(model: Model, rows: tuple[Crossing, ...]) -> dict[str, Expression]:
     """Return formulas of the places of rest on fixed stops, reflected to the side from which the body came."""
     formulas: dict[str, Expression] = {}
-    for k, i in fixed_stops(model, events).items():
-        guard, name = tree(model, events.rows[k].guard), model.positions[i]
+    for k, i in fixed_stops(model, rows).items():
+        guard, name = tree(model, rows[k].guard), model.positions[i]
         overshoot = Binary("/", guard, derivative(guard, name))
         formulas[f"place_{k}"] = Binary("-", Name(name), Binary("*", Number(2.0), overshoot))
     return formulas
@@ -106,7 +153,7 @@ def put_rows(module: Module, model: Model, events: Crossings, *, is_located: boo
     ):
         collect(module, text, text.__name__, {})
     rows = [(k, row, f"{2.0**k}", f"{float(row.direction)}") for k, row in enumerate(events.rows)]
-    stops = fixed_stops(model, events) if is_located else {}
+    stops = fixed_stops(model, events.rows) if is_located else {}
     _put_contacts(module, model, events, stops)
     apart = {k: f"not is_in_contact(mode, {_contact(k, len(rows))})" for k in stops}
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping
 from functools import partial
 from inspect import signature
 from typing import Any
@@ -11,21 +11,21 @@ from typing import Any
 from vibsim import formula as expression
 from vibsim.core.errors import SimulationError
 from vibsim.elementary import ELEMENTARY
-from vibsim.engine.crossings import coordinates_with_stops, fixed_stops, places, put_free
+from vibsim.engine import crossings, friction, impact
+from vibsim.engine.crossings import FREE, coordinates_with_stops, put_free
 from vibsim.engine.text import Module, collect
 from vibsim.formula import Binary, Call, Compare, Expression, Name, Number
 from vibsim.formula.algebra import filled
 from vibsim.models import Model
-from vibsim.models.base import Formula, parameter_names, rate, tree
+from vibsim.models.base import Formula, parameter_names, tree
 from vibsim.models.events import Crossings, Friction, Impact
 from vibsim.models.table import BEND, BENDS, HEADER, HEIGHT, HEIGHTS
 from vibsim.schemes.base import Stepper
 
 MOST_INLINE = 64
 """Largest number of calls of elementary functions that are inlined: each takes 0.1 s and 3 MB to compile."""
-_MODE = "mode"
-_FREE = "_free_"
-"""Prefix of the index of a coordinate, in the name of a number that is 0 while it rests on a stop and 1 otherwise."""
+KINDS: Mapping[type, Any] = {Friction: friction, Impact: impact, Crossings: crossings}
+"""Module of each kind of events, with its formulas and with the functions that a kernel binds."""
 _OF_CONTACTS = ("acceleration", "slopes", "guard_curvatures")
 """Functions whose formulas depend on contacts with stops."""
 _TUPLES = ("guards", "guard_rates", "guard_curvatures")
@@ -73,16 +73,16 @@ def put_formulas(
         Whether the powers of damping and of driving forces are needed.
     """
     put = marked(model)
-    accelerations = [put(formula) for formula in model.accelerations]
-    of_events = _of_events(model, put)
-    if "drive" in of_events:
-        held = Binary("*", Name(_MODE), of_events["limit"]["_limit"])
-        accelerations = [Binary("-", of_events["drive"]["_drive"], held)]
-    if isinstance(model.events, Crossings):
-        accelerations = [put(formula) for formula in _with_stops(model, model.events)]
+    kind = KINDS.get(type(model.events))
+    pushes = kind.accelerations(model, model.events) if kind else model.accelerations
+    accelerations = [put(formula) for formula in pushes]
+    of_events = kind.formulas(model, model.events) if kind else {}
     formulas = {
         "acceleration": {f"_result_{i}": formula for i, formula in enumerate(accelerations)},
-        **of_events,
+        **{
+            function: {result: put(formula) for result, formula in results.items()}
+            for function, results in of_events.items()
+        },
         "energies": {
             "_kinetic": put(model.kinetic_energy),
             "_potential": put(model.potential_energy),
@@ -109,8 +109,8 @@ def put_formulas(
     is_rare = is_rare or sum(isinstance(part, Call) for part in parts) > MOST_INLINE
     is_scaled = stepper.scaling is not None
     scaled = ("acceleration", "slopes") if is_scaled else ()
-    if isinstance(model.events, Crossings):
-        put_free(module, model, model.events)
+    if model.events and model.events.rows:
+        put_free(module, model, model.events.rows)
     put_functions(module, model, suffix, formulas, is_rare=is_rare, scaled=scaled)
     put_parameters(module, model, 2 if is_scaled else 0, tabulated=stepper.tabulated)
 
@@ -166,11 +166,11 @@ def put_functions(
     for function, results in formulas.items():
         lines = list(unpack)
         if model.events is not None and function in ("acceleration", "slopes"):
-            lines += [f"{_MODE} = p[{len(names)}]", f"t = t + p[{len(names) + 1}]"]
-        if isinstance(model.events, Crossings) and function in _OF_CONTACTS:
+            lines += [f"mode = p[{len(names)}]", f"t = t + p[{len(names) + 1}]"]
+        if model.events is not None and function in _OF_CONTACTS:
             lines += [
-                f"{_FREE}{i} = free_{i}(p[{len(names)}])"
-                for i in coordinates_with_stops(model, model.events)
+                f"{FREE}{i} = free_{i}(p[{len(names)}])"
+                for i in coordinates_with_stops(model, model.events.rows)
             ]
         lines += _looking_up(module, model, results.values())
         bind = expression.rebuilding(partial(_with_functions, module, suffix, is_rare))
@@ -237,64 +237,6 @@ def put_parameters(module: Module, model: Model, more: int = 0, *, tabulated: bo
     if tabulated:
         values += f", parameters[case, {count}:]"
     module.define("parameters_of(parameters, table, case)", f"return ({values},)")
-
-
-def _with_stops(model: Model, events: Crossings) -> list[Expression]:
-    """Return the accelerations, which vanish while a coordinate rests on a stop."""
-    stopped = coordinates_with_stops(model, events)
-    formulas = [tree(model, formula) for formula in model.accelerations]
-    return [
-        Binary("*", formula, Name(f"{_FREE}{i}")) if i in stopped else formula
-        for i, formula in enumerate(formulas)
-    ]
-
-
-def _curvatures(model: Model, events: Crossings, rates: Sequence[Expression]) -> list[Expression]:
-    """Return the second time derivatives of the guards; for guards of stops, as if no coordinate rested on them.
-
-    For a guard that depends on velocities it would need derivatives of the forces, and is set to 0.
-    """
-    held, stops = _with_stops(model, events), fixed_stops(model, events)
-    curvatures: list[Expression] = []
-    for k, (row, speed) in enumerate(zip(events.rows, rates, strict=True)):
-        is_of_positions = not set(model.velocities) & set(tree(model, row.guard).names)
-        curvature = rate(model, speed, None if k in stops else held)
-        curvatures.append(curvature if is_of_positions else Number(0.0))
-    return curvatures
-
-
-def _of_events(
-    model: Model, put: Callable[[Formula], Expression]
-) -> dict[str, dict[str, Expression]]:
-    """Return the formulas of the events of a model, by function and result."""
-    match model.events:
-        case None:
-            return {}
-        case Friction(drive, limit):
-            return {"drive": {"_drive": put(drive)}, "limit": {"_limit": put(limit)}}
-        case Impact(restitution, near, slow):
-            results = {"_restitution": restitution, "_near": near, "_slow": slow}
-            return {"impact_of": {name: put(formula) for name, formula in results.items()}}
-        case Crossings(rows):
-            guards = [tree(model, row.guard) for row in rows]
-            rates = [rate(model, guard) for guard in guards]
-            functions = {
-                name: {f"{result}_{k}": put(formula) for k, formula in enumerate(formulas)}
-                for name, result, formulas in (
-                    ("guards", "_guard", guards),
-                    ("guard_rates", "_rate", rates),
-                    ("guard_curvatures", "_curvature", _curvatures(model, model.events, rates)),
-                )
-            }
-            for name, place in places(model, model.events).items():
-                functions[name] = {"_place": put(place)}
-            states = [state.name for state in model.states]
-            for k, row in enumerate(rows):
-                new = dict(row.then)
-                functions[f"crossed_{k}"] = {
-                    f"_new_{name}": put(new.get(name, name)) for name in states
-                }
-            return functions
 
 
 def _with_functions(module: Module, suffix: str, is_rare: bool, node: Expression) -> Expression:

@@ -9,9 +9,24 @@ from __future__ import annotations
 from typing import Any
 
 from vibsim.engine.kernel_stubs import P, unbound
+from vibsim.formula import Binary, Name
+from vibsim.models import Model
+from vibsim.models.base import Formula, tree
+from vibsim.models.events import Friction
 
 # bound by the kernel (`vibsim.engine.kernel_stubs`)
 drive = limit = mode_of = unbound
+
+
+def accelerations(model: Model, events: Friction) -> list[Formula]:
+    """Return the acceleration of a body that slides in the direction of the mode."""
+    held = Binary("*", Name("mode"), tree(model, events.limit))
+    return [Binary("-", tree(model, events.drive), held)]
+
+
+def formulas(model: Model, events: Friction) -> dict[str, dict[str, Formula]]:
+    """Return the formulas of the functions of the model, by function and result."""
+    return {"drive": {"_drive": events.drive}, "limit": {"_limit": events.limit}}
 
 
 def slip(u: float, t: float, p: P) -> float:

@@ -9,9 +9,23 @@ from __future__ import annotations
 from typing import Any
 
 from vibsim.engine.kernel_stubs import P, unbound
+from vibsim.models import Model
+from vibsim.models.base import Formula
+from vibsim.models.events import Impact
 
 # bound by the kernel (`vibsim.engine.kernel_stubs`)
 impact_of = mode_of = unbound
+
+
+def accelerations(model: Model, events: Impact) -> tuple[Formula, ...]:
+    """Return the acceleration in flight."""
+    return model.accelerations
+
+
+def formulas(model: Model, events: Impact) -> dict[str, dict[str, Formula]]:
+    """Return the formulas of the functions of the model, by function and result."""
+    names = {"_restitution": events.restitution, "_near": events.near, "_slow": events.slow}
+    return {"impact_of": names}
 
 
 def first_mode(u: float, v: float, t: float, p: P) -> float:

@@ -22,13 +22,12 @@ from vibsim.engine import (
     coordinates,
     crossings,
     events,
-    friction,
     gather,
-    impact,
     member_loop,
     rows,
 )
 from vibsim.engine.formulas import (
+    KINDS,
     marked,
     n_between,
     n_parameters,
@@ -41,7 +40,6 @@ from vibsim.engine.stages import stages
 from vibsim.engine.text import Module, collect, divided, plain_code
 from vibsim.models import Model, has_budget
 from vibsim.models.base import Formula
-from vibsim.models.events import Crossings, Friction, Impact
 from vibsim.native.kernel_cache import Kernel, load
 from vibsim.schemes.base import HANDED, Stepper, handed
 
@@ -65,8 +63,6 @@ def kernel(
 """Entry point of a kernel; it calls `run` of `vibsim.engine.member_loop` or `vibsim.engine.block_loop`."""
 _STEPPING = "f2 f2 f2 f1 i i i i i i f f3 f2 i2 f3 f1"
 """Argument types of the entry point, as in `vibsim.native.linking.link`."""
-_OF_EVENTS = {Friction: friction, Impact: impact, Crossings: crossings}
-"""Module with the functions that a kernel binds, by kind of events."""
 _OBSERVING = "f2 f2 f1 i i f3 f3"
 """Argument types of `vibsim.engine.member_loop.observe`."""
 
@@ -241,9 +237,9 @@ def _put_events(module: Module, model: Model, stepper: Stepper) -> None:
     module.define("mode_of(p)", f"return p[{first}]")
     module.define("start_of(p)", f"return p[{first + 1}]")
     module.define("with_mode(p, mode, start)", f"return ({', '.join(places)},)")
-    if isinstance(model.events, Crossings):
-        crossings.put_rows(module, model, model.events, is_located=stepper.events != "mesh")
-    kind = _OF_EVENTS[type(model.events)]
+    kind = KINDS[type(model.events)]
+    if kind is crossings:
+        kind.put_rows(module, model, model.events, is_located=stepper.events != "mesh")
     for name in (
         *("first_mode", "guard", "guard_on_mesh", "landed", "settled", "followed", "held"),
         *("counts_as_event", "turning", "spent", "lost"),

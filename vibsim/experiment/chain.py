@@ -17,7 +17,7 @@ from vibsim.experiment.faults import Report
 from vibsim.experiment.repeat import REPEAT
 from vibsim.experiment.shorthand import OF_COORDINATE
 from vibsim.experiment.yaml.parse import Path_
-from vibsim.models.system import MOST
+from vibsim.models.shared.coordinates import MOST
 
 COUNT = "n"
 REPEATED = "outputs", "potential", "kinetic", "exact"

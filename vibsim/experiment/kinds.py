@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from vibsim.models import MODELS, Model
-from vibsim.models.system import MOST, coordinate_faults
+from vibsim.models.shared.coordinates import MOST, coordinate_faults
 from vibsim.schemes import SCHEMES, Scheme
 
 COORDINATES = "coordinates"

@@ -32,7 +32,8 @@ from vibsim.formula import (
     tidied,
     to_formula,
 )
-from vibsim.models.system import INPUT, velocities_of
+from vibsim.models.shared.coordinates import velocities_of
+from vibsim.models.shared.written_system import INPUT
 
 EQUATION = "equation"
 BESIDE_MODEL = "stop", "events"

@@ -90,9 +90,9 @@ class SolverExperiment(ReadExperiment):
     def _columns(self) -> dict[str, list[Any]]:
         if self.sweep is None:
             return {}
-        from vibsim.experiment.sweep_columns import columns_of
+        from vibsim.experiment.sweep_columns import grid_columns
 
-        columns = columns_of(self.sweep.axes, 0, self.members)
+        columns = grid_columns(self.sweep.axes, 0, self.members)
         return {name: column.tolist() for name, column in columns.items()}
 
     def words(self, level: int, member: int) -> dict[str, str]:

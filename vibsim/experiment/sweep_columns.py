@@ -8,22 +8,26 @@ seed.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from decimal import Context, Decimal
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from vibsim.core.array_types import Flags, Floats, Integers
 from vibsim.experiment.schema.sweep import Axis, Draw, Linspace, Logspace, Values, as_option
 
 if TYPE_CHECKING:
+    from vibsim.core.record import Record
     from vibsim.experiment.data import ExperimentSpec
+    from vibsim.schemes import Options, Scheme
 
 Column = NDArray[Any]
 """Values of one key, float64 or text."""
+Columns = Mapping[str, Column]
+"""Values of all members by dotted key, each of shape (case,)."""
 SAME, EPS = 1e-9, 1e-14
 """Tolerances for finding a swept value: relative to the value, and relative to the largest value of the sweep."""
 _PER_COUNT = 4
@@ -37,11 +41,20 @@ def columns(experiment: ExperimentSpec, start: int, stop: int) -> dict[str, Colu
 
     Values are float64 in the unit of the key, or text for options of schemes. The result is empty without a sweep.
     """
-    return columns_of(experiment.sweep.axes, start, stop) if experiment.sweep else {}
+    return grid_columns(experiment.sweep.axes, start, stop) if experiment.sweep else {}
+
+
+def recorded_columns(record: Record) -> Columns:
+    """Return the swept values of all members of a Record, which holds them as coordinates, by dotted key."""
+    return {
+        str(variable.attrs["sweep_key"]): variable.values
+        for variable in record.coords.values()
+        if "sweep_key" in variable.attrs
+    }
 
 
 def option_groups(
-    experiment: ExperimentSpec, scheme: int, columns: Mapping[str, Column]
+    experiment: ExperimentSpec, scheme: int, columns: Columns
 ) -> list[tuple[Mapping[str, str | float | bool], Integers]]:
     """Return the distinct option sets of scheme number `scheme`, each with the positions of its members.
 
@@ -67,7 +80,31 @@ def option_groups(
     ]
 
 
-def columns_of(axes: Sequence[Axis], start: int, stop: int) -> dict[str, Column]:
+def options_of(experiment: ExperimentSpec, columns: Columns, scheme: int, case: int) -> Options:
+    """Return the options of scheme number `scheme` for member number `case`."""
+    single = {key: values[case : case + 1] for key, values in columns.items()}
+    return option_groups(experiment, scheme, single)[0][0]
+
+
+def by_options(
+    experiment: ExperimentSpec,
+    columns: Columns,
+    function: Callable[[Scheme, Options], ArrayLike],
+) -> Floats:
+    """Return `function` for every scheme and for the options of each member, shape (scheme, 1 or case, ...)."""
+    rows = []
+    for i, scheme in enumerate(experiment.schemes):
+        groups = option_groups(experiment, i, columns)
+        values = [np.asarray(function(scheme.method, o), dtype=float) for o, _ in groups]
+        count = sum(len(cases) for _, cases in groups) if len(groups) > 1 else 1
+        row = np.empty((count, *values[0].shape))
+        for value, (_, cases) in zip(values, groups, strict=True):
+            row[cases if count > 1 else slice(None)] = value
+        rows.append(row)
+    return np.stack(np.broadcast_arrays(*rows))
+
+
+def grid_columns(axes: Sequence[Axis], start: int, stop: int) -> dict[str, Column]:
     """Return the values of members start..stop-1 of a grid by dotted key; the last axis varies fastest."""
     columns_: dict[str, Column] = {}
     member = np.arange(start, stop, dtype=np.int64)
@@ -98,9 +135,7 @@ def matching(column: Column, value: float | str) -> Flags:
     return np.asarray(np.abs(column - value) <= SAME * abs(value) + EPS * largest)
 
 
-def members_with(
-    columns: Mapping[str, Column], swept: Mapping[str, float | str], count: int
-) -> Flags:
+def members_with(columns: Columns, swept: Mapping[str, float | str], count: int) -> Flags:
     """Tell which of `count` members have all `swept` values, given by dotted key; shape (count,)."""
     result = np.ones(count, dtype=np.bool_)
     for key, value in swept.items():

@@ -12,6 +12,15 @@ Take = Literal[
     "largest", "smallest", "mean", "where", "where_largest", "where_smallest", "monotone"
 ]
 """How the numbers of all members are reduced to the one that is checked."""
+IN_WORDS: Mapping[str, str] = {
+    "largest": "largest",
+    "smallest": "smallest",
+    "mean": "mean",
+    "where_largest": "place of the largest",
+    "where_smallest": "place of the smallest",
+    "monotone": "direction of",
+}
+"""First words of the name of a reduced number; `where` has become `where_largest` before it is named."""
 OF_ONE_MEMBER = (None, "largest", "smallest")
 """Reductions that pick the number of one member."""
 OF_THE_SAME_KIND = (*OF_ONE_MEMBER, "mean")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from functools import cache
 
 from vibsim.formula.parser import parse
@@ -116,3 +117,24 @@ def slope_of(node: Expression, name: str, *, with_start: bool = True) -> Express
             slope = inner(left)
             return None if slope is None else _OPERATIONS[symbol](slope, right)
     return None
+
+
+def terms_of(node: Expression) -> Iterator[Expression]:
+    """Yield the terms of a sum, with factors and divisors of sums multiplied out."""
+    match node:
+        case Binary("+", left, right):
+            yield from terms_of(left)
+            yield from terms_of(right)
+        case Binary("-", left, right):
+            yield from terms_of(left)
+            yield from (Negate(term) for term in terms_of(right))
+        case Negate(operand):
+            yield from (Negate(term) for term in terms_of(operand))
+        case Binary("/", left, right):
+            yield from (term / right for term in terms_of(left))
+        case Binary("*", left, right) if len(_sum := list(terms_of(right))) > 1:
+            yield from (left * term for term in _sum)
+        case Binary("*", left, right) if len(_sum := list(terms_of(left))) > 1:
+            yield from (term * right for term in _sum)
+        case _:
+            yield node

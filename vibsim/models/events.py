@@ -20,20 +20,42 @@ Differential Equations I, section II.6 (discontinuous equations).
 
 from __future__ import annotations
 
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
 from vibsim.formula import Expression
 
 Formula = str | Expression
+Guards = Sequence[tuple[int, Formula]]
+"""Formulas that vanish at events, with the directions of `Crossing`."""
+
+
+class _Kind:
+    """What holds for a kind of events, unless it says otherwise."""
+
+    jumps: ClassVar[bool] = True
+    """Whether the state is discontinuous at events."""
+    reverses: ClassVar[bool] = False
+    """Whether a change of the direction of motion, at which the force jumps, is an event."""
+
+    def smooth(self, accelerations: Sequence[Formula]) -> Sequence[Formula]:
+        """Return the accelerations between events."""
+        return accelerations
+
+    def changed(self, velocities: Sequence[str]) -> Collection[str]:
+        """Return the states that an event changes."""
+        return ()
 
 
 @dataclass(frozen=True)
-class Friction:
+class Friction(_Kind):
     """Coulomb friction; formulas in the position, ``t`` and the parameters."""
 
     jumps: ClassVar[bool] = False
-    """Whether the state is discontinuous at events."""
+    reverses: ClassVar[bool] = True
+    rows: ClassVar[tuple[Crossing, ...]] = ()
+    """Events that a user writes: none."""
     drive: Formula
     """Acceleration by all forces except friction."""
     limit: Formula
@@ -41,12 +63,20 @@ class Friction:
     cost: Formula
     """Energy lost per length of the path: a force."""
 
+    def smooth(self, accelerations: Sequence[Formula]) -> Sequence[Formula]:
+        """Return the acceleration without friction."""
+        return (self.drive,)
+
+    def guards(self, position: str, velocity: str) -> Guards:
+        """Return the velocity: the body sticks or turns where it vanishes."""
+        return ((0, velocity),)
+
 
 @dataclass(frozen=True)
-class Impact:
+class Impact(_Kind):
     """Impact on the ground, at the position 0; formulas in the parameters."""
 
-    jumps: ClassVar[bool] = True
+    rows: ClassVar[tuple[Crossing, ...]] = ()
     restitution: Formula
     """Speed after an impact over the speed before it."""
     near: Formula
@@ -55,6 +85,14 @@ class Impact:
     """Largest speed after an impact at which the body stays on the ground."""
     cost: Formula
     """Energy lost per decrease of ``v^2/2``: a mass."""
+
+    def guards(self, position: str, velocity: str) -> Guards:
+        """Return the height, which falls to 0."""
+        return ((-1, position),)
+
+    def changed(self, velocities: Sequence[str]) -> Collection[str]:
+        """Return the states that an event changes."""
+        return velocities
 
 
 @dataclass(frozen=True)
@@ -72,13 +110,20 @@ class Crossing:
 
 
 @dataclass(frozen=True)
-class Crossings:
+class Crossings(_Kind):
     """Events where formulas change sign; simultaneous events happen in the order of the rows."""
 
-    jumps: ClassVar[bool] = True
     rows: tuple[Crossing, ...]
     cost: Formula = "1"
     """Factor of the lost energy: losses at events are counted as energy."""
+
+    def guards(self, position: str, velocity: str) -> Guards:
+        """Return the formulas that the user wrote."""
+        return [(row.direction, row.guard) for row in self.rows]
+
+    def changed(self, velocities: Sequence[str]) -> Collection[str]:
+        """Return the states that an event changes."""
+        return [name for row in self.rows for name, _ in row.then]
 
 
 Events = Friction | Impact | Crossings

@@ -39,7 +39,9 @@ from vibsim.formula import (
     put,
     values,
 )
+from vibsim.formula.algebra import terms_of
 from vibsim.models.base import Model, Numbers, Parameter, declared_parameters
+from vibsim.models.shared.coordinates import states_of, velocities_of
 from vibsim.models.shared.matrices import (
     Matrix,
     Modes,
@@ -48,7 +50,6 @@ from vibsim.models.shared.matrices import (
     lowest_modes,
     mode_motion,
 )
-from vibsim.models.system import states_of, terms_of, velocities_of
 
 MOST_DOFS = 10_000
 """Largest number of degrees of freedom."""

@@ -14,23 +14,16 @@ from vibsim.convergence.differences import last_change
 from vibsim.convergence.thresholds import ROUND_OFF_SAFETY, STILL_TO_CHANGE
 from vibsim.core.array_types import Flags, Floats
 from vibsim.core.record import Record
-from vibsim.formula import Expression, Name, values_of
+from vibsim.formula import Expression, values_of
 from vibsim.models import Model
 from vibsim.models.base import rate, tree
-from vibsim.models.events import Crossings, Friction, Impact
 from vibsim.observe.common_grid import Grid
 from vibsim.simulation.members import Members
 
 
 def may_jump(model: Model, quantity: str) -> bool:
     """Tell whether a quantity may jump at an event: all but the states that none changes."""
-    match model.events:
-        case Crossings(rows):
-            changed = {name for row in rows for name, _ in row.then}
-        case Impact():
-            changed = set(model.velocities)
-        case _:
-            changed = set()
+    changed = set(model.events.changed(model.velocities) if model.events else ())
     return bool(changed) and quantity not in {row.name for row in model.states} - changed
 
 
@@ -59,8 +52,8 @@ def is_at_end(
     with np.errstate(all="ignore"):
         found |= same_event & _may_be_zero(since_last, round_off)
         found |= ~moves & _may_be_zero(np.nan_to_num(since_rest), round_off)
-        for direction, guard in _guards(model):
-            numbers = [_at_end(model, row, group, guard) for row in rows]
+        for direction, guard in model.events.guards(model.position, model.velocity):
+            numbers = [_at_end(model, row, group, tree(model, guard)) for row in rows]
             value, slope = (np.stack(x, axis=-1) for x in zip(*numbers, strict=True))
             comes = np.any(direction * slope >= 0.0, axis=-1)
             found |= moves & comes & _may_be_zero(value, round_off * np.abs(slope[..., -1]))
@@ -71,18 +64,6 @@ def _may_be_zero(numbers: Floats, round_off: Floats) -> Flags:
     """Tell whether finer levels may bring a number to 0, from its values on all levels, shape (..., level)."""
     error = STILL_TO_CHANGE * last_change(numbers) + round_off
     return np.asarray(np.abs(numbers[..., -1]) <= error)
-
-
-def _guards(model: Model) -> list[tuple[int, Expression]]:
-    """Return the formulas that vanish at events, with the directions of `Crossing`; friction holds where v is 0."""
-    match model.events:
-        case Crossings(rows):
-            return [(row.direction, tree(model, row.guard)) for row in rows]
-        case Impact():
-            return [(-1, Name(model.position))]
-        case Friction():
-            return [(0, Name(model.velocity))]
-    return []
 
 
 def _at_end(

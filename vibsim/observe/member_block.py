@@ -9,19 +9,20 @@ import numpy as np
 
 from vibsim.apriori.exact_values import known_values
 from vibsim.apriori.force_discontinuities import Corners, corners_of
-from vibsim.apriori.formal_orders import (
-    Columns,
-    columns_of,
-    left_to_the_mesh,
+from vibsim.apriori.formal_orders import left_to_the_mesh
+from vibsim.apriori.roundoff_floor import (
+    SPACING_AT_ONE,
     relative_floors,
-    stability_limits,
+    solution_size,
+    stored_floor,
 )
-from vibsim.apriori.roundoff_floor import SPACING_AT_ONE, solution_size, stored_floor
+from vibsim.apriori.stability_limits import stability_limits
 from vibsim.convergence.differences import laid_out, largest
 from vibsim.core.array_types import Flags, Floats
 from vibsim.core.record import Record
 from vibsim.core.vocabulary import CENTRED, HIGHEST, NORMS, TYPICAL_NORM, plain_name
 from vibsim.experiment import Experiment
+from vibsim.experiment.sweep_columns import Columns, recorded_columns
 from vibsim.models import BUDGET, ENERGIES, Model
 from vibsim.observe import event_at_end
 from vibsim.observe.common_grid import Grid, check_belonging, common_grid, take
@@ -182,7 +183,7 @@ def block_of(experiment: Experiment, records: Mapping[int, Record]) -> MemberBlo
     failed = by_level([row["status"] for row in rows]) != 0
     eventless = stored_or_nan(finest, "event_count", failed.shape[:2]) == 0.0
     lean = any(record.attrs.get("storage") == "lean" for record in rows)
-    columns, states = columns_of(finest), [state.name for state in model.states]
+    columns, states = recorded_columns(finest), [state.name for state in model.states]
     case = np.asarray(finest["case"], dtype=np.int64)
     group = members(experiment, int(case[0]), int(case[-1]) + 1)
     t = grid.times(group.end)

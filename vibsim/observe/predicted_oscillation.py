@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from vibsim import theory
-from vibsim.apriori.formal_orders import limit_of
+from vibsim.apriori.stability_limits import limit_of
 from vibsim.core.array_types import Floats, Integers
 from vibsim.experiment import sweep_columns
 from vibsim.observe.member_block import MemberBlock

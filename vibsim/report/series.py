@@ -10,7 +10,6 @@ from vibsim.core.array_types import Floats
 from vibsim.core.record import Record
 from vibsim.formula import values
 from vibsim.models.base import Formula, Model, tree
-from vibsim.models.events import Impact
 from vibsim.report import data
 from vibsim.report.data import Member, pretty_unit
 from vibsim.report.types import Experiment
@@ -91,7 +90,7 @@ def exact_curve(
     if best is None or not np.isfinite(best).any():
         return t[there], data.exact_series(record, quantity, member)[there]
     model = experiment.model.definition
-    if isinstance(model.events, Impact) and quantity in model.velocities:
+    if model.events is not None and quantity in model.events.changed(model.velocities):
         rises = np.flatnonzero((best[:-1] < 0.0) & (best[1:] >= 0.0))
         fine, best = np.insert(fine, rises + 1, fine[rises]), np.insert(best, rises + 1, np.nan)
     return fine, best

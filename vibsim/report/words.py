@@ -9,13 +9,13 @@ from typing import Any
 
 from vibsim.checks.notation import Notation
 from vibsim.core import vocabulary
+from vibsim.core.decimals import order_interval
 from vibsim.core.vocabulary import (
     AMPLITUDE,
     CENTRED,
     PHASE,
     TYPICAL_NORM,
     is_error_part,
-    order_interval,
     plain_name,
     whole_of,
 )

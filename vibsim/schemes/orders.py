@@ -8,7 +8,6 @@ from functools import cache
 from typing import Any, Literal
 
 from vibsim.models.base import BUDGET, Model, tree
-from vibsim.models.events import Friction
 
 ORDER_OF_WORK = 4.0
 """Order of the quadrature for the work of forces (`vibsim.simulation.derived`)."""
@@ -36,7 +35,7 @@ def is_autonomous(model: Model) -> bool:
 def _names_in_acceleration(model: Model) -> frozenset[str]:
     """Return the names in the formulas of the acceleration (between events if the model has any)."""
     events = model.events
-    smooth = (events.drive,) if isinstance(events, Friction) else model.accelerations
+    smooth = model.accelerations if events is None else events.smooth(model.accelerations)
     return frozenset(name for formula in smooth for name in tree(model, formula).names)
 
 

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from vibsim import Experiment
-from vibsim.checks.value import what
+from vibsim.checks.value_text import what
 
 
 @pytest.mark.parametrize(

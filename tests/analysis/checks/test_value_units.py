@@ -7,7 +7,7 @@ import pytest
 from vibsim import experiment as spec
 from vibsim.analysis import analyse_records, verdicts
 from vibsim.analysis.blockwise import join_parts, keep_for_verdicts
-from vibsim.checks.value import unit_of
+from vibsim.checks.number_units import unit_of
 from vibsim.experiment.value_names import VALUES
 from vibsim.simulation import simulate_record
 

@@ -12,7 +12,7 @@ from vibsim.experiment.data import TimeSpec
 from vibsim.experiment.faults import Report
 from vibsim.experiment.rules.size_limits import Setting
 from vibsim.experiment.schema.checks import At, Members
-from vibsim.experiment.sweep_columns import Column, columns_of, matching, members_with
+from vibsim.experiment.sweep_columns import Column, grid_columns, matching, members_with
 from vibsim.experiment.value_names import Value
 from vibsim.experiment.yaml.parse import Path_
 
@@ -88,7 +88,7 @@ class Scope:
             first.refuse("must not be given together with case", at_key=True)
         for axis in setting.sweep.axes:
             wanted = {key: at.swept[key] for key in axis.keys if key in at.swept}
-            columns = columns_of([axis], 0, axis.count) if wanted else {}
+            columns = grid_columns([axis], 0, axis.count) if wanted else {}
             for key, value in wanted.items():
                 if not matching(columns[key], value).any():
                     hint = _nearest_values(columns[key], value)

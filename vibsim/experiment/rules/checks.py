@@ -29,7 +29,6 @@ from vibsim.experiment.value_names import CASES, OF_THE_SAME_KIND, VALUES, Value
 from vibsim.experiment.yaml.parse import Path_
 from vibsim.models import BUDGET, centred, has_budget, has_solution
 from vibsim.models.base import Model, error_parts, has_error_parts
-from vibsim.models.events import Crossings
 from vibsim.models.shared.free import why_not_free
 from vibsim.models.structure import MOST_MODES
 
@@ -438,7 +437,7 @@ def _why_unsolved(model: Model) -> str:
     """Return why there is neither an exact solution nor a reference; empty if the cause is uncertain."""
     if has_solution(model):
         return ""
-    if isinstance(model.events, Crossings):
+    if model.events and model.events.rows:
         return ", as for every motion with events of formulas or a stop"
     if model.loaded is None:
         return ""

@@ -33,8 +33,8 @@ from vibsim.formula import (
 )
 from vibsim.models import FormulaField, Model
 from vibsim.models.oscillator import COULOMB
+from vibsim.models.shared.coordinates import name_fault
 from vibsim.models.structure import RAYLEIGH
-from vibsim.models.system import name_fault
 
 NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 NONE = "none"

@@ -19,7 +19,7 @@ from vibsim.experiment.data import AnyExperiment, TimeSpec
 from vibsim.experiment.faults import Report
 from vibsim.experiment.schema.fields import TABLE, FrozenDict
 from vibsim.experiment.schema.sweep import Axis
-from vibsim.experiment.sweep_columns import columns_of
+from vibsim.experiment.sweep_columns import grid_columns
 from vibsim.experiment.yaml.parse import Path_
 from vibsim.formula import (
     Expression,
@@ -33,7 +33,6 @@ from vibsim.formula import (
 )
 from vibsim.models import FormulaField, Model, tree
 from vibsim.models.base import rate
-from vibsim.models.events import Crossings
 from vibsim.models.shared.crossings import STOP
 from vibsim.models.shared.inertia import MASS, inertia
 from vibsim.models.table import Lookup
@@ -83,7 +82,7 @@ class MemberNumbers:
     def starts(self) -> Iterator[tuple[int, dict[str, Any], dict[str, Any]]]:
         """Yield blocks of all members: their number, their variables at t = 0 by name, and their swept values."""
         for start, stop in _chunks(math.prod(axis.count for axis in self.axes)):
-            swept = columns_of(self.axes, start, stop)
+            swept = grid_columns(self.axes, start, stop)
             initial = (
                 self.model.start(self._parameters(swept)) if self.model.start else self.initial
             )
@@ -102,7 +101,7 @@ class MemberNumbers:
         return math.prod(axis.count for axis in self._distinct_axes())
 
     def _block(self, start: int, stop: int) -> tuple[dict[str, Any], Floats]:
-        columns = columns_of(self._distinct_axes(), start, stop)
+        columns = grid_columns(self._distinct_axes(), start, stop)
         swept = {key: column for key, column in columns.items() if _is_relevant(key)}
         end = swept.get("time.end", np.full(stop - start, self.time.end))
         if self.time.is_of_model:
@@ -263,7 +262,7 @@ def check_starts(members: MemberNumbers, formulas: Mapping[str, str], report: Re
                 report.add(path, rule.format(f" (where {who})" if who else ""), hint)
                 return
 
-    rows = model.events.rows if isinstance(model.events, Crossings) else ()
+    rows = model.events.rows if model.events else ()
     for guard in (tree(model, row.guard) for row in rows if row.ends):
         slope = rate(model, guard)
 

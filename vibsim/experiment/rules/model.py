@@ -19,11 +19,10 @@ from vibsim.experiment.schema.fields import AT, DECLARED, Section
 from vibsim.formula import ExpressionError, derivative, parts_of
 from vibsim.models import FormulaField, Model, tree
 from vibsim.models.base import rate
-from vibsim.models.events import Crossings
 from vibsim.models.oscillator import COULOMB
+from vibsim.models.shared.coordinates import coordinate_faults
 from vibsim.models.shared.crossings import is_crossing
 from vibsim.models.structure import RAYLEIGH
-from vibsim.models.system import coordinate_faults
 
 EVENTS = "events or a stop"
 STICTION = "coulomb friction, which may hold the body elsewhere"
@@ -190,11 +189,10 @@ def _check_size(model: Model) -> None:
     ]
     energies = [tree(model, formula) for formula in (model.kinetic_energy, model.potential_energy)]
     formulas = (*accelerations, *slopes, *energies)
-    if isinstance(model.events, Crossings):
-        rows = model.events.rows
-        guards = [tree(model, row.guard) for row in rows]
-        formulas += (*guards, *(rate(model, guard) for guard in guards))
-        formulas += tuple(tree(model, value) for row in rows for _, value in row.then)
+    rows = model.events.rows if model.events else ()
+    guards = [tree(model, row.guard) for row in rows]
+    formulas += (*guards, *(rate(model, guard) for guard in guards))
+    formulas += tuple(tree(model, value) for row in rows for _, value in row.then)
     if len(parts_of(*formulas)) > MAX_NODES:
         rule = f"the equation that follows, with its slopes and energies, has more than {MAX_NODES} operations"
         hint = "write a simpler formula, or the energy as `potential` where the model has that"

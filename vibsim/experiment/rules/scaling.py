@@ -12,7 +12,6 @@ from dataclasses import dataclass
 from vibsim.experiment.data import Scaling, TimeSpec
 from vibsim.experiment.faults import Report
 from vibsim.models import MODELS, Model
-from vibsim.models.events import Crossings
 from vibsim.models.shared.scales import scaled_parameters, scales
 
 
@@ -75,7 +74,7 @@ def _refusal(model: Model) -> tuple[str, str]:
     if model.lookup is not None:
         what = f"{rule} here: the numbers of its table have units, and stay what they are"
         return what, "leave it out, or write the table's curve as a formula"
-    if isinstance(model.events, Crossings):
+    if model.events and model.events.rows:
         return f"{rule} here: its events are formulas in the units of the file", "leave it out"
     if model.formulas:
         why = "its spring has no stiffness at u = 0, by which time would be measured"

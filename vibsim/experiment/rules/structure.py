@@ -14,8 +14,8 @@ from vibsim.experiment.schema.fields import DECLARED, TABLE
 from vibsim.experiment.schema.structure import LoadTable, Mode, ShapedLoad
 from vibsim.experiment.tables.structure import MATRICES, assemble, with_digests
 from vibsim.experiment.yaml.parse import Path_
+from vibsim.models.shared.coordinates import name_fault, velocities_of
 from vibsim.models.structure import HISTORY, LOAD, MOST_OBSERVED, RAYLEIGH
-from vibsim.models.system import name_fault, velocities_of
 
 ROUNDED_END = 1e-9
 """Relative tolerance of the end of a load table, which the file may have rounded."""

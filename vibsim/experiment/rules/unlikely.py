@@ -16,8 +16,9 @@ from vibsim.experiment.schema.unit_text import split
 from vibsim.experiment.value_names import OF_THE_SAME_KIND, VALUES
 from vibsim.experiment.yaml.parse import Path_
 from vibsim.formula import Binary, Call, Name, walk
+from vibsim.formula.algebra import terms_of
 from vibsim.models import Model, tree
-from vibsim.models.system import angles, terms_of
+from vibsim.models.shared.coordinates import angles
 
 TURN = 2.0 * math.pi
 EXACT_DIGITS = 9

@@ -36,8 +36,8 @@ from vibsim.experiment.schema.sweep import tolerance_name
 from vibsim.formula import CONSTANTS
 from vibsim.models import FormulaField, Model, Parameter
 from vibsim.models.oscillator import COULOMB
+from vibsim.models.shared.coordinates import MOST
 from vibsim.models.shared.crossings import MOST_EVENTS, STOP
-from vibsim.models.system import MOST
 from vibsim.schemes import AnyOption, Flag, NumberOption, Option, Scheme
 from vibsim.schemes.base import EVENTS
 

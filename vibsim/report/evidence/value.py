@@ -11,7 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from vibsim.checks.fields import name_of
-from vibsim.checks.value import unit_of, unit_of_norm, what
+from vibsim.checks.number_units import unit_of, unit_of_norm
+from vibsim.checks.value_text import what
 from vibsim.core.array_types import Floats
 from vibsim.core.record import Record
 from vibsim.core.vocabulary import OF_LEVEL, TYPICAL_NORM

@@ -21,7 +21,7 @@ from vibsim.core.array_types import Floats
 from vibsim.formula import derivative, parse, values
 from vibsim.models import Model, tree
 from vibsim.models.base import Formula, looked_up
-from vibsim.models.system import angles
+from vibsim.models.shared.coordinates import angles
 
 WIDTH, HEIGHT = 320.0, 220.0
 WEIGHT = 0.45  # length of the arrow of the weight over that of the wire

@@ -6,8 +6,9 @@ import math
 from collections.abc import Iterator, Mapping
 from typing import Any
 
+from vibsim.checks.number_units import unit_of
 from vibsim.checks.outcome import Result
-from vibsim.checks.value import is_proved, unit_of
+from vibsim.checks.value import is_proved
 from vibsim.checks.verdict_text import Wording
 from vibsim.core.home import called
 from vibsim.core.record import Record

@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
+from vibsim.checks.number_units import unit_of
 from vibsim.checks.outcome import about_members
-from vibsim.checks.value import unit_of
 from vibsim.comparison.best_values import WORDS
 from vibsim.core.home import called
 from vibsim.core.record import Record

@@ -8,11 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from vibsim.apriori.formal_orders import columns_of
 from vibsim.checks.fields import field_values
 from vibsim.core.record import Record
 from vibsim.core.vocabulary import CENTRED
-from vibsim.experiment.sweep_columns import members_with
+from vibsim.experiment.sweep_columns import members_with, recorded_columns
 from vibsim.experiment.value_names import VALUES
 from vibsim.report import data, words
 from vibsim.report.tables.table import Cell, Column, Table, Written
@@ -97,7 +96,9 @@ def _row(
     # by default the first member
     case = 0 if row.at.case is None else data.case_position(record, row.at.case) or 0
     if row.at.swept:
-        case = int(np.argmax(members_with(columns_of(record), row.at.swept, len(record["case"]))))
+        case = int(
+            np.argmax(members_with(recorded_columns(record), row.at.swept, len(record["case"])))
+        )
     scheme = record.words("scheme").index(row.scheme)
     ours = float(field_values(record, name, "value")[scheme, case])
     levels: list[int | str] = [*data.whole(record, "level")]

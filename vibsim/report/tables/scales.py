@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from vibsim.apriori.formal_orders import columns_of
 from vibsim.core.record import Record
+from vibsim.experiment.sweep_columns import recorded_columns
 from vibsim.models.shared.scales import dimensionless, scales
 from vibsim.report import data
 from vibsim.report.style import finite
@@ -19,7 +19,7 @@ def table(experiment: Experiment, record: Record) -> Table | None:
     if model.scales is None:
         return None
     if scaling is None:
-        swept = columns_of(record)
+        swept = recorded_columns(record)
         parameters, initial = (
             {key: swept.get(f"{section}.{key}", value) for key, value in values.items()}
             for section, values in (

@@ -5,12 +5,11 @@ from __future__ import annotations
 from typing import Any
 
 from vibsim.checks.accurate import rule
-from vibsim.checks.reductions import IN_WORDS
-from vibsim.checks.value import what
+from vibsim.checks.value_text import what
 from vibsim.checks.verdict_text import expectation, expected_verdict
 from vibsim.core.record import Record
 from vibsim.core.vocabulary import TYPICAL_NORM
-from vibsim.experiment.value_names import CASES
+from vibsim.experiment.value_names import CASES, IN_WORDS
 from vibsim.report import data, words
 from vibsim.report.text.reasons import OUTCOMES
 from vibsim.report.types import Check, Experiment, Measurement

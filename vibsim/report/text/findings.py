@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from vibsim.checks.order_context import COINCIDE
-from vibsim.checks.order_text import UNSEEN
+from vibsim.checks.order_sentences import UNSEEN
 from vibsim.checks.outcome import about_members
 from vibsim.convergence import LadderVerdict
 from vibsim.core.record import Record
