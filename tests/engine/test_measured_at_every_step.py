@@ -328,6 +328,10 @@ def test_peaks_lie_where_the_positions_turn_whenever_the_velocity_is(kind, start
     whole = found.gathered
     assert whole.period_count[0] in (count, count - 1)
     assert whole.period[0] == pytest.approx(period, abs=0.01 * p / count)
+    before, u, ahead = found.position[0, :-2], found.position[0, 1:-1], found.position[0, 2:]
+    peaks, several = np.flatnonzero((before < u) & (u > ahead)), int(whole.period_count[0])
+    on_grid = (peaks[-1] - peaks[-1 - several]) * p / several
+    assert whole.period_grid[0] == pytest.approx(on_grid, rel=1e-12)
     # half a step late a peak would be p^2/8 higher or lower than its parabola says, and a velocity off by p/2 more
     for height in (whole.first_peak[0], whole.last_peak[0], -whole.last_trough[0]):
         assert height == pytest.approx(np.hypot(a, b), rel=p * p / 8.0)

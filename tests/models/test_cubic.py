@@ -77,3 +77,11 @@ def test_the_period_of_a_wide_swing_in_a_softening_well(gap):
 def test_a_start_whose_energy_overflows_has_no_motion_and_no_warning():
     for place in (1e100, -1e200):
         assert np.isnan(motion(T, 1.0, 1.0, place, 0.0)).all()
+
+
+def test_a_start_outside_a_well_escapes_though_its_energy_is_below_the_barrier():
+    """The force ``u^3 - u`` points outward beyond 1; the energy at the barrier is 1/4."""
+    for place in (1.2, -1.3):
+        assert 0.0 < place**2 / 2 - place**4 / 4 < 0.25
+        assert np.isnan(motion(T, 1.0, -1.0, place, 0.0)).all()
+        assert np.isnan(period(1.0, -1.0, place, 0.0))

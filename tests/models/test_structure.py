@@ -28,7 +28,7 @@ TWO: dict[str, Any] = {
     "mass": [2, 1],
     "stiffness": [[3, -1], [-1, 1]],
     "rayleigh": {"alpha": 0.05, "beta": 0.01},
-    "load": {"2": "F*cos(w*t)"},
+    "load": {"2": "F*cos(w*t) - sin(0.7*t + 0.2)/4"},
     "parameters": {"F": 0.5, "w": 1.3},
     "observe": {"x": 1, "y": 2},
     "start": {"displacement": [1, -0.2], "velocity": {"1": 0.3}},
@@ -70,7 +70,7 @@ def test_a_structure_moves_like_the_same_system_of_formulas(scheme):
     """Another lane steps the system, and its reference is found by collocation."""
     forces = {
         "x": "-3*x + y - (0.05*2 + 0.01*3)*vx + 0.01*vy",
-        "y": "x - y - (0.05 + 0.01)*vy + 0.01*vx + 0.5*cos(1.3*t)",
+        "y": "x - y - (0.05 + 0.01)*vy + 0.01*vx + 0.5*cos(1.3*t) - sin(0.7*t + 0.2)/4",
     }
     system = {
         "kind": "system", "coordinates": ["x", "y"], "force": forces, "mass": {"x": "2", "y": "1"}
@@ -190,11 +190,12 @@ def test_what_is_no_structure_is_refused(changed, key, rule):
 def test_a_degree_of_freedom_has_the_names_that_it_has_in_results():
     by_number = {"load": {"2": "cos(t)"}, "start": {"displacement": {"1": 0.5, "2": 1}}}
     by_name = {"load": {"x": "cos(t)"}, "start": {"displacement": {"u1": 0.5, "x": 1}}}
+    of_another = {**by_name, "load": {"u1": "cos(t)"}}
     digests = [
         of({**TWO, "observe": {"x": 2}, **rows}).model.structure.structure.digest
-        for rows in (by_number, by_name)
+        for rows in (by_number, by_name, of_another)
     ]
-    assert digests[0] == digests[1]
+    assert digests[0] == digests[1] != digests[2]
 
 
 def test_a_pattern_has_no_numbers(tmp_path):

@@ -196,6 +196,16 @@ def test_a_cart_with_two_pendulums_moves_as_its_equations_say():
         assert evaluate(tree(model, model.dissipation), at) == pytest.approx(w[0] ** 2, abs=1e-10)
 
 
+def test_a_free_body_in_polar_coordinates_moves_along_a_straight_line():
+    """``r = sqrt(1 + t^2)``, ``a = atan t``: the mass of one coordinate depends on the other."""
+    model = written(("r", "a"), {"mass.a": "r**2", "force.r": "0", "force.a": "0"}, ())
+    for t in (0.3, -2.0):
+        square = 1.0 + t * t
+        at = {"r": np.sqrt(square), "a": np.arctan(t), "vr": t / np.sqrt(square), "va": 1 / square}
+        found = [evaluate(tree(model, a), at) for a in model.accelerations]
+        np.testing.assert_allclose(found, [square**-1.5, -2 * t / square**2], rtol=1e-14)
+
+
 def test_a_bar_of_elements_with_consistent_masses_has_its_frequencies():
     """64 coordinates, each of which has a mass in common with its neighbours, as linear elements give them.
 
