@@ -147,7 +147,7 @@ def test_swept_oscillator() -> None:
 
 
 def test_equations_of_the_file_take_any_unit() -> None:
-    """Numbers of a structure with a unit were all 1, and coordinates of a system took none."""
+    """Numbers and initial values of a structure were 1 with a unit; coordinates took none."""
     system = {
         "kind": "system",
         "force": "-k*u",
@@ -175,6 +175,11 @@ def test_equations_of_the_file_take_any_unit() -> None:
     plain |= {"damping_ratios": 0.05, "load": {"2": "F", "1": 3000.0}, "parameters": {"F": 2000.0}}
     plain["start"] = {"displacement": {"mode": 1, "size": 0.002}, "velocity": [0, 0.005]}
     assert experiment.model == build(model=plain, sweep=sweep, initial=None).model
+    moving = {name: plain[name] for name in ("kind", "mass", "stiffness")}
+    sweep = {"initial.u2": ["1 mm", "2 cm"]}
+    experiment = build(model=moving, initial={"vu2": "10 cm/s"}, sweep=sweep)
+    assert experiment.initial["vu2"] == 0.1
+    assert list(sweep_columns.columns(experiment, 0, 2)["initial.u2"]) == [0.001, 0.02]
 
 
 @pytest.mark.parametrize("model", MODELS.values(), ids=MODELS)

@@ -98,7 +98,7 @@ class Units:
             return text
         has_formulas = self.model is not None and bool(self.model.formulas)
         is_declared = has_formulas and key.startswith(f"model.{DECLARED}.")
-        is_any = is_declared or (self._is_structure and key.startswith("model."))
+        is_any = is_declared or (self._is_structure and key.startswith(("model.", "initial.")))
         wanted = self.units.get(key, _ANY if is_any else _UNKNOWN)
         halves = split(text)
         if halves is None or (self._is_structure and _is_name_or_formula(path, text, halves[1])):
