@@ -239,6 +239,13 @@ def test_labels_and_times_are_coordinates_too() -> None:
         for n in COUNTS
     ]  # fmt: skip
     assert judge(H, days, order=2).status == "PASS"
+    calendars = [
+        day.assign_coords(
+            t=xarray.date_range("2000-02-27", periods=n + 1, freq=f"{64 // n}h", calendar="noleap")
+        )
+        for n, day in zip(COUNTS, days, strict=True)
+    ]
+    assert judge(H, calendars, order=2).status == "PASS"
 
 
 def test_other_dimensions_are_refused() -> None:

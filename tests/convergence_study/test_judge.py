@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas
 import pytest
 import xarray
 from thinned import thinned
@@ -433,6 +434,7 @@ def test_a_verdict_is_drawn(tmp_path: Path) -> None:
         ({"values": [], "h": []}, "at least one level"),
         ({"values": ["a", "b", "c", "d", "e"]}, r"values\[0\]: str.*: must hold numbers"),
         ({"values": [1j, 2j, 3j, 4j, 5j]}, r"values\[0\].*must be real"),
+        ({"values": [pandas.Series([1.0, 2.0], [0.0, 0.1])] * 5}, r"Series: .*value.to_xarray\(\)"),
         ({"values": [np.empty(0)] * 5}, r"values\[0\].*must not be empty"),
         ({"values": [1.0, 2.0, 3.0, 4.0, np.ones(3)]}, "has the dimensions axis 0, the coarsest"),
         ({"order": 0}, "order: 0.0: must be a finite number above 0"),
@@ -461,6 +463,9 @@ def test_a_dataset_with_one_variable_is_taken_and_another_refused() -> None:
     assert judge(H, levels, order=1).quantity == "T"
     with pytest.raises(InputError, match="is a dataset of 2 variables"):
         judge(H, [level.assign(S=level["T"]) for level in levels])
+    # xarray names an array after the task of dask
+    unnamed = [xarray.DataArray(level["T"].chunk().data) for level in levels]
+    assert judge(H, unnamed, order=1).quantity == "u"
 
 
 def test_many_members_are_judged_one_by_one() -> None:

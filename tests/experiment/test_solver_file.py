@@ -87,6 +87,7 @@ REFUSED = [
     ("flux: {}", "flux: {noise: -1}", ["6: quantities.flux.noise: -1: must be at least 0"]),
     ("--dt {h}", "", ["3: solver.command: ", "has no placeholder that differs between levels"]),
     ("--out {output}", "", ["3: solver.command: ", "has no placeholder for the file that it wr"]),
+    ("--out {output}", "> {output}", ["3: solver.command: ", "no shell reads a command, so >"]),
     ("{kappa} ", "1 ", ["8: sweep.kappa: is not a placeholder of `command:`"]),
     ("--dt {h}", "--dt {h:.3f}", ["3: solver.command: ", "must have a name alone between braces"]),
     ("--dt {h}", "{h} }", ["3: solver.command: ", "must have a name alone between braces"]),
@@ -152,11 +153,21 @@ def test_faults_of_all_sections_are_told_at_once(
     assert {"solver.command", "refine.h[2]", "quantities.u.x", "checks[0].o"} <= keys
 
 
-def test_nothing_more_is_said_of_a_formula_whose_levels_are_faulty(
-    heat: Path, capsys: pytest.CaptureFixture[str]
+@pytest.mark.parametrize(
+    ("sizes", "fault"),
+    [
+        ("1/2**level, levels: [a]", "5: refine.levels[0]: a: must be a whole number"),
+        ("[0.1, .inf]", "5: refine.h[1]: .inf: must be a finite number"),
+    ],
+)
+def test_nothing_more_is_said_of_faulty_sizes(
+    heat: Path, sizes: str, fault: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    found = faults(changed(heat, ("[0.05, 0.1, 0.02]", "1/2**level, levels: [a]")), capsys)
-    assert found == ["5: refine.levels[0]: a: must be a whole number"]
+    assert faults(changed(heat, ("[0.05, 0.1, 0.02]", sizes)), capsys) == [fault]
+
+
+def test_signs_of_a_shell_may_be_quoted_arguments(heat: Path) -> None:
+    assert main(["check", str(changed(heat, ("{kappa}", "{kappa} '|' a>b \\;")))]) == 0
 
 
 def test_files_that_are_to_be_there_must_be(heat: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -147,6 +147,14 @@ def test_numbers_of_tables_are_known_to_the_digits_that_were_printed(
     assert entry["status"] == status
 
 
+@pytest.mark.parametrize("dim", ["h", "a"])
+def test_a_dimension_named_like_a_size_or_a_parameter_is_refused(tmp_path: Path, dim: str) -> None:
+    found = experiment(tmp_path, "[{converges: u}]")
+    row = GridValues(np.ones(3), (dim,), {dim: np.arange(3.0)}, "u")
+    with pytest.raises(VibsimError, match=f"u: its dimension {dim} has the name of a size"):
+        level_output.record(found, 0, 0, {"u": row})
+
+
 def test_stated_noise_hides_no_failure_as_an_order(tmp_path: Path) -> None:
     rng = np.random.default_rng(7)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import math
+import re
 import shlex
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
@@ -37,6 +38,8 @@ from vibsim.experiment.yaml.parse import Path_, Source, read
 from vibsim.formula import ExpressionError, constant, evaluate, parse
 
 _NAME = "must be a name of letters, digits and _"
+_QUOTED = r"'[^']*'|\"[^\"]*\"|\\."
+_SHELL_SIGN = r"(?:^|\s)(>>?|<|\|\|?|&&?|;)(?=\s|\{|$)"
 
 
 def from_file(path: Path) -> SolverExperiment:
@@ -93,10 +96,10 @@ def _sizes(section: Any, report: Report) -> tuple[tuple[int, ...], dict[str, tup
     if section is None:
         return (), {}
     numbers = rising_levels(section.levels, report, ("refine", "levels"))
-    if not section.sizes:
-        report.add(("refine",), "must name a step size", "e.g. h: [0.1, 0.05, 0.025]")
     sizes: dict[str, tuple[Any, ...]] = {}
     raw = report.source.data["refine"]
+    if not set(raw) - {"levels"}:
+        report.add(("refine",), "must name a step size", "e.g. h: [0.1, 0.05, 0.025]")
     for name, value in section.sizes.items():
         if isinstance(value, str):
             values = _by_formula(("refine", name), value, numbers, "levels" in raw, report)
@@ -262,6 +265,10 @@ def _check_template(
         return
     if is_empty:
         report.add(path, "must name a program", value=text)
+    unquoted = re.sub(_QUOTED, "", text) if kind == "command" else ""
+    if sign := re.search(_SHELL_SIGN, unquoted):
+        rule = f"no shell reads a command, so {sign[1]} would be an argument of the program"
+        report.add(path, rule, "write a script and run that, or quote it", text)
     if kind == "files" and not text.lower().endswith(ENDINGS):
         report.add(path, f"must end with {' or '.join(ENDINGS)}", value=text)
     known = [*level_names, *swept]

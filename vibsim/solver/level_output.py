@@ -127,7 +127,7 @@ def record(
     Raises
     ------
     VibsimError
-        Where two quantities have different points under one name.
+        Where a dimension has the name of a size, or two quantities have different points under one name.
     """
     coords: dict[str, Variable] = {
         LEVEL: plain((), np.int64(level), "position of the level, the coarsest 0")
@@ -136,9 +136,13 @@ def record(
         coords[name] = plain((), np.float64(size), f"size {name} of the level")
     for name, parameter in experiment.parameters_of(member).items():
         coords[name] = plain((), parameter, f"parameter {name}")
+    taken = tuple(coords)
     lengths: dict[str, int] = {}
     for name, quantity in values.items():
         for dim, length in zip(quantity.dims, quantity.values.shape, strict=True):
+            if dim in taken:
+                rule = f"its dimension {dim} has the name of a size or a parameter"
+                raise VibsimError(f"{name}: {rule}; rename one of them")
             points = quantity.coords.get(dim)
             known = coords.get(dim)
             is_other = known is not None and (

@@ -65,11 +65,15 @@ def grid_values(value: Any, key: str) -> GridValues:
             numbers,
             dims,
             coords,
-            str(value.name or ""),
+            # xarray names an array of dask after its task
+            "" if value.name == getattr(value.data, "name", None) else str(value.name or ""),
             epsilon,
             units_in(getattr(value, "attrs", {}))[0],
             {name: units_in(axes[name].attrs) for name in coords},
         )
+    if hasattr(value, "iloc"):
+        hint = "its index is a coordinate in value.to_xarray(), and left out in value.to_numpy()"
+        raise refused(key, type(value).__name__, "must not be an object of pandas", hint)
     try:
         array = value if isinstance(value, np.ma.MaskedArray) else np.asarray(value)
     except ValueError:
@@ -100,8 +104,12 @@ def real(array: NDArray[Any], key: str) -> tuple[Floats, float]:
 
 
 def plain_coordinate(coordinate: NDArray[Any]) -> NDArray[Any]:
-    """Return a coordinate that can be compared: times become integers in nanoseconds, all else is unchanged."""
+    """Return a coordinate that can be compared: times become integers, all else is unchanged."""
     if coordinate.dtype.kind in "mM":
         unit = "timedelta64[ns]" if coordinate.dtype.kind == "m" else "datetime64[ns]"
         return coordinate.astype(unit).astype(np.int64)
+    if coordinate.dtype == object and coordinate.size and hasattr(coordinate[0], "calendar"):
+        import cftime
+
+        return np.asarray(cftime.date2num(coordinate, "microseconds since 1970-01-01"))
     return coordinate
