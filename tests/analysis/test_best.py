@@ -222,8 +222,9 @@ def test_a_jump_of_the_force_that_no_level_shows_is_part_of_the_bound_of_the_bes
 ):
     start, end, strength = 1.2501, 2.5, 1.3
     model = {"kind": "oscillator", "force": f"{strength}*heaviside(t - {start})"}
-    data = {"title": "t", "model": model, "time": {"end": end}, "levels": [5, 6, 7]}
-    experiment = Experiment.from_dict({**data, "initial": {"u": 0.4}, "schemes": ["gauss4"]})
+    data = {"title": "t", "model": model, "time": {"end": end}, "tolerance": 0.015}
+    data |= {"initial": {"u": 0.4}, "schemes": ["gauss4"], "output": "best"}
+    experiment = Experiment.from_dict(data).with_levels((5, 6, 7))
     levels = {level: simulate_record(experiment, level) for level in experiment.levels}
     record = best_record(experiment, levels)
     t = np.asarray(record["t"])
@@ -231,6 +232,12 @@ def test_a_jump_of_the_force_that_no_level_shows_is_part_of_the_bound_of_the_bes
     away = np.abs(record["u"][0, 0] - exact)
     assert np.all(away <= record["u_error"][0, 0])
     assert np.max(away) > 1e-5
+    # the same part of the size of each state, of which one is within the tolerance
+    bounds = {name: np.max(record[f"{name}_error"]) for name in ("u", "v")}
+    parts = [bound / np.max(np.abs(record[name])) for name, bound in bounds.items()]
+    assert parts[1] == pytest.approx(parts[0], rel=1e-3)
+    assert bounds["u"] < 0.015 < bounds["v"]
+    assert not record["reached"][0, 0]
 
 
 def test_an_extremum_at_an_impact_lies_up_to_a_step_away() -> None:

@@ -152,7 +152,10 @@ def test_numbers_beside_what_is_asked_have_the_digits_that_tell_them_apart(
     (plain,) = asked(PENDULUM, {"accurate": "theta", kind: 1.0})
     error = facts(plain)["relative_error" if kind == "relative" else "error"]
     limit = float(f"{factor * error:.6g}")
-    (found,) = asked(PENDULUM, {"accurate": "theta", kind: limit})
+    tenth = {"accurate": "theta", kind: 0.1 * limit}
+    found, far = asked(PENDULUM, {"accurate": "theta", kind: limit}, tenth)
+    # a factor of 10 is two levels of second order
+    assert facts(far)["level_needed"] == 11
     assert found.status == ("PASS" if factor > 1.0 else "FAIL")
     name = "at most" if factor > 1.0 else "at least"
     told = re.search(rf"{name} ([0-9.e-]+[0-9])", found.text)

@@ -231,6 +231,26 @@ def test_a_phase_is_an_angle() -> None:
     assert [one.status for one in found] == ["PASS", "PASS"]
 
 
+def test_levels_on_either_side_of_pi_have_the_phase_between_them() -> None:
+    """A closed form again, of a force so late that coarse levels have the phase below -pi, which is 3.14."""
+    w, b, phase = 1.3, 0.4, 4e-4 - math.pi
+    lag = math.atan2(b * w, 1.0 - w**2)
+    size = 1.0 / math.hypot(b * w, 1.0 - w**2)
+    content = {
+        "model": {
+            **{"kind": "oscillator", "spring": "u", "damping": {"linear": b}},
+            **{"force": "cos(w*t - late)", "parameters": {"w": w, "late": phase - lag}},
+        },
+        "initial": {"u": size * math.cos(phase), "v": size * w * math.sin(phase)},
+        "time": {"periods": 12, "steps_per_period": 16, "frequency": "model.parameters.w"},
+        **{"levels": [0, 1, 2, 3], "schemes": ["central"]},
+    }
+    check = {"value": "steady_phase", "quantity": "u", "equals": phase, "atol": 1e-5, **BEST}
+    coarse = {"value": "steady_phase", "quantity": "u", "above": 3.0, "at": {"level": 0}}
+    found = run(content, check, coarse).verdicts
+    assert [one.status for one in found] == ["PASS", "PASS"]
+
+
 NEAR_PI = {
     "model": {
         **{"kind": "oscillator", "spring": "u", "damping": {"linear": 0.002}},

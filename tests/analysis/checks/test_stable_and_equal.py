@@ -11,6 +11,7 @@ import pytest
 from ladders import T, facts_of
 from spring_runs import PERIODS, STEPS, judged, registered, spring
 
+from vibsim.checks.stable import _is_removed
 from vibsim.comparison import solution_distance
 from vibsim.convergence.verdict import judge
 from vibsim.core.record import Variable
@@ -170,6 +171,16 @@ def test_of_several_coordinates_the_fastest_oscillation_decides_and_one_alone_sh
     for verdict in (coarse, fine, ladder):
         assert "predicted for the fastest small oscillations" in verdict.text
         assert "measured" not in verdict.text
+
+
+def test_growth_is_removed_where_the_next_finer_level_has_less_than_half_of_it() -> None:
+    growth = np.array([[8.0, 8.0, 1.0], [8.0, 1.0, 1.0]])
+    assert [_is_removed(growth, level).tolist() for level in range(3)] == [
+        [False, True],
+        [True, False],
+        [True, False],
+    ]
+    assert _is_removed(growth[:, :1], 0).tolist() == [False, False]
 
 
 def test_the_result_nearest_to_what_is_allowed_decides() -> None:

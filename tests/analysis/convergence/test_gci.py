@@ -109,6 +109,18 @@ def test_three_levels_that_do_not_converge_get_three_times_their_range() -> None
     assert of(1.0, 1.1, 0.8) == pytest.approx(3 * 0.3)
 
 
+def test_four_levels_that_do_not_converge_get_the_index_of_their_fit() -> None:
+    """Of one exponent, 1/2: numpy's straight line in h^(1/2), with four numbers less the three that are fitted."""
+    u, x = np.array([1.0, 1.3, 1.1, 1.25]), 2.0 ** (-0.5 * np.arange(4.0))
+    slope, limit = np.polyfit(x, u, 1)
+    residual = u - limit - slope * x
+    sigma, error = np.sqrt(np.sum(residual**2) / (4 - 3)), abs(slope) * x[-1]
+    typical = np.ptp(u) / 3
+    assert sigma > typical
+    expected = 3 * sigma / typical * (error + sigma + abs(residual[-1]))
+    assert of(*u, order=0.5) == pytest.approx(expected, rel=1e-12)
+
+
 @pytest.mark.slow
 def test_a_fit_covers_noisy_levels() -> None:
     """Of levels that scatter about the limit, the index bounds the error of the finest one."""
