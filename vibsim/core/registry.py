@@ -7,6 +7,7 @@ file is compared with their names, and never imported itself.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from functools import cache
 from types import MappingProxyType
@@ -26,26 +27,21 @@ class _HasKind(Protocol):
 Entry = TypeVar("Entry", bound=_HasKind)
 
 
-def hash_fault(entry: object) -> str:
-    """Return why results derived from an entry cannot be cached; empty if they can."""
-    try:
-        hash(entry)
-    except TypeError as error:
-        return f"it must have a hash: write tuples instead of lists ({error})"
-    return ""
-
-
 class Registry(Mapping[str, Entry]):
     """Models or schemes by kind. Iterating over the kinds imports no package; looking up a value does."""
 
     def __init__(
-        self, group: str, entries: Iterable[Entry], fault_of: Callable[[object], str]
+        self,
+        group: str,
+        type_: type[Entry],
+        entries: Iterable[Entry],
+        fault_of: Callable[[Entry], str],
     ) -> None:
         self.group = group
         """Group of the entry points."""
         self.built_in: Mapping[str, Entry] = MappingProxyType({row.kind: row for row in entries})
         """The entries of vibsim itself."""
-        self._fault_of = fault_of
+        self._type, self._own_fault_of = type_, fault_of
         self._loaded: dict[str, Entry] = {}
 
     def __getitem__(self, kind: str) -> Entry:
@@ -98,6 +94,20 @@ class Registry(Mapping[str, Entry]):
             except InputError as error:
                 faults += error.faults
         return entries, faults
+
+    def _fault_of(self, entry: object) -> str:
+        """Return why an object cannot be added; empty if it can."""
+        if not isinstance(entry, self._type):
+            known, given = f"{self.group}.{self._type.__name__}", type(entry).__name__
+            return f"is no {known}, but of the type {given}"
+        if not re.fullmatch("[a-z0-9_]+", entry.kind):
+            return "its kind must consist of a to z, 0 to 9 and _"
+        try:
+            # results derived from it are cached
+            hash(entry)
+        except TypeError as error:
+            return f"it must have a hash: write tuples instead of lists ({error})"
+        return self._own_fault_of(entry)
 
     def _offers(self) -> Mapping[str, EntryPoint]:
         points = offers(self.group)

@@ -1,7 +1,7 @@
 """Rounding to integers, and error-free sums and products, without a library call or fused multiply-add.
 
 A number "in two parts" is an unevaluated sum of two doubles, the larger part first. The smaller part of ``x`` is called
-``x_behind`` throughout this package.
+``x_behind`` throughout this package. The sums and products serve arrays as well as floats.
 
 Source: T. J. Dekker, A floating-point technique for extending the available precision, Numerische Mathematik 18 (1971);
 J.-M. Muller et al., Handbook of Floating-Point Arithmetic, 2nd ed. (2018), sections 4.3 and 4.4.
@@ -10,6 +10,11 @@ J.-M. Muller et al., Handbook of Floating-Point Arithmetic, 2nd ed. (2018), sect
 from __future__ import annotations
 
 import math
+from typing import TypeVar
+
+from vibsim.core.array_types import Floats
+
+Real = TypeVar("Real", float, Floats)
 
 _SPLIT = 134217729.0  # 2^27 + 1
 _ROUND = 6755399441055744.0  # 1.5 * 2^52: doubles of this size are integers
@@ -20,7 +25,7 @@ def nearest_whole(x: float) -> float:
     return (x + _ROUND) - _ROUND
 
 
-def two_product(a: float, b: float) -> tuple[float, float]:
+def two_product(a: Real, b: Real) -> tuple[Real, Real]:
     """Return ``a b`` rounded, and its error; exact without over- and underflow (sizes up to 2^996)."""
     c = _SPLIT * a
     a_1 = c - (c - a)
@@ -32,14 +37,14 @@ def two_product(a: float, b: float) -> tuple[float, float]:
     return p, ((a_1 * b_1 - p) + a_1 * b_2 + a_2 * b_1) + a_2 * b_2
 
 
-def two_sum(a: float, b: float) -> tuple[float, float]:
+def two_sum(a: Real, b: Real) -> tuple[Real, Real]:
     """Return ``a + b`` rounded, and its error."""
     s = a + b
     part = s - a
     return s, (a - (s - part)) + (b - part)
 
 
-def fast_two_sum(a: float, b: float) -> tuple[float, float]:
+def fast_two_sum(a: Real, b: Real) -> tuple[Real, Real]:
     r"""Return ``a + b`` rounded, and its error, for \|a\| >= \|b\| or a = 0."""
     s = a + b
     return s, b - (s - a)

@@ -52,7 +52,7 @@ _ALL = (
     SYSTEM,
     STRUCTURE,
 )
-MODELS = Registry[Model]("vibsim.models", _ALL, fault_of)
+MODELS = Registry("vibsim.models", Model, _ALL, fault_of)
 
 __all__ = [
     "BUDGET",

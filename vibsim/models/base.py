@@ -17,7 +17,6 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from vibsim.core.array_types import Floats
-from vibsim.core.registry import hash_fault
 from vibsim.core.vocabulary import AMPLITUDE, CENTRED, PHASE
 from vibsim.formula import (
     CONSTANTS,
@@ -276,14 +275,8 @@ _TAKEN = ("t", "scheme", "case", "level", "status", "end")
 """Names that have another meaning in files or formulas."""
 
 
-def fault_of(model: object) -> str:
-    """Return why an object from an installed package cannot be added as a model; empty if it can."""
-    if not isinstance(model, Model):
-        return f"is no vibsim.models.Model, but of the type {type(model).__name__}"
-    if not re.fullmatch("[a-z0-9_]+", model.kind):
-        return "its kind must consist of a to z, 0 to 9 and _"
-    if fault := hash_fault(model):
-        return fault
+def fault_of(model: Model) -> str:
+    """Return why a model from an installed package cannot be added; empty if it can."""
     if not model.states or len(model.states) != 2 * len(model.accelerations):
         return "it must have a position, a velocity and an acceleration for each coordinate"
     rows: list[State | Parameter | Output] = [*model.states, *model.parameters, *model.outputs]

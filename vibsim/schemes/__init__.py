@@ -35,7 +35,7 @@ _ALL = (
     GAUSS4,
     *ADAPTIVE,
 )
-SCHEMES = Registry[Scheme]("vibsim.schemes", _ALL, fault_of)
+SCHEMES = Registry("vibsim.schemes", Scheme, _ALL, fault_of)
 
 FIXED_STEP: Mapping[str, Scheme] = MappingProxyType(
     {scheme.kind: scheme for scheme in _ALL if not scheme.adaptive}

@@ -9,14 +9,12 @@ from __future__ import annotations
 
 import inspect
 import math
-import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
 from vibsim.core.array_types import Floats
-from vibsim.core.registry import hash_fault
 from vibsim.models.base import BUDGET, Model
 from vibsim.models.events import TREATMENTS
 from vibsim.schemes.orders import Beginning, Orders, depends_on_velocity
@@ -309,14 +307,8 @@ class Scheme:
         return model.lookup is None or (model.lookup.is_met and not is_multistep)
 
 
-def fault_of(scheme: object) -> str:
-    """Return why an object from an installed package cannot be added as a scheme; empty if it can."""
-    if not isinstance(scheme, Scheme):
-        return f"is no vibsim.schemes.Scheme, but of the type {type(scheme).__name__}"
-    if not re.fullmatch("[a-z0-9_]+", scheme.kind):
-        return "its kind must consist of a to z, 0 to 9 and _"
-    if fault := hash_fault(scheme):
-        return fault
+def fault_of(scheme: Scheme) -> str:
+    """Return why a scheme from an installed package cannot be added; empty if it can."""
     if scheme.adaptive:
         return "a scheme that chooses its own steps cannot be added"
     options = scheme.defaults()

@@ -18,9 +18,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from vibsim.core.array_types import Floats
+from vibsim.elementary.doubled import fast_two_sum, two_product, two_sum
 from vibsim.theory.arithmetic import Arithmetic
-
-_SPLITTER = 2.0**27 + 1.0
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -34,18 +33,18 @@ class Doubled(Arithmetic):
 
     def __add__(self, other: Any) -> Doubled:
         b = doubled(other)
-        total, rest = _two_sum(self.high, b.high)
-        low, rest_low = _two_sum(self.low, b.low)
-        total, rest = _fast_two_sum(total, rest + low)
-        return Doubled(*_fast_two_sum(total, rest + rest_low))
+        total, rest = two_sum(self.high, b.high)
+        low, rest_low = two_sum(self.low, b.low)
+        total, rest = fast_two_sum(total, rest + low)
+        return Doubled(*fast_two_sum(total, rest + rest_low))
 
     def __neg__(self) -> Doubled:
         return Doubled(-self.high, -self.low)
 
     def __mul__(self, other: Any) -> Doubled:
         b = doubled(other)
-        total, rest = _two_product(self.high, b.high)
-        return Doubled(*_fast_two_sum(total, rest + (self.high * b.low + self.low * b.high)))
+        total, rest = two_product(self.high, b.high)
+        return Doubled(*fast_two_sum(total, rest + (self.high * b.low + self.low * b.high)))
 
     def __truediv__(self, other: Any) -> Doubled:
         b = doubled(other)
@@ -53,7 +52,7 @@ class Doubled(Arithmetic):
         rest: Doubled = self - b * first
         second = rest.high / b.high
         rest = rest - b * second
-        return Doubled(*_fast_two_sum(first, second)) + rest.high / b.high
+        return Doubled(*fast_two_sum(first, second)) + rest.high / b.high
 
     def __matmul__(self, other: Doubled) -> Doubled:
         """Return the product of matrices, shapes (..., i, k) and (..., k, j)."""
@@ -107,7 +106,7 @@ def doubled(value: Any) -> Doubled:
 
 def product(a: ArrayLike, b: ArrayLike) -> Doubled:
     """Return the exact product of two arrays of floats."""
-    return Doubled(*_two_product(np.asarray(a, dtype=float), np.asarray(b, dtype=float)))
+    return Doubled(*two_product(np.asarray(a, dtype=float), np.asarray(b, dtype=float)))
 
 
 def stacked(numbers: Sequence[Any], shape: tuple[int, ...], axis: int = -1) -> Doubled:
@@ -127,28 +126,3 @@ def root(x: Doubled) -> Doubled:
     rest = x - product(first, first)
     better: Doubled = doubled(first) + rest.high / (2.0 * first)
     return better.mapped(lambda part: np.where(positive, part, 0.0))
-
-
-def _two_sum(a: Floats, b: Floats) -> tuple[Floats, Floats]:
-    total = a + b
-    part = total - a
-    return total, (a - (total - part)) + (b - part)
-
-
-def _fast_two_sum(a: Floats, b: Floats) -> tuple[Floats, Floats]:
-    """Return the sum and its rounding error, for ``|a| >= |b|``."""
-    total = a + b
-    return total, b - (total - a)
-
-
-def _halves(a: Floats) -> tuple[Floats, Floats]:
-    scaled = _SPLITTER * a
-    high = scaled - (scaled - a)
-    return high, a - high
-
-
-def _two_product(a: Floats, b: Floats) -> tuple[Floats, Floats]:
-    total = a * b
-    a_high, a_low = _halves(a)
-    b_high, b_low = _halves(b)
-    return total, ((a_high * b_high - total) + a_high * b_low + a_low * b_high) + a_low * b_low

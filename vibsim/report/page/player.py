@@ -182,7 +182,6 @@ def _context(record: Record, shown: list[Lane]) -> dict[str, Any]:
         "trace": TRACE,
         "zero": round(zero, 1) if 0.0 <= zero <= TRACE[1] else None,
         "curves": [(i, _curve(t, trace, window)) for i, trace in reversed(list(enumerate(traces)))],
-        "names": [lane.title for lane in shown],
         "label": style.label(words.symbol(position), unit),
         "from": words.number(float(t[0]), "step"),
         "to": words.number(float(f"{t[0] + window:.3g}"), "step"),
