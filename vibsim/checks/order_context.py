@@ -11,7 +11,6 @@ import numpy as np
 from vibsim import theory
 from vibsim.apriori.force_discontinuities import words_of
 from vibsim.apriori.formal_orders import is_promised, orders_in, special_orders
-from vibsim.apriori.stability_limits import stability_limits
 from vibsim.apriori.table_corners import is_on_a_point
 from vibsim.checks.accurate import error_in_words
 from vibsim.checks.phase_amplitude_text import parts_in_words
@@ -21,7 +20,7 @@ from vibsim.comparison.comparison_variables import has_exact
 from vibsim.core.record import Record
 from vibsim.core.vocabulary import is_error_part, whole_of
 from vibsim.experiment.schema.checks import ConvergesCheck
-from vibsim.experiment.sweep_columns import options_of, recorded_columns
+from vibsim.experiment.sweep_columns import recorded_columns
 from vibsim.observe.member_block import fastest
 from vibsim.schemes.base import LOW_STARTS, Scheme
 
@@ -47,7 +46,7 @@ class OrderContext:
     def __init__(self, f: MemberFacts, check: ConvergesCheck) -> None:
         experiment, record, scheme, case = f.experiment, f.record, f.scheme, f.case
         quantity = check.converges
-        self._facts, self._columns = f, recorded_columns(record)
+        self._facts = f
         self.quantity, self.norm, self.tolerance = quantity, check.norm, check.tolerance
         self.is_position = quantity in f.model.positions
         self.notation, self.reason = f.notation, f.reason
@@ -72,10 +71,11 @@ class OrderContext:
         """A sentence on the error of the finest level; empty if it is unknown."""
 
         self.scheme, self.kind = f.scheme_name, experiment.schemes[scheme].kind
-        self.options = options_of(experiment, self._columns, scheme, case)
+        self.options = f.options
         self.promised = f.of_member(orders_in(experiment, record, quantity))
         """The order that the scheme promises."""
-        self.special = f.of_member(special_orders(experiment, quantity, self._columns))
+        columns = recorded_columns(record)
+        self.special = f.of_member(special_orders(experiment, quantity, columns))
         """Its highest order in a special case of motion, model or options."""
         self.expected = self.promised if check.order == "scheme" else float(check.order)
         """The expected order; infinite for exactness."""
@@ -137,9 +137,7 @@ class OrderContext:
     @cached_property
     def limit(self) -> float:
         """The largest stable w dt of the scheme, infinite for none; NaN if no level failed."""
-        if self.culprit < 0:
-            return math.nan
-        return self._facts.of_member(stability_limits(self._facts.experiment, self._columns))
+        return math.nan if self.culprit < 0 else self._facts.stability_limit
 
     @cached_property
     def growth_in_words(self) -> str:

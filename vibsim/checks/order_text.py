@@ -98,8 +98,7 @@ class _Phrases(OrderContext):
         """Return the measured order with its interval and levels; empty if there is none."""
         if math.isnan(self.order):
             return ""
-        known = math.isfinite(self.low) and math.isfinite(self.high)
-        ends = order_interval(self.low, self.high) if known else ()
+        ends = order_interval(self.low, self.high)
         between = f" (between {ends[0]} and {ends[1]})" if len(ends) > 1 else ""
         return f"order {self.order:.3f}{between} on levels {self.first} to {self.last}"
 

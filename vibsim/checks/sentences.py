@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from vibsim.apriori.stability_limits import stability_limits
 from vibsim.checks.fields import field_values, name_of
 from vibsim.checks.notation import PLAIN, Notation
 from vibsim.core.array_types import Floats
@@ -18,7 +19,9 @@ from vibsim.core.record import Record
 from vibsim.experiment import Experiment
 from vibsim.experiment.cost import level_cost
 from vibsim.experiment.schema.checks import Measurement
+from vibsim.experiment.sweep_columns import options_of, recorded_columns
 from vibsim.models.base import Model
+from vibsim.schemes import Options
 
 LONG = 120.0
 """Times above this [s] are written in minutes, and above sixty times this in hours."""
@@ -108,6 +111,18 @@ class MemberFacts:
     def scheme_name(self) -> str:
         """Name of the scheme."""
         return self.experiment.schemes[self.scheme].name
+
+    @property
+    def options(self) -> Options:
+        """Options of the scheme for this member."""
+        columns = recorded_columns(self.record)
+        return options_of(self.experiment, columns, self.scheme, self.case)
+
+    @property
+    def stability_limit(self) -> float:
+        """The largest stable w dt; infinite if there is no limit."""
+        limits = stability_limits(self.experiment, recorded_columns(self.record))
+        return self.of_member(limits)
 
     @cached_property
     def failed_at(self) -> float:

@@ -18,7 +18,6 @@ import math
 
 import numpy as np
 
-from vibsim.apriori.stability_limits import stability_limits
 from vibsim.checks.fields import LEVEL, STATUS, Field, Measured
 from vibsim.checks.notation import ROUND_OFF
 from vibsim.checks.outcome import Judged
@@ -33,7 +32,6 @@ from vibsim.elementary import on_arrays
 from vibsim.elementary.exponential import log2
 from vibsim.experiment import Experiment
 from vibsim.experiment.schema.checks import StableCheck
-from vibsim.experiment.sweep_columns import recorded_columns
 from vibsim.observe import oscillation, predicted_oscillation
 from vibsim.observe.member_block import MemberBlock
 
@@ -211,7 +209,7 @@ def _advice(f: MemberFacts, level: int, w_dt: float, time: str) -> str:
             "Take another `kind:` in `schemes:`, or look for an error in this one, which does not grow as its own "
             "theory predicts."
         )
-    limit = f.of_member(stability_limits(f.experiment, recorded_columns(f.record)))
+    limit = f.stability_limit
     if math.isfinite(limit) and math.isfinite(w_dt) and w_dt > limit:
         return (
             f"Take finer `levels:`, from {first_within(limit, level, w_dt)} on (w dt within the limit "

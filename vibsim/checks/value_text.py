@@ -36,7 +36,6 @@ from vibsim.convergence.thresholds import STILL_TO_CHANGE
 from vibsim.core.vocabulary import LEVELS_OF_AN_ORDER, is_error_part
 from vibsim.elementary import on_arrays
 from vibsim.experiment.schema.checks import ValueCheck
-from vibsim.experiment.sweep_columns import options_of, recorded_columns
 from vibsim.observe.steady_state import LEAST_PERIODS
 from vibsim.schemes.base import is_on_the_mesh
 
@@ -194,8 +193,7 @@ def _by_level_of(f: MemberFacts) -> list[float]:
 
 def _is_on_the_mesh(f: MemberFacts, check: ValueCheck) -> bool:
     """Say whether a number depends on events that are left to the mesh."""
-    options = options_of(f.experiment, recorded_columns(f.record), f.scheme, f.case)
-    return check.number.needs_events and is_on_the_mesh(options)
+    return check.number.needs_events and is_on_the_mesh(f.options)
 
 
 def _is_of_events_at_end(f: MemberFacts, check: ValueCheck) -> bool:

@@ -119,7 +119,7 @@ def numbers(check: Entry) -> list[str]:
     if order is None:
         return []
     head = f"{check['quantity']}: order {order:.3f}"
-    ends = order_interval(low, high) if low is not None and high is not None else ()
+    ends = order_interval(low, high)
     between = f" ({' to '.join(ends)})" if len(ends) > 1 else ""
     error = facts.get("relative_error")
     error_text = "" if error is None else f", relative error {error:.2g}"

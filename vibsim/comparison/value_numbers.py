@@ -179,10 +179,6 @@ def _of_quantity(number: Callable[[MemberBlock, int, str], Floats]) -> Number:
     return lambda p: p.missing if p.at_level is None else number(p.block, p.at_level, p.quantity)
 
 
-def _max_abs_interior(p: Place) -> Floats:
-    return p.of_quantity("max_abs_interior")
-
-
 def _fall(number: Number) -> Number:
     """Return the ratio of a number to that at the next finer level; by default for the finest two levels."""
 
@@ -272,11 +268,6 @@ def _estimate_defect(p: Place) -> Floats:
     return safe_ratio(largest(estimate - error), largest(error))
 
 
-def _richardson_error(p: Place) -> Floats:
-    q = p.comparison()
-    return p.missing if q is None else q.largest_bound
-
-
 def _gathered(name: str) -> Number:
     return lambda p: p.gathered(name)
 
@@ -295,9 +286,9 @@ NUMBERS: Mapping[str, Number] = {
     "min": _extreme("min", np.min),
     "max": _extreme("max", np.max),
     "max_abs": _max_abs,
-    "max_abs_interior": _max_abs_interior,
+    "max_abs_interior": lambda p: p.of_quantity("max_abs_interior"),
     "max_abs_ratio": _fall(_max_abs),
-    "max_abs_interior_ratio": _fall(_max_abs_interior),
+    "max_abs_interior_ratio": _fall(lambda p: p.of_quantity("max_abs_interior")),
     "period_error": lambda p: safe_ratio(p.gathered("period"), p.gathered("exact_period")) - 1.0,
     "running_max": _running_max,
     "relative_running_max": _over_initial(_running_max),
@@ -335,6 +326,6 @@ NUMBERS: Mapping[str, Number] = {
     "observed_order": _of_triple(lambda q: q.observed_orders("l2")),
     "ratio": _of_triple(lambda q: q.ratios("l2")),
     "coincidence": _of_triple(lambda q: q.coincidence),
-    "richardson_error": _richardson_error,
+    "richardson_error": lambda p: q.largest_bound if (q := p.comparison()) else p.missing,
 }
 """The function that computes each number, by its name."""

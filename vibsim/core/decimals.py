@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from decimal import ROUND_CEILING, ROUND_FLOOR, Context
 
 
@@ -14,8 +15,13 @@ def round_outward(value: float, digits: int, *, up: bool = True) -> float:
     return float(context.create_decimal(str(float(value))))
 
 
-def order_interval(low: float, high: float) -> tuple[str, ...]:
-    """Return the ends of an order's interval as text, with the 3 to 6 decimals that differ; one text if none do."""
+def order_interval(low: float | None, high: float | None) -> tuple[str, ...]:
+    """Return the ends of an order's interval as text, with the 3 to 6 decimals that differ; one text if none do.
+
+    The result is empty if an end is unknown.
+    """
+    if low is None or high is None or not math.isfinite(low + high):
+        return ()
     for decimals in range(3, 7):
         ends = f"{low:.{decimals}f}", f"{high:.{decimals}f}"
         if ends[0] != ends[1]:

@@ -25,7 +25,7 @@ from vibsim.models.shared.coordinates import states_of, velocities_of
 from vibsim.models.shared.crossings import described
 from vibsim.models.shared.inertia import MASS
 from vibsim.models.shared.mechanical import damping_of
-from vibsim.models.shared.written_system import INPUT, Written
+from vibsim.models.shared.written_system import INPUT, WrittenSystem
 from vibsim.models.table import HEIGHT, Lookup, Table
 
 SHOWN = 6
@@ -96,7 +96,7 @@ def system(
     lookup: Lookup | None = None,
 ) -> Model:
     """Return the system with given formulas; see `written`."""
-    own = Written(coordinates, dict(formulas), declared, lookup)
+    own = WrittenSystem(coordinates, dict(formulas), declared, lookup)
     motion = own.manufactured
     more: dict[str, Any] = {}
     is_conservative = motion is None and own.vanishes(own.powers)
@@ -143,21 +143,21 @@ def system(
     )
 
 
-def _is_linear(own: Written) -> bool:
+def _is_linear(own: WrittenSystem) -> bool:
     """Tell whether the acceleration of the only coordinate is linear in it, with a constant coefficient."""
     (a,), (u,) = own.accelerations, own.coordinates
     jumps = (part for part in walk(a) if is_jump(part) and u in part.names)
     return not any(jumps) and own.is_constant(derivative(a, u))
 
 
-def _has_constant_slopes(own: Written) -> bool:
+def _has_constant_slopes(own: WrittenSystem) -> bool:
     """Tell whether the accelerations are linear in all states, with constant coefficients."""
     slopes = (derivative(a, s) for a in own.accelerations for s in own.states if s in a.names)
     jumps = (part for a in own.accelerations for part in walk(a) if is_jump(part))
     return all(map(own.is_constant, (*slopes, *jumps)))
 
 
-def _damping(own: Written) -> Damping | None:
+def _damping(own: WrittenSystem) -> Damping | None:
     """Return the damping of the only coordinate, where it is linear or quadratic with a constant rate."""
     (a,), (v,) = own.accelerations, own.velocities
     force = reduce(operator.sub, (term for term in terms_of(a) if v in term.names), ZERO)
@@ -165,7 +165,7 @@ def _damping(own: Written) -> Damping | None:
     return Damping(*found) if found is not None and own.is_constant(found[1]) else None
 
 
-def _sides(own: Written, i: int) -> tuple[Expression, Expression]:
+def _sides(own: WrittenSystem, i: int) -> tuple[Expression, Expression]:
     """Return both sides of the equation of a coordinate."""
     accelerations = [Name(f"{name}''") for name in own.coordinates]
     if own.inertia.is_plain:
@@ -176,7 +176,7 @@ def _sides(own: Written, i: int) -> tuple[Expression, Expression]:
     return left, own.forces[i]
 
 
-def _equation(own: Written) -> str:
+def _equation(own: WrittenSystem) -> str:
     """Return the equations of motion as a user would write them."""
     speeds = zip(own.velocities, own.coordinates, strict=True)
     shown = replacing({**{v: Name(f"{x}'") for v, x in speeds}, HEIGHT: Name(INPUT)})

@@ -5,20 +5,18 @@ The texts are those of the reports (`vibsim.report.text.reasons`).
 
 from __future__ import annotations
 
-import textwrap
 from argparse import Namespace
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 from vibsim.cli import terminal
 from vibsim.cli.jobs.common import refusal
+from vibsim.cli.list_entry import laid_out
 from vibsim.core.errors import nearest
 from vibsim.core.vocabulary import DECISIVE, REASONS, STATUSES
 
 if TYPE_CHECKING:
     from vibsim.report.text.reasons import Reason
-
-_WIDEST = 100
 
 
 def explain(options: Namespace) -> int:
@@ -37,13 +35,11 @@ def explain(options: Namespace) -> int:
 
 
 def _lines(word: str) -> Iterator[str]:
-    status, width = REASONS[word], min(terminal.columns(), _WIDEST)
+    status = REASONS[word]
     yield f"{terminal.painted(word, 'bold')}: {terminal.painted(status, status)}"
     for head, (meaning, needs) in meanings(word):
         yield ""
-        for title, text in (("meaning", f"{head}{meaning}"), ("needed", needs)):
-            label, indent = title.ljust(9), " " * 9
-            yield textwrap.fill(text, width, initial_indent=label, subsequent_indent=indent)
+        yield from laid_out([("meaning", f"{head}{meaning}"), ("needed", needs)])
     yield "\nMore: docs/verdicts.md, section Reasons"
 
 

@@ -10,15 +10,12 @@ from vibsim.core.array_types import Floats
 from vibsim.experiment.faults import Report
 from vibsim.formula import ZERO, Expression, derivative, has_rule, parse, values, values_of
 from vibsim.models import Model, tree
+from vibsim.models.shared.written_system import AGREE, TESTS
 
 AMPLITUDES = (-6, 8)
 """Range of the exponents of 2 of the amplitudes at which both are compared."""
 PANELS, POINTS = 32, 16
 """Number of quadrature panels per amplitude, and of points per panel."""
-TESTS = 24
-"""Number of points at which the potential of a system is compared with its forces."""
-AGREE = 1e-9
-"""Relative tolerance of the comparison."""
 NOT_FOUND = "no potential energy was found of the forces that the positions make"
 
 

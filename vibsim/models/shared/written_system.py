@@ -51,7 +51,7 @@ INPUT = "input"
 
 
 @dataclass(frozen=True)
-class Written:
+class WrittenSystem:
     """The parsed formulas of a user."""
 
     coordinates: tuple[str, ...]

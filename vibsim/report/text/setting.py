@@ -36,8 +36,8 @@ def setup(experiment: Experiment, record: Record) -> Iterator[tuple[str, str]]:
     yield "Model", model.title
     yield from not_in_file(experiment.settings)
     for name, spec in experiment.model.tables.items():
-        steps = "steps contain its points, where the force has corners"
-        steps = "no step contains one of its points" if spec.is_met else steps
+        corners = "steps contain its points, where the force has corners"
+        steps = "no step contains one of its points" if spec.is_met else corners
         yield "Table", f"{name} from {spec.file}, columns {spec.place} and {spec.value}; {steps}"
     if model.loaded is not None and experiment.model.structure is not None:
         yield from structure.rows(experiment.model.structure, model.loaded)
