@@ -5,7 +5,6 @@ own handler of SIGTERM waits for a lock that the interrupted thread may hold, po
 loses nothing, because every file is written in one step.
 """
 
-import gc
 import json
 import os
 import sys
@@ -22,7 +21,7 @@ from snakemake_interface_logger_plugins.registry import LoggerPluginRegistry
 from snakemake_interface_logger_plugins.settings import LogHandlerSettingsBase
 from snakemake_interface_report_plugins.registry import ReportPluginRegistry
 
-from vibsim.cli import YOUNG_OBJECTS, supervise
+from vibsim.cli import collect_seldom, supervise
 from vibsim.cli.run import remote
 from vibsim.core.processes import end_with
 
@@ -69,7 +68,7 @@ def main() -> None:
     else:
         supervise.end_at_once()
     end_with(parent)
-    gc.set_threshold(YOUNG_OBJECTS)
+    collect_seldom()
     # Snakemake imports every installed executor. The one for SLURM takes half a second and needs pandas.
     if where == "remote":
         ExecutorPluginRegistry()
