@@ -16,7 +16,7 @@ from vibsim.comparison.comparison_variables import Table
 from vibsim.comparison.quantity_comparison import Compared
 from vibsim.core.array_types import Floats
 from vibsim.core.record import Variable, flags
-from vibsim.core.vocabulary import DRIFTS, MEMBER, OF_LEVEL
+from vibsim.core.vocabulary import DRIFTS, MEMBER, OF_LEVEL, PEAKS
 from vibsim.experiment.schema.published import row_at, row_id
 from vibsim.experiment.value_names import VALUES
 from vibsim.observe import oscillation, predicted_oscillation
@@ -27,7 +27,6 @@ from vibsim.observe.member_block import MemberBlock, by_level
 THEORY_RUNS = 2**12
 """Most runs for which predictions are computed, at about 0.1 ms each."""
 
-PEAKS = "interpolated peaks"
 RECURRENCE = f"recurrence of the steps; {PEAKS} where a run satisfies none to rounding"
 """How growth and frequency were measured (`vibsim.observe.oscillation`): attribute ``method``."""
 GROWTH = "growth factor of the amplitude per period"

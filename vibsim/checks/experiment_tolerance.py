@@ -13,7 +13,6 @@ from vibsim.checks.fields import Field
 from vibsim.checks.notation import Notation
 from vibsim.checks.outcome import Judged, Outcome, outcome_of
 from vibsim.checks.sentences import Description, MemberFacts
-from vibsim.comparison.best_solution import extrapolated
 from vibsim.convergence.reasons import code
 from vibsim.core.array_types import Floats, Integers
 from vibsim.core.errors import VibsimError
@@ -38,6 +37,9 @@ def bounds(block: MemberBlock) -> dict[str, Variable]:
 
     It is NaN for adaptive schemes, which have no levels.
     """
+    # a page, which reads only the words of this module, does not need the engine behind it
+    from vibsim.comparison.best_solution import extrapolated
+
     rows = extrapolated(block.experiment, block.records, block.grid)
     bounds = np.stack([row.largest_bounds() for row in rows], axis=1)
     largest = np.full((len(bounds), *block.shape), np.nan)

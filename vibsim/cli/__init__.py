@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import atexit
 import gc
 import sys
 from collections.abc import Sequence
 
 LEAST_BYTES = 600 * 10**6
 """Address space that a run needs. Measured on 2 cores: 450 MB are sometimes too little, 500 MB were enough."""
-YOUNG_OBJECTS = 50_000
+_YOUNG_OBJECTS = 50_000
 """Threshold of Python's garbage collector (generation 0). With the default of 700, collections take a tenth of the time
 of a report, mostly during imports; with 50 000 a report takes 2 MB more."""
 
@@ -30,7 +31,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """
     if arguments is not None:
         return _perform(arguments)
-    gc.set_threshold(YOUNG_OBJECTS)
+    collect_seldom()
     try:
         _check_limits()
         from vibsim.cli.supervise import supervised
@@ -38,6 +39,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return supervised(lambda: _perform(sys.argv[1:]))
     except Exception as error:
         return _failed(error)
+
+
+def collect_seldom() -> None:
+    """Make Python's garbage collector run seldom, and not when this process ends, which would take a tenth of a job."""
+    gc.set_threshold(_YOUNG_OBJECTS)
+    atexit.register(gc.freeze)
 
 
 def _check_limits() -> None:

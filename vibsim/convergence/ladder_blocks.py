@@ -15,7 +15,7 @@ from vibsim.convergence.reasons import code
 from vibsim.core.array_types import Floats, Integers
 from vibsim.core.vocabulary import LEVELS_OF_AN_ORDER
 
-BLOCK_LADDERS = 1024
+BLOCK_LADDERS = 2048
 """Largest number of ladders that are judged at once."""
 LARGEST_RATIO = 1e60
 """Limit of the ratio of a difference to the largest finer one, and of noise to the largest difference."""

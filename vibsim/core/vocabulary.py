@@ -47,6 +47,8 @@ OF_LEVEL = (*MEMBER, "level")
 Restriction = Literal["subset", "mean", "linear", "cubic"]
 RESTRICTIONS: tuple[Restriction, ...] = get_args(Restriction)
 """Ways to restrict the levels of a study to common points."""
+PEAKS = "interpolated peaks"
+"""How growth is measured where no recurrence of the steps gives it."""
 ORDER_TOLERANCE = 0.1
 """Default distance that a check allows between the measured and the promised order."""
 LEVELS_OF_AN_ORDER = 3

@@ -5,7 +5,6 @@ own handler of SIGTERM waits for a lock that the interrupted thread may hold, po
 loses nothing, because every file is written in one step.
 """
 
-import gc
 import json
 import os
 import sys
@@ -14,7 +13,9 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from importlib import import_module
 from logging import LogRecord
+from typing import Any
 
+from snakemake_interface_common.plugin_registry import PluginRegistryBase
 from snakemake_interface_executor_plugins.registry import ExecutorPluginRegistry
 from snakemake_interface_logger_plugins.base import LogHandlerBase
 from snakemake_interface_logger_plugins.common import LogEvent
@@ -22,7 +23,7 @@ from snakemake_interface_logger_plugins.registry import LoggerPluginRegistry
 from snakemake_interface_logger_plugins.settings import LogHandlerSettingsBase
 from snakemake_interface_report_plugins.registry import ReportPluginRegistry
 
-from vibsim.cli import YOUNG_OBJECTS, supervise
+from vibsim.cli import collect_seldom, supervise
 from vibsim.cli.run import remote
 from vibsim.core.processes import end_with
 
@@ -69,8 +70,8 @@ def main() -> None:
     else:
         supervise.end_at_once()
     end_with(parent)
-    gc.set_threshold(YOUNG_OBJECTS)
-    # Snakemake imports every installed executor. The one for SLURM takes half a second and needs pandas.
+    collect_seldom()
+    # Snakemake searches all installed packages five times for plug-ins, and imports them. A local run needs none.
     if where == "remote":
         ExecutorPluginRegistry()
         remote.ask_by_age()
@@ -78,7 +79,7 @@ def main() -> None:
         remote.tell_reasons()
         remote.report_submissions()
     else:
-        ExecutorPluginRegistry.module_prefix = "none of them"
+        setattr(PluginRegistryBase, "collect_plugins", _collect_none)  # noqa: B010
     # It starts in half the time without modules that no run of vibsim uses: NumPy numbers in profiles, web addresses,
     # Snakemake's reports, and tables as parameters of rules.
     with _absent("numpy", "requests", "snakemake.report"):
@@ -91,6 +92,10 @@ def main() -> None:
         module = sys.modules[__name__]
         LoggerPluginRegistry().register_plugin("snakemake_logger_plugin_vibsim", module)
         snakemake()
+
+
+def _collect_none(registry: PluginRegistryBase[Any]) -> None:
+    registry.plugins = {}
 
 
 @contextmanager

@@ -12,7 +12,6 @@ from typing import Any
 import numpy as np
 
 from vibsim.core.record import Record
-from vibsim.observe import spectrum as observed
 from vibsim.report import choice, data, style, words
 from vibsim.report.data import Member, state_at, whole
 from vibsim.report.figures import panels
@@ -30,6 +29,9 @@ def spectrum(experiment: Experiment, record: Record, member: Member) -> Picture 
 
     None if there are too few samples for a line.
     """
+    # few pages have a spectrum
+    from vibsim.observe import spectrum as observed
+
     name = choice.position(experiment)
     t, levels = data.times(record, member.case), whole(record, "level")
     if t.size < 2 * observed.FIRST_LINE + 4:

@@ -11,10 +11,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from vibsim.analysis.motion_variables import PEAKS
 from vibsim.core.array_types import Floats
 from vibsim.core.record import Record
-from vibsim.core.vocabulary import MEMBER, OF_LEVEL
+from vibsim.core.vocabulary import MEMBER, OF_LEVEL, PEAKS
 from vibsim.report import choice, data, finest_level, words
 from vibsim.report.data import Member, optional, swept, whole
 from vibsim.report.tables.levels import Fill, by_level
