@@ -95,7 +95,34 @@ TOLD = {
             "model": {"kind": "oscillator", "damping": "k2*v", "parameters": {"k2": 1, "k": 2}},
             "initial": {"u": 1},
         },
-        "model.parameters.k: no formula names it: leave it out",
+        "model.parameters.k: no formula names it: use it, or leave it out",
+    ),
+    "phase": (
+        {"model": {**wave("2*t - 90"), "parameters": {}}, "initial": {}},
+        "model: 90 rad are 14 turns: 90 degrees are written `90*pi/180`",
+    ),
+    "declared phase": (
+        {
+            "model": {**wave("2*t + a"), "parameters": {"a": 30}},
+            "initial": {},
+        },
+        "model.parameters.a: 30 rad are 4.8 turns: 30 degrees are written `30 degree`",
+    ),
+    "rtol": (
+        {"checks": [{"value": "period", "equals": 6.7, "rtol": 5}]},
+        "checks[0].rtol: lets every number up to 6 times the expected one pass: 5 percent are 0.05",
+    ),
+    "damping that drives": (
+        {
+            "model": {"kind": "oscillator", "damping": "m*v**2/2"},
+            "initial": {"u": 1},
+            "schemes": ["rk4"],
+        },
+        "model.damping: is the same for both signs of v",
+    ),
+    "spring that pushes": (
+        {"model": {"kind": "oscillator", "spring": "-4*u"}, "initial": {"u": 1}},
+        "model.spring: pushes away from u = 0",
     ),
     "hertz": (
         {"model": wave("f*t + 0.1"), "initial": {}},
@@ -132,6 +159,11 @@ MEANT = {
     "velocity": {"initial": {"omega": 60}},
     "displacement": {"model": {"kind": "spring"}, "initial": {"u": 60}},
     "hertz": {"model": wave("t*f*2*pi"), "initial": {}},
+    "double well": {
+        "model": {"kind": "oscillator", "spring": "u**3 - u", "damping": "v + v**2"},
+        "initial": {"u": 1},
+        "schemes": ["rk4"],
+    },
     "place of a system": {"model": CART, "initial": {"x": 40}, "schemes": ["rk4"]},
     "tolerance": {"checks": [{"value": "period", "equals": 6.7, "atol": 0.1}]},
     "many digits": {"checks": [{"value": "period", "equals": 6.70024879}]},

@@ -175,6 +175,7 @@ def test_constant(text: str, value: float) -> None:
         ("lambda: 1", 6, "not allowed"),
         ("(y := 1)", 3, "not allowed"),
         ("theta = 1", 6, "a formula has no ="),
+        ("2*sin theta", 2, "write sin(...)"),
         ("2^3", 1, "write **"),
         ("2 \u00d7 3", 2, "write *"),
         ("\u03b8 + 1", 0, "not allowed"),

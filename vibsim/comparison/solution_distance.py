@@ -129,8 +129,8 @@ def exact_series(block: MemberBlock, level: int, name: str) -> Floats:
     if model.exact is not None:
         states = block.group.exact(model, t)
     else:
-        names = (model.position, model.velocity)
-        states = {n: record[f"{n}_exact"] for n in names if f"{n}_exact" in record}
+        known = {row.name: f"{row.name}_exact" for row in model.states}
+        states = {state: record[key] for state, key in known.items() if key in record}
     exact = states.get(plain)
     if exact is None:
         exact = known_values(model, plain, states, t, block.group)

@@ -47,6 +47,7 @@ _FORMS = {
 _EXAMPLES: Mapping[object, str] = {
     ("levels",): "e.g. [6, 7, 8, 9], or {from: 6, to: 9}",
     ("time",): "e.g. {end: 10.0}",
+    ("time", "frequency"): "name the parameter: e.g. model.parameters.w",
     ("model", "start"): "e.g. {displacement: [0, 1]}",
     ("model", "input"): "e.g. {table: road.csv, at: speed*t}",
     ("model", "outputs"): "e.g. {stretch: y - x}",

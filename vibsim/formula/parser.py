@@ -43,6 +43,8 @@ TOO_DEEP = f"must not nest deeper than {MAX_DEPTH} operations"
 _JOINED = re.compile(r"(?<![A-Za-z0-9_.])(\d+\.?\d*|\.\d+)(?=[A-Za-z_])(?![eE][+-]?\d)")
 """Matches a number directly followed by a name: a missing ``*``."""
 _EQUALS = re.compile(r"(?<![<>=!])=(?!=)")
+_BARE = re.compile(rf"\b({'|'.join(FUNCTIONS)})\s+(?=[\w.])")
+"""Matches a function whose argument has no parentheses."""
 _UNFINISHED = re.compile(r"([+\-*/<>=!,(]|\b(and|or|not|if|else))$")
 INSTEAD = {
     **{"^": "** for a power", "%": "mod(x, y)", "&": "and", "|": "or", "\u03c0": "pi"},
@@ -289,6 +291,8 @@ def place_of_fault(body: str, error: SyntaxError) -> tuple[int, str, str]:
         return len(body), "ends where a number, a name or '(' was expected", ""
     if equals := _EQUALS.search(body):
         return equals.start(), "a formula has no =", "write the difference, or == to compare"
+    if bare := _BARE.search(body):
+        return bare.start(), f"{bare[1]} without parentheses", f"write {bare[1]}(...)"
     position = min(max((error.offset or 1) - 1, 0), len(body) - 1)
     return position, "expected an operator, a number, a name or a parenthesis here", ""
 

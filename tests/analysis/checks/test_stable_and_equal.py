@@ -296,6 +296,32 @@ def test_a_scheme_equals_its_own_discrete_solution_and_not_the_exact_one() -> No
     assert [v.status for v in run.verdicts] == expected
 
 
+def test_every_coordinate_and_the_energy_are_compared_with_the_reference() -> None:
+    """Only the first coordinate was, and the energy of two ended in an internal error."""
+    content = {
+        "title": "two coordinates without a closed form",
+        "model": {
+            "kind": "system",
+            "coordinates": ["x", "y"],
+            "force": {"x": "y/2 - x - vx/10", "y": "x/2 - 3*y - y**3"},
+        },
+        "initial": {"x": 1.0},
+        "time": {"end": 3.0, "base_steps": 15},
+        "levels": [2, 3, 4],
+        "schemes": ["rk4"],
+        "checks": [
+            *(
+                {"equal": ["rk4", "exact"], "quantity": q, "atol": 1e-6}
+                for q in ("y", "vy", "energy")
+            ),
+            {"value": "error_rate", "quantity": "y", "at": {"level": 3}, "equals": 4, "atol": 0.1},
+        ],
+    }
+    experiment = Experiment.from_dict(content)
+    levels = {level: simulate_record(experiment, level) for level in experiment.levels}
+    assert [v.status for v in judged(experiment, levels).verdicts] == ["PASS"] * 4
+
+
 def test_a_disturbance_of_ten_times_the_bound_is_seen() -> None:
     run = spring(["rk4"], {"equal": ["rk4", "discrete"], "quantity": "u"})
     level = run.levels[0]

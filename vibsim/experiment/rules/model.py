@@ -88,7 +88,7 @@ def _note_unused(section: Any, formulas: Mapping[str, str], report: Report) -> N
     for name in section.parameters:
         path = "model", DECLARED, name
         if name not in used and (report.source.origin(path) or path)[1] == DECLARED:
-            report.note(path, "no formula names it", "leave it out")
+            report.note(path, "no formula names it", "use it, or leave it out")
 
 
 def _equation_of_structure(section: Any, model: Model, folder: Path, report: Report) -> Equation:

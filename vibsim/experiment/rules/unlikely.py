@@ -8,14 +8,17 @@ from collections.abc import Iterator, Mapping, Sequence
 from decimal import Decimal
 from typing import Any
 
+import numpy as np
+
 from vibsim.experiment.faults import Report
+from vibsim.experiment.rules.formulas import NAME
 from vibsim.experiment.rules.size_limits import Setting
 from vibsim.experiment.schema.checks import AccurateCheck, Check, ConvergesCheck, ValueCheck
 from vibsim.experiment.schema.fields import DECLARED
 from vibsim.experiment.schema.unit_text import split
 from vibsim.experiment.value_names import OF_THE_SAME_KIND, VALUES
 from vibsim.experiment.yaml.parse import Path_
-from vibsim.formula import Binary, Call, Name, walk
+from vibsim.formula import Binary, Call, Expression, Name, Negate, literal, parse, values_of, walk
 from vibsim.formula.algebra import terms_of
 from vibsim.models import Model, tree
 from vibsim.models.shared.coordinates import angles
@@ -28,7 +31,9 @@ EXACT_DIGITS = 9
 def note_unlikely(checks: Sequence[Check | None], setting: Setting, report: Report) -> None:
     """Warn about probable mistakes; `checks` are those of the file, None for a malformed one."""
     _warn_angles(setting, report)
+    _warn_phases(setting, report)
     _warn_hertz(setting, report)
+    _warn_signs(setting, report)
     _warn_repeated(report)
     _warn_set_and_swept(report)
     for i, check in enumerate(checks):
@@ -48,6 +53,9 @@ def note_unlikely(checks: Sequence[Check | None], setting: Setting, report: Repo
             ):
                 rule = f"{len(setting.levels)} of them decide no order"
                 report.note(("levels",), rule, "three are needed, and four are better")
+            case ValueCheck(rtol=float(part)) if part >= 1.0:
+                rule = f"lets every number up to {1.0 + part:g} times the expected one pass"
+                report.note((*path, "rtol"), rule, f"{part:g} percent are {part / 100:g}")
             case ValueCheck(equals=float(number), rtol=None, atol=None) if (
                 inner.take in OF_THE_SAME_KIND
             ):
@@ -65,9 +73,27 @@ def _warn_angles(setting: Setting, report: Report) -> None:
             continue
         for path, values in _unitless_starts(report.source.data, state.name):
             largest = max(map(abs, values), default=0.0)
-            if largest > TURN:
-                rule = f"{largest:g} rad are {largest / TURN:.2g} turns"
-                report.note(path, rule, f"{largest:g} degrees are written `{largest:g} degree`")
+            _note_angle(path, largest, report)
+
+
+def _warn_phases(setting: Setting, report: Report) -> None:
+    """Warn about phases of more than a turn without a unit: as 90 in ``cos(w*t + 90)``."""
+    model, declared = setting.model, _at_path(report.source.data, ("model", DECLARED))
+    phases = {*_terms_of_waves(model)} if model else set()
+    for name, value in declared.items() if isinstance(declared, Mapping) else ():
+        if Name(name) in phases and type(value) in (int, float):
+            _note_angle(("model", DECLARED, name), abs(value), report)
+    _note_angle(
+        ("model",), max((abs(literal(term) or 0.0) for term in phases), default=0.0), report
+    )
+
+
+def _note_angle(path: Path_, angle: float, report: Report) -> None:
+    if angle > TURN:
+        rule = f"{angle:g} rad are {angle / TURN:.2g} turns"
+        formula = f"{angle:g}*pi/180"
+        written = f"`{formula}`" if path == ("model",) else f"`{angle:g} degree`"
+        report.note(path, rule, f"{angle:g} degrees are written {written}")
 
 
 def _warn_hertz(setting: Setting, report: Report) -> None:
@@ -85,11 +111,10 @@ def _warn_hertz(setting: Setting, report: Report) -> None:
 
 def _rates(model: Model) -> set[str]:
     """Return the names of the rates w in ``sin(w*t)`` and ``cos(w*t + ...)``."""
-    parts = (node for formula in model.accelerations for node in walk(tree(model, formula)))
-    waves = (node for node in parts if isinstance(node, Call) and node.function in ("sin", "cos"))
-    turns = (term for wave in waves for term in terms_of(wave.arguments[0]))
     factors = (
-        set(turn.operands) for turn in turns if isinstance(turn, Binary) and turn.operator == "*"
+        set(turn.operands)
+        for turn in _terms_of_waves(model)
+        if isinstance(turn, Binary) and turn.operator == "*"
     )
     return {
         name.name
@@ -98,6 +123,35 @@ def _rates(model: Model) -> set[str]:
         for name in both - {Name("t")}
         if isinstance(name, Name)
     }
+
+
+def _terms_of_waves(model: Model) -> Iterator[Expression]:
+    """Yield the terms of the arguments of sines and cosines in the equation, without a minus sign before them."""
+    for node in (part for formula in model.accelerations for part in walk(tree(model, formula))):
+        if isinstance(node, Call) and node.function in ("sin", "cos"):
+            for term in terms_of(node.arguments[0]):
+                yield term.operand if isinstance(term, Negate) else term
+
+
+def _warn_signs(setting: Setting, report: Report) -> None:
+    """Warn about a damping that drives half of the time, as ``b*v**2``, and a spring that pushes, as ``-k*u``."""
+    model = setting.model
+    if model is None or model.kind != "oscillator":
+        return
+    for name, state in (("damping", "v"), ("spring", "u")):
+        text = _at_path(report.source.data, ("model", name))
+        names = NAME.findall(text) if isinstance(text, str) else []
+        if state not in names:
+            continue
+        law, numbers = parse(str(text), names), dict.fromkeys(names, 1.0)
+        at = np.array([-1.0, 1.0, 2.0])
+        below, above, twice = values_of([law], {**numbers, state: at})[0]
+        if name == "damping" and below == above != 0.0:
+            rule = "is the same for both signs of v, so it drives the motion half of the time"
+            report.note(("model", name), rule, "v**2 that always brakes is abs(v)*v")
+        elif name == "spring" and -below == above < 0.0 and twice == 2.0 * above:
+            rule = "pushes away from u = 0"
+            report.note(("model", name), rule, "a spring that pulls back is positive, as k*u")
 
 
 def _warn_repeated(report: Report) -> None:
