@@ -75,7 +75,7 @@ class Registry(Mapping[str, Entry]):
         """
         checked: dict[str, Entry] = {}
         for entry in entries:
-            fault = self._fault_of(entry)
+            fault = self._fault(entry)
             name = "" if fault else entry.kind
             if not fault and checked.get(name, self.built_in.get(name, entry)) is not entry:
                 fault = "the name is taken: give it another kind"
@@ -99,6 +99,13 @@ class Registry(Mapping[str, Entry]):
                 faults += error.faults
         return entries, faults
 
+    def _fault(self, entry: object) -> str:
+        """Return why an object cannot be added; empty if it can."""
+        try:
+            return self._fault_of(entry)
+        except (Exception, SystemExit) as error:
+            return f"cannot be used: {type(error).__name__}: {error}"
+
     def _offers(self) -> Mapping[str, EntryPoint]:
         points = offers(self.group)
         for name in points.keys() & self.built_in.keys():
@@ -106,14 +113,12 @@ class Registry(Mapping[str, Entry]):
         return points
 
     def _load(self, point: EntryPoint) -> Entry:
-        step = "imported"
         try:
             entry: Any = point.load()
-            step = "used"
-            fault = self._fault_of(entry)
         except (Exception, SystemExit) as error:
-            rule = f"cannot be {step}: {type(error).__name__}: {error}"
+            rule = f"cannot be imported: {type(error).__name__}: {error}"
             raise _refusal(point, rule) from error
+        fault = self._fault(entry)
         if not fault and entry.kind != point.name:
             fault = f"its kind is '{entry.kind}': the entry point must have the same name"
         if fault:
