@@ -245,6 +245,8 @@ FAULTY = {
     "no scheme": ("schemes", "mine", "other:MODEL", "is no vibsim.schemes.Scheme"),
     "another name": ("models", "mine", "other:MODEL", "its kind is 'theirs'"),
     "taken": ("schemes", "rk4", "other:SCHEME", "vibsim has one of this name already"),
+    "no frequency": ("models", "mine", "other:STILL", "its natural_frequency gives no number"),
+    "no velocity": ("schemes", "mine", "other:ALONE", "its step must return the next state, as"),
     "unusable": ("schemes", "mine", "other:UNUSABLE", "cannot be used: KeyError"),
 }
 
@@ -260,6 +262,10 @@ def offered(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Place]:
         "from vibsim.schemes import SCHEMES\n"
         "MODEL = replace(MODELS['spring'], kind='theirs')\n"
         "SCHEME = replace(SCHEMES['rk2'], kind='mine')\n"
+        "STILL = replace(MODEL, kind='mine', natural_frequency=lambda p: p['k'])\n"
+        "STEPPER = SCHEME.stepper({})\n"
+        "STEPPER = replace(STEPPER, step=lambda state, t, dt, p: state)\n"
+        "ALONE = replace(SCHEME, stepper=lambda options: STEPPER)\n"
         "UNUSABLE = replace(SCHEME, stepper=lambda options: options['missing'])\n"
     )
     (package / "broken.py").write_text("1/0\n")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -12,6 +13,8 @@ from hypothesis import strategies as st
 
 from vibsim.cli.setting_changes import Change, differences
 from vibsim.experiment import Experiment, canonical
+from vibsim.experiment.solver_reading import from_file
+from vibsim.plan.digests import analysed
 
 CONTENT: dict[str, Any] = {
     "title": "one",
@@ -30,6 +33,23 @@ def normal(**more: Any) -> dict[str, Any]:
         json.dumps(canonical(Experiment.from_dict({**CONTENT, **more})))
     )
     return found
+
+
+def test_settings_of_a_solver_have_the_names_of_its_file(tmp_path: Path) -> None:
+    def content(levels: list[int], kappa: list[int]) -> dict[str, Any]:
+        file = tmp_path / "heat.yaml"
+        file.write_text(
+            "title: heat\nsolver: {command: 'heat {h} {kappa} {output}'}\nquantities: {T: {}}\n"
+            f"refine: {{levels: {levels}, h: 1/2**level}}\nsweep: {{kappa: {kappa}}}\n"
+        )
+        return analysed(from_file(file).content)
+
+    changes = differences(content([1, 2, 3], [1, 2]), content([1, 2, 4], [1, 3]))
+    assert list(map(str, changes)) == [
+        "sweep.kappa: [1.0, 2.0] -> [1.0, 3.0]",
+        "refine.levels: 1 to 3 -> 1, 2, 4",
+        "refine.h: [0.5, 0.25, 0.125] -> [0.5, 0.25, 0.0625]",
+    ]
 
 
 @pytest.mark.parametrize(

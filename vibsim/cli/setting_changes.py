@@ -57,8 +57,11 @@ def _named(content: Mapping[str, Any]) -> dict[str, Any]:
             case [*rows] if all(isinstance(row, Mapping) and name in row for row in rows):
                 named[key] = {str(row[name]): _without(row, name) for row in rows}
     match named.get("sweep"):
-        case [*axes]:
+        case [*axes] | {"axes": [*axes]}:
             named["sweep"] = _columns(axes)
+    if "sizes" in named:
+        levels = {"levels": numbers} if (numbers := named.pop("numbers", None)) else {}
+        named["refine"] = levels | dict(_mapping(named.pop("sizes")))
     return named
 
 

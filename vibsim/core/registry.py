@@ -100,14 +100,17 @@ class Registry(Mapping[str, Entry]):
         if not isinstance(entry, self._type):
             known, given = f"{self.group}.{self._type.__name__}", type(entry).__name__
             return f"is no {known}, but of the type {given}"
-        if not re.fullmatch("[a-z0-9_]+", entry.kind):
-            return "its kind must consist of a to z, 0 to 9 and _"
         try:
             # results derived from it are cached
             hash(entry)
         except TypeError as error:
             return f"it must have a hash: write tuples instead of lists ({error})"
-        return self._own_fault_of(entry)
+        try:
+            if not re.fullmatch("[a-z0-9_]+", entry.kind):
+                return "its kind must consist of a to z, 0 to 9 and _"
+            return self._own_fault_of(entry)
+        except (Exception, SystemExit) as error:
+            return f"cannot be used: {type(error).__name__}: {error}"
 
     def _offers(self) -> Mapping[str, EntryPoint]:
         points = offers(self.group)
@@ -116,14 +119,12 @@ class Registry(Mapping[str, Entry]):
         return points
 
     def _load(self, point: EntryPoint) -> Entry:
-        step = "imported"
         try:
             entry: Any = point.load()
-            step = "used"
-            fault = self._fault_of(entry)
         except (Exception, SystemExit) as error:
-            rule = f"cannot be {step}: {type(error).__name__}: {error}"
+            rule = f"cannot be imported: {type(error).__name__}: {error}"
             raise _refusal(point, rule) from error
+        fault = self._fault_of(entry)
         if not fault and entry.kind != point.name:
             fault = f"its kind is '{entry.kind}': the entry point must have the same name"
         if fault:

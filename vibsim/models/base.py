@@ -300,6 +300,11 @@ def fault_of(model: Model) -> str:
             tree(model, formula)
         except ExpressionError as error:
             return f"its formula of {name}, {error.text}: {error.rule}"
+    defaults = {parameter.name: parameter.default for parameter in model.parameters}
+    try:
+        np.asarray(model.natural_frequency(defaults), dtype=float)
+    except Exception as error:
+        return f"its natural_frequency gives no number at its defaults: {type(error).__name__}: {error}"
     # models that may take its place in an experiment
     made = {
         "named": model.named and model.named(model.positions),
