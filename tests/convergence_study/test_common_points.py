@@ -168,6 +168,7 @@ def test_interpolation_at_points_of_a_level_changes_nothing() -> None:
     for kind in ("linear", "cubic"):
         verdict = judge(H, arrays(nodes, 4.0), order=4, restrict=kind)
         assert verdict.status == "PASS", "the points are common, so that nothing is interpolated"
+        assert verdict.values.shape == (4, COUNTS[0] + 1)
         assert verdict.order == pytest.approx(4.0, abs=1e-6)
 
 
