@@ -318,14 +318,18 @@ def test_every_value_that_exists_at_best_has_a_limit_or_is_of_the_solution() -> 
 
 def test_checks_compare_the_limit_and_tell_its_bound() -> None:
     at = {"level": "best"}
-    exact = float(analysed(**PENDULUM)[1]["exact_period"][0])
+    record = analysed(**PENDULUM)[1]
+    exact, last = float(record["exact_period"][0]), float(record["period"][0, 0, -1])
     finest = {"value": "period", "equals": exact, "atol": 2e-5}
     right = finest | {"at": at, "atol": 1e-6}
     near = {"value": "period", "at": at, "below": exact - 1e-7}
     wrong = {"value": "period", "at": at, "equals": exact + 1e-4, "atol": 1e-5}
-    found = judged(finest, right, near, wrong, **PENDULUM)
-    assert [v.status for v in found] == ["FAIL", "PASS", "INCONCLUSIVE", "FAIL"]
-    assert [v.reason for v in found[1:]] == ["match", "pre_asymptotic", "mismatch"]
+    of_the_last = {"value": "period", "at": at, "equals": last, "atol": 1e-7}
+    found = judged(finest, right, near, wrong, of_the_last, **PENDULUM)
+    assert [v.status for v in found] == ["FAIL", "PASS", "INCONCLUSIVE", "FAIL", "FAIL"]
+    assert [v.reason for v in found[1:]] == ["match", "pre_asymptotic", "mismatch", "mismatch"]
+    # no level is finer than all of them
+    assert found[4].results[0].facts["level_as_asked"] is None
     assert "with an error of at most" in found[1].text
     assert "`levels:`" in found[2].advice
 

@@ -11,6 +11,7 @@ import xarray
 from numpy.typing import NDArray
 
 from vibsim import InputError, LadderVerdict, judge
+from vibsim.convergence.study.restriction import polynomials
 
 Array = NDArray[np.float64]
 COUNTS = [8, 16, 32, 64]
@@ -149,10 +150,25 @@ def test_an_order_is_not_believed_from_that_of_the_interpolation_on(kind: str, o
     assert judge(h, arrays(nodes, 5.0, counts), restrict=kind).status == "INCONCLUSIVE"
 
 
+def test_interpolation_is_by_the_points_on_either_side() -> None:
+    """Two of them as numpy's; four as the cubic through them, which is exact for x^3."""
+    random = np.random.default_rng(4)
+    points, targets = np.sort(random.uniform(0.0, 1.0, 12)), random.uniform(0.3, 0.7, 30)
+    values = random.normal(size=12)
+    weights, indices, _ = polynomials(targets, points, 2, 0.0)
+    found = np.sum(weights * values[indices], axis=1)
+    np.testing.assert_allclose(found, np.interp(targets, points, values), rtol=1e-12)
+    weights, indices, _ = polynomials(targets, points, 4, 0.0)
+    behind = np.searchsorted(points, targets)
+    np.testing.assert_array_equal(indices, behind[:, None] + np.array([-2, -1, 0, 1]))
+    np.testing.assert_allclose(np.sum(weights * points[indices] ** 3, axis=1), targets**3)
+
+
 def test_interpolation_at_points_of_a_level_changes_nothing() -> None:
     for kind in ("linear", "cubic"):
         verdict = judge(H, arrays(nodes, 4.0), order=4, restrict=kind)
         assert verdict.status == "PASS", "the points are common, so that nothing is interpolated"
+        assert verdict.values.shape == (4, COUNTS[0] + 1)
         assert verdict.order == pytest.approx(4.0, abs=1e-6)
 
 

@@ -43,7 +43,7 @@ def error_at_all_points(dt: float) -> float:
         [("hours since 2000-01-01", 3600.0), *[("seconds since 2000-01-01", 1.0)] * 3],
         [
             *[("days since 2000-01-01", 86400.0)] * 3,
-            ("days since 1999-12-31 12:00:00", 86400.0, -43200.0),
+            ("minutes since 1999-12-31 12:00:00", 60.0, -43200.0),
         ],
     ],
     ids=["durations", "dates", "references"],

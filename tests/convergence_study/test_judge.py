@@ -251,6 +251,8 @@ def test_several_sizes_are_refined_together() -> None:
     assert verdict.status == "PASS"
     assert verdict.size_name == "dt"
     assert "in proportion" not in verdict.sentence
+    back = judge({"dt": H[::-1], "dx": dx[::-1]}, numbers(2.0)[::-1], order=2)
+    assert (back.status, back.order, back.sentence) == ("PASS", verdict.order, verdict.sentence)
     squares = judge({"dx": dx, "dt": [h * h for h in H]}, numbers(2.0), order=2)
     assert squares.status == "PASS"
     assert "counts powers of dx; dt is refined with it, not in proportion" in squares.sentence

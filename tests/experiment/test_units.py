@@ -182,6 +182,23 @@ def test_equations_of_the_file_take_any_unit() -> None:
     assert list(sweep_columns.columns(experiment, 0, 2)["initial.u2"]) == [0.001, 0.02]
 
 
+SI = {
+    "N": "kg m s-2", "Pa": "kg m-1 s-2", "J": "kg m2 s-2", "W": "kg m2 s-3", "C": "s A", "V": "kg m2 s-3 A-1",
+    "ohm": "kg m2 s-3 A-2", "F": "kg-1 m-2 s4 A2", "H": "kg m2 s-2 A-2", "Hz": "s-1", "bar": "1e5 kg m-1 s-2",
+    "t": "1e3 kg", "min": "60 s", "h": "3600 s", "day": "86400 s", "%": "0.01", "g": "1e-3 kg",
+    "deg": f"{math.pi / 180} rad", "turn": f"{2 * math.pi} rad", "rpm": f"{math.pi / 30} rad s-1",
+}  # fmt: skip
+"""Units in base units, from the SI brochure (9th edition), tables 4 and 8."""
+
+
+@pytest.mark.parametrize("name", SI)
+def test_units_are_those_of_the_si(name: str) -> None:
+    number, _, text = SI[name].partition(" ") if SI[name][0].isdigit() else ("1", "", SI[name])
+    unit = meaning(name)
+    assert float(unit.factor) == pytest.approx(float(number), rel=1e-15)
+    assert unit.text == (text or "1")
+
+
 @pytest.mark.parametrize("model", MODELS.values(), ids=MODELS)
 def test_every_unit_of_a_model_is_known(model: Model) -> None:
     units = [*(row.unit for row in model.states), *(row.unit for row in model.parameters)]

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 import pytest
 
-from vibsim.formula import first_jump, parse
+from vibsim.formula import first_jump, parse, values
+from vibsim.formula.jumps import held
 
 END = 4.0
 
@@ -50,3 +52,23 @@ def test_a_jump_is_found_where_it_is(text: str, place: float) -> None:
 )
 def test_what_is_continuous_has_none(text: str) -> None:
     assert first_jump(parse(text, ("t", "c")), {"c": 12.0}, END) is None
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        *(f"{name}(x)" for name in ("abs", "ceil", "floor", "heaviside", "round", "sign")),
+        *("mod(x, 0.7)", "max(x, y)", "min(y, x)", "x < y", "0 <= x", "2*x > y", "y >= -x", "x != y"),
+        "abs(x - round(y)) + (x if ceil(x + y) > 1 else y)",
+    ],
+)
+def test_modes_in_place_of_corners_and_jumps_give_the_same_values(text: str) -> None:
+    """The mode of a quantity is its floor where all integers count, otherwise -1 below 0 and 0 above."""
+    formula = parse(text, ("x", "y"))
+    (smooth,), switches = held((formula,), ("x", "y"))
+    numbers = dict(zip("xy", np.random.default_rng(3).uniform(-3.0, 3.0, (2, 50)), strict=True))
+    expected = np.broadcast_to(values(formula, numbers), 50)
+    for switch in switches:
+        quantity = values(switch.quantity, numbers)
+        numbers[switch.mode] = np.floor(quantity if switch.whole else np.sign(quantity) / 2.0)
+    np.testing.assert_allclose(np.broadcast_to(values(smooth, numbers), 50), expected, rtol=1e-12)

@@ -27,6 +27,11 @@ def test_bounds_hold_every_value(text: str) -> None:
     centre = random.uniform(-4.0, 4.0, (2, 400))
     half = 10.0 ** random.uniform(-6.0, 1.0, (2, 400))
     ends = [(c - h, c + h) for c, h in zip(centre, half, strict=True)]
+    # some end at 0 or begin there
+    for first, (a, b) in zip((0, 40), ends, strict=True):
+        last = slice(first, first + 80)
+        a[last], b[last] = -np.abs(a[last]), 0.0
+        a[last.stop : last.stop + 80], b[last.stop : last.stop + 80] = 0.0, 1.0 + half[0, :80]
     low, high = bounds(formula, dict(zip("xy", ends, strict=True)))
     part = random.uniform(0.0, 1.0, (64, 2, 400))
     x, y = (a + part[:, i] * (b - a) for i, (a, b) in enumerate(ends))

@@ -37,6 +37,9 @@ def test_events_that_differ_in_number_are_not_compared():
     change = [row["last, less that of the next finer level"] for row in found]
     for i in range(2):
         assert (change[i] is None) == (counts[i] != counts[i + 1])
+        if change[i] is not None:
+            assert change[i] == found[i]["last"] - found[i + 1]["last"] != 0.0
+    assert set(change) != {None}
 
 
 def test_a_row_for_every_member():

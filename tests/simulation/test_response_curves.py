@@ -12,6 +12,7 @@ from scipy.integrate import solve_ivp
 from vibsim import Experiment, analyse, simulate, verdicts
 from vibsim.core.home import home
 from vibsim.core.record import Record
+from vibsim.observe import steady_state
 
 FILE = home() / "configs" / "showcase" / "duffing_branches.yaml"
 SAMPLES = 32
@@ -189,6 +190,20 @@ def test_amplitude_and_phase_of_a_linear_oscillator_converge_to_the_closed_form(
         errors.append([abs(row.value - amplitude) for row in verdict.results])
     rates = np.log2(np.array(errors[1:-1]) / np.array(errors[2:]))
     np.testing.assert_allclose(rates[-1], [2.0, 4.0], atol=0.1)
+
+
+def test_what_is_left_of_a_transient_is_what_its_last_changes_say(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Of one that a period multiplies by z: the larger of the last two estimates is exact a period ago."""
+    z, steady = 0.6 * np.exp(0.4j), 0.8j
+
+    def harmonic(block: Any, level: int, quantity: str, back: int = 0) -> Any:
+        return np.array([[steady + 0.1 * z ** (5 - back)]])
+
+    monkeypatch.setattr(steady_state, "harmonic", harmonic)
+    found = steady_state.distance(None, 0, "u")  # type: ignore[arg-type]
+    np.testing.assert_allclose(found, steady_state.REST_SAFETY * 0.1 * 0.6**4, rtol=1e-12)
 
 
 @pytest.mark.parametrize("damping", [0.0, 0.05, 0.4])

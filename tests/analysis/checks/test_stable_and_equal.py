@@ -11,7 +11,7 @@ import pytest
 from ladders import T, facts_of
 from spring_runs import PERIODS, STEPS, judged, registered, spring
 
-from vibsim.checks.stable import _is_removed
+from vibsim.checks.stable import _is_removed, first_within
 from vibsim.comparison import solution_distance
 from vibsim.convergence.verdict import judge
 from vibsim.core.record import Variable
@@ -181,6 +181,12 @@ def test_growth_is_removed_where_the_next_finer_level_has_less_than_half_of_it()
         [True, False],
     ]
     assert _is_removed(growth[:, :1], 0).tolist() == [False, False]
+
+
+def test_w_dt_at_the_limit_is_within_it() -> None:
+    """Each level halves w dt; rounding of it does not ask for one level more."""
+    found = [first_within(2.0, 3, w_dt) for w_dt in (2.1, 4.0, 4.0 * (1.0 + 1e-14), 4.1, 8.0)]
+    assert found == [4, 4, 4, 5, 5]
 
 
 def test_the_result_nearest_to_what_is_allowed_decides() -> None:

@@ -124,6 +124,14 @@ def test_levels_that_hardly_approach_each_other_bound_nothing(levels: tuple[int,
     assert abs(value + 0.7) <= bound
 
 
+def test_levels_that_approach_each_other_raggedly_are_bounded_by_their_range() -> None:
+    """Three times the range of five levels, if the last two changes are below half of those before."""
+    levels = (4, 5, 6, 7, 8)
+    value, bound, *_ = run(np.array([1.0, 1.8, 1.3, 1.35, 1.15]), levels)
+    assert (value, bound) == (1.15, pytest.approx(3 * 0.8))
+    assert np.isnan(run(np.array([0.0, 0.3, 0.35, 0.65, 0.7]), levels)[1])
+
+
 def test_it_stops_at_round_off() -> None:
     levels = tuple(range(6, 24))
     rng = np.random.default_rng(5)
