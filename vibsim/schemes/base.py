@@ -312,7 +312,7 @@ def fault_of(scheme: Scheme) -> str:
     if scheme.adaptive:
         return "a scheme that chooses its own steps cannot be added"
     options = scheme.defaults()
-    stepper = scheme.stepper(options)
+    stepper: object = scheme.stepper(options)
     if not isinstance(stepper, Stepper):
         return "its stepper must return a vibsim.schemes.Stepper"
     force = (lambda u, v, t, p: -u, lambda u, v, t, p: (-1.0, 0.0))
