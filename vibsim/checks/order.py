@@ -36,7 +36,7 @@ from vibsim.comparison.parting import parting
 from vibsim.comparison.quantity_comparison import Compared, Comparison
 from vibsim.convergence.differences import largest, safe_ratio
 from vibsim.convergence.extrapolation.thresholds import ORDER_ABOVE_ROUND_OFF
-from vibsim.convergence.ladder_facts import pick
+from vibsim.convergence.ladder_facts import floor_of_pairs, pick
 from vibsim.convergence.reasons import code
 from vibsim.convergence.thresholds import (
     HALF_SPACING,
@@ -223,7 +223,7 @@ def _clean_difference(q: Comparison, norm: str, p: Floats) -> tuple[Floats, Floa
     """
     levels = np.array(q.block.grid.levels)
     e = facts_of(q, norm, q.order, ORDINARY_ORDER)
-    clean = e.difference >= ORDER_ABOVE_ROUND_OFF * (e.floor[..., :-1] + e.floor[..., 1:])
+    clean = e.difference >= ORDER_ABOVE_ROUND_OFF * floor_of_pairs(e)
     index = np.max(np.where(clean, np.arange(len(levels) - 1), 0), axis=-1)
     size = pick(e.difference, index)
     gap = np.diff(levels)[index]
