@@ -156,7 +156,7 @@ def _reasons(e: Evaluation, missed: Flags) -> Codes:
     # levels may by accident fit two powers, the weaker of which moves the measured order
     is_met = e.question.is_met_by(e.order, likely_power(p))
     is_met &= right > 1.0 - (RISK if e.exact_known else risk)
-    other_order = (lower + higher > 1.0 - risk) & (right < risk) & decidable
+    other_order = (lower + higher > 1.0 - risk) & decidable
     if np.any(other_order):
         other_order &= most_near_a_power(p) > DEFINITE
     elsewhere = 1.0 - p.noise - p.alternating

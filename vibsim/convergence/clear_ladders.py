@@ -35,7 +35,6 @@ def is_sure(ladder: Ladder, evaluation: Evaluation, question: Question) -> Flags
     definite[fails] = most_near_a_power(p)[fails]
     margins = [
         right - (1.0 - RISK),
-        right - RISK,
         lower + higher - (1.0 - RISK),
         np.where(fails, lower - higher, 1.0),
         definite - DEFINITE,

@@ -80,7 +80,7 @@ def breakdown(e: LadderFacts) -> tuple[Flags, Flags, Flags]:
     # a scheme may be stable at the limit itself, and w dt is rounded
     beyond = e.omega_dt > e.stability_limit[..., None] * (1.0 + th.LIMIT_ROUNDING)
     last, previous = e.growth[..., -1], e.growth[..., -2:][..., 0]
-    growing = (last > th.BLOWN_UP) & ~(last < 0.5 * previous)
+    growing = (last > th.BLOWN_UP) & ~(last < th.GROWTH_REMOVED * previous)
     # long steps keep a velocity that has decayed, and its rounding: then every level moves as far
     growing &= ~(unresolved(e) & (last <= th.BLOWN_UP * previous))
     # some levels may see a pulse that others miss; a step that sees a jump applies it over its whole length

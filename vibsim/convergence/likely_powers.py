@@ -12,11 +12,13 @@ from vibsim.core.vocabulary import ORDER_TOLERANCE
 
 OUTSIDE = 0.5 * (1.0 - ORDER_INTERVAL)
 """Probability that the order lies below its interval, and that it lies above."""
+ROUNDED = 1e-9
+"""A power is within a tolerance if it exceeds it by no more than this, which is more than its rounding."""
 
 
 def sides(p: Posterior, question: Question) -> tuple[Floats, Floats, Floats]:
     """Return the probabilities that a lower, an expected and a higher power dominates."""
-    margin = question.tolerance + 1e-9
+    margin = question.tolerance + ROUNDED
     if question.expected is not None:
         least, most = question.expected - margin, question.expected + margin
     elif question.at_least is not None:
@@ -52,7 +54,7 @@ def most_near_a_power(p: Posterior) -> Floats:
     """Return the probability that the most probable power, within the usual tolerance, dominates or is one of two."""
     # mixed powers are further apart than the tolerance
     present = p.lowest + p.highest - p.dominant
-    near = _sums_near(present, p, ORDER_TOLERANCE + 1e-9)
+    near = _sums_near(present, p, ORDER_TOLERANCE + ROUNDED)
     return np.asarray(np.max(near, axis=-1))
 
 

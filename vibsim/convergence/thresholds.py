@@ -71,6 +71,8 @@ STATED_LIMIT_FACTOR = 2.0 * STATED_NOISE_FACTOR / math.sqrt(2.0)
 
 LIMIT_ROUNDING = 1e-9  # relative distance within which w dt is at a stability limit [convention]
 BLOWN_UP = 10.0  # a solution has grown if it is this factor larger than the exact one [convention]
+# Refinement removes growth if one level more leaves less than this part of it, as of an error of order 1. [derived]
+GROWTH_REMOVED = 0.5
 RESOLVED_DECAY = 1.0  # longest resolved step, over the time constant of a decay [derived]
 ERROR_STAYED = 0.5  # part of the coarsest error above which the finest one stays [derived]
 

@@ -12,13 +12,15 @@ expansion holds, and how levels deviate from it. Its functions A and B are Gauss
     log p(X) = log(1/2) + log Gamma(n/2) - n/2 log(pi tr(K^-1 G)) - N/2 log det K,   n = N w,
 
 for w rows and N independent points, with the Gram matrix ``G_kl = <d_k, d_l>`` of the rows and their covariance K under
-the hypothesis. G is the only data the model reads. Except for a factor that all hypotheses on w rows share, the
-evidence is a power of one ratio (see `hypotheses.Table`). Six kinds of hypotheses compete:
+the hypothesis. G is the only data the model reads. This is the integral of ``N(X; 0, s^2 K) ds/s``; estimates of A, B
+and the limit take the most probable size, ``s^2 = tr(K^-1 G)/w``. Except for a factor that all hypotheses on w rows
+share, the evidence is a power of one ratio (see `hypotheses.Table`). Six kinds of hypotheses compete:
 
-- *two shapes*: A and B are unrelated. ``K = c(p) c(p)^T + s^2 c(q) c(q)^T + noise``;
-- *one shape*: B is a multiple of A, of unknown sign and about the stated size. The components of the rows along the
-  last row are scalars with the same K. The components orthogonal to it follow Student's t with `TAIL` degrees of
-  freedom and the scale given by `MISFIT`;
+- *two shapes*: A and B are unrelated. ``K = c(p) c(p)^T + r^2 c(q) c(q)^T + noise``, r the share of B;
+- *one shape*: B is a multiple of A, of unknown sign and about the stated size. The components y of the rows along the
+  last row d are scalars with the same K, and any direction of d is as probable, so they have the evidence
+  ``2 p(y) Gamma(N/2)/(2 pi^(N/2) |d|^(N-1))``. The components orthogonal to it follow Student's t with `TAIL` degrees
+  of freedom and the scale given by `MISFIT`;
 - *off by factors*: the error of each level is off by a factor of its own (`JITTERS`), as where events fall between
   grid points. B is a multiple of A of a given size and sign, and may also have a shape of its own. The evidence is
   that of one shape, where the orthogonal components include the shape of B;

@@ -126,7 +126,7 @@ def _table(
     signal: Floats,
     variance: Floats,
     c: tuple[Floats, Floats],
-    prior: tuple[Floats, Floats, Floats],
+    variances: tuple[Floats, Floats, Floats],
     orthogonal: Floats | None = None,
 ) -> Table:
     """Return the table of these hypotheses.
@@ -139,7 +139,7 @@ def _table(
         Noise variance of each level, shape (hypothesis, level).
     c
         Coefficients c_k(p) and c_k(q) of the two powers, each of shape (hypothesis, row).
-    prior
+    variances
         Variance of the first power, covariance of both, variance of the second, each of shape (hypothesis,).
     orthogonal
         For one shape: covariance of the components orthogonal to the last row, shape (hypothesis, w - 1, w - 1).
@@ -148,18 +148,18 @@ def _table(
     finest = np.flatnonzero(variance[0])[-1]
     finest_noise = variance[:, finest]
     w = precision.shape[-1]
-    var_first, cov, var_second = (x[:, None] for x in prior)
+    var_first, cov, var_second = (x[:, None] for x in variances)
     rows = (var_first * c[0] + cov * c[1], cov * c[0] + var_second * c[1])
     gains = [matvec(precision, row) for row in rows]
     left = [
         np.maximum(x - np.sum(gain * row, axis=-1), 0.0)
-        for x, gain, row in zip(prior[::2], gains, rows, strict=True)
+        for x, gain, row in zip(variances[::2], gains, rows, strict=True)
     ]
     # the finest level differs from the limit by both powers and by its noise
     to_limit = rows[0] + rows[1]
     to_limit[:, finest - 1] -= finest_noise
     limit = -matvec(precision, to_limit)
-    limit_variance = prior[0] + 2.0 * prior[1] + prior[2] + finest_noise
+    limit_variance = variances[0] + 2.0 * variances[1] + variances[2] + finest_noise
     limit_left = np.maximum(limit_variance + np.sum(limit * to_limit, axis=-1), 0.0)
     squares = [outer(g, g) for g in (*gains, limit)]
     forms = np.stack([form(x) for x in (precision, *squares)], axis=1)
@@ -234,7 +234,7 @@ def _bounds(
 def _independent(
     terms: Terms, c: tuple[Floats, Floats]
 ) -> tuple[Floats, tuple[Floats, Floats, Floats]]:
-    """Return `signal` and `prior` of `_table` for two powers with uncorrelated coefficients."""
+    """Return `signal` and `variances` of `_table` for two powers with uncorrelated coefficients."""
     square = terms.share**2
     signal = outer(c[0], c[0]) + square[:, None, None] * outer(c[1], c[1])
     return signal, (np.ones_like(square), np.zeros_like(square), square)
@@ -246,13 +246,13 @@ def _two_shapes(sizes: Floats, terms: Terms, *, alternating: bool = False) -> li
     if alternating:
         first, second = (x * (-1.0) ** np.arange(len(sizes)) for x in (first, second))
     c = level_differences(first), level_differences(second)
-    signal, prior = _independent(terms, c)
+    signal, variances = _independent(terms, c)
     finest = np.flatnonzero(sizes)[-1]
     tables = []
     for noise in priors.FINEST_NOISE:
         misfit = np.full(len(sizes), priors.MISFIT**2)
         misfit[finest] += noise**2
-        tables.append(_table(terms, signal, squares * misfit, c, prior))
+        tables.append(_table(terms, signal, squares * misfit, c, variances))
     return tables
 
 
@@ -272,19 +272,19 @@ def _off_by_factors(
         covariance = covariance + outer(own_part, own_part)
     orthogonal = priors.TAIL * covariance / c[:, -1, None, None] ** 2
     ones = np.ones_like(terms.share)
-    prior = ones, terms.share, terms.share**2
-    return _table(terms, outer(c, c), jitter**2 * squares, powers, prior, orthogonal)
+    variances = ones, terms.share, terms.share**2
+    return _table(terms, outer(c, c), jitter**2 * squares, powers, variances, orthogonal)
 
 
 def _one_shape(sizes: Floats, terms: Terms) -> Table:
     """Return the table of one shape: the second power is a multiple of the first, of random sign and size `share`."""
     first, second, squares = _level_errors(terms, sizes)
     c = level_differences(first), level_differences(second)
-    signal, prior = _independent(terms, c)
-    size = np.sqrt(c[0] ** 2 + prior[2][:, None] * c[1] ** 2)
+    signal, variances = _independent(terms, c)
+    size = np.sqrt(c[0] ** 2 + variances[2][:, None] * c[1] ** 2)
     _, covariance = _orthogonal_to_last(size, squares)
     orthogonal = priors.TAIL * covariance / size[:, -1, None, None] ** 2
-    return _table(terms, signal, priors.MISFIT**2 * squares, c, prior, orthogonal)
+    return _table(terms, signal, priors.MISFIT**2 * squares, c, variances, orthogonal)
 
 
 def _orthogonal_to_last(c: Floats, squares: Floats) -> tuple[Floats, Floats]:

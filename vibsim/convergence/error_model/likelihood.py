@@ -85,11 +85,12 @@ def window_rows(gram: Floats, points: Floats, *, split: bool) -> WindowRows:
         exponents, none = np.stack([n * w, 0 * n], axis=-1), np.empty((len(gram), 0))
         return WindowRows(last, log_scale, whole, whole, n, exponents, none, none)
     # one dimension along the last row, of unknown direction; Student's t in the others, of which numbers have none
-    free, one = (points - 1.0) * (w - 1), np.ones_like(points)
+    others, one = (points - 1.0) * (w - 1), np.ones_like(points)
     log_t = on_arrays.LN_2 + 0.5 * on_arrays.log(last) + scale_free(last, 0.0, points, 1)
-    log_t += log_gamma(free + priors.TAIL) - log_gamma(np.array(priors.TAIL))
-    log_t -= 0.5 * free * on_arrays.log(np.pi * last / points)
-    exponents = np.stack([one * w, (free + priors.TAIL) * (free > 0.0)], axis=-1).astype(np.int64)
+    log_t += log_gamma(others + priors.TAIL) - log_gamma(np.array(priors.TAIL))
+    log_t -= 0.5 * others * on_arrays.log(np.pi * last / points)
+    exponents = np.stack([one * w, (others + priors.TAIL) * (others > 0.0)], axis=-1)
+    exponents = exponents.astype(np.int64)
     parallel = outer(relative[:, -1], relative[:, -1])
     read = np.where(points[:, None, None] > 1.0, parallel, relative)
     orthogonal = packed((relative - parallel)[:, :-1, :-1]) * points[:, None]
@@ -134,11 +135,8 @@ def weigh_table(
         probabilities of pairs of powers, shape (ladder, 3, pair); the limit as weights of the rows, shape (ladder, w);
         the squared distance to the limit, shape (ladder,).
     """
-    count, w, half = (
-        len(rows.last_square),
-        table.columns.shape[1] - LIMIT,
-        0.5 * rows.exponents[:, 0],
-    )
+    count, w = len(rows.last_square), table.columns.shape[1] - LIMIT
+    half = 0.5 * rows.exponents[:, 0]
     optional = table.orthogonal_forms, table.orthogonal_bounds
     orthogonal_forms, bounds = (_NONE if x is None else x for x in optional)
     pairs, size = int(table.pair[-1]) + 1, len(table.pair)
@@ -279,9 +277,12 @@ def noise_evidence(sizes: Floats, gram: Floats, points: Floats, floor: Floats) -
 def finest_noise_log_priors(floor: Floats, last_square: Floats) -> tuple[Floats, Floats]:
     """Return the log priors of both entries of `FINEST_NOISE`, each of shape (ladder,).
 
-    A window should not end with a difference below the predicted noise: that costs a penalty.
+    The second one has the prior ``floor/(FINEST_NOISE[1] e)``, between `OTHER_NOISE_PRIOR` and `MOST_NOISY`, where the
+    error e of the finest level is `FINEST_ERROR` of the last difference (or of the error itself, if that is known and
+    smaller). A window should not end with a difference below the predicted noise: that costs as much as other noise.
     """
     ratio = floor / np.sqrt(np.maximum(last_square, TINY))
-    noisy = np.clip(ratio / (0.3 * priors.FINEST_NOISE[1]), priors.OTHER_NOISE_PRIOR, 0.999)
+    noisy = ratio / (priors.FINEST_ERROR * priors.FINEST_NOISE[1])
+    noisy = np.clip(noisy, priors.OTHER_NOISE_PRIOR, priors.MOST_NOISY)
     penalty = np.where(ratio > 1.0, LOG_OTHER_NOISE, 0.0)
     return on_arrays.log(1.0 - noisy) + penalty, on_arrays.log(noisy) + penalty

@@ -14,7 +14,11 @@ from vibsim.core.array_types import Floats, Integers
 from vibsim.elementary import on_arrays
 
 LEAST_PIVOT = 1e-16
-"""Lower limit of pivots, which rounding can make tiny or negative; the matrix has unit diagonal."""
+"""Lower limit of pivots, of matrices with unit diagonal: about the rounding of a pivot.
+
+Pivots are about the square of `MISFIT`, 1e-7. Only where two powers of one shape cancel in the last row are they
+smaller (1e-12 for twelve halved levels), and nothing keeps them positive there.
+"""
 
 
 def level_differences(levels: Floats) -> Floats:

@@ -138,22 +138,16 @@ class _Sum:
             for length in range(min(priors.LONGEST_WINDOW, last), 1, -1)
         ]
         # of the evidence that may be skipped, half is for whole tables and half for single hypotheses
-        share = 0.5 * left_out / len(self.windows)
-        self.log_table, self.log_single = (
-            on_arrays.log(share / x) for x in (MOST_TABLES, MOST_HYPOTHESES)
-        )
-        self.log_unit, self.total, self.index = (
-            self.rows.unrelated(),
-            np.ones(count),
-            np.arange(count),
-        )
+        part = 0.5 * left_out / len(self.windows)
+        self.log_table = on_arrays.log(part / MOST_TABLES)
+        self.log_single = on_arrays.log(part / MOST_HYPOTHESES)
+        self.log_unit, self.total = self.rows.unrelated(), np.ones(count)
+        self.index = np.arange(count)
         # the parts of the total that the fields of a `Posterior` are made of
         pairs, windows = len(self.terms.first_of_pairs), len(self.windows)
         self.noise, self.alternating = np.zeros(count), np.zeros(count)
-        self.pairs, self.any_power = (
-            np.zeros((count, 3, pairs)),
-            np.zeros((count, len(self.grid.powers))),
-        )
+        self.pairs = np.zeros((count, 3, pairs))
+        self.any_power = np.zeros((count, len(self.grid.powers)))
         self.window, self.limit_square = np.zeros((2, count, windows))
         self.limit_weights = np.zeros((count, windows, n - 1))
 
@@ -167,13 +161,10 @@ class _Sum:
         (start, end), rows, ladder = self.windows[index], self.rows, self.rows.ladder
         smallest = rows.differences[:, end - 1, end - 1]
         sizes = ladder.h[start : end + 1] / ladder.h[end]
-        gram, finer = (
-            rows.gram(start, end, with_exact=self.exact_known),
-            np.empty((len(smallest), 0)),
-        )
+        gram = rows.gram(start, end, with_exact=self.exact_known)
         if self.exact_known:
             smallest = np.minimum(smallest, gram[:, -1, -1])
-            sizes = np.append(sizes, 0.0)
+            sizes, finer = np.append(sizes, 0.0), np.empty((len(smallest), 0))
         else:
             finer = rows.finer_products(start, end)
         outside = rows.outside(start, end)
@@ -187,8 +178,8 @@ class _Sum:
             self.add_table(index, table, log_prior, split, finer)
         self.add_any_power(index, sizes, gram, finer, log_priors[0], hypotheses.any_power_log_bound)
         for table, log_prior in zip(hypotheses.alternating, log_priors, strict=True):
-            prior = log_prior + on_arrays.log(priors.ALTERNATING_PRIOR)
-            self.add_table(None, table, prior, whole, finer[:, :0])
+            log_prior = log_prior + on_arrays.log(priors.ALTERNATING_PRIOR)
+            self.add_table(None, table, log_prior, whole, finer[:, :0])
 
     def relevant(self, bound: Floats) -> tuple[Subset, Floats]:
         """Return the ladders for which evidence up to this bound matters, and the least that a hypothesis needs."""
@@ -198,22 +189,22 @@ class _Sum:
         return subset, total + self.log_single
 
     def add_table(
-        self, index: int | None, table: Table, prior: Floats, rows: WindowRows, finer: Floats
+        self, index: int | None, table: Table, log_prior: Floats, rows: WindowRows, finer: Floats
     ) -> None:
         """Add the hypotheses of a table on the rows of a window; no window stands for alternating errors."""
-        subset, least = self.relevant(prior + log_bound(table, rows))
+        subset, least = self.relevant(log_prior + log_bound(table, rows))
         part = rows if isinstance(subset, slice) else WindowRows._make(x[subset] for x in rows)
         if not len(part.last_square):
             return
         log, pairs, limit, squared = weigh_table(
-            table, part, finer[subset], (least - prior)[subset]
+            table, part, finer[subset], (least - log_prior)[subset]
         )
         if not np.any(np.isfinite(log)):
             return
         if index is None:
-            self.alternating[subset] += self.add(subset, log + prior[subset])
+            self.alternating[subset] += self.add(subset, log + log_prior[subset])
         else:
-            weight = self.add_to_window(index, subset, log + prior[subset], limit, squared)
+            weight = self.add_to_window(index, subset, log + log_prior[subset], limit, squared)
             self.pairs[subset] += weight[:, None, None] * pairs
 
     def add_any_power(
@@ -222,7 +213,7 @@ class _Sum:
         sizes: Floats,
         gram: Floats,
         finer: Floats,
-        prior: Floats,
+        log_prior: Floats,
         bound: Floats,
     ) -> None:
         """Add the hypotheses of one power of any value, close to the order of the finest rows of the window."""
@@ -231,7 +222,7 @@ class _Sum:
         order, points = self.rows.orders[:, triple], self.rows.points
         usable = (order > 0.0) & (order < priors.MAX_POWER)
         last = np.maximum(gram[:, -1, -1], TINY)
-        most = prior + scale_free(last, 0.0, points, w)
+        most = log_prior + scale_free(last, 0.0, points, w)
         most += np.where(points > 1.0, *bound[::-1])
         subset, _ = self.relevant(np.where(usable, most, -np.inf))
         order, gram = order[subset], gram[subset]
@@ -254,7 +245,7 @@ class _Sum:
             distance = np.min(np.abs(order[:, None] - np.array(priors.POWERS)), axis=-1)
             squares += ((distance > 0.5 * priors.SPACING) * drift)[:, None]
             squared = np.sum(weight * squares, axis=-1)
-        weight = self.add_to_window(index, subset, total + prior[subset], limit, squared)
+        weight = self.add_to_window(index, subset, total + log_prior[subset], limit, squared)
         self.any_power[self.index[subset], self.grid.nearest[subset, triple]] += weight
 
     def add_to_window(

@@ -53,6 +53,9 @@ FREE_PENALTY = 2.0  # log of the width of the range of the log size of a free ro
 # ---- Noise
 
 FINEST_NOISE = (0.0, 0.1)  # noise of the finest level of a window, over its error [chosen]
+# Error of the finest level over the last difference of a window: a third for order 2 and halved steps. [expansion]
+FINEST_ERROR = 0.3
+MOST_NOISY = 0.999  # largest prior of the second entry of `FINEST_NOISE` [chosen]
 OTHER_NOISE_PRIOR = 0.03  # prior of noise that differs from its prediction [chosen]
 PREDICTION_FACTOR = 10.0  # predicted noise is known to within this factor [arithmetic]
 GROWTHS = (0.0, 0.5, 1.0, 1.5)  # noise grows as the number of steps to such a power [arithmetic]
