@@ -55,7 +55,8 @@ def is_at_end(
         for direction, guard in model.events.guards(model.position, model.velocity):
             numbers = [_at_end(model, row, group, tree(model, guard)) for row in rows]
             value, slope = (np.stack(x, axis=-1) for x in zip(*numbers, strict=True))
-            comes = np.any(direction * slope >= 0.0, axis=-1)
+            # a body that rests on a stop does not move towards it
+            comes = np.any((direction * slope >= 0.0) & (slope != 0.0), axis=-1)
             found |= moves & comes & _may_be_zero(value, round_off * np.abs(slope[..., -1]))
     return found
 

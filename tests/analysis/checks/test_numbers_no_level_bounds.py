@@ -141,6 +141,26 @@ def test_a_run_may_end_at_an_extremum_or_where_a_guard_comes_back(
     assert [one.status for one in found] == ["PASS", "PASS"]
 
 
+def test_one_body_may_rest_on_its_stop_at_the_end_while_others_move() -> None:
+    """The guard is 0 there and no event is left, but the number of events was open."""
+    content = {
+        "title": "a ball that has stopped bouncing beside a pendulum",
+        "model": {
+            "kind": "system",
+            "coordinates": ["h", "q"],
+            "acceleration": {"h": -10, "q": "-4*q"},
+            "events": [{"when": "h", "falling": True, "then": {"vh": "-vh/2"}}],
+        },
+        "initial": {"h": 1.25, "q": 1.0},
+        "time": {"end": 3.0, "base_steps": 30},
+        "levels": [1, 2, 3],
+        "schemes": ["rk4"],
+    }
+    count = {"value": "event_count", "above": 5}
+    energy = {"value": "end", "quantity": "dissipated_energy", "equals": 12.5, "rtol": 1e-9}
+    assert [one.status for one in run(content, count, energy).verdicts] == ["PASS", "PASS"]
+
+
 def test_a_frequency_is_that_of_the_samples_of_its_own_level() -> None:
     """At the coarsest level a period has 1.7 steps, at the finest one 53."""
     content = {
