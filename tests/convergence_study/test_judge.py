@@ -180,6 +180,14 @@ def test_round_off_is_exact_and_noise_moves_the_floor() -> None:
     assert judge(H, [2.0 + 1e-7 * k for k in range(5)], order=2).reason != "exact"
 
 
+def test_levels_without_an_order_are_not_said_to_fit_one() -> None:
+    """They differ by a few units in the last place, and all miss the exact value by more."""
+    values = [1.0 + k * 2.0**-52 for k in (40, 13, 24, 4, 26)]
+    verdict = judge([0.6, 0.3, 0.15, 0.075, 0.0375], values, order=5, exact=1.0 - 250 * 2.0**-52)
+    assert verdict.order is None
+    assert "unknown" not in verdict.sentence + verdict.advice
+
+
 def test_constant_levels_are_exact_with_no_error() -> None:
     verdict = judge(H, [2.0] * 5)
     assert (verdict.reason, verdict.gci) == ("exact", 0.0)

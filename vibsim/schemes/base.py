@@ -317,11 +317,10 @@ def fault_of(scheme: Scheme) -> str:
         return "its stepper must return a vibsim.schemes.Stepper"
     force = (lambda u, v, t, p: -u, lambda u, v, t, p: (-1.0, 0.0))
     state = handed(stepper.start, *force)(stepper.variant, 1.0, 0.0, 0.1, ())
-    match handed(stepper.step, *force)(state, 0.1, 0.1, ()):
-        case (tuple(following), _) if len(following) == len(state):
-            pass
-        case _:
-            return "its step must return the next state, as long as that of the start, and the velocity"
+    made: Any = handed(stepper.step, *force)(state, 0.1, 0.1, ())
+    shapes = [len(part) if isinstance(part, tuple) else 0 for part in made]
+    if shapes != [len(state), 0]:
+        return "its step must return the next state, as long as that of the start, and the velocity"
     if not isinstance(scheme.orders(options), Orders):
         return "its orders must return a vibsim.schemes.orders.Orders"
     return ""

@@ -132,7 +132,7 @@ def describe(facts: LadderVerdict, setting: Setting) -> tuple[str, str]:
     key = "interpolation" if setting.interpolation else facts.reason
     if key == "pre_asymptotic" and _is_noise_seen(facts, setting):
         key = "noisy"
-    elif key == "pre_asymptotic" and setting.is_contradicted:
+    elif key == "pre_asymptotic" and setting.is_contradicted and facts.order is not None:
         key = "contradicted"
     elif facts.order is not None and facts.order < 0.0 and _is_growth(facts, setting):
         key = "growing"
