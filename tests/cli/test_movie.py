@@ -71,6 +71,20 @@ def test_frames_are_numbered_and_those_of_a_longer_movie_stay(
 
 
 @pytest.mark.slow
+def test_of_a_sweep_the_member_that_decides_is_shown(made: Made, tmp_path: Path) -> None:
+    """It was the first member, whatever the verdict was on."""
+    made.change("linear_pendulum", "pendulum")
+    made.change("checks:", "sweep: {model.drag: [0.3, 0.0]}\nchecks:")
+    made.make()
+    first = {}
+    for name, case in {"default": (), "0": ("--case", 0), "1": ("--case", 1)}.items():
+        folder = tmp_path / name
+        assert made.vibsim("movie", made.file, *case, "--frames", 2, "--frames-to", folder) == 0
+        first[name] = (folder / "frame_0001.png").read_bytes()
+    assert first["default"] == first["1"] != first["0"]
+
+
+@pytest.mark.slow
 def test_the_drawing_moves_as_the_level_file_says(made: Made, tmp_path: Path) -> None:
     asked = ("--scheme", "rk4", "--level", 8, "--frames", 9, "--frames-to", tmp_path)
     assert made.vibsim("movie", made.file, *asked) == 0

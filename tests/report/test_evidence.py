@@ -47,7 +47,7 @@ def test_a_number_with_a_border_is_drawn_by_level():
     assert energy is None or len(dots(energy)) == 3
     assert len(dots(theta)) == 3
     assert len(dots(theta, BLUE)) == 1
-    assert "max of θ [rad]" in texts(theta)
+    assert "largest value of θ [rad]" in texts(theta)
     assert "where it should lie" in theta.caption
 
 

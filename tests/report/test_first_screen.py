@@ -13,6 +13,7 @@ from thinned import thinned
 
 from vibsim import report
 from vibsim.convergence import judge
+from vibsim.core.record import Variable
 from vibsim.core.vocabulary import REASONS
 from vibsim.experiment import Experiment
 from vibsim.experiment.experiment import canonical
@@ -85,8 +86,8 @@ def test_the_title_says_the_finding(changes, title):
 @pytest.mark.parametrize(
     ("theta", "where"),
     [
-        (1.5, "in the member with initial θ = 1.5, of 3 in all"),
-        (1.0, "in both members with initial θ = 1, of 3 in all"),
+        (1.5, "in the member with initial θ = 1.5 rad, of 3 in all"),
+        (1.0, "in both members with initial θ = 1 rad, of 3 in all"),
     ],
 )
 def test_an_order_of_some_members_alone_says_of_how_many(theta, where):
@@ -101,7 +102,7 @@ def test_an_order_of_some_members_alone_says_of_how_many(theta, where):
     asked = 2 if theta == 1.0 else 1
     assert f"The check asks about {asked} of the 3 members" in shown["meaning"]
     assert (f"of {asked} of the 3 members" in shown["numbers"][0]["note"]) == (asked > 1)
-    assert assertions.about(exp.checks[0], record) == f"Order of θ (initial θ = {theta:g})"
+    assert assertions.about(exp.checks[0], record) == f"Order of θ (initial θ = {theta:g} rad)"
     drawn_of = {member.case for member in gallery.choose(exp, record, decisive.member)[0]}
     assert decisive.member.case in drawn_of
     _, tables = page_tables.collect(exp, record, summary, decisive, [])
@@ -383,6 +384,58 @@ def test_few_members_are_no_response_and_a_check_on_one_is_shown_on_that(check, 
     with style.applied():
         shown = hero.pictures(exp, record, decisive)
         assert [picture.name for picture in shown] == pictures
+
+
+def test_the_number_that_decides_is_the_one_that_is_drawn_over_the_members():
+    """The first screen showed the period beside a check on another number."""
+    asked = {"value": "end", "quantity": "theta", "at": {"level": 7, "initial.theta": 1.0}}
+    exp = samples.experiment(
+        sweep={"initial.theta": {"linspace": [0.5, 1.5, 9]}}, checks=[asked | {"below": 9}]
+    )
+    record, summary, decisive = found(exp)
+    with style.applied():
+        shown = hero.pictures(exp, record, decisive)[0]
+    assert (shown.name, shown.title) == ("hero_response", "θ at the end of 9 members")
+    drawn_values = shown.figure.axes[0].lines[0].get_ydata()
+    number = summary["checks"][0]["results"][0]["facts"]["value"]
+    np.testing.assert_allclose(drawn_values[4], number, rtol=1e-12)
+
+
+def test_every_scheme_with_an_error_has_its_entry():
+    """Schemes whose levels give no estimate were squares that no legend named."""
+    exp = samples.experiment(schemes=["central", "rk4"], levels=[6, 7, 8])
+    record, _, decisive = found(exp)
+    other = 1 - decisive.member.scheme
+    norms = np.array(record["theta_difference_norm"])
+    norms[other] = np.nan
+    variable = record.variables["theta_difference_norm"]
+    record.variables["theta_difference_norm"] = Variable(variable.dims, norms, variable.attrs)
+    with style.applied():
+        shown = drawn.against_step(record, decisive).figure.axes[0]
+    assert {"central", "rk4"} <= {text.get_text() for text in shown.get_legend().get_texts()}
+
+
+def test_a_row_names_its_number_and_its_member_in_words_with_units():
+    """Rows had names of the file: `Max abs of ΔE`, `below 9` without a unit, members without theirs."""
+    asked = {"value": "max_abs", "quantity": "energy_deviation", "at": {"model.g": 1.0}, "below": 9}
+    exp = samples.experiment(sweep={"model.g": [1.0, 2.0]}, checks=[asked])
+    record, summary, _ = found(exp)
+    card = cards.card(exp, record, summary["checks"][0])
+    assert card["what"] == "Largest absolute value of ΔE at g = 1 m s⁻²"
+    assert card["wanted"] == "below 9 J"
+    names = ("wire_force", "x_3", "u_left", "theta")
+    assert [words.symbol(name) for name in names] == ["wire force", "x_3", "u_left", "θ"]
+
+
+def test_an_order_that_misses_its_promise_says_that_nothing_asks_for_it():
+    """The number stood beside the promise that it misses, without a remark."""
+    scheme = {"kind": "central", "start": "first_order"}
+    value = {"value": "end", "quantity": "theta", "below": 9}
+    for check, is_told in ((value, True), ({"converges": "theta", "order": "scheme"}, False)):
+        exp = samples.experiment(schemes=[scheme], checks=[check])
+        record, _, decisive = found(exp)
+        notes = [number["note"] for number in hero.numbers(exp, record, decisive)]
+        assert any("promises 2, which no check asks for" in note for note in notes) is is_told
 
 
 def test_of_a_long_run_the_last_periods_are_shown():

@@ -124,6 +124,7 @@ def test_the_page_is_well_formed_and_loads_nothing(which, request):
     assert len(reader.ids) == len(set(reader.ids))
     assert not {"link", "iframe", "object", "embed"} & set(reader.tags)
     assert "<script src" not in text
+    assert 'aria-label=""' not in text
     assert PLOTS in text
     assert ("members-data" in reader.ids) == (MEMBERS in text) == (which == "swept")
     inside = {f"#{name}" for name in reader.ids}

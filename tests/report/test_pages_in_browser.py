@@ -228,6 +228,23 @@ def test_a_page_is_printed_on_a_few_sheets(
     assert 1 <= browser.printed(pages[name], tmp_path) <= MOST_SHEETS
 
 
+def test_a_table_is_no_wider_than_the_paper(pages: dict[str, Path], tmp_path: Path) -> None:
+    """Chromium makes a whole page smaller for it: its text had 6.6 pt."""
+    cells = "<td>a scale of the model</td>" * 3 + f'<td class="long">{"2*pi*speed" * 8}</td>'
+    table = f'<div class="scroll"><table id="wide"><tbody><tr>{cells}</tr></tbody></table></div>'
+    page = tmp_path / "wide.html"
+    page.write_text(
+        pages["swept"].read_text("utf-8").replace("</main>", f"{table}</main>"), "utf-8"
+    )
+    act = """
+    const rules = [...document.styleSheets].flatMap((sheet) => [...sheet.cssRules]);
+    rules.filter((rule) => rule.media?.mediaText === "print").forEach((rule) => (rule.media.mediaText = "all"));
+    document.body.style.width = "688px";
+    found.wide = document.querySelector("#wide").getBoundingClientRect().width;
+    """
+    assert browser.run(page, act, tmp_path)["wide"] <= 688
+
+
 def test_a_page_that_just_fills_its_sheets_has_no_blank_one_behind(tmp_path: Path) -> None:
     """The height at which another sheet begins is found by halving; what begins behind it is text, not a margin."""
     exp = samples.plain(model={"kind": "pendulum", "g": 9.81, "L": 1.0}, name="filled")

@@ -154,3 +154,22 @@ def test_a_legend_entry_switches_its_level_off_in_every_plot_and_on_again(found)
     assert not any(word.startswith("θ₆") for word in found["without"])
     assert found["on"]
     assert found["again"] == "true"
+
+
+def test_a_plot_against_the_step_without_points_is_left_alone(page, tmp_path):
+    """A page whose errors are all round-off had a script error for each key in such a plot."""
+    before, name, after = page.read_text("utf-8").partition('<figure id="order_theta_0">')
+    plot, end, rest = after.partition("</figure>")
+    empty = tmp_path / "empty.html"
+    empty.write_text(
+        before + name + plot.replace("data-curve=", "data-none=") + end + rest, "utf-8"
+    )
+    act = """
+    const step = document.querySelector("#order_theta_0 svg");
+    step.dispatchEvent(new KeyboardEvent("keydown", {key: "ArrowRight", bubbles: true}));
+    found.live = step.classList.contains("live");
+    found.others = document.querySelectorAll("svg.live").length;
+    """
+    found = browser.run(empty, act, tmp_path)
+    assert (found["errors"], found["live"]) == ([], False)
+    assert found["others"]

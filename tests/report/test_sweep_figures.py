@@ -361,7 +361,7 @@ def test_numbers_of_checks_have_maps_unless_they_are_shown_already():
     views, _ = samples.views(exp, record, "theta")
     assert [name for name in views if "check" in name] == ["map_check_kept_0"]
     panel = views["map_check_kept_0"].picture.figure.axes[0]
-    assert panel.get_title(loc="left") == "Relative energy error"
+    assert panel.get_title(loc="left") == "Relative energy error at level 9"
     shown = panel.collections[0].get_array().ravel()
     np.testing.assert_array_equal(np.sort(shown), np.sort(record["check_kept_value"][0]))
 

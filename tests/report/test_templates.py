@@ -89,6 +89,7 @@ def test_no_cache_is_no_fault(compiled: list[str], monkeypatch: pytest.MonkeyPat
     [
         ("rescaled by 4^k", "rescaled by 4<sup>k</sup>"),
         ("-4/3 (u_l - u_(l+1))", "-4/3 (u<sub>l</sub> - u<sub>l+1</sub>)"),
+        ("below 3.9e-4, `1e-3`", "below 3.9·10⁻⁴, <code>1e-3</code>"),
         ("like dt^2 and (w0/w)^-2", "like dt<sup>2</sup> and (w0/w)<sup>-2</sup>"),
         ("2^(k+1) < `a^b` & c", "2<sup>k+1</sup> &lt; <code>a^b</code> &amp; c"),
         ("steps_per_period, level_07, rk4_a, x^ y", "steps_per_period, level_07, rk4_a, x^ y"),

@@ -67,17 +67,17 @@ def what(check: ValueCheck, notation: Notation = PLAIN) -> str:
     return f"{value} of {quantity}" if quantity else value
 
 
-def rule(check: ValueCheck, notation: Notation = PLAIN) -> str:
-    """Say what the number should be."""
+def rule(check: ValueCheck, notation: Notation = PLAIN, unit: str = "") -> str:
+    """Say what the number should be, with its unit if that is given."""
     key, wanted = border(check)
     if check.take == "monotone":
         return DIRECTION_ASKED[wanted]
     if key != "equals":
-        return f"{key} {notation.number(wanted)}"
+        return f"{key} {notation.number(wanted)} {unit}".rstrip()
     # counts differ by at least 1
     is_counted = check.number.measure == "count" and check.allowed < 0.5
     within = "" if is_counted else f" within {notation.number(check.allowed)}"
-    return f"equal to {notation.number(wanted, 15)}{within}"
+    return f"equal to {notation.number(wanted, 15)}{within} {unit}".rstrip()
 
 
 def describe(f: MemberFacts, check: ValueCheck) -> Description:

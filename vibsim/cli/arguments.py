@@ -306,7 +306,7 @@ def _movie() -> Iterator[_Row]:
     yield _row("--scheme", _word, "NAME", text, nargs="+", action="extend")
     text = "one level, or two side by side (default: the finest, and the coarsest beside it)"
     yield _row("--level", _index, "L", text, nargs="+", action="extend")
-    yield _row("--case", _index, "K", "member of a sweep (default: 0)", default=0)
+    yield _row("--case", _index, "K", "member of a sweep (default: the hardest)")
     yield _row("--quantity", _word, "NAME", "quantity over time (default: the first position)")
     yield _row("--from", _finite, "T", "time at which the movie begins", dest="start")
     yield _row("--to", _finite, "T", "time at which the movie ends", dest="end")

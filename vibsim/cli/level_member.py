@@ -7,6 +7,7 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from vibsim.cli import outcome_text
 from vibsim.cli.jobs.common import refusal
 from vibsim.core.errors import VibsimError, nearest
 from vibsim.core.home import called
@@ -22,6 +23,25 @@ OUTDATED = "note: these results were made before the experiment or vibsim change
 def are_outdated(plan: Plan, summary: Mapping[str, Any]) -> bool:
     """Tell whether a summary was made before the experiment or vibsim changed."""
     return summary.get("digest") != plan.analysis
+
+
+def summary_of(plan: Plan, results: Path) -> Mapping[str, Any] | None:
+    """Return the summary of an experiment; None if there is none yet."""
+    from vibsim import store
+
+    path = results / plan.summary
+    return store.read_json(path, name=plan.key) if path.exists() else None
+
+
+def decisive(plan: Plan, summary: Mapping[str, Any] | None) -> tuple[int, str | None]:
+    """Return the member and the scheme that decide the verdict; the first ones without a verdict on this file."""
+    if summary is None or are_outdated(plan, summary):
+        return 0, None
+    check = outcome_text.decisive(summary["checks"])
+    if check is None or not check["results"]:
+        return 0, None
+    result = check["results"][0]
+    return result["case"], result["scheme"]
 
 
 def made(plan: Plan, results: Path, case: int, word: str) -> tuple[list[int], list[int]]:

@@ -32,7 +32,7 @@ def promises(experiment: Experiment, record: Record, quantity: str) -> list[tupl
     """
     requested = {
         (float(check.order), check.tolerance)
-        for check in _on_order(experiment, quantity)
+        for check in on_order(experiment, quantity)
         if isinstance(check.order, float)
     }
     if data.basis_of_order(record, quantity) == "expected" and requested:
@@ -48,14 +48,20 @@ def promises(experiment: Experiment, record: Record, quantity: str) -> list[tupl
 
 def tolerance(experiment: Experiment, quantity: str, scheme: str) -> float:
     """Return the smallest tolerance among the checks of the order of a quantity with a scheme."""
-    checks = _on_order(experiment, quantity)
-    tolerances = [row.tolerance for row in checks if row.schemes is None or scheme in row.schemes]
+    tolerances = [row.tolerance for row in on_order(experiment, quantity, scheme)]
     return min(tolerances, default=ORDER_TOLERANCE)
 
 
-def _on_order(experiment: Experiment, quantity: str) -> list[ConvergesCheck]:
+def on_order(
+    experiment: Experiment, quantity: str, scheme: str | None = None
+) -> list[ConvergesCheck]:
+    """Return the checks of the order of a quantity, of one scheme or of any."""
     measured = [check.measured for check in experiment.checks]
-    return [row for row in measured if row.kind == "converges" and row.converges == quantity]
+    return [
+        row for row in measured
+        if row.kind == "converges" and row.converges == quantity
+        and (scheme is None or row.schemes is None or scheme in row.schemes)
+    ]  # fmt: skip
 
 
 def position(experiment: Experiment) -> str:

@@ -63,10 +63,15 @@ def _named(quantity: str) -> tuple[str, str]:
         part, text = (form.format(letter) for form in PARTS[quantity.removeprefix(whole)])
         return part, text
     plain = plain_name(quantity)
-    letter, text = NAMES.get(plain, (plain, plain))
+    letter, text = NAMES.get(plain) or (plain.replace("_", " ") if is_phrase(plain) else plain,) * 2
     if plain == quantity:
         return letter, text
     return f"{letter} by [D₂ₜu]", f"{text} by the centred difference [D₂ₜu]"
+
+
+def is_phrase(name: str) -> bool:
+    """Return whether a name has several words, unlike a letter with an index such as ``x_3`` or ``u_left``."""
+    return re.fullmatch(r"[^\W\d_]{2,}(_[^\W\d_]{2,})+", name) is not None
 
 
 def symbol(quantity: str) -> str:
@@ -82,7 +87,7 @@ def title(quantity: str) -> str:
 def name(quantity: str) -> str:
     """Return a quantity in words."""
     letter, text = _named(quantity)
-    return f"the {text}, {letter}" if is_error_part(quantity) else text
+    return f"the {text.replace(' of', f' {letter} of')}" if is_error_part(quantity) else text
 
 
 _LETTERED = NAMES.keys() - {"energy"}
@@ -153,12 +158,16 @@ def broken(summary: Mapping[str, Any]) -> int:
     return int(summary.get("failure_count") or len(summary.get("failures") or []))
 
 
-ERRORS = {
+VALUE_NAMES = {
     "period_error": "relative error of the period",
     "error_linf": "largest error", "error_linf_interior": "largest error without the last point",
     "error_l1": "error in the L1 norm", "error_l2": "error in the L2 norm",
+    "min": "least value", "max": "largest value", "running_max": "largest absolute value so far",
+    "max_abs": "largest absolute value", "max_abs_interior": "largest absolute value without the last point",
+    "max_abs_ratio": "ratio between levels of the largest absolute value",
+    "max_abs_interior_ratio": "ratio between levels of the largest absolute value without the last point",
 }  # fmt: skip
-"""Words for errors whose names need more than their underscores replaced."""
+"""Words for values whose names need more than their underscores replaced."""
 NORMS = {
     "l1": "L1 norm", "l2": "L2 norm", "linf": "largest value", "linf_interior": "largest value without the last point",
 }  # fmt: skip
@@ -191,7 +200,7 @@ class _Page(Notation):
         return title(name)
 
     def value(self, name: str) -> str:
-        return ERRORS.get(name, spelled(name))
+        return VALUE_NAMES.get(name, spelled(name))
 
     def opening(self, text: str) -> str:
         # symbols keep their case

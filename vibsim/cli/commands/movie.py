@@ -108,6 +108,8 @@ def _film(plan: Plan, options: Namespace, form: str) -> Film:
         rule = "must have a model: a movie cannot show what your own solver does"
         raise refusal("EXPERIMENT", options.experiment, rule)
     results, case = chosen_results(options), options.case
+    if case is None:
+        case, _ = level_member.decisive(plan, level_member.summary_of(plan, results))
     levels, made = level_member.made(plan, results, case, options.experiment)
     for level in options.level or ():
         level_member.check_level(level, levels)

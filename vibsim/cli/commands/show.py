@@ -14,7 +14,6 @@ from vibsim.cli.jobs.common import chosen_results
 from vibsim.cli.setting_changes import shown
 from vibsim.cli.terminal import clean
 from vibsim.plan import Plan
-from vibsim.store import read_json
 
 if TYPE_CHECKING:
     from vibsim.cli.line_plot import Series
@@ -33,8 +32,8 @@ def show(options: Namespace) -> int:
         return 0
     plan = one_plan_of(options.what, options.settings)
     results = chosen_results(options)
-    summary = _summary(plan, results)
-    case, scheme = _decisive(plan, summary)
+    summary = level_member.summary_of(plan, results)
+    case, scheme = level_member.decisive(plan, summary)
     case = case if options.case is None else options.case
     options.scheme = options.scheme or scheme
     verdicts = "\n".join(_verdicts(plan, results, summary))
@@ -52,22 +51,6 @@ def show(options: Namespace) -> int:
         print(f"{text}, of levels {shown(levels)}; the others are not made yet")
     print(verdicts)
     return 0
-
-
-def _summary(plan: Plan, results: Path) -> Mapping[str, Any] | None:
-    path = results / plan.summary
-    return read_json(path, name=plan.key) if path.exists() else None
-
-
-def _decisive(plan: Plan, summary: Mapping[str, Any] | None) -> tuple[int, str | None]:
-    """Return the member and the scheme that decide the verdict; the first ones without a verdict on this file."""
-    if summary is None or level_member.are_outdated(plan, summary):
-        return 0, None
-    check = outcome_text.decisive(summary["checks"])
-    if check is None or not check["results"]:
-        return 0, None
-    result = check["results"][0]
-    return result["case"], result["scheme"]
 
 
 def _verdicts(plan: Plan, results: Path, summary: Mapping[str, Any] | None) -> Iterator[str]:

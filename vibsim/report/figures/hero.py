@@ -11,8 +11,11 @@ from typing import Any
 
 import numpy as np
 
+from vibsim.checks.fields import field_values
+from vibsim.checks.number_units import unit_of
 from vibsim.checks.order_context import COINCIDE
 from vibsim.checks.outcome import about_members
+from vibsim.checks.value_text import what
 from vibsim.core.array_types import Flags, Floats
 from vibsim.core.record import Record
 from vibsim.core.vocabulary import SECONDS_OF_NORM
@@ -87,7 +90,7 @@ def differences(record: Record, lead: Lead) -> Picture | None:
     ax.set_gid(style.TIME)
     # a name of several words would take the room of the curves
     labels = [
-        curve.label.replace(letter, "level") if "_" in letter else curve.label for curve in shown
+        curve.label.replace(letter, "level") if " " in letter else curve.label for curve in shown
     ]
     for i, curve in enumerate(shown):
         colour, width = style.COLOURS[i % style.MANY], 5.5 - 4.2 * i / max(1, len(shown) - 1)
@@ -148,13 +151,16 @@ def against_step(record: Record, lead: Lead) -> Picture | None:
         text = "estimated" if alone else style.entry(names[s])
         mark: dict[str, Any] = {"linestyle": "none", "gid": None if alone else text}
         mark |= {"color": style.COLOURS[s % style.MANY], "marker": style.MARKERS[s % style.MANY]}
-        if style.finite(estimate).size:
+        is_estimated = style.finite(estimate).size > 0
+        if is_estimated:
             ax.plot(dt, estimate, **mark, markersize=5 if is_lead else 3.5, label=text)
             drawn.append(estimate)
             notes["Filled: estimated from the differences of the levels."] = None
         if style.finite(true).size:
             ring = mark | {"markerfacecolor": "none", "markersize": 9 if is_lead else 6.5}
-            ax.plot(dt, true, **ring, label="true" if alone else f"_true, {names[s]}")
+            # one entry for each scheme: that of its estimate, if it has one
+            of_scheme = f"_true, {names[s]}" if is_estimated else text
+            ax.plot(dt, true, **ring, label="true" if alone else of_scheme)
             drawn.append(true)
             notes["Rings: the true error."] = None
         norm = data.norm_index(record, lead.norm)
@@ -284,7 +290,7 @@ def response(experiment: Experiment, record: Record, lead: Lead) -> Picture | No
     is_marked = math.isfinite(values[lead.member.case])
     return Picture(
         "hero_response",
-        f"{name[:1].upper()}{name[1:]} of {count} members",
+        f"{words.PAGE.opening(name)} of {count} members",
         "Each member is one run of the sweep, at its finest level."
         + f" The others have no {name}." * (known < every)
         + f" Hollow: not settled; {finest_level.SWINGS}." * bool(hollow.any())
@@ -297,9 +303,16 @@ def response(experiment: Experiment, record: Record, lead: Lead) -> Picture | No
 def _number(experiment: Experiment, record: Record, lead: Lead) -> tuple[str, str, Floats] | None:
     """Return name, label and values, shape (case,), of the first number that differs between members.
 
-    Numbers of checks come first, then period and amplitude, then the error of the finest level.
+    The number that decides comes first, then period and amplitude, those of checks first, then the error of the finest
+    level.
     """
-    position, scheme = choice.position(experiment), lead.member.scheme
+    position, scheme, check = choice.position(experiment), lead.member.scheme, lead.measured
+    if lead.entry is not None and check is not None and check.kind == "value":
+        values = field_values(record, lead.entry["id"], "value")[scheme]
+        if finest_level.varies(values):
+            name = what(check, words.PAGE)
+            unit = data.pretty_unit(unit_of(experiment, record, check))
+            return name, style.label(name, unit), values
     checked = [check.value for check in choice.asked_values(experiment)]
     usual = ["period", "amplitude"]
     usual = usual if experiment.model.definition.conservative else usual[::-1]

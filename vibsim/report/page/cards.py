@@ -91,7 +91,7 @@ def card(experiment: Experiment, record: Record, check: Mapping[str, Any]) -> di
     text = words.swept(wording.text(result, counts, check["where"]))
     if _is_said(asserted, check):
         text = _hardest(record, check)
-    wanted = assertions.wanted(experiment, measured, words.fact(decisive, "promised"))
+    wanted = assertions.wanted(experiment, measured, words.fact(decisive, "promised"), unit)
     results, more = _results(record, check, unit)
     return {
         "id": check["id"],

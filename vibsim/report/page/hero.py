@@ -15,7 +15,7 @@ from vibsim.checks.outcome import about_members
 from vibsim.comparison.best_values import WORDS
 from vibsim.core.home import called
 from vibsim.core.record import Record
-from vibsim.core.vocabulary import decisive_number
+from vibsim.core.vocabulary import ORDER_TOLERANCE, decisive_number
 from vibsim.report import choice, data, finest_level, style, sweep_layout, words
 from vibsim.report.choice import Lead, is_refutation, is_trap
 from vibsim.report.evidence import figure, frame
@@ -152,7 +152,7 @@ def _measured(experiment: Experiment, record: Record, lead: Lead) -> Iterator[Nu
         number = lead.facts.get("relative_error") or number
         unit = f"of the size of {words.symbol(lead.quantity)}"
     is_refuted = is_refutation(lead.asserted)
-    wanted = assertions.wanted(experiment, check)
+    wanted = assertions.wanted(experiment, check, unit=unit)
     note = f"{'the statement' if is_refuted else 'asked for'}: {wanted}"
     if is_trap(lead.asserted) and not is_refuted:
         note = "the check expects that it is not as asked"
@@ -202,6 +202,10 @@ def _order(experiment: Experiment, record: Record, lead: Lead) -> Iterator[Numbe
         if lead.is_on_order or lead.entry is None:
             yield {"label": label, "value": "not measurable", "note": due}
     else:
+        scheme = record.words("scheme")[member.scheme]
+        misses = abs(order - data.formal_order(record, member, quantity)) > ORDER_TOLERANCE
+        if misses and not lead.is_on_order and not choice.on_order(experiment, quantity, scheme):
+            due += ", which no check asks for"
         note = "; ".join(filter(None, [words.likely((low, high)), due]))
         yield {"label": label, "value": words.number(float(order), "order"), "note": note}
 

@@ -103,8 +103,8 @@ def _captions(drawn: Iterable[Shown]) -> list[tuple[str, str]]:
     """
     found: dict[str, Picture] = {}
     for picture, _ in drawn:
-        kind = picture.title.partition(":")[0].partition("?")[0]
-        found.setdefault(kind + "?" * ("?" in picture.title), picture)
+        kind, question, _ = picture.title.partition(":")[0].partition("?")
+        found.setdefault(kind + question, picture)
     return _readings(replace(picture, title=kind) for kind, picture in found.items())
 
 

@@ -53,7 +53,7 @@ _LOWERED = re.compile(r"(?<!\w)([A-Za-z])_(?:\(([^()]*)\)|([A-Za-z0-9]{1,2}))(?!
 
 
 def _code(text: str) -> str:
-    """Escape a text; text between backticks becomes code, elsewhere exponents and indices are set as such."""
+    """Escape a text; what stands between backticks becomes code, elsewhere powers, exponents and indices are set."""
     parts = text.split("`")
     if len(parts) % 2 == 0:
         return escape(text)
@@ -64,8 +64,9 @@ def _code(text: str) -> str:
 
 
 def _shifted(text: str) -> str:
-    """Escape a text and set its exponents and indices as superscripts and subscripts."""
-    raised = _RAISED.sub(lambda found: f"<sup>{found[1] or found[2]}</sup>", escape(text))
+    """Escape a text and set its powers of ten, exponents and indices as a page has them."""
+    powers = escape(words.PAGE.powers(text))
+    raised = _RAISED.sub(lambda found: f"<sup>{found[1] or found[2]}</sup>", powers)
     return Markup(
         _LOWERED.sub(lambda found: f"{found[1]}<sub>{found[2] or found[3]}</sub>", raised)
     )

@@ -289,7 +289,9 @@ function listenToEntry(node) {
   });
 }
 
-const panels = [...document.querySelectorAll("g[data-axis]:not([data-axis=member])")].map(readPanel);
+// against the step only points are read, so a panel without any is none
+const panels = [...document.querySelectorAll("g[data-axis]:not([data-axis=member])")]
+  .filter((node) => node.dataset.axis !== "step" || node.querySelector("[data-curve]")).map(readPanel);
 document.querySelectorAll("[data-entry]").forEach(listenToEntry);
 if (!panels.length) return;
 const back = document.body.appendChild(document.createElement("button"));

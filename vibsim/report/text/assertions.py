@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from vibsim.checks.accurate import rule
-from vibsim.checks.value_text import what
+from vibsim.checks import accurate
+from vibsim.checks.value_text import rule, what
 from vibsim.checks.verdict_text import expectation, expected_verdict
 from vibsim.core.record import Record
 from vibsim.core.vocabulary import TYPICAL_NORM
@@ -45,10 +45,17 @@ def about(check: Check | None, record: Record | None = None) -> str:
     return words.PAGE.opening(subject(check, record))
 
 
-def wanted(experiment: Experiment, check: Measurement | None, promised: float | None = None) -> str:
-    """Say in a few words what a check expects; without a check, the tolerance. `promised` is the scheme's order."""
+def wanted(
+    experiment: Experiment, check: Measurement | None, promised: float | None = None, unit: str = ""
+) -> str:
+    """Say in a few words what a check expects; without a check, the tolerance.
+
+    `promised` is the scheme's order, `unit` that of the number of a value check.
+    """
     if check is not None and check.kind == "conserves":
         return DRIFTS[check.drift]
+    if check is not None and check.kind == "value":
+        return rule(check, words.PAGE, unit)
     if check is None or check.kind != "converges":
         return words.labelled(expectation(experiment, check, words.PAGE), None)
     order = words.number(promised, "step") if check.order == "scheme" else f"{check.order:g}"
@@ -74,7 +81,7 @@ def measured(check: Measurement, record: Record | None = None) -> str:
                 "the order of its scheme" if check.order == "scheme" else f"order {check.order:g}"
             )
             schemes = [_listed(check.schemes)] if check.schemes else []
-            only = "".join(f", {part}" for part in [*schemes, *swept_values(check)])
+            only = "".join(f", {part}" for part in [*schemes, *swept_values(check, record)])
             statement = (
                 f"converges with {order} ± {check.tolerance:g} ({words.NORMS[check.norm]}{only})"
             )
@@ -82,9 +89,7 @@ def measured(check: Measurement, record: Record | None = None) -> str:
             trap = f", expected to end as {expected_verdict(check.expect)}" if is_trap else ""
             return f"{words.title(check.converges)} {statement}{trap}"
         case "accurate":
-            statement = (
-                f"{words.title(check.accurate)} is {rule(check, words.PAGE)} at the finest level"
-            )
+            statement = f"{words.title(check.accurate)} is {accurate.rule(check, words.PAGE)} at the finest level"
             return f"{statement}{_where(check, record)}"
         case "value":
             bounds = {"equals": check.equals, "is below": check.below, "is above": check.above}
@@ -119,7 +124,7 @@ def subject(check: Measurement, record: Record | None = None) -> str:
     keys = ("level", "scheme", "case") if is_sampled else PLACES
     places = ((key, getattr(check.at, key)) for key in keys)
     parts = [_place(record, key, value) for key, value in places if value is not None]
-    where = words.swept(", ".join([*parts, *swept_values(check)]))
+    where = words.swept(", ".join([*parts, *swept_values(check, record)]))
     if check.take is not None:
         statement = f"{IN_WORDS[check.take]} {statement} over {'all members' if check.over == CASES else check.over}"
     statement = f"{statement}{(f' ({where})' if is_sampled else f' at {where}') if where else ''}"
@@ -133,7 +138,7 @@ def _where(check: Measurement, record: Record | None = None, norm: str = TYPICAL
     parts += [_listed(names)] if names else []
     places = ((key, getattr(check, key, None)) for key in ("level", "case"))
     parts += [_place(record, key, value) for key, value in places if value is not None]
-    parts += swept_values(check)
+    parts += swept_values(check, record)
     return f" ({words.swept(', '.join(parts))})" if parts else ""
 
 
@@ -145,10 +150,13 @@ def _place(record: Record | None, key: str, value: Any) -> str:
     return data.case_name(record, case)
 
 
-def swept_values(check: Measurement) -> list[str]:
-    """Return the swept values that select the members of a check, as ``key = value``."""
+def swept_values(check: Measurement, record: Record | None = None) -> list[str]:
+    """Return the swept values that select the members of a check, as ``key = value`` with units that a record has."""
+    units = {}
+    if record is not None:
+        units = dict(data.swept_label(record, name) for name in data.swept(record))
     return [
-        f"{key} = {value if isinstance(value, str) else words.number(value, 'step')}"
+        f"{key} = {value if isinstance(value, str) else words.number(value, 'step')} {units.get(key, '')}".rstrip()
         for key, value in check.swept.items()
     ]
 

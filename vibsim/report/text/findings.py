@@ -252,23 +252,18 @@ def _contrast(order: float | None, expected: float | None) -> dict[str, str]:
 
 def _in_words(experiment: Experiment, quantity: str) -> str:
     """Return a quantity in words; in those of the model if it has no letter of its own."""
-    name, model = words.name(quantity), experiment.model.definition
+    model = experiment.model.definition
     long_names = {state.name: state.long_name for state in model.states}
     long_names |= {output.name: output.long_name for output in model.outputs}
-    if name != quantity or quantity not in long_names:
-        return name
-    return f"the {long_names[quantity]}{'' if _is_phrase(quantity) else f' {quantity}'}"
+    if quantity in words.NAMES or quantity not in long_names:
+        return words.name(quantity)
+    return f"the {long_names[quantity]}{'' if words.is_phrase(quantity) else f' {quantity}'}"
 
 
 def short(experiment: Experiment, quantity: str) -> str:
     """Return the letter of a quantity, or its words if its name is a phrase."""
-    letter = words.symbol(quantity)
-    return _in_words(experiment, quantity) if _is_phrase(letter) else letter
-
-
-def _is_phrase(name: str) -> bool:
-    """Return whether a name has several words, unlike a letter with an index such as ``x_3``."""
-    return re.search("_[^0-9]", name) is not None
+    is_phrase = words.is_phrase(quantity)
+    return _in_words(experiment, quantity) if is_phrase else words.symbol(quantity)
 
 
 def _everywhere(record: Record, lead: Lead) -> str:
@@ -286,7 +281,7 @@ def _everywhere(record: Record, lead: Lead) -> str:
     if data.swept(record):
         count = {1: "the", 2: "both"}.get(total, f"all {words.number(total, 'integer')}")
         noun = "runs" if total > members else "members" if total > 1 else "member"
-        values = assertions.swept_values(lead.measured) if lead.measured else []
+        values = assertions.swept_values(lead.measured, record) if lead.measured else []
         subset = f"with {words.swept(', '.join(values))}" if values else "asked about"
         subset = (
             f" {subset}, of {words.number(members, 'integer')} in all" if total < members else ""

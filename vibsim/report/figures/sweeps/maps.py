@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from vibsim.checks.number_units import unit_of
 from vibsim.core.array_types import Floats
 from vibsim.core.record import Record
 from vibsim.core.vocabulary import REASONS, SEVERITY
@@ -78,11 +79,12 @@ def _maps(experiment: Experiment, record: Record, names: list[str], scheme: int)
     for quantity in names:
         yield from _order(experiment, record, quantity, scheme)
         yield from _errors(record, quantity, scheme)
-    for name, check in view.value_checks(experiment):
+    for name, text, check in view.value_checks(experiment):
         values = view.of_check(record, name, check)[scheme]
+        unit = data.pretty_unit(unit_of(experiment, record, check))
         yield Map(
-            f"check_{name}", name, position(experiment), values, view.check_words(check),
-            caption="The number that the check of this name asks for.",
+            f"check_{name}", text, position(experiment), values, style.label(text, unit), unit,
+            caption="The number that a check asks for.",
         )  # fmt: skip
 
 

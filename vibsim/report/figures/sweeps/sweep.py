@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from vibsim.checks.number_units import unit_of
 from vibsim.core.array_types import Floats
 from vibsim.core.record import Record
 from vibsim.core.vocabulary import SEVERITY
@@ -44,8 +45,8 @@ def views(
             yield from draw.order(quantity)
         yield from draw.error(quantity)
         yield from draw.verdict(quantity)
-    for name, check in view.value_checks(experiment):
-        yield from draw.number(name, check)
+    for name, text, check in view.value_checks(experiment):
+        yield from draw.number(name, text, check)
 
 
 @dataclass(frozen=True)
@@ -238,7 +239,9 @@ class _Drawing:
                 "At the finest level: true (dots), and what two levels alone say of it (lines)"
             )
         has_pairs = bool(data.whole(record, "pair"))
-        explanation = f"{explanation}, with the interval of the order." if has_pairs else "True."
+        explanation = (
+            f"{explanation}, with the interval of the order." if has_pairs else "The true error."
+        )
         yield from self._view(
             f"sweep_error_{quantity}", name, quantity, error.best, explanation, draw, unit, "norm"
         )
@@ -260,13 +263,14 @@ class _Drawing:
         places = np.arange(len(status))[:, None] + RISE * rank
         yield self._finished(ax, f"sweep_verdict_{quantity}", name, "", quantity, None, places)
 
-    def number(self, name: str, check: ValueCheck) -> Iterator[View | str]:
-        """Yield the number that a check asks for of every member."""
+    def number(self, name: str, text: str, check: ValueCheck) -> Iterator[View | str]:
+        """Yield the number, `text` in words, that a check asks for of every member."""
         values = view.of_check(self.record, name, check)
-        number = Measured(view.check_words(check), "", values, np.full(values.shape, np.nan))
+        unit = data.pretty_unit(unit_of(self.experiment, self.record, check))
+        number = Measured(text, unit, values, np.full(values.shape, np.nan))
         yield from self._view(
-            f"sweep_check_{name}", name, position(self.experiment), values, "",
-            lambda ax: _draw_numbers(ax, self.record, self.along, number, None, name),
+            f"sweep_check_{name}", text, position(self.experiment), values, "",
+            lambda ax: _draw_numbers(ax, self.record, self.along, number, None, words.capitalized(text)), unit,
         )  # fmt: skip
 
 

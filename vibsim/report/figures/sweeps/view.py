@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from vibsim.checks.fields import field_values
+from vibsim.checks.value_text import what
 from vibsim.core.array_types import Floats
 from vibsim.core.record import Record
 from vibsim.core.vocabulary import REASONS
@@ -47,14 +48,20 @@ class View:
     """Position of the marked member."""
 
 
-def value_checks(experiment: Experiment) -> list[tuple[str, ValueCheck]]:
-    """Return the value checks, with their ids, on all members and without a view elsewhere."""
-    measured = [(check.id, check.measured) for check in experiment.checks]
-    return [
-        (name, check)
-        for name, check in measured
-        if check.kind == "value" and check.at.case is None and check.value not in SHOWN_ALREADY
-    ]
+def value_checks(experiment: Experiment) -> list[tuple[str, str, ValueCheck]]:
+    """Return id, number in words and value check, once for each number of all members that has no view elsewhere."""
+    found: dict[tuple[str, str | None], tuple[str, str, ValueCheck]] = {}
+    for asserted in experiment.checks:
+        check = asserted.measured
+        if check.kind != "value" or check.at.case is not None or check.value in SHOWN_ALREADY:
+            continue
+        of = "value of " if check.number.is_sample else ""
+        level = "" if check.at.level is None else f" at level {check.at.level}"
+        text = f"{of}{what(check, words.PAGE)}{level}".replace(
+            "level best", "the limit of the levels"
+        )
+        found.setdefault((text, check.at.scheme), (asserted.id, text, check))
+    return list(found.values())
 
 
 def of_check(record: Record, name: str, check: ValueCheck) -> Floats:
@@ -68,12 +75,6 @@ def by_scheme(record: Record, scheme: int, values: Floats) -> Floats:
     table = np.full((len(record["scheme"]), values.size), np.nan)
     table[scheme] = values
     return table
-
-
-def check_words(check: ValueCheck) -> str:
-    """Return the name of the number of a check."""
-    suffix = f" of {words.symbol(check.quantity)}" if check.quantity else ""
-    return f"{check.value}{suffix}".replace("_", " ")
 
 
 def shared_verdict(record: Record, quantity: str, scheme: int | None = None) -> str:
