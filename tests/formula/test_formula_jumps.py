@@ -58,7 +58,16 @@ def test_what_is_continuous_has_none(text: str) -> None:
     "text",
     [
         *(f"{name}(x)" for name in ("abs", "ceil", "floor", "heaviside", "round", "sign")),
-        *("mod(x, 0.7)", "max(x, y)", "min(y, x)", "x < y", "0 <= x", "2*x > y", "y >= -x", "x != y"),
+        *(
+            "mod(x, 0.7)",
+            "max(x, y)",
+            "min(y, x)",
+            "x < y",
+            "0 <= x",
+            "2*x > y",
+            "y >= -x",
+            "x != y",
+        ),
         "abs(x - round(y)) + (x if ceil(x + y) > 1 else y)",
     ],
 )
