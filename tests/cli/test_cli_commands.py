@@ -1,6 +1,8 @@
 from __future__ import annotations
 
 import json
+import os
+import shutil
 import subprocess
 import sys
 from collections.abc import Callable
@@ -14,8 +16,12 @@ from forked import vibsim
 from vibsim.cli import main, results_folder
 from vibsim.cli.jobs import extrapolate
 from vibsim.cli.run import snakemake
+from vibsim.cli.run.changes import changed
 from vibsim.core.errors import FileError, VibsimError
 from vibsim.models import MODELS
+from vibsim.plan import Choice, load
+
+from .conftest import Made
 
 TEXT = """\
 title: A tiny pendulum
@@ -402,3 +408,19 @@ def test_an_empty_name_is_refused(
     assert caught.value.code == 2
     assert "must not be empty" in capsys.readouterr().err
     assert list(tmp_path.iterdir()) == []
+
+
+def test_changed_bytes_are_seen_by_another_inode_and_without_one_where_all_are_compared(
+    made: Made,
+) -> None:
+    plan, file = load(Choice("adhoc", made.file)), made.small / "convergence.nc"
+    # of a copied folder the bytes are compared once
+    assert changed([plan], made.results, every=False) == []
+    status, content = file.stat(), bytearray(file.read_bytes())
+    content[len(content) // 2] ^= 1
+    file.write_bytes(content)
+    os.utime(file, ns=(status.st_atime_ns, status.st_mtime_ns))
+    assert changed([plan], made.results, every=False) == []
+    assert [error.path for error in changed([plan], made.results, every=True)] == [file]
+    shutil.copy2(file, file.with_name("other.nc")).replace(file)
+    assert [error.path for error in changed([plan], made.results, every=False)] == [file]

@@ -64,7 +64,6 @@ def test_a_folder_may_be_named_by_its_files_and_compared_with_a_name(
     assert capsys.readouterr().out == "no difference\n"
 
 
-@pytest.mark.slow
 def test_two_files_without_results_have_settings_alone(made: Made, capsys: Capture) -> None:
     copy = made.file.with_name("copy.yaml")
     copy.write_text(made.file.read_text().replace("levels: [6, 7, 8]", "levels: [6, 7, 8, 9]"))

@@ -137,6 +137,8 @@ def test_driven_oscillator(force):
 def test_linear_damping():
     model = oscillator(spring="k*u", damping="b*v")
     assert numbers(model, VALUES, INITIAL)["beta"] == pytest.approx(0.7 / (2 * math.sqrt(6)))
+    # without an initial position u_c = V t_c
+    assert sizes(model, VALUES, {"u": 0.0, "v": 0.1})["u"] == pytest.approx(0.1 * math.sqrt(2 / 3))
 
 
 @pytest.mark.parametrize(

@@ -99,6 +99,14 @@ def test_what_a_simulation_uses_changes_every_level(
     assert changed != analysis
 
 
+def test_another_version_of_a_library_changes_every_level(
+    plan_of: Callable[..., Plan], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    before = {shard.digest for shard in plan_of().shards}
+    monkeypatch.setattr("vibsim.plan.versions._installed", lambda: {"numpy": "0.1"})
+    assert before.isdisjoint(shard.digest for shard in plan_of().shards)
+
+
 def test_no_two_jobs_share_a_digest(plan_of: Plans) -> None:
     plans = [plan_of(), plan_of(name="other")]
     found = [d for p in plans for d in (*digests(p)[0].values(), p.analysis, p.report)]

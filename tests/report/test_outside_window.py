@@ -75,6 +75,12 @@ def test_coarse_levels_are_called_too_coarse() -> None:
     assert "round-off" not in notes(record)
 
 
+def test_a_ratio_needs_two_levels_that_are_sound_and_do_not_vanish() -> None:
+    is_sound = np.array([[[True, False, True, True, True]]])
+    found = tables._ratios(np.array([[[8.0, 4.0, 2.0, 1.0, 0.0]]]), is_sound)
+    np.testing.assert_array_equal(found, [[[np.nan, np.nan, 2.0, np.nan, np.nan]]])
+
+
 def test_levels_of_the_same_order_before_those_that_are_used_are_not_called_too_coarse() -> None:
     _, record = made(range(6, 19))
     orders = record["u_observed_order"][0, 0, :, record.words("norm").index(TYPICAL_NORM)]

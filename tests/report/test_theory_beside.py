@@ -88,6 +88,9 @@ def test_printed_digits_stand_beside_ours(text, tmp_path):
     agrees = [abs(ours - row.meaning.number) <= row.meaning.half_unit for ours, row in
               zip(column(table, "ours"), exp.published[0].rows, strict=True)]  # fmt: skip
     assert agrees == [True, False, True, False]
+    printed = [row.meaning.number for row in exp.published[0].rows]
+    expected = [a - b for a, b in zip(column(table, "ours"), printed, strict=True)]
+    assert column(table, "difference") == expected
     assert column(table, "agrees?") == ["yes", "no", "yes", "no (not as expected)"]
     assert (
         column(table, "beside: relative energy error by own velocity")[1]

@@ -9,8 +9,9 @@ import scheme_runs as runs_of
 from thinned import thinned
 
 from vibsim import Experiment, analyse, simulate, verdicts
+from vibsim.models import MODELS
 from vibsim.schemes import FIXED_STEP, SCHEMES, NumberOption
-from vibsim.schemes.base import LOW_STARTS
+from vibsim.schemes.base import LOW_STARTS, Orders
 
 UNIT = 2.0**-53
 
@@ -198,3 +199,15 @@ def test_the_scheme_says_what_it_is(scheme):
             assert option.least <= option.default <= option.most
     # kernels are kept by their functions
     assert scheme.adaptive or scheme.stepper(scheme.defaults()) == scheme.stepper(scheme.defaults())
+
+
+def test_an_output_has_the_order_of_the_position_unless_it_depends_on_the_velocity():
+    orders = Orders(position=2.0, velocity=1.0, energy=1.0, energy_linear=1.0)
+    assert orders.of("capacitor_voltage", MODELS["circuit"]) == 1.0
+    assert orders.of("wire_length", MODELS["elastic_pendulum"]) == 2.0
+
+
+@pytest.mark.parametrize(("beta", "order"), [(0.2, 2.0), (0.25, np.inf), (0.3, 2.0)])
+def test_of_newmarks_schemes_one_keeps_the_energy_of_linear_motions(beta, order):
+    """What they keep is ``v^2/2 + u^2/2 + (beta - 1/4) dt^2 a^2/2``."""
+    assert SCHEMES["newmark"].orders({"beta": beta, "gamma": 0.5}).energy_linear == order

@@ -15,6 +15,7 @@ from vibsim import Experiment, analyse, simulate
 from vibsim.models import MODELS, Model
 from vibsim.models.table import Table
 from vibsim.simulation.members import Members
+from vibsim.simulation.reference import event_detection
 from vibsim.simulation.reference.solve import method, reference
 
 FRACTION = np.arange(101) / 100
@@ -389,3 +390,12 @@ def test_errors_of_a_table_are_taken_against_it(tmp_path: Any, monkeypatch: Any)
     errors = np.abs(record["u_error_norm"].sel(norm="linf").values[:, 0])
     assert np.all(errors[:, -1] < errors[:, 0] / 20)
     assert np.isfinite(record["absolute_position_error_norm"]).all()
+
+
+def test_a_root_of_a_bent_function_is_found_in_a_few_steps() -> None:
+    """``e^(k x) = 2``; regula falsi alone would keep one end of the bracket and creep."""
+    rates = np.array([1.0, 3.0, -3.0])
+    left, right = np.where(rates > 0.0, 0.0, -1.0), np.where(rates > 0.0, 1.0, 0.5)
+    sign = np.sign(rates)
+    found = event_detection._root(lambda x: sign * (np.exp(rates * x) - 2.0), left, right)
+    np.testing.assert_allclose(found, np.log(2.0) / rates, rtol=1e-8)
