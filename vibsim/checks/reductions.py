@@ -280,7 +280,10 @@ def _finding(f: MemberFacts, check: ValueCheck, r: Reduced, members: Any) -> str
     place = _at(f, check, int(members[r.member]))
     number, unit = f.notation.number, number_units.unit_of(f.experiment, f.record, check)
     if take == "monotone":
-        turn = "" if r.value != NEITHER else f"; it turns at {place}"
+        numbers = field_values(f.record, f.id, "value")[f.scheme, members]
+        stays = np.count_nonzero(numbers == numbers[r.member]) > 1
+        turn = f"; it {'is the same beside' if stays else 'turns at'} {place}"
+        turn = turn if r.value == NEITHER else ""
         return f"{f.notation.opening(what)} {DIRECTIONS[r.value]} with {check.over} over {count} members{turn}"
     if take.startswith("where_"):
         which = take.removeprefix("where_")

@@ -194,6 +194,25 @@ def test_every_verdict_occurs_and_says_the_finding() -> None:
     )
 
 
+def test_a_number_that_stays_does_not_turn() -> None:
+    content = {
+        "title": "a ball with 3, 2, 2 and 2 bounces",
+        "model": {"kind": "bouncing_ball", "g": 9.81},
+        "initial": {"h": 1.0},
+        "time": {"end": 1.2, "base_steps": 12},
+        "levels": [1, 2, 3],
+        "schemes": ["rk4"],
+        "sweep": {"model.restitution": [0.5, 0.6, 0.7, 0.8]},
+        "checks": [
+            {"value": "event_count", "over": "cases", "take": "monotone", "equals": -1},
+        ],
+    }
+    experiment = Experiment.from_dict(content)
+    levels = [simulate(experiment, level) for level in experiment.levels]
+    (verdict,) = verdicts(experiment, analyse(experiment, levels))
+    assert "; it is the same beside model.restitution = 0.6; asked is that it falls" in verdict.text
+
+
 @pytest.mark.slow
 def test_members_that_decide_and_are_not_resolved_leave_it_open() -> None:
     # so coarse that the neighbours of the peak may be higher
