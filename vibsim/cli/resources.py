@@ -6,7 +6,8 @@ import shutil
 from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
-from typing import Any
+
+import psutil
 
 from vibsim.core.errors import Fault, InputError
 from vibsim.plan import Plan
@@ -22,7 +23,7 @@ def check(plans: Sequence[Plan], results: Path) -> None:
         States what is needed and what is available.
     """
     needed, free = _missing_bytes(plans, results), free_bytes(results)
-    total = _memory().total
+    total = psutil.virtual_memory().total
     problems = [
         f"{plan.key}: a job needs {size(plan.memory)} of memory, the machine has {size(total)}"
         for plan in plans
@@ -68,15 +69,8 @@ def obstacle(results: Path) -> tuple[str, ...]:
 def megabytes(plans: Sequence[Plan]) -> int:
     """Return the memory for all concurrent jobs [MB]: the free memory, or the largest job's need if that is more."""
     largest = max((plan.memory for plan in plans), default=0)
-    available: int = _memory().available
+    available: int = psutil.virtual_memory().available
     return max(available, largest) // 10**6 + 1
-
-
-def _memory() -> Any:
-    # imported here, since it takes 10 ms and most commands only format quantities
-    import psutil
-
-    return psutil.virtual_memory()
 
 
 def size(number: float) -> str:
