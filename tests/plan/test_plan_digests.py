@@ -265,3 +265,31 @@ def test_the_experiment_comes_back_without_its_file(plan_of: Plans) -> None:
     expected = Experiment.from_yaml(plan.file, collection="adhoc")
     Path(plan.file).unlink()
     assert replace(plan).experiment == expected
+
+
+@pytest.mark.parametrize(
+    ("change", "touched"),
+    [
+        (("[0.4, 0.2, 0.1]", "[0.4, 0.3, 0.1]"), {(1, 0), (1, 1)}),
+        (("[1, 2]", "[1, 3]"), {(0, 1), (1, 1), (2, 1)}),
+        (("[x]", "[y]"), {(level, member) for level in range(3) for member in range(2)}),
+        (("order: 2", "order: 1"), set()),
+    ],
+)
+def test_a_function_that_solves_runs_again_where_its_arguments_change(
+    tmp_path: Path, change: tuple[str, str], touched: set[tuple[int, int]]
+) -> None:
+    (tmp_path / "my_solver.py").write_text("def solve(h, a): ...\n")
+    text = (
+        "title: t\nsolver: {python: 'my_solver:solve'}\nrefine: {h: [0.4, 0.2, 0.1]}\nsweep: {a: [1, 2]}\n"
+        "quantities: {u: {coordinates: [x]}}\nchecks: [{converges: u, order: 2}]\n"
+    )
+    file = tmp_path / "own.yaml"
+
+    def levels(text: str) -> dict[tuple[int, int], str]:
+        file.write_text(text)
+        plan = load(Choice("adhoc", file))
+        return {(row.level, job.index): job.digest for row in plan.levels for job in row.shards}
+
+    before, after = levels(text), levels(text.replace(*change))
+    assert {key for key in before if before[key] != after[key]} == touched
