@@ -119,10 +119,13 @@ def pages(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
         {"converges": "theta", "order": 2},
         {"value": "end", "quantity": "theta", "above": 9},
     ]
+    # a number with a long name, by which a reader chooses it
+    named = {"value": "max_abs_interior", "quantity": "energy_deviation", "at": {"level": 8}}
+    of_sweep = [{"converges": "theta", "order": "scheme"}, named | {"below": 9}]
     experiments = {
         "plain": samples.plain(name="plain", figures=asked),
         "failed": samples.several(name="failed", checks=failing),
-        "swept": samples.swept(6, name="swept"),
+        "swept": samples.swept(6, name="swept", checks=of_sweep),
     }
     found = {}
     for name, exp in experiments.items():
