@@ -54,22 +54,6 @@ def test_a_command_starts_without_libraries_that_take_long(
     assert not spared & set(json.loads(ended.stderr.splitlines()[-1]))
 
 
-def test_snakemake_starts_without_what_no_local_run_uses() -> None:
-    program = (
-        "import atexit, json, os, sys\n"
-        "from vibsim.cli.run.snakemake_process import main\n"
-        "atexit.register(lambda: print(json.dumps(sorted(sys.modules)), file=sys.stderr))\n"
-        "sys.argv[1:] = [str(os.getppid()), 'here', '--version']\n"
-        "main()"
-    )
-    command = [sys.executable, "-c", program]
-    ended = subprocess.run(command, capture_output=True, text=True, check=True)
-    modules = json.loads(ended.stderr.splitlines()[-1])
-    unused = ("numpy", "pandas", "sqlalchemy", "sqlmodel", "snakemake_executor_plugin_slurm")
-    assert "snakemake.workflow" in modules
-    assert [name for name in unused if name in modules] == []
-
-
 def test_a_run_with_nothing_to_do_prints_its_lines_without_numbers_libraries() -> None:
     program = (
         "import json, sys\n"

@@ -8,15 +8,13 @@ loses nothing, because every file is written in one step.
 import json
 import os
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from importlib import import_module
 from logging import LogRecord
-from types import SimpleNamespace
 from typing import Any
 
-from pydantic import BaseModel, Field
 from snakemake_interface_common.plugin_registry import PluginRegistryBase
 from snakemake_interface_executor_plugins.registry import ExecutorPluginRegistry
 from snakemake_interface_logger_plugins.base import LogHandlerBase
@@ -28,7 +26,6 @@ from snakemake_interface_report_plugins.registry import ReportPluginRegistry
 from vibsim.cli import collect_seldom, supervise
 from vibsim.cli.run import remote
 from vibsim.core.processes import end_with
-from vibsim.plan.versions import versions
 
 FIELDS = {
     LogEvent.RUN_INFO: ("stats",),
@@ -38,8 +35,6 @@ FIELDS = {
     LogEvent.ERROR: ("exception", "msg"),
 }
 """The events that a run follows, with the fields that it reads."""
-_TESTED = "9.27.1"
-"""The version of Snakemake for which `_without_database` is right."""
 
 
 @dataclass
@@ -87,11 +82,11 @@ def main() -> None:
         setattr(PluginRegistryBase, "collect_plugins", _collect_none)  # noqa: B010
     # It starts in half the time without modules that no run of vibsim uses: NumPy numbers in profiles, web addresses,
     # Snakemake's reports, and tables as parameters of rules.
-    with _replaced(dict.fromkeys(("numpy", "requests", "snakemake.report"))):
+    with _absent("numpy", "requests", "snakemake.report"):
         for name in ("smart_open", "yte"):
             import_module(name)
         ReportPluginRegistry()
-    with _replaced({"pandas": None, **_without_database()}):
+    with _absent("pandas"):
         from snakemake.cli import main as snakemake
 
         module = sys.modules[__name__]
@@ -103,34 +98,15 @@ def _collect_none(registry: PluginRegistryBase[Any]) -> None:
     registry.plugins = {}
 
 
-def _without_database() -> dict[str, Any]:
-    """Return stand-ins for modules with which Snakemake could keep its records in a database.
-
-    They are kept in files; to import SQLAlchemy takes a third of the start. Other versions may need more of it.
-    """
-    if versions(("snakemake",))["snakemake"] != _TESTED:
-        return {}
-    return {
-        "sqlalchemy": SimpleNamespace(Column=lambda _: None, JSON=None),
-        "sqlmodel": SimpleNamespace(SQLModel=BaseModel, Field=_field),
-        "snakemake.persistence.db": SimpleNamespace(DbPersistence=None),
-    }
-
-
-def _field(sa_column: None, **given: Any) -> Any:
-    del sa_column
-    return Field(**given)
-
-
 @contextmanager
-def _replaced(modules: Mapping[str, Any]) -> Iterator[None]:
-    """Within the context, replace modules that are not yet imported, or mark them as not installed (None)."""
-    modules = {name: module for name, module in modules.items() if name not in sys.modules}
-    sys.modules.update(modules)
+def _absent(*names: str) -> Iterator[None]:
+    """Within the context, mark modules as not installed, except those already imported."""
+    names = tuple(name for name in names if name not in sys.modules)
+    sys.modules.update(dict.fromkeys(names))  # type: ignore[arg-type]
     try:
         yield
     finally:
-        for name in modules:
+        for name in names:
             del sys.modules[name]
 
 
