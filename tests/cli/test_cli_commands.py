@@ -422,5 +422,7 @@ def test_changed_bytes_are_seen_by_another_inode_and_without_one_where_all_are_c
     os.utime(file, ns=(status.st_atime_ns, status.st_mtime_ns))
     assert changed([plan], made.results, every=False) == []
     assert [error.path for error in changed([plan], made.results, every=True)] == [file]
-    shutil.copy2(file, file.with_name("other.nc")).replace(file)
+    other = file.with_name("other.nc")
+    shutil.copy2(file, other)
+    other.replace(file)
     assert [error.path for error in changed([plan], made.results, every=False)] == [file]
