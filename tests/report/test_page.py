@@ -24,7 +24,7 @@ from vibsim.report.data import Member
 from vibsim.report.figures import order as figures_order
 from vibsim.report.figures import time
 from vibsim.report.page import cards
-from vibsim.report.page.page_tables import cut
+from vibsim.report.page.page_tables import cut, headed
 from vibsim.report.page.templates import TEMPLATES
 from vibsim.report.tables import checks as check_tables
 from vibsim.report.tables.table import Column, Table
@@ -617,3 +617,15 @@ def test_a_page_cuts_a_table_between_its_blocks():
         assert told == (
             f"{more} more {'row is' if more == 1 else 'rows are'} in tables/t.csv." if more else ""
         )
+
+
+def test_a_scheme_and_a_member_that_all_rows_share_stand_in_the_heading():
+    columns = (Column("number"), Column("scheme"), Column("member"), Column("x", form="full"))
+    rows = (("a", "central", "g = 1", 1.0), ("b", "central", "g = 2", 2.0))
+    heading, shown, note = headed("Values", Table("t", "", columns, rows, 1), "more")
+    assert (heading, note) == ("Values, central", "more")
+    assert [column.header for column in shown.columns] == ["number", "member", "x"]
+    assert shown.rows == (("a", "g = 1", 1.0), ("b", "g = 2", 2.0))
+    alone = Table("t", "", columns, (("a", "central", "g = 1", 1.0), ("b", "rk4", "g = 1", 2.0)), 1)
+    heading, shown, _ = headed("Values", alone, "")
+    assert (heading, shown.columns[1].header) == ("Values, g = 1", "scheme")

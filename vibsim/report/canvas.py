@@ -14,6 +14,9 @@ from matplotlib.axis import Axis, XAxis, YAxis
 from matplotlib.figure import Figure
 from matplotlib.ticker import FixedFormatter, FixedLocator
 
+MOST_STEPS = 6
+"""Largest number of steps between the numbers of an axis; matplotlib has up to 9."""
+
 
 class _NoTicksYet:
     """Descriptor: a list of ticks for each axis, empty until the ticks are drawn."""
@@ -27,7 +30,7 @@ class _NoTicksYet:
 
 
 class _Quiet(Axis):  # type: ignore[misc, unused-ignore]
-    """An axis, horizontal or vertical, without artists for ticks."""
+    """An axis, horizontal or vertical, without artists for ticks and with few numbers."""
 
     majorTicks = _NoTicksYet()  # noqa: N815
     minorTicks = _NoTicksYet()  # noqa: N815
@@ -37,6 +40,10 @@ class _Quiet(Axis):  # type: ignore[misc, unused-ignore]
         # keeps grid lines within the frame
         tick.set_clip_path(self.axes.patch)
         return tick
+
+    def get_tick_space(self) -> int:
+        """Return the number of steps for which there is room, up to `MOST_STEPS`."""
+        return min(super().get_tick_space(), MOST_STEPS)  # type: ignore[misc, unused-ignore]
 
     def set_ticks(self, ticks: Any, labels: Any = None, **look: Any) -> Any:
         """Set positions and labels of ticks; styled labels need the artists of matplotlib."""

@@ -32,6 +32,7 @@ from vibsim.report.types import Experiment
 MOST_ROWS = 8  # of a table in the page; the CSV file holds all
 ROOM = 220  # most cells of all tables of numbers in the page; further tables are files only
 COPIED = 40_000  # most characters of a table that a page holds whole, for copying
+OWNERS = ("scheme", "member")  # headers of the columns that say whose numbers a row has
 LONG_HEADING = 90  # most characters of a heading; longer captions are shortened
 
 
@@ -58,7 +59,7 @@ def collect(
     return texts, {
         "failures": broken and cut(broken),
         "unlisted": f"{failures} runs broke down; the first {count} are listed." * (failures > count),
-        "numbers_shown": [cut(table) for table in listed],
+        "numbers_shown": [headed(*cut(table)) for table in listed],
         # for the copy buttons, which a very long table does not have
         "tables": {
             table.name: texts[table.name] if max(map(len, texts[table.name].values())) <= COPIED else {}
@@ -118,6 +119,17 @@ def cut(table: Table) -> tuple[str, Table, str]:
         more > 0
     )
     return _heading(table.caption), replace(table, rows=shown).without_empty(), note
+
+
+def headed(heading: str, table: Table, note: str) -> tuple[str, Table, str]:
+    """Move the scheme and the member that all rows of a table share from their columns to its heading."""
+    common = [
+        i
+        for i, column in enumerate(table.columns)
+        if column.header in OWNERS and i >= table.heads and len({row[i] for row in table.rows}) == 1
+    ]
+    others = [i for i in range(len(table.columns)) if i not in common]
+    return ", ".join([heading, *(str(table.rows[0][i]) for i in common)]), table.only(others), note
 
 
 def _heading(caption: str) -> str:

@@ -65,8 +65,12 @@ class Table:
             if not (column.header in headers if headers is not None else i >= self.heads)
             or any(not is_nothing(row[i]) for row in self.rows)
         ]
-        rows = tuple(tuple(row[i] for i in chosen) for row in self.rows)
-        return replace(self, columns=tuple(self.columns[i] for i in chosen), rows=rows)
+        return self.only(chosen)
+
+    def only(self, columns: Sequence[int]) -> Table:
+        """Return the table with the columns at these places."""
+        rows = tuple(tuple(row[i] for i in columns) for row in self.rows)
+        return replace(self, columns=tuple(self.columns[i] for i in columns), rows=rows)
 
     def text_rows(self) -> Iterator[list[str]]:
         """Yield every row as text."""
