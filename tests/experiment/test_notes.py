@@ -172,6 +172,11 @@ MEANT = {
         },
         "initial": {"u": 1},
     },
+    "swept stiffness": {
+        "model": {"kind": "oscillator", "spring": "(pi - 2)*k*u", "parameters": {"k": -1}},
+        "initial": {"u": 1},
+        "sweep": {"model.parameters.k": [1, 2]},
+    },
     "odd power": {
         "model": {"kind": "oscillator", "damping": "v**(n + 1)", "parameters": {"n": 2}},
         "initial": {"u": 1},

@@ -18,7 +18,18 @@ from vibsim.experiment.schema.fields import DECLARED
 from vibsim.experiment.schema.unit_text import split
 from vibsim.experiment.value_names import OF_THE_SAME_KIND, VALUES
 from vibsim.experiment.yaml.parse import Path_
-from vibsim.formula import Binary, Call, Expression, Name, Negate, literal, parse, values_of, walk
+from vibsim.formula import (
+    CONSTANTS,
+    Binary,
+    Call,
+    Expression,
+    Name,
+    Negate,
+    literal,
+    parse,
+    values_of,
+    walk,
+)
 from vibsim.formula.algebra import terms_of
 from vibsim.models import Model, tree
 from vibsim.models.shared.coordinates import angles
@@ -138,10 +149,15 @@ def _warn_signs(setting: Setting, report: Report) -> None:
     model, declared = setting.model, _at_path(report.source.data, ("model", DECLARED))
     if model is None or model.kind != "oscillator":
         return
-    given = declared if isinstance(declared, Mapping) else {}
+    swept = {key for axis in setting.sweep.axes for key in axis.keys}
+    given = {
+        name: value
+        for name, value in (declared.items() if isinstance(declared, Mapping) else ())
+        if f"model.{DECLARED}.{name}" not in swept
+    }
     for name, state in (("damping", "v"), ("spring", "u")):
         text = _at_path(report.source.data, ("model", name))
-        names = NAME.findall(text) if isinstance(text, str) else []
+        names = {*(NAME.findall(text) if isinstance(text, str) else ())} - {*CONSTANTS}
         if state not in names:
             continue
         law, numbers = parse(str(text), names), {row: _plain(given.get(row)) for row in names}
