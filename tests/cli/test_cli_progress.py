@@ -163,6 +163,29 @@ def test_a_broken_workflow_is_told_in_a_line(
     assert len(ended.text.splitlines()) > 1
 
 
+def test_options_behind_two_dashes_may_name_a_plug_in_of_a_local_run(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    root, plug_in = tmp_path / "root", tmp_path / "snakemake_logger_plugin_mine"
+    (root / "workflow/profiles/default").mkdir(parents=True)
+    (root / "workflow/profiles/default/config.yaml").write_text("{}")
+    (root / "Snakefile").write_text("rule all:\n    shell: 'true'\n")
+    plug_in.mkdir()
+    (plug_in / "__init__.py").write_text(
+        "from vibsim.cli.run.snakemake_process import LogHandler as Base\n\n\n"
+        "class LogHandler(Base):\n    def emit(self, record):\n        pass\n"
+    )
+    monkeypatch.setenv("PYTHONPATH", f"{tmp_path}:{os.environ.get('PYTHONPATH', '')}")
+    monkeypatch.setattr(snakemake, "home", lambda: root)
+    held = lock.hold(tmp_path / "results")
+    mine = Executor(["--cores", "1", "--logger", "vibsim", "mine"], is_extended=True)
+    try:
+        ended = snakemake.run([], tmp_path / "results", held, mine)
+    finally:
+        os.close(held)
+    assert ended.status == 0, ended.text
+
+
 def test_a_job_with_several_files_is_told_by_its_first_and_last() -> None:
     outputs = ("a/x/level_06.nc", "a/x/level_07.nc", "a/x/level_09.nc")
     assert str(Job("simulate_3", outputs, "", "")) == "simulate a/x level_06.nc to level_09.nc"

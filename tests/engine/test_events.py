@@ -313,6 +313,14 @@ def test_a_held_body_leaves_when_the_force_exceeds_what_friction_holds():
     assert (run.velocity[0, np.flatnonzero(~held)[1:5]] < 0.0).all()
 
 
+def test_a_parameter_may_have_the_name_of_a_number_of_the_kernel():
+    runs = []
+    for name in ("k", "mode"):
+        model = written({"damping": "b*sign(v)", "spring": f"{name}*u"}, (name,))
+        runs.append(runs_of.run(model, "rk4", {"b": 0.1, name: 4.0}, (1.0, 0.0), 6.0, 96))
+    assert runs[0].position.tobytes() == runs[1].position.tobytes()
+
+
 def test_what_is_not_gathered_changes_no_step():
     for model, events in ((BOX, "located"), (BALL, "mesh"), (DRIVEN, "located")):
         numbers, scheme = several(model), FIXED_STEP["rk4"]

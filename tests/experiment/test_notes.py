@@ -164,6 +164,24 @@ MEANT = {
         "initial": {"u": 1},
         "schemes": ["rk4"],
     },
+    "negative stiffness": {
+        "model": {
+            "kind": "oscillator",
+            "spring": "(a - 3*b + c)*u",
+            "parameters": {"a": 10, "b": 1, "c": "-4 N/m"},
+        },
+        "initial": {"u": 1},
+    },
+    "swept stiffness": {
+        "model": {"kind": "oscillator", "spring": "(pi - 2)*k*u", "parameters": {"k": -1}},
+        "initial": {"u": 1},
+        "sweep": {"model.parameters.k": [1, 2]},
+    },
+    "odd power": {
+        "model": {"kind": "oscillator", "damping": "v**(n + 1)", "parameters": {"n": 2}},
+        "initial": {"u": 1},
+        "schemes": ["rk4"],
+    },
     "place of a system": {"model": CART, "initial": {"x": 40}, "schemes": ["rk4"]},
     "tolerance": {"checks": [{"value": "period", "equals": 6.7, "atol": 0.1}]},
     "many digits": {"checks": [{"value": "period", "equals": 6.70024879}]},

@@ -167,7 +167,9 @@ def test_nothing_more_is_said_of_faulty_sizes(
 
 
 def test_signs_of_a_shell_may_be_quoted_arguments(heat: Path) -> None:
-    assert main(["check", str(changed(heat, ("{kappa}", "{kappa} '|' a>b \\;")))]) == 0
+    assert (
+        main(["check", str(changed(heat, ("{kappa}", '{kappa} \'|\' a>b \\; "a \\" > b"')))]) == 0
+    )
 
 
 def test_files_that_are_to_be_there_must_be(heat: Path, capsys: pytest.CaptureFixture[str]) -> None:

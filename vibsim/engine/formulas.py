@@ -166,7 +166,7 @@ def put_functions(
     for function, results in formulas.items():
         lines = list(unpack)
         if model.events is not None and function in ("acceleration", "slopes"):
-            lines += [f"mode = p[{len(names)}]", f"t = t + p[{len(names) + 1}]"]
+            lines += [f"{friction.MODE} = p[{len(names)}]", f"t = t + p[{len(names) + 1}]"]
         if model.events is not None and function in _OF_CONTACTS:
             lines += [
                 f"{FREE}{i} = free_{i}(p[{len(names)}])"

@@ -17,10 +17,13 @@ from vibsim.models.events import Friction
 # bound by the kernel (`vibsim.engine.kernel_stubs`)
 drive = limit = mode_of = unbound
 
+MODE = "_mode"
+"""Name of the mode in formulas, which no parameter can have."""
+
 
 def accelerations(model: Model, events: Friction) -> list[Formula]:
     """Return the acceleration of a body that slides in the direction of the mode."""
-    held = Binary("*", Name("mode"), tree(model, events.limit))
+    held = Binary("*", Name(MODE), tree(model, events.limit))
     return [Binary("-", tree(model, events.drive), held)]
 
 

@@ -38,7 +38,7 @@ from vibsim.experiment.yaml.parse import Path_, Source, read
 from vibsim.formula import ExpressionError, constant, evaluate, parse
 
 _NAME = "must be a name of letters, digits and _"
-_QUOTED = r"'[^']*'|\"[^\"]*\"|\\."
+_QUOTED = r"'[^']*'|\"(?:\\.|[^\"])*\"|\\."
 _SHELL_SIGN = r"(?:^|\s)(>>?|<|\|\|?|&&?|;)(?=\s|\{|$)"
 
 

@@ -38,6 +38,8 @@ class Executor:
     """Settings for `vibsim.cli.workflow.names_of` (`CONFIGURED`)."""
     is_remote: bool = False
     """Whether jobs run outside of this command's processes, so that an interrupt must cancel them."""
+    is_extended: bool = False
+    """Whether options of the user's own are among the arguments, which may name plug-ins."""
 
 
 def chosen(options: Namespace, plans: Sequence[Plan], results: Path) -> Executor:
@@ -55,8 +57,9 @@ def chosen(options: Namespace, plans: Sequence[Plan], results: Path) -> Executor
         resources.check(plans, results)
         allowed = str(options.cores or usable_cores())
         memory = f"mem_mb={resources.megabytes(plans)}"
-        return Executor(["--cores", allowed, "--resources", memory, *options.for_snakemake])
-    arguments: list[str] = []
+        arguments = ["--cores", allowed, "--resources", memory, *options.for_snakemake]
+        return Executor(arguments, is_extended=bool(options.for_snakemake))
+    arguments = []
     if name:
         _check_name(name)
         arguments += ["--executor", name]

@@ -240,7 +240,7 @@ def _write_config(plans: Sequence[Plan], results: Path, target: Executor) -> Pat
 def _command(config: Path, results: Path, target: Executor, pipe: int) -> list[str]:
     """Return the command that starts Snakemake, which writes its events to the lock_fd `pipe`."""
     command = [sys.executable, "-P", "-m", "vibsim.cli.run.snakemake_process", str(os.getpid())]
-    command.append("remote" if target.is_remote else "here")
+    command.append("remote" if target.is_remote else "extended" if target.is_extended else "here")
     command += ["--logger", "vibsim", "--logger-vibsim-pipe", str(pipe)]
     command += ["--snakefile", str(home() / "Snakefile")]
     command += ["--workflow-profile", str(home() / "workflow/profiles/default")]

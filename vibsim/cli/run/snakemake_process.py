@@ -63,7 +63,7 @@ class LogHandler(LogHandlerBase):
 
 
 def main() -> None:
-    """Run Snakemake. Arguments: the process to end with; ``remote`` or ``here``; those of Snakemake."""
+    """Run Snakemake. Arguments: the process to end with; ``remote``, ``extended`` or ``here``; those of Snakemake."""
     parent, where = int(sys.argv.pop(1)), sys.argv.pop(1)
     if where == "remote":
         supervise.end_in_order()
@@ -71,13 +71,16 @@ def main() -> None:
         supervise.end_at_once()
     end_with(parent)
     collect_seldom()
-    # Snakemake searches all installed packages five times for plug-ins, and imports them. A local run needs none.
+    # Snakemake searches all installed packages five times for plug-ins, and imports them. A local run needs none,
+    # but for those that the user may name, which are no executors.
     if where == "remote":
         ExecutorPluginRegistry()
         remote.ask_by_age()
         remote.cancel_all()
         remote.tell_reasons()
         remote.report_submissions()
+    elif where == "extended":
+        ExecutorPluginRegistry.module_prefix = "none of them"
     else:
         setattr(PluginRegistryBase, "collect_plugins", _collect_none)  # noqa: B010
     # It starts in half the time without modules that no run of vibsim uses: NumPy numbers in profiles, web addresses,

@@ -18,7 +18,18 @@ from vibsim.experiment.schema.fields import DECLARED
 from vibsim.experiment.schema.unit_text import split
 from vibsim.experiment.value_names import OF_THE_SAME_KIND, VALUES
 from vibsim.experiment.yaml.parse import Path_
-from vibsim.formula import Binary, Call, Expression, Name, Negate, literal, parse, values_of, walk
+from vibsim.formula import (
+    CONSTANTS,
+    Binary,
+    Call,
+    Expression,
+    Name,
+    Negate,
+    literal,
+    parse,
+    values_of,
+    walk,
+)
 from vibsim.formula.algebra import terms_of
 from vibsim.models import Model, tree
 from vibsim.models.shared.coordinates import angles
@@ -135,15 +146,21 @@ def _terms_of_waves(model: Model) -> Iterator[Expression]:
 
 def _warn_signs(setting: Setting, report: Report) -> None:
     """Warn about a damping that drives half of the time, as ``b*v**2``, and a spring that pushes, as ``-k*u``."""
-    model = setting.model
+    model, declared = setting.model, _at_path(report.source.data, ("model", DECLARED))
     if model is None or model.kind != "oscillator":
         return
+    swept = {key for axis in setting.sweep.axes for key in axis.keys}
+    given = {
+        name: value
+        for name, value in (declared.items() if isinstance(declared, Mapping) else ())
+        if f"model.{DECLARED}.{name}" not in swept
+    }
     for name, state in (("damping", "v"), ("spring", "u")):
         text = _at_path(report.source.data, ("model", name))
-        names = NAME.findall(text) if isinstance(text, str) else []
+        names = {*(NAME.findall(text) if isinstance(text, str) else ())} - {*CONSTANTS}
         if state not in names:
             continue
-        law, numbers = parse(str(text), names), dict.fromkeys(names, 1.0)
+        law, numbers = parse(str(text), names), {row: _plain(given.get(row)) for row in names}
         at = np.array([-1.0, 1.0, 2.0])
         below, above, twice = values_of([law], {**numbers, state: at})[0]
         if name == "damping" and below == above != 0.0:
@@ -152,6 +169,15 @@ def _warn_signs(setting: Setting, report: Report) -> None:
         elif name == "spring" and -below == above < 0.0 and twice == 2.0 * above:
             rule = "pushes away from u = 0"
             report.note(("model", name), rule, "a spring that pulls back is positive, as k*u")
+
+
+def _plain(value: Any) -> float:
+    """Return a declared number in the unit that it is written with; 1 if it is none, or a formula."""
+    halves = split(value) if isinstance(value, str) else (value,)
+    try:
+        return float(halves[0]) if halves else 1.0
+    except (TypeError, ValueError):
+        return 1.0
 
 
 def _warn_repeated(report: Report) -> None:
