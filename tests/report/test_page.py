@@ -343,7 +343,7 @@ def test_a_claim_has_its_source_and_its_measure(tmp_path):
     for part in (
         "“it is round”",
         "a book. Measured by: period is above 100.",
-        "false (the statement: above 100)",
+        "false (the statement: above 100 s)",
         "shown to be false",
         "Order of ω (scheme central)",
         "order 3 ± 0.1",
