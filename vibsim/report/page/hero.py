@@ -203,9 +203,10 @@ def _order(experiment: Experiment, record: Record, lead: Lead) -> Iterator[Numbe
             yield {"label": label, "value": "not measurable", "note": due}
     else:
         scheme = record.words("scheme")[member.scheme]
-        misses = abs(order - data.formal_order(record, member, quantity)) > ORDER_TOLERANCE
-        if misses and not lead.is_on_order and not choice.on_order(experiment, quantity, scheme):
-            due += ", which no check asks for"
+        formal = data.formal_order(record, member, quantity)
+        misses = not low - ORDER_TOLERANCE <= formal <= high + ORDER_TOLERANCE
+        is_asked = lead.is_on_order or choice.on_order(experiment, quantity, scheme)
+        due += ", which no check asks for" * bool(due and misses and not is_asked)
         note = "; ".join(filter(None, [words.likely((low, high)), due]))
         yield {"label": label, "value": words.number(float(order), "order"), "note": note}
 
