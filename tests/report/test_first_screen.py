@@ -395,10 +395,29 @@ def test_the_number_that_decides_is_the_one_that_is_drawn_over_the_members():
     record, summary, decisive = found(exp)
     with style.applied():
         shown = hero.pictures(exp, record, decisive)[0]
-    assert (shown.name, shown.title) == ("hero_response", "θ at the end of 9 members")
+    assert (shown.name, shown.title) == (
+        "hero_response",
+        "Value of θ at the end at level 7 in 9 members",
+    )
     drawn_values = shown.figure.axes[0].lines[0].get_ydata()
     number = summary["checks"][0]["results"][0]["facts"]["value"]
     np.testing.assert_allclose(drawn_values[4], number, rtol=1e-12)
+
+
+def test_members_have_the_level_and_the_unit_of_their_numbers_where_all_are_reduced_to_one():
+    """A swept value has another unit; the reading said that all pictures are of the finest level."""
+    asked = {"value": "max_abs", "quantity": "theta", "at": {"level": 7}, "equals": 1, "atol": 9}
+    asked |= {"over": "initial.theta", "take": "where_largest"}
+    sweep = {"initial.theta": {"linspace": [0.5, 1.5, 9]}}
+    exp = samples.experiment(sweep=sweep, checks=[asked])
+    record, summary, decisive = found(exp)
+    with style.applied():
+        shown = hero.pictures(exp, record, decisive)[0]
+    assert shown.title == "Largest absolute value of θ at level 7 in 9 members"
+    assert "[rad]" in shown.figure.axes[0].get_title(loc="left")
+    assert "finest" not in shown.caption
+    card = cards.card(exp, record, summary["checks"][0])
+    assert card["what"] == "Place of the largest absolute value of θ over initial θ at level 7"
 
 
 def test_every_scheme_with_an_error_has_its_entry():
@@ -436,6 +455,13 @@ def test_an_order_that_misses_its_promise_says_that_nothing_asks_for_it():
         record, _, decisive = found(exp)
         notes = [number["note"] for number in hero.numbers(exp, record, decisive)]
         assert any("promises 2, which no check asks for" in note for note in notes) is is_told
+    # a check of an order passes where the interval reaches it
+    exp = samples.experiment(schemes=[scheme], checks=[value])
+    record, _, decisive = found(exp)
+    high = record.variables["theta_order_high"]
+    values = np.full(np.shape(high.values), 2.0)
+    record.variables["theta_order_high"] = Variable(high.dims, values, high.attrs)
+    assert not any("no check" in number["note"] for number in hero.numbers(exp, record, decisive))
 
 
 def test_of_a_long_run_the_last_periods_are_shown():
@@ -504,7 +530,7 @@ def test_a_curve_over_the_sweep_counts_the_members_that_have_the_number():
     record, _, decisive = found(exp)
     with style.applied():
         shown = drawn.response(exp, record, decisive)
-    assert shown.title == "Period of 15 of 16 members"
+    assert shown.title == "Period in 15 of 16 members"
     assert "The others have no period." in shown.caption
 
 

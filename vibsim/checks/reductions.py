@@ -276,7 +276,8 @@ def _asked(f: MemberFacts, check: ValueCheck) -> tuple[str, str, str]:
 
 def _finding(f: MemberFacts, check: ValueCheck, r: Reduced, members: Any) -> str:
     """State the reduced number with its error."""
-    what, take, count = value_text.what(check, f.notation), str(check.take), len(members)
+    take, count = str(check.take), len(members)
+    what = value_text.what_of_all(check, f.notation)
     place = _at(f, check, int(members[r.member]))
     number, unit = f.notation.number, number_units.unit_of(f.experiment, f.record, check)
     if take == "monotone":

@@ -67,6 +67,15 @@ def what(check: ValueCheck, notation: Notation = PLAIN) -> str:
     return f"{value} of {quantity}" if quantity else value
 
 
+def what_of_all(check: ValueCheck, notation: Notation = PLAIN) -> str:
+    """Name the number of a check behind the word of its reduction, such as `largest`, without the same word again."""
+    take = str(check.take)
+    extreme = (
+        "largest " if take.endswith("largest") else "least " if take.endswith("smallest") else ""
+    )
+    return what(check, notation).removeprefix(extreme)
+
+
 def rule(check: ValueCheck, notation: Notation = PLAIN, unit: str = "") -> str:
     """Say what the number should be, with its unit if that is given."""
     key, wanted = border(check)

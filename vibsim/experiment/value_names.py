@@ -18,7 +18,7 @@ IN_WORDS: Mapping[str, str] = {
     "mean": "mean",
     "where_largest": "place of the largest",
     "where_smallest": "place of the smallest",
-    "monotone": "direction of",
+    "monotone": "direction of the",
 }
 """First words of the name of a reduced number; `where` has become `where_largest` before it is named."""
 OF_ONE_MEMBER = (None, "largest", "smallest")

@@ -19,7 +19,7 @@ from vibsim.core.vocabulary import (
     plain_name,
     whole_of,
 )
-from vibsim.experiment.value_names import VALUES
+from vibsim.experiment.value_names import IN_WORDS, VALUES
 
 NAMES = {
     "theta": ("θ", "the angle θ"),
@@ -87,7 +87,7 @@ def title(quantity: str) -> str:
 def name(quantity: str) -> str:
     """Return a quantity in words."""
     letter, text = _named(quantity)
-    return f"the {text.replace(' of', f' {letter} of')}" if is_error_part(quantity) else text
+    return f"the {text.replace(' of', f' {letter} of', 1)}" if is_error_part(quantity) else text
 
 
 _LETTERED = NAMES.keys() - {"energy"}
@@ -177,8 +177,9 @@ DIGITS = {"brief": 2, "close": 7, "full": 10, "step": 6, "value": 12}  # signifi
 LEAST_PERCENT = 1e-5  # smallest fraction written in per cent
 MORE_DIGITS = 2  # digits of a measured number beyond those of the printed one
 MOST_DIGITS = 11  # longer mantissas are shortened
-PROSE = {"phase", "amplitude", "largest"} | {name.partition("_")[0] for name in VALUES}
-"""First words of the names of values and of parts of an error."""
+PROSE = {"phase", "amplitude", "value"} | {name.partition("_")[0] for name in VALUES}
+PROSE |= {text.partition(" ")[0] for text in (*VALUE_NAMES.values(), *IN_WORDS.values())}
+"""First words of the names of numbers, one by one and of all members, and of parts of an error."""
 
 
 RAISE, LOWER = (str.maketrans("-0123456789", to) for to in ("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "₋₀₁₂₃₄₅₆₇₈₉"))

@@ -154,7 +154,7 @@ def test_one_body_may_rest_on_its_stop_at_the_end_while_others_move() -> None:
         "initial": {"h": 1.25, "q": 1.0},
         "time": {"end": 3.0, "base_steps": 30},
         "levels": [1, 2, 3],
-        "schemes": ["rk4"],
+        "schemes": ["velocity_verlet"],
     }
     count = {"value": "event_count", "above": 5}
     energy = {"value": "end", "quantity": "dissipated_energy", "equals": 12.5, "rtol": 1e-9}

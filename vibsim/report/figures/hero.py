@@ -15,7 +15,6 @@ from vibsim.checks.fields import field_values
 from vibsim.checks.number_units import unit_of
 from vibsim.checks.order_context import COINCIDE
 from vibsim.checks.outcome import about_members
-from vibsim.checks.value_text import what
 from vibsim.core.array_types import Flags, Floats
 from vibsim.core.record import Record
 from vibsim.core.vocabulary import SECONDS_OF_NORM
@@ -24,7 +23,7 @@ from vibsim.report.choice import Lead
 from vibsim.report.data import Member
 from vibsim.report.figures import moments, panels, time
 from vibsim.report.figures.solution import DOTS
-from vibsim.report.figures.sweeps.view import key_axis, ring
+from vibsim.report.figures.sweeps.view import key_axis, of_a_member, ring
 from vibsim.report.style import Picture
 from vibsim.report.sweep_layout import Along, Grid
 from vibsim.report.text import findings
@@ -290,8 +289,8 @@ def response(experiment: Experiment, record: Record, lead: Lead) -> Picture | No
     is_marked = math.isfinite(values[lead.member.case])
     return Picture(
         "hero_response",
-        f"{words.PAGE.opening(name)} of {count} members",
-        "Each member is one run of the sweep, at its finest level."
+        f"{words.PAGE.opening(name)} in {count} members",
+        f"Each member is one run of the sweep{', at its finest level' * ('level' not in name)}."
         + f" The others have no {name}." * (known < every)
         + f" Hollow: not settled; {finest_level.SWINGS}." * bool(hollow.any())
         + " The ring is the hardest member." * is_marked,
@@ -310,8 +309,8 @@ def _number(experiment: Experiment, record: Record, lead: Lead) -> tuple[str, st
     if lead.entry is not None and check is not None and check.kind == "value":
         values = field_values(record, lead.entry["id"], "value")[scheme]
         if finest_level.varies(values):
-            name = what(check, words.PAGE)
-            unit = data.pretty_unit(unit_of(experiment, record, check))
+            name, alone = of_a_member(check, experiment.levels[-1])
+            unit = data.pretty_unit(unit_of(experiment, record, alone))
             return name, style.label(name, unit), values
     checked = [check.value for check in choice.asked_values(experiment)]
     usual = ["period", "amplitude"]

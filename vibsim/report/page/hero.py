@@ -174,12 +174,16 @@ def _order(experiment: Experiment, record: Record, lead: Lead) -> Iterator[Numbe
     promised = data.promised_text(record, quantity, member.scheme)
     of = data.basis_of_order(record, quantity)
     due = f"the scheme promises {promised}" if of == "promised" else f"{promised} is expected"
-    due = "" if promised == of else due
+    due, unasked = "" if promised == of else due, ""
     if lead.is_on_order:
         order, low, high = (lead.facts.get(f"order{end}") for end in ("", "_low", "_high"))
     else:
         norm = data.norm_index(record, lead.norm)
         order, low, high = data.stated_order(record, quantity, member, norm)
+        formal, scheme = data.formal_order(record, member, quantity), record.words("scheme")
+        misses = not low - ORDER_TOLERANCE <= formal <= high + ORDER_TOLERANCE
+        if due and misses and not choice.on_order(experiment, quantity, scheme[member.scheme]):
+            unasked = ", which no check asks for"
     orders = finest_level.stated_orders(record, quantity, lead.norm)[0][member.scheme]
     shown = about_members(record, lead.measured if lead.is_on_order else None)
     every = style.finite(orders[shown])
@@ -202,11 +206,7 @@ def _order(experiment: Experiment, record: Record, lead: Lead) -> Iterator[Numbe
         if lead.is_on_order or lead.entry is None:
             yield {"label": label, "value": "not measurable", "note": due}
     else:
-        scheme = record.words("scheme")[member.scheme]
-        misses = abs(order - data.formal_order(record, member, quantity)) > ORDER_TOLERANCE
-        if misses and not lead.is_on_order and not choice.on_order(experiment, quantity, scheme):
-            due += ", which no check asks for"
-        note = "; ".join(filter(None, [words.likely((low, high)), due]))
+        note = "; ".join(filter(None, [words.likely((low, high)), due + unasked]))
         yield {"label": label, "value": words.number(float(order), "order"), "note": note}
 
 

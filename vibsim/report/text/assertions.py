@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from vibsim.checks import accurate
-from vibsim.checks.value_text import rule, what
+from vibsim.checks.value_text import rule, what, what_of_all
 from vibsim.checks.verdict_text import expectation, expected_verdict
 from vibsim.core.record import Record
 from vibsim.core.vocabulary import TYPICAL_NORM
@@ -126,7 +126,8 @@ def subject(check: Measurement, record: Record | None = None) -> str:
     parts = [_place(record, key, value) for key, value in places if value is not None]
     where = words.swept(", ".join([*parts, *swept_values(check, record)]))
     if check.take is not None:
-        statement = f"{IN_WORDS[check.take]} {statement} over {'all members' if check.over == CASES else check.over}"
+        over = "all members" if check.over == CASES else words.swept(str(check.over))
+        statement = f"{IN_WORDS[check.take]} {what_of_all(check, words.PAGE)} over {over}"
     statement = f"{statement}{(f' ({where})' if is_sampled else f' at {where}') if where else ''}"
     return statement.replace("level best", "the limit of the levels")
 

@@ -55,13 +55,17 @@ def value_checks(experiment: Experiment) -> list[tuple[str, str, ValueCheck]]:
         check = asserted.measured
         if check.kind != "value" or check.at.case is not None or check.value in SHOWN_ALREADY:
             continue
-        of = "value of " if check.number.is_sample else ""
-        level = "" if check.at.level is None else f" at level {check.at.level}"
-        text = f"{of}{what(check, words.PAGE)}{level}".replace(
-            "level best", "the limit of the levels"
-        )
-        found.setdefault((text, check.at.scheme), (asserted.id, text, check))
+        text, alone = of_a_member(check)
+        found.setdefault((text, check.at.scheme), (asserted.id, text, alone))
     return list(found.values())
+
+
+def of_a_member(check: ValueCheck, finest: int | None = None) -> tuple[str, ValueCheck]:
+    """Return the number of a member in words, with its level unless that is the `finest`, and the check on it alone."""
+    of = "value of " if check.number.is_sample else ""
+    level = "" if check.at.level in (None, finest) else f" at level {check.at.level}"
+    text = f"{of}{what(check, words.PAGE)}{level}".replace("level best", "the limit of the levels")
+    return text, check.model_copy(update={"take": None})
 
 
 def of_check(record: Record, name: str, check: ValueCheck) -> Floats:
