@@ -239,6 +239,21 @@ def test_three_levels_behind_others_that_do_not_fit_may_fall_like_a_power_by_acc
     assert found(assess(given, Question(expected))) == verdict
 
 
+def test_three_such_levels_pass_where_an_exact_solution_confirms_them() -> None:
+    values = [0.694, 0.749, 0.9362, 0.9848]
+    assert found(assess(ladder(HALVED, values, exact=1.0), Question(2.0))) == (PASSES, "asymptotic")
+    assert found(assess(ladder(HALVED, values), Question(2.0))) == (OPEN, "pre_asymptotic")
+
+
+@pytest.mark.parametrize(("step", "reason"), [(1.6, "exact"), (1.8, "round_off")])
+def test_stated_noise_limits_the_distance_of_the_two_levels_furthest_apart(
+    step: float, reason: str
+) -> None:
+    """Two levels have the noise 2, of which 2 times 1.25 is allowed for: 4.8 is within it, and 5.4 is not."""
+    given = ladder(HALVED, [3 * step, 2 * step, step, 0.0], noise=1.0)
+    assert found(assess(given, Question(2.0, is_noise_stated=True)))[1] == reason
+
+
 def test_an_order_that_two_powers_only_explain_passes_when_it_is_measured() -> None:
     h = 0.1 * 0.5 ** np.arange(6)
     values = numbers(h, (1.0, 2.5), (0.0345 / h[4] ** 2, 4.5))
