@@ -176,3 +176,10 @@ def test_no_cosine_depends_on_sizes_or_on_other_members(kind: str) -> None:
         np.testing.assert_allclose(scaled, found, rtol=1e-14)
     alone = differences.cosines([row[:1] for row in rows], kind)
     np.testing.assert_array_equal(alone, found[:1])
+
+
+def test_the_last_change_is_at_least_half_of_the_one_before() -> None:
+    numbers = np.array([[9.0, 4.0, 1.0], [4.0, 1.0, 1.5], [1.0, 4.0, 4.0]])
+    assert differences.last_change(numbers).tolist() == [3.0, 1.5, 1.5]
+    assert differences.last_change(numbers[:, 1:]).tolist() == [3.0, 0.5, 0.0]
+    assert np.all(np.isnan(differences.last_change(numbers[:, 2:])))
