@@ -124,6 +124,14 @@ TOLD = {
         {"model": {"kind": "oscillator", "spring": "-4*u"}, "initial": {"u": 1}},
         "model.spring: pushes away from u = 0",
     ),
+    "springs of a sweep that all push": (
+        {
+            "model": {"kind": "oscillator", "spring": "k*u", "parameters": {"k": 1}},
+            "initial": {"u": 1},
+            "sweep": {"model.parameters.k": [-1, -2]},
+        },
+        "model.spring: pushes away from u = 0",
+    ),
     "hertz": (
         {"model": wave("f*t + 0.1"), "initial": {}},
         "model.parameters.f: the formulas take it for an angular frequency",
@@ -171,6 +179,11 @@ MEANT = {
             "parameters": {"a": 10, "b": 1, "c": "-4 N/m"},
         },
         "initial": {"u": 1},
+    },
+    "swept stiffness of one sign": {
+        "model": {"kind": "oscillator", "spring": "-k*u", "parameters": {"k": 1}},
+        "initial": {"u": 1},
+        "sweep": {"model.parameters.k": [-1, -2]},
     },
     "swept stiffness": {
         "model": {"kind": "oscillator", "spring": "(pi - 2)*k*u", "parameters": {"k": -1}},

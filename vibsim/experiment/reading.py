@@ -162,7 +162,14 @@ def build(
     experiment._file, experiment._settings = file, source.settings
     size_limits.check_costs(experiment, report)
     report.raise_any()
-    unlikely.note_unlikely(document.checks, setting, report)
+    every = members.MemberNumbers(
+        experiment.model.definition,
+        numbers.parameters,
+        numbers.initial,
+        setting.time,
+        setting.sweep.axes,
+    )
+    unlikely.note_unlikely(document.checks, setting, every, report)
     experiment._notes = report.note_lines
     return members.update_tables(experiment)
 

@@ -12,6 +12,7 @@ import numpy as np
 
 from vibsim.experiment.faults import Report
 from vibsim.experiment.rules.formulas import NAME
+from vibsim.experiment.rules.members import MemberNumbers
 from vibsim.experiment.rules.size_limits import Setting
 from vibsim.experiment.schema.checks import AccurateCheck, Check, ConvergesCheck, ValueCheck
 from vibsim.experiment.schema.fields import DECLARED
@@ -35,16 +36,20 @@ from vibsim.models import Model, tree
 from vibsim.models.shared.coordinates import angles
 
 TURN = 2.0 * math.pi
+MEMBERS = 9
+"""Number of members of a sweep whose laws are looked at."""
 EXACT_DIGITS = 9
 """From this number of digits on, a number is meant to be compared to 1e-9 relative."""
 
 
-def note_unlikely(checks: Sequence[Check | None], setting: Setting, report: Report) -> None:
+def note_unlikely(
+    checks: Sequence[Check | None], setting: Setting, members: MemberNumbers, report: Report
+) -> None:
     """Warn about probable mistakes; `checks` are those of the file, None for a malformed one."""
     _warn_angles(setting, report)
     _warn_phases(setting, report)
     _warn_hertz(setting, report)
-    _warn_signs(setting, report)
+    _warn_signs(members, report)
     _warn_repeated(report)
     _warn_set_and_swept(report)
     for i, check in enumerate(checks):
@@ -144,40 +149,23 @@ def _terms_of_waves(model: Model) -> Iterator[Expression]:
                 yield term.operand if isinstance(term, Negate) else term
 
 
-def _warn_signs(setting: Setting, report: Report) -> None:
+def _warn_signs(members: MemberNumbers, report: Report) -> None:
     """Warn about a damping that drives half of the time, as ``b*v**2``, and a spring that pushes, as ``-k*u``."""
-    model, declared = setting.model, _at_path(report.source.data, ("model", DECLARED))
-    if model is None or model.kind != "oscillator":
+    if members.model.kind != "oscillator":
         return
-    swept = {key for axis in setting.sweep.axes for key in axis.keys}
-    given = {
-        name: value
-        for name, value in (declared.items() if isinstance(declared, Mapping) else ())
-        if f"model.{DECLARED}.{name}" not in swept
-    }
     for name, state in (("damping", "v"), ("spring", "u")):
         text = _at_path(report.source.data, ("model", name))
         names = {*(NAME.findall(text) if isinstance(text, str) else ())} - {*CONSTANTS}
         if state not in names:
             continue
-        law, numbers = parse(str(text), names), {row: _plain(given.get(row)) for row in names}
-        at = np.array([-1.0, 1.0, 2.0])
-        below, above, twice = values_of([law], {**numbers, state: at})[0]
-        if name == "damping" and below == above != 0.0:
+        law, at = parse(str(text), names), {state: np.array([-1.0, 1.0, 2.0])}
+        laws = [values_of([law], {**numbers, **at})[0] for numbers, _ in members.sampled(MEMBERS)]
+        if name == "damping" and all(below == above != 0.0 for below, above, _ in laws):
             rule = "is the same for both signs of v, so it drives the motion half of the time"
             report.note(("model", name), rule, "v**2 that always brakes is abs(v)*v")
-        elif name == "spring" and -below == above < 0.0 and twice == 2.0 * above:
+        elif name == "spring" and all(-a == b < 0.0 and c == 2.0 * b for a, b, c in laws):
             rule = "pushes away from u = 0"
             report.note(("model", name), rule, "a spring that pulls back is positive, as k*u")
-
-
-def _plain(value: Any) -> float:
-    """Return a declared number in the unit that it is written with; 1 if it is none, or a formula."""
-    halves = split(value) if isinstance(value, str) else (value,)
-    try:
-        return float(halves[0]) if halves else 1.0
-    except (TypeError, ValueError):
-        return 1.0
 
 
 def _warn_repeated(report: Report) -> None:
