@@ -23,6 +23,10 @@ SAFE_SQUARES = 1e140
 """Sums of squares of numbers between this and its inverse neither overflow nor underflow."""
 
 
+NEWTON_STEPS = 8
+"""After so many, the error is rounding alone, even if one gap is 1000 times the other."""
+
+
 def laid_out(values: Floats) -> Floats:
     """Return the same array with time outermost in memory: operations over time then run over all members at once."""
     return np.moveaxis(np.ascontiguousarray(np.moveaxis(values, -1, 0), dtype=np.float64), 0, -1)
@@ -104,26 +108,32 @@ def target_ratio(order: Floats | float, levels: Sequence[float]) -> Floats:
 
 
 def order_of_ratio(ratio: Floats, levels: Sequence[float]) -> Floats:
-    """Solve `target_ratio` for the order; NaN if it exceeds `STEEPEST`, or if the ratio is not positive and finite.
-
-    The ratio grows with the order, so bisection finds the only root.
-    """
+    """Solve `target_ratio` for the order; NaN if it exceeds `STEEPEST`, or if the ratio is not positive and finite."""
     first, second, third = levels
+    a, b = second - first, third - second
     ratio = np.asarray(ratio, dtype=np.float64)
     usable = np.isfinite(ratio) & (ratio > 0)
     safe = np.where(usable, ratio, 1.0)
-    if second - first == third - second:
-        order = on_arrays.log2(safe) / (second - first)
-        return np.asarray(np.where(usable & (np.abs(order) <= STEEPEST), order, np.nan))
-    low, high = np.full(safe.shape, -STEEPEST), np.full(safe.shape, STEEPEST)
-    with np.errstate(over="ignore"):
-        bounds = [target_ratio(b, levels) for b in (-STEEPEST, STEEPEST)]
-        usable &= (safe >= bounds[0]) & (safe <= bounds[1])
-        for _ in range(64):
-            middle = 0.5 * (low + high)
-            above = target_ratio(middle, levels) > safe
-            low, high = np.where(above, low, middle), np.where(above, middle, high)
-    return np.asarray(np.where(usable, 0.5 * (low + high), np.nan))
+    order = on_arrays.log2(safe) / a if a == b else _order_of_ratio(safe, a, b)
+    return np.asarray(np.where(usable & (np.abs(order) <= STEEPEST), order, np.nan))
+
+
+def _order_of_ratio(ratio: Floats, a: float, b: float) -> Floats:
+    """Return the order of positive ratios for unequal gaps.
+
+    The slope of the logarithm of the ratio is monotonic and lies between the gaps, so Newton's method converges from 0.
+    """
+    log = on_arrays.log(ratio)
+    x = (log - on_arrays.log(a / b)) / (0.5 * (a + b))
+    for _ in range(NEWTON_STEPS):
+        size = np.maximum(np.abs(x), 1e-290)
+        lost_a, lost_b = on_arrays.expm1(-a * size), on_arrays.expm1(-b * size)
+        value = np.where(x > 0.0, a, b) * x + on_arrays.log(lost_a / lost_b)
+        bend = b * (1.0 + lost_b) / lost_b - a * (1.0 + lost_a) / lost_a
+        slope = np.where(x > 0.0, a + bend, b - bend)
+        # rounding near 0 spoils the slope
+        x = x - (value - log) / np.clip(slope, min(a, b), max(a, b))
+    return np.asarray(x / on_arrays.LN_2)
 
 
 def local_orders(ratios: Floats, levels: Sequence[float]) -> Floats:

@@ -34,6 +34,7 @@ MOST_PLAIN = 20_000
 """Number of values that take as long in plain Python as loading LLVM, which also takes 60 MB. [measured]"""
 _PLAIN = {"numbers": 0}
 """Number of values computed in plain Python by this process."""
+_NUMBERS = (int, float)
 _LOOP = """
 @entry
 def kernel({names}, found):
@@ -58,7 +59,7 @@ def named(name: str) -> Callable[..., Any]:
     full = ELEMENTARY[name].full
 
     def function(*arguments: Any) -> Any:
-        if all(isinstance(x, int | float) for x in arguments):
+        if all(isinstance(x, _NUMBERS) for x in arguments):
             # a numpy number, whose division by zero does not raise
             return np.float64(full(*map(float, arguments)))
         arrays = [np.asarray(x, dtype=np.float64, order="C") for x in arguments]
