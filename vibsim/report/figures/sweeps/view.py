@@ -63,9 +63,9 @@ def value_checks(experiment: Experiment) -> list[tuple[str, str, ValueCheck]]:
 def of_a_member(check: ValueCheck, finest: int | None = None) -> tuple[str, ValueCheck]:
     """Return the number of a member in words, with its level unless that is the `finest`, and the check on it alone."""
     of = "value of " if check.number.is_sample else ""
-    level = "" if check.at.level in (None, finest) else f" at level {check.at.level}"
-    text = f"{of}{what(check, words.PAGE)}{level}".replace("level best", "the limit of the levels")
-    return text, check.model_copy(update={"take": None})
+    level = "the limit of the levels" if check.at.level == "best" else f"level {check.at.level}"
+    at = "" if check.at.level in (None, finest) else f" at {level}"
+    return f"{of}{what(check, words.PAGE)}{at}", check.model_copy(update={"take": None})
 
 
 def of_check(record: Record, name: str, check: ValueCheck) -> Floats:
