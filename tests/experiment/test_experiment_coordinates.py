@@ -65,6 +65,26 @@ def test_terms_that_are_not_there_are_no_part_of_the_equation():
         ({"levels": None, "tolerance": 1e-6}, "extrapolates a motion of one coordinate"),
         ({"output": "best"}, "extrapolates a motion of one coordinate"),
         ({"checks": [{"converges": "y_d2t", "order": 2}]}, "did you mean 'vy_d2t'?"),
+        ({"checks": [{"converges": "position_vectr"}]}, "did you mean 'position_vector'?"),
+        (
+            {"checks": [{"value": "end", "quantity": "position_vector", "below": 1}]},
+            "position_vector: end is not defined for this quantity: choose from x, y, vx, vy",
+        ),
+        (
+            {"checks": [{"equal": ["rk4", "exact"], "quantity": "velocity_vector"}]},
+            "velocity_vector: exact is not defined for this quantity: choose from x, y, vx, vy",
+        ),
+        (
+            {
+                "model": {"kind": "spring"},
+                "checks": [{"accurate": "velocity_vector", "relative": 1}],
+            },
+            "takes several coordinates together, and spring has one here: ask for v",
+        ),
+        (
+            {"model": {"kind": "system", "coordinates": ["position_vector"], "acceleration": "-1"}},
+            "'position_vector' has another meaning already",
+        ),
         (
             {"checks": [{"value": "running_max", "quantity": "energy_d2t", "below": 1}]},
             "choose from energy_deviation, energy_deviation_d2t",

@@ -48,6 +48,15 @@ TOLD = {
         {"model": CART, "initial": {"th": 40}, "schemes": ["rk4"]},
         "initial.th: 40 rad are 6.4 turns: 40 degrees are written `40 degree`",
     ),
+    "vector of an angle and a place": (
+        {
+            "model": CART,
+            "initial": {"th": 1},
+            "schemes": ["rk4"],
+            "checks": [{"accurate": "velocity_vector", "relative": 0.1}],
+        },
+        "checks[0]: velocity_vector adds squares of th, an angle, and of x: a sum means something only",
+    ),
     "angle": (
         {"initial": {"theta": 60}},
         "initial.theta: 60 rad are 9.5 turns: 60 degrees are written `60 degree`",

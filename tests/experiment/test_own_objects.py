@@ -175,6 +175,23 @@ def test_everything_is_checked_as_in_a_file(changes: dict[str, Any], key: str, r
     assert rule in fault.rule
 
 
+def test_coordinates_of_several_units_make_no_vector() -> None:
+    names = ("x", "m"), ("a", "rad"), ("vx", "m s-1"), ("va", "rad s-1")
+    model = replace(
+        RAYLEIGH,
+        states=tuple(State(name, unit, "state") for name, unit in names),
+        acceleration="-mu*x",
+        further_accelerations=("-a",),
+        kinetic_energy="vx**2/2",
+        potential_energy="mu*x**2/2",
+        dissipation=None,
+    )
+    start: dict[str, Any] = {"model": model, "initial": {"x": 1.0}, "schemes": ["rk4"]}
+    (fault,) = faults(**start, checks=[{"converges": "velocity_vector"}])
+    assert fault.key == "checks[0].converges"
+    assert fault.rule.endswith("these have several: vx [m s-1], va [rad s-1]")
+
+
 def test_a_message_offers_what_is_in_memory() -> None:
     assert faults(schemes=[RALSTON, "ralstn"])[0].hint == "did you mean 'ralston'?"
     (fault,) = faults(schemes=[replace(RALSTON, velocity_forces=False)])

@@ -677,3 +677,32 @@ def test_a_letter_with_an_index_is_named_and_a_name_of_words_is_said_in_words() 
     exp = Experiment.from_dict({**run, "levels": [4, 5, 6], "schemes": ["rk4"]})
     assert findings.short(exp, "x_3") == "x_3"
     assert findings.short(exp, "far_end").startswith("the ")
+
+
+@pytest.mark.usefixtures("unrendered")
+@pytest.mark.parametrize(
+    ("sweep", "names"),
+    [
+        (None, ["hero_error", "hero_solution"]),
+        ({"initial.x": {"linspace": [0.5, 1.5, 9]}}, ["hero_orders", "hero_response"]),
+    ],
+)
+def test_coordinates_together_have_numbers_and_no_picture_over_time(sweep, names, tmp_path):
+    exp = samples.experiment(
+        model={
+            "kind": "system",
+            "coordinates": ["x", "y"],
+            "acceleration": {"x": "y - 2*x", "y": "x - 2*y"},
+        },
+        initial={"x": 1.0},
+        schemes=["central", "rk4"],
+        checks=[{"converges": "position_vector"}],
+        **({"sweep": sweep} if sweep else {}),
+    )
+    record, summary, decisive = found(exp)
+    with style.applied():
+        assert sorted(picture.name for picture in hero.pictures(exp, record, decisive)) == names
+    report.write(samples.plan(exp), record, summary, tmp_path)
+    page = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert "position vector converges at the order that both schemes promise" in page
+    assert "L2 norm of position vector(level) − position vector(next level)" in page

@@ -106,7 +106,7 @@ def analyse_records(experiment: Experiment, records: Mapping[int, Record]) -> Re
             table |= numbers(q)
         if q.name in judged:
             table |= _verdict(q) | phase_at_start(q)
-        if is_shown and not block.lean:
+        if is_shown and not (block.lean or q.parts):
             table |= over_time(q)
     table |= _scalars(block) | check_variables(block, quantities) | motion(block, quantities)
     table |= corner_variables(block.model, block.corners)

@@ -59,7 +59,7 @@ def units_in(record: Record) -> dict[str, str]:
     """Return the units of all quantities of a convergence Record, to be stored as `UNITS`."""
     units: dict[str, str] = {}
     # at least one of these is stored for each quantity that a check may use
-    for suffix in ("_end", "_difference_norm", "_finest"):
+    for suffix in ("_end", "_floor", "_finest"):
         for name, variable in record.variables.items():
             if name.endswith(suffix):
                 unit = str(variable.attrs.get("units", ""))

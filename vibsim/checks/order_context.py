@@ -18,7 +18,7 @@ from vibsim.checks.sentences import MemberFacts, cost_in_words, growth_in_words
 from vibsim.checks.stable import SAME_TIME, first_within
 from vibsim.comparison.comparison_variables import has_exact
 from vibsim.core.record import Record
-from vibsim.core.vocabulary import is_error_part, whole_of
+from vibsim.core.vocabulary import POSITION_VECTOR, is_error_part, whole_of
 from vibsim.experiment.schema.checks import ConvergesCheck
 from vibsim.experiment.sweep_columns import recorded_columns
 from vibsim.observe.member_block import fastest
@@ -48,7 +48,7 @@ class OrderContext:
         quantity = check.converges
         self._facts = f
         self.quantity, self.norm, self.tolerance = quantity, check.norm, check.tolerance
-        self.is_position = quantity in f.model.positions
+        self.is_position = quantity in (*f.model.positions, POSITION_VECTOR)
         self.notation, self.reason = f.notation, f.reason
         self.cause = f.word("cause")
         """Why the order differs from the expected one: one of `vibsim.comparison.order_verdict.CAUSES`."""

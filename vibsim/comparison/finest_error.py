@@ -42,10 +42,10 @@ def error_of_finest(q: Comparison) -> FinestError:
     grid, shape, finest = q.block.grid, q.block.shape, q.values[-1]
 
     def size_of(series: Floats) -> Floats:
-        return differences.norm(series, TYPICAL_NORM, grid.spacing, grid.end_included)
+        return differences.norm(series, TYPICAL_NORM, grid.spacing)
 
     def norm_of_noise(noise: Floats) -> Floats:
-        return norm_of_floor(noise, TYPICAL_NORM, len(grid.t), grid.spacing)
+        return norm_of_floor(noise, TYPICAL_NORM, q.points, grid.spacing)
 
     error = q.in_norm(TYPICAL_NORM).error[..., -1]
     round_off = norm_of_noise(ROUND_OFF_SAFETY * q.floor[..., -1] + q.blur[..., -1])

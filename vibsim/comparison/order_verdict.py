@@ -151,7 +151,7 @@ def facts_of(q: Comparison, norm: str, order: Floats, tolerance: float) -> Ladde
     # an unknown error has no row
     unknown_rows = len(grid.levels) - cosines.shape[-1]
     # norm of noise of size 1 at each point
-    weight = norm_of_floor(np.ones(1), norm, len(grid.t), grid.spacing)
+    weight = norm_of_floor(np.ones(1), norm, q.points, grid.spacing)
     return LadderFacts(
         levels=grid.levels,
         expected=all_cases(order),
@@ -193,10 +193,11 @@ def _motion(q: Comparison, order: Floats, size: Floats) -> tuple[Floats, Flags]:
     For a quantity that is promised to be exact, or a part of an error, the change is that of the positions.
     """
     # all levels share the start: a quantity at rest at all other common times shows nothing about a scheme
-    block, later = q.block, q.values[-1][..., 1:]
+    block, rows = q.block, [part.values[-1][..., 1:] for part in q.parts or (q,)]
     with np.errstate(all="ignore"):
-        change = np.asarray(np.max(later, axis=-1) - np.min(later, axis=-1))
-        bend = np.max(np.abs(np.diff(later, 2, axis=-1)), axis=-1, initial=0.0)
+        change = np.max([np.max(later, axis=-1) - np.min(later, axis=-1) for later in rows], axis=0)
+        bends = [np.max(np.abs(np.diff(x, 2, axis=-1)), axis=-1, initial=0.0) for x in rows]
+        bend = np.max(bends, axis=0)
         moved, straight = change / size, np.asarray(bend <= STRAIGHT * change)
     positions = [name for name in block.model.positions if f"{name}_max" in block.finest]
     if not positions:
@@ -228,6 +229,8 @@ def causes(
         return result
     expected, model = np.broadcast_to(order, shape), q.block.model
     states = [state.name for state in model.states if state.name != q.name and state.name in others]
+    # that one state has the expected order does not make the sum of all have it
+    any_states = [] if q.parts else states
 
     def has_order(quantity: Comparison, in_norm: str, order: Floats) -> Flags:
         with np.errstate(invalid="ignore"):
@@ -245,7 +248,7 @@ def causes(
 
     if np.any(low):
         inside = has_order(q, "linf_interior", expected) & (norm != "linf_interior")
-        kinds = [(inside, LAST_POINT), (any_expected(states), ONE_QUANTITY)]
+        kinds = [(inside, LAST_POINT), (any_expected(any_states), ONE_QUANTITY)]
         kinds.append((all_same(), EVERYTHING))
         result = np.where(low, _first(kinds, shape), result)
     if np.any(high):
@@ -257,7 +260,7 @@ def causes(
             (_at_rest(q, others), SPECIAL_TIMES),
             (_in_theory(q, judged) & ~any_expected(positions), THEORY),
             (np.any(in_other_norm, axis=0), ONE_NORM),
-            (any_expected(states), ONE_QUANTITY),
+            (any_expected(any_states), ONE_QUANTITY),
             (all_same() & same_in_all_norms, EVERYTHING),
         ]
         result = np.where(high, _first(kinds, shape), result)

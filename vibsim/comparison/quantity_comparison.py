@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import pairwise
@@ -29,9 +29,23 @@ class InNorm:
     extrapolation: Floats  # norm of exact minus extrapolated, shape (scheme, case); NaN if unknown
 
 
+def interleaved(parts: Sequence[Floats]) -> Floats:
+    """Return the series of a vector: those of its coordinates, one after the other at each time."""
+    by_time = np.stack([np.moveaxis(series, -1, 0) for series in parts], axis=1)
+    return np.moveaxis(by_time.reshape(-1, *by_time.shape[2:]), 0, -1)
+
+
+def root_mean_square(numbers: Sequence[Floats]) -> Floats:
+    """Return the noise, size or bound of a vector at one point, from those of its coordinates."""
+    return np.asarray(differences.length(np.stack(numbers, axis=-1)) / np.sqrt(len(numbers)))
+
+
 @dataclass(frozen=True)
 class Comparison:
-    """One quantity at each level, on the common grid; series have the shape (scheme, case, t)."""
+    """One quantity at each level, on the common grid; series have the shape (scheme, case, t).
+
+    Those of a vector have every coordinate at each time (`interleaved`).
+    """
 
     block: MemberBlock
     name: str
@@ -43,6 +57,7 @@ class Comparison:
     floor: Floats  # predicted round-off at one point, shape (scheme, case, level)
     scale: Floats  # size that round-off is relative to, shape (scheme, case)
     blur: Floats  # measurement error without rounding, shape (scheme, case, level)
+    parts: tuple[Comparison, ...] = ()  # the coordinates of a vector
     # cached judgements with the usual tolerance, by norm and expected order
     judged: dict[tuple[str, float | str], Judgement] = field(default_factory=dict, repr=False)
     _norms: dict[str, InNorm] = field(default_factory=dict, repr=False)
@@ -78,8 +93,11 @@ class Comparison:
 
     @cached_property
     def extrapolation(self) -> tuple[Floats, Floats]:
-        """Extrapolation to a vanishing step, and the bound of its error; only the largest bound in a lean block."""
+        """Extrapolation to a vanishing step, and its error bound; if lean, or of a vector, only the largest one."""
         block = self.block
+        if self.parts:
+            values = interleaved([q.extrapolation[0] for q in self.parts])
+            return values, root_mean_square([q.largest_bound for q in self.parts])[..., None]
         even = even_powers(block.experiment, self.name, block.columns)
         order = np.where(np.isinf(self.order), th.EXACT_ORDER, self.order)
         value, bound = extrapolate_series(
@@ -88,6 +106,21 @@ class Comparison:
         bound = block.safety(th.IRREGULAR)[:, None] * bound
         unseen = block.unseen_at_corner(self.scale)[..., None]
         return value, bound + ROUND_OFF_SAFETY * self.floor[..., -1:] + unseen
+
+    @property
+    def points(self) -> int:
+        """Number of points of a series."""
+        return len(self.block.grid.t) * self.width
+
+    @property
+    def width(self) -> int:
+        """Number of coordinates of a vector, else 1."""
+        return max(len(self.parts), 1)
+
+    @property
+    def end_included(self) -> int:
+        """Number of points at the end of the run, 0 if that is not a common time."""
+        return self.block.grid.end_included * self.width
 
     @property
     def largest_bound(self) -> Floats:
@@ -117,18 +150,17 @@ class Comparison:
         if not rows:
             # a single level whose error is unknown
             return np.zeros((*self.block.shape, 0, 0))
-        return differences.cosines(rows, kind, self.block.grid.end_included)
+        return differences.cosines(rows, kind, self.end_included)
 
     def combined(self, kind: str, rows: Flags, first: int, weights: Floats) -> Floats:
         """Return the norm of a weighted sum of successive differences, starting with index `first`.
 
         `rows` selects schemes and members, shape (scheme, case); the result is flat.
         """
-        grid = self.block.grid
         terms = zip(weights, self.differences[first:], strict=False)
         combination = sum((w * d[rows] for w, d in terms), np.zeros(1))
-        spacing = np.broadcast_to(grid.spacing, self.block.shape)[rows]
-        return differences.norm(combination, kind, spacing, grid.end_included)
+        spacing = np.broadcast_to(self.block.grid.spacing, self.block.shape)[rows]
+        return differences.norm(combination, kind, spacing, self.end_included)
 
     def _measured(self, kind: str) -> InNorm:
         grid, shape, errors = self.block.grid, self.block.shape, self.errors
@@ -137,7 +169,7 @@ class Comparison:
             return by_level(rows) if rows else np.empty((*shape, 0))
 
         def norm(series: Floats) -> Floats:
-            return differences.norm(series, kind, grid.spacing, grid.end_included)
+            return differences.norm(series, kind, grid.spacing, self.end_included)
 
         unknown = np.full((*shape, len(grid.levels)), np.nan)
         error_of_limit = None if self.exact is None else self.exact - self.extrapolation[0]

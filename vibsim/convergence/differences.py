@@ -51,10 +51,11 @@ def largest(values: Floats) -> Floats:
     return np.asarray(np.maximum(np.max(values, axis=-1), -np.min(values, axis=-1)))
 
 
-def norm(error: Floats, kind: str, spacing: Floats, end_included: bool = True) -> Floats:
+def norm(error: Floats, kind: str, spacing: Floats, end_included: int = 1) -> Floats:
     """Return a norm over time.
 
-    ``l1 = dt sum |e|``, ``l2 = sqrt(dt sum e^2)``, ``linf = max |e|``; ``linf_interior`` excludes the end point.
+    ``l1 = dt sum |e|``, ``l2 = sqrt(dt sum e^2)``, ``linf = max |e|``; ``linf_interior`` excludes the end. A vector has
+    its coordinates one after the other at each time, so that sums and maxima are over all of them.
 
     Parameters
     ----------
@@ -63,10 +64,10 @@ def norm(error: Floats, kind: str, spacing: Floats, end_included: bool = True) -
     spacing
         Distance between the points, shape (case,) or (1,).
     end_included
-        Whether the last point is the end of the time interval.
+        How many of the last numbers belong to the end of the time interval, 0 if it is not there.
     """
     if kind == "linf_interior" and end_included:
-        error = error[..., :-1]
+        error = error[..., :-end_included]
     if kind in {"linf", "linf_interior"}:
         return largest(error)
     with np.errstate(over="ignore", invalid="ignore"):
@@ -181,14 +182,14 @@ def unit(series: Floats, size: Floats) -> Floats:
     return np.asarray(series / np.where(usable, size, np.nan)[..., None])
 
 
-def cosines(rows: Sequence[Floats], kind: str, end_included: bool = True) -> Floats:
+def cosines(rows: Sequence[Floats], kind: str, end_included: int = 1) -> Floats:
     """Return the cosines of the angles between series, shape (..., row, row); 0 if one of them vanishes.
 
     They fit the norm: for ``linf`` points are weighted by how large the series are there (`PEAKS`), and
-    ``linf_interior`` excludes the end point.
+    ``linf_interior`` excludes the end.
     """
     if kind == "linf_interior" and end_included:
-        rows = [series[..., :-1] for series in rows]
+        rows = [series[..., :-end_included] for series in rows]
     if kind in {"linf", "linf_interior"}:
         sizes = [np.abs(np.nan_to_num(unit(series, largest(series)))) for series in rows]
         weight = whole_power(np.maximum.reduce(sizes), PEAKS)

@@ -112,6 +112,9 @@ HIGHEST = "highest_omega_dt"
 """Variable with the highest angular frequency of small oscillations times the step, if it is not that of the period."""
 PHASE, AMPLITUDE = "_phase_error", "_amplitude_error"
 """Suffixes that form the names of the error parts of a position."""
+POSITION_VECTOR, VELOCITY_VECTOR = "position_vector", "velocity_vector"
+VECTORS = (POSITION_VECTOR, VELOCITY_VECTOR)
+"""All coordinates of a model with several, taken together: compared between levels, but not stored as series."""
 CENTRED = "_d2t"
 """Suffix of velocities and energies computed with the centred difference ``[D_2t u]`` of the position."""
 

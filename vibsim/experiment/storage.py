@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from vibsim.core.vocabulary import is_error_part
+from vibsim.core.vocabulary import VECTORS, is_error_part
 from vibsim.experiment.data import ExperimentSpec
 from vibsim.experiment.value_names import MOST_EVENTS
 
@@ -119,8 +119,9 @@ def lean_series(experiment: ExperimentSpec) -> tuple[str, ...]:
     checks.
     """
     states = (state.name for state in experiment.model.definition.states)
-    # parts of an error are computed from the states
-    checked = (name for name in checked_quantities(experiment) if not is_error_part(name))
+    # parts of an error and vectors are computed from the states
+    computed = {name for name in checked_quantities(experiment) if is_error_part(name)} | {*VECTORS}
+    checked = (name for name in checked_quantities(experiment) if name not in computed)
     return tuple(dict.fromkeys([*states, "energy_deviation", *checked]))
 
 

@@ -17,7 +17,14 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from vibsim.core.array_types import Floats
-from vibsim.core.vocabulary import AMPLITUDE, CENTRED, PHASE
+from vibsim.core.vocabulary import (
+    AMPLITUDE,
+    CENTRED,
+    PHASE,
+    POSITION_VECTOR,
+    VECTORS,
+    VELOCITY_VECTOR,
+)
 from vibsim.formula import (
     CONSTANTS,
     FUNCTIONS,
@@ -271,7 +278,7 @@ def tree(model: Model, formula: Formula) -> Expression:
     return parse(formula, (*(state.name for state in model.states), "t", *parameter_names(model)))
 
 
-_TAKEN = ("t", "scheme", "case", "level", "status", "end")
+_TAKEN = ("t", "scheme", "case", "level", "status", "end", *VECTORS)
 """Names that have another meaning in files or formulas."""
 
 
@@ -406,6 +413,12 @@ def quantities(model: Model, own_velocity: bool = False) -> tuple[str, ...]:
         *(output.name for output in model.outputs),
         *(centred(model) if own_velocity else ()),
     )
+
+
+def components(model: Model, quantity: str) -> tuple[str, ...]:
+    """Return the states that a vector of all coordinates consists of; any other quantity unchanged."""
+    vectors = {POSITION_VECTOR: model.positions, VELOCITY_VECTOR: model.velocities}
+    return vectors.get(quantity, (quantity,))
 
 
 def has_error_parts(model: Model) -> bool:

@@ -15,7 +15,7 @@ from functools import partial
 from typing import Any
 
 from vibsim.core.array_types import Floats
-from vibsim.models.base import BUDGET, Model
+from vibsim.models.base import BUDGET, Model, components
 from vibsim.models.events import TREATMENTS
 from vibsim.schemes.orders import Beginning, Orders, depends_on_velocity
 
@@ -274,7 +274,7 @@ class Scheme:
         An event left to the mesh is noticed up to a step late, which limits the order to 1. A corner of the force
         inside a step limits it to 2 (`ORDER_AT_CORNERS`). A motion that meets no event is smooth.
         """
-        orders = self.orders(options)
+        quantity, orders = components(model, quantity)[0], self.orders(options)
         if model.events is None or not meets_events:
             order = orders.of(quantity, model, beginning)
             # the power of the force has corners, wherever steps end; the power of damping has none
@@ -299,7 +299,9 @@ class Scheme:
         if model.events is not None or not self._resolves_corners(model):
             return False
         even = self.even_powers
-        return even if isinstance(even, bool) else even(quantity, model, options)
+        return (
+            even if isinstance(even, bool) else even(components(model, quantity)[0], model, options)
+        )
 
     def _resolves_corners(self, model: Model) -> bool:
         """Tell whether the force is smooth in every step: steps end at the corners and do not look back across them."""

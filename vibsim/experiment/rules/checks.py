@@ -7,7 +7,7 @@ from itertools import count
 from typing import Any
 
 from vibsim.core.errors import nearest
-from vibsim.core.vocabulary import BY_TOLERANCE, REASONS, is_error_part, plain_name
+from vibsim.core.vocabulary import BY_TOLERANCE, REASONS, VECTORS, is_error_part, plain_name
 from vibsim.experiment.faults import Report
 from vibsim.experiment.rules.check_places import Scope
 from vibsim.experiment.rules.potential import NOT_FOUND
@@ -28,7 +28,7 @@ from vibsim.experiment.schema.published import row_at, row_id
 from vibsim.experiment.value_names import CASES, OF_THE_SAME_KIND, VALUES, Value
 from vibsim.experiment.yaml.parse import Path_
 from vibsim.models import BUDGET, centred, has_budget, has_solution
-from vibsim.models.base import Model, error_parts, has_error_parts
+from vibsim.models.base import Model, components, error_parts, has_error_parts
 from vibsim.models.shared.free import why_not_free
 from vibsim.models.structure import MOST_MODES
 
@@ -157,9 +157,14 @@ def _instead_of_energy(scope: Scope) -> str:
     return budget if has_budget else ""
 
 
-def _check_quantity(name: str, key: str, schemes: Sequence[str] | None, scope: Scope) -> None:
-    """Check that the quantity under a key of a check exists, and that the schemes named by the check have it."""
-    if _is_quantity(name, scope.setting.quantities, scope.at(key)):
+def _check_quantity(
+    name: str, key: str, schemes: Sequence[str] | None, scope: Scope, more: tuple[str, ...] = ()
+) -> None:
+    """Check that the quantity under a key of a check exists, and that the schemes named by the check have it.
+
+    It may also be one of `more`.
+    """
+    if _is_quantity(name, (*scope.setting.quantities, *more), scope.at(key)):
         _must_have(name, ((s, scope.at("schemes", i)) for i, s in enumerate(schemes or ())))
 
 
@@ -191,7 +196,7 @@ def _check_convergent(name: str, key: str, schemes: Sequence[str] | None, scope:
     """Check that levels can be compared by the quantity under a key."""
     model = scope.setting.model
     if not is_error_part(name):
-        _check_quantity(name, key, schemes, scope)
+        _check_quantity(name, key, schemes, scope, _vectors(model))
     elif model is not None and name not in error_parts(model):
         rule, hint = "unknown quantity", nearest(name, error_parts(model))
         if not has_error_parts(model):
@@ -199,6 +204,26 @@ def _check_convergent(name: str, key: str, schemes: Sequence[str] | None, scope:
             rule = f"does not exist: {model.kind} has {what}, and only a smooth motion has a phase and an amplitude"
             hint = f"ask for {model.position}"
         scope.at(key).refuse(rule, hint, name)
+
+
+def _vectors(model: Model | None) -> tuple[str, ...]:
+    """Return the vectors of all coordinates; none for a single one."""
+    return VECTORS if model is not None and model.coordinates > 1 else ()
+
+
+def _is_vector(name: str, model: Model, place: Scope) -> bool:
+    """Tell whether a model has several coordinates to take together, in one unit; report a fault otherwise."""
+    states = [state for state in model.states if state.name in components(model, name)]
+    if len(states) == 1:
+        rule = f"takes several coordinates together, and {model.kind} has one here"
+        place.refuse(rule, f"ask for {states[0].name}", name)
+        return False
+    if len({state.unit for state in states}) > 1:
+        listed = ", ".join(f"{state.name} [{state.unit}]" for state in states)
+        rule = f"is a sum over coordinates of one unit, and these have several: {listed}"
+        place.refuse(rule, "give each coordinate a check of its own", name)
+        return False
+    return True
 
 
 def check_expect(expect: Expect, path: Path_, report: Report) -> None:
@@ -301,7 +326,7 @@ def _check_equal(check: EqualCheck, scope: Scope) -> None:
         named.append((check.second, second))
         if check.first == check.second:
             second.refuse("must differ from the first", value=check.second)
-    setting, what, choices = scope.setting, "", scope.setting.quantities
+    setting, what, choices = scope.setting, "equal", scope.setting.quantities
     if check.second in SOLUTIONS and setting.model is not None:
         what, choices = check.second, tuple(state.name for state in setting.model.states)
         if check.second == "exact":
@@ -328,6 +353,8 @@ def _is_quantity(
     With `is_at_best` the value exists at single levels, but not in their limit.
     """
     model = scope.setting.model
+    if name in VECTORS and model is not None and not _is_vector(name, model, scope):
+        return False
     if not choices or name in choices:
         return True
     if model is not None and name in centred(model) and not scope.setting.own_velocity:
@@ -336,7 +363,7 @@ def _is_quantity(
             rule = "does not exist: across an event the centred difference is no velocity"
         scope.refuse(rule, f"ask for {plain_name(name)}", name)
         return False
-    known = name in scope.setting.quantities
+    known = name in (*scope.setting.quantities, *VECTORS)
     where = " at `level: best`" if is_at_best else ""
     rule = f"{what}{where} is not defined for this quantity" if known else "unknown quantity"
     hints = ["choose from " + ", ".join(choices) if known else nearest(name, choices)]
@@ -481,4 +508,5 @@ def _allowed(row: Value, setting: Setting, best: bool = False) -> tuple[str, ...
         return choices[row.of]
     if best:
         return (*states, *ENERGIES, *centred_names)
-    return (*setting.quantities, *(error_parts(model) if row.of == "convergent" else ()))
+    compared = (*error_parts(model), *_vectors(model))
+    return (*setting.quantities, *(compared if row.of == "convergent" else ()))

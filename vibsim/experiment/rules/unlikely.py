@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from vibsim.core.vocabulary import VECTORS
 from vibsim.experiment.faults import Report
 from vibsim.experiment.rules.formulas import NAME
 from vibsim.experiment.rules.members import MemberNumbers
@@ -57,6 +58,8 @@ def note_unlikely(
             continue
         inner = check.measured
         path: Path_ = ("checks", i) if inner is check else ("checks", i, "that")
+        if inner.about in VECTORS and setting.model is not None:
+            _warn_mixed(path, inner.about, setting.model, report)
         match inner:
             case AccurateCheck(relative=float(bound)) if bound >= 1.0:
                 rule = f"is {bound:g} times the size of {inner.accurate}, and nearly every error is below that"
@@ -90,6 +93,15 @@ def _warn_angles(setting: Setting, report: Report) -> None:
         for path, values in _unitless_starts(report.source.data, state.name):
             largest = max(map(abs, values), default=0.0)
             _note_angle(path, largest, report)
+
+
+def _warn_mixed(path: Path_, vector: str, model: Model, report: Report) -> None:
+    """Warn about a vector of angles and other coordinates, if only the equation shows which are angles."""
+    turning = set(angles(model)) & set(model.positions)
+    others = [name for name in model.positions if name not in turning]
+    if model.dimensionless and turning and others:
+        rule = f"{vector} adds squares of {min(turning)}, an angle, and of {others[0]}"
+        report.note(path, rule, "a sum means something only in one unit")
 
 
 def _warn_phases(setting: Setting, report: Report) -> None:

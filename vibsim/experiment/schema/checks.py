@@ -304,8 +304,9 @@ class ConvergesCheck(MeasuringCheck):
     kind: ClassVar[Literal["converges"]] = "converges"
     stand_ins = MappingProxyType({"converges": STAND_IN})
     converges: Text
-    """The quantity: a state, energy, energy_deviation, kinetic_energy, potential_energy, or the part of an error
-    `<position>_phase_error` or `<position>_amplitude_error`."""
+    """The quantity: a state, energy, energy_deviation, kinetic_energy, potential_energy, all coordinates as
+    position_vector or velocity_vector, or the part of an error `<position>_phase_error` or
+    `<position>_amplitude_error`."""
     order: Order = "scheme"
     """The order: `scheme` for the order that the scheme promises, or a number."""
     tolerance: Positive = ORDER_TOLERANCE

@@ -6,6 +6,7 @@ import keyword
 import re
 from collections.abc import Iterator, Sequence
 
+from vibsim.core.vocabulary import VECTORS
 from vibsim.formula import CONSTANTS, FUNCTIONS, Binary, Call, Name
 from vibsim.formula.tree import walk
 from vibsim.models.base import BUDGET, ENERGIES, Model, State, tree
@@ -49,7 +50,7 @@ def name_fault(name: str, others: tuple[str, ...] = ()) -> str:
         return f"'{name}' is a word of the grammar of formulas and cannot be a name"
     if name in FUNCTIONS or name in CONSTANTS:
         return f"'{name}' is a {'function' if name in FUNCTIONS else 'constant'} of formulas"
-    stored = (*ENERGIES, *BUDGET, *NUMBERS)
+    stored = (*ENERGIES, *BUDGET, *VECTORS, *NUMBERS)
     if name in TAKEN or name in stored or name in others:
         return f"'{name}' has another meaning already, in formulas or in results"
     pairs = [*((name, of) for of in (*stored, *SECTIONS, *others)), *((of, name) for of in others)]

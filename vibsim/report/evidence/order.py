@@ -33,7 +33,7 @@ def picture(
         "Bar, and in brackets above: the stated order with its 95 % interval, which often ends at a whole power."
     )
     figure = style.canvas(1.0)
-    has_series = not data.is_lean(record)
+    has_series = f"{quantity}_rescaled" in record
     if has_series:
         _draw_differences(figure, record, quantity, member)
     _draw_orders(figure, record, check, member, norm)

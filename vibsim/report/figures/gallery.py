@@ -122,7 +122,8 @@ def _of_quantity(
     """
     has_pairs, letter = bool(data.whole(record, "pair")), words.symbol(quantity)
     is_energy = quantity == "energy_deviation" and "energy_deviation_scaled" in record
-    are_compared = has_pairs and (not is_energy or quantity in checked_quantities(experiment))
+    has_series = f"{quantity}_difference" in record
+    are_compared = has_series and (not is_energy or quantity in checked_quantities(experiment))
     # maps and curves of a sweep show the other members
     shared: Drawn = [order.against_step(experiment, record, quantity, case)] if has_pairs else []
     tabs = list[tuple[str, Drawn]]()

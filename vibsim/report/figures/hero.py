@@ -75,9 +75,9 @@ def _legend(ax: Axes, columns: int, size: float) -> None:
 
 def differences(record: Record, lead: Lead) -> Picture | None:
     """Draw the rescaled differences of the levels; None without stored series or with a single level."""
-    if data.is_lean(record) or not data.whole(record, "pair"):
-        return None
     quantity, member = lead.quantity, lead.member
+    if f"{quantity}_difference" not in record:
+        return None
     t, curves = data.times(record, member.case), time.differences(record, quantity, member)
     shown = [curve for curve in curves if curve.is_readable] or curves
     values = [curve.values for curve in shown]
