@@ -359,7 +359,7 @@ def test_stated_noise_is_that_of_all_levels(points: int) -> None:
 
 
 def test_sizes_near_the_ends_of_double_precision_have_no_finer_one() -> None:
-    advice = [judge([4 * s, 2 * s, s], [1.0, 2.0, 2.3], order=2).advice for s in (1.0, 5e-324)]
+    advice = [judge([4 * s, 2 * s, s], [1.0, 2.0, 7 / 3], order=2).advice for s in (1.0, 5e-324)]
     assert advice == ["Add a finer level, such as h = 0.5.", "Add a finer level."]
 
 
@@ -368,7 +368,7 @@ def test_every_reason_has_a_sentence() -> None:
 
     # levels alone do not show these; `not_applicable` is a case of the interpolation
     others = {"match", "mismatch", "unstable", "non_smooth", "not_applicable"}
-    cases = {"interpolation", "growing", "noisy", "contradicted"}
+    cases = {"interpolation", "growing", "noisy", "rounded", "contradicted"}
     assert set(SENTENCES) == REASONS.keys() - others | cases
     for reason, status in REASONS.items():
         if reason in others:

@@ -50,6 +50,29 @@ def test_finer_levels_are_not_advised_where_they_would_show_noise() -> None:
     assert verdict.advice == "Use coarser levels, or compute u with less noise."
 
 
+def test_finer_levels_are_not_advised_where_they_would_show_round_off() -> None:
+    """RK4 on u' = u (1 - u) with 50 to 1600 steps per unit: the last difference is 40 units of the last digit."""
+    values = [
+        *(0.45085306019019267, 0.4508530603674143, 0.45085306037854034),
+        *(0.4508530603792373, 0.4508530603792806, 0.4508530603792843),
+    ]
+    verdict = judge([0.02 * 2.0**-k for k in range(6)], values)
+    assert verdict.reason == "pre_asymptotic"
+    assert "differ by little more than round-off" in verdict.sentence
+    assert verdict.advice == "Use coarser levels, or compute u with less noise."
+
+
+@pytest.mark.parametrize("values", [[1.7197, 1.7186, 1.7184, 1.7183], [1.72, 1.719, 1.718, 1.718]])
+def test_printed_values_with_too_few_digits_hide_the_order(values: list[float]) -> None:
+    """The trapezoidal rule for exp(x) from 0 to 1, of order 2."""
+    verdict = judge([0.1, 0.05, 0.025, 0.0125], values, order=2)
+    assert verdict.status == "INCONCLUSIVE"
+    assert verdict.advice == "Use coarser levels, or give u with more digits."
+    assert verdict.order_low is not None
+    assert verdict.order_high is not None
+    assert verdict.order_low <= 2.0 <= verdict.order_high
+
+
 def test_what_noise_explains_has_a_bound_and_not_the_error_0() -> None:
     verdict = judge(H, [1.001, 1.002, 0.9995, 1.0], order=2, noise=1e-3)
     assert verdict.reason == "exact"

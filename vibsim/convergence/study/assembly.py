@@ -15,10 +15,13 @@ from vibsim.convergence.study.outcomes import LEAST_RATIO, Outcome, Request
 from vibsim.convergence.study.refinement import Refinement
 from vibsim.convergence.study.sentences import Setting, describe
 from vibsim.convergence.study.verdict import LadderVerdict, Level
+from vibsim.convergence.thresholds import ABOVE_ROUND_OFF
 from vibsim.core.array_types import Floats
 from vibsim.core.vocabulary import LEVELS_OF_AN_ORDER, ORDER_TOLERANCE, REASONS
 from vibsim.elementary import on_arrays
 
+NOISE_SEEN = 4.0
+"""A difference of two levels above this multiple of their stated noise is hardly noise."""
 ROUNDING_SAID = 0.1
 """A sentence mentions the rounding of printed digits if it is more than this part of the error bound."""
 
@@ -66,7 +69,11 @@ def verdict(
         best_values=None if outcome.best is None else outcome.best.reshape(values.shape[1:]),
     )
     setting = Setting(
-        noise=request.noise or 0.0,
+        is_noise_stated=bool(request.noise),
+        is_noise_seen=_is_noise_seen(request, outcome),
+        are_digits_few=not request.noise
+        and outcome.half > 0.0
+        and not _finest(outcome) > ABOVE_ROUND_OFF * outcome.half,
         sizes=steps.names,
         is_proportional=steps.is_proportional,
         interpolation=(common.kind, common.interpolation_order or 0) if hidden else None,
@@ -77,6 +84,19 @@ def verdict(
     )
     sentence, advice = describe(facts, setting)
     return replace(facts, sentence=sentence, advice=advice)
+
+
+def _finest(outcome: Outcome) -> float:
+    """Return the size of the difference of the finest two levels; NaN if there are no two, or they are the same."""
+    size = float(np.abs(outcome.differences[-1])) if len(outcome.differences) else 0.0
+    return size if size > 0.0 else np.nan
+
+
+def _is_noise_seen(request: Request, outcome: Outcome) -> bool:
+    """Say whether the finest difference may be noise, stated or of rounding, so that a finer level would not help."""
+    if request.noise:
+        return not _finest(outcome) > NOISE_SEEN * request.noise
+    return _finest(outcome) <= ABOVE_ROUND_OFF * outcome.floor
 
 
 def _order_shift(outcome: Outcome, h: Floats) -> float:

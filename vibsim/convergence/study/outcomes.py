@@ -104,6 +104,8 @@ class Outcome:
     """Whether the exact values were ignored because they have too few digits to show the error of the levels."""
     rounded: float = 0.0
     """Error of the extrapolated values due to the rounding of the levels; part of the bounds."""
+    half: float = 0.0
+    """Half a unit of the last digit of the finest level; 0 if it was not rounded."""
     comes_in_steps: bool = False
     """Whether that error is due to values that come in steps."""
 
@@ -266,16 +268,12 @@ def _with_finite(
 def _allow_for_rounding(
     assessment: Assessment, measured: Measurement, half: Floats, question: Question
 ) -> None:
-    """Revise the assessment of values with few digits if noise as large as their rounding leads to another one.
+    """Revise a decision on values with few digits if noise as large as their rounding leads to another one.
 
-    If both agree, the interval of the order becomes the union of both. `half` is half a unit of the last digit, shape
+    Otherwise the interval of the order becomes the union of both. `half` is half a unit of the last digit, shape
     (member, n).
     """
-    is_near = assessment.error * measured.scale <= MOST_UNITS * half[:, -1]
-    is_doubtful = is_one_of(assessment.reason, *DECIDED) | (
-        is_near & is_one_of(assessment.reason, "wrong_limit")
-    )
-    rows = np.flatnonzero((half[:, -1] > 0.0) & is_doubtful)
+    rows = np.flatnonzero(half[:, -1] > 0.0)
     if not len(rows):
         return
     ladder = measured.ladder.some(rows)
@@ -283,11 +281,15 @@ def _allow_for_rounding(
     rounding = (half / math.sqrt(3.0) / measured.scale[:, None])[rows]
     ladder = replace(ladder, floor=np.maximum(ladder.floor, rounding))
     rounded = assess(ladder, replace(question, is_noise_stated=True))
-    agrees = rounded.reason == assessment.reason[rows]
+    is_near = assessment.error * measured.scale <= MOST_UNITS * half[:, -1]
+    is_doubtful = is_one_of(assessment.reason, *DECIDED) | (
+        is_near & is_one_of(assessment.reason, "wrong_limit")
+    )
+    is_revised = is_doubtful[rows] & (rounded.reason != assessment.reason[rows])
     assessment.low[rows] = np.fmin(assessment.low[rows], rounded.low)
     assessment.high[rows] = np.fmax(assessment.high[rows], rounded.high)
     for entry in fields(Assessment):
-        getattr(assessment, entry.name)[rows[~agrees]] = getattr(rounded, entry.name)[~agrees]
+        getattr(assessment, entry.name)[rows[is_revised]] = getattr(rounded, entry.name)[is_revised]
 
 
 def _measure(
@@ -367,13 +369,15 @@ def _decide(
     outcome.left_out = len(finite_values) - len(judged_values)
     outcome.low, outcome.high = float(assessment.low[k]), float(assessment.high[k])
     outcome.is_contradicted = bool(assessment.contradicted[k])
+    halves = request.halves(judged_values, places)
+    outcome.half = float(halves[-1])
     if np.isfinite(weights).all():
         # summed one by one, so that a member has the same bits alone and among others
         outcome.best = sum(
             (w * row for w, row in zip(weights, judged_values, strict=True)), 0.0 * judged_values[0]
         )
         added_up = ADDED_UP * SINGLE * measured.norms[k, -1] * measured.are_single[k]
-        halves, step = request.halves(judged_values, places), step_of_values(judged_values)
+        step = step_of_values(judged_values)
         units = np.maximum(halves, float(added_up))
         # printed values differ by some units of their last digit: these are no steps
         outcome.comes_in_steps = step > 10.0 * float(np.max(units))

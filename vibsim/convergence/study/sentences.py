@@ -26,8 +26,12 @@ if TYPE_CHECKING:
 class Setting:
     """Facts beside the verdict that the words on a ladder use."""
 
-    noise: float = 0.0
-    """Noise of the levels, as the user states it."""
+    is_noise_stated: bool = False
+    """Whether the user states the noise of the levels."""
+    is_noise_seen: bool = False
+    """Whether the finest difference may be noise, so that a finer level would not help."""
+    are_digits_few: bool = False
+    """Whether the rounding of the values to their last digit may hide the order."""
     sizes: tuple[str, ...] = ("h",)
     """Names of the sizes that are refined together."""
     is_proportional: bool = True
@@ -44,8 +48,6 @@ class Setting:
     """Sentences on what was compared: points, levels left out, rounding."""
 
 
-NOISE_SEEN = 4.0
-"""A difference of two levels above this multiple of their noise is hardly noise."""
 BEYOND_ROUND_OFF = 1e-10
 """A difference above this part of the values is not round-off."""
 APART = 1e-3
@@ -54,7 +56,7 @@ LOOK_FOR = (
     "Look for a part of lower order, such as the first step, a formula at a boundary, a limiter, or an iteration that "
     "stops too early"
 )
-NOT_FINER = "Use coarser levels, or compute {quantity} with less noise."
+NOT_FINER = "Use coarser levels, or {less_noise}."
 ROUNDED = (
     "If the step sizes were rounded to the digits that they have, that alone may change the order."
 )
@@ -92,6 +94,11 @@ SENTENCES: Mapping[str, tuple[str, str]] = MappingProxyType(
             "{estimate}.",
             NOT_FINER,
         ),
+        "rounded": (
+            "The levels of {quantity} do not show a settled order yet{estimate}. The rounding of the values to their "
+            "last digit may hide it.",
+            NOT_FINER,
+        ),
         "contradicted": (
             "The levels of {quantity} down to {size} = {last_used} fit order {order}, but finer ones contradict them: "
             "they differ by more than the levels before them.",
@@ -123,19 +130,21 @@ SENTENCES: Mapping[str, tuple[str, str]] = MappingProxyType(
     }
 )
 """Templates of sentence and advice by the reasons that levels alone show. ``interpolation`` is the only case of
-``not_applicable``; ``noisy`` and ``contradicted`` are cases of ``pre_asymptotic``, and ``growing`` is one of this and
-of ``round_off``."""
+``not_applicable``; ``noisy``, ``rounded`` and ``contradicted`` are cases of ``pre_asymptotic``, and ``growing`` is one
+of this and of ``round_off``."""
 
 
 def describe(facts: LadderVerdict, setting: Setting) -> tuple[str, str]:
     """Return sentence and advice on a ladder; the advice is empty if it passed."""
     key = "interpolation" if setting.interpolation else facts.reason
-    if key == "pre_asymptotic" and _is_noise_seen(facts, setting):
+    if key == "pre_asymptotic" and setting.is_noise_seen:
         key = "noisy"
     elif key == "pre_asymptotic" and setting.is_contradicted and facts.order is not None:
         key = "contradicted"
     elif facts.order is not None and facts.order < 0.0 and _is_growth(facts, setting):
         key = "growing"
+    elif key == "pre_asymptotic" and setting.are_digits_few:
+        key = "rounded"
     phrases = _phrases(facts, setting)
     is_moved = key == "pre_asymptotic" or bool(_higher_part(facts))
     sentence, advice = (template.format_map(phrases) for template in SENTENCES[key])
@@ -161,19 +170,13 @@ def describe(facts: LadderVerdict, setting: Setting) -> tuple[str, str]:
     return _joined([sentence, *more]), _joined([advice, *setting.notes])
 
 
-def _is_noise_seen(facts: LadderVerdict, setting: Setting) -> bool:
-    """Say whether the finest difference may be the stated noise, so that a finer level would not help."""
-    finest = facts.levels[-2:][0].difference
-    return finest is not None and abs(finest) <= NOISE_SEEN * setting.noise
-
-
 def _is_growth(facts: LadderVerdict, setting: Setting) -> bool:
     """Say whether growing differences mean levels that move apart, and not noise."""
     if facts.reason != "round_off":
         return facts.reason == "pre_asymptotic"
     finest = facts.levels[-2:][0]
     size = abs(finest.value or 0.0)
-    return not setting.noise and abs(finest.difference or 0.0) > APART * size > 0.0
+    return not setting.is_noise_stated and abs(finest.difference or 0.0) > APART * size > 0.0
 
 
 def _joined(parts: Sequence[str]) -> str:
@@ -205,8 +208,11 @@ def _phrases(facts: LadderVerdict, setting: Setting) -> dict[str, Any]:
         "as_expected": as_expected,
         "wanted": wanted,
         "value": "value" if facts.is_number else "values",
-        "noise": "the stated noise" if setting.noise else "round-off",
-        "floor": "the stated noise" if setting.noise else "round-off or other noise",
+        "noise": "the stated noise" if setting.is_noise_stated else "round-off",
+        "floor": "the stated noise" if setting.is_noise_stated else "round-off or other noise",
+        "less_noise": f"give {facts.quantity} with more digits"
+        if setting.are_digits_few
+        else f"compute {facts.quantity} with less noise",
         "not_finite": f"{facts.size_name} = {listed(not_finite)}",
         "these": these,
         "estimate": f" (the last estimate is {number(round(facts.order, 3) + 0.0, 3)})"
