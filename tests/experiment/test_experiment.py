@@ -9,6 +9,7 @@ import subprocess
 import sys
 from copy import deepcopy
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -374,6 +375,12 @@ def test_dictionary_that_contains_itself() -> None:
     data["model"] = data
     with pytest.raises(InputError, match="nest deeper"):
         Experiment.from_dict(data)
+
+
+@pytest.mark.parametrize("content", [None, [1], "my_pendulum.yaml"])
+def test_what_is_no_dictionary_is_refused(content: Any) -> None:
+    with pytest.raises(InputError, match="must be a mapping of keys to values"):
+        Experiment.from_dict(content)
 
 
 def test_dictionary_faults_have_no_line() -> None:

@@ -59,6 +59,19 @@ def test_a_table_is_read_as_it_is_written(tmp_path: Path) -> None:
     assert found.heights.tolist() == [float(f"{h:g}") for h in HEIGHTS]
 
 
+@pytest.mark.parametrize(
+    ("head", "first"), [("place,z", True), ("t,x", True), ("h,place", False), ("z,x", False)]
+)
+def test_of_two_columns_one_holds_the_places(tmp_path: Path, head: str, *, first: bool) -> None:
+    """Times come first, even before a column that is called x, as the measured displacement of a base."""
+    rows = ROWS if first else [",".join(reversed(row.split(","))) for row in ROWS]
+    table(tmp_path, rows, head)
+    assert road(tmp_path).model.tables["road"].table.heights.tolist() == pytest.approx(HEIGHTS)
+    table(tmp_path, [*rows[:5], *rows[6:]], head)
+    place = head.split(",")[0 if first else 1]
+    assert f"line 7: '{place}' must be equally spaced" in only_fault(tmp_path).rule
+
+
 @pytest.mark.parametrize("form", ["NETCDF4", "NETCDF3_CLASSIC"])
 def test_a_road_in_a_netcdf_file_is_the_same_road(tmp_path: Path, form: Any) -> None:
     table(tmp_path, ROWS)

@@ -91,6 +91,7 @@ def test_the_last_of_several_counts_and_an_alias_elsewhere_stays(file: Path) -> 
     found = Experiment.from_yaml(file, settings=["model.g=2", "model.g=3"])
     assert found.model.parameters["g"] == 3.0
     assert found.model.parameters["L"] == 1.0
+    assert Experiment.from_yaml(file, settings="model.g=2").settings == ("model.g=2",)
 
 
 FAULTS = {

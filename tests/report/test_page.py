@@ -530,6 +530,8 @@ def test_a_number_within_round_off_has_two_digits():
     )
     assert re.fullmatch(r"\d\.\d·10⁻¹.", noise)
     assert len(number) > 10
+    asked = [cards.card(exp, record, c)["wanted"] for c in samples.summary(exp, record)["checks"]]
+    assert asked == ["conserved up to round-off", "an error that stays bounded"]
 
 
 def test_a_member_alone_carries_its_worst_verdict():

@@ -11,7 +11,7 @@ and k follows from the difference of the two formulas on either side. The corner
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from typing import Any
@@ -184,9 +184,12 @@ def _of_scheme(
     edge = np.where(law.whole[:, None, None], edge, 0.0)
     fraction = (edge - q[..., :-1]) / (q[..., 1:] - q[..., :-1])
     at = t[:, :-1] + fraction * np.diff(t)
-    in_time = np.array(_depends_on_time(law))[:, None, None]
-    passed = (np.diff(modes) != 0.0) & (in_time | ~has_event)
-    passed &= np.array([_is_inside_steps(law.model, row) for row in law.switches])[:, None, None]
+    in_time = _independent_of(law, [state.name for state in law.model.states])
+    crossed = np.diff(modes) != 0.0
+    crossed &= np.array([_is_inside_steps(law.model, row) for row in law.switches])[:, None, None]
+    passed = crossed & (in_time | ~has_event)
+    # what an event leaves as it is passes there, perhaps at the event itself
+    at_event = crossed & ~passed & _independent_of(law, _changed_at_events(law.model))
     is_within = ~is_on_a_point(at, dt[:, None])
     every = np.arange(cases)
 
@@ -218,6 +221,10 @@ def _of_scheme(
     # the first passage of each switch inside a step
     masks = np.eye(len(q), dtype=bool)[:, :, None, None]
     corners = [first(np.where(passed & is_within & mask, at, np.inf)) for mask in masks]
+    for mask in masks if at_event.any() else ():
+        power, time, switch = first(np.where(at_event & mask, at, np.inf))
+        # as at a grid point, only a jump matters
+        corners.append((np.where(power == 1.0, power, np.nan), time, switch))
     powers, times, switches = (np.stack(column) for column in zip(*corners, strict=True))
     # the roughest of these, and the earliest if several are equally rough
     which = np.lexsort((times, powers), axis=0)[0]
@@ -229,15 +236,19 @@ def _of_scheme(
     return power, time, np.asarray(switch, dtype=np.int64), least, least_time
 
 
-def _depends_on_time(law: Sides) -> list[bool]:
-    """Tell for every switch whether it depends on time alone, and not on the state."""
-    state_names = {state.name for state in law.model.states}
-    in_time = []
+def _changed_at_events(model: Model) -> Collection[str]:
+    return () if model.events is None else model.events.changed(model.velocities)
+
+
+def _independent_of(law: Sides, states: Collection[str]) -> Flags:
+    """Tell for every switch whether it depends on none of these states, shape (switch, 1, 1)."""
+    names = {*states}
+    independent = []
     for row in law.switches:
-        in_time.append(state_names.isdisjoint(row.quantity.names))
-        if not in_time[-1]:
-            state_names.add(row.mode)
-    return in_time
+        independent.append(names.isdisjoint(row.quantity.names))
+        if not independent[-1]:
+            names.add(row.mode)
+    return np.array(independent)[:, None, None]
 
 
 @dataclass(frozen=True)

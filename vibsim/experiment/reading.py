@@ -68,6 +68,8 @@ def from_file(
 
 def from_content(data: Mapping[str, Any], name: str, collection: str) -> ExperimentSpec:
     """Build an experiment from `data`; see `vibsim.experiment.Experiment.from_dict`."""
+    if not isinstance(data, Mapping):
+        raise InputError([Fault(name, 0, "", "", "must be a mapping of keys to values")])
     return build(Source(name, _plain(data, name)), collection, name)
 
 

@@ -27,6 +27,7 @@ def with_settings(source: Source, settings: Sequence[str]) -> Source:
 
     Raises `InputError` with every setting that is invalid, or whose key does not exist.
     """
+    settings = [settings] if isinstance(settings, str) else settings
     faults: list[Fault] = []
     for text in settings:
         try:

@@ -184,6 +184,10 @@ def solved(equation: str, others: Sequence[str]) -> tuple[str, str]:
     sides = equation.split("=")
     if len(sides) != 2:
         raise ExpressionError(equation, 0, "must have one =", "e.g. u'' + u = 0")
+    if "'''" in equation:
+        rule = "a derivative above the second is not allowed"
+        hint = "give `acceleration` of several coordinates: a velocity may be the unknown of first order"
+        raise ExpressionError(equation, equation.index("'''"), rule, hint)
     names = {name for name, mark in _DERIVATIVE.findall(equation) if mark == "''"}
     if len(names) != 1:
         rule = "must have the second derivative of one coordinate"
@@ -199,7 +203,7 @@ def solved(equation: str, others: Sequence[str]) -> tuple[str, str]:
         return _SECOND if match[2] == "''" else velocity
 
     texts = [_DERIVATIVE.sub(named, side) for side in sides]
-    words = set(re.findall(r"[A-Za-z_]\w*", " ".join(texts))) - {*FUNCTIONS, *CONSTANTS}
+    words = {*re.findall(r"[A-Za-z_]\w*", " ".join(texts))} - {*FUNCTIONS, *CONSTANTS} | {*others}
     left, right = (parse(text, words) for text in texts)
     for other in (*left.names, *right.names):
         if other not in (name, velocity, _SECOND, *others):

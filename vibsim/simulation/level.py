@@ -91,7 +91,7 @@ def simulate_record(
 ) -> Record:
     """Run members start..stop-1 (default: all) and return plain arrays; see `simulate`."""
     if level not in experiment.levels:
-        raise ValueError(f"level {level} is none of {list(experiment.levels)}")
+        raise ValueError(f"level {level!r} is none of {list(experiment.levels)}")
     model = experiment.model.definition
     group = members(experiment, start, experiment.members if stop is None else stop)
     steps, every = experiment.steps(level), storage.sampling(experiment, level)

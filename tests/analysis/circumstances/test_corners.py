@@ -198,6 +198,23 @@ def test_a_velocity_that_an_event_turns_has_passed_no_corner() -> None:
     assert turn > bounce + 0.1
 
 
+@pytest.mark.usefixtures("with_series")
+@pytest.mark.parametrize(("then", "jumps"), [({"v": "0.9*v"}, True), ({"u": "u - 0.1"}, False)])
+def test_a_force_that_jumps_where_an_event_is_has_a_corner(
+    then: dict[str, str], *, jumps: bool
+) -> None:
+    """A rocking block: steps end at the impact, but rounding and stages decide on which side the force is taken."""
+    model = {
+        **{"kind": "system", "acceleration": "-sin(0.25*sign(u) - u)"},
+        "events": [{"when": "u", "falling": True, "then": then}],
+    }
+    time, power, what = corner(model, initial={"u": 0.15}, time={"end": 2.5})
+    if jumps:
+        assert (time, power, what) == (pytest.approx(1.5690, abs=0.02), 1.0, "u passes zero")
+    else:
+        assert math.isnan(power)
+
+
 def test_a_turn_with_friction_is_an_event_and_no_corner_within_a_step() -> None:
     """Steps end where friction turns; a ladder that is too coarse is not blamed on it. The driving force may jump."""
     box = {"kind": "sliding_box", "mu": 0.3}

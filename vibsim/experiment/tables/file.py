@@ -32,8 +32,8 @@ MOST_SHOWN = 40
 """Largest number of characters of a name in a message."""
 
 
-_Columns = tuple[Floats, Floats, Callable[[Any], str]]
-"""Abscissae, values, and a function that gives the place of a point in the file, for messages."""
+_Columns = tuple[Floats, Floats, Callable[[Any], str], tuple[str, str]]
+"""Abscissae and values; for messages a function that gives the place of a point in the file, and their names there."""
 
 
 def read(path: Path, keys: tuple[str, str], names: tuple[str, str]) -> tuple[Table, str]:
@@ -42,7 +42,7 @@ def read(path: Path, keys: tuple[str, str], names: tuple[str, str]) -> tuple[Tab
     `names` are those of the columns of abscissae and values; `keys` are the keys of the experiment that give them.
     """
     columns, content = _read(path, keys, names, UNIT)
-    return _table(columns, names), content
+    return _table(columns), content
 
 
 def read_history(path: Path, names: tuple[str, str]) -> tuple[Floats, str]:
@@ -51,12 +51,12 @@ def read_history(path: Path, names: tuple[str, str]) -> tuple[Floats, str]:
     Times increase from 0 or below, with any spacing. Raises `TableError` if the file is not such a table.
     """
     columns, content = _read(path, ("t", "p"), names, "")
-    t, p, _ = columns
+    t, p, _, (name, _) = columns
     if len(t) < 2:
         raise TableError(f"must have at least 2 points, has {len(t)}")
-    _check_rising(columns, names)
+    _check_rising(columns)
     if t[0] > 0.0:
-        raise TableError(_late(names[0], t[0]))
+        raise TableError(_late(name, t[0]))
     return np.stack([t, p]), content
 
 
@@ -75,11 +75,17 @@ def _read(
 
 
 def _from_text(content: bytes, keys: tuple[str, str], names: tuple[str, str]) -> _Columns:
+    shown = names
+
     def choose(known: list[str], may_list: bool) -> list[int]:
+        nonlocal shown
         pairs = zip(keys, names, strict=True)
         if len(set(known)) == len(known) == 2 and names == keys and may_list:
-            # two columns need no names in the file: the first holds the places
-            return [1, 0] if known[0] == names[1] or known[1] == names[0] else [0, 1]
+            # two columns need no names in the file: the first holds the places, and certainly if these are times
+            swapped = known[0] == names[1] or known[1] == names[0]
+            order = [1, 0] if swapped and known[0] != "t" else [0, 1]
+            shown = known[order[0]][:MOST_SHOWN], known[order[1]][:MOST_SHOWN]
+            return order
         return [_found(known, name, key, "column", may_list=may_list) for key, name in pairs]
 
     try:
@@ -93,7 +99,7 @@ def _from_text(content: bytes, keys: tuple[str, str], names: tuple[str, str]) ->
             what = "" if cell or not error.column else "the cell "
             rule = f"line {error.line}: {cell}{what}{error.rule}{column}"
         raise TableError(rule, error.hint) from None
-    return place, value, lambda i: f"line {lines[i]}"
+    return place, value, lambda i: f"line {lines[i]}", shown
 
 
 def _found(names: list[str], name: str, key: str, word: str, *, may_list: bool = True) -> int:
@@ -120,7 +126,7 @@ def _from_netcdf(
     if len(place) != len(value):
         rule = f"'{names[0]}' has {len(place)} points, '{names[1]}' has {len(value)}"
         raise TableError(f"both variables must be of one dimension: {rule}")
-    return place, value, lambda i: f"index {i}"
+    return place, value, lambda i: f"index {i}", names
 
 
 def _variable(dataset: Any, key: str, name: str, unit: str) -> Floats:
@@ -145,9 +151,9 @@ def _late(name: str, first: float) -> str:
     return f"'{name}' must begin at 0 or below, where the motion starts; it begins at {first:.10g}"
 
 
-def _check_rising(columns: _Columns, names: tuple[str, str]) -> None:
+def _check_rising(columns: _Columns) -> None:
     """Refuse non-finite numbers, and abscissae that do not increase."""
-    x, h, place_of = columns
+    x, h, place_of, names = columns
     for name, values in zip(names, (x, h), strict=True):
         wrong = np.flatnonzero(~np.isfinite(values))
         if len(wrong):
@@ -160,25 +166,27 @@ def _check_rising(columns: _Columns, names: tuple[str, str]) -> None:
         raise TableError(f"{place_of(i + 1)}: {rule}")
 
 
-def _table(columns: _Columns, names: tuple[str, str]) -> Table:
-    x, h, place_of = columns
+def _table(columns: _Columns) -> Table:
+    x, h, place_of, (name, _) = columns
     if len(x) < FEWEST_POINTS:
         raise TableError(f"must have at least {FEWEST_POINTS} points, has {len(x)}")
-    _check_rising(columns, names)
+    _check_rising(columns)
     spacing = float(x[-1] - x[0]) / (len(x) - 1)
     if not 0.0 < spacing < np.inf:
-        raise TableError(f"'{names[0]}' must span a finite length")
+        raise TableError(f"'{name}' must span a finite length")
     gaps, even = np.diff(x), x[0] + np.arange(len(x)) * spacing
     usual = float(np.median(gaps))
     if np.any(np.abs(x - even) > EVEN * usual):
         # the first gap that differs from the median gap
         odd = np.flatnonzero(np.abs(gaps - usual) > EVEN * usual)
         i = min(int(odd[0] if len(odd) else np.argmax(np.abs(x - even))), len(gaps) - 1)
-        rule = f"'{names[0]}' must be equally spaced, but is {gaps[i]:.10g} further than the point before"
+        rule = (
+            f"'{name}' must be equally spaced, but is {gaps[i]:.10g} further than the point before"
+        )
         hint = f"the others are {usual:.10g} apart"
         raise TableError(f"{place_of(i + 1)}: {rule}", hint)
     if x[0] > EVEN * spacing:
-        raise TableError(_late(names[0], x[0]))
+        raise TableError(_late(name, x[0]))
     table = Table(float(x[0]), spacing, h)
     with np.errstate(all="ignore"):
         if not np.isfinite(table.rows).all():

@@ -53,7 +53,7 @@ def wanted(
     `promised` is the scheme's order, `unit` that of the number of a value check.
     """
     if check is not None and check.kind == "conserves":
-        return DRIFTS[check.drift]
+        return DRIFTS[check.drift].removeprefix("is ").removeprefix("has ")
     if check is not None and check.kind == "value":
         return rule(check, words.PAGE, unit)
     if check is None or check.kind != "converges":
