@@ -15,6 +15,7 @@ from vibsim.core.vocabulary import (
     CENTRED,
     PHASE,
     TYPICAL_NORM,
+    VECTORS,
     is_error_part,
     plain_name,
     whole_of,
@@ -28,6 +29,7 @@ NAMES = {
     "kinetic_energy": ("T", "the kinetic energy T"),
     "potential_energy": ("V", "the potential energy V"),
     "energy_deviation": ("ΔE", "the energy deviation ΔE = E(t) − E(0)"),
+    **{name: (text := name.replace("_", " "), f"the {text}") for name in VECTORS},
 }
 """Quantity to its letter and its words; other quantities go by their name."""
 
@@ -80,8 +82,8 @@ def symbol(quantity: str) -> str:
 
 
 def title(quantity: str) -> str:
-    """Return a quantity as titles and sentences show it: its letter, or the words for a part of an error."""
-    return _named(quantity)[is_error_part(quantity)]
+    """Return a quantity as titles and sentences show it: its letter, or words for a part of an error or a vector."""
+    return _named(quantity)[is_error_part(quantity) or quantity in VECTORS]
 
 
 def name(quantity: str) -> str:
@@ -177,7 +179,7 @@ DIGITS = {"brief": 2, "close": 7, "full": 10, "step": 6, "value": 12}  # signifi
 LEAST_PERCENT = 1e-5  # smallest fraction written in per cent
 MORE_DIGITS = 2  # digits of a measured number beyond those of the printed one
 MOST_DIGITS = 11  # longer mantissas are shortened
-PROSE = {"phase", "amplitude", "value"} | {name.partition("_")[0] for name in VALUES}
+PROSE = {"the", "phase", "amplitude", "value"} | {name.partition("_")[0] for name in VALUES}
 PROSE |= {text.partition(" ")[0] for text in (*VALUE_NAMES.values(), *IN_WORDS.values())}
 """First words of the names of numbers, one by one and of all members, and of parts of an error."""
 

@@ -228,7 +228,7 @@ def _error(experiment: Experiment, record: Record, lead: Lead) -> Iterator[Numbe
     mean = error / math.sqrt(data.ends_of(record)[member.case])
     unit = data.norm_unit(record, quantity, "linf")
     what = findings.short(experiment, quantity)
-    size = f"; {words.share(relative)} of that of {words.symbol(quantity)}" if relative else ""
+    size = f"; {words.share(relative)} of that of {words.title(quantity)}" if relative else ""
     note = f"root mean square, {word}{size}"
     if error == 0.0:
         equal = (
