@@ -66,6 +66,18 @@ LADDERS = {
         ("INCONCLUSIVE", "round_off"),
         ("round-off",),
     ),
+    "round-off of a motion within one well, whose largest change is below its size": Ladder(
+        {
+            "model": {"kind": "duffing", "alpha": -1, "beta": 1},
+            "initial": {"u": 0.3},
+            "time": {"end": 40.0, "base_steps": 80},
+        },
+        "rk4",
+        (6, 7, 8),
+        {"converges": "u", "order": "scheme"},
+        ("INCONCLUSIVE", "round_off"),
+        ("round-off",),
+    ),
     "Euler-Cromer": Ladder(
         {**PENDULUM, "time": {"end": 20.0}},
         "euler_cromer",
