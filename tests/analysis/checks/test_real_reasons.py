@@ -78,6 +78,21 @@ LADDERS = {
         ("INCONCLUSIVE", "round_off"),
         ("round-off",),
     ),
+    "damping beyond what a level within the limit bears": Ladder(
+        {
+            "model": {
+                **{"kind": "oscillator", "spring": "1e4*u", "damping": {"linear": 300}},
+                "force": "cos(t)",
+            },
+            "initial": {"u": 1.0},
+            "time": {"end": 10.0, "base_steps": 100},
+        },
+        "rk4",
+        (1, 2, 3),
+        {"converges": "u", "order": "scheme"},
+        ("FAIL", "unstable"),
+        ("Level 2 is the first within it.", "Start `levels:` at 4 or finer"),
+    ),
     "Euler-Cromer": Ladder(
         {**PENDULUM, "time": {"end": 20.0}},
         "euler_cromer",
