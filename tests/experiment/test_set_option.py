@@ -63,6 +63,7 @@ PLACES = {
     ),
     "scheme by its kind": ("schemes.rk4.label=a", "{kind: rk4}", "{kind: rk4, label: a}"),
     "entry of a mapping in a list": ("checks[0].order=1", "order: 2", "order: 1"),
+    "check by its default name": ("checks.check_1.order=1", "order: 2", "order: 1"),
     "key with a dot": ("sweep.model.L=[3, 4]", "{linspace: [1, 2, 3]}", "[3, 4]"),
     "within a key with a dot": ("sweep.model.L.linspace[2]=5", "2, 3]", "2, 5]"),
     "new key with a dot": ("sweep.model.g=[3, 4]", "sweep:", "sweep:\n  model.g: [3, 4]"),

@@ -142,12 +142,13 @@ class _Phrases(OrderContext):
         return "" if self.has_exact else UNSEEN
 
     def first_good(self) -> int:
-        """Return the coarsest stable level, or the first one from which on no level failed."""
-        if self.reason == "unstable":
-            return self.first_stable
+        """Return the coarsest level within the limit of stability from which on no level failed."""
         times = zip(self.levels, self.failures, strict=False)
         failed = [level for level, t in times if not math.isnan(t)]
-        return max([self.culprit, self.levels[0], *failed]) + 1
+        # levels within the limit fail, too, if damping is beyond what the scheme bears
+        is_unstable = self.reason == "unstable"
+        least = self.first_stable - 1 if is_unstable else max(self.culprit, self.levels[0])
+        return max([least, *failed]) + 1
 
     def cost_of_first(self) -> str:
         return self.cost([self.first_good()])

@@ -131,7 +131,7 @@ def truly_exact(e: LadderFacts) -> Flags:
 def at_rest(e: LadderFacts) -> Flags:
     """Say where all differences are round-off, and the solution moves too little for an error to be visible."""
     moved = _motion(e)
-    hidden = _would_show(e, np.ones(moved.shape)) & ~_would_show(e, moved)
+    hidden = (moved < th.STILL) & _would_show(e, np.ones(moved.shape)) & ~_would_show(e, moved)
     return np.asarray(at_round_off(e) & (hidden | (moved == 0.0)))
 
 

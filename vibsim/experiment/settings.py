@@ -100,7 +100,7 @@ def _entry(node: Node | None, path: Path_, tail: str) -> tuple[int, str] | None:
         return place, tail[index.end() :]
     entries = node.value if node is not None and isinstance(node.value, list) else ()
     for place, entry in enumerate(entries):
-        name = _name_of(entry)
+        name = _name_of(entry) or (f"check_{place + 1}" if path == ("checks",) else "")
         if name and (tail == name or tail.startswith(f"{name}.")):
             return place, tail[len(name) + 1 :]
     return None

@@ -66,6 +66,33 @@ LADDERS = {
         ("INCONCLUSIVE", "round_off"),
         ("round-off",),
     ),
+    "round-off of a motion within one well, whose largest change is below its size": Ladder(
+        {
+            "model": {"kind": "duffing", "alpha": -1, "beta": 1},
+            "initial": {"u": 0.3},
+            "time": {"end": 40.0, "base_steps": 80},
+        },
+        "rk4",
+        (6, 7, 8),
+        {"converges": "u", "order": "scheme"},
+        ("INCONCLUSIVE", "round_off"),
+        ("round-off",),
+    ),
+    "damping beyond what a level within the limit bears": Ladder(
+        {
+            "model": {
+                **{"kind": "oscillator", "spring": "1e4*u", "damping": {"linear": 300}},
+                "force": "cos(t)",
+            },
+            "initial": {"u": 1.0},
+            "time": {"end": 10.0, "base_steps": 100},
+        },
+        "rk4",
+        (1, 2, 3),
+        {"converges": "u", "order": "scheme"},
+        ("FAIL", "unstable"),
+        ("Level 2 is the first within it.", "Start `levels:` at 4 or finer"),
+    ),
     "Euler-Cromer": Ladder(
         {**PENDULUM, "time": {"end": 20.0}},
         "euler_cromer",
