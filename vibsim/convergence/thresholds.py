@@ -36,9 +36,8 @@ EXACT_ACCURACY = 1e-12  # assumed accuracy of an exact solution, relative to its
 # An ordinary error, (w dt)^p at the coarsest level, is visible if it exceeds `ABOVE_ROUND_OFF` floors by this factor.
 # [calibrated]
 VISIBLE_ERROR = 1e4
-STILL = (
-    0.1  # a solution that changes by more than this part of its size is not at rest [convention]
-)
+# A solution that changes by more than this part of its size is not at rest. [convention]
+STILL = 0.1
 # All finer levels together change a number by at most this multiple of its last change (2.4 for an order of 1/2).
 # [derived]
 STILL_TO_CHANGE = 3.0
