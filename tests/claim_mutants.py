@@ -10,6 +10,8 @@ import math
 from collections.abc import Iterator
 from typing import Any
 
+import pytest
+
 from vibsim import Verdict
 from vibsim.analysis import analyse_records, verdicts
 from vibsim.core.record import Record
@@ -22,6 +24,8 @@ FACTOR = 10.0
 """By so much a bound is made stricter."""
 ROUND_OFF = 1e-9
 """Bounds below it are those of rounding errors, which nobody predicts to a factor of 10."""
+PLAIN_MOST = 10_000
+"""Member-steps of a ladder up to which its kernels are not compiled."""
 BEYOND = 1e-6
 """By so much of itself a bound is moved to the other side of what was measured."""
 
@@ -79,12 +83,21 @@ def _orders(claim: Any, verdict: Verdict, order: float) -> Iterator[tuple[str, f
         yield "order", float(found.pop())
 
 
-def survivors(experiment: Experiment) -> list[str]:
+def simulated(experiment: Experiment) -> dict[int, Record]:
+    """Return all levels, which share the kernels here: they are compiled unless the whole ladder is short."""
+    work = experiment.members * sum(map(experiment.steps, experiment.levels))
+    with pytest.MonkeyPatch.context() as patch:
+        if work > PLAIN_MOST:
+            patch.setattr("vibsim.engine.trajectories.PLAIN_MEMBER_STEPS", 0)
+            patch.setattr("vibsim.simulation.adaptive.PLAIN_MEMBER_STEPS", 0)
+        return {level: simulate_record(experiment, level) for level in experiment.levels}
+
+
+def survivors(experiment: Experiment, levels: dict[int, Record]) -> list[str]:
     """Return the claims of an experiment that say the same with another number, and which number it is."""
     claims = tuple(c for c in experiment.checks if c.kind == "claim" and numbers_of(c))
     if not claims:
         return []
-    levels = {level: simulate_record(experiment, level) for level in experiment.levels}
     before = {v.id: v for v in judged(experiment, claims, levels)}
     added, of = [], {}
     for check in claims:
