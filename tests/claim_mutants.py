@@ -16,6 +16,7 @@ from vibsim import Verdict
 from vibsim.analysis import analyse_records, verdicts
 from vibsim.core.record import Record
 from vibsim.experiment import Experiment
+from vibsim.experiment.cost import PLAIN_MEMBER_STEPS
 from vibsim.simulation import simulate_record
 
 PART = 0.25
@@ -24,8 +25,6 @@ FACTOR = 10.0
 """By so much a bound is made stricter."""
 ROUND_OFF = 1e-9
 """Bounds below it are those of rounding errors, which nobody predicts to a factor of 10."""
-PLAIN_MOST = 10_000
-"""Member-steps of a ladder up to which its kernels are not compiled."""
 BEYOND = 1e-6
 """By so much of itself a bound is moved to the other side of what was measured."""
 
@@ -84,10 +83,10 @@ def _orders(claim: Any, verdict: Verdict, order: float) -> Iterator[tuple[str, f
 
 
 def simulated(experiment: Experiment) -> dict[int, Record]:
-    """Return all levels, which share the kernels here: they are compiled unless the whole ladder is short."""
+    """Return all levels, which share their kernels here: what a level alone must pay back, all of them may."""
     work = experiment.members * sum(map(experiment.steps, experiment.levels))
     with pytest.MonkeyPatch.context() as patch:
-        if work > PLAIN_MOST:
+        if work > PLAIN_MEMBER_STEPS:
             patch.setattr("vibsim.engine.trajectories.PLAIN_MEMBER_STEPS", 0)
             patch.setattr("vibsim.simulation.adaptive.PLAIN_MEMBER_STEPS", 0)
         return {level: simulate_record(experiment, level) for level in experiment.levels}
